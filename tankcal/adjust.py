@@ -29,9 +29,8 @@ ALPHA, POWER = 0.001, 0.80  # of the test of a single reading, and of its detect
 CRITICAL = 3.29  # critical value of the statistic: two-sided normal, ALPHA, as rounded in practice
 UNCONTROLLED = 1e-6  # redundancy number below which an observation counts as uncontrolled
 WELL_PLACED = 1e-3  # squared pivot, scaled columns: normal equations lose three of sixteen digits
-TIED = (
-    9  # decimals of compared statistics: two readings with only mutual control tie but for rounding
-)
+TIED = 9  # decimals of compared statistics: equal ones differ by rounding only
+SD_OVER_MEDIAN = 1.4826  # standard deviation of normal errors over their median absolute value
 SMALLEST_PIVOT = 1e-12  # squared pivot of normal equations with unit diagonal; rounding below it
 
 

@@ -240,7 +240,7 @@ DEAR = (  # a valid input takes a second of processor time or more; the command 
     "run liquid", "run liquid-lying", "run ship", "run tangents", "run total-station",
     "run wall-hits", "run silva-1995-photos", "run cloud", "run rings", "run strict", "report",
     "plan reference-line", "plan wall-hits", "plan tangents", "plan liquid", "plan silva",
-    "read-table lying", "camera influence",
+    "read-table lying", "camera influence", "answer",
 )  # fmt: skip
 
 

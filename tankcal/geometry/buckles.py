@@ -1,8 +1,8 @@
-"""Buckles told from clutter: rejected points that agree with their neighbours along the wall.
+"""Distinction of buckles from clutter: rejected points that agree with their neighbours.
 
-A buckle is wall, however deep: where it is, nothing of the sound wall is seen. What stands before a
-wall (steps of a stair, a pipe, the rim of a nozzle) is narrow, or leaves the wall to be seen
-between its parts.
+A buckle is a part of the wall, however deep: within its outline, no point of the regular wall is
+visible. An object in front of the wall (the treads of a stair, a pipe, the rim of a nozzle) is
+narrow, or points of the wall are visible between its parts.
 """
 
 import numpy as np
@@ -10,50 +10,57 @@ import scipy
 
 from tankcal.geometry.patches import find_patches
 
-LINK_M = 2.5  # along the wall, between points of one patch
-NARROWEST_M, SHORTEST_M = 0.4, 0.8  # of a patch, across and along it: smaller ones are no buckle
-FEWEST = 3
+LINK_M = 2.5  # largest distance between neighbouring points of a patch, along the wall
+NARROWEST_M, SHORTEST_M = 0.4, 0.8  # smallest width and length of a buckle
+FEWEST = 3  # smallest number of points in a patch: three points span an area
 
 
 def find_buckles(place_m, departure_m, rejected):
-    """Mark rejected points that are a buckle of the wall.
+    """Mark rejected points that belong to a buckle of the wall.
 
-    Rejected points of one sign that hang together are a buckle when they cover 0.8 m by 0.4 m of
-    the wall at least, in any direction, and no other point lies within their convex hull.
+    A patch is a group of connected rejected points whose departures have the same sign. A patch is
+    a buckle if it is at least 0.8 m long and 0.4 m wide, in any direction, and no other point lies
+    within its convex hull.
 
     Parameters
     ----------
     place_m : ndarray, shape (n, 2)
-        Along the arc and upwards, m.
+        Positions along the arc and upwards, m.
     departure_m : ndarray, shape (n,)
-        From the smooth form of the shell, fitted without the rejected points, m.
+        Departures from the smooth form of the shell, fitted without the rejected points, m.
     rejected : ndarray of bool, shape (n,)
+        Points that the test rejected.
 
     Returns
     -------
     ndarray of bool, shape (n,)
+        True for points of a buckle.
 
     Examples
     --------
     Nine points 30 mm behind a wall that is seen all around them:
 
-    >>> x, z = (one.ravel() for one in np.meshgrid(np.arange(8.0), np.arange(8.0)))
+    >>> x, z = (axis.ravel() for axis in np.meshgrid(np.arange(8.0), np.arange(8.0)))
     >>> departure = -0.03 * (abs(x - 4) < 1.5) * (abs(z - 4) < 1.5)
-    >>> found = find_buckles(np.column_stack([x, z]), departure, departure < 0)
-    >>> int(found.sum())
+    >>> buckle = find_buckles(np.column_stack([x, z]), departure, departure < 0)
+    >>> int(buckle.sum())
     9
     """
-    found = np.zeros(len(rejected), dtype=bool)
+    in_buckle = np.zeros(len(rejected), dtype=bool)
+    # An inward and an outward buckle may touch: the signs are treated separately.
     for sign in (-1, 1):
-        chosen = np.flatnonzero(rejected & (sign * departure_m > 0))
-        for patch in find_patches(place_m, chosen, LINK_M, FEWEST):
-            found[patch] = _is_buckle(place_m[patch], np.delete(place_m, patch, axis=0))
-    return found
+        candidates = np.flatnonzero(rejected & (sign * departure_m > 0))
+        for patch in find_patches(place_m, candidates, LINK_M, FEWEST):
+            in_buckle[patch] = _is_buckle(place_m[patch], np.delete(place_m, patch, axis=0))
+    return in_buckle
 
 
 def _is_buckle(patch_m, others_m):
+    """Whether a patch (k, 2) has the size of a buckle and encloses none of the other points."""
+    # Principal axes of the patch: a buckle may run in any direction of the wall.
     axes = np.linalg.svd(patch_m - patch_m.mean(axis=0), full_matrices=False)[2]
-    long, wide = np.ptp(patch_m @ axes.T, axis=0)
-    if wide < NARROWEST_M or long < SHORTEST_M:
+    length, width = np.ptp(patch_m @ axes.T, axis=0)
+    if width < NARROWEST_M or length < SHORTEST_M:
         return False
+    # `find_simplex` returns -1 for points outside the convex hull of the patch.
     return not np.any(scipy.spatial.Delaunay(patch_m).find_simplex(others_m) >= 0)

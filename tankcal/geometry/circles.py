@@ -1,4 +1,4 @@
-"""The circle through the points of a section, by the sum of squared distances (CIRCUM)."""
+"""Least-squares circle through the points of a section (program CIRCUM)."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,8 @@ from tankcal.adjust import Adjustment, adjust
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
-# of the fit to distances: minimisations, each with new weights; a centre that no longer moves
+# Fit to distances: largest number of minimisations, each with new weights; change of the centre
+# below which the iteration has converged; relative tolerance of a minimisation (rounding).
 MOST_ROUNDS, SETTLED_M, TOLERANCE = 10, 1e-8, 1e-14
 
 
@@ -23,13 +24,13 @@ class Circle:
     x_m, y_m, radius_m : float
         Centre and radius, m.
     cofactor_m2 : ndarray, shape (3, 3)
-        Covariance of x, y, radius for variance factor 1, m2.
+        Covariance of x, y and radius for variance factor 1, m2.
     residuals_m : ndarray, shape (n,)
-        Distance of each point to the circle, outwards positive, m.
+        Distance of each point from the circle, outwards positive, m.
     variance_factor : float
         v' Q^-1 v / (n - 3).
     dof : int
-        n - 3.
+        Degrees of freedom, n - 3.
     """
 
     x_m: float
@@ -42,24 +43,25 @@ class Circle:
 
 
 def fit_circle(xy_m, covariance_m2):
-    """Geometric circle: the sum of squared, weighted point corrections is the minimum.
+    """Fit a circle that minimises the weighted sum of squared point corrections.
 
-    Condition for each point, linearised at the adjusted points: hypot(x - xc, y - yc) - R = 0.
-    For n even points of standard deviation s: s_centre = s sqrt(2/n), s_radius = s / sqrt(n).
-    Source: Silva 1995, program CIRCUM.
+    The condition for each point, linearised at the adjusted points, is hypot(x - xc, y - yc) - R =
+    0. For n evenly spaced points of standard deviation s: s_centre = s sqrt(2/n), s_radius = s /
+    sqrt(n). Source: Silva 1995, program CIRCUM.
 
-    Where a form far above the noise meets a covariance that shifts or turns whole groups of points,
-    the adjusted points may move by decimetres, and the iteration alternates between two circles.
-    The circle is then that of the distances of the measured points from the centre, weighted by
-    their covariance; to first order of the residuals both are the same.
+    The adjusted points may move by decimetres if the departures from a circle are far above the
+    noise and the covariance shifts or rotates whole groups of points. The iteration then alternates
+    between two circles. In that case the circle is fitted to the distances of the measured points
+    from the centre, weighted by their covariance. To first order in the residuals, both circles are
+    equal.
 
     Parameters
     ----------
     xy_m : array_like, shape (n, 2)
         Points, m.
     covariance_m2 : ndarray or sparse array, shape (2n, 2n) or (n, 2, 2)
-        Their covariance, m2, in the order x1 y1 x2 y2 ...; or that of each, when the points are
-        independent of each other.
+        Covariance of the coordinates in the order x1 y1 x2 y2 ..., m2; or one covariance matrix for
+        each point if the points are independent.
 
     Returns
     -------
@@ -68,7 +70,7 @@ def fit_circle(xy_m, covariance_m2):
     Raises
     ------
     SolutionError
-        For fewer than 3 points or points on a line.
+        For fewer than 3 points, or points on a line.
 
     Examples
     --------
@@ -84,6 +86,7 @@ def fit_circle(xy_m, covariance_m2):
                 "circle_short_of_points", "a circle needs 3 points, {count} were given", count=n
             )
         )
+    # Coordinates about the mean avoid cancellation with large map coordinates.
     centre = xy_m.mean(axis=0)
     local = xy_m - centre
     model = _conditions_of_points if np.ndim(covariance_m2) == 3 else circle_conditions
@@ -91,6 +94,7 @@ def fit_circle(xy_m, covariance_m2):
     try:
         adjusted = adjust(model, start, local.ravel(), covariance_m2)
     except SolutionError:
+        # `adjust` does not converge: fall back on distances (see above).
         adjusted = _fit_distances(local, covariance_m2, start)
     x, y, radius = adjusted.unknowns
     return Circle(
@@ -105,22 +109,32 @@ def fit_circle(xy_m, covariance_m2):
 
 
 def _fit_distances(local, covariance_m2, start):
-    """`Adjustment` of x, y and radius to the distances of the measured points from the centre.
+    """Return an `Adjustment` of x, y and radius to the distances of the points from the centre.
 
-    The covariance of the distances is that at the last centre, taken anew after each minimisation.
+    The covariance of the distances depends on the centre and is computed anew after each
+    minimisation.
     """
     unknowns = start
     for _ in range(MOST_ROUNDS):
-        before, spread = unknowns, radial_covariance(local, unknowns[:2], covariance_m2)
-        variances = np.diag(spread) if np.ndim(spread) == 1 else spread
-        # a damped step lowers the sum of squares even where the full step of `adjust` does not
+        previous, distance_covariance = (
+            unknowns,
+            radial_covariance(local, unknowns[:2], covariance_m2),
+        )
+        variances = (
+            np.diag(distance_covariance)
+            if np.ndim(distance_covariance) == 1
+            else distance_covariance
+        )
+        # A damped step reduces the sum of squares even where the full step of `adjust` does not.
         lower = scipy.linalg.cholesky(variances, lower=True)
-        unknowns = _damped_circle(local, lower, before)
-        if np.allclose(unknowns, before, rtol=0, atol=SETTLED_M):
+        unknowns = _damped_circle(local, lower, previous)
+        if np.allclose(unknowns, previous, rtol=0, atol=SETTLED_M):
             break
+    # Linearise once more at the solution: L^-1 v and L^-1 A give chi2 and the cofactor (A' Q^-1
+    # A)^-1.
     misclosure, by_circle, _ = _conditions_of_points(unknowns, local.ravel())
     whitened, design = (
-        scipy.linalg.solve_triangular(lower, one, lower=True) for one in (misclosure, by_circle)
+        scipy.linalg.solve_triangular(lower, array, lower=True) for array in (misclosure, by_circle)
     )
     return Adjustment(
         unknowns=unknowns,
@@ -135,37 +149,39 @@ def _fit_distances(local, covariance_m2, start):
 
 def _damped_circle(local, lower, start):
     """Minimise the whitened misclosures of `_conditions_of_points` (Levenberg-Marquardt)."""
-    import scipy.optimize  # loaded where the ordinary iteration fails alone
+    import scipy.optimize  # slow to import and needed only where the ordinary iteration fails
 
-    def whitened(unknowns, which):
-        given = _conditions_of_points(unknowns, local.ravel())[which]
-        return scipy.linalg.solve_triangular(lower, given, lower=True)
+    def whitened(unknowns, index):
+        array = _conditions_of_points(unknowns, local.ravel())[index]
+        return scipy.linalg.solve_triangular(lower, array, lower=True)
 
-    found = scipy.optimize.least_squares(
+    solution = scipy.optimize.least_squares(
         whitened,
         start,
-        lambda unknowns, which: whitened(unknowns, which + 1),
+        lambda unknowns, index: whitened(unknowns, index + 1),
         method="lm",
         xtol=TOLERANCE,
         ftol=TOLERANCE,
         gtol=TOLERANCE,
         args=(0,),
     )
-    return found.x
+    return solution.x
 
 
 def circle_by_points(circle, xy_m, covariance_m2):
-    """Derivative of x, y and radius of a circle of `fit_circle` by its points.
+    """Return the derivative of x, y and radius of a fitted circle with respect to its points.
 
     Parameters
     ----------
     circle : Circle
+        Result of `fit_circle`.
     xy_m, covariance_m2
-        That it was fitted with.
+        Points and covariance of that fit.
 
     Returns
     -------
     ndarray, shape (3, 2n)
+        Columns in the order x1 y1 x2 y2 ...
 
     Examples
     --------
@@ -176,19 +192,22 @@ def circle_by_points(circle, xy_m, covariance_m2):
     >>> by[2].round(9).reshape(4, 2).tolist()
     [[0.25, 0.0], [0.0, 0.25], [-0.25, 0.0], [0.0, -0.25]]
     """
-    given = np.array([circle.x_m, circle.y_m, circle.radius_m])
-    _, by_circle, unit = _conditions_of_points(given, np.asarray(xy_m, dtype=float).ravel())
-    spread = radial_covariance(xy_m, given[:2], covariance_m2)
+    unknowns = np.array([circle.x_m, circle.y_m, circle.radius_m])
+    _, by_circle, unit = _conditions_of_points(unknowns, np.asarray(xy_m, dtype=float).ravel())
+    spread = radial_covariance(xy_m, unknowns[:2], covariance_m2)
     if np.ndim(spread) == 1:
         weighted = by_circle.T / spread
     else:
         weighted = np.linalg.solve(spread, by_circle).T
+    # Normal equations with the weights of the distances: dx = -(A' Q^-1 A)^-1 A' Q^-1 d(distance).
     by_radii = -np.linalg.solve(weighted @ by_circle, weighted)
+    # Chain rule: a distance changes by the component of the shift of its point along the unit
+    # vector.
     return (by_radii[:, :, None] * unit).reshape(3, -1)
 
 
 def circle_conditions(unknowns, coordinates):
-    """Misclosures and Jacobians of hypot(x - xc, y - yc) - R = 0, a model for `adjust`.
+    """Return misclosures and Jacobians of hypot(x - xc, y - yc) - R = 0, a model for `adjust`.
 
     Parameters
     ----------
@@ -200,6 +219,7 @@ def circle_conditions(unknowns, coordinates):
     Returns
     -------
     misclosures : ndarray, shape (n,)
+        Distance of each point from the circle, m.
     by_unknowns : ndarray, shape (n, 3)
     by_coordinates : sparse array, shape (n, 2n)
     """
@@ -208,7 +228,7 @@ def circle_conditions(unknowns, coordinates):
 
 
 def _conditions_of_points(unknowns, coordinates):
-    """`circle_conditions`, the last Jacobian as (n, 2): that of each point by its own."""
+    """Return `circle_conditions` with a last Jacobian (n, 2): each point by its coordinates."""
     x, y, radius = unknowns
     d = coordinates.reshape(-1, 2) - (x, y)
     distance = np.hypot(d[:, 0], d[:, 1])
@@ -217,19 +237,22 @@ def _conditions_of_points(unknowns, coordinates):
 
 
 def own_columns(rows):
-    """Sparse (n, n d) whose row i has the d entries of rows (n, d) in the columns of point i."""
+    """Return a sparse array (n, n d) with row i of `rows` (n, d) in the d columns of point i."""
     n, d = rows.shape
+    # CSR format: row i has d entries, in consecutive columns.
     entries = rows.ravel(), np.arange(n * d), np.arange(0, n * d + 1, d)
     return scipy.sparse.csr_array(entries, shape=(n, n * d))
 
 
 def taubin_circle(local):
-    """Centre and radius of Taubin's algebraic circle (1991), the start of the geometric fit.
+    """Return the centre and radius of Taubin's algebraic circle (1991).
+
+    The circle is the start value of the geometric fit.
 
     Parameters
     ----------
     local : ndarray, shape (n, 2)
-        Points about a place near the centre, m.
+        Points relative to an origin near the centre, m.
 
     Returns
     -------
@@ -239,23 +262,28 @@ def taubin_circle(local):
     Raises
     ------
     SolutionError
-        For points on a line.
+        For points on a line, or all in one place.
 
     Examples
     --------
     >>> taubin_circle(np.array([[1, 0], [0, 1], [-1, 0]])).round(9) + 0.0
     array([0., 0., 1.])
     """
+    # Algebraic circle a z + b x + c y + d = 0 with z = x^2 + y^2.
     z = np.sum(local**2, axis=1)
     mean = z.mean()
     if not mean > 0:
         raise SolutionError(
             message("section_in_one_place", "all points of the section lie in one place")
         )
+    # Scaling of z by 2 sqrt(mean z) turns Taubin's constraint into a unit vector: the solution is
+    # the last singular vector.
     design = np.column_stack([(z - mean) / (2 * np.sqrt(mean)), local])
     values, vectors = np.linalg.svd(design, full_matrices=False)[1:]
+    # A vanishing second singular value, or no quadratic term: the points lie on a line.
     if values[1] < 1e-9 * values[0] or abs(vectors[-1, 0]) < 1e-12:
         raise SolutionError(message("section_on_a_line", "the points of the section lie on a line"))
+    # Undo the scaling, then complete the square: centre -b / (2 a), R^2 = centre^2 + mean z.
     a = vectors[-1]
     scaled = a[0] / (2 * np.sqrt(mean))
     x, y = -a[1:] / (2 * scaled)
@@ -263,7 +291,7 @@ def taubin_circle(local):
 
 
 def radial_covariance(xy_m, centre_m, covariance_m2):
-    """Covariance of the distances of points from a centre, by that of their coordinates.
+    """Return the covariance of the distances of points from a centre.
 
     Parameters
     ----------
@@ -272,13 +300,14 @@ def radial_covariance(xy_m, centre_m, covariance_m2):
     centre_m : array_like, shape (2,)
         Centre, m.
     covariance_m2 : ndarray or sparse array, shape (2n, 2n) or (n, 2, 2)
-        Covariance of the coordinates, m2, in the order x1 y1 x2 y2 ..., or that of each point.
+        Covariance of the coordinates in the order x1 y1 x2 y2 ..., m2, or one covariance matrix for
+        each point.
 
     Returns
     -------
     ndarray, shape (n, n) or (n,)
-        m2; variances (n,) when the points are independent of each other (a sparse covariance, or
-        one of each).
+        Covariance, m2; variances (n,) if the points are independent (a sparse covariance, or one
+        matrix for each point).
 
     Examples
     --------
@@ -287,6 +316,7 @@ def radial_covariance(xy_m, centre_m, covariance_m2):
            [0., 4.]])
     """
     d = np.asarray(xy_m) - centre_m
+    # The derivative of a distance by its point is the unit vector from the centre.
     unit = d / np.hypot(d[:, 0], d[:, 1])[:, None]
     if np.ndim(covariance_m2) == 3:
         return np.einsum("ki,kij,kj->k", unit, covariance_m2, unit)

@@ -1,31 +1,44 @@
-"""Data snooping about the smooth form of a shell: what is clutter, and what is a dent.
+"""Data snooping about the smooth form of a shell: separation of wall, clutter and dents.
 
-The radii of the wall are fitted by one radius a course, a taper within it, one radius more for each
-of three rings or more, an axis, and a form of azimuth and height that has the spectrum of real
-shells as its prior. Points that deny that form are rejected, the worst first, and those that agree
-with it after all come back. Of many points some, even over the wall, tell the form.
+The fit to the radii of the wall contains a radius and a taper for each course. A course of three or
+more rings has an additional radius for each ring. The fit also contains an axis and a form of
+azimuth and height, with the spectrum of real shells as its prior. Points that contradict that form
+are rejected, the worst first; rejected points that agree with the final form are accepted again.
+For a large number of points, a sample evenly spread over the wall determines the form.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.adjust import CRITICAL, Adjustment, adjust, snoop
+from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN, Adjustment, adjust, snoop
 from tankcal.geometry.form import harmonics, mode_variances
 
-FITTED = 800  # points that the form is fitted to, about; twice as many at most
-MODES = 24  # highest mode of the form that the snooping allows for
-TAPER_M, RING_M = 0.010, 0.005  # prior sd of a radius: at the ends of a course; of a ring beside it
-FEWEST_OF_RING, WIDEST_GAP = 8, np.pi / 2  # points, and rad between two: they go round
-RING_SPAN, MIDDLE = 0.2, 0.15  # of half a course: between two rings; what is neither end
-MOST_ITERATIONS = 300  # each gains a tenth where coinciding limbs hardly determine a deep form
-REJECTED = 1e3  # factor on the sd of a rejected point: it is predicted, not fitted
-LEAST_NOISE_M = 1e-4  # a sound point is never rejected for less than a third of a millimetre
+FITTED = 800  # approximate number of points in the fit of the form; at most twice as many
+MODES = 24  # highest mode of the form in the snooping
+# Prior standard deviations: taper at the ends of a course; radius of a ring about its course.
+TAPER_M, RING_M = 0.010, 0.005
+# A ring covers the circumference: least number of points, and widest gap between two, rad.
+FEWEST_OF_RING, WIDEST_GAP = 8, np.pi / 2
+# In halves of a course: distance between two rings; half height of the middle zone of a course.
+RING_SPAN, MIDDLE = 0.2, 0.15
+# Coinciding points at an edge hardly determine a deep form: an iteration then gains only a tenth.
+MOST_ITERATIONS = 300
+REJECTED = 1e3  # factor on the sd of a rejected point: the point is predicted, not fitted
+LEAST_NOISE_M = 1e-4  # lower bound of the noise: no rejection below a third of a millimetre
 
 
 @dataclass(frozen=True)
 class Wall:
-    """What the snooping left: mask, axis (x, y, dx/dz, dy/dz), residuals, tests, point noise."""
+    """Result of the snooping, n points.
+
+    wall            (n,) mask of the accepted points
+    axis            (4,) x, y, m, at z = 0, and slopes dx/dz, dy/dz of the axis
+    slope_cofactor  (2, 2) covariance of the slope
+    w               (n,) normalised residuals
+    residual        (n,) residuals of the radii, m
+    noise           standard deviation of a point, m, with noise_dof degrees of freedom
+    """
 
     wall: np.ndarray
     axis: np.ndarray
@@ -37,51 +50,78 @@ class Wall:
 
 
 def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m, kept=None):
-    """The `Wall`: points about the smooth form of a shell, without those that deny it.
+    """Return the `Wall`: points about the smooth form of a shell, without contradicting points.
 
-    A pass rejects the points within a tenth of the worst and fits anew. When none is left to
-    reject, rejected points that agree with the fit after all come back, each once. A point that
-    departs by less than `least_m` stays; None: all do. So do those that are `kept` (n,), which bend
-    the form no more than any doubtful point does.
+    A pass rejects the points whose statistics are within a tenth of the worst, and repeats the fit.
+    After the last rejection, rejected points that agree with the fit are accepted again, each point
+    once.
+
+    Parameters
+    ----------
+    local : ndarray, shape (n, 3)
+        Points about an origin near the axis, m.
+    course : ndarray of int, shape (n,)
+        Course of each point.
+    zeta : ndarray, shape (n,)
+        Height within the course, -1 at its bottom to +1 at its top.
+    candidates : ndarray of bool, shape (n,)
+        Points that may belong to the wall.
+    axis : ndarray, shape (4,)
+        Start values: x, y, m, and slopes dx/dz, dy/dz.
+    relative : ndarray, shape (n,)
+        Standard deviations of the points, up to a common factor.
+    slope_sd : float
+        Prior standard deviation of the slopes.
+    least_m : float or None
+        Points with smaller departures are not rejected, m; None: no point is rejected.
+    kept : ndarray of bool, shape (n,), optional
+        Points that are never rejected. They have no more weight than any other doubtful point.
+
+    Returns
+    -------
+    Wall
     """
     index = np.flatnonzero(candidates)
     stays = np.zeros(len(index), dtype=bool) if kept is None else kept[index]
-    xyz, of, relative = local[index], course[index], relative[index]
-    uneven = unevenness(xyz, of, zeta[index], axis)
-    thin = _thinned(xyz, of, axis)
-    part = xyz[thin], of[thin], Uneven(uneven.columns[thin], uneven.sd_m)
+    xyz, courses, relative = local[index], course[index], relative[index]
+    uneven = unevenness(xyz, courses, zeta[index], axis)
+    thin = _sample_points(xyz, courses, axis)
+    part = xyz[thin], courses[thin], Uneven(uneven.columns[thin], uneven.sd_m)
 
-    def fitted(accepted, before):
-        return _fit_form(*part, axis, relative[thin], slope_sd, accepted, before)
+    def fitted(accepted, previous_fit):
+        return _fit_form(*part, axis, relative[thin], slope_sd, accepted, previous_fit)
 
-    def refit(before, goes, comes):
-        return fitted(before.accepted & ~goes | comes, before)
+    def refit(previous_fit, goes, comes):
+        return fitted(previous_fit.accepted & ~goes | comes, previous_fit)
 
     def tests(fit, stays=stays[thin]):
-        far = (np.abs(fit.residual) > least_m) & ~stays
-        return fit.accepted, np.where(far, np.abs(fit.w), 0.0), CRITICAL
+        is_far = (np.abs(fit.residual) > least_m) & ~stays
+        return fit.accepted, np.where(is_far, np.abs(fit.w), 0.0), CRITICAL
 
+    # The first fit accepts all points; `snoop` then alternates rejections and fits.
     fit = fitted(np.ones(len(thin), dtype=bool), None)
     if least_m is not None:
         fit = snoop(fit, tests, refit, at_once=0.9, returns=1).adjustment
-    everywhere = _predicted(fit, thin, xyz, of, uneven, relative)
+    # The sample determined the form; now predict and test the remaining points once.
+    everywhere = _predict_all(fit, thin, xyz, courses, uneven, relative)
     if least_m is not None:
         _, statistic, critical = tests(everywhere, stays)
-        rest = np.ones(len(index), dtype=bool)
-        rest[thin] = False
-        everywhere.accepted[rest] = statistic[rest] <= critical
-    return _wall_of(everywhere, index, thin, len(local))
+        outside_sample = np.ones(len(index), dtype=bool)
+        outside_sample[thin] = False
+        everywhere.accepted[outside_sample] = statistic[outside_sample] <= critical
+    return _build_wall(everywhere, index, thin, len(local))
 
 
-def _thinned(xyz, course, axis):
-    """Indices of the points that tell the form: all, or about FITTED, even over the wall."""
+def _sample_points(xyz, course, axis):
+    """Return indices of the points for the fit: all, or about FITTED spread over the wall."""
     offset, _ = distances_from_axis(xyz, axis)
+    # Every k-th point in order of course and azimuth covers the wall evenly.
     order = np.lexsort((np.arctan2(offset[:, 0], offset[:, 1]), course))
     return np.sort(order[:: max(1, len(xyz) // FITTED)])
 
 
-def _predicted(fit, thin, xyz, course, uneven, relative):
-    """The fit to some points as `_FormFit` of all of them."""
+def _predict_all(fit, thin, xyz, course, uneven, relative):
+    """Extend the fit of the sample points `thin` to a `_FormFit` of all points."""
     if len(thin) == len(xyz):
         return fit
     start = fit.fit.unknowns
@@ -89,6 +129,7 @@ def _predicted(fit, thin, xyz, course, uneven, relative):
     row_of = np.unique(course, return_inverse=True)[1]
     by_form = _form_columns(offset, _relative_height(xyz))
     residual = _misclosure(distance, row_of, by_form, uneven.columns, start)
+    # Points outside the sample did not take part in the fit: their statistic is simply v / s.
     w = residual / (fit.noise * relative)
     residual[thin], w[thin] = fit.residual, fit.w
     accepted = np.ones(len(xyz), dtype=bool)
@@ -96,18 +137,19 @@ def _predicted(fit, thin, xyz, course, uneven, relative):
     return replace(fit, accepted=accepted, residual=residual, w=w)
 
 
-def _wall_of(form, index, thin, count):
-    """The `Wall` of all `count` points: the candidates `index`, fitted to those of `thin`."""
+def _build_wall(form, index, thin, count):
+    """Return the `Wall` of `count` points from the fit of the candidates `index`."""
     wall, w, residual = np.zeros(count, dtype=bool), np.full(count, np.nan), np.full(count, np.nan)
     wall[index], w[index], residual[index] = form.accepted, form.w, form.residual
     fit = form.fit
+    # The redundancy numbers of the accepted points sum to the degrees of freedom of the noise.
     dof = float(np.sum(fit.redundancy[: len(thin)][form.accepted[thin]]))
     return Wall(wall, fit.unknowns[:4], fit.cofactor[2:4, 2:4], w, residual, form.noise, dof)
 
 
 @dataclass(frozen=True)
 class _FormFit:
-    """A fit of the form: its components, and residual and test statistic of every candidate."""
+    """Fit of the form: variance components, and residual and test statistic of each candidate."""
 
     fit: Adjustment
     noise: float
@@ -117,64 +159,75 @@ class _FormFit:
     w: np.ndarray
 
     def tests(self):
-        """What `snoop` asks for."""
+        """Return accepted points, test statistics and critical value, the input of `snoop`."""
         return self.accepted, np.abs(self.w), CRITICAL
 
 
-def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, before):
-    """Shell with form, its point noise and form amplitude as two variance components.
+def _fit_form(xyz, course, uneven, axis, relative, slope_sd, accepted, previous_fit):
+    """Fit a shell with form, with point noise and form amplitude as two variance components.
 
-    Helmert's simple iteration: each standard deviation is scaled by the root of its group's sum of
-    squared normalised residuals over its redundancy (Foerstner 1979). The point noise is kept
-    robust: never above 1.4826 times the median residual. Accepted points beyond two standard
-    deviations weigh less (Huber 1964), so that clutter does not bend the form.
+    Helmert's simple iteration: each standard deviation is scaled by the square root of the sum of
+    squared normalised residuals of its group over the redundancy of the group (Foerstner 1979). The
+    point noise is robust: it never exceeds the estimate from the median residual. Accepted points
+    beyond two standard deviations have less weight (Huber 1964), so that clutter does not distort
+    the form.
     """
-    noise, form = (before.noise, before.form) if before else (0.005, 0.010)
-    residual = before.residual if before else np.zeros(len(xyz))
-    axis = before.fit.unknowns[:4] if before else axis
+    noise, form = (previous_fit.noise, previous_fit.form) if previous_fit else (0.005, 0.010)
+    residual = previous_fit.residual if previous_fit else np.zeros(len(xyz))
+    axis = previous_fit.fit.unknowns[:4] if previous_fit else axis
     n = len(xyz)
-    for _ in range(3 if before else 10):
-        was = noise, form
-        doubt = np.maximum(1.0, np.abs(residual) / (2 * noise * relative))
-        sd = noise * relative * np.where(accepted, doubt, REJECTED)
+    for _ in range(3 if previous_fit else 10):
+        previous = noise, form
+        # Huber weights: beyond two standard deviations, the standard deviation grows with the
+        # residual.
+        huber_factor = np.maximum(1.0, np.abs(residual) / (2 * noise * relative))
+        sd = noise * relative * np.where(accepted, huber_factor, REJECTED)
         problem = shell_problem(xyz, course, axis, sd, form, slope_sd, uneven)
         fit = adjust(*problem, max_iterations=MOST_ITERATIONS)
         axis, residual = fit.unknowns[:4], fit.residuals[:n]
-        noise = _noise(residual[accepted] / relative[accepted], fit.redundancy[:n][accepted])
-        form = max(form * _component(fit, slice(n, n + 4 * (MODES - 1))), 0.1 * noise)
-        if np.allclose(was, (noise, form), rtol=0.05):
+        # Without a lower bound, the form amplitude of a round shell would converge to 0 and stay
+        # there.
+        noise = _estimate_noise(
+            residual[accepted] / relative[accepted], fit.redundancy[:n][accepted]
+        )
+        form = max(form * _scale_factor(fit, slice(n, n + 4 * (MODES - 1))), 0.1 * noise)
+        if np.allclose(previous, (noise, form), rtol=0.05):
             break
-    w = _left_out(fit, residual, sd, noise * relative)
+    w = _deletion_statistics(fit, residual, sd, noise * relative)
     return _FormFit(fit, noise, form, accepted, residual, w)
 
 
-def _left_out(fit, residual, sd, noise):
-    """(n,) residual of each point from the fit without it, over its standard deviation.
+def _deletion_statistics(fit, residual, sd, noise):
+    """Return residuals (n,) from the fit without each point, over their standard deviations.
 
-    For a point of full weight this is Baarda's w = v / (s sqrt(r)); for a rejected one it tests
-    whether the point agrees with all the others.
+    For a point of full weight, this is Baarda's w = v / (s sqrt(r)). For a rejected point, it tests
+    whether the point agrees with all other points.
     """
     r = np.maximum(fit.redundancy[: len(residual)], 1e-9)
+    # v / r is the deletion residual; its variance is that of the reading plus that of the
+    # prediction.
     return (residual / r) / np.sqrt(noise**2 + sd**2 * (1 - r) / r)
 
 
-def _noise(residual, redundancy):
-    """Point noise: root of the squares over the redundancy, at most the normal median's."""
-    whole = np.sqrt(np.sum(residual**2) / np.sum(redundancy))
-    robust = 1.4826 * np.median(np.abs(residual) / np.sqrt(np.maximum(redundancy, 1e-9)))
-    return max(min(whole, robust), LEAST_NOISE_M)
+def _estimate_noise(residual, redundancy):
+    """Return the point noise, m: root of squares over redundancy, at most the robust estimate."""
+    classical = np.sqrt(np.sum(residual**2) / np.sum(redundancy))
+    robust = SD_OVER_MEDIAN * np.median(np.abs(residual) / np.sqrt(np.maximum(redundancy, 1e-9)))
+    return max(min(classical, robust), LEAST_NOISE_M)
 
 
-def _component(fit, group):
+def _scale_factor(fit, group):
+    """Return the Helmert factor on the standard deviation of a group of observations."""
     redundancy = np.sum(fit.redundancy[group])
     return np.sqrt(np.sum(fit.normalised[group] ** 2) / max(redundancy, 1e-9))
 
 
 @dataclass(frozen=True)
 class Uneven:
-    """How the mean radius departs from that of its course.
+    """Model of the departure of the mean radius from the radius of the course.
 
-    columns  (n, c) derivative of the radii by each departure; sd_m (c,) of it, before any point
+    columns  (n, c) derivative of the radii by each departure
+    sd_m     (c,) prior standard deviations of the departures
     """
 
     columns: np.ndarray
@@ -182,94 +235,148 @@ class Uneven:
 
 
 def unevenness(xyz, course, zeta, axis):
-    """`Uneven`: a taper for each course that shows one, a radius for each of three rings or more.
+    """Return an `Uneven`: tapers of the courses, and radii of rings in courses of three or more.
 
-    zeta  (n,) height within the course, -1 at its bottom to +1 at its top
+    Only points in the lower and in the upper part of a course, all round it, determine a taper.
+    With fewer points, objects in front of the wall (treads of a stair, the rim of a nozzle) would
+    determine the taper and thus be accepted.
 
-    Only points that go round tell it, in the lower and the upper part of a course: with fewer, what
-    stands before the wall (treads of a stair, the rim of a nozzle) would bear itself out.
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Points, m.
+    course : ndarray of int, shape (n,)
+    zeta : ndarray, shape (n,)
+        Height within the course, -1 at its bottom to +1 at its top.
+    axis : ndarray, shape (4,)
+        x, y, m, and slopes dx/dz, dy/dz.
+
+    Returns
+    -------
+    Uneven
     """
     offset, _ = distances_from_axis(xyz, axis)
     azimuth = np.arctan2(offset[:, 0], offset[:, 1])
     columns, sds = [np.zeros((len(xyz), 0))], []
-    for one in np.unique(course):
-        own = np.flatnonzero(course == one)
-        ends = own[zeta[own] < -MIDDLE], own[zeta[own] > MIDDLE]
-        if not all(_goes_round(azimuth[end]) for end in ends):
+    for number in np.unique(course):
+        members = np.flatnonzero(course == number)
+        ends = members[zeta[members] < -MIDDLE], members[zeta[members] > MIDDLE]
+        if not all(_covers_turn(azimuth[end]) for end in ends):
             continue
-        columns.append(_column(len(xyz), own, zeta[own]))
+        columns.append(_indicator_column(len(xyz), members, zeta[members]))
         sds.append(TAPER_M)
-        rings = _rings(own, zeta, azimuth)
+        # Course radius and taper explain two rings exactly: only a third ring adds information.
+        rings = _split_rings(members, zeta, azimuth)
         if len(rings) > 2:
-            columns += [_column(len(xyz), ring, 1.0) for ring in rings]
+            columns += [_indicator_column(len(xyz), ring, 1.0) for ring in rings]
             sds += len(rings) * [RING_M]
     return Uneven(np.hstack(columns), np.array(sds))
 
 
-def _column(count, members, value):
+def _indicator_column(count, members, value):
+    """Return a column (count, 1) with the given value for the members and 0 elsewhere."""
     column = np.zeros((count, 1))
     column[members, 0] = value
     return column
 
 
-def _rings(members, zeta, azimuth):
-    """Lists of the points of a course that stand at one height, all round it."""
+def _split_rings(members, zeta, azimuth):
+    """Return the rings of a course: lists of points at one height that cover the circumference."""
     order = members[np.argsort(zeta[members], kind="stable")]
+    # A gap in height separates rings; scattered points form a tall group, which is no ring.
     rings = np.split(order, np.flatnonzero(np.diff(zeta[order]) > RING_SPAN) + 1)
     level = [ring for ring in rings if np.ptp(zeta[ring]) <= 2 * RING_SPAN]
-    return [ring for ring in level if _goes_round(azimuth[ring])]
+    return [ring for ring in level if _covers_turn(azimuth[ring])]
 
 
 def find_rings(course, zeta, azimuth):
-    """Ring of each point, and whether the ring is not level.
+    """Return the ring of each point, and whether the ring is not level.
 
-    The rings of a course are those that `unevenness` sees; what stands between them belongs to the
-    nearest, and where there is none all points of the course are one.
+    The rings of a course are those of `unevenness`. Points between rings belong to the nearest
+    ring. A course without rings counts as a single ring that is not level.
 
-    course (n,) index; zeta (n,) height within it, -1 to +1; azimuth (n,), rad
+    Parameters
+    ----------
+    course : ndarray of int, shape (n,)
+    zeta : ndarray, shape (n,)
+        Height within the course, -1 to +1.
+    azimuth : ndarray, shape (n,)
+        rad.
+
+    Returns
+    -------
+    ring : ndarray of int, shape (n,)
+    leans : ndarray of bool, shape (n,)
     """
     ring, leans, count = np.zeros(len(course), dtype=int), np.ones(len(course), dtype=bool), 0
-    for one in np.unique(course):
-        own = np.flatnonzero(course == one)
-        levels = [float(np.mean(zeta[members])) for members in _rings(own, zeta, azimuth)]
-        nearest = np.abs(np.subtract.outer(zeta[own], levels or [0.0])).argmin(axis=1)
+    for number in np.unique(course):
+        in_course = np.flatnonzero(course == number)
+        levels = [
+            float(np.mean(zeta[members])) for members in _split_rings(in_course, zeta, azimuth)
+        ]
+        nearest = np.abs(np.subtract.outer(zeta[in_course], levels or [0.0])).argmin(axis=1)
+        # Number the rings consecutively over all courses, without empty rings.
         _, nearest = np.unique(nearest, return_inverse=True)
-        ring[own], leans[own] = count + nearest, not levels
+        ring[in_course], leans[in_course] = count + nearest, not levels
         count += max(len(levels), 1)
     return ring, leans
 
 
-def _goes_round(azimuth):
+def _covers_turn(azimuth):
+    """Whether azimuths (k,) cover the circumference without a wide gap."""
     if len(azimuth) < FEWEST_OF_RING:
         return False
-    around = np.sort(azimuth)
-    return np.diff(around, append=around[0] + 2 * np.pi).max() < WIDEST_GAP
+    sorted_azimuths = np.sort(azimuth)
+    return np.diff(sorted_azimuths, append=sorted_azimuths[0] + 2 * np.pi).max() < WIDEST_GAP
 
 
 def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
-    """Arguments of `adjust` for radii = R of the course + uneven + form(azimuth, height).
+    """Return the arguments of `adjust` for radii = R of the course + `Uneven` + form.
 
-    The form is the same at all heights but for a part that grows linearly with height; its modes,
-    the slope and what is `Uneven` are unknowns with a prior (an observation of zero). Without
-    `form` the shell is round. sd (n,) of the radii.
+    The form depends on azimuth and height. It is equal at all heights except for a part that grows
+    linearly with height. The modes of the form, the slope and the terms of `Uneven` are unknowns
+    with a prior (an observation of zero). Without `form`, the shell is round.
 
-    Azimuths of the form are those about `axis`, so that the form is linear: about an axis that
-    moves in the adjustment, high modes of a deep form make Gauss-Newton swing without end.
-    Distances are square to the axis as it leans at first: its ellipse is known, but is no
-    observation of the slope, else the ovality of a single ring would be taken for a lean.
+    The azimuths of the form refer to the start axis, so that the form is linear. About an axis that
+    moves in the adjustment, high modes of a deep form would make Gauss-Newton oscillate. Distances
+    are perpendicular to the start axis. The ellipse of its horizontal cut is known but is no
+    observation of the slope; otherwise the ovality of a single ring would be taken for a lean.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Points, m.
+    course : ndarray of int, shape (n,)
+    axis : ndarray, shape (4,)
+        Start axis: x, y, m, and slopes dx/dz, dy/dz.
+    sd : ndarray, shape (n,)
+        Standard deviations of the radii, m.
+    form : float or None
+        Amplitude of the form, m.
+    slope_sd : float
+        Prior standard deviation of the slopes.
+    uneven : Uneven, optional
+
+    Returns
+    -------
+    model, start, observations, variances
+        In the order of the parameters of `adjust`.
     """
-    lean = np.array(axis[2:4], dtype=float)
+    # Unknowns: axis (4), course radii, modes of the form (twice: constant and linear part), uneven
+    # terms.
+    start_slope = np.array(axis[2:4], dtype=float)
     courses, row_of = np.unique(course, return_inverse=True)
     n, modes = len(xyz), 0 if form is None else 2 * (MODES - 1)
     first_mode = 4 + len(courses)
     by_radius = np.zeros((n, len(courses)))
     by_radius[np.arange(n), row_of] = -1.0
     by_uneven = np.zeros((n, 0)) if uneven is None else uneven.columns
-    more, last_mode = by_uneven.shape[1], first_mode + 2 * modes
-    priors = np.zeros((2 * modes + 2 + more, last_mode + more))
+    uneven_count, last_mode = by_uneven.shape[1], first_mode + 2 * modes
+    # Rows of the prior observations: each selects a single unknown with expectation zero.
+    priors = np.zeros((2 * modes + 2 + uneven_count, last_mode + uneven_count))
     priors[: 2 * modes, first_mode:last_mode] = np.eye(2 * modes)
     priors[2 * modes : 2 * modes + 2, 2:4] = np.eye(2)
-    priors[2 * modes + 2 :, last_mode:] = np.eye(more)
+    priors[2 * modes + 2 :, last_mode:] = np.eye(uneven_count)
 
     by_form = np.zeros((n, 0))
     if modes:
@@ -277,17 +384,21 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
 
     def model(x, observations):
         offset = _offsets(xyz, x[:4])
-        distance, along = _square_to(offset, lean)
-        by_xy = -(offset - np.outer(along, lean)) / distance[:, None]  # d(distance) / d(offset)
+        distance, foot_heights = _perpendicular_distance(offset, start_slope)
+        # The derivative of the slope is that of x and y times the height.
+        by_xy = (
+            -(offset - np.outer(foot_heights, start_slope)) / distance[:, None]
+        )  # d(distance) / d(offset)
         by_axis = np.hstack([by_xy, by_xy * xyz[:, 2:]])
-        top = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
+        by_unknowns = np.hstack([by_axis, by_radius, -by_form, -by_uneven])
         misclosure = _misclosure(distance, row_of, by_form, by_uneven, x)
         modelled = np.concatenate([misclosure, x[first_mode:last_mode], x[2:4], x[last_mode:]])
-        return modelled - observations, np.vstack([top, priors]), None
+        return modelled - observations, np.vstack([by_unknowns, priors]), None
 
+    # Start with median radii, which clutter hardly changes; all terms with a prior start at zero.
     distance = distances_from_axis(xyz, axis)[1]
     radii = [np.median(distance[row_of == i]) for i in range(len(courses))]
-    start = np.concatenate([axis, radii, np.zeros(2 * modes + more)])
+    start = np.concatenate([axis, radii, np.zeros(2 * modes + uneven_count)])
     uneven_variances = np.zeros(0) if uneven is None else uneven.sd_m**2
     prior = form**2 * mode_variances(MODES) if modes else np.zeros(0)
     variances = np.concatenate([sd**2, prior, prior, np.full(2, slope_sd**2), uneven_variances])
@@ -295,27 +406,30 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
 
 
 def _relative_height(xyz):
+    """Return heights (n,) over the largest absolute height, -1 to 1."""
     return xyz[:, 2] / max(np.abs(xyz[:, 2]).max(), 1e-9)
 
 
 def _form_columns(offset, height):
-    """(n, columns) derivative of the radii by the form, and by its part that grows with height."""
+    """Return derivatives (n, columns) of the radii by the form and by its part linear in height."""
+    # Drop the first three harmonics: radius and centre are unknowns of their own.
     waves = harmonics(np.arctan2(offset[:, 0], offset[:, 1]), MODES)[:, 3:]
     return np.hstack([waves, waves * height[:, None]])
 
 
 def _misclosure(distance, row_of, by_form, by_uneven, x):
-    """(n,) distances less the radius of the course, the form, and what is uneven."""
-    first_mode, more = len(x) - by_form.shape[1] - by_uneven.shape[1], by_uneven.shape[1]
-    form, uneven = x[first_mode : len(x) - more], x[len(x) - more :]
+    """Return distances (n,) less course radius, form and uneven terms."""
+    first_mode, uneven_count = len(x) - by_form.shape[1] - by_uneven.shape[1], by_uneven.shape[1]
+    form, uneven = x[first_mode : len(x) - uneven_count], x[len(x) - uneven_count :]
     return distance - x[4:first_mode][row_of] - by_form @ form - by_uneven @ uneven
 
 
 def distances_from_axis(local, axis):
-    """Horizontal offsets and distances of points from a leaning axis.
+    """Return horizontal offsets and perpendicular distances of points from a leaning axis.
 
-    The offset is horizontal, at the point's own height. The distance is square to the axis: that of
-    a cylinder is the same all round, whereas its horizontal cut is an ellipse.
+    The offset is horizontal, at the height of the point. The distance is perpendicular to the axis,
+    since the perpendicular distance of a cylinder is constant, whereas its horizontal cut is an
+    ellipse.
 
         rho^2 = |o|^2 - (o . s)^2 / (1 + s . s),    o the offset, s the slope of the axis
 
@@ -329,6 +443,7 @@ def distances_from_axis(local, axis):
     Returns
     -------
     offset : ndarray, shape (n, 2)
+        m.
     distance : ndarray, shape (n,)
         m.
 
@@ -339,15 +454,16 @@ def distances_from_axis(local, axis):
     ([[1.25, 0.0]], [1.0])
     """
     offset = _offsets(local, axis)
-    return offset, _square_to(offset, np.asarray(axis[2:4], dtype=float))[0]
+    return offset, _perpendicular_distance(offset, np.asarray(axis[2:4], dtype=float))[0]
 
 
 def _offsets(local, axis):
-    """(n, 2) horizontal offsets of points from the axis at their own height."""
+    """Return horizontal offsets (n, 2) of points from the axis at the height of each point."""
     return local[:, :2] - axis[:2] - local[:, 2:] * axis[2:4]
 
 
-def _square_to(offset, slope):
-    """Distances (n,) square to an axis, and heights (n,) of their feet above the points."""
-    along = offset @ slope / (1 + slope @ slope)
-    return np.sqrt(np.sum(offset**2, axis=1) - along * (offset @ slope)), along
+def _perpendicular_distance(offset, slope):
+    """Return distances (n,) perpendicular to an axis, and heights (n,) of their feet."""
+    # Foot of the perpendicular: (o - h s) . s - h = 0, so h = o . s / (1 + s . s).
+    foot_height = offset @ slope / (1 + slope @ slope)
+    return np.sqrt(np.sum(offset**2, axis=1) - foot_height * (offset @ slope)), foot_height

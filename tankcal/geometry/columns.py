@@ -1,11 +1,11 @@
-"""Columns of rejected points of which a survey cannot tell whether they are wall or a fitting.
+"""Columns of rejected points that may belong to the wall or to a fitting.
 
-A narrow seam that one column of points meets looks as a pipe does: points one above another, all as
-far off the wall, and sound wall beside them. What tells them apart is what is seen around: plate is
-never steeper than one in one, so that wall close beside a column says that it is none; wall that is
-seen between its points says that too. A column far off is a fitting. Even one that is wall for sure
-(it stands behind the rest) may be narrower than the wall that is seen beside it: how much it is
-worth is no better known.
+A column of points on a narrow seam looks like a pipe: points one above another, at equal distances
+from the wall, with regular wall on both sides. The surrounding points distinguish seam and pipe:
+the slope of a plate never exceeds one in one, so wall close beside a column shows that the column
+is a fitting. Wall between the points of a column shows this as well. A column far from the wall is
+a fitting. Even a column that certainly belongs to the wall (because it lies behind the other
+points) may be narrower than the wall visible beside it: its contribution is equally uncertain.
 """
 
 import numpy as np
@@ -13,65 +13,73 @@ import scipy
 
 from tankcal.geometry.patches import find_patches
 
-LINK_M = 0.2, 4.0  # along the arc and upwards, between points of a column
-FEWEST, SHORTEST_M = 2, 0.7  # points of a column, and its height
-SLENDER = 2.0  # it is so many times as tall as wide
-FARTHEST_M = 0.080  # from the wall: what is farther off is no form of a wall
-STEEPEST = 1.0  # slope of a plate
-SIGMA, LEAST = 3.0, 5.0  # of the scatter of the wall: a doubt of it; what chance does not set aside
-DENIED = 0.1  # of the points of a column: so many on the wall beside or between them deny it
-NONE = -1
+LINK_M = 0.2, 4.0  # largest distances along the arc and upwards, between points of a column
+FEWEST, SHORTEST_M = 2, 0.7  # least number of points of a column, and its least height
+SLENDER = 2.0  # least ratio of height to width of a column
+FARTHEST_M = 0.080  # distance from the wall beyond which a column is a fitting
+STEEPEST = 1.0  # largest slope of a plate
+# In standard deviations of the wall: tolerance of a contradiction; least departure of a column.
+SIGMA, LEAST = 3.0, 5.0
+DENIED = 0.1  # share of contradicting wall points, over the points of a column, that it tolerates
+NONE = -1  # number of points outside all columns
 
 
 def find_columns(place_m, departure_m, rejected, noise_m, turn_m):
-    """Number the columns of rejected points that may be wall as well as a fitting.
+    """Number the columns of rejected points that may belong to the wall or to a fitting.
 
     Parameters
     ----------
     place_m : ndarray, shape (n, 2)
-        Along the arc and upwards, m.
+        Positions along the arc and upwards, m.
     departure_m : ndarray, shape (n,)
-        From the wall without the rejected points, m.
+        Departures from the wall, fitted without the rejected points, m.
     rejected : ndarray of bool, shape (n,)
     noise_m : float
         Scatter of the wall (standard deviation), m.
     turn_m : float
-        Once around, along the arc, m.
+        Circumference along the arc, m.
 
     Returns
     -------
     ndarray of int, shape (n,)
-        From 0; -1 of points in no column.
+        Number of the column, from 0; -1 for points in no column.
 
     Examples
     --------
-    A column 40 mm off with the next points at 0.6 m, and one with the wall seen at 20 mm:
+    A column 40 mm off with the next points at 0.6 m, and x with the wall seen at 20 mm:
 
     >>> x, z = np.meshgrid([0.0, 0.6, 1.2, 1.8, 2.4, 2.42, 3.0], np.arange(5.0))
     >>> off = np.where((x == 0.6) | (x == 2.4), -0.04, 0.0).ravel()
     >>> place = np.column_stack([x.ravel(), z.ravel()])
-    >>> found = find_columns(place, off, off < 0, 0.001, 40.0)
-    >>> int(found.max()), [float(one) for one in np.unique(place[found == 0, 0])]
+    >>> number = find_columns(place, off, off < 0, 0.001, 40.0)
+    >>> int(number.max()), [float(x) for x in np.unique(place[number == 0, 0])]
     (0, [0.6])
     """
-    found, count = np.full(len(rejected), NONE), 0
+    numbers, count = np.full(len(rejected), NONE), 0
     if np.count_nonzero(rejected) < FEWEST:
-        return found
-    place = _cut_where_nothing_is(place_m, rejected, turn_m)
+        return numbers
+    place = _cut_at_gap(place_m, rejected, turn_m)
     for sign in (-1, 1):
         depth = sign * departure_m
-        for column in _columns(place, np.flatnonzero(rejected & (depth > 0))):
+        # A shallow column may be chance, a deep column is certainly a fitting: neither is
+        # ambiguous.
+        for column in _find_candidates(place, np.flatnonzero(rejected & (depth > 0))):
             if not LEAST * noise_m < np.median(depth[column]) <= FARTHEST_M:
                 continue
-            if _denials(place, depth, column, ~rejected, noise_m) > DENIED * len(column):
+            if _count_contradictions(place, depth, column, ~rejected, noise_m) > DENIED * len(
+                column
+            ):
                 continue
-            found[column] = count
+            numbers[column] = count
             count += 1
-    return found
+    return numbers
 
 
-def _cut_where_nothing_is(place_m, rejected, turn_m):
-    """Places whose arc begins in the widest gap between rejected points."""
+def _cut_at_gap(place_m, rejected, turn_m):
+    """Return positions whose arc begins in the widest gap between rejected points.
+
+    No column is then cut in two by the origin of the arc.
+    """
     arc = np.sort(place_m[rejected, 0] % turn_m)
     gaps = np.diff(arc, append=arc[0] + turn_m)
     widest = int(np.argmax(gaps))
@@ -80,27 +88,34 @@ def _cut_where_nothing_is(place_m, rejected, turn_m):
     return place
 
 
-def _columns(place_m, members):
-    """Arrays of members that hang together, tall and slender."""
+def _find_candidates(place_m, members):
+    """Return index arrays of connected members that are tall and slender."""
     patches = find_patches(place_m, members, LINK_M, FEWEST)
-    return [one for one in patches if _is_tall(*np.ptp(place_m[one], axis=0))]
+    return [patch for patch in patches if _is_tall(*np.ptp(place_m[patch], axis=0))]
 
 
 def _is_tall(width_m, height_m):
+    """Whether a group of points has the proportions of a column."""
     return height_m >= max(SHORTEST_M, SLENDER * width_m)
 
 
-def _denials(place_m, depth, column, accepted, noise_m):
-    """Number of points nearer to the wall than a plate through the column could be."""
+def _count_contradictions(place_m, depth, column, accepted, noise_m):
+    """Return the number of accepted points closer to the wall than a plate allows."""
     arc, height = place_m.T
+    # Beyond this distance along the arc, even the steepest plate has returned to the wall.
     reach = depth[column].max() / STEEPEST
-    low, high = place_m[column].min(axis=0), place_m[column].max(axis=0)
-    near = accepted & (arc > low[0] - reach) & (arc < high[0] + reach)
-    near = np.flatnonzero(near & (height >= low[1]) & (height <= high[1]))
-    if not len(near):
+    lowest, highest = place_m[column].min(axis=0), place_m[column].max(axis=0)
+    neighbours = accepted & (arc > lowest[0] - reach) & (arc < highest[0] + reach)
+    neighbours = np.flatnonzero(neighbours & (height >= lowest[1]) & (height <= highest[1]))
+    if not len(neighbours):
         return 0
-    scale = np.array([1.0, reach / LINK_M[1]])  # the nearest across counts, and the height little
-    nearest = scipy.spatial.cKDTree(place_m[column] * scale).query(place_m[near] * scale)[1]
-    own = column[nearest]
-    least = depth[own] - STEEPEST * np.abs(arc[near] - arc[own]) - SIGMA * noise_m
-    return np.count_nonzero(depth[near] < least)
+    # The slope of a plate concerns the distance along the arc: heights have little weight.
+    scale = np.array([1.0, reach / LINK_M[1]])
+    nearest = scipy.spatial.cKDTree(place_m[column] * scale).query(place_m[neighbours] * scale)[1]
+    partner = column[nearest]
+    # Least depth of the wall at a neighbour: the plate descends from the column at the steepest
+    # slope.
+    least_depth = (
+        depth[partner] - STEEPEST * np.abs(arc[neighbours] - arc[partner]) - SIGMA * noise_m
+    )
+    return np.count_nonzero(depth[neighbours] < least_depth)

@@ -1,7 +1,7 @@
-"""The form of a shell: what departs from a circle, by its modes around the turn.
+"""Form of a shell: departures from a circle as Fourier modes of the azimuth.
 
-Mode k >= 2 of the outline has the variance amplitude k^-3 (dents, ovality, plates that do not meet
-in a circle).
+Mode k >= 2 of the outline has the prior variance amplitude k^-3 (dents, ovality, plates that do not
+join to a circle).
 """
 
 from dataclasses import dataclass
@@ -9,24 +9,24 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-HARMONICS = 36  # of a smoothed outline: a dent of 10 deg still shows, if the prior believes it
-FORM_MODES = 100  # of the form that may lie between points; the others hold 2.5e-4 of its variance
+HARMONICS = 36  # highest mode of a smoothed outline: it resolves a dent of 10 deg
+FORM_MODES = 100  # highest mode between points; higher modes have 2.5e-4 of the variance
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Measured radii of one section, or of one course whose points are not level.
+    """Measured radii of a section, or of a course whose points are not level.
 
     Attributes
     ----------
     azimuth_rad, radius_m : ndarray, shape (n,)
-        About the centre of its circle, rad and m.
+        Azimuths and radii about the centre, rad and m.
     covariance_m2 : ndarray, shape (n, n) or (n,)
         Covariance, or variances, of the radii, m2.
     zeta : ndarray, shape (n,)
         Height within the course, -1 at its bottom to +1 at its top.
     centre_m : ndarray, shape (2,)
-        x and y that the radii are taken about, m.
+        x and y of the centre to which the radii refer, m.
     """
 
     azimuth_rad: np.ndarray
@@ -37,16 +37,16 @@ class Sample:
 
 
 def harmonics(azimuth_rad, highest, derivative=0):
-    """Columns 1, cos a, sin a, cos 2a, sin 2a, ... or their first derivative.
+    """Return the columns 1, cos a, sin a, cos 2a, sin 2a, ... or their first derivatives.
 
     Parameters
     ----------
     azimuth_rad : array_like, shape (n,)
         a, rad.
     highest : int
-        The last multiple of a.
+        Highest multiple of a.
     derivative : int, optional
-        0 or 1.
+        Order of the derivative, 0 or 1.
 
     Returns
     -------
@@ -70,14 +70,16 @@ def harmonics(azimuth_rad, highest, derivative=0):
 
 
 def multiples(azimuth_rad, highest):
-    """Cosines and sines of multiples of azimuths, by products of exp(i k a): ten times as fast.
+    """Return cosines and sines of multiples of azimuths.
+
+    Products of exp(i k a) are ten times as fast as calls of cos and sin.
 
     Parameters
     ----------
     azimuth_rad : array_like, shape (n,)
         a, rad.
     highest : int
-        The last multiple of a.
+        Highest multiple of a.
 
     Returns
     -------
@@ -88,27 +90,30 @@ def multiples(azimuth_rad, highest):
     >>> multiples([np.pi / 3], 3)[0].round(9)
     array([[ 0.5, -0.5, -1. ]])
     """
-    turned = np.empty((highest, len(azimuth_rad)), dtype=complex)
-    turned[:1] = np.exp(1j * np.asarray(azimuth_rad, dtype=float))
-    known = 1
-    while known < highest:
-        more = min(known, highest - known)
-        np.multiply(turned[:more], turned[known - 1], out=turned[known : known + more])
-        known += more
-    return turned.real.T, turned.imag.T
+    powers = np.empty((highest, len(azimuth_rad)), dtype=complex)
+    powers[:1] = np.exp(1j * np.asarray(azimuth_rad, dtype=float))
+    count = 1
+    # Doubling: exp(i (j + known) a) = exp(i j a) exp(i known a), so rounding grows as
+    # log2(highest).
+    while count < highest:
+        added = min(count, highest - count)
+        np.multiply(powers[:added], powers[count - 1], out=powers[count : count + added])
+        count += added
+    return powers.real.T, powers.imag.T
 
 
 def mode_variances(highest):
-    """Prior variance of the cos and sin amplitudes of modes 2..highest over the amplitude: k^-3.
+    """Return prior variances of the cos and sin amplitudes of modes 2..highest: k^-3.
 
     Parameters
     ----------
     highest : int
-        The last mode.
+        Highest mode.
 
     Returns
     -------
     ndarray, shape (2 (highest - 1),)
+        Variances for an amplitude of 1.
 
     Examples
     --------
@@ -119,14 +124,14 @@ def mode_variances(highest):
 
 
 def unit_form(azimuth_rad, highest=FORM_MODES):
-    """One standard deviation of each mode of a form of amplitude one.
+    """Return the standard deviations of each mode at azimuths, for a form of amplitude 1.
 
     Parameters
     ----------
     azimuth_rad : array_like, shape (n,)
         Azimuths, rad.
     highest : int, optional
-        The last mode.
+        Highest mode.
 
     Returns
     -------
@@ -137,14 +142,16 @@ def unit_form(azimuth_rad, highest=FORM_MODES):
     >>> unit_form([0.0], 3).round(4)
     array([[0.3536, 0.    , 0.1925, 0.    ]])
     """
+    # The first three columns are radius and centre, which have no prior.
     return harmonics(azimuth_rad, highest)[:, 3:] * np.sqrt(mode_variances(highest))
 
 
 def free_columns(azimuth_rad, zeta, degree):
-    """Columns of what no prior binds: radius and centre, taper and lean, barrel.
+    """Return the design columns of the parameters without prior.
 
-    1, cos a, sin a; from degree 1 on the same times zeta; at degree 2 the Legendre polynomial
-    (3 zeta^2 - 1) / 2 of the radius alone.
+    The columns are 1, cos a, sin a (radius and centre); from degree 1 on, also their products with
+    zeta (taper and lean); at degree 2 (barrel), also the Legendre polynomial (3 zeta^2 - 1) / 2 of
+    the radius.
 
     Parameters
     ----------
@@ -168,7 +175,7 @@ def free_columns(azimuth_rad, zeta, degree):
 
 
 def whiten(array, covariance, transposed=False):
-    """L^-1 array (or L^-T array) with covariance = L L'.
+    """Return L^-1 array (or L^-T array) with covariance = L L'.
 
     Parameters
     ----------
@@ -180,7 +187,8 @@ def whiten(array, covariance, transposed=False):
 
     Returns
     -------
-    ndarray, as `array`
+    ndarray
+        Same shape as `array`.
 
     Examples
     --------

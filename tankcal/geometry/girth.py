@@ -1,15 +1,17 @@
-"""What a tape round a wall, or its tangents, measure: its convex hull, which no circle of it has.
+"""Convex hull of a wall: the curve that a tape or tangents measure.
 
-A circle of the perimeter P has a larger area than the wall A that the tape lies on:
+The tape follows the convex hull. A circle of the perimeter P has a larger area than the wall A
+under the tape:
 
     excess = P^2 / (4 pi A) - 1 = (1 / (2 rho^2)) sum over k >= 2 of (k^2 - 1) c_k^2
 
-to the second order in the waves c_k of its outline, and less where it bridges a valley. How large
-the waves are somebody has to declare; how they are spread over k is what `components` say of walls.
+to second order in the waves c_k of the outline, and less where the tape bridges a valley. The size
+of the waves must be declared; `components` contains the prior distribution of their variance over
+k.
 
-A tangent whose normal has the azimuth f stands as far from the centre as the hull does there,
+A tangent whose normal has the azimuth f has the distance of the hull from the centre,
 
-    p(f) = R(f) + R'(f)^2 / (2 R) + ...  where the wall is convex, and farther out over a valley.
+    p(f) = R(f) + R'(f)^2 / (2 R) + ...  where the wall is convex, and more over a valley.
 """
 
 from dataclasses import dataclass
@@ -27,42 +29,46 @@ from tankcal.geometry.field.components import (
 )
 from tankcal.geometry.outlines import FULL_TURN
 
-SHORTEST_WAVE_M = 0.2  # along the arc: plates do not bend more sharply
-DRAWS, NODES_OF_WAVE = 64, 8  # walls drawn, and nodes of an outline in its shortest wave
-TANGENTS, REACH = 128, 8  # of each wall, and the part of a turn to either side that they may touch
-FREE_M, LEAST_M = 1.0, 1e-6  # sd of radius and centre of a ring beforehand; of its readings, least
-MOST_RINGS, FEW_RINGS = 8, 4  # asked what a wall looks like; of tangents, a parabola joins them
-LEVELS = np.array([0.0, 0.5, 1.0])  # parts of the shell's height at which hulls are measured
+SHORTEST_WAVE_M = 0.2  # shortest wavelength along the arc: plates do not bend more sharply
+DRAWS, NODES_OF_WAVE = 64, 8  # number of random walls; nodes of an outline in its shortest wave
+# Tangents of each wall; a tangent touches within 1 / REACH of a turn on either side of its azimuth.
+TANGENTS, REACH = 128, 8
+# Prior sd of radius and centre of a ring (practically free); least sd of its readings.
+FREE_M, LEAST_M = 1.0, 1e-6
+# Largest number of rings in the simulation; for tangents, a parabola interpolates between rings.
+MOST_RINGS, FEW_RINGS = 8, 4
+LEVELS = np.array([0.0, 0.5, 1.0])  # relative heights of the hulls of a wall without readings
 
 
 @cache
 def perimeter_excess(shape_sd_m, radius_m, *, shares=None):
-    """Mean and standard deviation of the excess over walls whose departures have a given size.
+    """Return mean and standard deviation of the excess over walls with departures of a given size.
 
     Parameters
     ----------
     shape_sd_m : float
-        Standard deviation of the radius round the wall, m.
+        Standard deviation of the radius along the perimeter, m.
     radius_m : float
+        Radius of the wall, m.
     shares : tuple of float, optional
-        Of the variance, in ovality and in seams; None: nobody knows them, nor how short the waves
-        are.
+        Shares of ovality and of seams in the variance; None: shares and wavelengths are unknown.
 
     Returns
     -------
     mean, sd : float
-        Of P^2 / (4 pi A) - 1.
+        Mean and standard deviation of P^2 / (4 pi A) - 1.
 
     Notes
     -----
-    Outlines are drawn from a fixed seed and their hulls measured. Where they are convex, the mean
-    is (s/rho)^2 sum (k^2 - 1) w_k / sum w_k, w_k the variance of wave k.
+    The outlines are random with a fixed seed, and the perimeters of their hulls are computed. For
+    convex outlines, the mean is (s/rho)^2 sum (k^2 - 1) w_k / sum w_k, with w_k the variance of
+    wave k.
 
-    How a wall spreads its variance over the waves is an assumption, and the excess hangs on it:
-    walls of one size have a tenth of the mean (plates of another curvature) or several times that
-    (seams narrower than 0.4 m). So no more than the mean is taken as known, as of what points do
-    not show (`seen_excess`): where no shares are given the variance is that of the draws and the
-    square of the mean.
+    The distribution of the variance over the waves is an assumption, and the excess depends on it.
+    Walls of equal size may have a tenth of the mean (plates of another curvature) or several times
+    the mean (seams narrower than 0.4 m). The standard uncertainty of the mean is therefore as large
+    as the mean, as for the waves that points do not show (`seen_excess`): without shares, the
+    variance is that of the simulation plus the square of the mean.
 
     Examples
     --------
@@ -70,31 +76,34 @@ def perimeter_excess(shape_sd_m, radius_m, *, shares=None):
     >>> round(1e6 * mean / 140, 1), round(1e6 * sd / 32, 1)
     (1.0, 1.0)
     """
+    # A circle has no excess.
     if shape_sd_m == 0:
         return 0.0, 0.0
     modes = modes_of(radius_m)
     spectra = mode_shares(modes, radius_m)
     rng = np.random.default_rng(0)
-    found = []
+    excesses = []
     for _ in range(DRAWS):
-        oval, seam = _drawn_shares(rng) if shares is None else shares
+        oval, seam = _draw_shares(rng) if shares is None else shares
         variances = oval * spectra["oval"] + seam * spectra["seam"]
-        variances = variances / variances.sum()  # of the waves that are longer than the shortest
-        found.append(_excess_of(_outline(rng, shape_sd_m**2 * variances, radius_m)))
-    mean, sd = float(np.mean(found)), float(np.std(found, ddof=1))
+        variances = variances / variances.sum()  # the truncated spectrum sums to one again
+        excesses.append(_excess_of(_outline(rng, shape_sd_m**2 * variances, radius_m)))
+    mean, sd = float(np.mean(excesses)), float(np.std(excesses, ddof=1))
     return mean, sd if shares is not None else float(np.hypot(sd, mean))
 
 
 @dataclass(frozen=True)
 class Ring:
-    """Radii read round one level.
+    """Radii measured round a level.
 
     Attributes
     ----------
     azimuth_rad, radius_m : ndarray, shape (n,)
+        Azimuths and radii, rad and m.
     noise_m2 : ndarray, shape (n, n)
+        Covariance of the radii, m2.
     up : float
-        Height of the ring above the foot of the shell, as a part of the shell's height.
+        Height of the ring above the foot of the shell, as a fraction of the height of the shell.
     """
 
     azimuth_rad: np.ndarray
@@ -104,33 +113,35 @@ class Ring:
 
 
 def seen_excess(amplitudes, radius_m, rings):
-    """Mean and standard deviation of the excess over walls that agree with radii read round them.
+    """Return mean and standard deviation of the excess over walls that agree with measured rings.
 
     Parameters
     ----------
     amplitudes : Amplitudes
-        Of the walls, and how well they are known.
+        Amplitudes of the walls and their uncertainty.
     radius_m : float
+        Radius of the wall, m.
     rings : sequence of Ring
-        Each has a radius and a centre of its own.
+        Measured radii; radius and centre of each ring are free.
 
     Returns
     -------
     mean, sd : float
-        Of P^2 / (4 pi A) - 1 of a level.
+        Mean and standard deviation of P^2 / (4 pi A) - 1 of a level.
 
     Notes
     -----
-    Sizes and outlines are drawn from a fixed seed, for one ring after another. A drawn outline f
-    moves to what the ring has read of it (conditional simulation, Matheron),
+    Variances and outlines are random with a fixed seed, for each ring in turn. A random outline f
+    is conditioned on the readings of the ring (conditional simulation, Matheron),
 
         f + K V^-1 (y - f at the sites - noise),
 
-    and the hull of that is measured: waves that the points show are those that they show, shorter
-    ones are drawn. How a wall spreads its variance over these is an assumption: of their part of
-    the excess, which is what the most likely outline K V^-1 y lacks of the mean, no more than the
-    mean is taken as known, so that its standard deviation is as large (the exponential
-    distribution, of most entropy above 0), beside the scatter of the draws.
+    and the perimeter of its hull is computed. Waves that the points resolve thus agree with the
+    readings; shorter waves are random. The distribution of the variance over the short waves is an
+    assumption. Their part of the excess is the mean excess less that of the most likely outline K
+    V^-1 y. The standard deviation of this part is taken equal to its mean, as for the exponential
+    distribution, the distribution of largest entropy above 0. It is added to the scatter of the
+    simulation.
 
     Examples
     --------
@@ -144,59 +155,80 @@ def seen_excess(amplitudes, radius_m, rings):
     True
     """
     modes = modes_of(radius_m)
-    spectra, rng, found = mode_shares(modes, radius_m), np.random.default_rng(0), []
-    nodes, known = nodes_of(radius_m), _known_rings(rings, radius_m)
-    for number, drawn in enumerate(_drawn_variances(amplitudes, rng)):
-        here = known[number % len(known)]
-        sizes = _sizes_of(drawn, here.up)
-        outline = _outline(rng, sum(sizes[one] * spectra[one] for one in sizes), radius_m)
-        found.append(_excess_of(here.moved(outline, sizes, rng)))
-    seen = [
-        _excess_of(one.moved(np.full(nodes, radius_m), _sizes_of(amplitudes.likely_m2, one.up)))
-        for one in known
+    spectra, rng, excesses = mode_shares(modes, radius_m), np.random.default_rng(0), []
+    nodes, ring_models = nodes_of(radius_m), _condition_rings(rings, radius_m)
+    for number, variances in enumerate(_draw_variances(amplitudes, rng)):
+        ring_model = ring_models[number % len(ring_models)]
+        sizes = _shape_variances(variances, ring_model.up)
+        outline = _outline(rng, sum(sizes[item] * spectra[item] for item in sizes), radius_m)
+        excesses.append(_excess_of(ring_model.moved(outline, sizes, rng)))
+    likely_excesses = [
+        _excess_of(
+            item.moved(np.full(nodes, radius_m), _shape_variances(amplitudes.likely_m2, item.up))
+        )
+        for item in ring_models
     ]
-    unseen = max(np.mean(found) - np.mean(seen), 0.0)
-    return float(np.mean(found)), float(np.hypot(np.std(found, ddof=1), unseen))
+    # The most likely outline is smoother than the simulated outlines: the difference is unresolved.
+    unresolved = max(np.mean(excesses) - np.mean(likely_excesses), 0.0)
+    return float(np.mean(excesses)), float(np.hypot(np.std(excesses, ddof=1), unresolved))
 
 
-class _Known:
-    """What one ring makes of outlines at azimuths."""
+class _ConditionedRing:
+    """Conditioning of outlines on the radii of a ring."""
 
     def __init__(self, ring, turn_rad, radius_m):
         self._ring, self._turn, self.up = ring, turn_rad, ring.up
-        at = ring.azimuth_rad
-        self._to_turn = azimuth_correlations(turn_rad, at, radius_m)
-        self._among = azimuth_correlations(at, at, radius_m)
-        free = np.column_stack([np.ones(len(at)), np.sin(at), np.cos(at)])
-        self._noise = ring.noise_m2 + LEAST_M**2 * np.eye(len(at))
-        self._free = FREE_M**2 * free @ free.T
+        azimuth = ring.azimuth_rad
+        self._to_turn = azimuth_correlations(turn_rad, azimuth, radius_m)
+        self._among = azimuth_correlations(azimuth, azimuth, radius_m)
+        free_columns = np.column_stack([np.ones(len(azimuth)), np.sin(azimuth), np.cos(azimuth)])
+        self._noise = ring.noise_m2 + LEAST_M**2 * np.eye(len(azimuth))
+        self._free = FREE_M**2 * free_columns @ free_columns.T
         self._root = np.linalg.cholesky(self._noise)
 
     def moved(self, outline_m, sizes, rng=None):
-        """An outline as it is after the ring was read; rng: with the noise of that."""
-        read = np.interp(self._ring.azimuth_rad, self._turn, outline_m, period=FULL_TURN)
+        """Return an outline conditioned on the ring.
+
+        Parameters
+        ----------
+        outline_m : ndarray, shape (n,)
+            Radii of an outline at evenly spaced azimuths, m.
+        sizes : dict of str to float
+            Variances of the shapes, m2.
+        rng : numpy.random.Generator, optional
+            Source of random noise of the readings; None: no noise.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        predicted = np.interp(self._ring.azimuth_rad, self._turn, outline_m, period=FULL_TURN)
         if rng is not None:
-            read = read + self._root @ rng.normal(size=len(read))
-        whole = self._free + self._noise + sum(sizes[one] * self._among[one] for one in sizes)
-        pull = scipy.linalg.solve(whole, self._ring.radius_m - read, assume_a="pos")
-        return outline_m + sum(sizes[one] * (self._to_turn[one] @ pull) for one in sizes)
+            predicted = predicted + self._root @ rng.normal(size=len(predicted))
+        covariance = (
+            self._free + self._noise + sum(sizes[shape] * self._among[shape] for shape in sizes)
+        )
+        # K V^-1 (y - f): the residual of the readings, spread over the outline by the prior.
+        weights = scipy.linalg.solve(covariance, self._ring.radius_m - predicted, assume_a="pos")
+        return outline_m + sum(sizes[shape] * (self._to_turn[shape] @ weights) for shape in sizes)
 
 
 def tangent_excess(amplitudes, radius_m, up, rings=(), most_m=np.inf):
-    """Excess of the tangents of a wall over its radius, beyond that of the most likely outline.
+    """Return the excess of tangents over the radius of a wall, beyond that of the likely outline.
 
     Parameters
     ----------
     amplitudes : Amplitudes
-        Of the wall, and how well they are known.
+        Amplitudes of the wall and their uncertainty.
     radius_m : float
+        Radius of the wall, m.
     up : array_like, shape (n,)
-        Heights above the foot of the shell, as parts of the shell's height.
+        Heights above the foot of the shell, as fractions of the height of the shell.
     rings : sequence of Ring, optional
-        Radii that were read round the wall; none: a wall that was not surveyed.
+        Radii measured round the wall; empty: a wall that was not surveyed.
     most_m : float
-        Largest rms departure from a circle that the wall can have; walls that are drawn rougher
-        than that are scaled down to it.
+        Largest possible rms departure of the wall from a circle; rougher random walls are scaled
+        down to it.
 
     Returns
     -------
@@ -206,12 +238,13 @@ def tangent_excess(amplitudes, radius_m, up, rings=(), most_m=np.inf):
 
     Notes
     -----
-    Outlines that agree with the rings are drawn from a fixed seed (`seen_excess` has the equation),
-    the support functions of their hulls are measured (`support_of`), and that of the most
-    likely outline is subtracted. Without rings that is a circle, whose excess is zero. The excess
-    of convex outlines is quadratic in the departures, and settlement grows in proportion to the
-    height, so a parabola in the height smooths the values of the rings. The mean of the part that
-    the rings do not show counts as known to its own size, as in `seen_excess`.
+    Outlines that agree with the rings are random with a fixed seed (equation in `seen_excess`). The
+    support functions of their hulls are computed (`support_of`), and the support function of the
+    most likely outline is subtracted. Without rings, the most likely outline is a circle, whose
+    excess is zero. The excess of convex outlines is quadratic in the departures, and settlement
+    grows in proportion to the height: a parabola in the height thus smooths the values of the
+    rings. The standard uncertainty of the mean of the unresolved part equals this mean, as in
+    `seen_excess`.
 
     Examples
     --------
@@ -221,60 +254,72 @@ def tangent_excess(amplitudes, radius_m, up, rings=(), most_m=np.inf):
     True
     """
     spectra = mode_shares(modes_of(radius_m), radius_m)
-    known = _known_rings(rings, radius_m, FEW_RINGS) or [_Unread(up) for up in LEVELS]
-    drawn = _drawn_variances(amplitudes, np.random.default_rng(0))[:: max(len(known) // 2, 1)]
-    likely, circle, found = amplitudes.likely_m2, np.full(nodes_of(radius_m), radius_m), []
-    for one in known:
-        seen = _at_tangents(one.moved(circle, _bounded(_sizes_of(likely, one.up), most_m)))
-        means, spreads, rng = [], [], np.random.default_rng(1)  # the same walls at all heights
-        for variances in drawn:
-            sizes = _bounded(_sizes_of(variances, one.up), most_m)
+    ring_models = _condition_rings(rings, radius_m, FEW_RINGS) or [
+        _UnmeasuredLevel(up) for up in LEVELS
+    ]
+    variance_draws = _draw_variances(amplitudes, np.random.default_rng(0))[
+        :: max(len(ring_models) // 2, 1)
+    ]
+    likely, circle, moments = amplitudes.likely_m2, np.full(nodes_of(radius_m), radius_m), []
+    for ring_model in ring_models:
+        likely_tangents = _tangent_differences(
+            ring_model.moved(
+                circle, _limit_variances(_shape_variances(likely, ring_model.up), most_m)
+            )
+        )
+        means, spreads, rng = [], [], np.random.default_rng(1)  # equal walls at all heights
+        for variances in variance_draws:
+            sizes = _limit_variances(_shape_variances(variances, ring_model.up), most_m)
             outline = _outline(rng, sum(sizes[s] * spectra[s] for s in sizes), radius_m)
-            beyond = _at_tangents(one.moved(outline, sizes, rng)) - seen
-            means.append(beyond.mean())
-            spreads.append(beyond.var())
+            excess = _tangent_differences(ring_model.moved(outline, sizes, rng)) - likely_tangents
+            means.append(excess.mean())
+            spreads.append(excess.var())
         mean = max(float(np.mean(means)), 0.0)
-        found.append((mean, np.var(means, ddof=1) + mean**2 * bool(rings), np.mean(spreads)))
-    at_rings = np.vander([one.up for one in known], min(3, len(known)))
-    smooth = np.linalg.lstsq(at_rings, np.array(found), rcond=1e-3)[0]
-    smoothed = np.vander(np.asarray(up, dtype=float), len(smooth)) @ smooth
-    smoothed = np.maximum(smoothed, np.min(found, axis=0))  # no parabola goes below all rings
-    smoothed[:, 1:] **= 0.5
+        moments.append((mean, np.var(means, ddof=1) + mean**2 * bool(rings), np.mean(spreads)))
+    # Least-squares parabola (or a polynomial of lower degree) of mean and both variances over
+    # height.
+    at_rings = np.vander([ring_model.up for ring_model in ring_models], min(3, len(ring_models)))
+    coefficients = np.linalg.lstsq(at_rings, np.array(moments), rcond=1e-3)[0]
+    smoothed = np.vander(np.asarray(up, dtype=float), len(coefficients)) @ coefficients
+    smoothed = np.maximum(
+        smoothed, np.min(moments, axis=0)
+    )  # keep the parabola above the least ring
+    smoothed[:, 1:] **= 0.5  # variances to standard deviations
     return smoothed
 
 
-def _known_rings(rings, radius_m, most=MOST_RINGS):
-    """`_Known` of at most so many of the rings."""
+def _condition_rings(rings, radius_m, most=MOST_RINGS):
+    """Return the `_ConditionedRing` of at most `most` rings, evenly chosen."""
     nodes = nodes_of(radius_m)
     turn = FULL_TURN * np.arange(nodes) / nodes
     chosen = np.unique(np.linspace(0, len(rings) - 1, most).astype(int)) if rings else ()
-    return [_Known(rings[i], turn, radius_m) for i in chosen]
+    return [_ConditionedRing(rings[i], turn, radius_m) for i in chosen]
 
 
-def _bounded(sizes, most_m):
-    """Variances of the shapes, scaled down where they make a wall rougher than most_m (rms)."""
+def _limit_variances(sizes, most_m):
+    """Return the variances of the shapes, scaled down to at most `most_m` (rms of the wall)."""
     scale = min(1.0, most_m**2 / max(sum(sizes.values()), 1e-30))
     return {shape: scale * size for shape, size in sizes.items()}
 
 
-def _at_tangents(radii_m):
-    """(TANGENTS,) support function less the radius, at even azimuths."""
-    at = len(radii_m) // TANGENTS * np.arange(TANGENTS)
-    return _support_at(at, radii_m) - radii_m[at]
+def _tangent_differences(radii_m):
+    """Return the support function less the radius, shape (TANGENTS,), at evenly spaced azimuths."""
+    places = len(radii_m) // TANGENTS * np.arange(TANGENTS)
+    return _support_at(places, radii_m) - radii_m[places]
 
 
 def support_of(radii_m):
-    """Support function of the convex hull of an outline.
+    """Return the support function of the convex hull of an outline.
 
     Parameters
     ----------
     radii_m : ndarray, shape (n,)
-        At even azimuths clockwise from 0, m.
+        Radii at evenly spaced azimuths clockwise from 0, m.
 
     Returns
     -------
     ndarray, shape (n,)
-        At the same azimuths, m.
+        Support function at these azimuths, m.
 
     Examples
     --------
@@ -286,115 +331,123 @@ def support_of(radii_m):
 
 
 @dataclass(frozen=True)
-class _Unread:
-    """A level at which no radius was read."""
+class _UnmeasuredLevel:
+    """Level without measured radii."""
 
     up: float
 
     def moved(self, outline_m, sizes, rng=None):
-        """The outline unchanged."""
+        """Return the outline unchanged."""
         return outline_m
 
 
-def _drawn_variances(amplitudes, rng):
-    """(DRAWS, components) variances of walls, as unsure as the amplitudes are, m2.
+def _draw_variances(amplitudes, rng):
+    """Draw variances (DRAWS, components) of walls from the distribution of the amplitudes, m2.
 
-    Components without waves round the wall have none.
+    Components without waves along the perimeter have the variance zero.
     """
-    chosen = [i for i, one in enumerate(COMPONENTS) if one.shape in ROUND_SHAPES]
-    spread = amplitudes.log_covariance[np.ix_(chosen, chosen)]
-    logs = np.log(amplitudes.likely_m2[chosen])
-    drawn = np.zeros((DRAWS, len(COMPONENTS)))
-    drawn[:, chosen] = np.exp(rng.multivariate_normal(logs, spread, size=DRAWS, method="eigh"))
-    return drawn
+    round_indices = [i for i, component in enumerate(COMPONENTS) if component.shape in ROUND_SHAPES]
+    spread = amplitudes.log_covariance[np.ix_(round_indices, round_indices)]
+    logs = np.log(amplitudes.likely_m2[round_indices])
+    variances = np.zeros((DRAWS, len(COMPONENTS)))
+    variances[:, round_indices] = np.exp(
+        rng.multivariate_normal(logs, spread, size=DRAWS, method="eigh")
+    )
+    return variances
 
 
-def _sizes_of(variances_m2, up):
-    """{shape: variance of all components of that shape at a height of the shell, m2}."""
-    found = dict.fromkeys(ROUND_SHAPES, 0.0)
+def _shape_variances(variances_m2, up):
+    """Return {shape: sum of the variances of its components at a relative height, m2}."""
+    sums = dict.fromkeys(ROUND_SHAPES, 0.0)
     at_height = Heights(np.zeros(1), np.array([up]))
-    for one, size in zip(COMPONENTS, variances_m2, strict=True):
-        if one.shape == "settled":
-            size = size * one.height_covariance(at_height, at_height)[0, 0]
-        if one.shape in found:
-            found[one.shape] += float(size)
-    return found
+    for component, size in zip(COMPONENTS, variances_m2, strict=True):
+        # Settlement grows with the height; all other variances refer to the course.
+        if component.shape == "settled":
+            size = size * component.height_covariance(at_height, at_height)[0, 0]
+        if component.shape in sums:
+            sums[component.shape] += float(size)
+    return sums
 
 
 def modes_of(radius_m):
-    """(modes,) waves round a wall of that radius, from k = 2 to the shortest that a plate takes."""
+    """Return the wave numbers (modes,) of a wall, from k = 2 to the shortest wave of a plate."""
     return np.arange(2.0, max(37.0, np.ceil(FULL_TURN * radius_m / SHORTEST_WAVE_M)))
 
 
 def nodes_of(radius_m):
-    """How many nodes a drawn outline of such a wall has."""
+    """Return the number of nodes of a random outline of a wall."""
     return NODES_OF_WAVE * (len(modes_of(radius_m)) + 2)
 
 
-def _support_at(at, radii_m):
-    """(k,) support function of the hull of radii at even azimuths, at those of places (k,).
+def _support_at(places, radii_m):
+    """Return the support function (k,) of the hull of radii, at the nodes `at` (k,).
 
-    It touches between nodes: a parabola through the highest one and those beside it.
+    The tangent touches between nodes: a parabola through the highest node and its neighbours.
     """
     count = len(radii_m)
-    reach = np.arange(-(count // REACH), count // REACH + 1)  # a tangent touches near its azimuth
-    near = radii_m[(at[:, None] + reach) % count]
-    near = near * np.cos(FULL_TURN / count * reach)
-    top = np.clip(np.argmax(near, axis=1), 1, near.shape[1] - 2)
-    low, high, beyond = (near[np.arange(len(at)), top + k] for k in (-1, 0, 1))
-    bend = np.maximum(2 * high - low - beyond, 1e-300)
-    return high + (low - beyond) ** 2 / (8 * bend)
+    # Support function: maximum of r(a) cos(a - f) over azimuths a near that of the normal.
+    reach = np.arange(-(count // REACH), count // REACH + 1)
+    projections = radii_m[(places[:, None] + reach) % count]
+    projections = projections * np.cos(FULL_TURN / count * reach)
+    top = np.clip(np.argmax(projections, axis=1), 1, projections.shape[1] - 2)
+    previous, peak, next_value = (projections[np.arange(len(places)), top + k] for k in (-1, 0, 1))
+    # Vertex of the parabola through three equidistant ordinates; the bound avoids division by zero.
+    curvature = np.maximum(2 * peak - previous - next_value, 1e-300)
+    return peak + (previous - next_value) ** 2 / (8 * curvature)
 
 
-def _drawn_shares(rng):
-    """Shares of ovality and of seams in the variance of a wall, as unsure as their amplitudes."""
+def _draw_shares(rng):
+    """Draw the shares of ovality and of seams in the variance of a wall from the prior."""
     sizes = {"oval": 0.0, "seam": 0.0}
-    for one in COMPONENTS:
-        if one.shape in sizes:
-            sizes[one.shape] += one.median_m**2 * np.exp(one.log_sd * rng.normal())
-    whole = sum(sizes.values())
-    return sizes["oval"] / whole, sizes["seam"] / whole
+    for component in COMPONENTS:
+        if component.shape in sizes:
+            sizes[component.shape] += component.median_m**2 * np.exp(
+                component.log_sd * rng.normal()
+            )
+    total = sum(sizes.values())
+    return sizes["oval"] / total, sizes["seam"] / total
 
 
 def _outline(rng, variances_m2, radius_m):
-    """(n,) radii of an outline whose waves, from k = 2 on, have these mean squares about it."""
+    """Return radii (n,) of a random outline with the mean squares `variances_m2` from k = 2 on."""
     return radius_m + draw_waves(rng, variances_m2)
 
 
 def draw_waves(rng, variances_m2, draws=()):
-    """Departures of outlines from a circle, at even azimuths clockwise from 0.
+    """Draw departures of outlines from a circle, at evenly spaced azimuths clockwise from 0.
 
     Parameters
     ----------
     rng : numpy.random.Generator
     variances_m2 : ndarray, shape (modes,)
-        Mean squares about the outline of its waves, from k = 2 on.
+        Mean squares of the waves along the outline, from k = 2 on, m2.
     draws : tuple of int
-        How many outlines.
+        Shape of the array of outlines.
 
     Returns
     -------
     ndarray, shape (*draws, n)
-        n is NODES_OF_WAVE for each of the shortest waves.
+        m; n is NODES_OF_WAVE per shortest wave.
     """
     modes = len(variances_m2)
     count = NODES_OF_WAVE * (modes + 2)
     waves = np.zeros((*draws, count // 2 + 1), dtype=complex)
-    drawn = rng.normal(size=(2, *draws, modes))
-    waves[..., 2 : modes + 2] = np.sqrt(variances_m2) * (drawn[0] - 1j * drawn[1])
+    normals = rng.normal(size=(2, *draws, modes))
+    waves[..., 2 : modes + 2] = np.sqrt(variances_m2) * (normals[0] - 1j * normals[1])
+    # `irfft` divides by count; a real wave has two conjugate terms.
     return np.fft.irfft(waves, count) * count / 2
 
 
 def _excess_of(radii_m):
-    """P^2 / (4 pi A) - 1 of the hull's perimeter and the outline's area, radii at even azimuths."""
+    """Return P^2 / (4 pi A) - 1 with the perimeter of the hull and the area of the outline."""
     area_m2 = np.sum(radii_m**2) * FULL_TURN / len(radii_m) / 2
     return girth_of(radii_m) ** 2 / (4 * np.pi * area_m2) - 1
 
 
 def girth_of(radii_m):
-    """Perimeter of the convex hull of an outline, of its radii (n,) at even azimuths, m.
+    """Return the perimeter of the convex hull of an outline, m, from radii (n,) at even azimuths.
 
-    That of the polygon, longer by what a circle is than its own.
+    The perimeter of the polygon is scaled by the ratio of a circle to its own polygon.
 
     Examples
     --------
@@ -407,29 +460,30 @@ def girth_of(radii_m):
 
 
 def hull_perimeter(places):
-    """Perimeter of the convex hull of points round the origin.
+    """Return the perimeter of the convex hull of points round the origin.
 
-    A point on the inner side of the chord between its neighbours is no corner of the hull; without
-    such points others may become one, until every corner turns left.
+    A point on the inner side of the chord between its neighbours is no corner of the hull. The
+    removal of such points is repeated until every corner turns left.
 
     Parameters
     ----------
     places : ndarray of complex, shape (n,)
-        x + i y of the points, anticlockwise, neighbours less than half a turn apart.
+        x + i y of the points, anticlockwise; neighbours are less than half a turn apart.
 
     Returns
     -------
     float
-        In the unit of the points.
+        Perimeter, in the unit of the points.
 
     Examples
     --------
-    >>> hull_perimeter(np.array([3, 1 + 1j, 4j, -3, -4j]))  # 1 + 1j stands within
+    >>> hull_perimeter(np.array([3, 1 + 1j, 4j, -3, -4j]))  # 1 + 1j is inside
     20.0
     """
     while True:
-        after = np.roll(places, -1) - places
-        outer = (np.roll(after, 1).conj() * after).imag > 0
-        if outer.all():
-            return float(np.abs(after).sum())
-        places = places[outer]
+        edges = np.roll(places, -1) - places
+        # Imaginary part of conj(a) b: cross product of successive edges, positive at a left turn.
+        convex = (np.roll(edges, 1).conj() * edges).imag > 0
+        if convex.all():
+            return float(np.abs(edges).sum())
+        places = places[convex]

@@ -1,17 +1,18 @@
-"""Great ellipses of an upright ellipsoid: what a tape round a sphere measures.
+"""Great ellipses of an upright ellipsoid: the circumferences measured on a sphere.
 
-A sphere as built and loaded is, to the degree 2 of its form, an ellipsoid. Upright, it has the
-horizontal radii and the polar one
+A sphere as built and loaded is, to degree 2 of its form, an ellipsoid. An upright ellipsoid has the
+horizontal radii and the polar radius
 
     r(azimuth) = m + A cos 2 azimuth + B sin 2 azimuth   (first order; exact: the ellipse of the
     matrix S of m, A, B, whose eigenvalues are the semi-axes a and b),      c along the vertical.
 
-The equator has the length L(a, b), a meridian in the azimuth u the length L(1 / |S^-1 u|, c), with
-L(p, q) = 8 R_G(0, p^2, q^2) the complete elliptic integral of an ellipse. A meridian thus tells
-about r + c, and no axis alone; the mean of evenly spread ones r_m gives c = 2 r_m - r_e.
+The equator has the length L(a, b). A meridian in the azimuth u has the length L(1 / |S^-1 u|, c).
+L(p, q) = 8 R_G(0, p^2, q^2) is the complete elliptic integral of an ellipse. A meridian thus
+determines approximately r + c, but no single axis. The mean r_m of evenly spaced meridians gives c
+= 2 r_m - r_e.
 
-Source: Carlson 1995, Numerical computation of real or complex elliptic integrals (R_G, R_D);
-API Std 2552 (method of measurement of spheres).
+Source: Carlson 1995, Numerical computation of real or complex elliptic integrals (R_G, R_D); API
+Std 2552 (method of measurement of spheres).
 """
 
 from dataclasses import dataclass
@@ -26,7 +27,7 @@ UNKNOWNS = ("mean", "cos", "sin", "pole")  # m, A, B, c
 
 
 def ellipse_length(p_m, q_m):
-    """Length of an ellipse, and its derivatives by the semi-axes.
+    """Return the length of an ellipse and its derivatives by the semi-axes.
 
         L = 8 R_G(0, p^2, q^2),    dL/dp = (4 p q^2 / 3) R_D(0, p^2, q^2)
 
@@ -37,8 +38,10 @@ def ellipse_length(p_m, q_m):
 
     Returns
     -------
-    length_m, by_p, by_q : ndarray
-        m, and without unit; p by_p + q by_q is the length.
+    length_m : ndarray
+        Length, m.
+    by_p, by_q : ndarray
+        Derivatives, dimensionless; p by_p + q by_q is the length.
 
     Examples
     --------
@@ -54,73 +57,78 @@ def ellipse_length(p_m, q_m):
 
 
 def horizontal_axes(unknowns):
-    """Semi-axes a >= b of the equator, m, and the azimuth of a, rad, from m, A, B, c.
+    """Return the semi-axes a >= b of the equator, m, and the azimuth of a, rad.
+
+    The argument contains m, A, B and c of the module docstring.
 
     Examples
     --------
     >>> horizontal_axes([10.0, 0.0, 0.1, 10.0])
     (10.1, 9.9, 0.7853981633974483)
     """
-    mean, cos, sin = (float(one) for one in unknowns[:3])
+    mean, cos, sin = (float(value) for value in unknowns[:3])
     half = float(np.hypot(cos, sin))
     return mean + half, mean - half, float(np.arctan2(sin, cos) / 2)
 
 
 def great_circle_lengths(unknowns, azimuth_rad):
-    """Lengths of great circles of an upright ellipsoid, and their derivatives.
+    """Return lengths of great circles of an upright ellipsoid, and their derivatives.
 
     Parameters
     ----------
     unknowns : array_like, shape (4,)
         m, A, B, c, m.
     azimuth_rad : ndarray, shape (n,)
-        Of the plane of each meridian, clockwise from +y; nan: the equator.
+        Azimuth of the plane of each meridian, clockwise from +y; nan for the equator.
 
     Returns
     -------
     length_m : ndarray, shape (n,)
     by_unknowns : ndarray, shape (n, 4)
     """
-    mean, cos, sin, pole = (float(one) for one in unknowns)
+    mean, cos, sin, pole = (float(value) for value in unknowns)
     azimuth = np.asarray(azimuth_rad, dtype=float)
-    length, by = np.empty(len(azimuth)), np.zeros((len(azimuth), 4))
+    length, by_unknowns = np.empty(len(azimuth)), np.zeros((len(azimuth), 4))
     equator = np.isnan(azimuth)
     a, b, _ = horizontal_axes(unknowns)
     round_m, by_a, by_b = ellipse_length(a, b)
+    # a, b = m +- half with half = hypot(A, B); at a circle, the direction of A and B is arbitrary.
     half = max(np.hypot(cos, sin), np.finfo(float).tiny)
     by_half = by_a - by_b
     length[equator] = round_m
-    by[equator] = [by_a + by_b, by_half * cos / half, by_half * sin / half, 0.0]
-    radius, by_form = _radii((mean, cos, sin), azimuth[~equator])
+    by_unknowns[equator] = [by_a + by_b, by_half * cos / half, by_half * sin / half, 0.0]
+    radius, by_form = _equator_radii((mean, cos, sin), azimuth[~equator])
     length[~equator], by_radius, by_pole = ellipse_length(radius, pole)
-    by[~equator, :3] = by_radius[:, None] * by_form
-    by[~equator, 3] = by_pole
-    return length, by
+    by_unknowns[~equator, :3] = by_radius[:, None] * by_form
+    by_unknowns[~equator, 3] = by_pole
+    return length, by_unknowns
 
 
-def _radii(form, azimuth):
-    """(k,) radii 1 / |S^-1 u| of the equator, and (k, 3) their derivatives by m, A, B."""
+def _equator_radii(form, azimuth):
+    """Return radii (k,) 1 / |S^-1 u| of the equator, and derivatives (k, 3) by m, A, B."""
     mean, cos, sin = form
     u = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
-    moves = np.array([np.eye(2), [[-1.0, 0.0], [0.0, 1.0]], [[0.0, 1.0], [1.0, 0.0]]])
-    inverse = np.linalg.inv(np.tensordot([mean, cos, sin], moves, axes=1))
+    # S = m I + A M_A + B M_B: the matrices are the derivatives of S.
+    by_matrix = np.array([np.eye(2), [[-1.0, 0.0], [0.0, 1.0]], [[0.0, 1.0], [1.0, 0.0]]])
+    inverse = np.linalg.inv(np.tensordot([mean, cos, sin], by_matrix, axes=1))
     w = u @ inverse
-    size = np.linalg.norm(w, axis=1)
-    by = np.einsum("ki,oij,kj->ko", w @ inverse, moves, w) / size[:, None] ** 3
-    return 1 / size, by
+    length = np.linalg.norm(w, axis=1)
+    # d(S^-1) = -S^-1 dS S^-1, and d(1/|w|) = -w . dw / |w|^3: the signs cancel.
+    by_form = np.einsum("ki,oij,kj->ko", w @ inverse, by_matrix, w) / length[:, None] ** 3
+    return 1 / length, by_form
 
 
 @dataclass(frozen=True)
 class FormPrior:
-    """What is assumed of the degree 2 of a sphere's form where no strap tells it.
+    """Prior of the form of degree 2 of a sphere, for parts that no strapping determines.
 
     Attributes
     ----------
     ovality_m : float
         Standard deviation of A and of B.
     oblateness_m : float
-        Of m - c; it counts only where the equator or every meridian is missing, so that it never
-        pulls a polar axis that was measured.
+        Standard deviation of m - c. It applies only if the equator or all meridians are missing, so
+        that it never changes a measured polar axis.
     """
 
     ovality_m: float
@@ -129,7 +137,7 @@ class FormPrior:
 
 @dataclass(frozen=True)
 class FittedEllipsoid:
-    """An upright ellipsoid through the lengths of great circles.
+    """Upright ellipsoid through the lengths of great circles.
 
     Attributes
     ----------
@@ -138,12 +146,12 @@ class FittedEllipsoid:
     weights : ndarray, shape (4, n)
         Derivatives of the unknowns by the lengths.
     by_prior : ndarray, shape (4, k)
-        What one standard deviation of each prior does to them: ovality twice, oblateness where it
-        counts.
+        Change of the unknowns for one standard deviation of each prior: ovality twice, and
+        oblateness if it applies.
     residuals_m : ndarray, shape (n,)
-        Length of the ellipsoid less that measured.
+        Length of the ellipsoid less the measured length.
     precision : ndarray, shape (n, n)
-        Of the lengths, 1/m2, less what the ellipsoid takes up of them.
+        Precision matrix of the lengths after elimination of the ellipsoid, 1/m2.
     """
 
     unknowns: np.ndarray
@@ -154,27 +162,28 @@ class FittedEllipsoid:
 
     @property
     def axes_m(self):
-        """(a, b, c), a the longer one of the equator."""
+        """(a, b, c), with a the longer axis of the equator."""
         a, b, _ = horizontal_axes(self.unknowns)
         return a, b, float(self.unknowns[3])
 
 
 def binds_pole(azimuth_rad):
-    """Whether the prior of the oblateness counts: no equator, or no meridian."""
+    """Whether the prior of the oblateness applies: the equator or all meridians are missing."""
     equator = np.isnan(azimuth_rad)
     return bool(equator.all() or not equator.any())
 
 
 def fit_ellipsoid(azimuth_rad, length_m, covariance_m2, prior):
-    """Least squares of an upright ellipsoid to the lengths of great circles.
+    """Fit an upright ellipsoid to the lengths of great circles by least squares.
 
     Parameters
     ----------
     azimuth_rad : array_like, shape (n,)
-        Of meridians; nan: the equator.
+        Azimuths of meridians; nan for the equator.
     length_m : array_like, shape (n,)
         Circumferences, m.
     covariance_m2 : ndarray, shape (n, n)
+        Covariance of the circumferences, m2.
     prior : FormPrior
 
     Returns
@@ -184,44 +193,48 @@ def fit_ellipsoid(azimuth_rad, length_m, covariance_m2, prior):
     Examples
     --------
     >>> azimuths = np.radians([np.nan, 0.0, 90.0])
-    >>> found = fit_ellipsoid(azimuths, [62.8512, 62.8431, 62.8467], 1e-8 * np.eye(3),
+    >>> ellipsoid = fit_ellipsoid(azimuths, [62.8512, 62.8431, 62.8467], 1e-8 * np.eye(3),
     ...                       FormPrior(0.01, 0.01))
-    >>> [round(one, 6) for one in found.axes_m]
+    >>> [round(axis, 6) for axis in ellipsoid.axes_m]
     [10.003652, 10.002506, 10.001074]
     """
     azimuth, length = np.asarray(azimuth_rad, dtype=float), np.asarray(length_m, dtype=float)
     rows, sds = _prior_rows(prior, binds_pole(azimuth))
     count = len(length)
-    whole = np.zeros((count + len(sds), count + len(sds)))
-    whole[:count, :count] = covariance_m2
-    whole[range(count, len(whole)), range(count, len(whole))] = sds**2
+    # The priors are additional, independent observations of zero.
+    covariance = np.zeros((count + len(sds), count + len(sds)))
+    covariance[:count, :count] = covariance_m2
+    covariance[range(count, len(covariance)), range(count, len(covariance))] = sds**2
 
     def misclosures(unknowns, observations):
-        found, by = great_circle_lengths(unknowns, azimuth)
+        modelled, by_unknowns = great_circle_lengths(unknowns, azimuth)
         return (
-            np.concatenate([found, rows @ unknowns]) - observations,
-            np.vstack([by, rows]),
+            np.concatenate([modelled, rows @ unknowns]) - observations,
+            np.vstack([by_unknowns, rows]),
             None,
         )
 
+    # Start with a sphere of the mean circumference.
     start = np.array([1.0, 0.0, 0.0, 1.0]) * length.mean() / FULL_TURN
-    given = np.concatenate([length, np.zeros(len(sds))])
-    adjusted = adjust(misclosures, start, given, whole)
-    found, by = great_circle_lengths(adjusted.unknowns, azimuth)
-    design = np.vstack([by, rows])
-    weighted = np.linalg.solve(whole, design)
+    observed_values = np.concatenate([length, np.zeros(len(sds))])
+    adjusted = adjust(misclosures, start, observed_values, covariance)
+    # Linearise at the solution: weights (A' Q^-1 A)^-1 A' Q^-1 propagate the lengths to the
+    # unknowns.
+    modelled, by_unknowns = great_circle_lengths(adjusted.unknowns, azimuth)
+    design = np.vstack([by_unknowns, rows])
+    weighted = np.linalg.solve(covariance, design)
     weights = np.linalg.solve(design.T @ weighted, weighted.T)
     return FittedEllipsoid(
         unknowns=adjusted.unknowns,
         weights=weights[:, :count],
         by_prior=weights[:, count:] * sds,
-        residuals_m=found - length,
-        precision=(np.linalg.inv(whole) - weighted @ weights)[:count, :count],
+        residuals_m=modelled - length,
+        precision=(np.linalg.inv(covariance) - weighted @ weights)[:count, :count],
     )
 
 
 def _prior_rows(prior, binds):
-    """(k, 4) what each prior says is 0, and (k,) its standard deviation."""
+    """Return rows (k, 4) of the combinations with expectation zero, and their sds (k,)."""
     rows = [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, -1.0]]
     sds = [prior.ovality_m, prior.ovality_m, prior.oblateness_m]
     count = 3 if binds else 2

@@ -1,11 +1,11 @@
-"""The irregular outline r(azimuth) of a section, smoothed by harmonics.
+"""Outline r(azimuth) of a section, smoothed by harmonics.
 
 Azimuths count clockwise from +y, so a point of the outline is (x + r sin a, y + r cos a). An
-outline is linear in its parameters and they are linear in the measured radii.
+outline is linear in its parameters, and the parameters are linear in the measured radii.
 
-Every section has the same estimator, whatever the number and the spacing of its points. On six
-families of walls that are not its model it is at least as close to the wall as a periodic spline
-through evenly spaced points, and twice as close where the noise is 10 mm.
+The estimator is equal for all sections, regardless of the number and spacing of points. It was
+tested on six families of walls that differ from its model. It is at least as close to the wall as a
+periodic spline through evenly spaced points, and twice as close for a noise of 10 mm.
 """
 
 from dataclasses import dataclass
@@ -25,12 +25,12 @@ from tankcal.messages import message
 from tankcal.quadrature import panels, polar_products
 
 FULL_TURN = 2 * np.pi
-PANELS = 4 * HARMONICS  # around the turn: r^2 has twice the harmonics, each panel four nodes
+PANELS = 4 * HARMONICS  # panels around the turn: r^2 has twice the harmonics; four nodes a panel
 
 
 @dataclass(frozen=True)
 class Outline:
-    """The irregular section: r(azimuth) = basis(azimuth) @ parameters about (x_m, y_m).
+    """Outline of a section: r(azimuth) = basis(azimuth) @ parameters about (x_m, y_m).
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class Outline:
     azimuth_rad : ndarray, shape (n,)
         Azimuths of the measured radii, rad.
     form_m2 : float
-        Amplitude of the shell's form.
+        Amplitude of the form of the shell, m2.
     """
 
     x_m: float
@@ -54,32 +54,32 @@ class Outline:
     form_m2: float
 
     def basis(self, azimuth_rad, derivative=0):
-        """(len(azimuth), p) functions that the parameters multiply, or their derivative."""
+        """Return the functions (len(azimuth), p) of the parameters, or their derivatives."""
         return harmonics(azimuth_rad, (len(self.parameters) - 1) // 2, derivative)
 
     def radius_m(self, azimuth_rad, derivative=0):
-        """(len(azimuth),) radius at each azimuth, or its derivative by the azimuth."""
+        """Return the radius (len(azimuth),) at each azimuth, or its derivative by the azimuth."""
         return self.basis(azimuth_rad, derivative) @ self.parameters
 
     def nodes(self):
-        """Azimuths and weights of a rule that integrates r^2 over the full turn."""
+        """Return azimuths and weights of a rule that integrates r^2 over the full turn."""
         return panels(np.linspace(0.0, FULL_TURN, PANELS + 1), 4)
 
     def area_m2(self):
-        """A = 1/2 integral of r^2 over the full turn, by Gaussian quadrature."""
+        """Return A = 1/2 integral of r^2 over the full turn, by Gaussian quadrature."""
         azimuth, weight = self.nodes()
         return float(polar_products(self.radius_m(azimuth), weight)[0, 0])
 
     def unseen_form_m(self, azimuth_rad):
-        """(len(azimuth), modes) how far the outline misses one sd of each mode of the form.
+        """Return errors (len(azimuth), modes) of the outline for one sd of each mode of the form.
 
-        The outline of a mode sampled at the points, less the mode itself.
+        The error is the outline fitted to the mode at the points, less the mode.
         """
-        shown = self.basis(azimuth_rad) @ (self.from_radii @ unit_form(self.azimuth_rad))
-        return np.sqrt(self.form_m2) * (shown - unit_form(azimuth_rad))
+        fitted_mode = self.basis(azimuth_rad) @ (self.from_radii @ unit_form(self.azimuth_rad))
+        return np.sqrt(self.form_m2) * (fitted_mode - unit_form(azimuth_rad))
 
     def modes_m(self, highest=6):
-        """(highest + 1, 2) cos and sin amplitude of each Fourier mode; row 0 is the mean radius."""
+        """Return cos and sin amplitudes (highest + 1, 2) of modes; row 0 is the mean radius."""
         azimuth = np.arange(720) * FULL_TURN / 720
         spectrum = np.fft.rfft(self.radius_m(azimuth)) / 360
         spectrum[0] /= 2
@@ -87,7 +87,7 @@ class Outline:
 
 
 def polar(xy_m, x_m, y_m):
-    """Azimuths and distances of points about a centre.
+    """Return azimuths and distances of points about a centre.
 
     Parameters
     ----------
@@ -98,8 +98,10 @@ def polar(xy_m, x_m, y_m):
 
     Returns
     -------
-    azimuth_rad, radius_m : ndarray, shape (n,)
-        0 to 2 pi, clockwise from +y, and m.
+    azimuth_rad : ndarray, shape (n,)
+        0 to 2 pi, clockwise from +y, rad.
+    radius_m : ndarray, shape (n,)
+        m.
 
     Examples
     --------
@@ -111,23 +113,24 @@ def polar(xy_m, x_m, y_m):
 
 
 def radii_square_to_axis(azimuth_rad, radius_m, slope):
-    """Radii of a horizontal cut without the ellipse that the lean of the axis makes of a circle.
+    """Return radii of a horizontal cut, corrected for the ellipse due to the lean of the axis.
 
-    A cylinder that leans by m has a horizontal cut of semi-axes r and r sqrt(1 + m^2). Its radius
-    over the distance from the axis is (1 - (n . s)^2 / (1 + m^2))^(-1/2) in the direction n. The
-    factor (1 + m^2)^(1/4) keeps the area of the cut, so a cylinder becomes a circle of equal area.
+    A cylinder that leans by m has a horizontal cut of semi-axes r and r sqrt(1 + m^2). The ratio of
+    its radius to the distance from the axis is (1 - (n . s)^2 / (1 + m^2))^(-1/2) in the direction
+    n. The factor (1 + m^2)^(1/4) preserves the area of the cut, so a cylinder becomes a circle of
+    equal area.
 
     Parameters
     ----------
     azimuth_rad, radius_m : ndarray, shape (n,)
-        About the axis, rad, and m.
+        Azimuths and radii about the axis, rad and m.
     slope : array_like, shape (2,)
-        Of the axis: metres in x and y for a metre of height.
+        Slope of the axis: metres in x and y per metre of height.
 
     Returns
     -------
     ndarray, shape (n,)
-        m.
+        Corrected radii, m.
 
     Examples
     --------
@@ -140,10 +143,11 @@ def radii_square_to_axis(azimuth_rad, radius_m, slope):
 
 
 def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2, away, degree):
-    """Outline smoothed by harmonics, of points that may not be level.
+    """Return an outline smoothed by harmonics, from points that may not be level.
 
-    r(a) with harmonics to order 36 (prior variance form_m2 k^-3 of mode k >= 2). Free are radius
-    and centre, from degree 1 on taper and lean, and at degree 2 the barrel.
+    The model is r(a) with harmonics to order 36 (prior variance form_m2 k^-3 of mode k >= 2).
+    Radius and centre have no prior, nor have taper and lean (from degree 1) and the barrel (degree
+    2).
 
     Parameters
     ----------
@@ -154,7 +158,7 @@ def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2, away, degree):
     noise_m2 : ndarray, shape (n, n) or (n,)
         Covariance of the measured radii, m2.
     form_m2 : float
-        Amplitude of the shell's form.
+        Amplitude of the form of the shell, m2.
     away : ndarray, shape (n,)
         Heights of the points above the outline, in halves of the course.
     degree : int
@@ -167,16 +171,17 @@ def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2, away, degree):
     Raises
     ------
     SolutionError
-        When the points do not determine what is free.
+        If the points do not determine the parameters without prior.
     """
     azimuth, radius = polar(xy_m, x_m, y_m)
     free = free_columns(azimuth, away, degree)
+    # Columns scaled to unit prior variance: the prior adds 1 to the diagonal of the normal matrix.
     waves = np.sqrt(form_m2) * unit_form(azimuth, HARMONICS)
-    solution = _shrunk(np.hstack([free, waves]), free.shape[1], noise_m2)
+    solution = _solve_regularised(np.hstack([free, waves]), free.shape[1], noise_m2)
     sd = np.sqrt(form_m2 * mode_variances(HARMONICS))[:, None]
     from_radii = np.vstack([solution[:3], sd * solution[free.shape[1] :]])
     if degree == 2:
-        from_radii[0] -= 0.5 * solution[6]  # the parabola where the outline stands
+        from_radii[0] -= 0.5 * solution[6]  # (3 zeta^2 - 1) / 2 at the height of the outline
     return Outline(
         x_m=x_m,
         y_m=y_m,
@@ -187,8 +192,8 @@ def smooth_outline(xy_m, x_m, y_m, noise_m2, form_m2, away, degree):
     )
 
 
-def _shrunk(design, free, noise_m2):
-    """(p, n) estimates by the radii: the first `free` columns free, the others of unit variance."""
+def _solve_regularised(design, free, noise_m2):
+    """Return estimates (p, n) by the radii, with a unit prior on columns from `free` on."""
     white = whiten(design, noise_m2)
     normal = white.T @ white
     bound = np.arange(free, len(normal))
@@ -200,14 +205,15 @@ def _shrunk(design, free, noise_m2):
                 "the points of a section do not determine its centre and radius",
             )
         )
+    # (A' Q^-1 A + prior)^-1 A' Q^-1, one column for each radius.
     return np.linalg.solve(normal, whiten(white, noise_m2, transposed=True).T)
 
 
 def radii_by_coordinates(outline, xy_m):
-    """Derivative of the radius at fixed azimuth by the points' x and y.
+    """Return the derivative of the radius at fixed azimuth by x and y of its point.
 
-    A point that moves along the outline changes nothing: dr = n . dp, with n the outline's normal,
-    scaled so that its radial part is one: (sin a - r'/r cos a, cos a + r'/r sin a).
+    The shift of a point along the outline has no effect: dr = n . dp, with n the normal of the
+    outline, scaled to a radial component of one: (sin a - r'/r cos a, cos a + r'/r sin a).
 
     Parameters
     ----------
@@ -218,9 +224,10 @@ def radii_by_coordinates(outline, xy_m):
     Returns
     -------
     ndarray, shape (n, 2)
-        Of each radius by its own point: no other one moves it.
+        Derivative of each radius by its point; other points have no effect.
     """
     azimuth, radius = polar(xy_m, outline.x_m, outline.y_m)
+    # Slope r'/r of the outline: the tangential shift of a point changes r at a fixed azimuth.
     slope = outline.radius_m(azimuth, derivative=1) / radius
     sin, cos = np.sin(azimuth), np.cos(azimuth)
     return np.column_stack([sin - slope * cos, cos + slope * sin])

@@ -1,13 +1,13 @@
-"""Ellipses and spheres through points: geometric fits with their full covariance.
+"""Ellipses and spheres through points: geometric fits with full covariance.
 
-Each shape gives one condition for a point, its signed distance from the shape (outwards positive)
-at the foot of the perpendicular, so v' Q^-1 v of the points' corrections is the minimum when the
-adjusted points lie on the shape (Gauss-Helmert, `adjust`); for equal variances that is the sum of
-squared distances. With n the outward normal at the foot f of a point P,
+The condition for each point is its signed distance from the shape (outwards positive) at the foot
+of the perpendicular. The sum v' Q^-1 v of the point corrections is the minimum for adjusted points
+on the shape (Gauss-Helmert, `adjust`). For equal variances, this is the sum of squared distances.
+With n the outward normal at the foot f of a point P,
 
     distance = n (P - f),   by P: n',   by a parameter: -n' df/dparameter at a fixed place of f.
 
-Starts are found here: an algebraic fit, then unweighted distances by Levenberg-Marquardt.
+Start values are computed here: an algebraic fit, then unweighted distances by Levenberg-Marquardt.
 Source: Ahn 2004, Least Squares Orthogonal Distance Fitting.
 """
 
@@ -20,7 +20,7 @@ from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
-FLAT_BEYOND = 100.0  # spreads of the points: a larger radius is that of a plane or a line
+FLAT_BEYOND = 100.0  # a radius above 100 times the spread of the points is a plane or a line
 
 
 @dataclass(frozen=True)
@@ -30,19 +30,22 @@ class FittedEllipse:
     Attributes
     ----------
     x_m, y_m : float
-        Centre.
+        Centre, m.
     semi_major_m, semi_minor_m : float
-        Half axes.
+        Semi-axes, m.
     azimuth_rad : float
-        Of the major axis, clockwise from +y, 0 to pi; 0 of a circle.
+        Azimuth of the major axis, clockwise from +y, 0 to pi; 0 for a circle.
     cofactor : ndarray, shape (5, 5)
-        Covariance of x, y, both half axes and azimuth (m, rad) for variance factor 1; azimuth of a
-        circle: inf, uncorrelated. Half axes that differ by little more than their standard
-        deviations are biased apart, and the azimuth is not normal.
+        Covariance of x, y, both semi-axes and azimuth (m, rad) for variance factor 1. The variance
+        of the azimuth of a circle is inf, without correlation. Semi-axes that differ by little more
+        than their standard deviations are biased apart, and the azimuth is then not normally
+        distributed.
     residuals_m : ndarray, shape (n,)
-        Distance of each point to the ellipse, outwards positive.
+        Distance of each point from the ellipse, outwards positive, m.
     variance_factor : float
         v' Q^-1 v / dof, nan without redundancy.
+    dof : int
+        Redundancy.
     """
 
     x_m: float
@@ -69,7 +72,7 @@ class FittedSphere:
     cofactor_m2 : ndarray, shape (4, 4)
         Covariance of centre and radius for variance factor 1, m2.
     residuals_m : ndarray, shape (n,)
-        Distance of each point to the sphere, outwards positive, m.
+        Distance of each point from the sphere, outwards positive, m.
     variance_factor : float
         v' Q^-1 v / dof, nan without redundancy.
     dof : int
@@ -85,21 +88,26 @@ class FittedSphere:
 
 
 def fit_ellipse(xy_m, covariance_m2):
-    """Geometric ellipse: centre + S w for all unit vectors w, S a symmetric matrix.
+    """Fit a geometric ellipse: centre + S w for all unit vectors w, with S a symmetric matrix.
 
-    S is regular where half axes and azimuth (its eigenvalues and eigenvectors) are not: at a
-    circle. Start: direct least squares (Halir & Flusser 1998).
+    S is regular at a circle, where the parameters semi-axes and azimuth (its eigenvalues and
+    eigenvectors) are singular. Start values: direct least squares (Halir & Flusser 1998).
 
     Parameters
     ----------
     xy_m : ndarray, shape (n, 2)
-    covariance_m2 : ndarray, shape (2n, 2n)
-        Dense or sparse, or (2n,) variances, x1 y1 x2 y2 ...
+        Points, m.
+    covariance_m2 : ndarray, shape (2n, 2n) or (2n,)
+        Covariance, dense or sparse, or variances, in the order x1 y1 x2 y2 ..., m2.
+
+    Returns
+    -------
+    FittedEllipse
 
     Raises
     ------
     SolutionError
-        For fewer than 5 points, points on a line or on no ellipse.
+        For fewer than 5 points, or points on a line or on no ellipse.
     """
     mean, local = center_points(xy_m, 5, "an ellipse")
     spread = spread_of(local, 2, "line")
@@ -108,6 +116,7 @@ def fit_ellipse(xy_m, covariance_m2):
     x, y, *shape = adjusted.unknowns
     (major, minor, azimuth), by_shape = _axes(*shape)
     refuse_flat(major, spread, "an ellipse with a half axis")
+    # Propagate the covariance from (Sxx, Syy, Sxy) to semi-axes and azimuth.
     transform = np.eye(5)
     transform[2:, 2:] = by_shape
     cofactor = transform @ adjusted.cofactor @ transform.T
@@ -127,26 +136,31 @@ def fit_ellipse(xy_m, covariance_m2):
 
 
 def ellipse_distances(unknowns, points):
-    """Distances (n,) of points (n, 2) to an ellipse x, y, Sxx, Syy, Sxy; by these; normals."""
+    """Return distances (n,) of points (n, 2) from an ellipse, their derivatives, and normals.
+
+    The unknowns are x, y, Sxx, Syy, Sxy; the derivatives have the shape (n, 5), the normals (n, 2).
+    """
     x, y, sxx, syy, sxy = unknowns
     values, axes = np.linalg.eigh([[sxx, sxy], [sxy, syy]])
+    # The foot points are found in the frame of the principal axes.
     d = (points - (x, y)) @ axes
     distance, normal, place = _foot_points(d, np.abs(values))
     normal, w = normal @ axes.T, (place * np.sign(values)) @ axes.T
-    across = normal[:, 0] * w[:, 1] + normal[:, 1] * w[:, 0]
-    by_unknowns = -np.column_stack([normal, normal * w, across])
+    # dS w = (dSxx wx + dSxy wy, dSyy wy + dSxy wx); the derivative of the distance is -n . dS w.
+    by_sxy = normal[:, 0] * w[:, 1] + normal[:, 1] * w[:, 0]
+    by_unknowns = -np.column_stack([normal, normal * w, by_sxy])
     return distance, by_unknowns, normal
 
 
 def fit_sphere(xyz_m, covariance_m2):
-    """Geometric sphere: distance from the centre, minus R, is 0 for each adjusted point.
+    """Fit a geometric sphere: distance from the centre - R = 0 for each adjusted point.
 
     Parameters
     ----------
     xyz_m : array_like, shape (n, 3)
         Points, m.
     covariance_m2 : ndarray or sparse array, shape (3n, 3n) or (3n,)
-        Their covariance, or variances, m2, in the order x1 y1 z1 x2 ...
+        Covariance, or variances, of the coordinates in the order x1 y1 z1 x2 ..., m2.
 
     Returns
     -------
@@ -155,7 +169,7 @@ def fit_sphere(xyz_m, covariance_m2):
     Raises
     ------
     SolutionError
-        For fewer than 4 points and points in a plane.
+        For fewer than 4 points, or points in a plane.
 
     Examples
     --------
@@ -165,9 +179,10 @@ def fit_sphere(xyz_m, covariance_m2):
     """
     mean, local = center_points(xyz_m, 4, "a sphere")
     spread = spread_of(local, 3, "plane")
+    # Algebraic start: |p|^2 = 2 c . p + (R^2 - |c|^2) is linear in c and the constant.
     design = np.column_stack([2 * local, np.ones(len(local))])
-    *centre, rest = np.linalg.lstsq(design, np.sum(local**2, axis=1), rcond=None)[0]
-    algebraic = [*centre, np.sqrt(max(rest + np.sum(np.square(centre)), 0.0))]
+    *centre, constant = np.linalg.lstsq(design, np.sum(local**2, axis=1), rcond=None)[0]
+    algebraic = [*centre, np.sqrt(max(constant + np.sum(np.square(centre)), 0.0))]
     start = descend_distances(sphere_distances, algebraic, local)
     refuse_flat(start[3], spread, "a sphere with a radius")
     adjusted = adjust(conditions_of(sphere_distances), start, local.ravel(), covariance_m2)
@@ -183,14 +198,37 @@ def fit_sphere(xyz_m, covariance_m2):
 
 
 def sphere_distances(unknowns, points):
-    """Distances (n,) of points (n, 3) to a sphere x, y, z, R; by these; normals (n, 3)."""
+    """Return distances (n,) of points (n, 3) from a sphere, derivatives (n, 4), and normals (n, 3).
+
+    The unknowns are x, y, z, R.
+    """
     distance, normal = unit_vectors(points - unknowns[:3])
     by_unknowns = -np.column_stack([normal, np.ones(len(normal))])
     return distance - unknowns[3], by_unknowns, normal
 
 
 def center_points(points_m, needed, what):
-    """Mean (k,) of points (n, k) and the points about it; too few are refused."""
+    """Return the mean (k,) of points (n, k), and the points about the mean.
+
+    Parameters
+    ----------
+    points_m : array_like, shape (n, k)
+        Points, m.
+    needed : int
+        Least number of points.
+    what : str
+        Shape, for the message.
+
+    Returns
+    -------
+    mean : ndarray, shape (k,)
+    local : ndarray, shape (n, k)
+
+    Raises
+    ------
+    SolutionError
+        For fewer points than needed.
+    """
     points_m = np.asarray(points_m, dtype=float)
     if len(points_m) < needed:
         raise SolutionError(f"{what} needs {needed} points, {len(points_m)} were given")
@@ -199,7 +237,26 @@ def center_points(points_m, needed, what):
 
 
 def spread_of(local, dimensions, flat):
-    """Root mean square distance from the mean; the points must fill the given dimensions."""
+    """Return the root mean square distance of points from their mean, m.
+
+    Parameters
+    ----------
+    local : ndarray, shape (n, k)
+        Points about their mean, m.
+    dimensions : int
+        Number of dimensions that the points must span.
+    flat : str
+        "line" or "plane", for the message.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    SolutionError
+        If the points span fewer dimensions.
+    """
     sizes = np.linalg.svd(local, compute_uv=False)
     if not sizes[dimensions - 1] > 1e-9 * sizes[0]:
         raise SolutionError(
@@ -211,7 +268,19 @@ def spread_of(local, dimensions, flat):
 
 
 def refuse_flat(size_m, spread_m, what):
-    """A shape that is large against the points that it was found by is a line or a plane."""
+    """Raise SolutionError for a shape much larger than the spread of its points.
+
+    Such a shape is practically a line or a plane.
+
+    Parameters
+    ----------
+    size_m : float
+        Radius or semi-axis, m.
+    spread_m : float
+        Result of `spread_of`, m.
+    what : str
+        Shape, for the message.
+    """
     if not size_m < FLAT_BEYOND * spread_m:
         raise SolutionError(
             f"{what} of {size_m:.3g} m through points that spread {spread_m:.3g} m: they are flat"
@@ -219,7 +288,7 @@ def refuse_flat(size_m, spread_m, what):
 
 
 def unit_vectors(d):
-    """Lengths (n,) of vectors (n, k), and the vectors of length one."""
+    """Return the lengths (n,) of vectors (n, k), and the unit vectors (n, k)."""
     distance = np.linalg.norm(d, axis=1)
     if not np.all(distance > 0):
         raise SolutionError(
@@ -232,12 +301,19 @@ def unit_vectors(d):
 
 
 def conditions_of(distances, dimensions=3):
-    """The model for `adjust` of a function (unknowns, points) -> distances, by unknowns, normals.
+    """Return the model for `adjust` of a distance function.
 
     Parameters
     ----------
+    distances : callable
+        (unknowns, points) -> distances (n,), derivatives by the unknowns (n, p), normals (n, k).
     dimensions : optional
-        Of the points, 2 or 3.
+        Dimensions of the points, 2 or 3.
+
+    Returns
+    -------
+    callable
+        (unknowns, coordinates) -> misclosures and both Jacobians, the second as a sparse array.
     """
 
     def conditions(unknowns, coordinates):
@@ -251,9 +327,27 @@ def conditions_of(distances, dimensions=3):
 
 
 def descend_distances(distances, unknowns, points, steps=100):
-    """Unknowns near the least sum of squared, unweighted distances, after at most some steps."""
+    """Minimise the sum of squared, unweighted distances by Levenberg-Marquardt.
+
+    Parameters
+    ----------
+    distances : callable
+        As for `conditions_of`.
+    unknowns : array_like, shape (p,)
+        Start values.
+    points : ndarray, shape (n, k)
+        m.
+    steps : int
+        Largest number of evaluations.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        Unknowns near the minimum; not necessarily converged.
+    """
     latest = {}
 
+    # `least_squares` requests value and Jacobian separately: both come from one evaluation.
     def at(x):
         if latest.get("x") != x.tobytes():
             latest.update(x=x.tobytes(), found=distances(x, points))
@@ -272,17 +366,20 @@ def descend_distances(distances, unknowns, points, steps=100):
 
 
 def _direct_ellipse(local):
-    """Start of an ellipse: direct least squares in the partition of Halir & Flusser 1998."""
+    """Return a start ellipse: direct least squares in the partition of Halir & Flusser 1998."""
     x, y = local.T
     quadratic, linear = np.column_stack([x * x, x * y, y * y]), np.column_stack([x, y, x**0])
-    back = -np.linalg.solve(linear.T @ linear, linear.T @ quadratic)
-    reduced = quadratic.T @ (quadratic + linear @ back)
+    # Eliminate the linear coefficients; the reduced problem has the constraint 4 a c - b^2 = 1.
+    by_quadratic = -np.linalg.solve(linear.T @ linear, linear.T @ quadratic)
+    reduced = quadratic.T @ (quadratic + linear @ by_quadratic)
     vectors = np.linalg.eig(np.array([reduced[2] / 2, -reduced[1], reduced[0] / 2]))[1].real
+    # The eigenvector with 4 a c - b^2 > 0 is the ellipse.
     a, b, c = vectors[:, np.argmax(4 * vectors[0] * vectors[2] - vectors[1] ** 2)]
     matrix = np.array([[a, b / 2], [b / 2, c]])
     if not np.linalg.det(matrix) > 0:
         raise SolutionError(message("no_ellipse", "the points do not lie on an ellipse"))
-    d, e, f = back @ (a, b, c)
+    d, e, f = by_quadratic @ (a, b, c)
+    # Complete the square: centre, then semi-axes from the eigenvalues of the centred conic.
     centre = -np.linalg.solve(matrix, [d, e]) / 2
     size = centre @ matrix @ centre - f
     values, axes = np.linalg.eigh(matrix * np.sign(size))
@@ -292,9 +389,9 @@ def _direct_ellipse(local):
 
 
 def _axes(sxx, syy, sxy):
-    """Half axes and azimuth of a shape matrix, and their Jacobian by sxx, syy, sxy."""
-    middle, lean = (sxx + syy) / 2, (sxx - syy) / 2
-    half = np.hypot(lean, sxy)
+    """Return semi-axes and azimuth of a shape matrix, and their Jacobian by sxx, syy, sxy."""
+    middle, half_difference = (sxx + syy) / 2, (sxx - syy) / 2
+    half = np.hypot(half_difference, sxy)
     if not middle > half:
         raise SolutionError(
             message(
@@ -303,25 +400,30 @@ def _axes(sxx, syy, sxy):
                 half_axis_m=middle + half,
             )
         )
-    sine, cosine = (sxy / half, lean / half) if half > 1e-12 * middle else (0.0, 0.0)
+    sine, cosine = (sxy / half, half_difference / half) if half > 1e-12 * middle else (0.0, 0.0)
+    # Eigenvalues middle +- half, half = hypot(lean, sxy); half its angle is the mathematical
+    # direction.
     by_half = np.array([cosine / 2, -cosine / 2, sine])
     by_middle = np.array([0.5, 0.5, 0.0])
     by_angle = np.zeros(3)
     if sine or cosine:
         by_angle = np.array([sine / 2, -sine / 2, -cosine]) / (2 * half)
+    # Convert the direction (anticlockwise from +x) to an azimuth (clockwise from +y).
     azimuth = (np.pi / 2 - np.arctan2(sine, cosine) / 2) % np.pi if np.any(by_angle) else 0.0
     jacobian = np.array([by_middle + by_half, by_middle - by_half, by_angle])
     return (float(middle + half), float(middle - half), float(azimuth)), jacobian
 
 
 def _foot_points(d, half):
-    """Signed distances (n,), unit normals and places w (n, 2) of the feet f = half w.
+    """Return signed distances (n,), unit normals and w (n, 2) of the feet f = half w.
 
-    d (n, 2) in the frame of the axes, half (2,). Newton's method on the convex, falling
-    (a u / (t + a^2))^2 + (b v / (t + b^2))^2 = 1 from its left, which is monotone (Eberly 2013).
+    d (n, 2) are points in the frame of the axes, half (2,) the semi-axes. Newton's method solves (a
+    u / (t + a^2))^2 + (b v / (t + b^2))^2 = 1, a convex, decreasing function of t, from the left,
+    where the convergence is monotone (Eberly 2013).
     """
     sign, u = np.where(d < 0, -1.0, 1.0), np.maximum(np.abs(d), 1e-14 * half)
     square = half**2
+    # Start left of the root: a single term of the sum already equals 1 there.
     t = np.max(half * u - square, axis=1)
     for _ in range(100):
         place = half * u / (t[:, None] + square)
@@ -330,8 +432,9 @@ def _foot_points(d, half):
         t = t + step
         if np.all(np.abs(step) <= 1e-15 * (t + square.min())):
             break
-    lever = u / (t[:, None] + square)
-    long = np.linalg.norm(lever, axis=1)
-    place = half * lever
+    # P - f = t f / a^2 for each axis: the normal is parallel to u / (t + a^2), and t > 0 outside.
+    normal_direction = u / (t[:, None] + square)
+    length = np.linalg.norm(normal_direction, axis=1)
+    place = half * normal_direction
     place = place / np.linalg.norm(place, axis=1)[:, None]
-    return t * long, sign * lever / long[:, None], sign * place
+    return t * length, sign * normal_direction / length[:, None], sign * place

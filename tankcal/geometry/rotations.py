@@ -1,21 +1,21 @@
-"""Rotations of photographs: angles at the surface, tangent space inside.
+"""Rotations of photographs: angles in the interface, tangent space in the computation.
 
     R = R3(kappa) R2(phi) R1(omega)          (passive, omega about X first)
 
-A rotation is updated by a small rotation vector in the frame of the camera, R <- exp([d]x) R, which
-has no singular place; omega, phi and kappa are only reported. Source: Foerstner & Wrobel 2016,
+A rotation is updated by a small rotation vector in the frame of the camera, R <- exp([d]x) R. This
+update has no singularity; omega, phi and kappa are only reported. Source: Foerstner & Wrobel 2016,
 Photogrammetric Computer Vision, ch. 8.
 """
 
 import numpy as np
 
-_CROSS = np.zeros((3, 3, 3))  # [d]x by d
+_CROSS = np.zeros((3, 3, 3))  # derivative of the cross-product matrix [d]x by d
 _CROSS[[0, 1, 2], [2, 0, 1], [1, 2, 0]] = 1.0
 _CROSS[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = -1.0
 
 
 def rotation_of_angles(omega_rad, phi_rad, kappa_rad):
-    """Rotation matrices R3(kappa) R2(phi) R1(omega) of angles.
+    """Return rotation matrices R3(kappa) R2(phi) R1(omega) from angles.
 
     Parameters
     ----------
@@ -42,9 +42,9 @@ def rotation_of_angles(omega_rad, phi_rad, kappa_rad):
 
 
 def angles_of(rotation):
-    """omega, phi, kappa of rotation matrices.
+    """Return omega, phi, kappa of rotation matrices.
 
-    phi lies in [-pi/2, pi/2]. At phi = +-pi/2 only kappa +- omega is defined: omega is then 0.
+    phi lies in [-pi/2, pi/2]. At phi = +-pi/2, only kappa +- omega is defined: omega is then 0.
 
     Parameters
     ----------
@@ -58,6 +58,7 @@ def angles_of(rotation):
     """
     r = np.asarray(rotation, dtype=float)
     cos_phi = np.hypot(r[..., 0, 0], r[..., 1, 0])
+    # atan2 is accurate near +-90 deg, where asin would lose half the digits.
     phi = np.arctan2(r[..., 2, 0], cos_phi)
     locked = cos_phi < 1e-12
     omega = np.where(locked, 0.0, np.arctan2(-r[..., 2, 1], r[..., 2, 2]))
@@ -68,13 +69,17 @@ def angles_of(rotation):
 
 
 def rotation_of_view(azimuth_rad, tilt_rad, roll_rad):
-    """Rotation matrices of cameras that look along an azimuth, tilted up, rolled about the axis.
+    """Return rotation matrices of cameras from the azimuth, tilt and roll of the view.
 
     Parameters
     ----------
-    azimuth_rad, tilt_rad, roll_rad : array_like, shape (...)
-        Of the viewing direction, clockwise from +y; above the horizon; of the image's x axis,
-        anticlockwise as the photographer sees it from behind; rad.
+    azimuth_rad : array_like, shape (...)
+        Azimuth of the viewing direction, clockwise from +y, rad.
+    tilt_rad : array_like, shape (...)
+        Angle of the viewing direction above the horizon, rad.
+    roll_rad : array_like, shape (...)
+        Rotation of the x axis of the image about the viewing direction, anticlockwise as seen from
+        behind the camera, rad.
 
     Returns
     -------
@@ -88,15 +93,17 @@ def rotation_of_view(azimuth_rad, tilt_rad, roll_rad):
     sa, sv, sk = np.sin(azimuth_rad), np.sin(tilt_rad), np.sin(roll_rad)
     ca, cv, ck = np.cos(azimuth_rad), np.cos(tilt_rad), np.cos(roll_rad)
     zero = np.zeros_like(sa * sv * sk)
+    # Axes of a camera without roll: viewing direction, horizontal to the right, and upwards.
     ahead = np.stack([sa * cv, ca * cv, sv + zero], axis=-1)
     level = np.stack([ca + zero, -sa + zero, zero], axis=-1)
-    above = np.stack([-sa * sv, -ca * sv, cv + zero], axis=-1)
+    upward = np.stack([-sa * sv, -ca * sv, cv + zero], axis=-1)
+    # The rows of R are the axes of the camera in the object frame; its z axis points backwards.
     ck, sk = (ck + zero)[..., None], (sk + zero)[..., None]
-    return np.stack([level * ck + above * sk, -level * sk + above * ck, -ahead], axis=-2)
+    return np.stack([level * ck + upward * sk, -level * sk + upward * ck, -ahead], axis=-2)
 
 
 def view_of_rotation(rotation):
-    """azimuth, tilt, roll of cameras: the inverse of `rotation_of_view`.
+    """Return azimuth, tilt and roll of cameras, the inverse of `rotation_of_view`.
 
     Parameters
     ----------
@@ -112,6 +119,7 @@ def view_of_rotation(rotation):
     azimuth = np.arctan2(ahead[..., 0], ahead[..., 1])
     tilt = np.arcsin(np.clip(ahead[..., 2], -1.0, 1.0))
     level = rotation_of_view(azimuth, tilt, np.zeros_like(azimuth))
+    # The roll is the angle of the x axis in the frame of the camera without roll.
     roll = np.arctan2(
         np.sum(right * level[..., 1, :], axis=-1), np.sum(right * level[..., 0, :], axis=-1)
     )
@@ -119,7 +127,7 @@ def view_of_rotation(rotation):
 
 
 def apply_small_rotation(rotation, small_rad):
-    """Rotation matrices after small rotations: exp([d]x) R.
+    """Return rotation matrices after small rotations: exp([d]x) R.
 
     Parameters
     ----------
@@ -135,14 +143,16 @@ def apply_small_rotation(rotation, small_rad):
     d = np.asarray(small_rad, dtype=float)
     cross = (d @ _CROSS.reshape(3, 9)).reshape(-1, 3, 3)
     half = 0.5 * np.sqrt(np.einsum("ni,ni->n", d, d))
+    # Rodrigues: exp([d]x) - I = sin t / t [d]x + (1 - cos t) / t^2 [d]x^2, in half angles for
+    # accuracy.
     half = np.maximum(half, 1e-30)[:, None, None]
     first, second = np.sin(2 * half) / (2 * half), 0.5 * (np.sin(half) / half) ** 2
-    turned_by = first * cross + second * (cross @ cross)
-    return rotation + turned_by @ rotation
+    increment = first * cross + second * (cross @ cross)
+    return rotation + increment @ rotation
 
 
 def rotation_vector(rotation):
-    """Rotation vectors, shorter than pi, with exp([d]x) = R.
+    """Return rotation vectors, shorter than pi, with exp([d]x) = R.
 
     Parameters
     ----------
@@ -155,6 +165,7 @@ def rotation_vector(rotation):
         d, rad.
     """
     r = np.asarray(rotation, dtype=float)
+    # The skew-symmetric part of R is sin t times the axis; the trace is 1 + 2 cos t.
     axial = 0.5 * np.stack(
         [r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]], axis=-1
     )
@@ -164,7 +175,7 @@ def rotation_vector(rotation):
 
 
 def vector_derivatives(vector_rad):
-    """Derivatives of the rotation vector of exp([d]x) exp([v]x) by d, at d = 0.
+    """Return derivatives of the rotation vector of exp([d]x) exp([v]x) by d, at d = 0.
 
     Parameters
     ----------
@@ -178,6 +189,7 @@ def vector_derivatives(vector_rad):
     v = np.asarray(vector_rad, dtype=float)
     square = np.sum(v * v, axis=1)
     half = np.sqrt(square) / 2
+    # Inverse of the left Jacobian of SO(3); a series replaces the quotient near zero.
     with np.errstate(invalid="ignore", divide="ignore"):
         second = np.where(square < 1e-8, 1 / 12 + square / 720, (1 - half / np.tan(half)) / square)
     cross = np.cross(np.eye(3), v[:, None, :]).transpose(0, 2, 1)
@@ -185,7 +197,7 @@ def vector_derivatives(vector_rad):
 
 
 def angle_axes(rotation):
-    """Small rotations in the camera's frame, one column for each of omega, phi, kappa.
+    """Return small rotations in the frame of the camera, one column each for omega, phi, kappa.
 
     Parameters
     ----------
@@ -199,6 +211,8 @@ def angle_axes(rotation):
     r = np.asarray(rotation, dtype=float)
     kappa = angles_of(r)[:, 2]
     axes = np.zeros_like(r)
+    # omega turns about X of the object, phi about the once-turned Y axis, kappa about z of the
+    # camera; the signs are those of a passive rotation.
     axes[:, :, 0] = -r[:, :, 0]
     axes[:, 0, 1], axes[:, 1, 1] = -np.sin(kappa), -np.cos(kappa)
     axes[:, 2, 2] = -1.0
@@ -206,9 +220,10 @@ def angle_axes(rotation):
 
 
 def angle_derivatives(rotation):
-    """Derivatives of omega, phi, kappa (rows) by a small rotation in the camera's frame.
+    """Return derivatives of omega, phi, kappa (rows) by a small rotation in the camera frame.
 
-    They grow without bound towards phi = +-90 deg: an angle by itself is not defined there.
+    The derivatives grow without bound towards phi = +-90 deg, where omega and kappa are not defined
+    separately.
 
     Parameters
     ----------
@@ -222,10 +237,11 @@ def angle_derivatives(rotation):
     r = np.asarray(rotation, dtype=float)
     _, phi, kappa = angles_of(r).T
     sk, ck, cp, tp = np.sin(kappa), np.cos(kappa), np.cos(phi), np.tan(phi)
-    zero, one = np.zeros_like(sk), np.ones_like(sk)
+    zero, ones = np.zeros_like(sk), np.ones_like(sk)
+    # Inverse of the matrix of `angle_axes`, written out.
     rows = [
         [-ck / cp, sk / cp, zero],
         [-sk, -ck, zero],
-        [tp * ck, -tp * sk, -one],
+        [tp * ck, -tp * sk, -ones],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from scipy import sparse
 
-from tankcal.adjust import ALPHA
+from tankcal.adjust import ALPHA, SD_OVER_MEDIAN
 from tankcal.inspection.levelling import LEAST_READINGS
 
 LEAST_IN_BULGE = 3  # readings: a narrower bulge is not told from one bad reading
@@ -124,7 +124,7 @@ def on_the_bottom(r, z, sd):
     deviations = np.abs(z - z[i, None] - slopes[:, None] * (r - r[i, None]))
     medians = np.median(deviations, axis=1)
     best = int(np.argmin(medians))
-    scale = 1.4826 * (1 + 5 / (len(r) - 2)) * medians[best]
+    scale = SD_OVER_MEDIAN * (1 + 5 / (len(r) - 2)) * medians[best]
     scale = np.maximum(scale, 0.0 if sd is None else sd)
     return deviations[best] <= np.maximum(ON_BOTTOM * scale, 1e-9)
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.inspection.boards import BOARD_M, END_M, REACH_M, bead_height, gaps_of_profile
 from tankcal.inspection.known_welds import BANDING, PEAKING
@@ -17,7 +18,6 @@ from tankcal.inspection.known_welds import BANDING, PEAKING
 TOGETHER = 2  # boards along the weld that are averaged: 0.3 m
 LAGS = 2, 4, 6  # boards between those whose scatter is looked at: apart, they share no point
 FEWEST = 20  # gaps that a scatter is told by
-NORMAL = 1.4826  # sd over median absolute deviation
 LEAST_BEAD_M, SURE_BEAD = 0.001, 3.0  # height of a bead, and over its sd
 LEAST_PEAK_M = 0.002  # that a loose weld is put in the middle of
 
@@ -148,4 +148,5 @@ def noise_factor(boards):
                 known = np.isfinite(off)
                 ratios[lag].append(np.abs(off[known] / sd[known]))
     told = [np.concatenate(one) for one in ratios.values() if one]
-    return max([1.0] + [NORMAL * float(np.median(one)) for one in told if len(one) >= FEWEST])
+    medians = [float(np.median(one)) for one in told if len(one) >= FEWEST]
+    return max(1.0, SD_OVER_MEDIAN * max(medians, default=0.0))

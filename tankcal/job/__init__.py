@@ -1,12 +1,12 @@
-"""The job: what the user hands in, read, checked and converted to SI (docs/job-format.md).
+"""Jobs: input files, read, checked and converted to SI (docs/job-format.md).
 
-Names are resolved when they are first used: what a job is called is told before it is read.
+Names are imported at first use, so that the command line responds before the dataclasses load.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
+if TYPE_CHECKING:  # for type checkers only; not executed
     from tankcal.job.loading import load
     from tankcal.job.model import (
         Bottom,
@@ -57,8 +57,8 @@ __all__ = [
 def __getattr__(name):
     if name not in __all__:
         raise AttributeError(f"module 'tankcal.job' has no attribute {name!r}")
-    room = "loading" if name == "load" else "model"
-    return getattr(import_module(f"tankcal.job.{room}"), name)
+    module = "loading" if name == "load" else "model"
+    return getattr(import_module(f"tankcal.job.{module}"), name)
 
 
 def __dir__():

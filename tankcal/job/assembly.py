@@ -1,4 +1,4 @@
-"""From checked values to a `Job`: SI units, defaults, one dataclass for each part."""
+"""Conversion of checked values to a `Job`: SI units, defaults, one dataclass for each part."""
 
 from dataclasses import dataclass, replace
 
@@ -42,19 +42,26 @@ from tankcal.job.tables import fingerprint, read_beside
 from tankcal.messages import message
 from tankcal.tank.rules.model import Rule
 
-# What lies beside job.toml or the workbook; the file of a mesh is not parsed here.
+# Files beside job.toml or the workbook. The geometry package parses the mesh.
 
-MAX_MESH_BYTES = 200_000_000
+MAX_MESH_BYTES = 200_000_000  # largest file of a mesh
 
 
 @dataclass(frozen=True)
 class Attached:
-    """What a job has beside its settings and tables; None: not there.
+    """Content of the files beside the settings and tables of a job.
 
-    covariance_m2  (3n, 3n) of its points
-    mesh           ((name, SHA-256, size), bytes)
-    rule           (Rule, (name, SHA-256, size) of its file, or None: it ships with tankcal)
-    radii_covariance_m2  (n, n) of its radii
+    Attributes
+    ----------
+    covariance_m2 : ndarray, shape (3n, 3n), or None
+        Covariance matrix of the n points, m2; None: not given.
+    mesh : tuple or None
+        ((name, SHA-256, size in bytes), content) of the mesh file; None: not given.
+    rule : tuple or None
+        (Rule, (name, SHA-256, size in bytes)); None in place of the second: the rule ships with
+        tankcal; None in place of the pair: no rule given.
+    radii_covariance_m2 : ndarray, shape (n, n), or None
+        Covariance matrix of the n radii, m2; None: not given.
     """
 
     covariance_m2: np.ndarray | None
@@ -64,15 +71,27 @@ class Attached:
 
     @property
     def files(self):
-        """(name, SHA-256, size) of each file that was read for it."""
+        """(name, SHA-256, size in bytes) of each of these files."""
         given = (self.mesh and self.mesh[0], self.rule and self.rule[1])
         return tuple(file for file in given if file)
 
 
 def read_mesh_file(folder, name, log):
-    """((name, SHA-256, size), bytes) of the file, or None after telling `log` what is wrong.
+    """Read the file of a mesh.
 
-    folder  Path that the job lies in; name  as checked by the field mesh.file: no path
+    Parameters
+    ----------
+    folder : Path
+        Folder of the job.
+    name : str
+        File name without a path, as checked by the field mesh.file.
+    log : Log
+        Receives the problems.
+
+    Returns
+    -------
+    tuple or None
+        ((name, SHA-256, size in bytes), content); None if the file cannot be used.
     """
     path = folder / name
     try:
@@ -96,24 +115,24 @@ def read_mesh_file(folder, name, log):
     return fingerprint(name, data), data
 
 
-# From checked rows to what a job declares about uncertainty, and what is assumed beside it.
+# Declared and assumed inputs of uncertainty.
 
 
 def inputs_of(values, tables):
-    """`DeclaredInput`s: the rows of uncertainty.csv, then the defaults in the order of INPUTS."""
+    """Inputs of uncertainty: declared rows, then assumed inputs in the order of INPUTS."""
     declared = _declared(tables["uncertainty"])
-    return (*declared, *_assumed(values, tables, {one.name for one in declared}))
+    return (*declared, *_assumed(values, tables, {item.name for item in declared}))
 
 
 def correlations_of(table):
-    """(name, name, r) of the rows of correlations.csv."""
+    """(name, name, correlation coefficient) of each row of correlations.csv."""
     if table is None:
         return ()
     return tuple(zip(*map(table.of, ("input", "with", "r")), strict=True))
 
 
 def stated_of(table):
-    """`StatedVolume`s of the rows of stated.csv."""
+    """`StatedVolume` of each row of stated.csv."""
     if table is None:
         return ()
     columns = map(table.of, ("high_m", "low_m", "volume_m3", "note"))
@@ -126,6 +145,7 @@ def stated_of(table):
 def _declared(table):
     if table is None:
         return ()
+    # A normal distribution of type B with infinite degrees of freedom is the default.
     columns = map(table.of, ("input", "unit", "type", "distribution", "dof", "note"))
     rows = zip(*columns, spreads(table), strict=True)
     return tuple(
@@ -144,23 +164,42 @@ def _declared(table):
 
 
 def _assumed(values, tables, declared):
-    """What is assumed of the inputs that bear on the job and are not declared."""
+    """Yield the assumed inputs that affect the job and are not declared."""
     useless = useless_inputs(values, tables, values["tank"]["kind"])
-    own_values = {"roof_mass": values["roof"]["mass_kg"]}
-    for name, known in INPUTS.items():
-        if known.assumption and name not in declared and name not in useless:
-            assumed = within(known.assumed_half_width(own_values.get(name)))
-            yield _input(name, assumed.u, known.unit, distribution=assumed.name, is_default=True)
+    values_of_job = {"roof_mass": values["roof"]["mass_kg"]}
+    for name, declarable in INPUTS.items():
+        if declarable.assumption and name not in declared and name not in useless:
+            assumed = within(declarable.assumed_half_width(values_of_job.get(name)))
+            yield _input(
+                name, assumed.u, declarable.unit, distribution=assumed.name, is_default=True
+            )
 
 
-def _input(name, u, unit, **more):
-    return DeclaredInput(name, float(u / INPUTS[name].per_si), unit, float(u), **more)
+def _input(name, u, unit, **details):
+    return DeclaredInput(name, float(u / INPUTS[name].per_si), unit, float(u), **details)
 
 
 def make_job(raw, values, tables, attached, measurements, warnings):
-    """The Job of values and tables without problems.
+    """Build the Job from values and tables without problems.
 
-    attached  attached.Attached        measurements  Measurements or None
+    Parameters
+    ----------
+    raw : RawJob
+        Job as read.
+    values : dict of {str: dict}
+        {section: {key: value}} of the settings.
+    tables : dict of {str: ColumnValues or None}
+        Tables by name.
+    attached : Attached
+        Files beside the settings.
+    measurements : Measurements or None
+        Survey to be adjusted.
+    warnings : tuple of Problem
+        Warnings of all checks.
+
+    Returns
+    -------
+    Job
     """
     kind, within_mm = values["tank"]["kind"], values["checks"]["diameter_within_mm"]
     points = _points(tables["points"], attached.covariance_m2)
@@ -191,7 +230,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
 
 
 def _inspection(given):
-    """What an inspection is to know; None: nothing was said of one."""
+    """`Inspection` of the section [inspection]; None if rule and yield stress are blank."""
     rule, strength = given["rule"], given["yield_mpa"]
     if rule is None and strength is None:
         return None
@@ -199,7 +238,19 @@ def _inspection(given):
 
 
 def make_frame(raw, values, tables, measurements, warnings, has_points=True):
-    """The Job without the parts of its tank: what can be made of a job that may not be whole."""
+    """Build the Job without the parts of the tank, also from an incomplete job.
+
+    Parameters
+    ----------
+    raw, values, tables, measurements, warnings
+        As for `make_job`.
+    has_points : bool, optional
+        True if the job has points or a survey.
+
+    Returns
+    -------
+    Job
+    """
     adjustment, kind = values["adjustment"], values["tank"]["kind"]
     return Job(
         tank=_tank(values["tank"]),
@@ -221,11 +272,12 @@ def make_frame(raw, values, tables, measurements, warnings, has_points=True):
 
 
 def _given(values):
+    """Items of a dict whose value is not None."""
     return {key: value for key, value in values.items() if value is not None}
 
 
 def _tank(values):
-    """The Tank; None where its name or kind is not known."""
+    """`Tank`; None if its name or kind is not given."""
     if values["id"] is None or values["kind"] is None:
         return None
     sizes = {name: value for name, value in values.items() if name.startswith("nominal_")}
@@ -241,14 +293,15 @@ def _survey(values):
     return Survey(**{**given, "side": values["side"] or "inside"}, pressure_pa=pressure)
 
 
-def _pascals(bar):
-    """None of nothing, and of 0."""
-    return 1e5 * bar if bar else None
+def _pascals(pressure_bar):
+    """Pressure in pascals; None if no pressure or zero was given."""
+    return 1e5 * pressure_bar if pressure_bar else None
 
 
 def _datum(values, kind, has_points):
     if kind is None and not _given(values):
         return None
+    # Without points, z counts from the inside bottom beneath the dip point.
     has_own_frame = kind in ("horizontal", "sphere") and not has_points
     return Datum(**{**values, "bottom_z_m": 0.0 if has_own_frame else values["bottom_z_m"]})
 
@@ -280,7 +333,7 @@ def _material(values):
 
 def _courses(tables):
     table, welds = tables["courses"], tables["welds"]
-    read = gauged(tables["thickness"]) if is_strapped(tables) else {}
+    gauge_means = gauged(tables["thickness"]) if is_strapped(tables) else {}
     if table is None:
         return ()
     azimuths = {}
@@ -292,7 +345,7 @@ def _courses(tables):
         Course(
             name,
             height_m,
-            *_plate(thickness_mm / 1000, (paint_mm or 0.0) / 1000, read.get(name)),
+            *_plate(thickness_mm / 1000, (paint_mm or 0.0) / 1000, gauge_means.get(name)),
             tuple(sorted(azimuths[name])) if name in azimuths else None,
         )
         for name, height_m, thickness_mm, paint_mm in zip(*columns, strict=True)
@@ -303,24 +356,24 @@ def _rings(tables):
     table = tables["rings"]
     if table is None:
         return ()
-    read = gauged(tables["thickness"])
+    gauge_means = gauged(tables["thickness"])
     columns = map(table.of, ("ring", "length_m", "thickness_mm", "paint_mm", "lap"))
     return tuple(
         Ring(
             name,
             length_m,
-            *_plate((thickness_mm or 0.0) / 1000, (paint_mm or 0.0) / 1000, read.get(name)),
+            *_plate((thickness_mm or 0.0) / 1000, (paint_mm or 0.0) / 1000, gauge_means.get(name)),
             lap,
         )
         for name, length_m, thickness_mm, paint_mm, lap in zip(*columns, strict=True)
     )
 
 
-def _plate(thickness_m, paint_m, read):
-    """Plate and paint of a course; the means of a gauge's readings (`gauged`) replace them."""
-    if read is None:
+def _plate(thickness_m, paint_m, gauge_mean):
+    """Thickness of plate and paint, m; gauge readings, averaged by `gauged`, take precedence."""
+    if gauge_mean is None:
         return thickness_m, paint_m
-    return read[0], paint_m if read[2] is None else read[2]
+    return gauge_mean[0], paint_m if gauge_mean[2] is None else gauge_mean[2]
 
 
 def _points(table, covariance):
@@ -352,7 +405,7 @@ def _bottom(values, table):
     if form == "liquid":
         level, volume, u = (_column(table, name) for name in ("level_m", "volume_m3", "u_m3"))
         return Bottom(form, level_m=level, volume_m3=volume, u_m3=u, rows=table.rows)
-    return Bottom(form, **{key: one for key, one in values["bottom"].items() if key != "form"})
+    return Bottom(form, **{key: value for key, value in values["bottom"].items() if key != "form"})
 
 
 def _top(values):
@@ -360,6 +413,7 @@ def _top(values):
 
 
 def _column(table, name, per_si=1):
+    """Column as an array (n,) in SI; None if the table has no such column."""
     return None if table.columns[name] is None else np.array(table.of(name)) / per_si
 
 
@@ -408,7 +462,7 @@ def _sphere(values):
     return Sphere(
         values["diameter_m"],
         (values["thickness_mm"] or 0.0) / 1000,
-        *(None if one is None else one / 1000 for one in lengths),
+        *(None if length is None else length / 1000 for length in lengths),
     )
 
 
@@ -417,7 +471,7 @@ def _ship(values):
     return Ship(
         tuple(sorted(values["trim_m"])),
         values["length_between_marks_m"],
-        tuple(sorted(float(np.radians(one)) for one in values["list_deg"])),
+        tuple(sorted(float(np.radians(angle)) for angle in values["list_deg"])),
         float(np.radians(BOW_DEG if bow is None else bow)),
         values["pipe_bottom_m"],
         values["pipe_top_m"],

@@ -1,4 +1,4 @@
-"""From the raw tables of a job to a checked `Job`, or to every problem that it has."""
+"""From the raw tables of a job to a checked `Job`, or to the list of all its problems."""
 
 from dataclasses import replace
 
@@ -48,9 +48,25 @@ from tankcal.messages import message
 
 
 def job_of(raw, log, is_whole=True):
-    """The checked Job of a RawJob; InputError with every problem that `log` has been told.
+    """Check a job as a whole and build it.
 
-    is_whole  False: the survey alone is needed
+    Parameters
+    ----------
+    raw : RawJob
+        Job as read.
+    log : Log
+        Contains the problems of reading; receives the problems of the checks.
+    is_whole : bool, optional
+        False: check only the survey, for an adjustment without a capacity table.
+
+    Returns
+    -------
+    Job
+
+    Raises
+    ------
+    InputError
+        With every problem in `log`.
     """
     registers = {name: read_register(raw, name, log) for name in REGISTERS}
     tables = _read_tables(raw, registers, is_whole, log)
@@ -67,57 +83,59 @@ def job_of(raw, log, is_whole=True):
     if not is_whole:
         frame = make_frame(raw, values, tables, measurements, tuple(log.warnings))
         return replace(frame, overrulings=overrulings)
-    made = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
-    found = _make_surveys(raw, values, tables, registers, attached)
-    return replace(made, overrulings=overrulings, **found)
+    job = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
+    surveys = _make_surveys(raw, values, tables, registers, attached)
+    return replace(job, overrulings=overrulings, **surveys)
 
 
 def _make_surveys(raw, values, tables, registers, attached):
-    """{part of a Job: what was measured} other than points, of the tables that it has.
+    """Measurements other than points, by the attributes of `Job`.
 
-    Each kind is imported where a job has it: most jobs have one, and all take long to load.
+    The modules are imported only if the job has the tables, because they load slowly.
     """
-    found = {}
+    surveys = {}
     if is_strapped(tables):
         from tankcal.job.strapping import make_strapping
 
-        found["strapping"] = make_strapping(values, tables, registers)
+        surveys["strapping"] = make_strapping(values, tables, registers)
     if has_lines(tables):
         from tankcal.job.lines import make_lines
 
-        found["lines"] = make_lines(tables, registers)
+        surveys["lines"] = make_lines(tables, registers)
     if has_hits(tables):
         from tankcal.job.hits import make_hits
 
-        found["hits"] = make_hits(tables, registers)
+        surveys["hits"] = make_hits(tables, registers)
     if has_tangents(tables):
         from tankcal.job.tangents import make_tangents
 
-        found["tangents"] = make_tangents(tables, registers)
+        surveys["tangents"] = make_tangents(tables, registers)
     if has_clouds(tables):
         from tankcal.job.clouds import make_clouds
 
-        found["clouds"] = make_clouds(values, tables, registers, raw)
+        surveys["clouds"] = make_clouds(values, tables, registers, raw)
     if is_metered(tables):
         from tankcal.job.liquid import make_metering
 
-        found["liquid"] = make_metering(values, tables, registers, raw)
+        surveys["liquid"] = make_metering(values, tables, registers, raw)
     if has_radii(tables):
         from tankcal.job.radii import make_radii
 
         radii, change = make_radii(values, tables, attached.radii_covariance_m2)
-        found |= {"radii": radii, "change": change}
+        surveys |= {"radii": radii, "change": change}
     if has_great_circles(tables):
         from tankcal.job.great_circles import make_great_circles
 
-        found["great_circles"] = make_great_circles(tables, registers)
-    return found
+        surveys["great_circles"] = make_great_circles(tables, registers)
+    return surveys
 
 
 def _read_tables(raw, registers, is_whole, log):
-    """{name: ColumnValues}, None for a table that is missing, cannot be read or does not belong.
+    """Read and check all tables.
 
-    A table of a survey that is there but empty is None, too. Clouds make a table, one row a file.
+    Returns {name: ColumnValues}, with None for a table that is missing, unreadable or not allowed
+    for the kind of tank, and for an empty table of a survey. The clouds form a table with one row
+    for each file.
     """
     kind = kind_of(raw)
     allowed = None if kind is None else TABLES_OF_KIND[kind] + LIQUID_TABLES
@@ -132,7 +150,8 @@ def _read_tables(raw, registers, is_whole, log):
     if kind in OF_CLOUDS:
         allowed += CLOUD_TABLES
     tables = {"clouds": _cloud_table(raw, registers, kind, log)}
-    looks = kind or ("horizontal" if raw.tables.get("rings") is not None else None)
+    # Without a valid kind, the table of rings indicates a lying cylinder.
+    assumed_kind = kind or ("horizontal" if raw.tables.get("rings") is not None else None)
     for name in TABLES:
         table = raw.tables.get(name)
         is_empty = table is None or not (table.rows or table.skipped)
@@ -144,21 +163,21 @@ def _read_tables(raw, registers, is_whole, log):
         if table is None or (is_empty and name not in TANK_TABLES):
             tables[name] = None
         else:
-            tables[name] = _as_upright(read_columns(name, table, log, kind=looks))
+            tables[name] = _as_upright(read_columns(name, table, log, kind=assumed_kind))
     if is_whole:
         _tell_missing_tables(raw, tables, kind, log)
     return tables
 
 
 def _as_upright(table):
-    """A table of a lying tank with the columns that an upright one has in their place."""
-    own = {name: table.columns[in_place] for name, in_place in IN_PLACE.items()
-           if in_place in table.columns and name not in table.columns}  # fmt: skip
-    return replace(table, columns=table.columns | own) if own else table
+    """Add to a table of a lying tank the columns that an upright tank has in their place."""
+    equivalents = {name: table.columns[equivalent] for name, equivalent in IN_PLACE.items()
+                   if equivalent in table.columns and name not in table.columns}  # fmt: skip
+    return replace(table, columns=table.columns | equivalents) if equivalents else table
 
 
 def _cloud_table(raw, registers, kind, log):
-    """ColumnValues of the clouds, one row each; None: there is none, or they do not belong."""
+    """ColumnValues of the clouds, one row each; None if absent or not allowed for the kind."""
     given, register = registers["clouds"], raw.registers.get("clouds")
     if register is None or not given:
         return None
@@ -166,12 +185,12 @@ def _cloud_table(raw, registers, kind, log):
         log.problem(register.file, not_for_this_kind(kind))
         return None
     rows = tuple(register.rows[name] for name in given)
-    columns = {"cloud": [*given], "file": [one["file"] for one in given.values()]}
+    columns = {"cloud": [*given], "file": [keys["file"] for keys in given.values()]}
     return ColumnValues(register.file, rows, 0, columns)
 
 
 def not_for_this_kind(kind):
-    """What is said of a table that a tank of a kind does not have."""
+    """Message about a table that a tank of this kind does not have."""
     return message(
         "not_for_this_kind", "not for a tank of kind {of_kind}; remove the table", of_kind=kind
     )
@@ -181,28 +200,29 @@ def _tell_missing_tables(raw, tables, kind, log):
     if kind == "vertical":
         _tell_sights_missing(raw, tables, log)
         _tell_clouds_missing(raw, tables, log)
+    # Any measurement of the shape of the wall replaces the points.
     for name in REQUIRED_TABLES.get(kind, ()):
-        measured = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
-        told = measured or is_metered(tables) or has_radii(tables)
-        elsewhere = name == "points" and (told or has_lines(tables))
-        if name in raw.tables or elsewhere:
+        has_readings = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
+        has_shape = has_readings or is_metered(tables) or has_radii(tables)
+        is_replaced = name == "points" and (has_shape or has_lines(tables))
+        if name in raw.tables or is_replaced:
             continue
         if name == "points" and "clouds" in raw.registers:
-            if raw.registers["clouds"] is not None:  # else it is told already
+            if raw.registers["clouds"] is not None:  # else reported already
                 log.problem(raw.registers["clouds"].file, _NO_CLOUD)
             continue
-        instead = [one for one in _IN_PLACE_OF_POINTS if one in raw.tables]
-        if name != "points" or not instead:
+        replacements = [table for table in _IN_PLACE_OF_POINTS if table in raw.tables]
+        if name != "points" or not replacements:
             log.problem(raw.file_of(name), _missing(raw, name))
-        elif raw.tables[instead[0]] is not None:  # else it is told already
-            log.problem(raw.tables[instead[0]].file, _IN_PLACE_OF_POINTS[instead[0]])
+        elif raw.tables[replacements[0]] is not None:  # else reported already
+            log.problem(raw.tables[replacements[0]].file, _IN_PLACE_OF_POINTS[replacements[0]])
 
 
 def _tell_sights_missing(raw, tables, log):
-    """Set-ups that name no target, beside an empty table of what was sighted from them, or none."""
-    elsewhere = has_rows(tables["points"]) or has_rows(tables["targets"]) or is_sighted(tables)
-    measured = has_survey(tables) or is_strapped(tables)  # without, the points are missing
-    if elsewhere or not measured or not has_rows(tables["setups"]):
+    """Report set-ups from which no target, wall point or limb was sighted."""
+    has_targets = has_rows(tables["points"]) or has_rows(tables["targets"]) or is_sighted(tables)
+    has_readings = has_survey(tables) or is_strapped(tables)  # otherwise reported as missing points
+    if has_targets or not has_readings or not has_rows(tables["setups"]):
         return
     sights = [name for name in ("wall_hits", "tangents") if name in raw.tables]
     for name in sights:
@@ -218,10 +238,10 @@ def _tell_sights_missing(raw, tables, log):
 
 
 def _tell_clouds_missing(raw, tables, log):
-    """An empty register of clouds, beside the survey that their targets belong to."""
-    elsewhere = has_rows(tables["points"]) or has_rows(tables["targets"]) or is_sighted(tables)
+    """Report an empty clouds.toml beside a survey without targets or other sights to the wall."""
+    has_targets = has_rows(tables["points"]) or has_rows(tables["targets"]) or is_sighted(tables)
     register = raw.registers.get("clouds")
-    if register is not None and has_survey(tables) and not register.entries and not elsewhere:
+    if register is not None and has_survey(tables) and not register.entries and not has_targets:
         log.problem(register.file, _NO_CLOUD)
 
 
@@ -261,7 +281,7 @@ def _missing(raw, name):
 
 
 def _attached(raw, values, tables, log):
-    """What lies beside the settings, None for what cannot be read; values: None: unreadable."""
+    """Read the files beside the settings; values is None if the settings are unreadable."""
     mesh = rule = None
     if values is not None:
         mesh, rule = values["mesh"]["file"], values["table"]["rule"]
@@ -274,7 +294,7 @@ def _attached(raw, values, tables, log):
 
 
 def _covariance(raw, points, log):
-    """The full covariance of the points, m2, or None: not given, or told to `log`."""
+    """Covariance matrix of the points, m2; None if not given or not usable."""
     if raw.covariance is None:
         return None
     if points is None:
@@ -296,11 +316,11 @@ def _covariance(raw, points, log):
 
 
 def _covariance_of_radii(raw, radii, log):
-    """The covariance of the radii, m2, or None: not given, or told to `log`."""
+    """Covariance matrix of the radii, m2; None if not given or not usable."""
     if raw.radii_covariance is None:
         return None
     if radii is None:
-        if "radii" not in raw.tables or raw.tables["radii"] is not None:  # else it is told already
+        if "radii" not in raw.tables or raw.tables["radii"] is not None:  # else reported already
             expected = message(
                 "covariance_without_radii",
                 "given without its radii; expected radii.csv beside it",

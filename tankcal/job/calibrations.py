@@ -1,4 +1,4 @@
-"""Calibrations of a camera without a job: a cameras.toml alone, with the checks of a job."""
+"""Camera calibrations without a job: read a cameras.toml alone, with the checks of a job."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,23 +17,29 @@ from tankcal.job.tables import Log, RawJob, nearest, read_bytes, shown
 from tankcal.messages import list_some, message
 
 CAMERAS_FILE = "cameras.toml"
+# Every key of [adjustment.camera], without a value.
 NO_SETTINGS = dict.fromkeys((*PARAMETER_KEYS, *SECOND_NAMES.values(), "default"))
 
 
 def read_cameras(path, warn=None, in_pixels=True):
-    """CameraSetup of each [cameras.NAME] of a cameras.toml, in the order of the file.
+    """Read the camera calibrations of a cameras.toml.
 
-    Its keys are those of a job's (docs/job-format.md), with the size of a pixel: format_px with
-    pixel_um, format_px with format_mm, or format_mm with pixel_um.
+    The keys are the same as in a job (docs/job-format.md). The size of a pixel is required:
+    format_px with pixel_um, format_px with format_mm, or format_mm with pixel_um.
 
     Parameters
     ----------
-    path
-        Of the file, or of a folder with a cameras.toml.
-    warn : optional
-        Called with a Problem for each thing that only deserves a look; None: not told.
-    in_pixels : optional
-        False: a format_mm alone will do, as for film.
+    path : str or PathLike
+        The file, or a folder with a cameras.toml.
+    warn : callable, optional
+        Called with each warning (a Problem); None: warnings are dropped.
+    in_pixels : bool, optional
+        False: format_mm alone is sufficient, as for film.
+
+    Returns
+    -------
+    tuple of CameraSetup
+        One for each [cameras.NAME], in the order of the file.
 
     Raises
     ------
@@ -52,34 +58,49 @@ def read_cameras(path, warn=None, in_pixels=True):
     log.stop_if_problems()
     values = _values(path, log, in_pixels)
     log.stop_if_problems()
-    for one in log.warnings if warn else ():
-        warn(one)
+    for warning in log.warnings if warn else ():
+        warn(warning)
     return tuple(
         make_camera(name, _with_frame(given), NO_SETTINGS) for name, given in values.items()
     )
 
 
 def with_pixels(setups, pixel_um):
-    """The CameraSetup of film with pixels of a size, to count in; None: as they are.
+    """Give the cameras with film a pixel size; the format is rounded to a whole number of pixels.
 
-    The format becomes a whole number of them.
+    pixel_um is the side of a pixel; None returns the cameras unchanged.
     """
     if pixel_um is None:
         return tuple(setups)
     pixel = np.full(2, pixel_um / 1000)
     return tuple(
-        replace(one, pixel_mm=pixel, format_mm=np.round(one.format_mm / pixel) * pixel)
-        if one.pixel_mm is None
-        else one
-        for one in setups
+        replace(setup, pixel_mm=pixel, format_mm=np.round(setup.format_mm / pixel) * pixel)
+        if setup.pixel_mm is None
+        else setup
+        for setup in setups
     )
 
 
 def choose(setups, names, file=CAMERAS_FILE):
-    """The CameraSetup of the names, in their order; without a name all, in that of `setups`.
+    """Select cameras by name.
 
-    file  what messages call the place where they stand
-    Raises InputError for names that are not there, or stand there twice.
+    Parameters
+    ----------
+    setups : sequence of CameraSetup
+        Cameras of the file.
+    names : sequence of str
+        Names in the order required; empty: all cameras, in the order of `setups`.
+    file : str, optional
+        Name of the file in messages.
+
+    Returns
+    -------
+    tuple of CameraSetup
+
+    Raises
+    ------
+    InputError
+        For unknown and repeated names.
     """
     known = [setup.camera.name for setup in setups]
     problems = []
@@ -110,7 +131,7 @@ def choose(setups, names, file=CAMERAS_FILE):
 
 
 def _values(path, log, in_pixels):
-    """{name: {key: value}} of the file; what is wrong goes to `log`."""
+    """{name: {key: value}} of the file; problems go to `log`."""
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     register = None if data is None else raw_register(path.name, data, log, "cameras")
     if register is None:
@@ -126,7 +147,7 @@ def _values(path, log, in_pixels):
 
 
 def _with_frame(given):
-    """The keys of a camera with its format in pixels, which the others say."""
+    """Add the format in pixels, computed from format_mm and pixel_um, to the keys of a camera."""
     if given["format_px"] is not None or given["pixel_um"] is None:
         return given
     pixels = np.array(given["format_mm"]) / np.broadcast_to(given["pixel_um"], 2) * 1000

@@ -1,9 +1,11 @@
-"""From the keys of a camera to network.Camera: values, form of the distortion, what is adjusted.
+"""From the keys of a camera to network.Camera: values, form of the distortion, adjusted parameters.
 
-scope and state   [adjustment.camera]: the parameter's own key, else `default` for the default
-                  set (c x0 y0 K1 K2 K3 P1 P2 and the affinity), else off
-sd 0              held at its value, whatever `default` says
-off               no unknown; the value given in cameras.toml, 0 where there is none, is kept
+The adjustment of a parameter follows from [adjustment.camera] and its standard deviation:
+
+scope and state   the key of the parameter; else `default`, for the default set (c x0 y0 K1 K2 K3
+                  P1 P2 and the affinity); else off
+sd 0              held at its value, whatever `default` states
+off               not an unknown; keeps the value of cameras.toml, or 0 without a value
 """
 
 from dataclasses import dataclass
@@ -22,31 +24,41 @@ from tankcal.job.contract.registers import (
 from tankcal.survey.measurements import CameraSetup
 from tankcal.survey.network.survey import DEFAULT_SCOPE, Camera
 
-# The points of a datum as they are written: P7, P7:xy.
+# Datum points as written in the settings: P7, P7:xy.
 
 AXES = "xyz"
 
 
 def datum_point(text):
-    """(name, axes) of a datum point such as P7 or P7:xy; axes "" where they make no sense."""
+    """(name, axes) of a datum point such as P7 or P7:xy; axes are "" if they are invalid."""
     name, colon, axes = text.rpartition(":")
     if not colon:
         return text, AXES
-    sound = axes and set(axes) <= set(AXES) and len(set(axes)) == len(axes)
-    return name.strip(), "".join(axis for axis in AXES if axis in axes) if sound else ""
+    is_valid = axes and set(axes) <= set(AXES) and len(set(axes)) == len(axes)
+    return name.strip(), "".join(axis for axis in AXES if axis in axes) if is_valid else ""
 
 
-ASSUMED_CONVENTION = "distortion_of_ideal"
+ASSUMED_CONVENTION = "distortion_of_ideal"  # sign convention if none is given
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of one camera as the job has it: key and value (None: not given) and more.
+    """One parameter of one camera, with its role in the adjustment.
 
-    key, sd_key   as given in cameras.toml, or as they would be
-    value, sd     None: not given
-    scope, state  what the adjustment does with it
-    is_own        whether a key of its own in [adjustment.camera] says so; setting is that key
+    Attributes
+    ----------
+    name : str
+        Name in camera.model.PARAMETERS.
+    key, sd_key : str
+        Keys of value and standard deviation in cameras.toml, whether given or not.
+    value, sd : float or None
+        None: not given.
+    scope, state : str
+        Role in the adjustment.
+    is_own : bool
+        True if the role is set by a key of its own in [adjustment.camera].
+    setting : str
+        Name of this key.
     """
 
     name: str
@@ -61,16 +73,25 @@ class Parameter:
 
 
 def parameters_of(given, settings):
-    """The 13 Parameter of a camera.
+    """Parameters of a camera.
 
-    given     {key: value} of cameras.toml     settings  {key: value} of [adjustment.camera]
+    Parameters
+    ----------
+    given : dict
+        {key: value} of cameras.toml.
+    settings : dict
+        {key: value} of [adjustment.camera].
+
+    Returns
+    -------
+    list of Parameter, length 13
     """
     given = at_focus(given)
     return [_parameter(name, given, settings) for name in PARAMETERS]
 
 
 def focus_keys():
-    """Keys of the focus calibrations: the distances, then K1, K2, K3."""
+    """Keys of the calibrations at two focus distances: the distances, then K1, K2, K3."""
     return tuple(
         f"{FOCUS_CALIBRATIONS}.{key}"
         for key in ("distance_m", *(PARAMETER_KEYS[name][0] for name in RADIAL))
@@ -78,20 +99,21 @@ def focus_keys():
 
 
 def lens_of(given):
-    """The focus.Lens of a camera {key: value}; None where its keys do not make one."""
+    """`Lens` of the keys of a camera; None if they do not determine a lens."""
     distances, *radial = (given[key] for key in focus_keys())
     focal, focus = given["lens_focal_length_mm"], given["focus_m"]
-    whole = None not in (distances, focal, focus) and any(radial)
-    if not whole or any(len(one) != 2 for one in (distances, *filter(None, radial))):
+    is_complete = None not in (distances, focal, focus) and any(radial)
+    if not is_complete or any(len(pair) != 2 for pair in (distances, *filter(None, radial))):
         return None
+    # Equal distances determine no slope; an object within the focal length has no image.
     if distances[0] == distances[1] or min(*distances, focus) * 1000 <= focal:
         return None
-    pairs = [one or (0.0, 0.0) for one in radial]
+    pairs = [pair or (0.0, 0.0) for pair in radial]
     return Lens(focal, 1000 * focus, 1000 * np.array(distances), np.array(pairs).T)
 
 
 def at_focus(given):
-    """The keys of a camera, with K1, K2, K3 for its focus where a Lens tells them."""
+    """Keys of a camera, with K1, K2, K3 at its focus where two calibrations determine them."""
     lens = lens_of(given)
     if lens is None:
         return given
@@ -101,40 +123,51 @@ def at_focus(given):
 
 def _parameter(name, given, settings):
     key, key_of_sd, setting = PARAMETER_KEYS[name][0], sd_key(name), name
-    second = SECOND_NAMES.get(name)
-    if second is not None and given[key] is None and given[second] is not None:
-        key = second
-    if second is not None and given[key_of_sd] is None:
-        key_of_sd = sd_key(second)
-    if second is not None and settings[setting] is None and settings[second] is not None:
-        setting = second
-    own, default = settings[setting], settings["default"] or "camera free"
-    if own is None and DEFAULT_SCOPE[PARAMETERS.index(name)] == "off":
+    # Several parameters have a second name; use it if only the second name is filled in.
+    alias = SECOND_NAMES.get(name)
+    if alias is not None and given[key] is None and given[alias] is not None:
+        key = alias
+    if alias is not None and given[key_of_sd] is None:
+        key_of_sd = sd_key(alias)
+    if alias is not None and settings[setting] is None and settings[alias] is not None:
+        setting = alias
+    own_setting, default = settings[setting], settings["default"] or "camera free"
+    # `default` applies to the default set of parameters only.
+    if own_setting is None and DEFAULT_SCOPE[PARAMETERS.index(name)] == "off":
         default = "off"
-    scope, _, state = (own or default).partition(" ")
+    scope, _, state = (own_setting or default).partition(" ")
     sd = given[key_of_sd]
     if sd == 0 and scope != "off":
         state = "fixed"
     return Parameter(
-        name, key, key_of_sd, given[key], sd, scope, state or "free", own is not None, setting
+        name,
+        key,
+        key_of_sd,
+        given[key],
+        sd,
+        scope,
+        state or "free",
+        own_setting is not None,
+        setting,
     )
 
 
 def is_adjusted(parameter):
-    """Is it an unknown of the adjustment?"""
+    """Return True if the parameter is an unknown of the adjustment."""
     return parameter.scope != "off" and parameter.state != "fixed"
 
 
 def affinity_of(given):
-    """Name of the form of the affinity: as named, by itself or by its author, else b1_b2."""
+    """Form of the affinity, given by its name or by its author; default b1_b2."""
     name = given["affinity"] or "b1_b2"
     return AFFINITIES_BY_AUTHOR.get(name, name)
 
 
 def format_of(given):
-    """(format_mm, pixel_mm) of a camera, pairs; None where the keys do not say it.
+    """(format_mm, pixel_mm) of a camera, each (2,); None for a size that the keys do not determine.
 
-    With all three keys format_mm is that of the pixels: it is where their middle is.
+    If format_mm, format_px and pixel_um are all given, the format follows from the pixels, because
+    the image coordinates refer to the centre of the pixel array.
     """
     pixel = _pair(given["pixel_um"], 1e-3)
     size_mm, size_px = _pair(given["format_mm"]), _pair(given["format_px"])
@@ -146,12 +179,28 @@ def format_of(given):
 
 
 def _pair(values, factor=1.0):
-    """(2,) of two numbers, or of one that stands for both."""
+    """Array (2,) of two numbers, or of a single number for both axes."""
     return None if values is None else factor * np.array([*values, *values][:2], dtype=float)
 
 
 def make_camera(name, given, settings, weights="measured"):
-    """CameraSetup of a checked camera; `weights` as `camera.Form` has them."""
+    """Build the CameraSetup of a checked camera.
+
+    Parameters
+    ----------
+    name : str
+        Name of the camera.
+    given : dict
+        {key: value} of cameras.toml.
+    settings : dict
+        {key: value} of [adjustment.camera].
+    weights : str, optional
+        Weights of image coordinates, as in `camera.model.Form`.
+
+    Returns
+    -------
+    CameraSetup
+    """
     parameters = parameters_of(given, settings)
     form = Form(
         convention=given["convention"] or ASSUMED_CONVENTION,
@@ -173,17 +222,31 @@ def make_camera(name, given, settings, weights="measured"):
 
 
 def _role(parameter):
-    """(scope, state) for network.Camera, which drops what is off: a value that is kept is fixed."""
+    """(scope, state) for network.Camera.
+
+    network.Camera drops parameters that are off, so a nonzero value that is kept becomes fixed.
+    """
     if parameter.scope == "off" and parameter.value:
         return "camera", "fixed"
     return parameter.scope, parameter.state
 
 
 def image_frames(table, photos, cameras):
-    """(n, 2) format and (n, 2) pixel, mm, for each row of image_points; nan where not known.
+    """Format and pixel size of the camera of each image point.
 
-    table, photos  ColumnValues of image_points and photos, or photos None
-    cameras        {name: {key: value}}
+    Parameters
+    ----------
+    table : ColumnValues
+        image_points, n rows.
+    photos : ColumnValues or None
+        photos.
+    cameras : dict
+        {name: {key: value}} of cameras.toml.
+
+    Returns
+    -------
+    size_mm, pixel_mm : ndarray, shape (n, 2)
+        nan where not known.
     """
     frames = {None: np.full(4, np.nan)}
     if photos is not None:
@@ -191,21 +254,35 @@ def image_frames(table, photos, cameras):
             frames[photo] = _frame(cameras.get(camera))
     names = [name if name in frames else None for name in table.of("photo")]
     places = {name: place for place, name in enumerate(frames)}
-    both = np.array(list(frames.values()))[[places[name] for name in names]]
-    return both[:, :2], both[:, 2:]
+    frame_of_rows = np.array(list(frames.values()))[[places[name] for name in names]]
+    return frame_of_rows[:, :2], frame_of_rows[:, 2:]
 
 
 def _frame(given):
+    """Format and pixel size of a camera, mm, as an array (4,); nan where not known."""
     size, pixel = (None, None) if given is None else format_of(given)
-    return np.concatenate([np.full(2, np.nan) if two is None else two for two in (size, pixel)])
+    return np.concatenate([np.full(2, np.nan) if pair is None else pair for pair in (size, pixel)])
 
 
 def image_coordinates(table, size_mm, pixel_mm):
-    """(n, 2) image coordinates, mm, x to the right and y up from the middle of the format.
+    """Image coordinates from coordinates in millimetres or in pixels.
 
-    The centre of the first pixel is column 0, line 0:
+    x points to the right and y upwards, from the centre of the format. The centre of the first
+    pixel is column 0, line 0:
 
         x = (column - (columns - 1) / 2) pixel      y = -(line - (lines - 1) / 2) pixel
+
+    Parameters
+    ----------
+    table : ColumnValues
+        image_points, n rows.
+    size_mm, pixel_mm : ndarray, shape (n, 2)
+        Format and pixel size, mm.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Image coordinates, mm.
     """
     middle = (np.round(size_mm / pixel_mm) - 1) / 2
     in_mm = np.column_stack([table.numbers("x_mm"), table.numbers("y_mm")])

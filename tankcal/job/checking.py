@@ -1,39 +1,51 @@
-"""What the checks of all tables share: how they tell, and what they ask of a table or a setting."""
+"""Shared parts of the checks of all tables: messages, and questions about a table or a setting."""
 
 import numpy as np
 
 from tankcal.job.fields import is_blank
 from tankcal.messages import message
 
-RELATIVE_DENSITY = 20  # smaller numbers are no densities in kg/m3
-UNIT_FACTOR = 5  # sizes that differ by more cannot be in the same unit
+RELATIVE_DENSITY = 20  # a smaller number is a relative density or g/cm3, not kg/m3
+UNIT_FACTOR = 5  # largest ratio of two sizes in the same unit
 
 
 def settings_place(raw, section, key):
-    """(file, row, name) of a setting, for a message about it."""
+    """(file, row, name) of a setting, for messages."""
     value = raw.settings.get(section, {}).get(key)
     return raw.settings_file, value.row if value else None, f"{section}.{key}"
 
 
-def tell(to, raw, section, key, expected):
-    """Tell log.problem or log.warning about one setting, with its file and row."""
+def tell(report, raw, section, key, expected):
+    """Report on one setting, with its file and row.
+
+    Parameters
+    ----------
+    to : callable
+        log.problem or log.warning.
+    raw : RawJob
+        Job as read.
+    section, key : str
+        Section and key of the setting.
+    expected : Message or str
+        Text of the report.
+    """
     file, row, name = settings_place(raw, section, key)
-    to(file, expected, row, name)
+    report(file, expected, row, name)
 
 
 def is_not_given(raw, section, key):
-    """Is the key missing or blank? A value that is bad counts as given: it is told already."""
+    """Return True if the key is missing or blank; an invalid value counts as given."""
     value = raw.settings.get(section, {}).get(key)
     return value is None or is_blank(value.raw)
 
 
 def has_rows(table):
-    """Does the table exist, with at least one row, be it readable or not?"""
+    """Return True if the table has at least one row, readable or not."""
     return table is not None and not table.is_empty
 
 
 def refuse_repeated(table, column, log):
-    """A problem for each name that stands in the table a second time."""
+    """Report each name that occurs in the column a second time."""
     first_row = {}
     for row, name in zip(table.rows, table.of(column), strict=True):
         if name is None:
@@ -45,7 +57,7 @@ def refuse_repeated(table, column, log):
 
 
 def name_twice(name, first_row):
-    """What is said of a name that stands in a table a second time."""
+    """Message about a name that occurs in a table a second time."""
     return message(
         "name_twice",
         "{name!r} is already in row {first_row}; expected once",
@@ -55,9 +67,16 @@ def name_twice(name, first_row):
 
 
 def tell_missing(log, file, table, column):
-    """One problem for a table or a register that is not there, however many columns refer to it.
+    """Report a missing table or register once, however many columns refer to it.
 
-    table, column  of one of those that do
+    Parameters
+    ----------
+    log : Log
+        Receives the problem.
+    file : str
+        Name of the missing file.
+    table, column : str
+        A column that refers to its entries.
     """
     if log.has(file, None, None):
         return
@@ -71,7 +90,7 @@ def tell_missing(log, file, table, column):
 
 
 def course_heights(courses):
-    """Heights of all courses, m; None where one is missing, bad or unreadable."""
+    """Heights of all courses, m; None if a height is missing, invalid or unreadable."""
     if courses is None or courses.skipped:
         return None
     heights = courses.of("height_m")
@@ -79,12 +98,12 @@ def course_heights(courses):
 
 
 def missing_beside(other):
-    """What is said of a key that has to be given where another one is."""
+    """Message about a key that is required together with another key."""
     return message("missing_beside", "missing; expected together with {other}", other=other)
 
 
 def temperature_missing():
-    """What is said of a tape that expands from a temperature that nobody gives."""
+    """Message about a tape with an expansion coefficient but no certificate temperature."""
     return message(
         "certified_temperature_missing",
         "missing, but expansion_per_k is given; expected the temperature of the certificate",
@@ -92,7 +111,7 @@ def temperature_missing():
 
 
 def same_parameter(other):
-    """What is said of a key that stands beside another name of the same parameter."""
+    """Message about two keys that are names of the same parameter."""
     return message(
         "same_parameter",
         "given together with {other}; expected only one of them: they are the same parameter",
@@ -101,7 +120,7 @@ def same_parameter(other):
 
 
 def tiny_sd(unit, largest):
-    """What is said of standard deviations of which the largest is tiny in their unit."""
+    """Message about standard deviations whose largest value is tiny in the unit given."""
     if unit == "mm":
         template = "at most {largest:g}; expected millimetres: is it in metres?"
         return message("tiny_sd_mm", template, largest=largest)
@@ -113,14 +132,14 @@ def tiny_sd(unit, largest):
 
 
 def loads_the_shell(values):
-    """Is the table to be made for a shell that the liquid stretches?"""
+    """Return True if the table requires the expansion of the shell under liquid head."""
     table = values["table"]
-    asked = (table["liquid_density_kg_m3"] or 0) > 0 or table["other_densities_kg_m3"]
-    return bool(asked) and values["corrections"]["head"] is not False
+    has_liquid = (table["liquid_density_kg_m3"] or 0) > 0 or table["other_densities_kg_m3"]
+    return bool(has_liquid) and values["corrections"]["head"] is not False
 
 
 def loads_sphere(values):
-    """Does anything widen a sphere: pressure or liquid, of the table or of the survey day?"""
+    """Return True if pressure or liquid, of the table or of the survey day, expands the sphere."""
     table, survey = values["table"], values["survey"]
     liquid = (survey["liquid_density_kg_m3"] or 0) * (survey["liquid_level_m"] or 0)
     loads = (table["pressure_bar"], survey["pressure_bar"], liquid, loads_the_shell(values))
@@ -128,12 +147,12 @@ def loads_sphere(values):
 
 
 def zero_z(values):
-    """z of the table's zero in the frame of the points, m, or None: not known."""
+    """z of the zero of the table in the frame of the points, m; None if not known."""
     plate = values["datum"]["dip_plate_z_m"]
     return values["datum"]["bottom_z_m"] if plate is None else plate
 
 
 def places_of(table):
-    """(n, 3) coordinates of the rows of a table that have all three."""
+    """Coordinates, shape (n, 3), m, of the rows that have all three."""
     places = zip(table.of("x_m"), table.of("y_m"), table.of("z_m"), strict=True)
     return np.array([place for place in places if None not in place]).reshape(-1, 3)

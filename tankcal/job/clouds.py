@@ -1,4 +1,4 @@
-"""From the checked clouds.toml and scan_targets.csv to `Clouds`, all in SI."""
+"""From the checked clouds.toml and scan_targets.csv to `Clouds`, in SI."""
 
 import numpy as np
 
@@ -14,31 +14,31 @@ from tankcal.survey.scans import KnownTargets, ScanSetup, ScanTarget
 from tankcal.survey.wall_hits import RangingInstrument
 
 AXES = "xyz"
-SCANNER = "scanner"  # the name of one that has none
+SCANNER = "scanner"  # name of a scanner without a name
 
 
 def make_clouds(values, tables, registers, raw):
-    """Clouds of a job without problems."""
+    """Build `Clouds` from the values, tables and registers of a job without problems."""
     given = registers["clouds"]
     files, scans, sides, tools = [], [], [], {}
-    for name, one in given.items():
-        header = tankcal.clouds.describe_cloud(raw.folder / one["file"])
-        unit = unit_of(one)
+    for name, keys in given.items():
+        header = tankcal.clouds.describe_cloud(raw.folder / keys["file"])
+        unit = unit_of(keys)
         files.append(
             CloudFile(
                 name,
-                one["file"],
+                keys["file"],
                 header,
                 unit,
                 len(scans),
-                np.array(one["leave_out"] or [], dtype=float).reshape(-1, 6),
-                one["time"],
+                np.array(keys["leave_out"] or [], dtype=float).reshape(-1, 6),
+                keys["time"],
             )
         )
-        scanner = one["scanner"] or SCANNER
-        tools.setdefault(scanner, _tool(scanner, one))
-        scans += _scans(name, one, header, unit, scanner)
-        side = one["side"] or values["survey"]["side"] or "inside"
+        scanner = keys["scanner"] or SCANNER
+        tools.setdefault(scanner, _tool(scanner, keys))
+        scans += _scans(name, keys, header, unit, scanner)
+        side = keys["side"] or values["survey"]["side"] or "inside"
         sides += [side] * len(header.scans)
     targets = tables["scan_targets"]
     return Clouds(
@@ -52,9 +52,9 @@ def make_clouds(values, tables, registers, raw):
 
 
 def _tool(name, given):
-    """(RangingInstrument, whether its offset is assumed, whether its scale is)."""
+    """(RangingInstrument, is its offset assumed, is its scale assumed)."""
     offset, scale, bias = (given[key] for key in ("u_offset_mm", "u_scale_ppm", "u_incidence_mm"))
-    tool = RangingInstrument(
+    instrument = RangingInstrument(
         name,
         correction=(given["scale_ppm"] or 0.0) / 1e6,
         correction_m=(given["offset_mm"] or 0.0) / 1000,
@@ -65,16 +65,17 @@ def _tool(name, given):
         u_incidence_m=(USUAL_INCIDENCE_MM if bias is None else bias) / 1000,
         certificate=given["certificate"] or "",
     )
-    return tool, offset is None, scale is None
+    return instrument, offset is None, scale is None
 
 
 def _scans(name, given, header, unit_m, scanner):
-    stood = unit_m * np.array(given["scanner_xyz"] or (0.0, 0.0, 0.0))
-    mm, arcsec = (given[key] for key in ("s_translation_mm", "s_rotation_arcsec"))
+    """`ScanSetup` of each scan of a file; pose and standard deviations in SI."""
+    scanner_xyz_m = unit_m * np.array(given["scanner_xyz"] or (0.0, 0.0, 0.0))
+    shift_mm, turn_arcsec = (given[key] for key in ("s_translation_mm", "s_rotation_arcsec"))
     assumes = given["assume"] is not None
     if assumes:
-        mm = ASSUMED["s_translation_mm"] if mm is None else mm
-        arcsec = ASSUMED["s_rotation_arcsec"] if arcsec is None else arcsec
+        shift_mm = ASSUMED["s_translation_mm"] if shift_mm is None else shift_mm
+        turn_arcsec = ASSUMED["s_rotation_arcsec"] if turn_arcsec is None else turn_arcsec
     missing = given["s_translation_mm"] is None or given["s_rotation_arcsec"] is None
     return [
         ScanSetup(
@@ -82,9 +83,9 @@ def _scans(name, given, header, unit_m, scanner):
             scanner,
             given["surface"] or "",
             pose,
-            stood,
-            np.nan if mm is None else mm / 1000,
-            np.nan if arcsec is None else arcsec * ARCSEC,
+            scanner_xyz_m,
+            np.nan if shift_mm is None else shift_mm / 1000,
+            np.nan if turn_arcsec is None else turn_arcsec * ARCSEC,
             is_assumed=assumes and missing,
         )
         for scan, pose in zip(scans_of(name, header), poses_of(given, header, unit_m), strict=True)
@@ -101,12 +102,12 @@ def _targets(table):
 
 
 def _control(table):
-    """Control points as they were handed in, each by itself; those without an sd are left out."""
+    """`KnownTargets` of uncorrelated control points with all sds and without a local system."""
     if not has_rows(table):
         return KnownTargets()
     xyz = np.column_stack([table.numbers(f"{axis}_m") for axis in AXES])
     sd = np.column_stack([table.numbers(f"s{axis}_mm") for axis in AXES]) / 1000
-    own = np.array([system is None for system in table.of("system")])
-    own &= ~np.isnan(np.hstack([xyz, sd])).any(axis=1)
-    names = tuple(name for name, kept in zip(table.of("point"), own, strict=True) if kept)
-    return KnownTargets(names, xyz[own], np.diag(sd[own].ravel() ** 2))
+    is_used = np.array([system is None for system in table.of("system")])
+    is_used &= ~np.isnan(np.hstack([xyz, sd])).any(axis=1)
+    names = tuple(name for name, keep in zip(table.of("point"), is_used, strict=True) if keep)
+    return KnownTargets(names, xyz[is_used], np.diag(sd[is_used].ravel() ** 2))

@@ -1,8 +1,8 @@
-"""points_cov.npz and radii_cov.npz: full covariance matrices, read with care.
+"""Full covariance matrices in points_cov.npz and radii_cov.npz, read without unpickling.
 
-An archive holds `covariance_m2`, m2, and the names that it is of, in their order: of points (3n,
-3n), x, y, z of each point of points.csv, and `points` (n,); of radii (n, n), and `courses` (n,).
-Nothing in it is ever unpickled.
+An archive contains `covariance_m2`, m2, and names in the order of the matrix. For points:
+`covariance_m2` (3n, 3n) with x, y, z of each point of points.csv, and `points` (n,). For radii:
+`covariance_m2` (n, n) and `courses` (n,).
 """
 
 import io
@@ -15,14 +15,26 @@ import numpy as np
 from tankcal.job.tables import COVARIANCE_FILE, RADII_COVARIANCE_FILE, shown
 from tankcal.messages import message
 
-MAX_POINTS = 2500  # the matrix is 450 MB then
-TOLERANCE = 1e-8  # of a correlation
+MAX_POINTS = 2500  # largest number of points; the matrix has 450 MB
+TOLERANCE = 1e-8  # rounding of a correlation coefficient
 _MATRIX = "covariance_m2"
 
 
 @dataclass(frozen=True)
 class Archive:
-    """A file with a covariance: its name, the array of names, their table, rows of each."""
+    """Format of a file with a covariance matrix.
+
+    Attributes
+    ----------
+    file : str
+        Name of the file.
+    names : str
+        Name of the array of names.
+    table : str
+        Name of the table with these names.
+    each : int
+        Rows of the matrix for each name.
+    """
 
     file: str
     names: str
@@ -35,7 +47,24 @@ OF_RADII = Archive(RADII_COVARIANCE_FILE, "courses", "radii.csv", 1)
 
 
 def read_covariance(data, names, log, archive=OF_POINTS):
-    """The covariance in m2 of the points or courses called `names`, or None after telling `log`."""
+    """Read a covariance matrix and check it.
+
+    Parameters
+    ----------
+    data : bytes
+        Content of the archive.
+    names : sequence of str or None
+        Names of points or courses; None for an invalid name, which is not compared.
+    log : Log
+        Receives the problems.
+    archive : Archive, optional
+        OF_POINTS or OF_RADII.
+
+    Returns
+    -------
+    ndarray or None
+        Symmetric matrix, m2; None if it cannot be used.
+    """
     if len(names) > MAX_POINTS:
         expected = message(
             "covariance_too_many",
@@ -67,6 +96,7 @@ def read_covariance(data, names, log, archive=OF_POINTS):
 
 
 def _other_shape(matrix, size, archive):
+    """Message about a matrix of another shape or type."""
     given = {
         "name": matrix.dtype.name,
         "shape": str(matrix.shape),
@@ -89,9 +119,9 @@ def _other_shape(matrix, size, archive):
 
 
 def _load(data, n, log, archive):
-    """The two arrays, after a look at what they would unpack to."""
+    """Read the two arrays; their unpacked size is checked first. None if unreadable."""
     largest = 8 * (3 * n) ** 2 + 64 * 4 * n + 100_000  # matrix, names of 64 characters, headers
-    wanted = (_MATRIX, archive.names)
+    required = (_MATRIX, archive.names)
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as zipped:
             unpacked = sum(member.file_size for member in zipped.infolist())
@@ -105,7 +135,7 @@ def _load(data, n, log, archive):
             log.problem(archive.file, expected, None, _MATRIX)
             return None
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            missing = [name for name in wanted if name not in arrays.files]
+            missing = [name for name in required if name not in arrays.files]
             for name in missing:
                 log.problem(
                     archive.file,
@@ -114,7 +144,7 @@ def _load(data, n, log, archive):
                     name,
                 )
             if not missing:
-                return {name: arrays[name] for name in wanted}
+                return {name: arrays[name] for name in required}
     except (ValueError, OSError, EOFError, KeyError, TypeError, SyntaxError, MemoryError):
         _tell_damaged(log, archive)
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OverflowError):
@@ -132,28 +162,30 @@ def _tell_damaged(log, archive):
     log.problem(archive.file, expected)
 
 
-def _complaint_about_names(found, names, archive):
-    if found.dtype.kind != "U" or found.shape != (len(names),):
+def _complaint_about_names(given_names, names, archive):
+    """Message about names that differ from the table; None if they agree."""
+    if given_names.dtype.kind != "U" or given_names.shape != (len(names),):
         return message(
             "covariance_names",
             "expected the {count} names of {table} as text, in its order",
             count=len(names),
             table=archive.table,
         )
-    for position, (one, other) in enumerate(zip(found.tolist(), names, strict=True), 1):
-        if other is not None and one != other:
+    for position, (given, name) in enumerate(zip(given_names.tolist(), names, strict=True), 1):
+        if name is not None and given != name:
             return message(
                 "covariance_other_name",
                 "name {position} is {found}; expected {wanted} as in {table}",
                 position=position,
-                found=shown(one),
-                wanted=shown(other),
+                found=shown(given),
+                wanted=shown(name),
                 table=archive.table,
             )
     return None
 
 
 def _complaint_about_matrix(matrix):
+    """Message about a matrix that is not a covariance matrix; None if it is."""
     if not np.all(np.isfinite(matrix)):
         return message(
             "covariance_infinite", "holds NaN or infinite values; expected finite numbers"
@@ -167,11 +199,13 @@ def _complaint_about_matrix(matrix):
             low=variance.min(),
             high=variance.max(),
         )
+    # Judge correlations in place of covariances, so that the tolerance has no unit.
     sd = np.sqrt(variance)
     scale = np.where(sd > 0, sd, 1.0)
     correlation = matrix / scale[:, None] / scale[None, :]
     if np.any(np.abs(correlation - correlation.T) > TOLERANCE):
         return message("covariance_not_symmetric", "is not symmetric; expected a covariance matrix")
+    # n times the tolerance shifts the eigenvalues by more than the rounding of the file.
     try:
         np.linalg.cholesky(correlation + TOLERANCE * len(matrix) * np.eye(len(matrix)))
     except np.linalg.LinAlgError:

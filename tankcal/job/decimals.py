@@ -1,7 +1,8 @@
-"""The decimal mark of a CSV file of a job, by its numbers.
+"""Decimal mark of the numbers in a CSV file of a job.
 
-A number such as 12,5 or 0.125 has one meaning. 1,234 and 1.234 have two, with a decimal mark or
-with one between thousands: the other numbers of the file, or [csv] in job.toml, decide.
+A number such as 12,5 or 0.125 has one meaning. The numbers 1,234 and 1.234 have two meanings: the
+mark may be a decimal mark or separate thousands. The other numbers of the file, or [csv] in
+job.toml, decide.
 """
 
 import re
@@ -15,7 +16,7 @@ _TWO_MEANINGS = re.compile(r"[+-]?[1-9][0-9]{0,2}[.,][0-9]{3}")
 
 
 def has_two_meanings(text):
-    """Whether a number may have a decimal mark or a mark between thousands.
+    """Return True if the mark of a number may be a decimal mark or separate thousands.
 
     Examples
     --------
@@ -26,10 +27,23 @@ def has_two_meanings(text):
 
 
 def settle_decimal(table, fields, log):
-    """The decimal mark of the numbers in a Table of a CSV file; None in a workbook.
+    """Determine the decimal mark of the numbers in a table; None for a table of a workbook.
 
-    The marks of numbers with one meaning decide; without any, or with both, the mark that [csv]
-    declares. A number with two meanings that neither decides is one problem for the file.
+    The numbers with one meaning decide if they all have the same mark. Otherwise the mark declared
+    in [csv] applies. A number with two meanings that neither decides is one problem for the file.
+
+    Parameters
+    ----------
+    table : Table
+        Table as read.
+    fields : sequence of Field
+        Columns of the table.
+    log : Log
+        Receives the problem.
+
+    Returns
+    -------
+    str or None
     """
     if table.decimal is None:
         return None
@@ -41,10 +55,10 @@ def settle_decimal(table, fields, log):
     marks = _marks_of(table, [place for place, _ in places])
     if len(marks) == 1:
         return marks.pop()
-    usual = "." if table.decimal == NOT_KNOWN else table.decimal
+    default = "." if table.decimal == NOT_KNOWN else table.decimal
     doubtful = _first_in_doubt(table, places, marks)
     if doubtful is None:
-        return usual
+        return default
     text, row, column = doubtful
     plain = text.replace(",", ".")
     found = {"found": shown(text), "small": plain, "large": plain.replace(".", "")}
@@ -68,7 +82,7 @@ def settle_decimal(table, fields, log):
 
 
 def _marks_of(table, places):
-    """The decimal marks of the numbers with one meaning."""
+    """Set of the decimal marks of numbers with one meaning."""
     marks = set()
     for place in places:
         cells = {row[place] for row in table.rows}
@@ -79,6 +93,7 @@ def _marks_of(table, places):
 
 
 def _shows(cell, mark):
+    """Return True if the cell is a number with one meaning and this decimal mark."""
     text = cell.strip(" \t")
     if len(text) > MAX_NAME or text.count(",") + text.count(".") != 1 or has_two_meanings(text):
         return False
@@ -86,9 +101,9 @@ def _shows(cell, mark):
 
 
 def _first_in_doubt(table, places, marks):
-    """(text, row, column) of the first number that no mark decides, or None.
+    """(text, row, column) of the first number whose meaning is not decided, or None.
 
-    Where both marks occur in numbers with one meaning, each other number is refused by itself.
+    If both marks occur in numbers with one meaning, `read_value` refuses each other number.
     """
     if marks and table.decimal != NOT_KNOWN:
         return None

@@ -1,4 +1,4 @@
-"""From raw tables to values: each key and cell is read as its `Field` says, or told to the log."""
+"""From raw tables to values: each key and cell is read according to its `Field`."""
 
 import re
 from dataclasses import dataclass, replace
@@ -19,10 +19,20 @@ from tankcal.text.numerals import NUMBER
 
 @dataclass(frozen=True)
 class ColumnValues:
-    """The columns of one table, in the order of its rows; a value that is blank or bad is None.
+    """Columns of one table, in the order of its rows; a blank or invalid value is None.
 
-    A column that the table lacks, or that is blank in every row, is None as a whole. `skipped` rows
-    of the file are missing here, for they could not be read.
+    A column that is missing or blank in every row is None as a whole.
+
+    Attributes
+    ----------
+    file : str
+        File or sheet of the table.
+    rows : tuple of int
+        Row of each entry in the file.
+    skipped : int
+        Number of rows that could not be read, which are missing here.
+    columns : dict of {str: list or None}
+        Values of each column.
     """
 
     file: str
@@ -31,23 +41,35 @@ class ColumnValues:
     columns: dict[str, list | None]
 
     def of(self, name):
-        """The values of a column; a list of None when the column is not given."""
+        """Values of a column; a list of None if the column is missing or blank."""
         return self.columns[name] or [None] * len(self.rows)
 
     def numbers(self, name):
-        """(n,) the values of a column of numbers, nan where there is none."""
+        """Values of a numeric column, shape (n,); nan for blank and invalid values."""
         return np.array(self.of(name), dtype=float)
 
     @property
     def is_empty(self):
-        """Has it no row at all, not even one that cannot be read?"""
+        """Return True if the table has no row, readable or not."""
         return not self.rows and not self.skipped
 
 
 def read_settings(raw, log, is_whole=True):
-    """{section: {key: value}} with None for what is blank, missing or bad (told to `log`).
+    """Read the settings of a job.
 
-    is_whole  False: nothing of it is required
+    Parameters
+    ----------
+    raw : RawJob
+        Job as read; its settings are readable.
+    log : Log
+        Receives the problems.
+    is_whole : bool, optional
+        False: no key is required.
+
+    Returns
+    -------
+    dict of {str: dict}
+        {section: {key: value}}; None for a blank, missing or invalid value.
     """
     kind = kind_of(raw)
     for section, entries in raw.settings.items():
@@ -81,10 +103,24 @@ def read_settings(raw, log, is_whole=True):
 
 
 def read_register(raw, name, log):
-    """{name: {key: value}} of cameras or instruments, with None for what is blank, missing or bad.
+    """Read the cameras, instruments, clouds or meters of a job.
 
-    An entry in which nothing is filled in counts as not there. A family of keys (marks) is one
-    value {name in the family: value}, without those that are blank or bad.
+    An entry whose keys are all blank is ignored. A family of keys, such as marks, is a single value
+    {name in the family: value}, without blank and invalid items.
+
+    Parameters
+    ----------
+    raw : RawJob
+        Job as read.
+    name : str
+        "cameras", "instruments", "clouds" or "meters".
+    log : Log
+        Receives the problems.
+
+    Returns
+    -------
+    dict of {str: dict}
+        {entry: {key: value}}; None for a blank, missing or invalid value.
     """
     register = raw.registers.get(name)
     if register is None:
@@ -124,22 +160,22 @@ def read_register(raw, name, log):
 
 
 def _read_family(file, owner, family, field, entries, log):
-    """{name: value} of the keys that belong to a family; what is bad is told to `log`."""
-    found = {}
+    """{name: value} of the keys of a family; invalid values go to `log`."""
+    values = {}
     for key, value in entries.items():
-        first, _, own = key.partition(".")
+        first, _, item = key.partition(".")
         if first != family or is_blank(value.raw):
             continue
         try:
-            own = read_value(Field(key, "name", ""), own)
-            found[own] = read_value(field, value.raw)
+            item = read_value(Field(key, "name", ""), item)
+            values[item] = read_value(field, value.raw)
         except Refused as refusal:
             log.problem(file, refusal.text, value.row, f"{owner}.{key}")
-    return found
+    return values
 
 
 def as_spelt(register, entries, key):
-    """The spelling of a key that an entry has: its short one when that alone is filled in."""
+    """Spelling of a key in an entry: the short one if only the short one is filled in."""
     short = SHORT_KEYS[register].get(key)
     return short if _is_filled(entries, short) and not _is_filled(entries, key) else key
 
@@ -160,7 +196,7 @@ def _refuse_two_spellings(file, register, owner, entries, log):
 
 
 def kind_of(raw):
-    """The kind of tank, or None where the settings do not tell it; nothing is told to a log."""
+    """Kind of tank; None if the settings do not state it. Problems are not logged here."""
     value = (raw.settings or {}).get("tank", {}).get("kind")
     kind = value.raw.strip() if value and isinstance(value.raw, str) else None
     if kind is None or kind in KINDS:
@@ -169,7 +205,7 @@ def kind_of(raw):
 
 
 def _says_nothing(value):
-    """Whether a setting may stand in a job of a kind that it is not for: blank, 0 or false."""
+    """Return True if a setting has no effect: blank, 0 or false."""
     if isinstance(value.raw, str) and meant(value.raw, (YES, NO)) == NO:
         return True
     return is_blank(value.raw) or (isinstance(value.raw, int | float) and value.raw == 0)
@@ -200,7 +236,7 @@ def _refuse_unknown(file, section, entries, section_row, log):
 
 
 def unknown_section(section, known):
-    """What is said of a section that is none of the known ones."""
+    """Message about a section with an unknown name."""
     return message("unknown_section", "unknown section{hint}", hint=nearest(section, known))
 
 
@@ -209,7 +245,7 @@ def _unknown_key(key, known):
 
 
 def _own_fields(section, fields, given):
-    """Text fields of the user's own: printed under the name that they have in job.toml."""
+    """Text fields defined by the user, which are printed under their names in job.toml."""
     known = [field.name for field in fields]
     return [
         Field(key, "text", "a field of your own")
@@ -219,16 +255,37 @@ def _own_fields(section, fields, given):
 
 
 def _is_own(section, key, known):
-    """Whether a key is the user's own: only in OPEN_SECTIONS, and no slip of a known one."""
+    """Return True for a key defined by the user: in OPEN_SECTIONS, and not close to a known key."""
     plain = re.fullmatch(r"[a-z][a-z0-9_]{0,39}", key)
     return section in OPEN_SECTIONS and plain is not None and not nearest(key, known)
 
 
 def read_setting(file, name, field, value, kind, log, is_required, row=None):
-    """The value of one key, or None after telling `log`, which calls it `name`.
+    """Read the value of one key.
 
-    value  its tables.Value, or None         kind  of the tank, or None
-    row    where its section begins, for a message that it is missing
+    Parameters
+    ----------
+    file : str
+        File or sheet of the setting.
+    name : str
+        Name of the key in messages.
+    field : Field
+        Description of the key.
+    value : Value or None
+        Value as read; None: missing.
+    kind : str or None
+        Kind of tank; None: not known.
+    log : Log
+        Receives the problems.
+    is_required : bool
+        True: a missing or blank value is a problem.
+    row : int, optional
+        First row of the section, for messages about a missing key.
+
+    Returns
+    -------
+    object
+        Value; None if blank, missing or invalid.
     """
     if value is None or (is_blank(value.raw) and value.raw not in field.choices):
         if is_required:
@@ -255,9 +312,25 @@ def read_setting(file, name, field, value, kind, log, is_required, row=None):
 
 
 def read_section(file, section, fields, given, row, log):
-    """{key: value or None} of one section of a file; unknown, missing and bad goes to the log.
+    """Read one section of a file other than the settings of a job.
 
-    given  {key: tables.Value}         row  where the section begins
+    Parameters
+    ----------
+    file, section : str
+        Names of file and section.
+    fields : sequence of Field
+        Keys of the section.
+    given : dict of {str: Value}
+        Entries as read.
+    row : int or None
+        First row of the section.
+    log : Log
+        Receives unknown, missing and invalid keys.
+
+    Returns
+    -------
+    dict
+        {key: value}; None if blank, missing or invalid.
     """
     known = [field.name for field in fields]
     for key, value in given.items():
@@ -285,24 +358,39 @@ def read_section(file, section, fields, given, row, log):
 
 
 def _row_of(value, row):
-    """The row of a value; of one within an inline table, that of its section."""
+    """Row of a value; for a value in an inline table, the row of its section."""
     return row if value is None or value.row is None else value.row
 
 
 def read_columns(name, table, log, fields=None, kind=None):
-    """ColumnValues of one raw table; unknown, missing and bad things are told to `log`.
+    """Read the columns of a table.
 
-    fields  its columns; None: those that the table of this name has in a job of a tank of the kind
+    Parameters
+    ----------
+    name : str
+        Name of the table.
+    table : Table
+        Table as read.
+    log : Log
+        Receives unknown, missing and invalid columns and cells.
+    fields : sequence of Field, optional
+        Columns of the table; None: as in a job with this kind of tank.
+    kind : str, optional
+        Kind of tank.
+
+    Returns
+    -------
+    ColumnValues
     """
     fields = columns_of(name, kind) if fields is None else fields
-    known, told = [field.name for field in fields], ()
+    known, refused = [field.name for field in fields], ()
     if table.decimal is not None and not set(table.headings) <= set(known):
-        from tankcal.job.headings import rename_headings  # lists of others alone need its words
+        from tankcal.job.headings import rename_headings  # slow; needed only for foreign headings
 
-        headings, told = rename_headings(table, fields, log)
+        headings, refused = rename_headings(table, fields, log)
         table = replace(table, headings=headings)
     for heading in table.headings:
-        if heading not in known and heading not in told:
+        if heading not in known and heading not in refused:
             expected = message(
                 "unknown_column",
                 "unknown column{hint}; expected {known}",
@@ -324,17 +412,18 @@ def read_columns(name, table, log, fields=None, kind=None):
 
 
 def _column(table, field, log):
+    """Values of one column; None if it is optional and blank in every row."""
     position = table.headings.index(field.name)
     raws = [row[position] for row in table.rows]
-    filled = field.required or field.in_full
+    is_filled_in = field.required or field.in_full
     if not field.required and all(is_blank(raw) for raw in raws):
         return None
-    values, read = _plain_numbers(field, raws, table.decimal), {}
+    values, known_values = _plain_numbers(field, raws, table.decimal), {}
     for place, raw in enumerate(raws):
         if values[place] is not None:
             continue
         if is_blank(raw):
-            if filled:
+            if is_filled_in:
                 row = table.row_numbers[place]
                 log.problem(
                     table.file,
@@ -346,18 +435,18 @@ def _column(table, field, log):
                     row,
                     field.name,
                 )
-        elif type(raw) is str and raw in read:
-            values[place] = read[raw]  # names and choices come again and again
+        elif type(raw) is str and raw in known_values:
+            values[place] = known_values[raw]  # names and choices recur, and reading is slow
         else:
             try:
-                values[place] = read[raw] = read_value(field, raw, table.decimal)
+                values[place] = known_values[raw] = read_value(field, raw, table.decimal)
             except Refused as refusal:
                 log.problem(table.file, refusal.text, table.row_numbers[place], field.name)
     return values
 
 
 def _plain_numbers(field, raws, decimal):
-    """The sound numbers among the texts of a long column, None for all else."""
+    """Valid numbers of a long column, converted together for speed; None for other values."""
     if field.kind != "number" or decimal != ".":
         return [None] * len(raws)
     is_number = NUMBER.fullmatch
@@ -367,9 +456,9 @@ def _plain_numbers(field, raws, decimal):
             for raw in raws
         ]
     )
-    sound = (values >= field.low) & (values <= field.high) & np.isfinite(values)
+    is_valid = (values >= field.low) & (values <= field.high) & np.isfinite(values)
     if field.low == 0:
-        sound &= (values == 0) | (values >= NEXT_TO_ZERO)
+        is_valid &= (values == 0) | (values >= NEXT_TO_ZERO)
     if field.above_low:
-        sound &= values > field.low
-    return [value if good else None for value, good in zip(values.tolist(), sound, strict=True)]
+        is_valid &= values > field.low
+    return [value if keep else None for value, keep in zip(values.tolist(), is_valid, strict=True)]

@@ -1,7 +1,7 @@
-"""How the value of a cell or key is read by the kind of its field.
+"""Conversion of cells and keys to values, by the kind of their field.
 
-`read_value` turns what stands in the file into a Python value, or raises `Refused` with what was
-found and what was expected. What a field is: `tankcal.job.fields`.
+`read_value` converts the content of a file to a Python value, or raises `Refused` with the value
+found and the value expected. `tankcal.job.fields` describes the fields.
 """
 
 import datetime
@@ -18,12 +18,12 @@ from tankcal.text.form_words import NO, YES, meant
 from tankcal.text.naming import MAX_NAME, is_name
 from tankcal.text.numerals import NUMBER
 
-MAX_LIST = 50  # numbers or pairs
-MAX_NAMES = 5000
-MAX_ROWS = 4000
-IN_LIST = "list"  # in place of a decimal mark: a point, since a comma may separate two numbers
-IN_TOML = "toml"  # in place of a decimal mark: a number is a number, and never a cell
-NEXT_TO_ZERO = 1e-30  # no size, no standard deviation is so small: its square would be nothing
+MAX_LIST = 50  # largest count of numbers or pairs in one value
+MAX_NAMES = 5000  # largest count of names in one value
+MAX_ROWS = 4000  # largest count of rows of numbers in one value
+IN_LIST = "list"  # in place of a decimal mark: a point, because a comma may separate numbers
+IN_TOML = "toml"  # in place of a decimal mark: a text is not a number
+NEXT_TO_ZERO = 1e-30  # smallest size or sd other than 0; its square must not underflow
 
 _TANK_ID = re.compile(r"(?!.*\.\.)[\w(][\w .()-]*")
 _RULE_NAME = re.compile(r"(?!.*\.\.)\w[\w .()-]*")
@@ -44,10 +44,26 @@ _ISO_DATE = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}")
 
 
 def read_value(field, raw, decimal=None):
-    """The value of a field as float, text or bool; `raw` is not blank.
+    """Convert the content of a cell or key to a value.
 
-    decimal is the mark of numbers that stand as text (CSV), or None (workbook) or IN_TOML where a
-    number is a number. Raises Refused.
+    Parameters
+    ----------
+    field : Field
+        Description of the cell or key.
+    raw : object
+        Content, not blank.
+    decimal : str, optional
+        Decimal mark of numbers given as text (CSV). None (workbook) or IN_TOML: numbers must be
+        given as numbers.
+
+    Returns
+    -------
+    float, str, bool or tuple
+
+    Raises
+    ------
+    Refused
+        If the field does not accept the value.
     """
     if isinstance(raw, BadCell):
         raise Refused(
@@ -74,7 +90,7 @@ def read_value(field, raw, decimal=None):
 
 
 def _refused(field, found, hint=""):
-    """Refused of a value that is not what the field takes."""
+    """`Refused` for a value that the field does not accept."""
     return Refused(
         message(
             "found_expected",
@@ -108,6 +124,7 @@ def _read_number(field, raw, decimal):
 
 
 def _number_of_text(field, raw, decimal):
+    """Number given as text, with the decimal mark of the file or an unambiguous other mark."""
     text = raw.strip(" \t")
     if len(text) > MAX_NAME:
         raise _refused(field, shown(raw))
@@ -119,9 +136,10 @@ def _number_of_text(field, raw, decimal):
         raise _refused(field, found, hint)
     if is_number and not (decimal == "," and "." in text):
         return float(plain)
-    other = text.replace(",", ".")
-    if decimal != IN_LIST and NUMBER.fullmatch(other) and not has_two_meanings(text):
-        return float(other)
+    # A mark that differs from the declared mark is accepted if the number has one meaning.
+    with_point = text.replace(",", ".")
+    if decimal != IN_LIST and NUMBER.fullmatch(with_point) and not has_two_meanings(text):
+        return float(with_point)
     if decimal == "." and NUMBER.fullmatch(text.replace(",", ".")):
         hint = message(
             "with_decimal_point",
@@ -142,7 +160,7 @@ def _float(raw):
 
 
 def _kind_of(raw):
-    """A value as found, with its kind where that is what is wrong with it."""
+    """Value as shown in a message, with its type if the type is wrong."""
     found = shown(raw)
     if isinstance(raw, bool):
         return message("the_truth_value", "the truth value {found}", found=found)
@@ -185,9 +203,9 @@ def _read_text(field, raw, _decimal):
     else:
         text = str(raw)
     if field.kind == "text":
-        sound = len(text) <= MAX_TEXT and all(_is_writing(char) for char in text)
+        is_valid = len(text) <= MAX_TEXT and all(_is_writing(char) for char in text)
     elif field.kind == "name":
-        sound = is_name(text)
+        is_valid = is_name(text)
     else:
         patterns = {
             "tank id": _TANK_ID,
@@ -196,8 +214,8 @@ def _read_text(field, raw, _decimal):
             "rule name": _RULE_NAME,
         }
         pattern = patterns[field.kind]
-        sound = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
-    if not sound:
+        is_valid = len(text) <= MAX_NAME and pattern.fullmatch(text) is not None
+    if not is_valid:
         raise _refused(field, shown(text))
     return meant(text, field.choices) or text
 
@@ -259,7 +277,7 @@ def _read_time(field, raw, _decimal):
 
 
 def _read_numbers(field, raw, decimal):
-    """Tuple of a list of numbers, of a text such as 700; 850, or of one number."""
+    """Tuple of numbers from a list, a text such as 700; 850, or a single number."""
     parts = raw.split(";") if isinstance(raw, str) else raw if isinstance(raw, list) else [raw]
     if not parts or len(parts) > MAX_LIST:
         raise Refused(
@@ -280,7 +298,7 @@ def _read_numbers(field, raw, decimal):
 
 
 def _read_rows(field, raw, decimal):
-    """Tuple of rows of numbers, of a list of lists or of a text such as 1 0 0; 0 1 0."""
+    """Tuple of rows of numbers from a list of lists or a text such as 1 0 0; 0 1 0."""
     if isinstance(raw, str) and raw.strip() in field.choices:
         return raw.strip()
     rows = raw
@@ -293,15 +311,15 @@ def _read_rows(field, raw, decimal):
     if not all(isinstance(row, list) and len(row) == field.width for row in rows):
         raise _refused(field, shown(raw))
     mark = IN_LIST if isinstance(raw, str) else decimal
-    one = Field(field.name, "number", field.note, low=field.low, high=field.high)
+    number = Field(field.name, "number", field.note, low=field.low, high=field.high)
     try:
-        return tuple(tuple(_read_number(one, value, mark) for value in row) for row in rows)
+        return tuple(tuple(_read_number(number, value, mark) for value in row) for row in rows)
     except Refused as refusal:
         raise _refused(field, refusal.text.values["found"]) from None
 
 
 def _read_names(field, raw, _decimal):
-    """Tuple of texts of a list, of a text such as P7; P9, or of one number that is a name."""
+    """Tuple of names from a list, a text such as P7; P9, or a single number used as a name."""
     parts = raw.split(";") if isinstance(raw, str) else raw if isinstance(raw, list) else [raw]
     if len(parts) > MAX_NAMES:
         raise Refused(
@@ -322,7 +340,7 @@ def _read_names(field, raw, _decimal):
 
 
 def _read_dms(field, raw, _decimal):
-    """Degrees of a text such as 123 04 05.6, 123-04-05.6 or 123°04'05.6\"; negative: -0 30 00."""
+    """Degrees from a text such as 123 04 05.6, 123-04-05.6 or 123°04'05.6\"; negative: -0 30 00."""
     if not isinstance(raw, str):
         raise Refused(
             message(
@@ -336,7 +354,7 @@ def _read_dms(field, raw, _decimal):
     if match is None:
         raise _refused(field, shown(raw))
     sign, degrees, minutes, seconds = match.groups()
-    seconds = float((seconds or "0").replace(",", "."))  # a thousands mark it cannot be
+    seconds = float((seconds or "0").replace(",", "."))  # a comma is a decimal mark below 60
     if int(minutes) >= 60 or seconds >= 60:
         hint = message("minutes_below_60", ", minutes and seconds below 60")
         raise _refused(field, shown(raw), hint)
@@ -348,7 +366,7 @@ def _read_dms(field, raw, _decimal):
 
 
 def _read_ranges(field, raw, _decimal):
-    """Tuple of (low, high) of a list of pairs, or of a text such as 0-0.3; 2.1-2.4."""
+    """Tuple of (low, high) from a list of pairs or a text such as 0-0.3; 2.1-2.4."""
     pairs = raw
     if isinstance(raw, str):
         matches = [_PAIR.fullmatch(part) for part in raw.split(";")]

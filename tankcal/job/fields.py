@@ -1,8 +1,7 @@
-"""What one value of a job may be: a number with its bounds, a name, a date, a choice.
+"""Description of one value of a job: a number with bounds, a name, a date, a choice.
 
-A `Field` describes one key of job.toml or one column of a table, and says in words what it expects;
-`Refused` is what is raised of a value that it does not take. How a value is read, kind by kind, is
-`tankcal.job.field_values`.
+A `Field` describes one key of job.toml or one column of a table, and states in words which values
+it accepts. `tankcal.job.field_values` reads the values and raises `Refused` for invalid ones.
 """
 
 import math
@@ -11,11 +10,11 @@ from dataclasses import dataclass
 from tankcal.messages import message
 from tankcal.text.naming import MAX_NAME
 
-MAX_TEXT = 300  # characters
+MAX_TEXT = 300  # longest text, characters
 
 
 class Refused(ValueError):
-    """The value is not what the field takes; `text` says what was found and expected."""
+    """A value that the field does not accept; `text` states the values found and expected."""
 
     @property
     def text(self):
@@ -24,25 +23,40 @@ class Refused(ValueError):
 
 @dataclass(frozen=True)
 class Field:
-    """One key or column.
+    """Description of one key or column.
 
-    name       as written in the file, with its unit
-    kind       "number", "text", "name", "tank id", "choice", "flag", "date", "time" (date and time
-               of day; read as seconds since 2000), "mesh file",
-               "rule name", "numbers" (several of them), "ranges" (pairs of numbers), "names"
-               (several of them), "rows" (of so many numbers each), "cloud file" or "dms"
-               (degrees, minutes and seconds; read as degrees)
-    note       one line for the person who fills it in
-    required   must be there and filled in, for every kind of tank in `kinds`
-    kinds      the kinds of tank that it is for; (): all
-    required_for  kinds of tank for which it is required though `required` is not set
-    low, high  bounds of a number, both allowed unless `above_low`: then low itself is not
-    choices    what a choice may be; of a number, words that may stand in its place; of a text, what
-               it mostly is
-    in_full    an optional column that is filled in for every row, or for none
-    start      what the starter job has there
-    of_survey  of use only where observations are adjusted
-    width      numbers in each of the rows
+    Attributes
+    ----------
+    name : str
+        Name as written in the file, with its unit.
+    kind : str
+        "number", "text", "name", "tank id", "choice", "flag", "date", "time" (date and time of day;
+        read as seconds since 2000), "mesh file", "cloud file", "rule name", "numbers" (several),
+        "ranges" (pairs of numbers), "names" (several), "rows" (of numbers) or "dms" (degrees,
+        minutes and seconds; read as degrees).
+    note : str
+        Explanation in one line for the user.
+    required : bool
+        True: must be filled in, for every kind of tank in `kinds`.
+    low, high : float
+        Bounds of a number, both allowed; see `above_low`.
+    above_low : bool
+        True: `low` itself is not allowed.
+    choices : tuple of str
+        Values of a choice; for a number, words accepted in place of a number; for a text, the usual
+        values.
+    in_full : bool
+        True: an optional column that is filled in for all rows or for none.
+    start : str
+        Value in the starter job.
+    kinds : tuple of str
+        Kinds of tank that have the field; (): all.
+    required_for : tuple of str
+        Kinds of tank for which the field is required although `required` is False.
+    of_survey : bool
+        True: used only if observations are adjusted.
+    width : int
+        Count of numbers in each of the rows.
     """
 
     name: str
@@ -61,17 +75,17 @@ class Field:
     width: int = 0
 
     def suits(self, tank_kind):
-        """Is it for tanks of this kind? Of a kind that is not known (None), nothing is refused."""
+        """Return True if tanks of this kind have the field; None (kind not known): always True."""
         return tank_kind is None or not self.kinds or tank_kind in self.kinds
 
     def is_required(self, tank_kind):
-        """Must it be filled in for tanks of this kind (None: not known)?"""
+        """Return True if the field is required for this kind of tank (None: not known)."""
         if self.required:
             return not self.kinds or tank_kind in self.kinds
         return tank_kind in self.required_for
 
     def expectation(self):
-        """What is expected, in words: "a number above 0, at most 300"."""
+        """Accepted values in words: "a number above 0, at most 300"."""
         if self.kind == "choice":
             return _one_of(self.choices)
         if self.kind == "number":
@@ -105,7 +119,7 @@ class Field:
         return self._or_words(rows)
 
     def _two_of_them(self):
-        """Two values that the field allows, as a file has them: {one, other}."""
+        """Two accepted values as text, for an example: {one, other}."""
         low, high = max(self.low, 0.0), self.high
         two = (700.0, 850.0)
         if not low <= two[0] < two[1] <= high:
@@ -113,7 +127,7 @@ class Field:
         return {name: f"{value:g}" for name, value in zip(("one", "other"), two, strict=True)}
 
     def wanted(self):
-        """What is expected where nothing stands: "height of the course (a number above 0)"."""
+        """Meaning and accepted values in words: "height of the course (a number above 0)"."""
         if self.kind in ("text", "name", "tank id"):
             return message("noted", "{note}", note=self.note)
         return message("wanted", "{note} ({expected})", note=self.note, expected=self.expectation())
@@ -130,7 +144,7 @@ class Field:
 
     def _bounds(self):
         low, high = self.low, self.high
-        if low == -high and high >= 1e5:  # bounds that only keep nonsense out
+        if low == -high and high >= 1e5:  # bounds that only exclude absurd values are not shown
             return ""
         if math.isinf(high) and self.above_low:
             return message("bound_above", " above {low:g}", low=low)
@@ -189,13 +203,16 @@ _EXPECTED = {
 
 
 def _one_of(choices):
-    """ "'a' or 'b' or 'c'"; in another language by the words that its forms have for them."""
-    *others, last = (message("choice", "{choice!r}", choice=one) for one in choices)
-    for one in reversed(others):
-        last = message("either_or", "{one} or {other}", one=one, other=last)
+    """List of the choices: "'a' or 'b' or 'c'".
+
+    Other languages show the words of their forms.
+    """
+    *others, last = (message("choice", "{choice!r}", choice=choice) for choice in choices)
+    for choice in reversed(others):
+        last = message("either_or", "{one} or {other}", one=choice, other=last)
     return last
 
 
 def is_blank(raw):
-    """Is nothing given? An empty text and an empty list count as blank; 0 and false do not."""
+    """Return True for None, an empty text and an empty list; 0 and false are values."""
     return raw is None or raw == [] or (isinstance(raw, str) and not raw.strip())

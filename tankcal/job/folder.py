@@ -1,4 +1,4 @@
-"""A job as a folder: job.toml for the settings, a CSV file for each table."""
+"""Read a job from a folder: job.toml for the settings, a CSV file for each table."""
 
 import csv
 import re
@@ -31,15 +31,15 @@ from tankcal.text.decoding import WESTERN, decode_text, is_western
 from tankcal.text.delimited import separator_of_table, split_cells
 from tankcal.text.spreadsheets import unguard_formula
 
-SAVED_FILES = (  # what commands save; a folder with such a file and no job.toml holds results
+SAVED_FILES = (  # results of commands; such a file without job.toml marks a folder of results
     *("record.json", "comparison.json", "inspection.json", "history.json", "camera.json"),
     *("plan.json", "scores.json"),
 )
-MAX_SETTINGS_BYTES = 1_000_000
-MAX_SETTINGS_LINE = 4000  # characters
+MAX_SETTINGS_BYTES = 1_000_000  # largest TOML file
+MAX_SETTINGS_LINE = 4000  # longest line of a TOML file, characters
 DECIMALS = (".", ",")
-OF_INSPECTIONS = ("settlement.csv", "edge_profiles.csv")  # beside a job, no part of it
-_LONGEST_START = 100_000  # bytes, of comments before a heading
+OF_INSPECTIONS = ("settlement.csv", "edge_profiles.csv")  # may lie beside a job, are not part of it
+_LONGEST_START = 100_000  # most bytes of comments before a heading
 _TWICE = message("toml_given_twice", "a key or a section is given twice")
 _BROKEN_TEXT = message(
     "toml_text_broken", "a text without its closing quotation mark, or with a control character"
@@ -49,7 +49,7 @@ _ESCAPE = message(
     "a backslash in a text between double quotation marks; write two of them, or put the text "
     "between single ones",
 )
-_TOML_REASONS = {  # {how tomllib begins a reason: the reason in our words}
+_TOML_REASONS = {  # {beginning of a message of tomllib: reason for the user}
     "Cannot overwrite": _TWICE,
     "Cannot declare": _TWICE,
     "Cannot redefine": _TWICE,
@@ -81,9 +81,20 @@ _DECIMAL_COMMA = re.compile(
 
 
 def read_folder(folder, log, edited=None):
-    """RawJob of a job folder (a Path); what is wrong goes to `log`.
+    """Read a job folder.
 
-    edited  {name: bytes} of files that stand in place of those of the folder, or beside them
+    Parameters
+    ----------
+    folder : Path
+        Folder of the job.
+    log : Log
+        Receives the problems.
+    edited : dict of {str: bytes}, optional
+        Files that replace files of the folder or are added to them, by name.
+
+    Returns
+    -------
+    RawJob
     """
     edited = edited or {}
     names = sorted({*_names_in(folder, log), *edited})
@@ -113,7 +124,7 @@ def read_folder(folder, log, edited=None):
         if name in names:
             data = content(name)
             is_readable = data is not None and marks is not None
-            if is_readable and settings is None:  # what [csv] says is lost
+            if is_readable and settings is None:  # the declared separator is not known
                 is_readable = _has_plain_heading(data)
             tables[table] = read_csv(name, data, *marks, log) if is_readable else None
     covariance, of_radii = (
@@ -141,7 +152,7 @@ def read_folder(folder, log, edited=None):
 
 
 def _names_in(folder, log):
-    """Names of what is in a folder; [] after telling `log` that it cannot be read."""
+    """Sorted names of the files in a folder; [] and a problem if the folder cannot be read."""
     try:
         return sorted(item.name for item in folder.iterdir())
     except OSError as error:
@@ -166,7 +177,7 @@ def _hint(names):
 
 
 def _has_plain_heading(data):
-    """Is the heading of a CSV file free of the separators that only [csv] can allow?"""
+    """Return True if the heading contains no separator that requires [csv]."""
     for line in data[:_LONGEST_START].splitlines():
         if line.strip() and not line.lstrip(b'\xef\xbb\xbf \t"').startswith(b"#"):
             return not any(mark.encode() in line for mark in SEPARATORS[1:])
@@ -193,13 +204,27 @@ def _refuse_unknown_files(names, log):
 
 
 def decode(file, data, log, or_western=False):
-    """The text of a file in UTF-8 or UTF-16, or None after telling `log`.
+    """Decode a text file in UTF-8 or UTF-16.
 
-    or_western  Windows-1252 is also read, with a warning: spreadsheets of western Windows write it
+    Parameters
+    ----------
+    file : str
+        Name in messages.
+    data : bytes
+        Content.
+    log : Log
+        Receives problem or warning.
+    or_western : bool, optional
+        True: also accept Windows-1252, with a warning; western versions of spreadsheets write it.
+
+    Returns
+    -------
+    str or None
+        None if the file cannot be decoded.
     """
     if or_western and is_western(data):
-        said = message("lint_cp1252", "not UTF-8: read with the letters of Windows-1252")
-        log.warning(file, said)
+        warning = message("lint_cp1252", "not UTF-8: read with the letters of Windows-1252")
+        log.warning(file, warning)
         return data.decode(WESTERN)
     try:
         text = decode_text(data)
@@ -227,7 +252,7 @@ def decode(file, data, log, or_western=False):
 
 
 def _utf8(file):
-    """What programs call the text that is expected of a file."""
+    """Name of the expected text format, as in the menus of programs."""
     return (
         message("utf8_text", "UTF-8 text")
         if file.lower().endswith(".toml")
@@ -236,20 +261,34 @@ def _utf8(file):
 
 
 def split_lines(text):
-    """Lines of a text with the line ends of any system."""
+    """Lines of a text with the line ends of any operating system."""
     return re.split("\r\n|\r|\n", text)
 
 
 def read_toml(file, data, log):
-    """({section: {key: Value}}, {section: row}) of a TOML file, or (None, {}) when unreadable."""
+    """({section: {key: Value}}, {section: row}) of a TOML file; (None, {}) if unreadable."""
     parsed = parsed_toml(file, data, log)
     return (None, {}) if parsed is None else flattened(file, *parsed, log)
 
 
 def read_register(file, data, log, register=None):
-    """Register of cameras.toml or instruments.toml, or None after telling `log` what is wrong.
+    """Read a list of cameras, instruments, clouds or meters.
 
-    register  "cameras" or "instruments"; None: as the file is called
+    Parameters
+    ----------
+    file : str
+        Name of the file in messages.
+    data : bytes
+        Content of the TOML file.
+    log : Log
+        Receives the problems.
+    register : str, optional
+        Name of the list, such as "cameras"; None: the name of the file.
+
+    Returns
+    -------
+    Register or None
+        None if unreadable.
     """
     parsed = parsed_toml(file, data, log)
     if parsed is None:
@@ -257,8 +296,8 @@ def read_register(file, data, log, register=None):
     content, rows = parsed
     register = register or file.rpartition(".")[0]
     entries, places = {}, {}
-    for section, inside in content.items():
-        if section != register or not isinstance(inside, dict):
+    for section, items in content.items():
+        if section != register or not isinstance(items, dict):
             expected = message(
                 "outside_register",
                 "is in no section; expected sections such as [{register}.NAME]",
@@ -266,35 +305,35 @@ def read_register(file, data, log, register=None):
             )
             log.problem(file, expected, rows.get(section), section)
             continue
-        for name, given in inside.items():
-            where = re.sub(r"[\s\"']", "", f"{register}.{name}")
+        for name, given in items.items():
+            place = re.sub(r"[\s\"']", "", f"{register}.{name}")
             if not isinstance(given, dict):
                 expected = message(
                     "in_no_register",
                     "is in no section [{register}.NAME]; expected in one",
                     register=register,
                 )
-                log.problem(file, expected, rows.get(where), name)
+                log.problem(file, expected, rows.get(place), name)
                 continue
             entries[name] = {
-                key: Value(value, rows.get(re.sub(r"[\s\"']", "", f"{where}.{key}")))
+                key: Value(value, rows.get(re.sub(r"[\s\"']", "", f"{place}.{key}")))
                 for key, value in _flat(given)
             }
-            places[name] = rows.get(where)
+            places[name] = rows.get(place)
     return Register(file, entries, places)
 
 
 def _flat(given):
-    """Pairs (key, value) of an entry; those of a section within it as section.key."""
+    """Yield (key, value) of an entry; a key in a nested section becomes section.key."""
     for key, value in given.items():
         if isinstance(value, dict):
-            yield from ((f"{key}.{inner}", one) for inner, one in value.items())
+            yield from ((f"{key}.{inner}", item) for inner, item in value.items())
         else:
             yield key, value
 
 
 def parsed_toml(file, data, log):
-    """(content, row of each section and 'section.key') of a TOML file, or None when unreadable."""
+    """(content, {section or section.key: row}) of a TOML file; None if unreadable."""
     text = decode(file, data, log)
     if text is None:
         return None
@@ -313,11 +352,12 @@ def parsed_toml(file, data, log):
 
 
 def _content(file, text, log):
-    """What a TOML text says, or None when unreadable.
+    """Parse a TOML text; None if unreadable.
 
-    A decimal comma is told and read as a point, so that all else is judged in the same run.
+    A decimal comma is reported and read as a point, so that the remaining text is checked in the
+    same run.
     """
-    lines = split_lines(text)  # tomllib itself takes no lone carriage return for the end of a line
+    lines = split_lines(text)  # tomllib does not accept a lone carriage return as line end
     for _ in range(MAX_PROBLEMS_PER_FILE):
         try:
             return tomllib.loads("\n".join(lines))
@@ -353,12 +393,12 @@ def _reason(error):
     if isinstance(error, RecursionError):
         return message("too_deep", "too deeply nested")
     reason = re.sub(r"\s*\(at .*\)$", "", str(error))
-    known = (said for start, said in _TOML_REASONS.items() if reason.startswith(start))
+    known = (text for start, text in _TOML_REASONS.items() if reason.startswith(start))
     return next(known, reason)
 
 
 def _toml_rows(text):
-    """Row of each section and 'section.key', for messages only."""
+    """Row of each section and section.key, for messages."""
     rows, section = {}, ""
     for number, line in enumerate(split_lines(text), 1):
         heading = re.match(r"[ \t]*\[+([^\[\]]+)\]", line)
@@ -373,18 +413,37 @@ def _toml_rows(text):
 
 
 def flattened(file, data, rows, log):
-    """({section: {key: Value}}, {section: row}) of the content of a TOML file."""
+    """Flatten the nested sections of a TOML file.
+
+    Parameters
+    ----------
+    file : str
+        Name of the file in messages.
+    data : dict
+        Content as parsed.
+    rows : dict
+        Row of each section and section.key.
+    log : Log
+        Receives keys outside a section.
+
+    Returns
+    -------
+    settings : dict
+        {section: {key: Value}}.
+    sections : dict
+        {section: row}.
+    """
     settings, sections = {}, {}
-    todo = [("", data, 0)]
-    while todo:
-        section, entries, depth = todo.pop(0)
+    queue = [("", data, 0)]
+    while queue:
+        section, entries, depth = queue.pop(0)
         if section:
             settings.setdefault(section, {})
             sections[section] = rows.get(section)
         for key, value in entries.items():
             name = f"{section}.{key}" if section else key
             if isinstance(value, dict) and depth < 3:
-                todo.append((name, value, depth + 1))
+                queue.append((name, value, depth + 1))
             elif section:
                 settings[section][key] = Value(value, rows.get(name))
             else:
@@ -396,9 +455,9 @@ def flattened(file, data, rows, log):
 
 
 def csv_marks(file, settings, log):
-    """(separator, decimal mark) that the settings in a file give, or None when they are unusable.
+    """(separator, decimal mark) declared in [csv]; the defaults are , and . ; None if unusable.
 
-    Marks that are not known are told by the check of the settings.
+    The check of the settings reports unknown marks.
     """
     given = {key: value.raw for key, value in settings.get("csv", {}).items()}
     separator, decimal = given.get("separator") or ",", given.get("decimal") or "."
@@ -416,19 +475,34 @@ def csv_marks(file, settings, log):
 
 
 def declared_marks(file, settings, log):
-    """The same for reading, with NOT_KNOWN where [csv] has no key filled in."""
+    """(separator, decimal mark) for reading, with NOT_KNOWN as decimal mark if [csv] is blank."""
     marks = csv_marks(file, settings, log)
     is_declared = any(value.raw for value in settings.get("csv", {}).values())
     return marks if marks is None or is_declared else (marks[0], NOT_KNOWN)
 
 
 def read_csv(file, data, separator, decimal, log, settings_file=SETTINGS_FILE):
-    """Table of the bytes of a CSV file, or None after telling `log` why it cannot be read.
+    """Read a CSV file. The headings determine the separator.
 
-    The separator is recognised by the headings.
+    Parameters
+    ----------
+    file : str
+        Name of the file in messages.
+    data : bytes
+        Content.
+    separator : str
+        Separator of a file with a single column.
+    decimal : str
+        Declared decimal mark; NOT_KNOWN: not declared.
+    log : Log
+        Receives the problems.
+    settings_file : str, optional
+        File with the section [csv], for messages.
 
-    separator  of a file that has one column
-    decimal    as it is declared; NOT_KNOWN: it is not
+    Returns
+    -------
+    Table or None
+        None if unreadable.
     """
     text = decode(file, data, log, or_western=True)
     if text is None or has_too_many_lines(file, text, log):
@@ -442,14 +516,14 @@ def read_csv(file, data, separator, decimal, log, settings_file=SETTINGS_FILE):
             settings_file=settings_file,
         )
     if separator == "," and decimal == NOT_KNOWN:
-        decimal = "."  # a decimal comma would have divided the number
+        decimal = "."  # a decimal comma would have split the number
     return make_table(file, _csv_rows(file, text, separator, log), decimal, log, hint)
 
 
 def has_too_many_lines(file, text, log, most=MAX_LINES):
-    """Whether a text has more lines than a table may have, after telling `log` so.
+    """Return True, and report it, if a text has more lines than a table may have.
 
-    A caller asks this before it splits the text.
+    Callers check this before they split the text, to bound the memory.
     """
     count = max(text.count("\n"), text.count("\r")) + (not text.endswith(("\n", "\r")))
     if count > most:
@@ -461,19 +535,19 @@ def has_too_many_lines(file, text, log, most=MAX_LINES):
 
 
 def separator_of_text(text, usual):
-    """The separator of the text of a CSV file with comments; `usual` where it has one column."""
+    """Separator of a CSV text with comments; `usual` if the text has a single column."""
     return separator_of_table([line for line in split_lines(text) if is_row(line)], usual)
 
 
 def is_row(line):
-    """Whether a line has cells: it is neither blank nor a comment."""
+    """Return True if a line is neither blank nor a comment."""
     return bool(line) and not line.isspace() and not line.lstrip(' \t"').startswith("#")
 
 
 def _csv_rows(file, text, separator, log):
-    """(row, cells) of each line that is neither blank nor a comment; cells is None when unreadable.
+    """Yield (row, cells) of each line that is neither blank nor a comment; None: unreadable cells.
 
-    A cell holds no line break, so that a forgotten quotation mark spoils one row, not the file.
+    A cell contains no line break, so that a missing quotation mark affects one row only.
     """
     for number, line in enumerate(split_lines(text), 1):
         if not is_row(line):
@@ -498,14 +572,17 @@ def _csv_rows(file, text, separator, log):
 def results_given_as_job(path):
     """Message about a path to results where a job is expected; None for any other path.
 
-    The message names the job whose results they are where it lies in its usual place.
+    The message names the job of the results if the job lies in its usual place.
     """
     saved = saved_file_in(path)
     if saved is None or (path / SETTINGS_FILE).exists():
         return None
-    whole = (path if path.is_dir() else path.parent).resolve()
-    book = whole.with_name(f"{whole.name.removesuffix('-results')}.xlsx")
-    job = next((one for one in (whole.parent / SETTINGS_FILE, book) if one.is_file()), None)
+    folder = (path if path.is_dir() else path.parent).resolve()
+    book = folder.with_name(f"{folder.name.removesuffix('-results')}.xlsx")
+    job = next(
+        (candidate for candidate in (folder.parent / SETTINGS_FILE, book) if candidate.is_file()),
+        None,
+    )
     hint = "" if job is None else message("job_of_results", ": {job}", job=str(job))
     return message(
         "results_as_job",
@@ -516,7 +593,7 @@ def results_given_as_job(path):
 
 
 def saved_file_in(path):
-    """Name of the file of results that a path is, or that its folder holds; None: of neither."""
+    """Name of the file of results that is the path or lies in this folder; None if none."""
     if path.is_dir():
         return next((name for name in SAVED_FILES if (path / name).is_file()), None)
     return path.name if path.name in SAVED_FILES and path.is_file() else None

@@ -1,4 +1,4 @@
-"""Which form of a job folder is filled in: the text files, or the workbook job.xlsx.
+"""Decision which form of a job folder is filled in: the text files, or the workbook job.xlsx.
 
 `tankcal new` writes one form. Folders of older versions, and of `tankcal plan`, have both.
 """
@@ -14,14 +14,14 @@ from tankcal.messages import message
 from tankcal.text.form_words import NO, YES, meant
 from tankcal.text.numerals import NUMBER
 
-OF_EVERY_FORM = (("tank", "kind"), ("table", "language"))  # every starter has them filled in
+OF_EVERY_FORM = (("tank", "kind"), ("table", "language"))  # filled in by every starter job
 
 
 def filled_workbook(folder, log):
-    """The workbook of a folder with both forms if it is the one to read, else None.
+    """Workbook of a folder with both forms, if it is the form to be read; else None.
 
-    The form with more entries is read where both agree otherwise. Two forms that contradict each
-    other are one problem in `log`.
+    If the values agree, the form with more entries is read. Two forms with contradictory values are
+    one problem in `log`.
     """
     book = folder / WORKBOOK_FILE
     if not ((folder / SETTINGS_FILE).is_file() and book.is_file()):
@@ -29,7 +29,7 @@ def filled_workbook(folder, log):
     log_of_texts = Log()
     texts, sheets = read_folder(folder, log_of_texts), read_workbook(book, Log())
     if sheets is None or log_of_texts.problems or texts.settings is None:
-        return None  # the text files, with their problems
+        return None  # read the text files and report their problems
     by_texts, by_book = _entries(texts), _entries(sheets)
     if not _adds(by_book, by_texts):
         return None
@@ -39,7 +39,7 @@ def filled_workbook(folder, log):
         )
         log.warning(WORKBOOK_FILE, expected)
         return book
-    # rows that a plan wrote may be deleted in one form alone: the form with more columns is read
+    # A user may delete rows written by a plan in one form only, so compare filled-in columns.
     agree = all(
         by_texts.get(place, value) == value for place, value in by_book.items() if place[0] in KEYS
     )
@@ -70,48 +70,48 @@ def filled_workbook(folder, log):
 
 
 def _adds(entries, others):
-    """Whether entries have a value that was typed, and that the other form does not have."""
+    """Return True if entries contain a value that the other form does not have."""
     return any(others.get(place) != value for place, value in entries.items())
 
 
 def _columns(entries):
-    """{(section or table, key or heading)} that have a value."""
+    """{(section or table, key or heading)} with a value."""
     return {(place[0], place[-1]) for place in entries}
 
 
 def _entries(raw):
-    """{place: value} of what a form may have been given, without the values it begins with."""
-    found = {}
+    """{place: value} of the values that differ from those of the empty form."""
+    entries = {}
     for section, given in (raw.settings or {}).items():
         fields = {field.name: field for field in KEYS.get(section, ())}
         for key, value in given.items() if section != "csv" else ():
             plain = _plain(value.raw, fields.get(key))
             if plain not in _starts(section, fields.get(key)):
-                found[section, key] = plain
+                entries[section, key] = plain
     for name, register in raw.registers.items():
         for owner, given in register.entries.items() if register else ():
-            found |= {(name, owner, key): _plain(value.raw) for key, value in given.items()}
+            entries |= {(name, owner, key): _plain(value.raw) for key, value in given.items()}
     for name, table in raw.tables.items():
         fields = {field.name: field for field in COLUMNS[name]}
         for number, row in enumerate(table.rows if table else ()):
             for heading, cell in zip(table.headings, row, strict=True):
-                found[name, number, heading] = _plain(cell, fields.get(heading))
-    return {place: plain for place, plain in found.items() if plain != ""}
+                entries[name, number, heading] = _plain(cell, fields.get(heading))
+    return {place: plain for place, plain in entries.items() if plain != ""}
 
 
 def _starts(section, field):
-    """The values of a key that starter jobs have, as `_plain` has them."""
+    """Values of a key in starter jobs, normalised by `_plain`."""
     if field is None:
         return [""]
     if (section, field.name) in OF_EVERY_FORM:
         return (*map(str, field.choices), "")
     name = f"{section}.{field.name}"
-    given = [one.get(name, "") for one in (STARTS_OF_STRAPPING, STARTS_OF_LIQUID)]
-    return [_plain(one, field) for one in ("", field.start, *given)]
+    given = [start.get(name, "") for start in (STARTS_OF_STRAPPING, STARTS_OF_LIQUID)]
+    return [_plain(start, field) for start in ("", field.start, *given)]
 
 
 def _plain(raw, field=None):
-    """A value as a text that is the same in TOML, CSV and a workbook, in all languages."""
+    """Value as a text that is equal in TOML, CSV and a workbook, in all languages."""
     if raw is None:
         return ""
     if isinstance(raw, list):

@@ -9,7 +9,7 @@ from tankcal.survey.strapping import Strap, Strapping
 
 
 def make_great_circles(tables, registers):
-    """GreatCircles of tables and registers without problems."""
+    """Build `GreatCircles` from tables and registers without problems."""
     table = tables["great_circles"]
     tapes = tapes_of(registers)
     columns = (

@@ -1,4 +1,4 @@
-"""The rows of a sheet that count: without comments, and without what a person could not see."""
+"""Rows of a sheet that are read: without comments; hidden and merged cells are refused."""
 
 from bisect import bisect_left
 
@@ -8,11 +8,26 @@ from tankcal.messages import message
 
 
 def table_rows(place, grid, log):
-    """([(row, cells)] of the heading and the rows below it, number of the first column).
+    """Rows of a table in a sheet.
 
-    A first column without a heading is for marks: # switches its row off. It is left out. Cells
-    that are merged, hidden, or beyond the last column are told to `log`, which calls the sheet
-    `place`.
+    A first column without a heading is reserved for marks: # switches its row off. The column is
+    left out.
+
+    Parameters
+    ----------
+    place : str
+        Name of the sheet in messages.
+    grid : Grid
+        Cells of the sheet.
+    log : Log
+        Receives merged and hidden cells, and cells beyond the last column.
+
+    Returns
+    -------
+    rows : list of (int, list)
+        Row number and cells of the heading and of the rows below it.
+    first_column : int
+        Number of the first column.
     """
     rows = [(number, cells) for number, cells in grid.rows if not _is_comment(cells)]
     for number, cells in rows:
@@ -47,7 +62,7 @@ def table_rows(place, grid, log):
 
 
 def placed_columns(rows, first_column):
-    """{heading: letters of its column} of the first of some rows."""
+    """{heading: letters of its column} from the first of the rows."""
     headings = rows[0][1] if rows else []
     return {
         heading.strip(): column_letters(column)
@@ -115,7 +130,7 @@ def _tell_hidden(place, grid, rows, log):
 
 
 def _runs(numbers):
-    """(first, last) of each run of numbers that follow one another."""
+    """(first, last) of each run of consecutive numbers."""
     runs = []
     for number in numbers:
         if runs and number == runs[-1][1] + 1:

@@ -1,7 +1,7 @@
-"""Headings of a technician's own list: which column of a job each of them means.
+"""Recognition of the columns in a list of the user, by their headings.
 
-The names of a column are its own, its headings in the forms of all languages, and usual ones of
-survey software. A unit in a heading must be known; another unit has a factor.
+The names of a column are its own name, its headings in the forms of all languages, and the usual
+headings of survey software. A unit in a heading must be known; a different unit gives a factor.
 """
 
 import re
@@ -14,7 +14,7 @@ from tankcal.text.languages import LANGUAGES
 from tankcal.text.unit_endings import parted
 from tankcal.text.word_files import load_words
 
-USUAL = {  # by the name of a column without its unit
+USUAL = {  # usual headings, by the name of the column without its unit
     "point": (
         *("point", "point name", "point id", "point number", "name", "id", "no", "number", "pt"),
         *("ponto", "nome", "nome do ponto", "numero", "punto", "nombre", "nombre del punto", "pto"),
@@ -36,7 +36,7 @@ STANDARD_DEVIATIONS = (
     *("desv", "desviacion", "desviacion estandar", "desviacion tipica", "incertidumbre"),
 )
 USUAL |= {f"s{axis}": tuple(f"{name} {axis}" for name in STANDARD_DEVIATIONS) for axis in "xyz"}
-LENGTHS = {  # sizes in metres
+LENGTHS = {  # metres of one unit
     "m": Fraction(1),
     "dm": Fraction(1, 10),
     "cm": Fraction(1, 100),
@@ -53,15 +53,21 @@ UNIT_NAMES = {
 }  # fmt: skip
 _BRACKETED = re.compile(r"(.*?)[\s,]*[(\[]([^()\[\]]*)[)\]]\s*")
 _LAST_WORD = re.compile(r"(.*\S)[\s,]+(\S+)")
-MOST_LETTERS = 80
+MOST_LETTERS = 80  # longest heading that is recognised
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """A column that a heading means.
+    """Column recognised in a heading.
 
-    factor  of its values; None: the unit of the heading cannot be converted
-    unit    as the heading has it, "" without one
+    Attributes
+    ----------
+    column : str
+        Name of the column.
+    factor : Fraction or None
+        Factor of its values; None: the unit of the heading cannot be converted.
+    unit : str
+        Unit in the heading; "" without a unit.
     """
 
     column: str
@@ -70,40 +76,66 @@ class Meaning:
 
 
 def meanings_of(headings, fields):
-    """{heading: Meaning} of the headings that mean exactly one column, and alone mean it."""
+    """{heading: Meaning}; a heading and its column must match only each other."""
     names = {field.name: _names_of(field) for field in fields}
-    found = {}
+    meanings = {}
     for heading in headings:
         if not isinstance(heading, str) or len(heading) > MOST_LETTERS:
             continue
-        meant = [one for field in fields for one in _meaning(heading, field, names[field.name])]
-        exact = [one for one in meant if one.factor == 1] or meant  # of columns in several units
-        if len({one.column for one in exact}) == 1:
-            found[heading] = exact[0]
-    columns = [one.column for one in found.values()]
-    return {heading: one for heading, one in found.items() if columns.count(one.column) == 1}
+        candidates = [
+            meaning for field in fields for meaning in _meaning(heading, field, names[field.name])
+        ]
+        exact = [
+            meaning for meaning in candidates if meaning.factor == 1
+        ] or candidates  # a column may exist in several units
+        if len({meaning.column for meaning in exact}) == 1:
+            meanings[heading] = exact[0]
+    columns = [meaning.column for meaning in meanings.values()]
+    return {
+        heading: meaning
+        for heading, meaning in meanings.items()
+        if columns.count(meaning.column) == 1
+    }
 
 
 def stated_meaning(heading, field):
-    """The Meaning of a heading that the user gives a column: its unit in brackets has a factor."""
+    """`Meaning` of a heading assigned to a column by the user; a unit in brackets is converted."""
     parts = _BRACKETED.fullmatch(heading)
     unit = _unit_of(parts[2]) if parts else ""
-    own = parted(field.name)[1]
-    if unit in LENGTHS and own in LENGTHS:
-        return Meaning(field.name, LENGTHS[unit] / LENGTHS[own], unit)
+    field_unit = parted(field.name)[1]
+    if unit in LENGTHS and field_unit in LENGTHS:
+        return Meaning(field.name, LENGTHS[unit] / LENGTHS[field_unit], unit)
     return Meaning(field.name, Fraction(1), unit)
 
 
 def rename_headings(table, fields, log):
-    """(headings, refused) of a Table, with the names of columns in place of foreign headings.
+    """Replace foreign headings by the names of columns.
 
-    What was read is one warning. Headings in another unit are refused here, one problem each.
+    The renamed headings are reported in one warning. A heading in another unit is a problem.
+
+    Parameters
+    ----------
+    table : Table
+        Table as read.
+    fields : sequence of Field
+        Columns of the table.
+    log : Log
+        Receives warning and problems.
+
+    Returns
+    -------
+    headings : tuple of str
+        Headings with the names of columns.
+    refused : set of str
+        Headings in another unit.
     """
     known = {field.name for field in fields}
     foreign = [heading for heading in table.headings if heading not in known]
     free = [field for field in fields if field.name not in table.headings]
     meanings = meanings_of(foreign, free) if foreign else {}
-    renamed = {heading: one.column for heading, one in meanings.items() if one.factor == 1}
+    renamed = {
+        heading: meaning.column for heading, meaning in meanings.items() if meaning.factor == 1
+    }
     if renamed:
         text = message(
             "headings_read",
@@ -111,40 +143,40 @@ def rename_headings(table, fields, log):
             pairs=[f"{heading} = {column}" for heading, column in renamed.items()],
         )
         log.warning(table.file, text, table.heading_row)
-    for heading, one in meanings.items():
-        if one.factor is None:
+    for heading, meaning in meanings.items():
+        if meaning.factor is None:
             text = message(
                 "heading_in_unknown_unit",
                 "is {column} in {unit}, a unit that is not converted; expected the unit of "
                 "{column}",
-                column=one.column,
-                unit=one.unit,
+                column=meaning.column,
+                unit=meaning.unit,
             )
             log.problem(table.file, text, table.heading_row, heading)
-        elif one.factor != 1:
+        elif meaning.factor != 1:
             text = message(
                 "heading_in_other_unit",
                 "is {column} in {unit}; expected its own unit: tankcal import {file} --replace "
                 "converts it",
-                column=one.column,
-                unit=one.unit,
+                column=meaning.column,
+                unit=meaning.unit,
                 file=table.file,
             )
             log.problem(table.file, text, table.heading_row, heading)
-    told = {heading for heading, one in meanings.items() if one.factor != 1}
-    return tuple(renamed.get(heading, heading) for heading in table.headings), told
+    refused = {heading for heading, meaning in meanings.items() if meaning.factor != 1}
+    return tuple(renamed.get(heading, heading) for heading in table.headings), refused
 
 
 def _names_of(field):
-    """Plain names of a column without its unit."""
+    """Normalised names of a column, without its unit."""
     stem, _ = parted(field.name)
-    labels = [load_words(one)["input"]["labels"].get(stem, stem) for one in LANGUAGES]
-    return {_plain(one) for one in (stem, *labels, *USUAL.get(stem, ()))}
+    labels = [load_words(name)["input"]["labels"].get(stem, stem) for name in LANGUAGES]
+    return {_plain(name) for name in (stem, *labels, *USUAL.get(stem, ()))}
 
 
 def _meaning(heading, field, names):
-    """A list of the Meaning that a heading has as a column, or an empty list."""
-    _, own = parted(field.name)
+    """List with the `Meaning` of the heading for this column; empty if it does not match."""
+    _, field_unit = parted(field.name)
     if _plain(heading) in names:
         return [Meaning(field.name, Fraction(1))]
     for pattern in (_BRACKETED, _LAST_WORD):
@@ -152,10 +184,10 @@ def _meaning(heading, field, names):
         if parts is None or _plain(parts[1]) not in names:
             continue
         unit = _unit_of(parts[2])
-        if unit == _plain(own):
+        if unit == _plain(field_unit):
             return [Meaning(field.name, Fraction(1), unit)]
-        if unit in LENGTHS and own in LENGTHS:
-            return [Meaning(field.name, LENGTHS[unit] / LENGTHS[own], unit)]
+        if unit in LENGTHS and field_unit in LENGTHS:
+            return [Meaning(field.name, LENGTHS[unit] / LENGTHS[field_unit], unit)]
         return [Meaning(field.name, None, parts[2].strip())] if pattern is _BRACKETED else []
     return []
 
@@ -166,7 +198,7 @@ def _unit_of(text):
 
 
 def _plain(text):
-    """Lower case, without accents and marks, one blank between words."""
+    """Text in lower case, without accents and punctuation, words separated by one blank."""
     letters = unicodedata.normalize("NFKD", text.lower())
-    letters = "".join(one for one in letters if not unicodedata.combining(one))
+    letters = "".join(letter for letter in letters if not unicodedata.combining(letter))
     return " ".join(re.split(r"[\s_.:#]+", letters)).strip()

@@ -1,4 +1,4 @@
-"""Hints for values that a spreadsheet keeps as something else than what was meant."""
+"""Hints on values that a spreadsheet stores as another type than intended."""
 
 import datetime
 import re
@@ -10,15 +10,26 @@ _WITH_UNIT = re.compile(
     r"([+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?)([^\W\d_].{0,11}|[%°'\"′″].{0,5})?"
 )
 _SHARES = {"ppm": 1e-6, "%": 1e-2}
-_OF_SHARES = "_ppm", "_percent"  # ends of keys that are in these units
-_DAYS_OF_OUR_TIME = (18_000, 80_000)  # numbers that spreadsheets have for 1949 to 2119
+_OF_SHARES = "_ppm", "_percent"  # endings of keys in these units
+_DAYS_OF_OUR_TIME = (18_000, 80_000)  # day numbers of spreadsheets for 1949 to 2119
 
 
 def hint_of_text(text, in_cell=True, name=""):
-    """How to mend a text that looks like a number; "" for one that does not.
+    """Hint on how to correct a text that looks like a number.
 
-    in_cell  False: it stands in a TOML file
-    name     of the key, which says its unit
+    Parameters
+    ----------
+    text : str
+        Content of the cell or key.
+    in_cell : bool, optional
+        False: the text is in a TOML file.
+    name : str, optional
+        Name of the key, which ends with its unit.
+
+    Returns
+    -------
+    Message or str
+        "" if the text does not look like a number.
     """
     plain = unicodedata.normalize("NFKC", text).strip().lstrip("'\u2019`").replace(" ", "")
     match = _WITH_UNIT.fullmatch(plain)
@@ -55,7 +66,7 @@ def hint_of_text(text, in_cell=True, name=""):
 
 
 def hint_of_number(raw):
-    """How to mend a cell that holds a number's place as a date or a percentage."""
+    """Hint on how to correct a date or a percentage in the cell of a number."""
     if isinstance(raw, float):
         return message(
             "without_percent",
@@ -71,7 +82,7 @@ def hint_of_number(raw):
 
 
 def hint_of_date(raw):
-    """How to mend a cell that holds the number of a day in place of a date."""
+    """Hint on how to correct a day number in the cell of a date."""
     low, high = _DAYS_OF_OUR_TIME
     if isinstance(raw, int | float) and not isinstance(raw, bool) and low < raw < high:
         return message("give_date_format", ": give the cell a date format")

@@ -1,4 +1,4 @@
-"""From the checked tables of wall hits to `WallHits`, all in SI."""
+"""From the checked tables of wall hits to `WallHits`, in SI."""
 
 from dataclasses import replace
 
@@ -9,19 +9,24 @@ from tankcal.job.contract.registers import FREE
 from tankcal.job.measuring import ARCSEC, angle_in_rad, setups_of
 from tankcal.survey.wall_hits import ControlReading, RangingInstrument, WallHits
 
-USUAL_INCIDENCE_MM = 1.0  # u of the bias at 60 degrees that nobody gave
+USUAL_INCIDENCE_MM = 1.0  # default standard uncertainty of the bias at 60 degrees incidence, mm
 AXES = "xyz"
 
 
 def make_hits(tables, registers):
-    """WallHits of tables and registers without problems."""
+    """Build `WallHits` from tables and registers without problems."""
     table, setups = tables["wall_hits"], _setups(tables["setups"], registers)
     names = tuple(table.of("setup"))
     used = dict.fromkeys(setups[name].instrument for name in names)
     ranging = ranging_of(registers)
-    own = [ranging[setups[name].instrument] for name in names]
+    instruments = [ranging[setups[name].instrument] for name in names]
+    # The sd of the row takes precedence over the sd of the instrument.
     sd_mm, sd_arcsec = (
-        np.where(np.isnan(table.numbers(key)), [one[key] or 0.0 for one in own], table.numbers(key))
+        np.where(
+            np.isnan(table.numbers(key)),
+            [entry[key] or 0.0 for entry in instruments],
+            table.numbers(key),
+        )
         for key in ("s_mm", "s_arcsec")
     )
     return WallHits(
@@ -33,7 +38,7 @@ def make_hits(tables, registers):
         distance_m=table.numbers("distance_m"),
         sd_m=sd_mm / 1000,
         sd_rad=sd_arcsec * ARCSEC,
-        surface=tuple(one or "" for one in table.of("surface")),
+        surface=tuple(entry or "" for entry in table.of("surface")),
         check=np.array([use == "check" for use in table.of("use")], dtype=bool),
         setups=setups,
         instruments={name: _instrument(name, ranging[name]) for name in used},
@@ -46,7 +51,7 @@ def make_hits(tables, registers):
 
 def _setups(table, registers):
     used = instruments_used(table, ranging_of(registers))
-    return {one.name: replace(one, instrument=used[one.name]) for one in setups_of(table)}
+    return {setup.name: replace(setup, instrument=used[setup.name]) for setup in setups_of(table)}
 
 
 def _instrument(name, given):

@@ -1,7 +1,8 @@
-"""Image coordinates as they were read become photo coordinates: comparator, pixels, film.
+"""From image coordinates as read to photo coordinates: comparator, pixels, film.
 
-In this order: repeated readings of marks are rejected where they scatter too much; the others make
-the transformation of their photo; image points go through it; then the film is made flat.
+Order of the steps: repeated readings of fiducial marks are rejected if they scatter too much; the
+other readings determine the transformation of their photo; the transformation is applied to the
+image points; finally the image points are corrected for the unflatness of the film.
 """
 
 from dataclasses import dataclass, field, replace
@@ -16,18 +17,26 @@ from tankcal.job.contract.registers import MARKS
 from tankcal.messages import message
 from tankcal.survey.measurements import FiducialFit, RejectedReadings
 
-FEWEST_HEIGHTS = 3
-FLAT = 1e-6  # of the extent of the places of a film: nearer to one line they are no surface
+FEWEST_HEIGHTS = 3  # smallest number of heights that determine the surface of a film
+FLAT = 1e-6  # smallest ratio of width to length of the positions of heights on a film
 
 
 @dataclass(frozen=True)
 class Imagery:
-    """The rows of image_points in the photo system.
+    """Image points in the photo system, in the order of image_points.
 
-    xy_mm         (n, 2), nan where it cannot be told     sd_mm  (n, 2) of the readings
-    shared_sd_mm  (n, 2) of the transformations, or None
-    fits          {photo: FiducialFit}
-    outside       {owner of a film: (image points outside its hull, all of them)}
+    Attributes
+    ----------
+    xy_mm : ndarray, shape (n, 2)
+        Photo coordinates; nan where they cannot be determined.
+    sd_mm : ndarray, shape (n, 2)
+        Standard deviations of the readings.
+    shared_sd_mm : ndarray, shape (n, 2), or None
+        Standard deviations from the transformations.
+    fits : dict of {str: FiducialFit}
+        Transformation of each photo.
+    outside : dict
+        {owner of a film: (number of image points outside the hull of its heights, number of all)}.
     """
 
     xy_mm: np.ndarray
@@ -38,68 +47,87 @@ class Imagery:
 
 
 def imagery_of(tables, cameras, adjustment):
-    """The Imagery of the tables of a survey; what is not sound in them is left out.
+    """Photo coordinates of a survey; invalid parts of the tables are left out.
 
-    tables  {name: ColumnValues or None}       cameras  {name: {key: value}}
-    adjustment  {key: value} of [adjustment], or None
+    Parameters
+    ----------
+    tables : dict of {str: ColumnValues or None}
+        Tables by name.
+    cameras : dict
+        {name: {key: value}} of cameras.toml.
+    adjustment : dict or None
+        {key: value} of [adjustment].
+
+    Returns
+    -------
+    Imagery
     """
     images, photos = tables["image_points"], tables["photos"]
     size, pixel = image_frames(images, photos, cameras)
     xy = image_coordinates(images, size, pixel)
     sd = np.column_stack([images.numbers("sx_um"), images.numbers("sy_um")]) / 1000
     sd = np.where(np.isnan(sd), images.numbers("s_px")[:, None] * pixel, sd)
-    found = Imagery(xy, sd)
+    imagery = Imagery(xy, sd)
     if photos is None:
-        return found
+        return imagery
     if tables["fiducials"] is not None:
-        found = _transformed(found, tables, cameras, adjustment or {})
+        imagery = _transformed(imagery, tables, cameras, adjustment or {})
     if tables["film"] is not None:
-        found = _flattened(found, tables, cameras)
-    return found
+        imagery = _flattened(imagery, tables, cameras)
+    return imagery
 
 
 def cameras_of_photos(photos, cameras):
-    """{photo: (name of its camera, {key: value} of it)} of photos whose camera is known."""
+    """{photo: (name of its camera, {key: value} of the camera)}, without unknown cameras."""
     rows = zip(photos.of("photo"), photos.of("camera"), strict=True)
     return {photo: (name, cameras[name]) for photo, name in rows if photo and name in cameras}
 
 
-def _transformed(found, tables, cameras, adjustment):
+def _transformed(imagery, tables, cameras, adjustment):
+    """Apply the transformations of the fiducial marks to the image points."""
     images = tables["image_points"]
     default = (adjustment.get("image_sd_um") or np.nan) / 1000
     fits = fiducial_fits(tables["fiducials"], tables["photos"], cameras, adjustment)
-    xy, sd, shared = found.xy_mm.copy(), found.sd_mm.copy(), np.zeros_like(found.xy_mm)
-    read, points_of = set(tables["fiducials"].of("photo")), images.of("point")
-    for photo, mine in rows_by(images.of("photo")).items():
-        if photo not in read:
+    xy, sd, shared = imagery.xy_mm.copy(), imagery.sd_mm.copy(), np.zeros_like(imagery.xy_mm)
+    photos_with_marks, points_of = set(tables["fiducials"].of("photo")), images.of("point")
+    for photo, rows_of_photo in rows_by(images.of("photo")).items():
+        if photo not in photos_with_marks:
             continue
         if photo not in fits:
-            xy[mine] = np.nan
+            xy[rows_of_photo] = np.nan
             continue
         fit = fits[photo].transformation
-        points = [points_of[i] for i in mine.tolist()]
-        readings, own = xy[mine], fit.turned(np.where(np.isnan(sd[mine]), default, sd[mine]))
+        points = [points_of[i] for i in rows_of_photo.tolist()]
+        readings, reading_sd = (
+            xy[rows_of_photo],
+            fit.turned(np.where(np.isnan(sd[rows_of_photo]), default, sd[rows_of_photo])),
+        )
         added = np.einsum("nii->ni", fit.added_covariance(readings))
-        same = repeats(points, readings)
-        variance = own**2 / same.count[same.group][:, None]
+        # The mean of repeated readings has a smaller variance; the transformation adds to it.
+        repeated = repeats(points, readings)
+        variance = reading_sd**2 / repeated.count[repeated.group][:, None]
         growth = np.sqrt(1 + added / variance)
-        xy[mine], sd[mine], shared[mine] = fit.of(readings), own, np.sqrt(added)
+        xy[rows_of_photo], sd[rows_of_photo], shared[rows_of_photo] = (
+            fit.of(readings),
+            reading_sd,
+            np.sqrt(added),
+        )
         if np.isfinite(growth).any():
             fits[photo] = replace(fits[photo], growth=float(np.nanmax(growth)))
-    return replace(found, xy_mm=xy, sd_mm=sd, shared_sd_mm=shared, fits=fits)
+    return replace(imagery, xy_mm=xy, sd_mm=sd, shared_sd_mm=shared, fits=fits)
 
 
 def rows_by(names):
-    """{name: (n,) places of its rows}, without None."""
-    found = {}
+    """{name: indices (n,) of its rows}, without None."""
+    groups = {}
     for place, name in enumerate(names):
         if name is not None:
-            found.setdefault(name, []).append(place)
-    return {name: np.array(places) for name, places in found.items()}
+            groups.setdefault(name, []).append(place)
+    return {name: np.array(places) for name, places in groups.items()}
 
 
 def fiducial_fits(table, photos, cameras, adjustment):
-    """{photo: FiducialFit}; photos whose marks do not determine a transformation are left out."""
+    """{photo: FiducialFit}, without photos whose marks do not determine a transformation."""
     of_photos, fits = cameras_of_photos(photos, cameras), {}
     for photo, readings in readings_of_marks(table, of_photos, adjustment).items():
         try:
@@ -110,39 +138,65 @@ def fiducial_fits(table, photos, cameras, adjustment):
 
 
 def readings_of_marks(table, of_photos, adjustment):
-    """{photo: MarkReadings} of the photos in fiducials.csv whose camera is known.
+    """Readings of the fiducial marks of each photo.
 
-    of_photos  see `cameras_of_photos`; a reading without any sd is left out
+    Parameters
+    ----------
+    table : ColumnValues
+        fiducials.
+    of_photos : dict
+        Cameras of the photos, see `cameras_of_photos`.
+    adjustment : dict
+        {key: value} of [adjustment].
+
+    Returns
+    -------
+    dict of {str: MarkReadings}
+        Photos whose camera is known. Readings without a standard deviation are left out.
     """
     default = adjustment.get("image_sd_um") or np.nan
     limit = adjustment.get("reading_limit_um")
     xy = np.column_stack([table.numbers("x_mm"), table.numbers("y_mm")])
     sd = table.numbers("s_um")
     sd = np.where(np.isnan(sd), default, sd) / 1000
-    sound = np.isfinite(xy).all(axis=1) & np.isfinite(sd)
-    found, marks = {}, table.of("mark")
+    is_valid = np.isfinite(xy).all(axis=1) & np.isfinite(sd)
+    readings, marks = {}, table.of("mark")
     for photo, rows in rows_by(table.of("photo")).items():
         if photo not in of_photos:
             continue
         given = of_photos[photo][1]
         known = {mark: place for mark, place in given[MARKS].items() if len(place) == 2}
-        rows = np.array([i for i in rows.tolist() if sound[i] and marks[i] in known], dtype=int)
+        rows = np.array([i for i in rows.tolist() if is_valid[i] and marks[i] in known], dtype=int)
         names = tuple(marks[i] for i in rows)
         places = np.array([known[name] for name in names]).reshape(-1, 2)
         kind = given["fiducial_transformation"] or "affine"
-        read = MarkReadings(rows, names, xy[rows], places, sd[rows], kind)
-        found[photo] = read.within(None if limit is None else limit / 1000, photo, table.rows)
-    return found
+        of_photo = MarkReadings(rows, names, xy[rows], places, sd[rows], kind)
+        readings[photo] = of_photo.within(
+            None if limit is None else limit / 1000, photo, table.rows
+        )
+    return readings
 
 
 @dataclass(frozen=True)
 class MarkReadings:
-    """The readings of the marks of one photo that can be used, (n,) in the order of their rows.
+    """Valid readings of the marks of one photo, in the order of their rows.
 
-    rows      (n,) places in the table     xy_mm     (n, 2)
-    names     (n,) marks                   marks_mm  (n, 2) calibrated
-    sd_mm     (n,)                         kind      of the transformation
-    rejected  tuple of RejectedReadings
+    Attributes
+    ----------
+    rows : ndarray, shape (n,)
+        Indices in the table.
+    names : tuple of str, length n
+        Marks.
+    xy_mm : ndarray, shape (n, 2)
+        Readings.
+    marks_mm : ndarray, shape (n, 2)
+        Calibrated coordinates.
+    sd_mm : ndarray, shape (n,)
+        Standard deviations of the readings.
+    kind : str
+        Kind of the transformation.
+    rejected : tuple of RejectedReadings
+        Marks whose readings scatter too much.
     """
 
     rows: np.ndarray
@@ -154,23 +208,35 @@ class MarkReadings:
     rejected: tuple = ()
 
     def within(self, limit_mm, photo, numbers):
-        """Those of marks whose readings scatter no more than a limit; the others as `rejected`.
+        """Reject the marks whose readings scatter more than a limit.
 
-        numbers  row of the file of each place in the table
+        Parameters
+        ----------
+        limit_mm : float or None
+            Limit; None: no limit.
+        photo : str
+            Name of the photo.
+        numbers : sequence of int
+            Row in the file of each index in the table.
+
+        Returns
+        -------
+        MarkReadings
+            The remaining readings, with the others in `rejected`.
         """
-        same = self.repeats
-        bad = same.beyond(limit_mm)
+        repeated = self.repeats
+        is_rejected = repeated.beyond(limit_mm)
         rejected = tuple(
             RejectedReadings(
                 photo,
-                self.names[same.first[i]],
-                int(same.count[i]),
-                same.sd[i],
-                numbers[self.rows[same.first[i]]],
+                self.names[repeated.first[i]],
+                int(repeated.count[i]),
+                repeated.sd[i],
+                numbers[self.rows[repeated.first[i]]],
             )
-            for i in np.flatnonzero(bad)
+            for i in np.flatnonzero(is_rejected)
         )
-        kept = np.flatnonzero(~bad[same.group])
+        kept = np.flatnonzero(~is_rejected[repeated.group])
         return MarkReadings(
             self.rows[kept],
             tuple(self.names[i] for i in kept),
@@ -183,32 +249,32 @@ class MarkReadings:
 
     @property
     def repeats(self):
-        """The comparator.Repeats of the marks."""
+        """Repeated readings of the marks (comparator.Repeats)."""
         return repeats(self.names, self.xy_mm)
 
     def fit(self, photo, camera):
-        """The FiducialFit; raises SolutionError where the marks do not determine it."""
-        same = self.repeats
+        """Fit the transformation; raises SolutionError if the marks do not determine it."""
+        repeated = self.repeats
         if not len(self.rows):
             raise SolutionError(message("no_marks", "no marks"))
-        found = transformation(self.xy_mm, self.marks_mm, self.sd_mm[:, None], self.kind)
-        calibrated = self.marks_mm[same.first]
+        fitted = transformation(self.xy_mm, self.marks_mm, self.sd_mm[:, None], self.kind)
+        calibrated = self.marks_mm[repeated.first]
         return FiducialFit(
             photo=photo,
             camera=camera,
-            marks=tuple(self.names[i] for i in same.first),
+            marks=tuple(self.names[i] for i in repeated.first),
             calibrated_mm=calibrated,
-            count=same.count,
-            mean_mm=same.mean,
-            sd_mm=same.sd,
-            residual_mm=found.of(same.mean) - calibrated,
-            transformation=found,
+            count=repeated.count,
+            mean_mm=repeated.mean,
+            sd_mm=repeated.sd,
+            residual_mm=fitted.of(repeated.mean) - calibrated,
+            transformation=fitted,
             rejected=self.rejected,
         )
 
 
 def surfaces_of(table):
-    """{("camera" or "photo", name): (Surface, first row)} of film.csv, sound or not."""
+    """{("camera" or "photo", name): (Surface, first row)} of film.csv, valid or not."""
     xy = np.column_stack([table.numbers("x_mm"), table.numbers("y_mm")])
     height = table.numbers("height_um") / 1000
     owners = {}
@@ -223,7 +289,7 @@ def surfaces_of(table):
 
 
 def is_surface(surface):
-    """Three places or more, not on one line, each of them once."""
+    """Return True for at least three different positions that are not on one line."""
     xy = surface.xy_mm
     if len(xy) < FEWEST_HEIGHTS or len(np.unique(xy, axis=0)) < len(xy):
         return False
@@ -231,22 +297,22 @@ def is_surface(surface):
     return bool(spread[1] > FLAT * spread[0])
 
 
-def _flattened(found, tables, cameras):
-    """The Imagery on the plane of the photo system; a photo's own film before its camera's."""
+def _flattened(imagery, tables, cameras):
+    """Correct the image points for unflatness; the film of a photo replaces that of its camera."""
     surfaces = {
         owner: surface for owner, (surface, _) in surfaces_of(tables["film"]).items()
         if is_surface(surface)
     }  # fmt: skip
-    xy, outside = found.xy_mm.copy(), {}
+    xy, outside = imagery.xy_mm.copy(), {}
     rows = rows_by(tables["image_points"].of("photo"))
     for photo, (camera, given) in cameras_of_photos(tables["photos"], cameras).items():
         owner = ("photo", photo) if ("photo", photo) in surfaces else ("camera", camera)
         if owner not in surfaces or given["c_mm"] is None or photo not in rows:
             continue
-        mine = rows[photo]
-        height, beyond = heights_at(surfaces[owner], xy[mine])
+        rows_of_photo = rows[photo]
+        height, is_outside = heights_at(surfaces[owner], xy[rows_of_photo])
         interior = (given["c_mm"], given["x0_mm"] or 0.0, given["y0_mm"] or 0.0)
-        xy[mine] = flatten_film(xy[mine], height, interior)
-        so_far = outside.get(owner, (0, 0))
-        outside[owner] = (so_far[0] + int(beyond.sum()), so_far[1] + len(mine))
-    return replace(found, xy_mm=xy, outside=outside)
+        xy[rows_of_photo] = flatten_film(xy[rows_of_photo], height, interior)
+        counts = outside.get(owner, (0, 0))
+        outside[owner] = (counts[0] + int(is_outside.sum()), counts[1] + len(rows_of_photo))
+    return replace(imagery, xy_mm=xy, outside=outside)

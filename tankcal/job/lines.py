@@ -1,4 +1,4 @@
-"""From the checked tables of reference lines to `ReferenceLines`, all in SI."""
+"""From the checked tables of reference lines to `ReferenceLines`, in SI."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from tankcal.survey.reference_line import ARCSEC, Line, Offset, Plummet, Referen
 
 
 def make_lines(tables, registers):
-    """ReferenceLines of tables and registers without problems."""
+    """Build `ReferenceLines` from tables and registers without problems."""
     lines, plummets = tables["lines"], plummets_of(registers)
     used = plummets_used(lines, plummets)
     return ReferenceLines(
@@ -19,6 +19,7 @@ def make_lines(tables, registers):
 
 def _lines(table, used):
     azimuth = np.radians(table.numbers("azimuth_deg"))
+    # Lines without azimuths are assumed to be evenly spaced.
     if np.all(np.isnan(azimuth)):
         azimuth = 2 * np.pi * np.arange(len(azimuth)) / len(azimuth)
     columns = zip(table.of("line"), azimuth, used, table.of("side"), table.rows, strict=True)

@@ -1,4 +1,4 @@
-"""From the checked meters.toml, liquid.csv and [liquid] to `Metering`, all in SI."""
+"""From the checked meters.toml, liquid.csv and [liquid] to `Metering`, in SI."""
 
 import datetime
 
@@ -13,14 +13,15 @@ _EPOCH = datetime.datetime(2000, 1, 1)
 
 
 def make_metering(values, tables, registers, raw):
-    """Metering of a job without problems."""
+    """Build `Metering` from the values, tables and registers of a job without problems."""
     table, given = tables["liquid"], values["liquid"]
     rows, meters = raw.registers["meters"].rows, registers["meters"]
     names = tuple(meters_read(table, meters))
     dips = table.numbers("dip_m")
-    usual = np.nan if given["s_dip_mm"] is None else given["s_dip_mm"]
+    default_sd = np.nan if given["s_dip_mm"] is None else given["s_dip_mm"]
+    # A start without a dip was empty and dry, and has no uncertainty.
     sds = table.numbers("s_dip_mm")
-    sds = np.where(np.isnan(dips), 0.0, np.where(np.isnan(sds), usual, sds))
+    sds = np.where(np.isnan(dips), 0.0, np.where(np.isnan(sds), default_sd, sds))
     return Metering(
         row=np.array(table.rows),
         run=tuple(table.of("run")),
@@ -44,7 +45,7 @@ def make_metering(values, tables, registers, raw):
 
 
 def _settings(given, values):
-    """The keys of [liquid] in SI, with what is taken for those that are blank."""
+    """Keys of [liquid] in SI, with defaults for blank keys."""
     expansion, diameter = given["expansion_per_k"], values["tank"]["nominal_diameter_m"]
     u_expansion = given["u_expansion_per_k"]
     u_radius = given["u_radius_mm"]
@@ -86,5 +87,5 @@ def _meter(name, given, row):
 
 
 def _moment(seconds):
-    """ISO text of seconds since 2000."""
+    """Time in ISO format from seconds since 2000."""
     return None if seconds is None else (_EPOCH + datetime.timedelta(seconds=seconds)).isoformat()

@@ -1,4 +1,4 @@
-"""From a folder or a workbook to a checked `Job`, or to every problem that it has."""
+"""From a folder or a workbook to a checked `Job`, or to the list of all its problems."""
 
 from os import PathLike
 from pathlib import Path
@@ -18,23 +18,23 @@ def load(path: str | PathLike, only: str | None = None) -> Job:
     Parameters
     ----------
     path : str or PathLike
-        A folder with job.toml, that job.toml itself, or a workbook (.xlsx).
+        A folder with job.toml, a job.toml, or a workbook (.xlsx).
     only : {"adjustment"}, optional
-        The survey alone is needed. Of the rest what is there is read, and its values are checked
-        one by one; tank, survey, datum and table of the job are None where they are not whole,
-        and the parts of the tank (points, bottom, deadwood, ...) are left out.
+        "adjustment" reads a job whose survey alone is needed. All values are checked singly. Tank,
+        survey, datum and table of the job are None if they are incomplete. The parts of the tank
+        (points, bottom, deadwood, ...) are left out.
 
     Returns
     -------
     Job
-        In SI units. Its `warnings` are what does not stop it.
+        In SI units. Its `warnings` list findings that do not prevent a calculation.
 
     Raises
     ------
     InputError
         With every problem of the input, each with its file, row and column.
     ValueError
-        `only` is something else.
+        If `only` has another value.
 
     Examples
     --------
@@ -49,14 +49,14 @@ def load(path: str | PathLike, only: str | None = None) -> Job:
 
 
 def load_edited(path: str | PathLike, edited: dict[str, bytes]) -> Job:
-    """The same of a job some of whose files were edited and are not saved yet.
+    """Read a job with edited files that are not yet saved.
 
     Parameters
     ----------
     path : str or PathLike
-        As `load` takes it.
-    edited : dict of bytes
-        What stands in place of the files of these names, or beside the others of the folder.
+        As for `load`.
+    edited : dict of {str: bytes}
+        Content of the edited files by name. They replace files of the folder or are added to them.
 
     Returns
     -------
@@ -65,7 +65,7 @@ def load_edited(path: str | PathLike, edited: dict[str, bytes]) -> Job:
     Raises
     ------
     InputError
-        As `load` does.
+        As for `load`.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def _load(path, edited, is_whole):
 
 
 def _form_in(folder, log, edited):
-    """The folder, or its workbook where that is the form filled in; None after telling `log`."""
+    """The folder, or its workbook if that is the form filled in; None if they contradict."""
     book = folder / WORKBOOK_FILE
     if edited is not None or not book.is_file():
         return folder
@@ -108,7 +108,7 @@ def _form_in(folder, log, edited):
 
 
 def _read(path, log, edited):
-    """RawJob, or None after telling `log` what `path` is instead of a job."""
+    """RawJob; None, with a problem in `log`, if the path is not a job."""
     expected = message("expected_job", "expected a job folder, its job.toml or a workbook (.xlsx)")
     try:
         results = results_given_as_job(path)

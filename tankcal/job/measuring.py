@@ -25,15 +25,24 @@ from tankcal.survey.stadia import distance_of_angle_m, distance_sd_m
 
 ARCSEC = np.pi / 180 / 3600
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "dms": np.pi / 180}
-PRINTED = ("certificate", "tension_n")
+PRINTED = ("certificate", "tension_n")  # keys of instruments that the report shows
 
 
 def make_measurements(values, tables, registers):
-    """Measurements of settings, tables and registers without problems.
+    """Build the `Measurements` of a survey without problems.
 
-    values     {section: {key: value}}
-    tables     {name: ColumnValues or None}
-    registers  {"cameras" or "instruments": {name: {key: value}}}
+    Parameters
+    ----------
+    values : dict
+        {section: {key: value}} of the settings.
+    tables : dict of {str: ColumnValues or None}
+        Tables by name.
+    registers : dict
+        {"cameras" or "instruments": {name: {key: value}}}.
+
+    Returns
+    -------
+    Measurements
     """
     weights = values["adjustment"]["image_weights"] or "measured"
     cameras = tuple(
@@ -84,6 +93,7 @@ def _settings(given):
 
 
 def _nominal(values):
+    """`NominalTank` of a vertical tank; None without nominal diameter and height."""
     tank, sizes = values["tank"], ("nominal_diameter_m", "nominal_height_m")
     if tank["kind"] != "vertical" or None in (tank[name] for name in sizes):
         return None
@@ -92,25 +102,26 @@ def _nominal(values):
 
 
 def _check(table):
+    """True for each row that is used only as a check, shape (n,)."""
     return np.array([use == "check" for use in table.of("use")], dtype=bool)
 
 
 def angle_in_rad(table, name):
-    """(n,) rad of an angle that is given in one of its units in each row; nan: in none."""
-    found = np.full(len(table.rows), np.nan)
+    """Angle of each row, shape (n,), rad, from any of its units; nan where it is blank."""
+    angle = np.full(len(table.rows), np.nan)
     for unit, factor in RADIANS.items():
         column = f"{name}_{unit}"
         if table.columns.get(column) is not None:
             given = table.numbers(column) * factor
-            found = np.where(np.isnan(given), found, given)
-    return found
+            angle = np.where(np.isnan(given), angle, given)
+    return angle
 
 
 def _photos(table, images):
-    """The photos that have image points; one without any is told by the checks."""
+    """Photos with image points; the checks report photos without image points."""
     if not _has_rows(table):
         return ()
-    seen = set() if images is None else set(images.photo)
+    photos_with_points = set() if images is None else set(images.photo)
     angles = ("omega", "phi", "kappa")
     values = np.column_stack(
         [table.numbers(f"{axis}_m") for axis in AXES] + [angle_in_rad(table, a) for a in angles]
@@ -120,27 +131,27 @@ def _photos(table, images):
         + [angle_in_rad(table, f"s_{a}") for a in angles]
     )
     named = zip(table.of("photo"), table.of("camera"), values, sd, table.rows, strict=True)
-    return tuple(Photo(*row) for row in named if row[0] in seen)
+    return tuple(Photo(*row) for row in named if row[0] in photos_with_points)
 
 
 def _image_points(tables, cameras, adjustment):
-    """ImageReadings, or None, and the FiducialFit of photos that have image points."""
+    """(ImageReadings or None, FiducialFit of each photo with image points)."""
     table = tables["image_points"]
     if not _has_rows(table):
         return None, ()
-    found = imagery_of(tables, cameras, adjustment)
+    imagery = imagery_of(tables, cameras, adjustment)
     photos = tuple(table.of("photo"))
     images = ImageReadings(
         photo=photos,
         point=tuple(table.of("point")),
-        xy_mm=found.xy_mm,
-        sd_mm=found.sd_mm,
+        xy_mm=imagery.xy_mm,
+        sd_mm=imagery.sd_mm,
         check=_check(table),
         rows=table.rows,
         file=table.file,
-        shared_sd_mm=found.shared_sd_mm,
+        shared_sd_mm=imagery.shared_sd_mm,
     )
-    return images, tuple(fit for photo, fit in found.fits.items() if photo in set(photos))
+    return images, tuple(fit for photo, fit in imagery.fits.items() if photo in set(photos))
 
 
 def _known_points(table, check=False):
@@ -190,7 +201,7 @@ def _instrument(name, given):
 
 
 def setups_of(table):
-    """The `Setup`s of setups.csv, in their order."""
+    """`Setup`s of setups.csv, in the order of the file."""
     if not _has_rows(table):
         return ()
     names = ("setup", "station", "instrument", "instrument_height_m")
@@ -203,7 +214,7 @@ def setups_of(table):
 
 
 def _readings(name, table):
-    """Readings of one table; what a table does not have stays as Readings has it."""
+    """`Readings` of one table; columns that the table lacks keep the defaults of `Readings`."""
     value, sd = _values(name, table)
     columns, optional = table.columns, {}
     start = "at" if "at" in columns else "from"
@@ -235,16 +246,16 @@ def _readings(name, table):
 
 
 def _stadia_readings(tables, registers):
-    """Distances that bars tell by the angles under which they are seen.
+    """Distances computed from the angles subtended by stadia bars.
 
-    What the length of a bar is off by is a scale of all its distances.
+    The error of the length of a bar is a common scale error of its distances.
     """
     table = tables["stadia"]
     if not _has_rows(table):
         return ()
     bars = bars_of(registers)
     used = bars_used(table, bars)
-    stations = {one.name: one.station for one in setups_of(tables["setups"])}
+    stations = {setup.name: setup.station for setup in setups_of(tables["setups"])}
     length = np.array([bars[name]["length_m"] for name in used])
     angle, angle_sd = angle_in_rad(table, "angle"), table.numbers("s_arcsec") * ARCSEC
     return (
@@ -265,7 +276,7 @@ def _stadia_readings(tables, registers):
 
 
 def _correlated(table):
-    """CorrelatedReadings, or None."""
+    """`CorrelatedReadings`; None without rows."""
     if not _has_rows(table):
         return None
     axes = [[AXES.index(value or "x") for value in table.of(f"value_{i}")] for i in "12"]
@@ -280,6 +291,7 @@ def _correlated(table):
 
 
 def _values(name, table):
+    """(values, standard deviations) of a table of readings, in m or rad."""
     if name in ANGLES:
         return angle_in_rad(table, ANGLES[name]), table.numbers("s_arcsec") * ARCSEC
     if "dx_m" in table.columns:
@@ -288,5 +300,5 @@ def _values(name, table):
             for kind, unit, factor in (("d", "m", 1.0), ("s", "mm", 1e-3))
         )
     sd = table.numbers("s_mm") / 1000
-    measured = [name for name in ("distance_m", "dz_m") if name in table.columns]
-    return table.numbers(measured[0]) if measured else np.zeros(len(sd)), sd
+    lengths = [name for name in ("distance_m", "dz_m") if name in table.columns]
+    return table.numbers(lengths[0]) if lengths else np.zeros(len(sd)), sd

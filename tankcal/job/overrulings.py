@@ -6,14 +6,14 @@ _COLUMNS = ("point", "table", "row", "decision", "reason", "by", "date")
 
 
 def make_overrulings(table):
-    """`Overruling`s in the order of the file; () of no table."""
+    """`Overruling`s in the order of the file; () without the table."""
     if table is None:
         return ()
     rows = zip(*map(table.of, _COLUMNS), table.rows, strict=True)
     return tuple(
         Overruling(
             point=point,
-            table=of,
+            table=reading_table,
             reading_row=None if number is None else int(number),
             decision=decision,
             reason=reason,
@@ -22,5 +22,5 @@ def make_overrulings(table):
             row=row,
             file=table.file,
         )
-        for point, of, number, decision, reason, by, date, row in rows
+        for point, reading_table, number, decision, reason, by, date, row in rows
     )

@@ -1,8 +1,8 @@
-"""What is plausible: the limits of what is read, and what is computed from them.
+"""Limits of plausible input and of quantities computed from it.
 
-A number beyond a range is told as a warning, or as a problem where it cannot be at all; the limits
-are tankcal's own choice, wide enough for what is built, narrow enough for a slip of the hand. In
-words they stand in the table of `tankcal.job.plausibility_table`.
+A number beyond a range causes a warning; an impossible number is a problem. The limits are chosen
+by tankcal: wide enough for existing tanks, narrow enough to detect mistyped values. The table in
+`tankcal.job.plausibility_table` describes them in words.
 """
 
 import math
@@ -17,20 +17,21 @@ CARBON_STEEL, STAINLESS_STEEL, ALUMINIUM = METALS = (
 )
 SHELLS = (*METALS, "other")
 INSIDE, MIDDLE, OUTSIDE = DIAMETERS = ("inside", "middle", "outside")
-PLATES_TO_INSIDE = {INSIDE: 0.0, MIDDLE: 0.5, OUTSIDE: 1.0}  # from that radius
+# Plates between the inside radius and this radius.
+PLATES_TO_INSIDE = {INSIDE: 0.0, MIDDLE: 0.5, OUTSIDE: 1.0}
 FLAT, RAISED = TARGETS = ("flat", "raised")
 
-MOST_YIELD_MPA = 2000  # of a shell's steel: more is pascals or psi
+MOST_YIELD_MPA = 2000  # yield stress of the shell; a larger number is in Pa or psi
 
-FIRST_YEAR = 1900  # of a survey
-DAYS_AHEAD = 1  # of a survey, for time zones
-YEARS_PLANNED = 10  # ahead, of a survey that is planned
-DAYS_TO_ISSUE = 60  # a certificate may be prepared before its day
+FIRST_YEAR = 1900  # earliest year of a survey
+DAYS_AHEAD = 1  # latest day of a survey after today, because of time zones
+YEARS_PLANNED = 10  # longest time until a planned survey
+DAYS_TO_ISSUE = 60  # longest time until the date of issue of a certificate
 
 SHELL_C = {AMBIENT: (-35.0, 50.0), HEATED: (-35.0, 300.0), REFRIGERATED: (-200.0, 50.0)}
 REFERENCE_C = {AMBIENT: (0.0, 40.0), HEATED: (0.0, 300.0), REFRIGERATED: (-200.0, 40.0)}
 AIR_C = (-45.0, 48.0)
-SHELL_OVER_AIR_K = (-15.0, 30.0)  # a shell at night and a shell in the sun
+SHELL_OVER_AIR_K = (-15.0, 30.0)  # shell at night, shell in the sun
 
 EXPANSION_PER_K = {
     "carbon_steel": (0.95e-5, 1.4e-5),
@@ -43,73 +44,83 @@ E_GPA = {
     "aluminium": (62.0, 80.0),
 }
 
-WATER_STRESS_MPA = 350.0  # in the thinnest plates
-LEAST_STRESS_MPA = {"carbon_steel": 137.0, "stainless_steel": 120.0, "aluminium": 55.0}  # of design
-LIGHT, HEAVY = 0.45, 1.0  # relative densities of the contents where the job gives none
-THICK_MM, THICK_FACTOR = 6.5, 1.4  # what a course may have over what head and code need
-CODE_MM, CODE_PER_M = 5.0, 0.08  # what codes ask for at least, by the diameter in metres
-THIN_MM = {  # of a course: least and by the diameter in metres; the lesser of two lines
+WATER_STRESS_MPA = 350.0  # largest stress in the thinnest plausible plates
+# Smallest design stress.
+LEAST_STRESS_MPA = {"carbon_steel": 137.0, "stainless_steel": 120.0, "aluminium": 55.0}
+LIGHT, HEAVY = 0.45, 1.0  # relative densities: of liquid not given; least for the upper limit
+# Largest thickness: addend and factor to the need of head and code.
+THICK_MM, THICK_FACTOR = 6.5, 1.4
+CODE_MM, CODE_PER_M = 5.0, 0.08  # minimum thickness of codes: a + b times the diameter in m
+THIN_MM = {  # thinnest course: the lesser of two lines a + b times the diameter in m
     "carbon_steel": ((2.0, 0.15), (4.0, 0.04)),
     "stainless_steel": ((1.0, 0.05), (1.0, 0.05)),
     "aluminium": ((2.0, 0.15), (4.0, 0.04)),
 }
-SOLID_PLATES_MM = {  # a lying cylinder or a sphere: least and most, each a + b times the diameter
+SOLID_PLATES_MM = {  # lying cylinder, sphere: least and most, each a + b times the diameter in m
     "horizontal": ((1.0, 0.4), (12.0, 8.0)),
     "sphere": ((1.0, 0.2), (6.0, 4.0)),
 }
-LEAST_PLATE_MM = 1.0
-PAINT_MM = 1.5
-TARGET_MM = {  # from the wall to the centre: film and thin magnets; prisms, balls, holders
+LEAST_PLATE_MM = 1.0  # thinnest plate
+PAINT_MM = 1.5  # thickest paint
+TARGET_MM = {  # wall to centre of target; flat: film, thin magnets; raised: prisms, balls, holders
     FLAT: (0.0, 2.5),
     RAISED: (2.5, 100.0),
 }
 RISING_PLATES = 1.1  # thickness of the top course over that of the bottom course
 
-NEAR_JOINT_M = 0.025  # rings are surveyed on plates, not on welds
+NEAR_JOINT_M = 0.025  # points nearer to a joint are on a weld, not on a plate
+# Rings of points: largest height of a ring, smallest gap between rings, largest number of rings.
 LEVEL_M, RING_GAP_M, MOST_RINGS = 0.03, 0.08, 60
-TOP_MISS_M = 0.05
-OFF_SHELL_M, OFF_SHELL, OFF_SHELL_POINTS = 0.05, 0.03, 5  # beyond an end; part of the points; least
-NEAR_WALL = 0.005  # of the radius: such points are of the wall, not clutter
-RIM, RIM_MISS_M = 0.8, 0.25  # bottom points beyond this part of the radius lie near bottom_z_m
-DIP_PLATE_M, DIP_PLATE = 0.3, 0.05  # and of the diameter of a lying tank or a sphere
-PLATE_ON_BOTTOM, PLATE_ON_BOTTOM_M = 0.5, 0.05  # of the rise at the dip point, and
-SLOPE_UP = 0.04  # rise of a cone over the radius; 1:120 is usual, up to 1:25 is plausible
+TOP_MISS_M = 0.05  # largest difference of checks.top_z_m and the sum of the courses
+# Points of the wall beyond an end of the shell: distance, and largest share and number of them.
+OFF_SHELL_M, OFF_SHELL, OFF_SHELL_POINTS = 0.05, 0.03, 5
+NEAR_WALL = 0.005  # share of the radius; nearer points belong to the wall
+# Bottom points beyond this share of the radius agree with bottom_z_m within this length.
+RIM, RIM_MISS_M = 0.8, 0.25
+# Largest distance of dip plate and bottom, as a length and, for a lying tank or a sphere, also as
+# a share of the diameter.
+DIP_PLATE_M, DIP_PLATE = 0.3, 0.05
+PLATE_ON_BOTTOM, PLATE_ON_BOTTOM_M = 0.5, 0.05  # share of the rise at the dip point, plus a length
+SLOPE_UP = 0.04  # rise of a cone over the radius; 1:120 is usual, 1:25 the limit
+# Reference height below the top of the tank; above it, as a length plus a share of the diameter.
 REFERENCE_BELOW_M, REFERENCE_ABOVE_M, REFERENCE_ABOVE = 0.05, 5.0, 0.2
 
+# Difference from the drawing: share of the size plus a length.
 DIAMETER_MISS, DIAMETER_MISS_M = 0.01, 0.02
 SIZE_MISS, SIZE_MISS_M, IMPOSSIBLE_MISS = 0.01, 0.02, 0.3
-VOLUME_MISS = 0.05
+VOLUME_MISS = 0.05  # relative difference of capacity and nominal volume
 LENGTH_OVER_DIAMETER, MOST_LENGTH_OVER_DIAMETER = (0.4, 16.0), 40.0
-END_DEPTH = {  # over the diameter
+END_DEPTH = {  # depth of an end over the diameter
     "conical": (0.02, 0.3),
     "ellipsoidal": (0.12, 0.4),
     "spherical": (0.05, 0.22),
     "torispherical": (0.12, 0.3),
     "guppy": (0.05, 0.6),
 }
-STRONG_ROLL_DEG = 15.0  # of a gauge tube off the plumb
-HEMISPHERE = 0.47
+STRONG_ROLL_DEG = 15.0  # inclination of a gauge tube
+HEMISPHERE = 0.47  # smallest depth of a hemispherical end over the diameter
 DISH_RADIUS, KNUCKLE_RADIUS = (0.7, 1.3), (0.03, 0.25)  # over the diameter
-ENDS_DIFFER, ENDS_DIFFER_M = 1.2, 0.03
-SPHERE_M = 50.0
+ENDS_DIFFER, ENDS_DIFFER_M = 1.2, 0.03  # two ends of one form: ratio and difference of sizes
+SPHERE_M = 50.0  # largest diameter of a sphere
 DENSITIES_KG_M3 = (400.0, 2000.0)
-ROOF_KG_M2 = (15.0, 500.0)
+ROOF_KG_M2 = (15.0, 500.0)  # mass of a floating roof over the area of the tank
 
 MISFIT, MISFIT_M, IMPOSSIBLE_MISFIT = 0.002, 0.010, 0.02  # rms of residuals, over the diameter
-MISFIT_SDS = 3.0  # over the standard deviation that was given
+MISFIT_SDS = 3.0  # rms of residuals over the given standard deviation
 CIRCUMFERENCE_MISS, CIRCUMFERENCE_SDS = 4e-4, 3.0
-DRAWN_MISS, DRAWN_MISS_M = 1e-3, 0.004  # of an inside diameter that is known from the drawing
-OTHER_SIDE = (0.6, 1.6)  # of two plates: a miss that the other side of the wall explains
+# Difference of inside diameter and drawing: share plus length.
+DRAWN_MISS, DRAWN_MISS_M = 1e-3, 0.004
+OTHER_SIDE = (0.6, 1.6)  # difference over two plates that indicates the other side of the wall
 
 LIQUID_C = {AMBIENT: (-30.0, 50.0), HEATED: (-30.0, 250.0), REFRIGERATED: (-200.0, 50.0)}
 LIQUID_EXPANSION_PER_K = (5e-5, 2.5e-3)  # water at 8 degrees, liquefied gas
 METER_OVER_TANK_K, SHELL_OVER_LIQUID_K = 10.0, 25.0
-TANK_C_STEP_K = 2.0  # of the liquid in the tank from dip to dip
-METER_DRIFT, MUCH_METER_DRIFT = 2e-4, 5e-4  # of a factor, before and after
+TANK_C_STEP_K = 2.0  # change of the liquid temperature in the tank from dip to dip
+METER_DRIFT, MUCH_METER_DRIFT = 2e-4, 5e-4  # relative change of a meter factor: drift, large change
 BATCH_SD = 1e-3  # sd of a batch by its meter, over the batch
 
-RATIO_MISS = 0.03  # of a ratio of two units: sizes and drawings differ by so much
-RATIOS = {  # of two sizes that should be equal
+RATIO_MISS = 0.03  # relative difference of a ratio of sizes from a ratio of units
+RATIOS = {  # ratios of two sizes that should be equal, by cause
     "feet": (1 / 0.3048,),
     "radius": (2.0,),
     "girth": (math.pi,),
@@ -117,6 +128,7 @@ RATIOS = {  # of two sizes that should be equal
     "point": (10.0, 100.0, 1000.0),
 }
 
+# Words in names of deadwood that reduce or increase the capacity, in three languages.
 TAKES_ROOM = (
     *("coil", "pipe", "tube", "column", "pillar", "ladder", "stair", "agitator", "mixer", "beam"),
     *("serpentina", "tubo", "tubulação", "coluna", "pilar", "escada", "agitador", "viga"),
@@ -130,7 +142,7 @@ GIVES_ROOM = (
 
 
 def unit_guess(ratio):
-    """Message with the likely cause of a ratio of two sizes that should be equal."""
+    """Message with the likely cause of the ratio of two sizes that should be equal."""
     ratio = max(ratio, 1 / ratio) if ratio > 0 else math.inf
     cause = {
         "feet": message("ratio_of_feet", ", as of feet and metres"),
@@ -139,36 +151,69 @@ def unit_guess(ratio):
         "inches": message("ratio_of_inches", ", as of an inch in place of a metric unit"),
         "point": message("ratio_of_point", ", as of a decimal point in the wrong place"),
     }
-    near = (
-        (abs(ratio / one - 1), text)
+    matches = (
+        (abs(ratio / match - 1), text)
         for name, text in cause.items()
-        for one in RATIOS[name]
-        if abs(ratio / one - 1) <= RATIO_MISS
+        for match in RATIOS[name]
+        if abs(ratio / match - 1) <= RATIO_MISS
     )
-    text = min(near, key=lambda one: one[0], default=(0.0, ""))[1]
+    text = min(matches, key=lambda match: match[0], default=(0.0, ""))[1]
     return message(
         "ratio_of_sizes", "; they are as {ratio:.3g} to 1{cause}", ratio=ratio, cause=text
     )
 
 
 def least_course_mm(diameter_m, head_m, density=LIGHT, shell="carbon_steel"):
-    """Plate that water stress of 350 MPa asks for, or what tanks of the metal are made of."""
+    """Smallest plausible thickness of a course, mm.
+
+    It is the larger of the thickness at a stress of 350 MPa and of the thinnest plates of this
+    metal.
+
+    Parameters
+    ----------
+    diameter_m, head_m : float
+        Diameter of the tank; height of liquid above the bottom of the course.
+    density : float, optional
+        Relative density of the liquid.
+    shell : str, optional
+        Metal of the shell.
+    """
     needed = _head_mm(diameter_m, head_m, density, WATER_STRESS_MPA)
     return max(min(a + b * diameter_m for a, b in THIN_MM[shell]), needed)
 
 
 def most_course_mm(diameter_m, head_m, density=HEAVY, shell="carbon_steel"):
-    """1.4 times what the least design stress or a code asks for, and 6.5 mm for corrosion."""
+    """Largest plausible thickness of a course, mm.
+
+    It is 1.4 times the thickness required by the smallest design stress or by a code, plus 6.5 mm
+    for corrosion. For the parameters, see `least_course_mm`.
+    """
     needed = _head_mm(diameter_m, head_m, density, LEAST_STRESS_MPA[shell])
     return THICK_MM + THICK_FACTOR * max(CODE_MM + CODE_PER_M * diameter_m, needed)
 
 
 def side_doubt(inside_m, nominal_m, drawn, plate_m, side, sd_m=0.0):
-    """Message about an inside diameter against the drawing's, to the plate; None: plausible.
+    """Compare an inside diameter with the drawing, to the thickness of a plate.
 
-    inside_m  of the first course, as it was made of points or sizes, sd_m its standard deviation
-    drawn     what nominal_m is: inside, middle or outside; plate_m with the paint, 0: not known
-    side      that was declared: of a survey from the other one the miss is that of two plates
+    Parameters
+    ----------
+    inside_m : float
+        Inside diameter of the first course, from points or sizes.
+    nominal_m : float or None
+        Nominal diameter.
+    drawn : {"inside", "middle", "outside"} or None
+        Definition of the nominal diameter.
+    plate_m : float
+        Thickness of plate and paint; 0: not known.
+    side : {"inside", "outside"}
+        Declared side of the survey. A survey from the other side differs by two plates.
+    sd_m : float, optional
+        Standard deviation of `inside_m`.
+
+    Returns
+    -------
+    Message or None
+        None if the diameter is plausible or cannot be compared.
     """
     if drawn is None or nominal_m is None or (drawn != INSIDE and not plate_m):
         return None
@@ -204,7 +249,7 @@ def side_doubt(inside_m, nominal_m, drawn, plate_m, side, sd_m=0.0):
 
 
 def reference_doubt(reference_m, top_m, diameter_m):
-    """Message about a reference height against the dip of the top; None: plausible."""
+    """Message about a reference height that does not fit the top of the tank; None if plausible."""
     if reference_m < top_m - REFERENCE_BELOW_M:
         return message(
             "reference_below_top",
@@ -227,5 +272,5 @@ def reference_doubt(reference_m, top_m, diameter_m):
 
 
 def _head_mm(diameter_m, head_m, density, stress_mpa):
-    """Thickness under a liquid head: 1000 rho g H D / 2 over the stress, mm."""
+    """Thickness required by a liquid head, mm: 1000 rho g H D / 2 over the stress."""
     return 4.903 * density * diameter_m * head_m / stress_mpa

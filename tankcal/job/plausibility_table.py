@@ -1,7 +1,7 @@
-"""What is plausible, in words: the table of ranges and cross-checks, and the codes that tell them.
+"""Table of plausible ranges and cross-checks in words, with the codes of their messages.
 
-`docs/plausibility.md` shows TABLE, and a test holds the two together. The limits themselves are
-those of `tankcal.job.plausibility`.
+`docs/plausibility.md` shows TABLE; a test compares both. `tankcal.job.plausibility` contains the
+limits.
 """
 
 from dataclasses import dataclass
@@ -13,12 +13,20 @@ from tankcal.job import plausibility as limits
 class Plausible:
     """One line of the table.
 
-    what     keys of job.toml and columns of tables, as they are written
-    expected the plausible range, in words
-    slip     what slip of the hand is told by it
-    against  what the number is compared with
-    codes    of the messages that tell it
-    verified False: a limit of a standard that was read at second hand, not in its source
+    Attributes
+    ----------
+    what : str
+        Keys of job.toml and columns of tables, as written in the files.
+    expected : str
+        Plausible range.
+    slip : str
+        Mistake that the check detects.
+    against : str
+        Quantities that the number is compared with.
+    codes : tuple of str
+        Codes of the messages.
+    verified : bool
+        False: a limit of a standard that was read in a secondary source.
     """
 
     what: str
@@ -441,4 +449,4 @@ TABLE = (
         ("batch_too_small", "batch_unlike_sizes", "batches_in_other_unit", "liquid_far_because"),
     ),
 )
-CODES = frozenset(code for one in TABLE for code in one.codes)
+CODES = frozenset(code for line in TABLE for code in line.codes)

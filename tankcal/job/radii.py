@@ -7,27 +7,42 @@ from tankcal.job.model.radii import Change, Radii
 
 
 def make_radii(values, tables, covariance_m2):
-    """(Radii, Change) of a job without problems; None: nothing was measured since then.
+    """Build `Radii` and `Change` of a job without problems.
 
-    covariance_m2  (rows, rows) of radii_cov.npz, in the order of radii.csv, or None
+    Parameters
+    ----------
+    values : dict
+        {section: {key: value}} of the settings.
+    tables : dict of {str: ColumnValues or None}
+        Tables by name.
+    covariance_m2 : ndarray, shape (rows, rows), or None
+        Covariance matrix in radii_cov.npz, in the order of radii.csv, m2.
+
+    Returns
+    -------
+    radii : Radii
+    change : Change or None
+        None without a new survey.
     """
     table, given = tables["radii"], values["radii"]
     place = {name: i for i, name in enumerate(table.of("course"))}
     order = [place.get(name) for name in tables["courses"].of("course")]
-    known = [i is not None for i in order]
-    radius, own = np.full(len(order), np.nan), np.zeros((len(order), len(order)))
+    is_given = [i is not None for i in order]
+    radius, covariance = np.full(len(order), np.nan), np.zeros((len(order), len(order)))
+    # Place the rows of radii.csv in the order of the courses; missing courses stay nan.
     rows = [i for i in order if i is not None]
-    radius[known] = table.numbers("radius_m")[rows]
+    radius[is_given] = table.numbers("radius_m")[rows]
     if covariance_m2 is None:
         covariance_m2 = np.diag(np.nan_to_num(table.numbers("u_mm") / 1000) ** 2)
-    own[np.ix_(known, known)] = covariance_m2[np.ix_(rows, rows)]
-    own[np.isnan(radius)], own[:, np.isnan(radius)] = 0.0, 0.0
+    covariance[np.ix_(is_given, is_given)] = covariance_m2[np.ix_(rows, rows)]
+    covariance[np.isnan(radius)], covariance[:, np.isnan(radius)] = 0.0, 0.0
+    # Radii without a temperature refer to the temperature of the table.
     temperature = given["reference_temperature_c"]
     if temperature is None:
         temperature = values["table"]["reference_temperature_c"]
     radii = Radii(
         radius,
-        own,
+        covariance,
         given["u_common_mm"] / 1000,
         temperature,
         given["source"],

@@ -1,8 +1,8 @@
-"""Decision rules as files: the shipped ones, and a house rule beside the job.
+"""Decision rules as files: rules shipped with tankcal, and rules of a user beside the job.
 
-A rule is a TOML file (docs/job-format.md): [rule] says what it is, each [uncertainty.NAME] is a
-limit of the expanded uncertainty, each [deviation.NAME] one of the deviation from a stated volume.
-[reference_height.NAME] and [period.NAME] are of a new table beside a former one.
+A rule is a TOML file (docs/job-format.md). [rule] describes it. Each [uncertainty.NAME] limits the
+expanded uncertainty. Each [deviation.NAME] limits the deviation from a stated volume.
+[reference_height.NAME] and [period.NAME] apply to a new table compared with a former table.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ from tankcal.tank.rules.model import (
 )
 from tankcal.text.shipped import shipped_folder
 
-# The keys of a decision rule's file: [rule], and [PART.NAME] for the parts of LIMITS.
+# Keys of the file of a decision rule: [rule], and [PART.NAME] for the parts of LIMITS.
 
 RULE = (
     Field("name", "text", "name of the rule", required=True),
@@ -79,21 +79,25 @@ _ENDING = ".toml"
 
 @dataclass(frozen=True)
 class ShippedRules:
-    """The rules of one kind: those that ship with tankcal, and files of a laboratory's own.
+    """Rules of one kind: shipped with tankcal, or in files of a laboratory.
 
-    folder  of the shipped ones, below the package
-    parse   parse(file, data, log) -> a rule, or None after telling `log`
+    Attributes
+    ----------
+    folder : str
+        Folder of the shipped rules within the package.
+    parse : callable
+        parse(file, data, log) returns a rule, or None with problems in `log`.
     """
 
     folder: str
     parse: Callable
 
     def names(self):
-        """Names of the rules that ship with tankcal."""
+        """Names of the shipped rules."""
         return tuple(sorted(path.stem for path in shipped_folder(self.folder).glob(f"*{_ENDING}")))
 
     def rule(self, name):
-        """A rule that ships with tankcal. Raises ValueError for a name that does not."""
+        """Shipped rule of this name; raises ValueError for an unknown name."""
         if name not in self.names():
             raise ValueError(f"no rule {name!r}; expected one of {', '.join(self.names())}")
         path, log = shipped_folder(self.folder) / f"{name}{_ENDING}", Log()
@@ -102,7 +106,7 @@ class ShippedRules:
         return rule
 
     def named(self, name, log):
-        """(rule, file name) of --rule: a shipped name or a path; None after telling `log`."""
+        """(rule, file name) of the option --rule, a shipped name or a path; None with a problem."""
         if name in self.names():
             return self.rule(name), f"{name}{_ENDING}"
         path = Path(name)
@@ -116,20 +120,32 @@ class ShippedRules:
 
 
 def limits_one_table(rule):
-    """Whether a rule limits something of one table; rules of periods compare two."""
+    """Return True if a rule limits a property of one table; rules of periods compare two tables."""
     return bool(rule.uncertainty or rule.deviation)
 
 
 def rules_of_one_table():
-    """Names of the rules that ship with tankcal and that a job may name."""
+    """Names of the shipped rules that a job may name."""
     return tuple(name for name in shipped_names() if limits_one_table(shipped_rule(name)))
 
 
 def find_rule(raw, name, log):
-    """(Rule, (file, SHA-256, size) or None) that table.rule names; None after telling `log`.
+    """Find the rule named by table.rule.
 
-    raw   RawJob, beside whose settings a house rule lies     name  as the field says: no path
-    The second is None for a rule that ships with tankcal.
+    Parameters
+    ----------
+    raw : RawJob
+        Job as read; a rule of the user lies in its folder.
+    name : str
+        Name of a shipped rule or of a file, without a path, as checked by the field.
+    log : Log
+        Receives the problems.
+
+    Returns
+    -------
+    tuple or None
+        (Rule, (file, SHA-256, size in bytes)); the second is None for a shipped rule. None if no
+        valid rule was found.
     """
     value = raw.settings["table"]["rule"]
     place = (raw.settings_file, value.row, "table.rule")
@@ -147,7 +163,7 @@ def find_rule(raw, name, log):
 
 
 def _of_one_table(rule, file, place, log):
-    """(Rule, file) of a rule that limits something of one table; None after telling `log`."""
+    """(Rule, file) if the rule limits a property of one table; else None and a problem."""
     if limits_one_table(rule):
         return rule, file
     expected = message(
@@ -173,8 +189,8 @@ def _tell_unknown(file, row, column, name, no_file, rules, log):
 
 
 def parse_rule(file, data, log):
-    """The Rule in the bytes of a TOML file, or None after telling `log` every problem of it."""
-    told = len(log.problems)
+    """Rule in the content of a TOML file; None, with every problem in `log`, if invalid."""
+    problems_before = len(log.problems)
     settings, sections = read_toml(file, data, log)
     if settings is None:
         return None
@@ -189,7 +205,7 @@ def parse_rule(file, data, log):
             expected = message(
                 "unknown_section_of_rule",
                 "unknown section; expected [rule] or one of {sections}{hint}",
-                sections=[f"[{one}.NAME]" for one in LIMITS],
+                sections=[f"[{known}.NAME]" for known in LIMITS],
                 hint=hint,
             )
             log.problem(file, expected, row, f"[{section}]")
@@ -204,15 +220,15 @@ def parse_rule(file, data, log):
                 part=part,
             )
             log.problem(file, expected, row, f"[{section}]")
-    if len(log.problems) == told and not any(limits.values()):
+    if len(log.problems) == problems_before and not any(limits.values()):
         log.problem(
             file, message("no_limits", "no limits; expected sections such as [uncertainty.volumes]")
         )
-    return _rule(head, limits) if len(log.problems) == told else None
+    return _rule(head, limits) if len(log.problems) == problems_before else None
 
 
 def _tell_contradictions(file, part, section, values, given, row, log):
-    """A problem for each pair of keys that do not go together, and for unknown kinds of tank."""
+    """Report keys that contradict each other or are missing, and unknown kinds of tank."""
 
     def is_given(key):
         return key in given and not is_blank(given[key].raw)
@@ -249,7 +265,7 @@ def _tell_contradictions(file, part, section, values, given, row, log):
 
 
 def _tell_heights(values, is_given, tell):
-    """A problem for a least height, or a percentage, that a limit of U lacks or must not have."""
+    """Report a minimum height or a percentage that a limit of U lacks or must not have."""
     is_delivery = values["of"] == "deliveries"
     if is_delivery and not is_given("minimum_height_m"):
         tell(
@@ -308,7 +324,7 @@ def _rule(head, limits):
     return Rule(
         name=head["name"],
         source=head["source"],
-        verified=all(one.verified for one in (*uncertainty, *deviation, *heights, *periods)),
+        verified=all(limit.verified for limit in (*uncertainty, *deviation, *heights, *periods)),
         remark=head["remark"] or "",
         largest_capacity_m3=head["largest_capacity_m3"],
         uncertainty=uncertainty,
@@ -329,6 +345,7 @@ def _shared(name, values, rule_verified):
 
 
 def _part(percent):
+    """Fraction from a percentage; None if not given."""
     return None if percent is None else percent / 100
 
 

@@ -1,4 +1,4 @@
-"""A job as one Excel workbook: a sheet `job` for the settings and a sheet for each table."""
+"""Read a job from an Excel workbook: a sheet `job` for the settings, a sheet for each table."""
 
 from tankcal.errors import sheet_named
 from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
@@ -29,20 +29,32 @@ SECTION = "section"
 
 
 def read_workbook(path, log, edited=None):
-    """RawJob of a workbook (a Path), or None after telling `log` why it cannot be read.
+    """Read a job in a workbook.
 
-    edited  {its name: bytes}, which stand in place of what the file holds
+    Parameters
+    ----------
+    path : Path
+        The workbook.
+    log : Log
+        Receives the problems.
+    edited : dict of {str: bytes}, optional
+        Content that replaces the content of the file, by file name.
+
+    Returns
+    -------
+    RawJob or None
+        None if the workbook cannot be read.
     """
     log.book = path.name
     data = (edited or {}).get(path.name) or read_bytes(path, log, MAX_FILE_BYTES)
     if data is None:
         return None
     try:
-        found = read_sheets(data, is_read)
+        sheets_of_book = read_sheets(data, is_read)
     except Unreadable as reason:
         log.problem(path.name, reason.args[0])
         return None
-    sheets = _known_sheets(path.name, found, log)
+    sheets = _known_sheets(path.name, sheets_of_book, log)
     tables = {name: _table(name, sheet, log) for name, sheet in sheets.items()}
     settings, sections = None, {}
     if SETTINGS_SHEET not in tables:
@@ -50,26 +62,28 @@ def read_workbook(path, log, edited=None):
     elif tables[SETTINGS_SHEET] is not None:
         settings, sections = _settings(tables[SETTINGS_SHEET], SECTION, log)
     files = (fingerprint(path.name, data),)
-    wanted = {name: tables[name] for name in TABLES if name in tables}
+    tables_of_job = {name: tables[name] for name in TABLES if name in tables}
     place = sheet_named(SETTINGS_SHEET)
     registers = {
         name: _register(tables[name], owner, log)
         for name, owner in REGISTERS.items()
         if name in tables
     }
-    return RawJob(path.name, path.parent, place, settings, sections, wanted, None, files, registers)
+    return RawJob(
+        path.name, path.parent, place, settings, sections, tables_of_job, None, files, registers
+    )
 
 
 def is_read(title):
-    """Does a sheet of this title belong to a job? Notes and what `tankcal new` explains do not."""
+    """Return True if a sheet with this title belongs to a job; notes and explanations do not."""
     return title.strip().lower() != README_SHEET and not title.strip().startswith("#")
 
 
-def _known_sheets(file, found, log):
-    """{name: Sheet} of the sheets that a job has; the others are told to `log`."""
+def _known_sheets(file, sheets_of_book, log):
+    """{name: Sheet} of the sheets of a job; other sheets are reported."""
     known = (SETTINGS_SHEET, *TABLES, *REGISTERS)
     sheets = {}
-    for sheet in found:
+    for sheet in sheets_of_book:
         name = sheet.title.strip().lower()
         if name in sheets:
             log.problem(
@@ -99,7 +113,7 @@ def _known_sheets(file, found, log):
 
 
 def _table(name, sheet, log):
-    """Table of a sheet, or None after telling `log` why it cannot be read."""
+    """Table of a sheet; None, with a problem in `log`, if unreadable."""
     place = sheet_named(name)
     if sheet.is_hidden:
         log.problem(
@@ -111,14 +125,15 @@ def _table(name, sheet, log):
     rows, first_column = table_rows(place, sheet.grid, log)
     letters = placed_columns(rows, first_column)
     if name == SETTINGS_SHEET or name in REGISTERS:
-        nowhere = dict.fromkeys((REGISTERS.get(name, SECTION), KEY, VALUE))
-        letters = {None: letters.get(VALUE)} | nowhere | letters
+        # Messages name the keys of settings; their cell is in the column of values.
+        fallbacks = dict.fromkeys((REGISTERS.get(name, SECTION), KEY, VALUE))
+        letters = {None: letters.get(VALUE)} | fallbacks | letters
     log.place_columns(place, letters)
     return make_table(place, rows, None, log)
 
 
 def _register(table, owner, log):
-    """Register of the sheet cameras or instruments, or None."""
+    """Register of a sheet such as cameras; None if unreadable."""
     if table is None:
         return None
     entries, rows = _settings(table, owner, log)
@@ -126,9 +141,23 @@ def _register(table, owner, log):
 
 
 def _settings(table, owner, log):
-    """({section: {key: Value}}, {section: row}) of a sheet of settings, or (None, {}).
+    """Read a sheet of settings.
 
-    owner  heading of the column of sections: "section", "camera" or "instrument"
+    Parameters
+    ----------
+    table : Table
+        Table of the sheet.
+    owner : str
+        Heading of the column of sections: "section", "camera" or "instrument".
+    log : Log
+        Receives the problems.
+
+    Returns
+    -------
+    settings : dict or None
+        {section: {key: Value}}; None if columns are missing.
+    sections : dict
+        {section: row}.
     """
     needed = (owner, KEY, VALUE)
     known = (*needed, *REMARKS)
@@ -156,7 +185,7 @@ def _settings(table, owner, log):
     for row, cells in zip(table.row_numbers, table.rows, strict=True):
         section, key, value = (cells[position] for position in place)
         if key is None and value is None:
-            continue  # a row that only names a section or carries a note
+            continue  # a row with only a section or a note
         if owner != SECTION and isinstance(section, int | float):
             section = f"{section:.15g}"  # a camera called 1
         if not isinstance(section, str) or not isinstance(key, str):

@@ -5,11 +5,11 @@ import numpy as np
 from tankcal.job.checks.strapping import tapes_of, tapes_read
 from tankcal.survey.strapping import Comparison, Obstruction, Strap, Strapping, Tape
 
-LEAST_GAUGE_SD_M = 5e-5  # of a mean of gauge readings that nobody gave a standard deviation
+LEAST_GAUGE_SD_M = 5e-5  # smallest standard deviation of the mean of gauge readings
 
 
 def make_strapping(values, tables, registers):
-    """Strapping of settings, tables and registers without problems."""
+    """Build `Strapping` from settings, tables and registers without problems."""
     table = tables["circumferences"]
     tapes, keys = tapes_of(registers), values["strapping"]
     return Strapping(
@@ -18,15 +18,12 @@ def make_strapping(values, tables, registers):
         shape_sd_m=_metres(values["shell"]["shape_sd_mm"]),
         wave_m=_metres(keys["wave_mm"]),
         helix_m=_metres(keys["helix_mm"]),
-        plate_sd_m={name: one[1] for name, one in gauged(tables["thickness"]).items()},
+        plate_sd_m={name: means[1] for name, means in gauged(tables["thickness"]).items()},
     )
 
 
 def tools_of(tables, tapes):
-    """Tapes, obstructions and comparisons, as arguments of `Strapping`.
-
-    tapes  {name: {key: value}}
-    """
+    """Tapes {name: {key: value}}, obstructions and comparisons as arguments of `Strapping`."""
     return {
         "tapes": tuple(_tape(name, given) for name, given in tapes.items()),
         "obstructions": _obstructions(tables["obstructions"]),
@@ -35,27 +32,29 @@ def tools_of(tables, tapes):
 
 
 def gauged(table):
-    """{course: (mean plate, its sd, mean paint or None)} of the readings of a gauge, m."""
+    """{course: (mean plate, sd of the mean, mean paint or None)} of the gauge readings, m."""
     if table is None:
         return {}
-    courses, found = table.of("course"), {}
+    courses, means = table.of("course"), {}
     plates, sds, paints = (
         table.numbers(f"{name}_mm") / 1000 for name in ("thickness", "s", "paint")
     )
     for name in dict.fromkeys(courses):
-        rows = np.array([one == name for one in courses])
+        rows = np.array([course == name for course in courses])
         given = plates[rows]
+        # sd of the mean, from the given sds; else from the scatter of the readings.
         if np.all(np.isfinite(sds[rows])):
             sd = np.sqrt(np.mean(sds[rows] ** 2) / len(given))
         else:
             sd = np.std(given, ddof=1) / np.sqrt(len(given)) if len(given) > 1 else 0.0
         painted = paints[rows & np.isfinite(paints)]
         paint = float(np.mean(painted)) if len(painted) else None
-        found[name] = (float(np.mean(given)), float(max(sd, LEAST_GAUGE_SD_M)), paint)
-    return found
+        means[name] = (float(np.mean(given)), float(max(sd, LEAST_GAUGE_SD_M)), paint)
+    return means
 
 
 def _metres(millimetres):
+    """Length in m from mm; None if not given."""
     return None if millimetres is None else millimetres / 1000
 
 
@@ -100,20 +99,21 @@ def _tape(name, given):
 
 
 def _sd(given):
+    """Standard uncertainty; 0 if not given or to be estimated."""
     return 0.0 if given is None or isinstance(given, str) else given
 
 
 def _obstructions(table):
     if table is None:
         return {}
-    found = {}
+    obstructions = {}
     lengths = [f"{name}_mm" for name in ("thickness", "width", "over", "arc", "excess")]
     columns = map(table.of, ("circumference", "kind", "count", *lengths, "span_m", "s_mm"))
     for name, kind, count, *sizes, span, s_mm in zip(*columns, strict=True):
         sizes = map(_metres, sizes)
-        one = Obstruction(kind, count or 1.0, *sizes, span_m=span, sd_m=(s_mm or 0.0) / 1000)
-        found.setdefault(name, []).append(one)
-    return {name: tuple(those) for name, those in found.items()}
+        item = Obstruction(kind, count or 1.0, *sizes, span_m=span, sd_m=(s_mm or 0.0) / 1000)
+        obstructions.setdefault(name, []).append(item)
+    return {name: tuple(items) for name, items in obstructions.items()}
 
 
 def _comparisons(table):

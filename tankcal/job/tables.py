@@ -1,8 +1,8 @@
-"""The raw tables of a job: text and numbers as they stand, with the file and row of each.
+"""Raw tables of a job: text and numbers as given, with file and row.
 
-Nothing here knows what a value means. `tankcal.job.folder` reads job.toml and CSV files,
-`tankcal.job.sheets` the same from one workbook. Both give a `RawJob`, and tell everything that
-is wrong to a `Log`, so that all problems of a job come in one run.
+The meaning of values is not interpreted here. `tankcal.job.folder` reads job.toml and CSV files;
+`tankcal.job.sheets` reads the same tables from one workbook. Both return a `RawJob` and report
+every problem to a `Log`, so that one run lists all problems of a job.
 """
 
 import difflib
@@ -39,7 +39,7 @@ OVERRULING_TABLES = ("overrulings",)
 TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
 TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES + SPHERE_TABLES + SURVEY_TABLES
 TABLES += OVERRULING_TABLES
-REGISTERS = {  # what each lists
+REGISTERS = {  # name of an entry in each list
     "cameras": "camera",
     "instruments": "instrument",
     "clouds": "cloud",
@@ -47,20 +47,20 @@ REGISTERS = {  # what each lists
 }
 SETTINGS_FILE = "job.toml"
 SETTINGS_SHEET = "job"
-WORKBOOK_FILE = "job.xlsx"  # of a job folder that is filled in as a workbook
+WORKBOOK_FILE = "job.xlsx"  # workbook in a job folder
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read
 COVARIANCE_FILE = "points_cov.npz"
 RADII_COVARIANCE_FILE = "radii_cov.npz"
 
-MAX_FILE_BYTES = 200_000_000
-MAX_LINES, MAX_COLUMNS = 500_000, 100  # of a text table
+MAX_FILE_BYTES = 200_000_000  # largest file of a job
+MAX_LINES, MAX_COLUMNS = 500_000, 100  # largest text table
 MAX_PROBLEMS_PER_FILE = 50
 SEPARATORS = (",", ";", "\t")
-NOT_KNOWN = "?"  # in place of the decimal mark of a CSV file
+NOT_KNOWN = "?"  # replaces an undeclared decimal mark of a CSV file
 
 
 def shown(value):
-    """The value as a message shows it: one printable line of at most 60 characters."""
+    """Value as shown in a message: one printable line of at most 60 characters."""
     if isinstance(value, dict | list | tuple):
         return (
             message("a_list", "a list")
@@ -75,16 +75,16 @@ def shown(value):
 
 
 def meant(word, known):
-    """The known word that is close to `word`, or None."""
-    spelt = {one.lower(): one for one in known}
-    close = difflib.get_close_matches(str(word)[:80].lower(), [*spelt], n=1, cutoff=0.6)
-    return spelt[close[0]] if close else None
+    """Known word close to `word`, or None."""
+    spellings = {name.lower(): name for name in known}
+    close = difflib.get_close_matches(str(word)[:80].lower(), [*spellings], n=1, cutoff=0.6)
+    return spellings[close[0]] if close else None
 
 
 def nearest(word, known):
-    """' (did you mean x?)' when one of the known words is close to `word`, else ''."""
-    found = meant(word, known)
-    return message("did_you_mean", " (did you mean {spelt}?)", spelt=found) if found else ""
+    """Hint ' (did you mean x?)' if a known word is close to `word`, else ''."""
+    close = meant(word, known)
+    return message("did_you_mean", " (did you mean {spelt}?)", spelt=close) if close else ""
 
 
 def _printable(text):
@@ -94,9 +94,16 @@ def _printable(text):
 
 
 class Log:
-    """Collects what is wrong (`problems`) and what only deserves a look (`warnings`).
+    """Collector of problems, which prevent a calculation, and of warnings.
 
-    book  name of the workbook that the sheets stand in
+    Parameters
+    ----------
+    book : str, optional
+        Name of the workbook with the sheets.
+
+    Attributes
+    ----------
+    problems, warnings : list of Problem
     """
 
     def __init__(self, book=None):
@@ -104,26 +111,38 @@ class Log:
         self.problems = []
         self.warnings = []
         self._letters = {}
-        self._cells = set()  # with a problem
+        self._cells = set()  # cells with a problem
 
     def place_columns(self, file, letters):
-        """Tell in which column of a sheet each heading stands: {heading: letters}.
+        """Set the column of each heading of a sheet: {heading: letters}.
 
-        None in place of a heading stands for all that is no heading, such as the keys of settings.
+        The heading None applies to names that are not headings, such as the keys of settings.
         """
         self._letters[file] = letters
 
     def problem(self, file, expected, row=None, column=None):
-        """Note one thing that stops the job; each text becomes one printable line."""
+        """Add a problem; the text becomes one printable line.
+
+        Parameters
+        ----------
+        file : str
+            Name of file or sheet.
+        expected : Message or str
+            What was found and what is expected.
+        row : int, optional
+            Row in the file.
+        column : str, optional
+            Heading or key.
+        """
         self.problems.append(self._problem(file, expected, row, column))
         self._cells.add((file, row, column))
 
     def warning(self, file, expected, row=None, column=None):
-        """Note one thing that does not stop the job."""
+        """Add a warning, which does not prevent a calculation; parameters as for `problem`."""
         self.warnings.append(self._problem(file, expected, row, column))
 
     def has(self, file, row, column):
-        """Is a problem of that cell noted already?"""
+        """Return True if a problem of this cell exists."""
         return (file, row, column) in self._cells
 
     def _problem(self, file, expected, row, column):
@@ -137,7 +156,7 @@ class Log:
         return Problem(_printable(str(file)[:120]), _printable(expected), row, column, cell, book)
 
     def stop_if_problems(self):
-        """Raise InputError with every problem, by file and row; the longest lists are cut."""
+        """Raise InputError with the problems, sorted by file and row; long lists are truncated."""
         if not self.problems:
             return
         by_file = {}
@@ -158,7 +177,7 @@ class Log:
 
 @dataclass(frozen=True)
 class BadCell:
-    """A workbook cell without a usable value: a formula never calculated, an error such as #N/A."""
+    """Workbook cell without a usable value: a formula not calculated, an error such as #N/A."""
 
     complaint: str
 
@@ -172,7 +191,7 @@ class Percent(float):
 
 @dataclass(frozen=True)
 class Value:
-    """One setting as read, and the row of its file; blank is None or an empty text."""
+    """One setting as read, with its row in the file; None or an empty text is blank."""
 
     raw: object
     row: int | None = None
@@ -180,11 +199,25 @@ class Value:
 
 @dataclass(frozen=True)
 class Table:
-    """One table as read: `rows[i]` stands in row `row_numbers[i]` of `file`.
+    """One table as read.
 
-    skipped is the number of rows that could not be read (each told as a problem).
-    decimal is the mark of numbers in a CSV file as it is declared (NOT_KNOWN: it is not), or None
-    in a workbook, where a number cell must hold a number.
+    Attributes
+    ----------
+    file : str
+        Name of file or sheet.
+    headings : tuple of str
+        Headings of the columns.
+    heading_row : int
+        Row of the headings in the file.
+    rows : tuple of tuple
+        Cells of each row.
+    row_numbers : tuple of int
+        Row in the file of each row.
+    decimal : str or None
+        Declared decimal mark of a CSV file (NOT_KNOWN: not declared). None: a workbook, whose
+        numbers must be in number cells.
+    skipped : int
+        Number of unreadable rows, each with a problem.
     """
 
     file: str
@@ -198,9 +231,16 @@ class Table:
 
 @dataclass(frozen=True)
 class Register:
-    """Cameras or instruments as read.
+    """List of cameras, instruments, clouds or meters as read.
 
-    entries  {name: {key: Value}}        rows  {name: row, None where it is not known}
+    Attributes
+    ----------
+    file : str
+        Name of file or sheet.
+    entries : dict
+        {name: {key: Value}}.
+    rows : dict
+        {name: row in the file; None: not known}.
     """
 
     file: str
@@ -210,16 +250,32 @@ class Register:
 
 @dataclass(frozen=True)
 class RawJob:
-    """A job as read. A table or register that is there but cannot be read is None (this is told).
+    """A job as read; an unreadable table or register is None, with a problem in the log.
 
-    settings    {section: {key: Value}}, or None: unreadable
-    sections    {section: row}
-    covariance  bytes of points_cov.npz, or None
-    files       (name, SHA-256, bytes) of each file read
-    folder      Path of the folder of job.toml or of the workbook
-    registers   {"cameras", "instruments", "clouds" or "meters": Register}
-    radii_covariance  bytes of radii_cov.npz, or None
-    is_planned  whether it is still to be measured: its day lies ahead
+    Attributes
+    ----------
+    source : str
+        Name of the folder or workbook.
+    folder : Path
+        Folder of job.toml or of the workbook.
+    settings_file : str
+        Name of the file or sheet of settings in messages.
+    settings : dict or None
+        {section: {key: Value}}; None: unreadable.
+    sections : dict
+        {section: row}.
+    tables : dict of {str: Table or None}
+        Tables by name.
+    covariance : bytes or None
+        Content of points_cov.npz.
+    files : tuple
+        (name, SHA-256, size in bytes) of each file read.
+    registers : dict
+        {"cameras", "instruments", "clouds" or "meters": Register or None}.
+    radii_covariance : bytes or None
+        Content of radii_cov.npz.
+    is_planned : bool
+        True: the survey lies in the future.
     """
 
     source: str
@@ -235,14 +291,14 @@ class RawJob:
     is_planned: bool = False
 
     def file_of(self, table):
-        """Name of the table's file or sheet in messages, whether it is there or not."""
+        """Name of the file or sheet of a table in messages, whether it exists or not."""
         if self.settings_file.startswith(SHEET):
             return sheet_named(table)
         return f"{table}.toml" if table in REGISTERS else f"{table}.csv"
 
 
 def in_book(problem, book):
-    """A problem of a job that stands in a workbook: its file is a sheet there."""
+    """Change the file of a problem to the sheet of a workbook."""
     if problem.file.startswith(SHEET):
         return replace(problem, book=book)
     name, _, ending = problem.file.rpartition(".")
@@ -253,7 +309,7 @@ def in_book(problem, book):
 
 
 def read_bytes(path, log, limit=MAX_FILE_BYTES):
-    """The bytes of a file, or None after telling `log` why it cannot be read."""
+    """Content of a file; None, with a problem in `log`, if unreadable."""
     try:
         if not path.exists():
             return log.problem(path.name, message("file_not_found", "not found; expected a file"))
@@ -276,13 +332,13 @@ def read_bytes(path, log, limit=MAX_FILE_BYTES):
 
 
 def read_beside(folder, name, log, limit=MAX_FILE_BYTES):
-    """The bytes of a file of a job, or None after telling `log`; no link leads out of its folder.
+    """Content of a file in the folder of a job; None, with a problem in `log`, if unreadable.
 
-    A job may come from somebody else. The target of such a link is no part of the job, and a
-    message about a table that cannot be read would print lines of it.
+    Links to files outside the folder are refused. A job may come from somebody else, and messages
+    about an unreadable table would show lines of the linked file.
     """
     path = folder / name
-    with suppress(OSError, ValueError, RuntimeError):  # read_bytes reports these
+    with suppress(OSError, ValueError, RuntimeError):  # read_bytes reports these errors
         if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
             expected = message(
                 "link_out_of_job",
@@ -295,7 +351,7 @@ def read_beside(folder, name, log, limit=MAX_FILE_BYTES):
 
 
 def unreadable_file(error):
-    """What is said of a file that an OSError or a ValueError keeps from being read."""
+    """Message about a file that cannot be read because of an OSError or a ValueError."""
     reason = message("impossible_name", "impossible name")
     if isinstance(error, OSError):
         reason = reason_of(error)
@@ -303,15 +359,31 @@ def unreadable_file(error):
 
 
 def fingerprint(name, data):
-    """(name, SHA-256, bytes) of a file, as `RawJob.files` lists it."""
+    """(name, SHA-256, size in bytes) of a file, as in `RawJob.files`."""
     return name, hashlib.sha256(data).hexdigest(), len(data)
 
 
 def make_table(file, numbered_rows, decimal, log, hint=""):
-    """Table of (row, cells) pairs, or None; blank rows and rows that start with # are left out.
+    """Build a Table from rows; blank rows and rows that start with # are left out.
 
-    The first row that remains is the heading. Cells that are None stand for a row that cannot be
-    read, told already. `hint` ends the message about a row of too many cells.
+    Parameters
+    ----------
+    file : str
+        Name of file or sheet.
+    numbered_rows : iterable of (int, list or None)
+        Row number and cells; None: unreadable, already reported. The first row that is not left out
+        contains the headings.
+    decimal : str or None
+        As in `Table`.
+    log : Log
+        Receives the problems.
+    hint : str, optional
+        End of the message about a row with too many cells.
+
+    Returns
+    -------
+    Table or None
+        None without valid headings.
     """
     headings, heading_row, rows, numbers, skipped = None, 0, [], [], 0
     for number, raw_cells in numbered_rows:
@@ -365,7 +437,7 @@ def _headings(file, cells, number, log):
     if len(cells) > MAX_COLUMNS:
         log.problem(file, too_many_columns(len(cells)), number)
         return None
-    sound = True
+    is_valid = True
     for position, cell in enumerate(cells):
         if not isinstance(cell, str) or not cell:
             column = position + 1
@@ -375,7 +447,7 @@ def _headings(file, cells, number, log):
             if cell in (None, ""):
                 expected = message("no_heading", "column {column} has no heading", column=column)
             log.problem(file, expected, number)
-            sound = False
+            is_valid = False
         elif cell in cells[:position]:
             log.problem(
                 file,
@@ -383,24 +455,24 @@ def _headings(file, cells, number, log):
                 number,
                 cell,
             )
-            sound = False
-    return tuple(cells) if sound else None
+            is_valid = False
+    return tuple(cells) if is_valid else None
 
 
 def too_many_columns(count):
-    """Message about a row of so many cells."""
+    """Message about a row with too many cells."""
     return message(
         "too_many_columns", "{count} cells; expected at most {most}", count=count, most=MAX_COLUMNS
     )
 
 
 def missing_sheet():
-    """What is said of a sheet that is not there."""
+    """Message about a missing sheet."""
     return message("missing_sheet", "missing sheet; {sheets}", sheets=expected_sheets())
 
 
 def expected_sheets():
-    """One phrase that names the sheets of a workbook."""
+    """Phrase that lists the sheets of a workbook."""
     return message(
         "sheets_of_workbook",
         "a workbook has the sheets {settings}, {tables} (the last five are optional), or "

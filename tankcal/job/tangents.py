@@ -1,4 +1,4 @@
-"""From the checked table of tangents to `Tangents`, all in SI."""
+"""From the checked table of tangents to `Tangents`, in SI."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from tankcal.survey.tangents import Tangents
 
 
 def make_tangents(tables, registers):
-    """Tangents of tables and registers without problems."""
+    """Build `Tangents` from tables and registers without problems."""
     table = tables["tangents"]
     return Tangents(
         setup=tuple(table.of("setup")),
@@ -19,7 +19,7 @@ def make_tangents(tables, registers):
         zenith_rad=angle_in_rad(table, "zenith"),
         sd_rad=table.numbers("s_arcsec") * ARCSEC,
         check=np.array([use == "check" for use in table.of("use")], dtype=bool),
-        setups={one.name: one for one in setups_of(tables["setups"])},
+        setups={setup.name: setup for setup in setups_of(tables["setups"])},
         certificates={
             name: given["certificate"] or "" for name, given in registers["instruments"].items()
         },

@@ -1,4 +1,4 @@
-"""The main job on one screen: a checked job in; wall, parts and the capacity table out."""
+"""Computation of a job: from the checked job to the wall, the parts of the tank and the table."""
 
 from collections.abc import Callable
 from contextlib import contextmanager
@@ -27,9 +27,9 @@ from tankcal.tank.falling_capacity import refuse_falling
 if TYPE_CHECKING:
     from tankcal.survey import Adjustment
 
-MILLIMETRE, PARTS = 0.001, 10  # of a step of the tables that proportional parts are for
-PARTS_OF_U, PARTS_M3 = 0.05, 0.0005  # error of proportional parts: a share of U, or half a litre
-VAST_M3 = 1e12  # stands for a U without end
+MILLIMETRE, PARTS = 0.001, 10  # m; parts of a table step of 10 mm, for proportional parts
+PARTS_OF_U, PARTS_M3 = 0.05, 0.0005  # largest error of proportional parts: share of U, or m3
+UNBOUNDED_U_M3 = 1e12  # replaces an infinite U
 
 
 def run(
@@ -45,18 +45,18 @@ def run(
     Parameters
     ----------
     job : Job
-        Of `tankcal.load`.
+        Job from `tankcal.load`.
     progress : callable, optional
-        Called with a line of text as each step begins.
+        Called with a line of text at the start of each step.
     part_progress : callable, optional
-        Called with (text, done, total) while a long step goes on.
+        Called with (text, done, total) during a long step.
     simulated : bool, optional
-        Whether the table is simulated, too; None: as the job says. One without any uncertainty
-        never is.
+        Whether the table is also simulated by Monte Carlo; None: according to the job. A table
+        without any uncertainty is never simulated.
     cluster : int or str, optional
-        Who reads clouds: None, this process; a number of workers on this machine; "local", as
-        many as it has cores; "auto", these where it pays; the address of a scheduler of dask.
-        The result is the same.
+        Processes that read point clouds. None: this process; an integer: number of local workers;
+        "local": as many as this machine has cores; "auto": local workers for large clouds; an
+        address: the scheduler of a dask cluster. The result does not depend on it.
 
     Returns
     -------
@@ -65,13 +65,12 @@ def run(
     Raises
     ------
     InputError
-        When a course is left with too few points, when clouds cannot be read, or when a cluster
-        does not answer.
+        If a course has too few points, if clouds cannot be read, or if a cluster does not answer.
     SolutionError
-        When the survey does not determine the points, the vertical or the scale, or when there is
-        no wall.
+        If the survey does not determine the points, the vertical or the scale, or if the points
+        show no wall.
     TypeError
-        For anything but a `Job`.
+        If `job` is not a `Job`.
 
     Examples
     --------
@@ -80,12 +79,13 @@ def run(
     >>> print(result.at(9.5))
     1249.8 m3, U = 1.5 m3 (k = 1.96)
     """
-    _refuse_other(job, "run")
-    with _telling(job):
+    _require_job(job, "run")
+    with _problems_placed(job):
         return _run(job, progress or (lambda text: None), part_progress, simulated, cluster)
 
 
 def _run(job, progress, part_progress, simulated, cluster):
+    """`Result` of a job; parameters as `run`."""
     if job.tank is None:
         raise InputError(
             Problem(
@@ -93,31 +93,34 @@ def _run(job, progress, part_progress, simulated, cluster):
                 message("no_tank", "the job has no tank: only its survey can be adjusted"),
             )
         )
-    given = job
-    found = find_survey(job, progress, cluster=cluster, part_progress=part_progress)
-    job, survey, adjustment = found.job, found.survey, found.adjustment
-    surveyed = _by_kind(survey)
-    measured = None
+    original_job = job
+    survey_result = find_survey(job, progress, cluster=cluster, part_progress=part_progress)
+    job, survey, adjustment = survey_result.job, survey_result.survey, survey_result.adjustment
+    by_kind = _results_by_kind(survey)
+    # The table may be that of liquid: the metered runs are adjusted first.
+    measured_liquid = None
     if job.liquid is not None:
         from tankcal.pipeline.liquid import measure_by_liquid
 
         progress(message("adjusting_liquid", "adjusting the runs by liquid with the geometry"))
-        measured = measure_by_liquid(job, survey)
-    made = compute_table(job, survey, progress, measured and measured.body)
-    body, zero, table = made.body, made.zero_m, made.table
-    top = float(table.volume_m3[-1]), float(made.levels_m[-1])
-    overruled = effect_of(given, found, *top, progress)
+        measured_liquid = measure_by_liquid(job, survey)
+    tabulation = compute_table(job, survey, progress, measured_liquid and measured_liquid.body)
+    body, zero, table = tabulation.body, tabulation.zero_m, tabulation.table
+    # Effect of overruled readings on the volume and the level of the top row.
+    top = float(table.volume_m3[-1]), float(tabulation.levels_m[-1])
+    overruled = effect_of(original_job, survey_result, *top, progress)
     progress(message("stating", "stating volumes and deliveries"))
-    stated = statements(job, table, made.straightness.largest_m3)
+    stated = statements(job, table, tabulation.straightness.largest_m3)
     simulation = None
+    # The intervals of the law of propagation hold unless a simulation replaces them.
     intervals = gum_intervals(table.volume_m3, table.u_m3, table.U_m3)
-    wanted = job.table.monte_carlo if simulated is None else simulated
-    if wanted and table.sources:
+    is_simulated = job.table.monte_carlo if simulated is None else simulated
+    if is_simulated and table.sources:
         progress(SIMULATING)
         pairs = pairs_to_simulate(stated, job, body, table)
         simulation = simulate_table(job, survey, body, zero, table, pairs, progress=part_progress)
         intervals = simulation.intervals(table)
-    liquid = measured and measured.result(made.levels_m)
+    liquid = measured_liquid and measured_liquid.result(tabulation.levels_m)
     ship = None
     if job.ship is not None:
         from tankcal.pipeline.ship import ship_tables
@@ -125,70 +128,75 @@ def _run(job, progress, part_progress, simulated, cluster):
         ship = ship_tables(job, survey, body, table, progress=part_progress)
     return Result(
         job=job,
-        wall=surveyed.get("wall"),
-        scan=surveyed.get("scan"),
+        wall=by_kind.get("wall"),
+        scan=by_kind.get("scan"),
         body=body,
         zero_m=zero,
         table=table,
-        straightness=made.straightness,
-        proportional_parts=_parts(job, made, intervals.U_m3),
-        corrections=_corrections(job, survey, made, liquid),
-        by_density=_by_density(job, survey, made.levels_m, zero, measured),
+        straightness=tabulation.straightness,
+        proportional_parts=_proportional_parts(job, tabulation, intervals.U_m3),
+        corrections=_list_corrections(job, survey, tabulation, liquid),
+        by_density=_volumes_by_density(job, survey, tabulation.levels_m, zero, measured_liquid),
         stated=stated,
         simulation=simulation,
         intervals=intervals,
         rule=verdict_of(job, body, table, intervals, simulation),
-        warnings=_warnings(
+        warnings=_collect_warnings(
             job,
             adjustment,
-            found.sighting or found.touching or found.clouded,
+            survey_result.sighting or survey_result.touching or survey_result.clouded,
             survey,
-            made,
+            tabulation,
             liquid,
             overruled,
         ),
         adjustment=adjustment,
-        strapped=surveyed.get("strapped"),
-        sighting=found.sighting,
-        touching=found.touching,
-        clouded=found.clouded,
+        strapped=by_kind.get("strapped"),
+        sighting=survey_result.sighting,
+        touching=survey_result.touching,
+        clouded=survey_result.clouded,
         liquid=liquid,
-        nominal=surveyed.get("nominal"),
-        radii=surveyed.get("radii"),
-        rings=surveyed.get("rings"),
+        nominal=by_kind.get("nominal"),
+        radii=by_kind.get("radii"),
+        rings=by_kind.get("rings"),
         ship=ship,
-        circles=surveyed.get("circles"),
+        circles=by_kind.get("circles"),
         overrulings=overruled,
     )
 
 
-def _by_kind(survey):
-    """{kind: what was surveyed}; beside declared radii what was measured again of them."""
-    both = (survey, survey.surveyed if is_surveyed_as(survey, "radii") else None)
-    return {one.surveyed_as: one for one in both if one is not None}
+def _results_by_kind(survey):
+    """Map each kind of survey to its result.
+
+    With declared radii, a survey that checks them is included.
+    """
+    results = (survey, survey.surveyed if is_surveyed_as(survey, "radii") else None)
+    return {result.surveyed_as: result for result in results if result is not None}
 
 
-def _warnings(job, adjustment, sighting, survey, made, liquid, overruled):
-    of_survey, of_liquid = (), ()
+def _collect_warnings(job, adjustment, sighting, survey, tabulation, liquid, overruled):
+    """All warnings of a job, each with its place in the input."""
+    adjustment_warnings, liquid_warnings = (), ()
     if adjustment is not None:
-        left_open = open_questions(job, adjustment.datum, adjustment.causes)
-        of_survey = (*adjustment.warnings, *left_open, *_warnings_of_bases(job, adjustment))
+        questions = open_questions(job, adjustment.datum, adjustment.causes)
+        adjustment_warnings = (*adjustment.warnings, *questions, *_base_warnings(job, adjustment))
     if liquid is not None:
         from tankcal.pipeline.liquid_checks import check_liquid_result
 
-        of_liquid = check_liquid_result(job, liquid)
+        liquid_warnings = check_liquid_result(job, liquid)
     warnings = (
         *job.warnings,
-        *of_survey,
+        *adjustment_warnings,
         *warn_of_overrulings(job, overruled),
-        *check_table(job, survey, made, sighting),
-        *of_liquid,
+        *check_table(job, survey, tabulation, sighting),
+        *liquid_warnings,
         *incomplete_certificate(job),
     )
     return placed(job, warnings)
 
 
-def _warnings_of_bases(job, adjustment):
+def _base_warnings(job, adjustment):
+    """Warnings of the bases measured by stadia."""
     from tankcal.pipeline.stadia_checks import check_bases, check_rejected_bases
 
     rejected = check_rejected_bases(job.measurements, adjustment.readings)
@@ -196,7 +204,8 @@ def _warnings_of_bases(job, adjustment):
 
 
 @contextmanager
-def _telling(job):
+def _problems_placed(job):
+    """Add the place in the input to the problems of an InputError."""
     try:
         yield
     except InputError as error:
@@ -204,14 +213,14 @@ def _telling(job):
 
 
 def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adjustment":
-    """Adjust the survey of a job, whether it has a tank or not.
+    """Adjust the survey of a job, with or without a tank.
 
     Parameters
     ----------
     job : Job
-        Of `tankcal.load`; `tankcal.load(path, only="adjustment")` for one without a tank.
+        Job from `tankcal.load`; `tankcal.load(path, only="adjustment")` for a job without a tank.
     progress : callable, optional
-        Called with a line of text as each step begins.
+        Called with a line of text at the start of each step.
 
     Returns
     -------
@@ -220,11 +229,11 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adju
     Raises
     ------
     InputError
-        When nothing was measured.
+        If the job has no measurements.
     SolutionError
-        When the measurements do not determine the points.
+        If the measurements do not determine the points.
     TypeError
-        For anything but a `Job`.
+        If `job` is not a `Job`.
 
     Examples
     --------
@@ -234,7 +243,7 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adju
     >>> len(adjusted.names), adjusted.xyz_m.shape == (len(adjusted.names), 3)
     (167, True)
     """
-    _refuse_other(job, "adjust_job")
+    _require_job(job, "adjust_job")
     if job.measurements is None:
         raise InputError(
             Problem(
@@ -244,49 +253,61 @@ def adjust_job(job: Job, progress: Callable[[str], None] | None = None) -> "Adju
                 ),
             )
         )
-    with _telling(job):
+    with _problems_placed(job):
         adjustment = adjust_decided(job, progress or (lambda text: None))
-    warnings = (*adjustment.warnings, *_warnings_of_bases(job, adjustment))
+    warnings = (*adjustment.warnings, *_base_warnings(job, adjustment))
     return replace(adjustment, warnings=placed(job, warnings))
 
 
-def _refuse_other(job, name):
+def _require_job(job, name):
+    """Raise TypeError if `job` is not a `Job`; name: the function that was called."""
     if not isinstance(job, Job):
         raise TypeError(f"found {type(job).__name__}; expected a Job: {name}(tankcal.load(path))")
 
 
-def _parts(job, made, U_m3):
-    """Proportional parts of a centimetre table where their error is a small part of U."""
+def _proportional_parts(job, tabulation, U_m3):
+    """Proportional parts of a centimetre table, if their error is a small part of U.
+
+    Only vertical tanks have proportional parts; other tanks give ().
+    """
     spec = job.table
     is_centimetres = spec.step_m is not None and abs(spec.step_m - PARTS * MILLIMETRE) <= 1e-9
     if job.tank.kind != "vertical" or not is_centimetres:
         return ()
-    edges = np.unique(np.round([0.0, *made.breakpoints_m, made.top_m], 3))
-    allowed = np.maximum(PARTS_OF_U * np.minimum(U_m3, VAST_M3), PARTS_M3)
+    # Interpolation must not cross a break of the volume curve: each part ends at a breakpoint.
+    edges = np.unique(np.round([0.0, *tabulation.breakpoints_m, tabulation.top_m], 3))
+    allowed = np.maximum(PARTS_OF_U * np.minimum(U_m3, UNBOUNDED_U_M3), PARTS_M3)
 
     def bound_m3(dips_m):
-        return np.interp(dips_m, made.table.height_m, allowed)
+        return np.interp(dips_m, tabulation.table.height_m, allowed)
 
-    return proportional_parts(made.volume_m3, edges, spec.step_m, PARTS, bound_m3)
+    return proportional_parts(tabulation.volume_m3, edges, spec.step_m, PARTS, bound_m3)
 
 
-def _corrections(job, survey, made, liquid):
-    found = corrections_of(job, survey, made.over_m)
+def _list_corrections(job, survey, tabulation, liquid):
+    """Corrections of the table; with a table by liquid, the effect of the liquid is the last."""
+    corrections = corrections_of(job, survey, tabulation.over_m)
     if liquid is None or liquid.certified == "geometry":
-        return found
-    gross = gross_at_top(job, survey, made.over_m)
-    return (*found, correction_by_liquid(found, gross, float(made.table.volume_m3[-1])))
+        return corrections
+    gross = gross_at_top(job, survey, tabulation.over_m)
+    return (
+        *corrections,
+        correction_by_liquid(corrections, gross, float(tabulation.table.volume_m3[-1])),
+    )
 
 
-def _by_density(job, survey, levels, zero_m, measured):
-    """The same rows for each further density of the liquid: another head, another draught."""
-    found = {}
+def _volumes_by_density(job, survey, levels, zero_m, measured_liquid):
+    """Volumes at the rows of the table for each further density of the liquid.
+
+    Density changes the liquid head and the draught of a floating roof.
+    """
+    volumes = {}
     for density in job.table.other_densities_kg_m3:
         filled = filled_with(job, density)
-        if measured is None:
+        if measured_liquid is None:
             body = body_of(filled, survey, uncertain=False)
         else:
-            body = measured.body_for(density)
-        found[density] = body.volume_m3(levels)
-        refuse_falling(filled, body, zero_m, levels - zero_m, found[density])
-    return found
+            body = measured_liquid.body_for(density)
+        volumes[density] = body.volume_m3(levels)
+        refuse_falling(filled, body, zero_m, levels - zero_m, volumes[density])
+    return volumes

@@ -1,8 +1,8 @@
-"""Bottom of an upright tank and what stands in it, in scans from inside, as parts of its job.
+"""Bottom of a vertical tank and objects in it, from scans taken inside the tank.
 
-The bottom is a surveyed surface. Its heights share with the wall, scan by scan, registration,
-scale, offset and bias by incidence, by the same unit variables: what lowers the floor widens the
-wall. What stands in the tank is proposed as deadwood, and never taken off.
+The bottom is a surveyed surface. For each scan, its heights share registration, scale, offset and
+incidence bias with the wall, by the same unit variables. An error that lowers the bottom therefore
+widens the wall. Objects in the tank are proposed as deadwood and never deducted automatically.
 """
 
 from dataclasses import dataclass, replace
@@ -18,22 +18,25 @@ from tankcal.survey.beams import shared_by_beams
 from tankcal.survey.results import Cause
 
 FILE = "clouds.toml"
-MOST_POINTS = 400  # of a bottom, that its surface is made through
-UNSEEN = 0.1  # of the plan: what lies there is told by the form of the rest alone
-WET_CELLS, WET_SHARE = 2, 1e-4  # that show images; of the points inside, those under the bottom
-IN_MM = 1000.0
+MOST_POINTS = 400  # largest number of points that define the surface of the bottom
+UNSEEN = 0.1  # largest share of the plan in which the surface is only interpolated, no warning
+# A bottom is wet from so many cells with mirror images, or from such a share of the points inside
+# the tank that lie under the bottom.
+WET_CELLS, WET_SHARE = 2, 1e-4
+IN_MM = 1000.0  # mm per m
 
 
 @dataclass(frozen=True)
 class CloudInside:
-    """What scans from inside show beside the wall.
+    """Bottom and objects that scans from inside show.
 
     Attributes
     ----------
     bottom : CloudBottom
     points : BottomPoints
-        Of the bottom, as they came from the files.
+        Points of the bottom, as computed from the files.
     things : tuple of Thing
+        Objects in the tank.
     """
 
     bottom: CloudBottom
@@ -42,94 +45,117 @@ class CloudInside:
 
     @property
     def proposals(self):
-        """What would be rows of deadwood, things and pits; heights in the frame of the tank."""
+        """Proposed rows of deadwood, objects and pits; heights in the frame of the tank."""
         return (*self.things, *self.bottom.pits)
 
 
-def find_inside(job, passes, found, telling):
-    """`CloudInside` of a job whose bottom is that of its clouds; None of another.
+def find_inside(job, passes, cloud_wall, telling):
+    """Find the bottom and the objects in a tank whose bottom is surveyed by point clouds.
 
     Parameters
     ----------
     job : Job
     passes : JobPasses or ClusterPasses
-        Both read all files once more.
-    found : CloudWall
+        Passes over the files; all files are read twice more.
+    cloud_wall : CloudWall
+        Wall of the clouds.
     telling : Telling
+        Receives the progress.
+
+    Returns
+    -------
+    CloudInside or None
+        None if the bottom of the job is not surveyed by clouds.
 
     Raises
     ------
     InputError
-        Where no surface that meets the foot of the shell is seen.
+        If the clouds show no surface that meets the foot of the shell.
     """
     if job.bottom.form != OF_CLOUD or not job.switches.bottom:
         return None
     telling.step(message("cloud_third_pass", "summing up what lies inside, over the plan"))
-    bottom = find_cloud_bottom(passes, found, job.clouds.sides)
+    bottom = find_cloud_bottom(passes, cloud_wall, job.clouds.sides)
     telling.step(message("cloud_fourth_pass", "looking for what stands in the tank"))
     things = find_things_in_cells(passes, bottom, job.clouds.sides)
     return CloudInside(bottom, bottom_points(bottom, MOST_POINTS), things)
 
 
-def with_bottom(job, inside, registration, told=()):
-    """The job with the points of the bottom and what their heights share.
+def with_bottom(job, inside, registration, estimates=()):
+    """Return the job with the points of its bottom and the causes that their heights share.
 
     Parameters
     ----------
     job : Job
     inside : CloudInside or None
-        None: the job as it is.
+        None: the job is returned unchanged.
     registration : Registration
-    told : sequence of ToldCause
-        Offsets that were free and that the wall has told: taken off, with what is left of their u.
+    estimates : sequence of ToldCause
+        Offsets without a prior that the wall estimated: they are corrected, and their remaining
+        standard uncertainty is kept.
+
+    Returns
+    -------
+    Job
     """
     if inside is None:
         return job
     points = inside.points
-    place, scan = np.nonzero(points.share)
-    weight, n = points.share[place, scan], len(points.xyz_m)
-    free = {one.name: one for one in told if np.isinf(one.u_before)}
-    values = {name: one.value for name, one in free.items()}
-    level = np.tile([0.0, 0.0, 1.0], (len(place), 1))
+    # A point of the bottom is a weighted mean over scans: one row for each scan that contributes to
+    # it.
+    point, scan = np.nonzero(points.share)
+    weight, n = points.share[point, scan], len(points.xyz_m)
+    estimated = {cause.name: cause for cause in estimates if np.isinf(cause.u_before)}
+    values = {name: cause.value for name, cause in estimated.items()}
+    vertical = np.tile([0.0, 0.0, 1.0], (len(point), 1))
     shared = shared_by_beams(
-        points.xyz_m[place], scan, level, registration, job.clouds.tools, told_m=values
+        points.xyz_m[point], scan, vertical, registration, job.clouds.tools, told_m=values
     )
 
     def heights(column_m):
-        """(n,) what a column over all coordinates does to the height of each point."""
-        return np.bincount(place, weight * column_m.reshape(-1, 3)[:, 2], n)
+        """Effect on the height of each point, shape (n,), of a column over all coordinates."""
+        return np.bincount(point, weight * column_m.reshape(-1, 3)[:, 2], n)
 
-    xyz = np.column_stack([np.bincount(place, weight * one, n) for one in shared.xyz_m.T])
-    causes = [replace(one, column_m=heights(one.column_m)) for one in shared.causes]
-    for one in shared.unbound:
-        if one.name in free:
-            u = free[one.name].u_after
-            column = u * heights(one.column_m)
-            causes.append(Cause(one.name, one.what, IN_MM * u, one.unit, column))
+    xyz = np.column_stack(
+        [np.bincount(point, weight * coordinate, n) for coordinate in shared.xyz_m.T]
+    )
+    causes = [replace(cause, column_m=heights(cause.column_m)) for cause in shared.causes]
+    # An estimated offset gets the standard uncertainty after the adjustment as its prior.
+    for cause in shared.unbound:
+        if cause.name in estimated:
+            u = estimated[cause.name].u_after
+            column = u * heights(cause.column_m)
+            causes.append(Cause(cause.name, cause.what, IN_MM * u, cause.unit, column))
     bottom = replace(job.bottom, xyz_m=xyz, sd_m=points.sd_m, shared=tuple(causes))
     return replace(job, bottom=bottom)
 
 
 def deadwood_rows(inside, zero_m):
-    """(name, bottom, top, volume, u) of all proposals as deadwood.csv takes them; nan: not known.
+    """Return all proposals as rows of deadwood.csv.
 
     Parameters
     ----------
     inside : CloudInside
     zero_m : float
         Height of the table's zero in the frame of the tank, m.
+
+    Returns
+    -------
+    list of tuple
+        (name, bottom, top, volume, u): heights in m above the zero, volumes in m3; nan: not known.
+        Repeated names are numbered.
     """
-    found, seen = [], {}
-    for one in inside.proposals:
-        name, low, high, volume, u = one.deadwood_row
-        seen[name] = seen.get(name, 0) + 1
-        name = name if seen[name] == 1 else f"{name} ({seen[name]})"
-        found.append((name, low - zero_m, high - zero_m, volume, u))
-    return found
+    rows, counts = [], {}
+    for proposal in inside.proposals:
+        name, low, high, volume, u = proposal.deadwood_row
+        counts[name] = counts.get(name, 0) + 1
+        name = name if counts[name] == 1 else f"{name} ({counts[name]})"
+        rows.append((name, low - zero_m, high - zero_m, volume, u))
+    return rows
 
 
 def check_inside(job, inside):
-    """Warnings of what lies inside a tank: a wet bottom, one half seen, things, a roof."""
+    """Yield warnings of a wet bottom, a bottom partly hidden, unconfirmed objects and a roof."""
     if inside is None:
         return
     bottom = inside.bottom
@@ -150,15 +176,15 @@ def check_inside(job, inside):
             share=100 * bottom.seen_share,
         )
         yield Problem(FILE, text)
-    confirmed = {one.name for one in job.deadwood}
-    left = [row[0] for row in deadwood_rows(inside, 0.0) if row[0] not in confirmed]
-    if left:
+    confirmed = {part.name for part in job.deadwood}
+    unconfirmed = [row[0] for row in deadwood_rows(inside, 0.0) if row[0] not in confirmed]
+    if unconfirmed:
         text = message(
             "things_proposed",
             "{count} things are seen in the tank that no row of deadwood.csv has the name of"
             " ({names}): nothing is taken off for them; expected rows that a person has confirmed",
-            count=len(left),
-            names=left[:12],
+            count=len(unconfirmed),
+            names=unconfirmed[:12],
         )
         yield Problem("deadwood.csv", text)
     if bottom.roof is not None:

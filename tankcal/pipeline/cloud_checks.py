@@ -1,4 +1,4 @@
-"""Warnings of clouds: scans that do not meet, walls that are hidden, and what nobody declared."""
+"""Warnings of point clouds: scans that do not agree, hidden walls, and undeclared uncertainties."""
 
 import numpy as np
 
@@ -9,76 +9,86 @@ from tankcal.pipeline.cloud_overlaps import overlap_test, overlaps_of, scans_apa
 from tankcal.pipeline.cloud_wall import FILE, TARGETS
 from tankcal.pipeline.hit_checks import causes_unlike_certificates
 
-HIDDEN = 0.25  # of the cells of a course: what lies behind is a guess of the form alone
-LEAST_OF_WALL = 0.01  # of the points of a scan
+HIDDEN = 0.25  # largest share of hidden cells of a course: their form is only interpolated
+LEAST_OF_WALL = 0.01  # smallest share of wall points in a scan
 
 
 def check_clouds(job, survey, clouded):
-    """`Problem`s of the clouds of a wall.
+    """Return the warnings of the clouds of a wall.
 
     Parameters
     ----------
     job : Job
     survey : Wall or Scan
     clouded : Clouded
+
+    Returns
+    -------
+    tuple of Problem
     """
     return (
-        *_of_targets(clouded.registration),
-        *_of_overlaps(job, clouded),
-        *_of_idle_scans(job, clouded),
-        *_of_hidden(job, clouded),
-        *_of_assumed(job, clouded),
+        *_check_targets(clouded.registration),
+        *_check_overlaps(job, clouded),
+        *_check_idle_scans(job, clouded),
+        *_check_hidden_courses(job, clouded),
+        *_check_assumed_uncertainties(job, clouded),
         *check_inside(job, clouded.inside),
         *causes_unlike_certificates(survey, clouded.told, FILE, taken_off_m=clouded.beamed.told_m),
     )
 
 
-def _of_overlaps(job, clouded):
-    apart = [one for one in overlaps_of(job, clouded.cells, clouded.registration) if one.is_apart]
-    for one in apart:
-        yield Problem(FILE, scans_apart(job, one))
+def _check_overlaps(job, clouded):
+    """Warn of pairs of scans that disagree; if there are none, test all overlaps together."""
+    apart = [
+        overlap
+        for overlap in overlaps_of(job, clouded.cells, clouded.registration)
+        if overlap.is_apart
+    ]
+    for overlap in apart:
+        yield Problem(FILE, scans_apart(job, overlap))
     if not apart:
-        yield from _of_registration(job, clouded)
+        yield from _check_registration(job, clouded)
 
 
-def _of_registration(job, clouded):
-    """A registration that all overlaps together show to be worse than declared."""
-    found = overlap_test(job, clouded.cells, clouded.registration)
-    if found is not None and found.chi2 > found.limit:
+def _check_registration(job, clouded):
+    """Warn of a registration worse than declared, according to all overlaps together."""
+    test = overlap_test(job, clouded.cells, clouded.registration)
+    if test is not None and test.chi2 > test.limit:
         text = message(
             "registration_beyond",
             "where scans overlap they differ {factor:.1f} times as much as the declared"
             " registration allows (chi2 = {chi2:.1f}, expected at most {limit:.1f} with {dof}"
             " degrees of freedom): U may be too small by this factor; check poses,"
             " s_translation_mm, s_rotation_arcsec and targets",
-            factor=found.factor,
-            chi2=found.chi2,
-            limit=found.limit,
-            dof=found.dof,
+            factor=test.factor,
+            chi2=test.chi2,
+            limit=test.limit,
+            dof=test.dof,
         )
         yield Problem(FILE, text)
 
 
-def _of_targets(registration):
-    for one in registration.residuals:
-        if one.removed:
+def _check_targets(registration):
+    """Warn of rejected targets."""
+    for residual in registration.residuals:
+        if residual.removed:
             text = message(
                 "target_removed",
                 "target {target!r} of scan {scan!r} is {off_mm:.1f} mm off where the others have it"
                 " (|w| = {w:.1f}): rejected",
-                target=one.target,
-                scan=one.scan,
-                off_mm=1000 * float(np.linalg.norm(one.residual_m)),
-                w=one.w,
+                target=residual.target,
+                scan=residual.scan,
+                off_mm=1000 * float(np.linalg.norm(residual.residual_m)),
+                w=residual.w,
             )
-            yield Problem(TARGETS, text, one.row)
+            yield Problem(TARGETS, text, residual.row)
 
 
-def _of_idle_scans(job, clouded):
-    """Scans that show hardly anything of the wall that the others show."""
+def _check_idle_scans(job, clouded):
+    """Warn of scans with hardly any point of the wall."""
     cells = clouded.cells
-    for place, scan in enumerate(job.clouds.scans):
-        share = cells.of_wall[place] / max(cells.delivered[place], 1)
+    for number, scan in enumerate(job.clouds.scans):
+        share = cells.of_wall[number] / max(cells.delivered[number], 1)
         if share < LEAST_OF_WALL:
             text = message(
                 "scan_without_wall",
@@ -92,10 +102,11 @@ def _of_idle_scans(job, clouded):
             yield Problem(FILE, text)
 
 
-def _of_hidden(job, clouded):
-    for place, share in enumerate(clouded.cells.masked_share):
+def _check_hidden_courses(job, clouded):
+    """Warn of courses that are largely hidden from all scans."""
+    for number, share in enumerate(clouded.cells.masked_share):
         if share > HIDDEN:
-            name = job.courses[place].name if place < len(job.courses) else str(place + 1)
+            name = job.courses[number].name if number < len(job.courses) else str(number + 1)
             text = message(
                 "course_hidden",
                 "{percent:.0f} % of course {course!r} are hidden from all scans; expected at most"
@@ -107,7 +118,8 @@ def _of_hidden(job, clouded):
             yield Problem(FILE, text)
 
 
-def _of_assumed(job, clouded):
+def _check_assumed_uncertainties(job, clouded):
+    """Warn of assumed standard uncertainties of scanners and of the registration."""
     for name, (tool, offset, scale) in job.clouds.tools.items():
         if offset or scale:
             text = message(
@@ -121,7 +133,8 @@ def _of_assumed(job, clouded):
             yield Problem(FILE, text)
     scans = clouded.registration.scans
     ties = clouded.registration.ties
-    assumed = [i for i, one in enumerate(scans) if one.is_assumed and ties[i] != "network"]
+    # The network determines the registration of tied scans, so nothing is assumed for them.
+    assumed = [i for i, scan in enumerate(scans) if scan.is_assumed and ties[i] != "network"]
     if assumed:
         text = message(
             "registration_assumed",

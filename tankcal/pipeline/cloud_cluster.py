@@ -1,8 +1,8 @@
-"""The passes over a job's clouds by workers of dask, on this machine or on others.
+"""Passes over the clouds of a job by dask workers, on this machine or on other machines.
 
-Each share of a file is read by one worker, which gives back its sample or its sums; these are added
-in a tree. They are whole numbers and samples that know no order, so the record has the same bytes
-with any number of workers and any shares. The workers themselves are those of `cluster`.
+Each worker reads one share of a file and returns its sample or its sums, which are added in a tree.
+The sums are integers and the samples do not depend on the order. The record therefore has the same
+bytes for any number of workers and any shares. `cluster` starts the workers.
 """
 
 import contextlib
@@ -20,22 +20,35 @@ from tankcal.messages import message
 from tankcal.pipeline.cloud_passes import JobPasses, Tally
 from tankcal.pipeline.cluster import Watch, count_cores, failures_told, is_installed, open_client
 
-PAYS, FEWEST_CORES = 200_000_000, 4  # points and cores from which local workers pay: docs/clouds.md
+# Fewest points and cores for which local workers are faster: docs/clouds.md.
+PAYS, FEWEST_CORES = 200_000_000, 4
 FEWEST_EACH, MOST_EACH = 1 << 20, 1 << 23  # points of a share
-SHARES_OF_WORKER = 6
-FAN = 8  # parts that are added at once
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, KEPT_BYTES = -1, -3, 8 << 20  # of mallopt(3)
-LOOK_S = 0.05  # between looks
+SHARES_OF_WORKER = 6  # shares per worker
+FAN = 8  # results added in one task
+# Parameters of mallopt(3), and the size up to which freed memory is kept.
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, KEPT_BYTES = -1, -3, 8 << 20
+LOOK_S = 0.05  # s between two checks of the cluster
 
 
 @contextlib.contextmanager
 def open_passes(placing, reading, telling):
-    """The passes over clouds as `Reading` asks for them: in this process or by workers.
+    """Open the passes over clouds that a `Reading` requests: in this process or by workers.
+
+    Parameters
+    ----------
+    placing : Placing
+    reading : Reading
+    telling : Telling
+        Receives the progress.
+
+    Yields
+    ------
+    JobPasses or ClusterPasses
 
     Raises
     ------
     InputError
-        Where dask is not installed, or an address does not answer.
+        If dask is not installed, or if an address does not answer.
     """
     workers = _workers_for(placing, reading.cluster)
     if workers == 0:
@@ -46,7 +59,7 @@ def open_passes(placing, reading, telling):
 
 
 def _workers_for(placing, cluster):
-    """Number of local workers, 0: none; or an address."""
+    """Number of local workers, 0 for this process, or the address of a scheduler."""
     cores = count_cores()
     if cluster == "auto":
         if cores < FEWEST_CORES or not is_installed():
@@ -62,7 +75,7 @@ class ClusterPasses:
     Attributes
     ----------
     left_out : ndarray of int, shape (scans,)
-        Points in boxes that are left out, of the last pass.
+        Points of the last pass in excluded boxes.
     """
 
     def __init__(self, client, placing, telling, points_each=None):
@@ -71,12 +84,22 @@ class ClusterPasses:
         self.left_out = None
 
     def sample(self, most):
-        """`PointSample` of at most so many points."""
+        """Return a `PointSample` of at most `most` points."""
         with failures_told():
             return self._reduced(_sample_part, _add_samples, most)
 
     def cells(self, surface, grid, scans):
-        """`WallCells` of all points."""
+        """Return the `WallCells` of all points.
+
+        Parameters
+        ----------
+        surface, grid, scans
+            As for `tankcal.clouds.wall.cells.WallCells`.
+
+        Returns
+        -------
+        WallCells
+        """
         with failures_told():
             packed = self._reduced(_cells_part, _add_cells, surface, grid, scans)
         cells = WallCells(surface, grid, scans)
@@ -84,20 +107,23 @@ class ClusterPasses:
         return cells
 
     def gather(self, taken_of, *sizes):
-        """What taken_of(points, *sizes) takes of all points; two of it have `merged`."""
+        """Return taken_of(points, *sizes) for all points.
+
+        Results of different shares are combined by their method `merged`.
+        """
         with failures_told():
             return self._reduced(_taken_part, _add_taken, taken_of, *sizes)
 
-    def _reduced(self, part_of, added, *sizes):
-        """What the shares give, added in a tree."""
+    def _reduced(self, part_of, add_parts, *sizes):
+        """Sum of the results of all shares, added in a tree."""
         shares = self.placing.shares(self._points_each())
-        about = sum(one.points for one in shares)
+        about = sum(share.points for share in shares)
         topic = f"tankcal-{uuid.uuid4().hex}"
-        read = {}
+        points_read = {}
 
-        def note(event):  # of a share that is read again, its last word counts
+        def note(event):  # the last count replaces that of a share read twice
             number, count = event[1]
-            read[number] = count
+            points_read[number] = count
 
         level = [
             self.client.submit(
@@ -107,24 +133,28 @@ class ClusterPasses:
         ]
         depth = 0
         while len(level) > 1:
+            # Add FAN results per task, level by level.
             depth += 1
             level = [
-                self.client.submit(added, level[i : i + FAN], *sizes, key=f"{topic}-{depth}-{i}")
+                self.client.submit(
+                    add_parts, level[i : i + FAN], *sizes, key=f"{topic}-{depth}-{i}"
+                )
                 for i in range(0, len(level), FAN)
             ]
         self.client.subscribe_topic(topic, note)
         try:
-            found, tally = self._result_of(
-                level[0], lambda: self.telling.tell(sum([*read.values()]), about)
+            result, tally = self._result_of(
+                level[0], lambda: self.telling.tell(sum([*points_read.values()]), about)
             )
         finally:
-            with contextlib.suppress(Exception):  # of a scheduler that is gone
+            with contextlib.suppress(Exception):  # the scheduler may have ended
                 self.client.unsubscribe_topic(topic)
         tally.check(self.placing)
         self.left_out = tally.left_out
-        return found
+        return result
 
     def _points_each(self):
+        """Number of points per share, from the number of points and workers."""
         if self.points_each:
             return self.points_each
         points = sum(count_about(file.header) for file in self.placing.files)
@@ -132,7 +162,7 @@ class ClusterPasses:
         return int(min(max(points / workers / SHARES_OF_WORKER, FEWEST_EACH), MOST_EACH))
 
     def _result_of(self, future, tell):
-        """The result of a future; InputError in one line for what keeps it from coming."""
+        """Wait for the result of a future; raise InputError if the cluster fails."""
         watch = Watch(self.client)
         while not future.done():
             time.sleep(LOOK_S)
@@ -157,23 +187,23 @@ def _cells_part(placing, share, topic, number, surface, grid, scans):
 
 
 def _taken_part(placing, share, topic, number, taken_of, *sizes):
-    """What is taken of a share, and its `Tally`."""
+    """Result of taken_of for a share, and its `Tally`."""
     tally = _tally_of(placing, share, topic, number)
     return taken_of(placing.points([share], tally), *sizes), tally
 
 
 def _add_taken(parts, *_):
-    """What was taken of several shares as one."""
+    """Merge the results of several shares."""
     (taken, _), *others = parts
     for other, _ in others:
         taken = taken.merged(other)
-    return taken, Tally.added([one for _, one in parts])
+    return taken, Tally.added([tally for _, tally in parts])
 
 
 def _add_samples(parts, most):
-    """Several samples as one."""
+    """Merge several samples."""
     (sample, _), *others = parts
-    tally = Tally.added([one for _, one in parts])
+    tally = Tally.added([part_tally for _, part_tally in parts])
     for other, _ in others:
         sample = sample.merged(other)
         sample.reduce()
@@ -181,15 +211,15 @@ def _add_samples(parts, most):
 
 
 def _add_cells(parts, surface, grid, scans):
-    """Several packed sums as one."""
+    """Add several packed sums."""
     cells = WallCells(surface, grid, scans)
     for packed, _ in parts:
         cells.add_packed(packed)
-    return cells.packed(), Tally.added([one for _, one in parts])
+    return cells.packed(), Tally.added([tally for _, tally in parts])
 
 
 def _tally_of(placing, share, topic, number):
-    """A `Tally` that tells the client how far it is; InputError where this machine has no file."""
+    """`Tally` that reports its progress to the client; InputError if the file is missing here."""
     from distributed import get_worker
 
     path = placing.files[share.file].header.path
@@ -213,10 +243,12 @@ def _tally_of(placing, share, topic, number):
 
 @cache
 def _keep_memory():
-    """Let malloc keep what is free: workers of dask are told to give it back at once, and each
-    array of a few hundred kilobytes would then be made of fresh pages: LAS took twice the time.
+    """Let malloc keep freed memory.
+
+    Dask makes its workers return freed memory at once. Each array of a few hundred kilobytes would
+    then need fresh pages, and reading a LAS file took twice as long.
     """
-    with contextlib.suppress(OSError, AttributeError, TypeError):  # another system than Linux
+    with contextlib.suppress(OSError, AttributeError, TypeError):  # mallopt exists on Linux only
         malloc = ctypes.CDLL(None).mallopt
         malloc(M_MMAP_THRESHOLD, KEPT_BYTES)
         malloc(M_TRIM_THRESHOLD, 2 * KEPT_BYTES)

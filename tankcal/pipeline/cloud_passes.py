@@ -1,7 +1,7 @@
-"""The passes over the files of a job's clouds: points placed in the frame of the tank, counted.
+"""Passes over the files of the clouds of a job: points in the frame of the tank, and their counts.
 
-What is read in one go is a `Share` of a file. Here all shares are read one after the other;
-`cloud_cluster` has the same from workers. Both give the same sums to the last bit.
+A `Share` is the part of a file that is read in one go. This module reads all shares one after the
+other; `cloud_cluster` reads them by workers. The sums agree to the last bit.
 """
 
 import time
@@ -16,18 +16,19 @@ from tankcal.clouds.wall import cells_of, sample_of
 from tankcal.messages import message
 from tankcal.survey.readings import certified_distance_m
 
-TOLD_EVERY_S = 0.5
+TOLD_EVERY_S = 0.5  # s between two reports of progress
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How the files of clouds are read, and who is told.
+    """Processes that read the files of clouds, and the function that receives the progress.
 
     Attributes
     ----------
     cluster : None, "auto", "local", int or str
-        None: in this process; "auto": by local workers where that pays; "local": by as many as
-        there are cores; a number of local workers; the address of a scheduler of dask.
+        None: this process; "auto": local workers for large clouds; "local": as many workers as
+        there are cores; an integer: number of local workers; an address: the scheduler of a dask
+        cluster.
     part_progress : callable or None
         part_progress(text, points read, points in all).
     """
@@ -38,7 +39,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Share:
-    """A piece of a file: number of the file, its piece, about how many points it has."""
+    """A piece of a file: number of the file, its piece, and its approximate number of points."""
 
     file: int
     piece: CloudPiece = WHOLE
@@ -47,15 +48,16 @@ class Share:
 
 @dataclass(frozen=True)
 class Placing:
-    """All that is needed to read shares of a job's clouds, in whatever process.
+    """All data that a process needs to read shares of the clouds of a job.
 
     Attributes
     ----------
     files : tuple of job.model.clouds.CloudFile
     scans : tuple of ScanSetup
     ranging : dict of str to RangingInstrument
+        Instruments by name.
     rotation, place_m : ndarray, shapes (scans, 3, 3) and (scans, 3)
-        Of the registration.
+        Rotation and origin of each scan in the frame of the tank, m, from the registration.
     """
 
     files: tuple
@@ -66,27 +68,39 @@ class Placing:
 
     @classmethod
     def of(cls, clouds, registration):
-        """Of the clouds of a job and the `Registration` of their scans."""
-        files = tuple(replace(one, header=_from_root(one.header)) for one in clouds.files)
+        """Return the `Placing` of the clouds of a job and the `Registration` of their scans."""
+        files = tuple(replace(file, header=_absolute_header(file.header)) for file in clouds.files)
         places = registration.rotation, registration.place_m
         return cls(files, clouds.scans, clouds.ranging, *places)
 
     def shares(self, points_each=None):
-        """`Share`s of all files; None: each file is one."""
-        found = []
+        """Return the `Share`s of all files; None: one share per file."""
+        shares = []
         for number, file in enumerate(self.files):
             pieces = pieces_of(file.header, points_each) if points_each else (WHOLE,)
             points = count_about(file.header)
             for piece in pieces:
-                found.append(Share(number, piece, _points_in(file.header, piece, points)))
-        return tuple(found)
+                shares.append(Share(number, piece, _points_in(file.header, piece, points)))
+        return tuple(shares)
 
     def tally(self, tell_read=None):
-        """A `Tally` of the files."""
+        """Return an empty `Tally` of the files."""
         return Tally(len(self.files), len(self.scans), tell_read)
 
     def points(self, shares, tally):
-        """Scan and places (n, 3) in the frame of the tank, m, of shares one after the other."""
+        """Yield the scan number and the points of each chunk of given shares.
+
+        Parameters
+        ----------
+        shares : sequence of Share
+        tally : Tally
+            Counts the records read and the points in excluded boxes.
+
+        Yields
+        ------
+        (int, ndarray of shape (n, 3))
+            Scan, and points in the frame of the tank, m.
+        """
         for share in shares:
             file = self.files[share.file]
             chunks = read_cloud(
@@ -107,29 +121,36 @@ class Placing:
             tally.end(share.file)
 
     def _placed(self, xyz_m, scan):
-        given = self.scans[scan]
-        tool = self.ranging[given.scanner]
-        beam = xyz_m - given.beam_from_m if given.beam_from_m.any() else xyz_m
+        """Points (n, 3) of a scan in the frame of the tank, m, with certified distances."""
+        setup = self.scans[scan]
+        tool = self.ranging[setup.scanner]
+        beam = xyz_m - setup.beam_from_m if setup.beam_from_m.any() else xyz_m
         if tool.correction or tool.correction_m:
+            # Distances are corrected along the beam, before the rotation.
             distance = np.maximum(np.sqrt((beam * beam).sum(axis=1)), 1e-9)
             beam = beam * (certified_distance_m(distance, tool) / distance)[:, None]
-        x, y, z = beam.T  # no product of matrices: its rounding would hang on the number of points
-        found = np.empty((3, len(beam)))
+        # A matrix product would round differently for different numbers of points.
+        x, y, z = beam.T
+        placed = np.empty((3, len(beam)))
         for row, (a, b, c), place in zip(
-            found, self.rotation[scan], self.place_m[scan], strict=True
+            placed, self.rotation[scan], self.place_m[scan], strict=True
         ):
             np.multiply(x, a, out=row)
             row += b * y
             row += c * z
             row += place
-        return found.T
+        return placed.T
 
 
 class Tally:
-    """What is counted beside the points: records read of each file, points in boxes of each scan.
+    """Counts of a pass: records read from each file, and points of each scan in excluded boxes.
 
-    files, scans  numbers of them
-    tell_read     called with the records read in all, now and then
+    Parameters
+    ----------
+    files, scans : int
+        Numbers of files and scans.
+    tell_read : callable, optional
+        Called with the number of all records read.
     """
 
     def __init__(self, files, scans, tell_read=None):
@@ -139,28 +160,28 @@ class Tally:
 
     @classmethod
     def added(cls, tallies):
-        """One that has counted what all of them have."""
-        found = cls(len(tallies[0].read), len(tallies[0].left_out))
-        for one in tallies:
-            found.left_out += one.left_out
-            found.read += one.read
-        return found
+        """Return the sum of several tallies."""
+        total = cls(len(tallies[0].read), len(tallies[0].left_out))
+        for tally in tallies:
+            total.left_out += tally.left_out
+            total.read += tally.read
+        return total
 
     def tell(self, file, read):
-        """So many records were read of the share at hand."""
+        """Report the number of records read of the current share."""
         self._now = read
         if self._tell_read is not None:
             self._tell_read(int(self.read.sum()) + read)
 
     def end(self, file):
-        """The share at hand is read."""
+        """Close the current share and add its records to those of its file."""
         self.read[file] += self._now
         self._now = 0
 
     def check(self, placing):
-        """InputError where all shares together have not the points that a file declares."""
+        """Raise InputError if the shares lack points that a file declares, or have more."""
         for file, read in zip(placing.files, self.read, strict=True):
-            declared = [one.declared for one in file.header.scans]
+            declared = [scan.declared for scan in file.header.scans]
             if None not in declared and read != sum(declared):
                 raise count_mismatch(open_cloud(file.header.path), sum(declared), int(read))
 
@@ -174,7 +195,7 @@ class JobPasses:
     Attributes
     ----------
     left_out : ndarray of int, shape (scans,)
-        Points in boxes that are left out, of the last pass.
+        Points of the last pass in excluded boxes.
     """
 
     def __init__(self, placing, telling=None):
@@ -182,28 +203,41 @@ class JobPasses:
         self.left_out = np.zeros(len(placing.scans), dtype=int)
 
     def sample(self, most):
-        """`PointSample` of at most so many points."""
+        """Return a `PointSample` of at most `most` points."""
         return self.gather(sample_of, most)
 
     def cells(self, surface, grid, scans):
-        """`WallCells` of all points."""
+        """Return the `WallCells` of all points.
+
+        Parameters
+        ----------
+        surface, grid, scans
+            As for `tankcal.clouds.wall.cells.WallCells`.
+
+        Returns
+        -------
+        WallCells
+        """
         return self.gather(cells_of, surface, grid, scans)
 
     def gather(self, taken_of, *sizes):
-        """What taken_of(points, *sizes) takes of all points."""
+        """Return taken_of(points, *sizes) for all points."""
         shares = self.placing.shares()
-        about = sum(one.points for one in shares)
+        about = sum(share.points for share in shares)
         tally = self.placing.tally(lambda read: self.telling.tell(read, about))
-        found = taken_of(self.placing.points(shares, tally), *sizes)
+        result = taken_of(self.placing.points(shares, tally), *sizes)
         tally.check(self.placing)
         self.left_out = tally.left_out
-        return found
+        return result
 
 
 class Telling:
-    """Tells how many points of a pass were read, under the text of the step that is done.
+    """Reports the number of points read, under the text of the current step.
 
-    progress, part_progress  as `chain.run` takes them
+    Parameters
+    ----------
+    progress, part_progress : callable, optional
+        As in `chain.run`.
     """
 
     def __init__(self, progress=None, part_progress=None):
@@ -211,26 +245,26 @@ class Telling:
         self._text, self._told = message("reading_points", "reading points"), 0.0
 
     def step(self, text):
-        """A step begins."""
+        """Begin a step."""
         self._text, self._told = text, 0.0
         if self._progress is not None:
             self._progress(text)
 
     def tell(self, read, about):
-        """So many of about so many points are read."""
+        """Report the points read so far, out of approximately `about` points."""
         now = time.monotonic()
         if self._part is not None and now - self._told >= TOLD_EVERY_S:
             self._told = now
             self._part(self._text, int(read), int(max(read, about)))
 
 
-def _from_root(header):
-    """The header with the whole path of its file: other processes stand in other folders."""
+def _absolute_header(header):
+    """Header with the absolute path of its file: the working directory of a worker may differ."""
     return replace(header, path=header.path.absolute())
 
 
 def _points_in(header, piece, about):
-    """About how many points a piece of a file has."""
+    """Approximate number of points of a piece of a file."""
     if piece.scan is not None:
         return header.scans[piece.scan].declared
     if piece.count is None:
@@ -239,6 +273,7 @@ def _points_in(header, piece, about):
 
 
 def _is_in_boxes(xyz_m, boxes_m):
+    """Whether each point lies in a box, shape (n,); boxes: lowest and highest corner, (k, 6), m."""
     inside = np.zeros(len(xyz_m), dtype=bool)
     for box in boxes_m:
         inside |= np.all((xyz_m >= box[:3]) & (xyz_m <= box[3:]), axis=1)

@@ -1,4 +1,4 @@
-"""What is told of clouds without a wall where another unit of a file explains it."""
+"""Error message for clouds without a wall, if another unit of a file explains the missing wall."""
 
 import itertools
 
@@ -11,31 +11,32 @@ from tankcal.job.contract.clouds import UNITS_M
 from tankcal.messages import message
 
 FILE = "clouds.toml"
-SAMPLE, MOST_CHUNKS = 60_000, 8  # of a file: points that are looked at, pieces that are read
-DEFINED = {"e57": "m"}  # unit that a format defines, by ASTM E2807 for E57: no other is guessed
-SAME = 1e-3  # of two units that points do not tell apart: feet and survey feet
+SAMPLE, MOST_CHUNKS = 60_000, 8  # largest numbers of points and of chunks examined per file
+DEFINED = {"e57": "m"}  # units defined by a format (E57: ASTM E2807); no other unit is tried
+SAME = 1e-3  # relative difference of units that points cannot separate: feet and survey feet
 
 
 def refusal_of_units(placing, sizes, refused):
-    """The error that no wall was found, or one that names the files in another unit.
+    """Return the error that no wall was found, or an error that names the files in another unit.
 
-    Each file is examined alone: each of its scans is as large as that unit makes it, about the
-    scanner where its pose comes from targets, about the origin where it comes from the file. A
-    format that defines its unit has no other, and a wall that was found has the right unit.
+    Each file is examined alone, with its scans scaled to each unit. The scale applies about the
+    scanner if the pose comes from targets, and about the origin if the pose comes from the file. A
+    format that defines its unit allows no other unit. If a wall was found, the unit is right.
 
     Parameters
     ----------
     placing : Placing
     sizes : dict
-        Of the wall: kind, ends_m, radius_m, azimuth_rad.
+        Nominal sizes of the wall: kind, ends_m, radius_m, azimuth_rad.
     refused : InputError
+        Error that no wall was found.
 
     Returns
     -------
     InputError
     """
     problems = []
-    if any(one.expected.code == "cloud_two_surfaces" for one in refused.problems):
+    if any(problem.expected.code == "cloud_two_surfaces" for problem in refused.problems):
         return refused
     for number, file in enumerate(placing.files):
         units = units_of(file)
@@ -59,19 +60,19 @@ def refusal_of_units(placing, sizes, refused):
 
 
 def units_of(file):
-    """{unit: metres} that the coordinates of a `CloudFile` may be in."""
+    """Return the possible units of the coordinates of a `CloudFile`, {unit: size in m}."""
     defined = DEFINED.get(file.header.format)
     return UNITS_M if defined is None else {defined: UNITS_M[defined]}
 
 
 def is_unit_defined(placing):
-    """Whether all files have the unit that their format defines."""
-    return all(list(units_of(one).values()) == [one.unit_m] for one in placing.files)
+    """Whether the format of every file defines its unit, and the job declares this unit."""
+    return all(list(units_of(file).values()) == [file.unit_m] for file in placing.files)
 
 
 def _some_points(placing, number):
-    """The first scan with points of a file, and some of its points, (k, 3) m."""
-    shares = [one for one in placing.shares() if one.file == number]
+    """Number of the first scan of a file with points, and a sample of its points (k, 3), m."""
+    shares = [share for share in placing.shares() if share.file == number]
     points = placing.points(shares, placing.tally())
     sample, first = PointSample(SAMPLE), None
     try:
@@ -85,13 +86,15 @@ def _some_points(placing, number):
 
 
 def _unit_that_fits(xyz_m, place_m, declared_m, units, sizes):
-    """Name of a unit with which the points show a wall; None: of no other."""
+    """Name of another unit with which the points show a wall, or None."""
     tried = [declared_m]
     for unit, size in units.items():
         factor = size / declared_m
-        if any(abs(size / one - 1) < SAME for one in tried):
+        if any(abs(size / earlier - 1) < SAME for earlier in tried):
             continue
         tried.append(size)
+        # The pose from targets is independent of the unit of the file; the pose from the file is
+        # not.
         for origin in (place_m, np.zeros(3)):
             if shows_wall((xyz_m - origin) * factor + origin, **sizes):
                 return unit

@@ -1,4 +1,4 @@
-"""Point clouds of a wall: their scans registered, means of their cells, the wall they show."""
+"""Point clouds of a wall: registration of their scans, mean points of cells, and the wall."""
 
 import hashlib
 from dataclasses import dataclass, replace
@@ -27,15 +27,15 @@ from tankcal.survey.registration import Registration, register
 from tankcal.survey.scans import KnownTargets
 
 FILE, TARGETS = "clouds.toml", "scan_targets.csv"
-MOST_READINGS = 1200  # whose full covariance is kept
-FEWEST_MEANS = 5  # of a course: a section has as many points
-FAR_AWAY = 20.0  # radii: no scanner that sees a wall stands further from it
+MOST_READINGS = 1200  # largest number of mean points, because of their full covariance
+FEWEST_MEANS = 5  # smallest number of mean points of a course, as in a section
+FAR_AWAY = 20.0  # largest distance of a scanner from the wall, in radii of the tank
 IN_PROCESS = Reading()
 
 
 @dataclass(frozen=True)
 class Clouded:
-    """Clouds as points of a wall, and how they came about.
+    """Mean points of clouds, with the intermediate results.
 
     Attributes
     ----------
@@ -43,16 +43,17 @@ class Clouded:
         SHA-256 of each file of a scanner, in the order of the job.
     registration : Registration
     cells : CloudWall
-        Cells of the wall, what hides it, and how many points were read.
+        Cells of the wall, obstructions, and numbers of points read.
     readings : CloudReadings
         Means of cells: the points of the job, in their order.
     beamed : Beamed
+        Points with the causes that beams share.
     told : tuple of ToldCause
-        What an upright wall says of offsets and scales.
+        Offsets and scales estimated by a vertical wall.
     left_out : ndarray of int, shape (scans,)
-        Points of each scan in boxes that are left out.
+        Points of each scan in excluded boxes.
     inside : CloudInside or None
-        Bottom and things inside; None: not asked for.
+        Bottom and objects inside the tank; None: not requested.
     """
 
     files: tuple
@@ -68,42 +69,68 @@ class Clouded:
 def find_wall_in_clouds(
     job, adjustment, progress, dof=np.inf, *, amplitudes=None, reading=IN_PROCESS
 ):
-    """The job with means of its clouds as points, `Clouded`, and the `Wall` or `Scan` of them.
+    """Find the wall of a job in its point clouds.
 
-    Offsets that nothing but a tape tells are taken off, and the wall is found once more.
+    Offsets that only a tape determines are corrected, and the wall is computed again.
 
     Parameters
     ----------
     job : Job
     adjustment : Adjustment or None
-        Of the network that targets of scans belong to.
+        Adjustment of the network that contains the targets of the scans.
     progress : callable
     dof, amplitudes
         As in `find_wall`.
     reading : Reading, optional
-        By how many workers files are read; None: in this process.
+        Processes that read the files; None: this process.
+
+    Returns
+    -------
+    job : Job
+        The job with mean points of its clouds as its points.
+    clouded : Clouded
+    survey : Wall or Scan
+        Wall of a vertical tank, or shape of another tank.
 
     Raises
     ------
     InputError
-        For clouds without a wall, targets under wrong names, a scanner on the other side.
+        If the clouds show no wall, if targets have wrong names, or if a scanner is on the wrong
+        side.
     """
     job, clouded = points_of_clouds(job, adjustment, progress, reading)
     if job.tank.kind != "vertical":
         return job, clouded, fit_scan(job, dof)
     wall = find_wall(job, progress, dof, amplitudes)
-    told = told_causes(job, wall)
-    free = {one.name: one.value for one in told if np.isinf(one.u_before)}
-    if free:
-        job, clouded = _as_points(job, clouded, free)
+    estimates = told_causes(job, wall)
+    offsets_m = {
+        estimate.name: estimate.value for estimate in estimates if np.isinf(estimate.u_before)
+    }
+    if offsets_m:
+        job, clouded = _as_points(job, clouded, offsets_m)
         wall = find_wall(job, progress, dof, amplitudes)
-        told = told_causes(job, wall)
-        job = with_bottom(job, clouded.inside, clouded.registration, told)
-    return job, replace(clouded, told=told), wall
+        estimates = told_causes(job, wall)
+        job = with_bottom(job, clouded.inside, clouded.registration, estimates)
+    return job, replace(clouded, told=estimates), wall
 
 
 def points_of_clouds(job, adjustment, progress, reading=IN_PROCESS):
-    """The job with means of its clouds as points, and their `Clouded`."""
+    """Return the job with mean points of its clouds as its points, and the `Clouded`.
+
+    Parameters
+    ----------
+    job : Job
+    adjustment : Adjustment or None
+        Adjustment of the network that contains the targets of the scans.
+    progress : callable
+    reading : Reading, optional
+        Processes that read the files.
+
+    Returns
+    -------
+    job : Job
+    clouded : Clouded
+    """
     registration = registered(job, adjustment)
     progress(
         message(
@@ -116,23 +143,23 @@ def points_of_clouds(job, adjustment, progress, reading=IN_PROCESS):
     telling = Telling(progress, reading.part_progress)
     placing = Placing.of(job.clouds, registration)
     with open_passes(placing, reading, telling) as passes:
-        files = tuple(_fingerprint(one) for one in job.clouds.files)
-        found = _wall_of_cells(job, placing, passes, telling)
-        _refuse_places(job, registration, found.surface)
-        inside = find_inside(job, passes, found, telling)
-    readings = cells_of_clouds.readings_of(found, MOST_READINGS)
-    _refuse_empty_courses(job, found, readings)
-    _refuse_scans_apart(job, found, registration)
+        files = tuple(_fingerprint(file) for file in job.clouds.files)
+        cloud_wall = _wall_of_cells(job, placing, passes, telling)
+        _refuse_places(job, registration, cloud_wall.surface)
+        inside = find_inside(job, passes, cloud_wall, telling)
+    readings = cells_of_clouds.readings_of(cloud_wall, MOST_READINGS)
+    _refuse_empty_courses(job, cloud_wall, readings)
+    _refuse_scans_apart(job, cloud_wall, registration)
     job = replace(job, files=(*job.files, *files))
     job = with_bottom(job, inside, registration)
     clouded = Clouded(
-        files, registration, found, readings, None, left_out=passes.left_out, inside=inside
+        files, registration, cloud_wall, readings, None, left_out=passes.left_out, inside=inside
     )
     return _as_points(job, clouded)
 
 
 def _wall_of_cells(job, placing, passes, telling):
-    """`CloudWall`; InputError with the unit that would explain that there is none."""
+    """`CloudWall` of a job; if none is found, InputError with the unit that would explain it."""
     joints = tuple(job.datum.bottom_z_m + joints_of(job)) if job.courses else None
     sizes = {
         "kind": job.tank.kind,
@@ -154,11 +181,11 @@ def _wall_of_cells(job, placing, passes, telling):
 
 
 def registered(job, adjustment):
-    """`Registration` of the scans of a job; adjustment: of its network, or None."""
+    """Return the `Registration` of the scans of a job; adjustment: of its network, or None."""
     clouds, known = job.clouds, job.clouds.control
     if adjustment is not None:
-        wanted = {one.target for one in clouds.targets}
-        names = tuple(name for name in adjustment.names if name in wanted)
+        targets = {reading.target for reading in clouds.targets}
+        names = tuple(name for name in adjustment.names if name in targets)
         place = {name: i for i, name in enumerate(adjustment.names)}
         xyz = adjustment.xyz_m[[place[name] for name in names]].reshape(-1, 3)
         known = KnownTargets(names, xyz, adjustment.full_covariance_m2(names))
@@ -170,7 +197,7 @@ def registered(job, adjustment):
 
 
 def _as_points(job, clouded, told_m=None):
-    """The job with the readings of a cloud as its points, all on one side of the wall."""
+    """Return the job with the readings of its clouds as points, all on one side of the wall."""
     readings, surface = clouded.readings, clouded.cells.surface
     beamed = points_of_beams(
         readings.xyz_m,
@@ -183,17 +210,18 @@ def _as_points(job, clouded, told_m=None):
         told_m=told_m,
     )
     side = np.array(job.clouds.sides)[readings.scan]
-    moved = side != job.survey.side
-    if moved.any() and job.courses:
-        points = through_wall(job, beamed.points, normals_of(surface, readings.xyz_m), moved)
+    # Readings from the other side are moved through the plate to the side of the survey.
+    is_moved = side != job.survey.side
+    if is_moved.any() and job.courses:
+        points = through_wall(job, beamed.points, normals_of(surface, readings.xyz_m), is_moved)
         beamed = replace(beamed, points=points)
-    _refuse_untold(job, beamed)
+    _refuse_unknown_offset(job, beamed)
     job = replace(job, points=s_transform(beamed.points))
     return job, replace(clouded, beamed=beamed)
 
 
 def _fingerprint(file):
-    """`InputFile` of a file of a scanner, whose content is never held whole."""
+    """`InputFile` of a file of a scanner; the file is hashed as a stream because of its size."""
     try:
         with open(file.header.path, "rb") as stream:
             digest = hashlib.file_digest(stream, "sha256")
@@ -203,11 +231,12 @@ def _fingerprint(file):
 
 
 def _nominal_radius_m(job):
+    """Nominal radius of the tank, m."""
     return job.tank.nominal_diameter_m / 2
 
 
 def _refuse_places(job, registration, surface):
-    """Raise InputError for scanners on the other side of the wall than said, or far from it."""
+    """Raise InputError for scanners on the wrong side of the wall, or far from it."""
     distance = surface.places(registration.place_m.copy())[2]
     radius = _nominal_radius_m(job)
     problems = []
@@ -236,28 +265,34 @@ def _refuse_places(job, registration, surface):
 
 
 def _refuse_scans_apart(job, cells, registration):
-    """Raise InputError where scans show two walls that their registration does not bring together.
+    """Raise InputError if scans show two walls that their registration does not reconcile.
 
-    Two walls within the registration are one; beyond it either the registration is wrong or a
-    scan shows another surface, and the table could be that of either.
+    Within the uncertainty of the registration, two walls are treated as the same wall. Beyond it,
+    the registration is wrong or a scan shows another surface, and the table could belong to either
+    wall.
     """
     if cells.are_apart:
-        apart = [one for one in overlaps_of(job, cells, registration) if one.is_apart]
-        if apart:
-            raise InputError([Problem(FILE, scans_apart(job, one)) for one in apart])
+        overlaps = [
+            overlap for overlap in overlaps_of(job, cells, registration) if overlap.is_apart
+        ]
+        if overlaps:
+            raise InputError([Problem(FILE, scans_apart(job, overlap)) for overlap in overlaps])
 
 
-def _refuse_empty_courses(job, found, readings):
-    """Raise InputError for courses of which too few means of cells are, with the reason."""
+def _refuse_empty_courses(job, cloud_wall, readings):
+    """Raise InputError for courses with too few mean points, with the reason."""
     means = np.bincount(readings.course, minlength=len(job.courses))
-    middle = (found.grid.edges_m[:-1] + found.grid.edges_m[1:]) / 2
+    middle = (cloud_wall.grid.edges_m[:-1] + cloud_wall.grid.edges_m[1:]) / 2
     problems = []
-    for place, course in enumerate(job.courses):
-        if means[place] >= FEWEST_MEANS:
+    for number, course in enumerate(job.courses):
+        if means[number] >= FEWEST_MEANS:
             continue
-        low, high = found.joints_m[place : place + 2]
-        mine = (middle > low) & (middle < high)
-        few = np.all([np.isin(one[mine], (EMPTY, FEW)) for one in found.why.values()], axis=0)
+        low, high = cloud_wall.joints_m[number : number + 2]
+        is_in_course = (middle > low) & (middle < high)
+        few = np.all(
+            [np.isin(reasons[is_in_course], (EMPTY, FEW)) for reasons in cloud_wall.why.values()],
+            axis=0,
+        )
         text = message(
             "course_without_cells",
             "nothing of the wall of course {course!r} can be used: {few:.0f} % of its cells have"
@@ -272,9 +307,11 @@ def _refuse_empty_courses(job, found, readings):
         raise InputError(problems)
 
 
-def _refuse_untold(job, beamed):
-    """Raise InputError for an offset that nobody gave, and that no tape tells."""
-    taped = job.strapping is not None and any(not one.check for one in job.strapping.straps)
-    names = [one.name for one in beamed.points.unbound if one.what == "instrument_offset"]
-    if names and not (taped and job.tank.kind == "vertical"):
+def _refuse_unknown_offset(job, beamed):
+    """Raise InputError for an offset without a declared uncertainty that no tape determines."""
+    is_strapped = job.strapping is not None and any(
+        not strap.check for strap in job.strapping.straps
+    )
+    names = [cause.name for cause in beamed.points.unbound if cause.what == "instrument_offset"]
+    if names and not (is_strapped and job.tank.kind == "vertical"):
         raise InputError(Problem(FILE, offset_untold(), column="u_offset_mm"))

@@ -1,7 +1,7 @@
-"""Workers of dask, on this machine or by the address of a scheduler, and what goes wrong with them.
+"""Dask workers on this machine or of a scheduler at an address, and their errors.
 
-`cloud_cluster` reads clouds by them, `tankcal.batch` computes jobs. All that dask, a network or
-another machine comes up with is told in one line.
+`cloud_cluster` reads clouds by workers, and `tankcal.batch` computes jobs. Errors of dask, of the
+network or of another machine are reported in one line.
 """
 
 import contextlib
@@ -21,39 +21,44 @@ from tankcal.messages import message
 from tankcal.version import install_command
 
 OPTION = "--cluster"
-WORKER_BYTES = 1 << 30  # of memory that a worker of this machine may take
-LENGTH, LONGEST_GREETING = struct.Struct("<Q"), 1 << 20  # bytes of the first message of a scheduler
-DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"  # Ctrl-C is the client's
-CONNECT_S, ALONE_S = 5, 30  # to connect; without any worker
+WORKER_BYTES = 1 << 30  # memory limit of a local worker
+# Format of the length of the first message of a scheduler, and its largest length in bytes.
+LENGTH, LONGEST_GREETING = struct.Struct("<Q"), 1 << 20
+DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"  # Ctrl-C ends the client
+CONNECT_S, ALONE_S = 5, 30  # longest time to connect, and without any worker, s
 
 
 def is_installed():
-    """Whether there is the library that workers need."""
+    """Whether the library distributed is installed."""
     return importlib.util.find_spec("distributed") is not None
 
 
 def count_cores():
-    """Cores of this machine that this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
 @contextlib.contextmanager
 def open_client(workers, *, worker_bytes=WORKER_BYTES, settings=()):
-    """A client of so many workers of this machine, or of the scheduler at an address.
+    """Open a client of local workers or of the scheduler at an address.
 
     Parameters
     ----------
     workers : int or str
+        Number of local workers, or address of a scheduler.
     worker_bytes : int, optional
-        Of memory that each worker of this machine may take; one that takes more is ended, and
-        another one started.
+        Memory limit of each local worker; a worker beyond the limit is replaced.
     settings : dict, optional
-        Further settings of dask for workers of this machine.
+        Further settings of dask for local workers.
+
+    Yields
+    ------
+    distributed.Client
 
     Raises
     ------
     InputError
-        Where dask is not installed, or an address does not answer.
+        If dask is not installed, or if an address does not answer.
     """
     if not is_installed():
         raise refusal(
@@ -63,13 +68,13 @@ def open_client(workers, *, worker_bytes=WORKER_BYTES, settings=()):
                 command=install_command("cluster"),
             )
         )
-    with _quiet(), _client_of(workers, worker_bytes, dict(settings)) as client:
+    with _silence_dask(), _client_of(workers, worker_bytes, dict(settings)) as client:
         yield client
 
 
 @contextlib.contextmanager
-def _quiet():
-    """Without what dask logs and warns of: problems are told in words."""
+def _silence_dask():
+    """Suppress the log and the warnings of dask; this module reports its errors."""
     logger = logging.getLogger("distributed")
     before = logger.level
     logger.setLevel(logging.CRITICAL + 1)
@@ -83,17 +88,19 @@ def _quiet():
 
 @contextlib.contextmanager
 def _client_of(workers, worker_bytes, more):
-    """A client of local workers, or of the scheduler at an address."""
+    """Client of local workers, or of the scheduler at an address."""
     import dask
     from distributed import Client, LocalCluster
 
     with contextlib.ExitStack() as stack:
         if isinstance(workers, str):
             address = workers
-            _greet(address)
+            _check_greeting(address)
         else:
             memory = {"pause": False, "spill": False, "target": False}
-            settings = {f"distributed.worker.memory.{name}": of for name, of in memory.items()}
+            settings = {
+                f"distributed.worker.memory.{name}": limit for name, limit in memory.items()
+            }
             settings["distributed.worker.preload"] = [DEAF]
             stack.enter_context(dask.config.set(settings | more))
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="tankcal-"))
@@ -109,45 +116,45 @@ def _client_of(workers, worker_bytes, more):
             )
         try:
             client = stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
-        except Exception as error:  # whatever a port that is none of dask comes up with
-            raise _no_answer(address, error) from error
+        except Exception as error:  # a port of another service may cause any error
+            raise _no_answer_error(address, error) from error
         with failures_told():
             _check_workers(client, workers)
         yield client
 
 
-def _greet(address):
-    """InputError where nothing at an address greets as a scheduler of dask does.
+def _check_greeting(address):
+    """Raise InputError if no dask scheduler answers at an address.
 
-    A greeting begins with its length; of a port that speaks otherwise dask would take a number of
-    bytes that no memory holds, and of one that is silent it waits for long.
+    A greeting begins with its length. Without this check, dask may read a length beyond the memory
+    from another service, and waits long for a silent port.
     """
     try:
-        found = urlsplit(address if "://" in address else f"tcp://{address}")
-        if found.scheme not in ("tcp", "tls") or not (found.hostname and found.port):
+        url = urlsplit(address if "://" in address else f"tcp://{address}")
+        if url.scheme not in ("tcp", "tls") or not (url.hostname and url.port):
             raise ValueError(address)
-        with socket.create_connection((found.hostname, found.port), CONNECT_S) as stream:
-            if found.scheme == "tls":
+        with socket.create_connection((url.hostname, url.port), CONNECT_S) as stream:
+            if url.scheme == "tls":
                 return
             stream.settimeout(CONNECT_S)
             head = b""
             while len(head) < LENGTH.size:
-                if not (more := stream.recv(LENGTH.size - len(head))):
+                if not (received := stream.recv(LENGTH.size - len(head))):
                     raise ConnectionError
-                head += more
+                head += received
         if LENGTH.unpack(head)[0] > LONGEST_GREETING:
             raise ConnectionError
     except (OSError, ValueError) as error:
-        raise _no_answer(address, error) from error
+        raise _no_answer_error(address, error) from error
 
 
 def _check_workers(client, workers):
-    """InputError where there are no workers, or some of another version of tankcal."""
+    """Raise InputError if there are no workers, or workers with another version of tankcal."""
     try:
         client.wait_for_workers(1, timeout=CONNECT_S if isinstance(workers, str) else ALONE_S)
     except TimeoutError as error:
-        raise _no_workers() from error
-    for worker, version in client.run(_version, on_error="return").items():
+        raise _no_workers_error() from error
+    for worker, version in client.run(_read_version, on_error="return").items():
         if version != tankcal.__version__:
             raise refusal(
                 message(
@@ -161,29 +168,31 @@ def _check_workers(client, workers):
 
 
 class Watch:
-    """Watches over a cluster while something is waited for.
+    """Monitors a cluster during a wait.
 
-    client  of the cluster
+    Parameters
+    ----------
+    client : distributed.Client
     """
 
     def __init__(self, client):
         self._client, self._alone_since = client, None
 
     def look(self):
-        """Number of workers; InputError where there was none for ALONE_S."""
+        """Return the number of workers; InputError if there was none for ALONE_S."""
         count = len(self._client.scheduler_info(n_workers=-1)["workers"])
         if count:
             self._alone_since = None
             return count
         self._alone_since = self._alone_since or time.monotonic()
         if time.monotonic() - self._alone_since > ALONE_S:
-            raise _no_workers()
+            raise _no_workers_error()
         return count
 
 
 @contextlib.contextmanager
 def failures_told():
-    """InputError in one line for whatever dask, a network or another machine comes up with."""
+    """Turn any error of dask, of the network or of another machine into a one-line InputError."""
     try:
         yield
     except TankcalError:
@@ -199,11 +208,13 @@ def failures_told():
         ) from error
 
 
-def _version():
+def _read_version():
+    """Version of tankcal on a worker."""
     return tankcal.__version__
 
 
-def _no_answer(address, error):
+def _no_answer_error(address, error):
+    """InputError for an address without an answer."""
     return refusal(
         message(
             "cluster_no_answer",
@@ -215,7 +226,8 @@ def _no_answer(address, error):
     )
 
 
-def _no_workers():
+def _no_workers_error():
+    """InputError for a cluster without workers."""
     return refusal(
         message(
             "cluster_no_workers",
@@ -225,5 +237,5 @@ def _no_workers():
 
 
 def refusal(text):
-    """The InputError of the option that asks for workers."""
+    """Return the InputError of the command-line option that requests workers."""
     return InputError(Problem(OPTION, text))

@@ -1,32 +1,34 @@
-"""Courses compared with each other: a pair that looks exchanged, and one that stands apart."""
+"""Comparison of courses: pairs that seem exchanged, and a course that differs from all others."""
 
 from itertools import combinations
 
 import numpy as np
 from scipy.special import stdtr
 
-EXCHANGED_SHARE, EXCHANGED_M = 0.4, 1.5e-3  # of the steps between courses: left, and saved
-BY_CHANCE = 0.05  # of sound courses that scatter as much so many look so, at most
-DRAWS = 1000  # of sound shells
-FEWEST_COURSES = 4  # of which one is told from the others
+# An exchange must leave at most this share of the sum of steps between courses, and reduce the sum
+# by at least this length, m.
+EXCHANGED_SHARE, EXCHANGED_M = 0.4, 1.5e-3
+BY_CHANCE = 0.05  # largest probability of the same finding by chance, for valid courses
+DRAWS = 1000  # number of simulated valid shells
+FEWEST_COURSES = 4  # smallest number of courses for the test of a single course
 
 
-def exchanged_courses(outside_m, plates_m, both):
-    """The pair of courses that look exchanged, by the steps between neighbouring courses.
+def exchanged_courses(outside_m, plates_m, candidates):
+    """Find the pair of courses that seem exchanged, by the steps between neighbouring courses.
 
     Parameters
     ----------
     outside_m, plates_m : ndarray, shape (courses,)
-        Radius of the outside, and plate with paint.
+        Radius of the outside, and thickness of plate with paint.
     both : sequence of int
         Courses that may be exchanged.
 
     Returns
     -------
     (int, int, float, float) or None
-        The pair, the sum of the steps with it exchanged, and as it is, m; None: too little is
-        saved, or courses whose inside radii scatter as much look so much better exchanged by
-        chance in over one of twenty shells.
+        The pair, the sum of the steps after its exchange, and the sum as read, m. None if the
+        exchange reduces the sum too little, or if an exchange improves more than one in twenty
+        simulated shells with the same scatter as much by chance.
 
     Examples
     --------
@@ -35,53 +37,62 @@ def exchanged_courses(outside_m, plates_m, both):
     >>> exchanged_courses((inside + plates)[[0, 4, 2, 3, 1, 5]], plates, range(6))[:2]
     (1, 4)
     """
-    if len(both) < 2:
+    if len(candidates) < 2:
         return None
     inside = outside_m - plates_m
-    steps = float(_steps(inside))
-    left, pairs = _steps_exchanged(outside_m, plates_m, both)
-    best = int(np.argmin(left))
-    if left[best] >= EXCHANGED_SHARE * steps or steps - left[best] <= EXCHANGED_M:
+    steps = float(_sum_steps(inside))
+    sums, pairs = _sum_steps_exchanged(outside_m, plates_m, candidates)
+    best = int(np.argmin(sums))
+    if sums[best] >= EXCHANGED_SHARE * steps or steps - sums[best] <= EXCHANGED_M:
         return None
-    sound = np.random.default_rng(0).normal(size=(DRAWS, len(inside))) * np.std(inside, ddof=1)
-    shares = np.min(_steps_exchanged(sound + plates_m, plates_m, both)[0], axis=-1) / _steps(sound)
-    if np.mean(shares <= left[best] / steps) > BY_CHANCE:
+    simulated = np.random.default_rng(0).normal(size=(DRAWS, len(inside))) * np.std(inside, ddof=1)
+    # Simulated shells have the scatter of the inside radii; their best exchange shows what chance
+    # achieves.
+    shares = np.min(
+        _sum_steps_exchanged(simulated + plates_m, plates_m, candidates)[0], axis=-1
+    ) / _sum_steps(simulated)
+    if np.mean(shares <= sums[best] / steps) > BY_CHANCE:
         return None
-    return *pairs[best], float(left[best]), steps
+    return *pairs[best], float(sums[best]), steps
 
 
-def _steps_exchanged(outside_m, plates_m, both):
-    """(..., k) steps between courses with each pair of them exchanged, and the pairs."""
-    pairs, left = list(combinations(both, 2)), []
+def _sum_steps_exchanged(outside_m, plates_m, candidates):
+    """Sums of steps (..., k) after the exchange of each of k pairs of courses, and the pairs."""
+    pairs, sums = list(combinations(candidates, 2)), []
     for i, k in pairs:
-        turned = outside_m.copy()
-        turned[..., [i, k]] = outside_m[..., [k, i]]
-        left.append(_steps(turned - plates_m))
-    return np.stack(left, axis=-1), pairs
+        exchanged = outside_m.copy()
+        exchanged[..., [i, k]] = outside_m[..., [k, i]]
+        sums.append(_sum_steps(exchanged - plates_m))
+    return np.stack(sums, axis=-1), pairs
 
 
-def _steps(radii_m):
-    """(...) sum of the steps between neighbouring courses, of radii (..., courses)."""
+def _sum_steps(radii_m):
+    """Sum (...) of the steps between neighbouring courses, for radii (..., courses)."""
     return np.abs(np.diff(radii_m, axis=-1)).sum(axis=-1)
 
 
 def course_apart(inside_m, least_m):
-    """The course that stands apart from all others, which scatter less; None: none does.
+    """Find the course whose radius differs from all other courses.
 
     Parameters
     ----------
     inside_m : ndarray, shape (courses,)
         Inside radii.
     least_m : float
-        By how much at least.
+        Smallest difference.
 
     Returns
     -------
     (int, float) or None
-        The course, and its radius over the mean of the others, m; None: of courses that scatter as
-        the others do one in twenty shells or more has one so far off (Grubbs 1950, as a test of
-        the radius by the mean and the standard deviation s of the other n - 1: d / s / sqrt(1 +
-        1 / (n - 1)) is Student's t of n - 2 degrees of freedom).
+        The course, and its radius less the mean radius of the others, m. None if one in twenty
+        valid shells or more would have so large a difference by chance.
+
+    Notes
+    -----
+    The test is that of Grubbs (1950). With the standard deviation s of the other n - 1 radii and
+    the
+    difference d from their mean, d / s / sqrt(1 + 1 / (n - 1)) is Student's t with n - 2 degrees of
+    freedom.
 
     Examples
     --------
@@ -94,10 +105,12 @@ def course_apart(inside_m, least_m):
     count = len(inside_m)
     if count < FEWEST_COURSES:
         return None
-    others = (inside_m.sum() - inside_m) / (count - 1)
-    away = inside_m - others
-    place = int(np.argmax(np.abs(away)))
-    sd = np.std(np.delete(inside_m, place), ddof=1) * np.sqrt(1 + 1 / (count - 1))
-    by_chance = 2 * count * stdtr(count - 2, -abs(away[place]) / max(sd, 1e-9))
-    is_apart = abs(away[place]) > least_m and by_chance < BY_CHANCE
-    return (place, float(away[place])) if is_apart else None
+    mean_of_others_m = (inside_m.sum() - inside_m) / (count - 1)
+    away = inside_m - mean_of_others_m
+    course = int(np.argmax(np.abs(away)))
+    sd = np.std(np.delete(inside_m, course), ddof=1) * np.sqrt(1 + 1 / (count - 1))
+    # Two-sided probability, times the number of courses because the most deviating course is
+    # tested.
+    probability = 2 * count * stdtr(count - 2, -abs(away[course]) / max(sd, 1e-9))
+    is_apart = abs(away[course]) > least_m and probability < BY_CHANCE
+    return (course, float(away[course])) if is_apart else None

@@ -1,4 +1,4 @@
-"""What each correction is worth: the tank with it less the tank without it, at the top row."""
+"""Size of each correction: volume with the correction less volume without it, at the top row."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -9,20 +9,30 @@ from tankcal.messages import Message, message
 from tankcal.pipeline.tanks import as_declared, body_of, thermal_scale
 from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 
-# Named by title and edition alone: the bodies of paid standards were not read, so no clause is.
+# Cited by title and edition only: the texts of paid standards were not read, so no clause is cited.
 ISO_7507 = "ISO 7507-1:2003"
 ISO_4269 = "ISO 4269:2001"
 TIMOSHENKO = "Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
+# No correction, except tilt, which the surveyed sections include.
 NONE = Switches(**{field.name: field.name == "tilt" for field in fields(Switches)})
 
 
 @dataclass(frozen=True)
 class Correction:
-    """One correction: its code, whether the table has it, its size, formula and source.
+    """A correction: its code, whether the table includes it, its size, formula and source.
 
-    size_m3  change of the capacity at the top row; of one that is switched off, what it would be
+    Attributes
+    ----------
+    code : str
+    applied : bool
+    size_m3 : float
+        Change of the capacity at the top row; for a correction switched off, its change if applied.
+    size_percent : float
+        The same in percent.
+    formula : Message
+    source : str
     """
 
     code: str
@@ -34,74 +44,111 @@ class Correction:
 
 
 def corrections_of(job, survey, over_m=0.0):
-    """Every correction that bears on the job, in the order in which they are made.
+    """Return every correction that applies to the job, in the order of application.
 
-    over_m  how far the top row, a whole millimetre, stands above the top of the tank
+    The size of a correction is the volume with it and all previous corrections, less the volume
+    with the previous corrections. The surveyed sections already include the tilt: its size is the
+    error of sections square to the axis.
 
-    Each size is that of the tank with this correction and those before it, less the tank without
-    it. The tilt is in the surveyed sections already: its size is what a cut square to the axis
-    would lack.
+    Parameters
+    ----------
+    job : Job
+    survey : object
+        Survey of the job.
+    over_m : float
+        Height of the top row, a whole millimetre, above the top of the tank, m.
+
+    Returns
+    -------
+    tuple of Correction
     """
     job = as_declared(job)
-    made, volume = NONE, _at_top(job, survey, NONE, over_m)
-    found = []
+    switches, volume = NONE, _volume_at_top(job, survey, NONE, over_m)
+    corrections = []
     reference = volume
-    for code, bears, formula, source in _known(job, survey):
-        if not bears:
+    for code, is_relevant, formula, source in _applicable_corrections(job, survey):
+        if not is_relevant:
             continue
         if code == "tilt":
-            found.append(_tilt(job, survey, reference, formula, source))
+            corrections.append(_tilt_correction(job, survey, reference, formula, source))
             continue
-        with_it = _at_top(job, survey, replace(made, **{code: True}), over_m)
-        size = with_it - volume
-        on = getattr(job.switches, code)
-        if on:
-            made, volume = replace(made, **{code: True}), with_it
-        found.append(Correction(code, on, size, 100 * size / reference, formula, source))
-    return tuple(found)
+        corrected = _volume_at_top(job, survey, replace(switches, **{code: True}), over_m)
+        # A correction switched off leaves the volume for the next corrections unchanged.
+        size = corrected - volume
+        is_applied = getattr(job.switches, code)
+        if is_applied:
+            switches, volume = replace(switches, **{code: True}), corrected
+        corrections.append(
+            Correction(code, is_applied, size, 100 * size / reference, formula, source)
+        )
+    return tuple(corrections)
 
 
 def correction_by_liquid(corrections, gross_m3, top_m3):
-    """The `Correction` that metered runs make at the top row: what is left of the others' sum.
+    """Return the `Correction` by metered runs at the top row: the rest after all other corrections.
 
     Parameters
     ----------
     corrections : tuple of Correction
     gross_m3, top_m3 : float
-        At the top row: without any correction, and of the table.
+        Volume at the top row without any correction, and according to the table.
+
+    Returns
+    -------
+    Correction
     """
-    made = sum(one.size_m3 for one in corrections if one.applied and one.code != "tilt")
-    size = top_m3 - gross_m3 - made
+    sum_m3 = sum(
+        correction.size_m3
+        for correction in corrections
+        if correction.applied and correction.code != "tilt"
+    )
+    size = top_m3 - gross_m3 - sum_m3
     formula = message("by_liquid", "adjusted together with the metered volumes")
     return Correction("liquid", True, size, 100 * size / gross_m3, formula, ISO_4269)
 
 
 def gross_at_top(job, survey, over_m=0.0):
-    """Volume at the top row without any correction, m3."""
-    return _at_top(job, survey, NONE, over_m)
+    """Return the volume at the top row without any correction, m3.
+
+    Parameters
+    ----------
+    job : Job
+    survey : object
+        Survey of the job.
+    over_m : float
+        Height of the top row above the top of the tank, m.
+
+    Returns
+    -------
+    float
+    """
+    return _volume_at_top(job, survey, NONE, over_m)
 
 
-def _at_top(job, survey, switches, over_m):
+def _volume_at_top(job, survey, switches, over_m):
+    """Volume at the top row with given switches, m3."""
     body = body_of(job, survey, switches, uncertain=False)
     return float(body.volume_m3(np.array([body.highest_m + over_m]))[0])
 
 
-def _tilt(job, wall, volume, formula, source):
+def _tilt_correction(job, wall, volume, formula, source):
+    """Correction by tilt: horizontal sections against sections square to the axis."""
     share = float(1 - 1 / np.hypot(1.0, wall.shell.tilt))
     return Correction("tilt", job.switches.tilt, volume * share, 100 * share, formula, source)
 
 
-def _known(job, survey):
-    """(code, whether it bears on the job, formula, source) of each correction, in their order."""
-    of_shell = _of_shell(job, survey) if job.tank.kind == "vertical" else ()
+def _applicable_corrections(job, survey):
+    """(code, whether it applies to the job, formula, source) of each correction, in order."""
+    shell_corrections = _shell_corrections(job, survey) if job.tank.kind == "vertical" else ()
     if job.tank.kind == "sphere":
-        of_shell = (_of_pressure(job),)
+        shell_corrections = (_pressure_correction(job),)
     declared = message("sum_of_volumes", "sum of the declared volumes")
     deadwood = ("deadwood", bool(job.deadwood), declared, ISO_7507)
-    return [*_of_lengths(job), *of_shell, deadwood]
+    return [*_length_corrections(job), *shell_corrections, deadwood]
 
 
-def _of_lengths(job):
+def _length_corrections(job):
+    """Corrections of lengths: plate, paint and temperature."""
     outside = job.survey.side == "outside"
     solid = job.horizontal or job.sphere
     parts = job.courses or job.rings
@@ -124,6 +171,7 @@ def _of_lengths(job):
 
 
 def _thermal_formula(job):
+    """Formula of the correction by shell temperature."""
     scale = thermal_scale(job, Switches())
     if job.table.height_expansion or not job.courses:
         template = "all lengths times 1 + α (T_ref − T_shell) = {scale:.8f}"
@@ -132,7 +180,8 @@ def _thermal_formula(job):
     return message("horizontal_lengths", template, scale=scale)
 
 
-def _of_shell(job, wall):
+def _shell_corrections(job, wall):
+    """Corrections of a vertical shell: tilt, liquid head, bottom, top and roof."""
     survey, table, roof = job.survey, job.table, job.roof
     head = message(
         "liquid_head",
@@ -165,7 +214,8 @@ def _of_shell(job, wall):
     )
 
 
-def _of_pressure(job):
+def _pressure_correction(job):
+    """Correction of a sphere by gas pressure and liquid head."""
     from tankcal.pipeline.tanks.solid import pressure_of
 
     load = pressure_of(job)
@@ -216,6 +266,7 @@ TOP_FORMULA = message("head_on_top", "volume of the head over the area of the la
 
 
 def _roof_formula(roof):
+    """Formula of the correction by a floating roof; "" without a roof."""
     if roof is None:
         return ""
     if roof.weighing == "vacuum":

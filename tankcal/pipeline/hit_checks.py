@@ -1,4 +1,4 @@
-"""Warnings of bare wall hits: what a sound crew with a sound instrument hardly brings home."""
+"""Warnings of bare wall hits: findings that are rare in a valid survey."""
 
 import numpy as np
 
@@ -26,38 +26,52 @@ from tankcal.survey.control_drift import repeats_of
 from tankcal.survey.sighting import NETWORK, WALL
 
 RULES, CONTROL = "wall_hits", "control_readings.csv"
-UNLIKE_SDS = 3.0  # of an offset or a scale from its certificate
-OVER_JOINT_M = 0.02  # a hit of a course may lie so far beyond it
-SUSPECT = 3.0  # test quantity of the worst set-up, from which it is tested by all others
-WAVE_M = 3e-3  # sd of each long wave of a wall, when a set-up is tested
-MOSTLY = 0.9  # of the test quantity of a move: distances explain the set-up as well
-MOVED_M = 4e-3  # of its hits or its station: less looks like the form of the wall
-SHOWN = 5
+UNLIKE_SDS = 3.0  # largest deviation of an offset or scale from its certificate, in sds
+OVER_JOINT_M = 0.02  # largest distance of a hit beyond the joints of its course
+SUSPECT = 3.0  # test quantity of the worst set-up from which it is tested against all others
+WAVE_M = 3e-3  # standard deviation of each long wave of the wall in the test of a set-up
+# Distances explain a set-up as well as a movement from this share of the test quantity of the
+# movement.
+MOSTLY = 0.9
+MOVED_M = 4e-3  # smallest reported movement; less cannot be separated from the form of the wall
+SHOWN = 5  # largest number of names in a message
 GON = FULL_TURN / 400
 
 
 def least_hits(job):
-    """How many hits a section of a tank of that circumference should have."""
+    """Return the recommended number of hits in a section of the tank, by its circumference."""
     return limit_at(RULES, "hits", "least", girth_m(job))
 
 
 def check_hits(job, wall, sighting):
-    """`Problem`s of the hits of a wall."""
+    """Return the warnings of the hits of a wall.
+
+    Parameters
+    ----------
+    job : Job
+    wall : Wall
+    sighting : Sighting
+
+    Returns
+    -------
+    tuple of Problem
+    """
     return (
-        *_of_control(job),
-        *_of_assumed_places(job, wall, sighting.poses),
-        *_of_levels(job, wall),
-        *_of_courses(job, sighting),
-        *_of_incidence(sighting),
+        *_check_control(job),
+        *_check_assumed_places(job, wall, sighting.poses),
+        *_check_levels(job, wall),
+        *_check_courses(job, sighting),
+        *_check_incidence(sighting),
         *check_lost_setups(job, wall, sighting),
-        *_of_setups(job, wall, sighting),
+        *_check_setups(job, wall, sighting),
         *check_nominal(job, wall, job.hits.file),
         *(() if wall.by_inputs else check_size_told(job, [*job.hits.instruments])),
         *causes_unlike_certificates(wall, sighting.told, taken_off_m=sighting.told_m),
     )
 
 
-def _of_control(job):
+def _check_control(job):
+    """Warn of missing or deviating control readings."""
     limits = limits_of(RULES)
     if not job.hits.control:
         text = message(
@@ -66,16 +80,19 @@ def _of_control(job):
         )
         yield Problem(CONTROL, text)
         return
-    again = repeats_of(job.hits.control)
-    factor = repeat_factor(sum(3 * len(one.rows) for one in again))
-    for one in again:
-        of_distances, of_angles = (factor * sd for sd in _sds_of(job.hits, one.setup))
-        angle = max(limits["control_angle_gon"] * GON, of_angles)
-        distance = max(limits["control_distance_mm"] / 1000, of_distances)
-        for name, values, limit, per, unit in (
-            ("direction", one.direction_rad, angle, GON / 1000, "mgon"),
-            ("zenith", one.zenith_rad, angle, GON / 1000, "mgon"),
-            ("distance_m", one.distance_m, distance, 1e-3, "mm"),
+    targets = repeats_of(job.hits.control)
+    factor = repeat_factor(sum(3 * len(target.rows) for target in targets))
+    for target in targets:
+        distance_spread, angle_spread = (
+            factor * sd for sd in _standard_deviations(job.hits, target.setup)
+        )
+        # Below the spread due to the declared standard deviations, chance would exceed the limit.
+        angle = max(limits["control_angle_gon"] * GON, angle_spread)
+        distance = max(limits["control_distance_mm"] / 1000, distance_spread)
+        for name, values, limit, scale, unit in (
+            ("direction", target.direction_rad, angle, GON / 1000, "mgon"),
+            ("zenith", target.zenith_rad, angle, GON / 1000, "mgon"),
+            ("distance_m", target.distance_m, distance, 1e-3, "mm"),
         ):
             size = np.nan_to_num(np.abs(values))
             worst = int(np.argmax(size))
@@ -84,19 +101,20 @@ def _of_control(job):
                     "control_moved",
                     "set-up {setup!r} reads target {target!r} {apart:+.1f} {unit} from its first"
                     " reading, over the limit of {limit:.3g} {unit}: did the instrument move?",
-                    setup=one.setup,
-                    target=one.target,
-                    apart=values[worst] / per,
-                    limit=limit / per,
+                    setup=target.setup,
+                    target=target.target,
+                    apart=values[worst] / scale,
+                    limit=limit / scale,
                     unit=unit,
                 )
-                yield Problem(CONTROL, text, one.rows[worst], name)
+                yield Problem(CONTROL, text, target.rows[worst], name)
 
 
-def _of_assumed_places(job, wall, poses):
-    """Set-ups that were placed evenly round the tank, and whose places determine its radius.
+def _check_assumed_places(job, wall, poses):
+    """Warn of set-ups that were assumed to be evenly spaced and determine the radius of the tank.
 
-    A radius by the curvature of arcs depends on where these lie; a strap makes it independent.
+    A radius from the curvature of arcs depends on the places of these arcs; a strap makes it
+    independent of them.
     """
     stations, setups = job.hits.stations, job.hits.setups
     unknown = np.full(3, np.nan)
@@ -115,52 +133,57 @@ def _of_assumed_places(job, wall, poses):
         yield Problem("control.csv", text, column="x_m")
 
 
-def _sds_of(hits, setup):
+def _standard_deviations(hits, setup):
     """Standard deviations of a distance (m) and of an angle (rad) of a set-up; 0 without hits."""
-    own = np.array(hits.setup) == setup
-    return [np.median(one[own]) if own.any() else 0.0 for one in (hits.sd_m, hits.sd_rad)]
+    is_of_setup = np.array(hits.setup) == setup
+    return [
+        np.median(values[is_of_setup]) if is_of_setup.any() else 0.0
+        for values in (hits.sd_m, hits.sd_rad)
+    ]
 
 
-def _of_levels(job, wall):
+def _check_levels(job, wall):
+    """Warn of sections with few hits and of courses with few levels."""
     least = least_hits(job)
-    few = levels_with_few(wall, least)
-    if few:
+    sections = levels_with_few(wall, least)
+    if sections:
         text = message(
             "few_hits",
             "sections {sections} have fewer than {least} hits, as many as a circumference of"
             " {girth_m:.0f} m asks for",
-            sections=few,
+            sections=sections,
             least=least,
             girth_m=girth_m(job),
         )
         yield Problem(job.hits.file, text)
     least = limits_of(RULES)["sets_a_course"]
-    short = courses_with_few(job, wall, least, slopes_count=True)
-    if short:
+    courses = courses_with_few(job, wall, least, slopes_count=True)
+    if courses:
         text = message(
             "few_levels_of_hits",
             "courses {courses} were hit at fewer than {least} levels: nothing shows a taper there",
-            courses=short,
+            courses=courses,
             least=least,
         )
         yield Problem(job.hits.file, text)
 
 
-def _of_courses(job, sighting):
-    """Hits that are said to be of another course than the one at their height."""
+def _check_courses(job, sighting):
+    """Warn of hits whose declared course differs from the course at their height."""
     names = [course.name for course in job.courses]
     joints = job.datum.bottom_z_m + joints_of(job)
     z = sighting.points.xyz_m[:, 2]
-    wrong = {}
-    for place, name in enumerate(job.hits.course):
+    misplaced = {}
+    for hit, name in enumerate(job.hits.course):
         if name is None:
             continue
         index = names.index(name)
-        if not joints[index] - OVER_JOINT_M <= z[place] <= joints[index + 1] + OVER_JOINT_M:
-            there = names[int(course_of(z[place], joints))]
-            there = "" if there == name else there  # beyond the bottom or the top
-            wrong.setdefault((name, there), []).append(place)
-    for (name, there), places in wrong.items():
+        if not joints[index] - OVER_JOINT_M <= z[hit] <= joints[index + 1] + OVER_JOINT_M:
+            course_there = names[int(course_of(z[hit], joints))]
+            # No course lies beyond the bottom or the top.
+            course_there = "" if course_there == name else course_there
+            misplaced.setdefault((name, course_there), []).append(hit)
+    for (name, course_there), places in misplaced.items():
         text = (
             message(
                 "hits_beyond_ends",
@@ -169,7 +192,7 @@ def _of_courses(job, sighting):
                 count=len(places),
                 course=name,
             )
-            if not there
+            if not course_there
             else message(
                 "hits_of_other_course",
                 "hits that are said to be of course {course!r} ({count}) lie at the height of"
@@ -177,54 +200,56 @@ def _of_courses(job, sighting):
                 " instrument?",
                 count=len(places),
                 course=name,
-                there=there,
+                there=course_there,
             )
         )
         yield Problem(job.hits.file, text, job.hits.rows[places[0]], "course")
 
 
-def _of_incidence(sighting):
+def _check_incidence(sighting):
+    """Warn of hits at large angles of incidence."""
     most = limits_of(RULES)["most_incidence_deg"]
-    flat = np.flatnonzero(np.degrees(sighting.incidence_rad) > most)
-    if len(flat):
+    oblique = np.flatnonzero(np.degrees(sighting.incidence_rad) > most)
+    if len(oblique):
         text = message(
             "hits_too_flat",
             "{count} hits meet the wall at more than {most:g} degrees from its normal: what such"
             " ranging is worth nobody knows",
-            count=len(flat),
+            count=len(oblique),
             most=most,
         )
-        yield Problem(sighting.points.file, text, sighting.points.rows[flat[0]])
+        yield Problem(sighting.points.file, text, sighting.points.rows[oblique[0]])
 
 
-def _of_setups(job, wall, sighting):
-    """The set-up of a network that ranged otherwise than all others, or whose hits contradict
-    those of all others most, where one does.
+def _check_setups(job, wall, sighting):
+    """Warn of the set-up of a network whose hits or distances contradict all others most.
 
-    Where the wall alone ties set-ups nothing tells that one moved.
+    If only the wall ties the set-ups, no test can detect a moved set-up.
     """
     names = np.array(job.hits.setup)[~job.hits.check]
-    if len(set(names.tolist())) < 2 or any(one != NETWORK for one in sighting.poses.ties):
+    if len(set(names.tolist())) < 2 or any(tie != NETWORK for tie in sighting.poses.ties):
         return
-    order = np.concatenate([one.group.members for one in wall.sections])
-    at = wall.accepted[order]  # of each reading of the field, among the points
-    if len(wall.field.radius_m) - len(wall.readings) != len(at):  # several in a cell
+    order = np.concatenate([section.group.members for section in wall.sections])
+    point = wall.accepted[order]  # number of the point of each reading of the field
+    if len(wall.field.radius_m) - len(wall.readings) != len(point):  # several points in a cell
         return
-    hits = at < len(names)  # targets come after them
+    hits = point < len(names)  # the points list targets after hits
     if not hits.all():
         return
-    whole = wall.field.covariance_m2 + noise_of_wall(wall) - wall.field.noise_m2
-    counted = np.flatnonzero(~job.hits.check)[at]
-    sight = (sighting.points.xyz_m - sighting.poses.xyz_m[sighting.pose])[counted]
-    away, normal = sight[:, :2], sighting.normal[counted]
+    covariance_m2 = wall.field.covariance_m2 + noise_of_wall(wall) - wall.field.noise_m2
+    used = np.flatnonzero(~job.hits.check)[point]
+    sight = (sighting.points.xyz_m - sighting.poses.xyz_m[sighting.pose])[used]
+    away, normal = sight[:, :2], sighting.normal[used]
+    # Derivatives of the distance from the wall: by a rotation of the set-up about the vertical, by
+    # its shift along the normal, and by a longer distance.
     turn = normal[:, 0] * away[:, 1] - normal[:, 1] * away[:, 0]
     along = np.sum(normal * sight, axis=1) / np.linalg.norm(sight, axis=1)
     columns = np.column_stack([turn, normal[:, :2]])
     moved, ranged = moved_or_ranged(
-        wall.field, whole, names[at], columns, along, SUSPECT, wave_m=WAVE_M
+        wall.field, covariance_m2, names[point], columns, along, SUSPECT, wave_m=WAVE_M
     )
-    setup = max(ranged, key=lambda one: ranged[one][0])
-    (w, longer), most = ranged[setup], max(one[0] for one in moved.values())
+    setup = max(ranged, key=lambda name: ranged[name][0])
+    (w, longer), most = ranged[setup], max(test[0] for test in moved.values())
     if w > max(critical_of_ranging(len(ranged)), MOSTLY * most) and abs(longer) > MOVED_M:
         text = message(
             "hits_ranged_otherwise",
@@ -233,7 +258,7 @@ def _of_setups(job, wall, sighting):
             " used?",
             setup=setup,
             w=w,
-            too_long=_too_long(1000 * longer),
+            too_long=_length_in_words(1000 * longer),
         )
         yield Problem("setups.csv", text, job.hits.setups[setup].row, "instrument")
         return
@@ -241,6 +266,8 @@ def _of_setups(job, wall, sighting):
     if worst is None:
         return
     _, turned, shift = moved[worst["setup"]]
+    # The movement of the hits: by the shift of the station, or by the rotation at the median
+    # distance.
     moved_m = max(float(np.hypot(*shift)), abs(turned) * float(np.median(np.hypot(*away.T))))
     if moved_m > MOVED_M:
         text = message(
@@ -254,35 +281,48 @@ def _of_setups(job, wall, sighting):
         yield Problem("setups.csv", text, job.hits.setups[worst["setup"]].row, "setup")
 
 
-def _too_long(by_mm):
+def _length_in_words(by_mm):
+    """Difference of a distance in words."""
     if by_mm < 0:
         return message("mm_too_short", "{by_mm:.1f} mm too short", by_mm=-by_mm)
     return message("mm_too_long", "{by_mm:.1f} mm too long", by_mm=by_mm)
 
 
-def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off_m):
-    """Offsets and scales that straps, or hits from the other side, make out to be unlike their
-    certificates, which stand in a file.
+def causes_unlike_certificates(wall, estimates, file="instruments.toml", *, taken_off_m):
+    """Warn of offsets and scales that differ from their certificates, according to the wall.
 
-    taken_off_m  {instrument: offset that was taken off its readings before}, m
+    The wall controls them only with straps, or with hits from both sides.
+
+    Parameters
+    ----------
+    wall : Wall
+    estimates : sequence of ToldCause
+    file : str
+        File of the certificates.
+    taken_off_m : dict
+        {instrument: offset already corrected in its readings, m}.
+
+    Yields
+    ------
+    Problem
     """
-    if not told or (wall.straps is None and not wall.by_inputs):
+    if not estimates or (wall.straps is None and not wall.by_inputs):
         return
-    for one in told:
-        if not np.isfinite(one.u_before) and one.what == "instrument_offset":
-            yield from _strange_offset(one, taken_off_m.get(one.name, 0.0), file)
-        if not np.isfinite(one.u_before) or abs(one.value) <= UNLIKE_SDS * one.u_before:
+    for cause in estimates:
+        if not np.isfinite(cause.u_before) and cause.what == "instrument_offset":
+            yield from _strange_offset(cause, taken_off_m.get(cause.name, 0.0), file)
+        if not np.isfinite(cause.u_before) or abs(cause.value) <= UNLIKE_SDS * cause.u_before:
             continue
-        ratio = abs(one.value) / one.u_before
-        if one.what == "instrument_offset":
+        ratio = abs(cause.value) / cause.u_before
+        if cause.what == "instrument_offset":
             key, text = (
                 "u_offset_mm",
                 message(
                     "offset_unlike_certificate",
                     "the wall makes the offset of {name} {value_mm:+.2f} mm, {ratio:.1f} times its"
                     " u_offset_mm: is that of another reflector, or a strap or a plate wrong?",
-                    name=one.name,
-                    value_mm=1000 * one.value,
+                    name=cause.name,
+                    value_mm=1000 * cause.value,
                     ratio=ratio,
                 ),
             )
@@ -293,26 +333,26 @@ def causes_unlike_certificates(wall, told, file="instruments.toml", *, taken_off
                     "scale_unlike_certificate",
                     "the wall makes the scale of {name} {value_ppm:+.0f} ppm, {ratio:.1f} times its"
                     " u_scale_ppm",
-                    name=one.name,
-                    value_ppm=1e6 * one.value,
+                    name=cause.name,
+                    value_ppm=1e6 * cause.value,
                     ratio=ratio,
                 ),
             )
-        yield Problem(file, text, None, f"{one.name}.{key}")
+        yield Problem(file, text, None, f"{cause.name}.{key}")
 
 
-def _strange_offset(one, taken_off_m, file):
-    """An offset that nobody certified, and that is surely larger than instruments have."""
+def _strange_offset(cause, taken_off_m, file):
+    """Warn of an offset without certificate that is larger than usual for instruments."""
     most = limits_of(RULES)["most_offset_mm"] / 1000
-    value = one.value + taken_off_m
-    if abs(value) > most + UNLIKE_SDS * one.u_after:
+    value = cause.value + taken_off_m
+    if abs(value) > most + UNLIKE_SDS * cause.u_after:
         text = message(
             "offset_strange",
             "straps and wall make the offset of {name} {value_mm:+.2f} mm; on a bare wall it is"
             " seldom more than {most_mm:g} mm: was the constant of a reflector set, is a strap"
             " misread, or are circumferences those of the inside?",
-            name=one.name,
+            name=cause.name,
             value_mm=1000 * value,
             most_mm=1000 * most,
         )
-        yield Problem(file, text, None, f"{one.name}.u_offset_mm")
+        yield Problem(file, text, None, f"{cause.name}.u_offset_mm")

@@ -1,4 +1,4 @@
-"""Bare hits of a wall as its points, by the poses of the set-ups that they were taken from."""
+"""Bare hits of a wall as its points, by the poses of the set-ups that observed them."""
 
 from dataclasses import replace
 
@@ -18,42 +18,67 @@ from tankcal.survey import wall_points
 from tankcal.survey.poses import covariance_with_points, poses_of, settled
 from tankcal.survey.sighting import Beside, sight
 
-FEWEST_AROUND = 3  # stations that show on which side of the wall they are
-ROUNDS = 4  # in which the wall tells offsets or places
-SETTLED_M = 1e-5  # what moves no hit by more has settled
+FEWEST_AROUND = 3  # smallest number of stations that show their side of the wall
+ROUNDS = 4  # largest number of iterations for offsets and places of set-ups
+SETTLED_M = 1e-5  # largest movement of a hit in the last iteration
 
 
 def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
-    """The job with its hits as points, their `Sighting`, and the `Wall` that they show.
+    """Find the wall of a job by its hits.
 
-    What nothing but the wall tells is taken off, and the wall is found again: offsets of
-    instruments, and how far set-ups stand from where they were placed, so that sections and all
-    that is said of points are those of the wall in the table.
+    Quantities that only the wall determines are corrected, and the wall is computed again: offsets
+    of instruments, and places of set-ups. Sections and points then refer to the wall of the table.
 
-    adjustment  of the network that the set-ups belong to; None: there is none
-    dof, amplitudes  as in `find_wall`
+    Parameters
+    ----------
+    job : Job
+    adjustment : Adjustment or None
+        Adjustment of the network of the set-ups; None: no network.
+    progress : callable
+    dof, amplitudes
+        As in `find_wall`.
+
+    Returns
+    -------
+    job : Job
+        The job with its hits as points.
+    sighting : Sighting
+    wall : Wall
     """
     job, sighting = sight_wall(job, adjustment, progress)
     wall, sizes = find_wall(job, progress, dof, amplitudes), None
     for _ in range(ROUNDS):
-        told = wall.told
-        if told is None or told.largest_m < SETTLED_M:
+        estimates = wall.told
+        if estimates is None or estimates.largest_m < SETTLED_M:
             break
-        if len(told.poses):  # they take up a part of the form that further rounds would see
+        if len(estimates.poses):
+            # Poses absorb a part of the form, which later rounds no longer see: keep its size.
             sizes = wall.field.amplitudes
-        poses = settled(sighting.poses, told.poses)
-        again = sight(job.hits, poses, told.offsets_m)
-        offsets = {name: sighting.told_m.get(name, 0.0) + more
-                   for name, more in told.offsets_m.items()}  # fmt: skip
-        job, sighting = _as_points(job, replace(again, beside=sighting.beside, told_m=offsets))
+        poses = settled(sighting.poses, estimates.poses)
+        sighted = sight(job.hits, poses, estimates.offsets_m)
+        offsets = {name: sighting.told_m.get(name, 0.0) + correction
+                   for name, correction in estimates.offsets_m.items()}  # fmt: skip
+        job, sighting = _as_points(job, replace(sighted, beside=sighting.beside, told_m=offsets))
         wall = find_wall(job, progress, dof, amplitudes, sizes=sizes)
     return job, replace(sighting, told=told_causes(job, wall)), wall
 
 
 def sight_wall(job, adjustment, progress):
-    """The job with the hits that count as its points, and the `Sighting` of all of them.
+    """Compute the hits of the wall as points.
 
-    adjustment  of the network that the set-ups belong to; None: there is none
+    Parameters
+    ----------
+    job : Job
+    adjustment : Adjustment or None
+        Adjustment of the network of the set-ups; None: no network.
+    progress : callable
+
+    Returns
+    -------
+    job : Job
+        The job with the hits used as its points.
+    sighting : Sighting
+        Of all hits.
     """
     progress(
         message(
@@ -81,20 +106,22 @@ def sight_wall(job, adjustment, progress):
 
 
 def _as_points(job, sighting):
-    """The job with the hits that count as its points, all on one side of the wall, and then its
-    targets; the sighting without the covariance of its points, which may be half a gigabyte.
+    """Return the job with the hits used as its points, followed by its targets.
+
+    All points are on one side of the wall. The sighting is returned without the covariance of its
+    points, which may take half a gigabyte.
     """
-    sighting = _on_one_side(job, sighting)
-    counted = np.flatnonzero(~job.hits.check)
-    used = take_points(sighting.points, counted)
+    sighting = _move_to_one_side(job, sighting)
+    used_hits = np.flatnonzero(~job.hits.check)
+    points = take_points(sighting.points, used_hits)
     if sighting.beside is not None:
-        used = sighting.beside.after(used, sighting.by_poses[coordinates_of(counted)])
+        points = sighting.beside.after(points, sighting.by_poses[coordinates_of(used_hits)])
     sighting = replace(sighting, points=replace(sighting.points, covariance_m2=None))
-    return replace(job, points=s_transform(used)), sighting
+    return replace(job, points=s_transform(points)), sighting
 
 
 def _targets_beside(job, poses, adjustment):
-    """`Beside` of the targets that targets.csv names; None: it names none."""
+    """`Beside` of the targets in targets.csv; None if it names no target."""
     if adjustment is None or job.measurements.targets is None:
         return None
     points = wall_points(adjustment, job.measurements, job.survey.side)
@@ -102,54 +129,55 @@ def _targets_beside(job, poses, adjustment):
 
 
 def take_points(points, chosen):
-    """Some points (k,) of all, with their covariance and their causes."""
+    """Return selected points (k,), with their covariance and their causes."""
     if np.array_equal(chosen, np.arange(len(points.names))):  # the covariance may be large
         return points
     index = coordinates_of(chosen)
 
-    def of(values):
+    def select(values):
         return tuple(values[i] for i in chosen)
 
-    def columns(causes):
-        return tuple(replace(one, column_m=one.column_m[index]) for one in causes)
+    def select_columns(causes):
+        return tuple(replace(cause, column_m=cause.column_m[index]) for cause in causes)
 
     return replace(
         points,
-        names=of(points.names),
+        names=select(points.names),
         xyz_m=points.xyz_m[chosen],
         covariance_m2=points.covariance_m2[np.ix_(index, index)],
-        section=of(points.section),
-        generatrix=of(points.generatrix),
-        rows=of(points.rows),
-        causes=columns(points.causes),
-        unbound=columns(points.unbound),
+        section=select(points.section),
+        generatrix=select(points.generatrix),
+        rows=select(points.rows),
+        causes=select_columns(points.causes),
+        unbound=select_columns(points.unbound),
         by_inputs={name: column[index] for name, column in points.by_inputs.items()},
     )
 
 
 def _refuse_side(job, sighting):
-    """Raise InputError where all set-ups stand on the other side of the wall than was said."""
+    """Raise InputError if all set-ups lie on the other side of the wall than declared."""
     if not np.any(sighting.is_inside == (job.survey.side == "inside")):
-        raise _on_other_side(job)
+        raise _wrong_side_error(job)
 
 
 def _refuse_stations_outside(job):
-    """The same where the stations alone show it: each further from the middle of all than the wall.
+    """Raise InputError if the stations alone show that they lie outside the tank.
 
-    Untied set-ups that see a line of the wall each would not be placed at all. In the tank none has
-    its stations so: the mean of the squared distances from their middle is at most that from the
-    axis.
+    Set-ups without ties that each see a line of the wall would not be placed. Stations inside the
+    tank cannot all be further from their centre than the radius: the mean squared distance from
+    their centre is at most the mean squared distance from the axis.
     """
     hits = job.hits
-    used = dict.fromkeys(hits.setups[name].station for name in hits.setup)
-    places = np.array([hits.stations.get(one, np.full(3, np.nan))[:2] for one in used])
+    stations = dict.fromkeys(hits.setups[name].station for name in hits.setup)
+    places = np.array([hits.stations.get(station, np.full(3, np.nan))[:2] for station in stations])
     if job.survey.side != "inside" or len(places) < FEWEST_AROUND:
         return
     if np.all(np.hypot(*(places - places.mean(axis=0)).T) > job.tank.nominal_diameter_m / 2):
-        raise _on_other_side(job)
+        raise _wrong_side_error(job)
 
 
-def _on_other_side(job):
+def _wrong_side_error(job):
+    """InputError for set-ups on the other side of the wall."""
     text = message(
         "hits_on_other_side",
         "found {side}, but all set-ups of the hits stand {other} the tank; expected {other}",
@@ -159,47 +187,65 @@ def _on_other_side(job):
     return InputError(Problem("job.toml", text, column="survey.side"))
 
 
-def _on_one_side(job, sighting):
-    """The sighting with the hits of the other side than `survey.side` moved through the wall.
+def _move_to_one_side(job, sighting):
+    """Return the sighting with the hits of the other side moved through the wall.
 
-    Outside is the inside plus plate and paint of the course, along the wall's normal.
+    The outside is the inside plus plate and paint of the course, along the normal of the wall.
     """
-    moved = sighting.is_inside != (job.survey.side == "inside")
-    if not moved.any():
+    is_moved = sighting.is_inside != (job.survey.side == "inside")
+    if not is_moved.any():
         return sighting
-    points = through_wall(job, sighting.points, sighting.normal, moved)
+    points = through_wall(job, sighting.points, sighting.normal, is_moved)
     return replace(sighting, points=points)
 
 
-def through_wall(job, points, normal, moved):
-    """Points of an upright wall of which some are moved to its other side.
+def through_wall(job, points, normal, is_moved):
+    """Move points of a vertical wall to its other side.
 
-    normal  (n, 3) of the wall, outwards
-    moved   (n,) which are not on the side of the survey
+    Parameters
+    ----------
+    job : Job
+    points : Points
+    normal : ndarray, shape (n, 3)
+        Normals of the wall, outwards.
+    is_moved : ndarray of bool, shape (n,)
+        Points that are not on the side of the survey.
+
+    Returns
+    -------
+    Points
+        With the derivatives by plate thickness and paint.
     """
     joints = job.datum.bottom_z_m + joints_of(job)
     course = course_of(points.xyz_m[:, 2], joints)
     outwards = 1.0 if job.survey.side == "outside" else -1.0
-    normal = (outwards * moved)[:, None] * normal
+    normal = (outwards * is_moved)[:, None] * normal
     switches = {"plate_thickness": job.switches.plate, "paint": job.switches.paint}
     sizes = {
-        "plate_thickness": np.array([one.thickness_m for one in job.courses])[course],
-        "paint": np.array([one.paint_m for one in job.courses])[course],
+        "plate_thickness": np.array([part.thickness_m for part in job.courses])[course],
+        "paint": np.array([part.paint_m for part in job.courses])[course],
     }
-    size = sum(switches[name] * one for name, one in sizes.items())
+    size = sum(switches[name] * thickness for name, thickness in sizes.items())
     xyz = points.xyz_m + size[:, None] * normal
-    by = {name: normal.ravel() for name, one in sizes.items() if switches[name] and one.any()}
-    return replace(points, xyz_m=xyz, by_inputs=by)
+    derivatives = {
+        name: normal.ravel()
+        for name, thickness in sizes.items()
+        if switches[name] and thickness.any()
+    }
+    return replace(points, xyz_m=xyz, by_inputs=derivatives)
 
 
 def _refuse_unknown_offset(job, sighting):
-    """Raise InputError for an offset that nobody gave, and that neither a tape nor hits from both
-    sides of the wall tell.
+    """Raise InputError for an undeclared offset without any control.
+
+    A tape, or hits from both sides of the wall, determine an offset.
     """
-    taped = job.strapping is not None and any(not one.check for one in job.strapping.straps)
-    if taped or len(set(sighting.is_inside.tolist())) == 2:
+    is_strapped = job.strapping is not None and any(
+        not strap.check for strap in job.strapping.straps
+    )
+    if is_strapped or len(set(sighting.is_inside.tolist())) == 2:
         return
-    names = [one.name for one in sighting.points.unbound if one.what == "instrument_offset"]
+    names = [cause.name for cause in sighting.points.unbound if cause.what == "instrument_offset"]
     if names:
         raise InputError(
             [

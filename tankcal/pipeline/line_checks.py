@@ -1,4 +1,4 @@
-"""Warnings of reference lines: offsets that were rejected, lines that moved, too few of them."""
+"""Warnings of reference lines: rejected offsets, moved lines, and insufficient readings."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -18,58 +18,72 @@ from tankcal.survey.reference_line import (
 )
 
 FILE, RULES = "offsets.csv", "reference_line"
-UNLIKE_SDS = 3.0  # of a collimation, from what its certificate says
-OFF_AXIS_M, OFF_AXIS_SDS = 0.01, 6.0  # of a level's centre, from the straight axis
-OFF_LEVEL_M = 0.003  # of a strap's radius, from the levels of its course
-SCALE_OF_MEDIAN = 1.4826
-WRITTEN_M = 5e-5  # half the last digit that is said of a difference
-CRITICAL_LEAN = 3.72  # of two slopes together: a chi-square of two exceeds it in 0.1 %
-VERTICALS = 1e-4  # m/m: how alike the verticals of a plummet and of the points are, 20"
-MANY, MANY_LINES = 0.15, 0.5  # of the offsets, and of the lines with one of them, rejected
-FEWEST_LEVELS, FEWEST_ALIKE = 5, 4  # to tell a level, or a copied line, from the others
+UNLIKE_SDS = 3.0  # largest deviation of a collimation from its certificate, in sds
+# Largest distance of the centre of a level from the straight axis, in m and in sds.
+OFF_AXIS_M, OFF_AXIS_SDS = 0.01, 6.0
+OFF_LEVEL_M = 0.003  # largest deviation of the radius of a strap from the levels of its course
+SCALE_OF_MEDIAN = 1.4826  # standard deviation over median absolute deviation, normal distribution
+WRITTEN_M = 5e-5  # half the last digit of a reported difference
+# Critical value of the length of two slopes over their standard deviation: a chi-square with two
+# degrees of freedom exceeds its square in 0.1 % of cases.
+CRITICAL_LEAN = 3.72
+VERTICALS = 1e-4  # sd of the difference between the verticals of plummet and points, m/m (20")
+# Largest shares of rejected offsets, and of lines with a rejected offset.
+MANY, MANY_LINES = 0.15, 0.5
+FEWEST_LEVELS, FEWEST_ALIKE = 5, 4  # smallest numbers of levels, and of equal readings of two lines
 
 
 def least_lines(circumference_m):
-    """How many lines a tank of that circumference should have."""
+    """Return the recommended number of lines for a tank of given circumference in m."""
     return limit_at(RULES, "lines", "least", circumference_m)
 
 
 def accepted_offsets(job, wall):
-    """Offsets that the wall was taken from."""
+    """Return the offsets used for the wall."""
     places = wall.places[wall.are("offsets")]
     _, _, accepted = wall.tests_of("offsets")
     return [job.lines.offsets[i] for i in places[accepted]]
 
 
 def levels_and_lean(job, wall):
-    """`Level`s and `Lean` of the accepted offsets, with the adjusted collimations."""
-    kappa = {name: one[0] for name, one in wall.collimations.items()}
+    """Return `Level`s and `Lean` of the accepted offsets, with the adjusted collimations."""
+    kappa = {name: estimate[0] for name, estimate in wall.collimations.items()}
     levels = levels_of(job.lines, accepted_offsets(job, wall), kappa)
     return levels, lean_of(job.lines, levels)
 
 
 def check_lines(job, wall):
-    """`Problem`s of the reference lines of a wall; none where there are no lines."""
+    """Return the warnings of the reference lines of a wall; () without lines.
+
+    Parameters
+    ----------
+    job : Job
+    wall : StrappedWall or Wall
+
+    Returns
+    -------
+    tuple of Problem
+    """
     if job.lines is None:
         return ()
     levels, lean = levels_and_lean(job, wall)
     return (
-        *_set_aside(job, wall),
-        *_moved(job),
-        *_copied(job),
+        *_check_rejected(job, wall),
+        *_check_moved_lines(job),
+        *_check_copied_lines(job),
         *check_lines_apart(job, wall.collimations),
         *check_scale(job),
-        *_too_few(job, wall),
-        *_off_axis(job, levels, lean),
-        *_of_scope(job, lean),
-        *_of_plummets(job),
-        *(_of_straps(job, wall, levels) if wall.surveyed_as == "strapped" else ()),
+        *_check_numbers(job, wall),
+        *_check_axis(job, levels, lean),
+        *_check_scope(job, lean),
+        *_check_plummets(job),
+        *(_check_straps(job, wall, levels) if wall.surveyed_as == "strapped" else ()),
     )
 
 
 @dataclass(frozen=True)
 class LeanTest:
-    """The lean that lines show against the lean of the points.
+    """Comparison of the lean of lines with the lean of points.
 
     Attributes
     ----------
@@ -78,7 +92,7 @@ class LeanTest:
     w : float
         Length of the difference over its standard deviation.
     mirrored_w : float
-        The same with azimuths of lines that grow anticlockwise.
+        The same with azimuths of lines taken as anticlockwise.
     sd : float
         Mean standard deviation of a component of the difference.
     """
@@ -91,16 +105,16 @@ class LeanTest:
 
     @property
     def turned_rad(self):
-        """Angle from the lean of the lines to that of the points, clockwise."""
-        before, after = (np.arctan2(*one) for one in (self.of_lines, self.of_points))
+        """Clockwise angle from the lean of the lines to the lean of the points."""
+        before, after = (np.arctan2(*slope) for slope in (self.of_lines, self.of_points))
         return float((after - before + np.pi) % (2 * np.pi) - np.pi)
 
 
 def compare_leans(lean, shell):
-    """`LeanTest` of the `Lean` of lines against that of a `Shell`; None: one is not known.
+    """Compare the `Lean` of lines with the lean of a `Shell`; None if either is unknown.
 
-    w = sqrt(d' C^-1 d) of the difference d of both slopes; C is the sum of their covariances and
-    VERTICALS squared.
+    The test quantity is w = sqrt(d' C^-1 d), with the difference d of both slopes. C is the sum of
+    their covariances and VERTICALS squared.
 
     Examples
     --------
@@ -114,32 +128,35 @@ def compare_leans(lean, shell):
     if not (shell.tilt_known and np.isfinite(lean.sd)):
         return None
     lines, points = np.array([lean.x, lean.y]), np.array(shell.slope)
-    spread = shell.slope_cofactor + (lean.sd**2 + VERTICALS**2) * np.eye(2)
-    away = np.stack([points - lines, points - lines * [-1, 1]])
-    w, mirrored = np.sqrt(np.sum(away * np.linalg.solve(spread, away.T).T, axis=1)).tolist()
-    return LeanTest(lines, points, w, mirrored, float(np.sqrt(np.trace(spread) / 2)))
+    covariance = shell.slope_cofactor + (lean.sd**2 + VERTICALS**2) * np.eye(2)
+    # Anticlockwise azimuths mirror the lean in x.
+    differences = np.stack([points - lines, points - lines * [-1, 1]])
+    w, mirrored = np.sqrt(
+        np.sum(differences * np.linalg.solve(covariance, differences.T).T, axis=1)
+    ).tolist()
+    return LeanTest(lines, points, w, mirrored, float(np.sqrt(np.trace(covariance) / 2)))
 
 
 def check_leans(job, wall):
-    """`Problem`s of a `Wall` whose lines lean otherwise than its points."""
+    """Yield a warning of a `Wall` whose lines show another lean than its points."""
     if job.lines is None:
         return
     test = compare_leans(levels_and_lean(job, wall.read)[1], wall.shell)
     if test is None or test.w <= CRITICAL_LEAN:
         return
     size_of_lines, size = np.hypot(*test.of_lines), np.hypot(*test.of_points)
-    told = {
+    figures = {
         "lines": 1000 * size_of_lines,
         "to_lines": np.degrees(np.arctan2(*test.of_lines)) % 360,
         "points": 1000 * size,
         "to_points": np.degrees(np.arctan2(*test.of_points)) % 360,
         "w": test.w,
     }
-    found = message(
+    finding = message(
         "leans_differ",
         "the lines show a lean of {lines:.2f} mm/m towards {to_lines:.0f} deg, the points one of"
         " {points:.2f} mm/m towards {to_points:.0f} deg (w = {w:.1f})",
-        **told,
+        **figures,
     )
     if test.mirrored_w <= CRITICAL_LEAN:
         cause = message(
@@ -153,90 +170,94 @@ def check_leans(job, wall):
         )
     else:
         cause = message("leans_unlike", "was the plummet, or the network, upright?")
-    text = message("leans_with_cause", "{found}: {cause}", found=found, cause=cause)
+    text = message("leans_with_cause", "{found}: {cause}", found=finding, cause=cause)
     yield Problem("lines.csv", text, column="azimuth_deg")
 
 
-def _set_aside(job, wall):
+def _check_rejected(job, wall):
+    """Warn of rejected offsets; if there are many, warn of their declared standard deviation."""
     places = wall.places[wall.are("offsets")]
     w, _, accepted = wall.tests_of("offsets")
-    away = wall.tested.departure_m[wall.are("offsets")]
-    read = [job.lines.offsets[place] for place in places]
-    lost = [one for one, kept in zip(read, accepted, strict=True) if not kept]
-    share_of_lines = len({one.line for one in lost}) / len(job.lines.lines)
-    if len(lost) > MANY * len(read) and share_of_lines > MANY_LINES:
+    deviations_m = wall.tested.departure_m[wall.are("offsets")]
+    offsets = [job.lines.offsets[place] for place in places]
+    rejected = [offset for offset, is_kept in zip(offsets, accepted, strict=True) if not is_kept]
+    share_of_lines = len({offset.line for offset in rejected}) / len(job.lines.lines)
+    if len(rejected) > MANY * len(offsets) and share_of_lines > MANY_LINES:
         text = message(
             "many_offsets_set_aside",
             "{count} of {all} offsets, on {lines} lines, depart from what all others show by more"
             " than their standard deviations of {sd_mm:g} mm (median) allow, and were rejected: is"
             " s_mm too small, or in another unit?",
-            count=len(lost),
-            all=len(read),
-            lines=len({one.line for one in lost}),
-            sd_mm=1000 * float(np.median([one.sd_m for one in read])),
+            count=len(rejected),
+            all=len(offsets),
+            lines=len({offset.line for offset in rejected}),
+            sd_mm=1000 * float(np.median([offset.sd_m for offset in offsets])),
         )
-        yield Problem(FILE, text, row=lost[0].row, column="s_mm")
+        yield Problem(FILE, text, row=rejected[0].row, column="s_mm")
         return
-    for place, of_w, kept, by_m in zip(places, w, accepted, away, strict=True):
-        if not kept:
-            one = job.lines.offsets[place]
+    for place, statistic, is_kept, radial_m in zip(places, w, accepted, deviations_m, strict=True):
+        if not is_kept:
+            offset = job.lines.offsets[place]
             text = message(
                 "offset_set_aside",
                 "line {line!r} at {level_m:g} m: {away_mm:+.1f} mm of radius from what all others"
                 " show, w = {w:.1f}; it was rejected",
-                line=one.line,
-                level_m=one.level_m,
-                away_mm=1000 * by_m,
-                w=of_w,
+                line=offset.line,
+                level_m=offset.level_m,
+                away_mm=1000 * radial_m,
+                w=statistic,
             )
-            yield Problem(FILE, text, row=one.row, column="offset_mm")
+            yield Problem(FILE, text, row=offset.row, column="offset_mm")
 
 
-def _moved(job):
-    """Lines whose readings at the reference level differ: the instrument was moved between."""
-    seen = {}
-    for one in job.lines.offsets:
-        if one.reference:
-            seen.setdefault((one.line, one.face), []).append(one)
-    factor = repeat_factor(max(sum(len(one) - 1 for one in seen.values()), 1))
-    for (line, _), several in seen.items():
-        found = [one.offset_m for one in several]
+def _check_moved_lines(job):
+    """Warn of lines whose readings at the reference level differ: the instrument may have moved."""
+    readings = {}
+    for offset in job.lines.offsets:
+        if offset.reference:
+            readings.setdefault((offset.line, offset.face), []).append(offset)
+    factor = repeat_factor(max(sum(len(group) - 1 for group in readings.values()), 1))
+    for (line, _), repeats in readings.items():
+        offsets_m = [offset.offset_m for offset in repeats]
         limit = limits_of(RULES)["reference_repeats_mm"] / 1000
-        limit = max(limit, factor * max(one.sd_m for one in several)) + WRITTEN_M
-        if max(found) - min(found) > limit:
+        limit = max(limit, factor * max(offset.sd_m for offset in repeats)) + WRITTEN_M
+        if max(offsets_m) - min(offsets_m) > limit:
             text = message(
                 "line_moved",
                 "the readings of line {line!r} at the reference level differ by {apart_mm:.1f} mm;"
                 " expected at most {limit_mm:.1f} mm: did the instrument move?",
                 line=line,
-                apart_mm=1000 * (max(found) - min(found)),
+                apart_mm=1000 * (max(offsets_m) - min(offsets_m)),
                 limit_mm=1000 * limit,
             )
-            yield Problem(FILE, text, row=several[-1].row, column="offset_mm")
+            yield Problem(FILE, text, row=repeats[-1].row, column="offset_mm")
 
 
-def _copied(job):
-    """Lines of equal readings, to the last digit."""
-    read = {}
-    for one in job.lines.offsets:
-        read.setdefault(one.line, {})[round(one.level_m, 3), one.face, one.reference] = one
-    for (first, before), (second, after) in combinations(read.items(), 2):
-        both = before.keys() & after.keys()
-        alike = all(before[place].offset_m == after[place].offset_m for place in both)
-        if len(both) >= FEWEST_ALIKE and alike:
+def _check_copied_lines(job):
+    """Warn of lines with equal readings to the last digit."""
+    readings = {}
+    for offset in job.lines.offsets:
+        readings.setdefault(offset.line, {})[
+            round(offset.level_m, 3), offset.face, offset.reference
+        ] = offset
+    for (first, before), (second, after) in combinations(readings.items(), 2):
+        common = before.keys() & after.keys()
+        is_equal = all(before[place].offset_m == after[place].offset_m for place in common)
+        if len(common) >= FEWEST_ALIKE and is_equal:
             text = message(
                 "line_copied",
                 "all {count} readings of line {second!r} are those of line {first!r}, to the last"
                 " digit: were they copied?",
-                count=len(both),
+                count=len(common),
                 second=second,
                 first=first,
             )
-            row = min(one.row or 0 for one in after.values()) or None
+            row = min(offset.row or 0 for offset in after.values()) or None
             yield Problem(FILE, text, row=row, column="line")
 
 
-def _too_few(job, wall):
+def _check_numbers(job, wall):
+    """Warn of few lines, and of courses with a single level."""
     circumference = np.pi * job.tank.nominal_diameter_m
     least = least_lines(circumference)
     if len(job.lines.lines) < least:
@@ -248,55 +269,58 @@ def _too_few(job, wall):
             least=least,
         )
         yield Problem("lines.csv", text, column="line")
-    used = accepted_offsets(job, wall)
+    offsets = accepted_offsets(job, wall)
     levels = {}
-    for one, level in zip(used, level_names(used), strict=True):
-        levels.setdefault(one.course, set()).add(int(level))
-    few = [
-        name for name, those in levels.items() if len(those) < limits_of(RULES)["levels_a_course"]
+    for offset, level in zip(offsets, level_names(offsets), strict=True):
+        levels.setdefault(offset.course, set()).add(int(level))
+    courses = [
+        name
+        for name, numbers in levels.items()
+        if len(numbers) < limits_of(RULES)["levels_a_course"]
     ]
-    if few:
+    if courses:
         text = message(
             "few_levels",
             "courses {courses}: one level; two are advised, else nothing shows how they taper",
-            courses=", ".join(few),
+            courses=", ".join(courses),
         )
         yield Problem(FILE, text, column="level_m")
 
 
-def _off_axis(job, levels, lean):
-    """A level whose centre stands far off the axis through those of the others."""
+def _check_axis(job, levels, lean):
+    """Warn of a level whose centre is far from the axis through the centres of the others."""
     if len(levels) < FEWEST_LEVELS or not np.isfinite(lean.x):
         return
-    heights = np.array([one.level_m for one in levels])
-    centres = np.array([one.centre_m for one in levels])
+    heights = np.array([level.level_m for level in levels])
+    centres = np.array([level.centre_m for level in levels])
     high, low = np.nonzero(heights[:, None] > heights)
     slopes = (centres[high] - centres[low]) / (heights[high] - heights[low])[:, None]
-    slope = np.median(slopes, axis=0)  # Theil 1950: of all pairs, so that one level bends nothing
+    slope = np.median(slopes, axis=0)  # median of all pairs (Theil 1950): robust against an outlier
     axis = np.median(centres, axis=0) + (heights - np.median(heights))[:, None] * slope
-    away = np.linalg.norm(centres - axis, axis=1)
-    usual = SCALE_OF_MEDIAN * float(np.median(away))
-    worst = int(np.argmax(away))
-    if away[worst] > max(OFF_AXIS_M, OFF_AXIS_SDS * usual):
-        one = levels[worst]
+    distances = np.linalg.norm(centres - axis, axis=1)
+    typical = SCALE_OF_MEDIAN * float(np.median(distances))
+    worst = int(np.argmax(distances))
+    if distances[worst] > max(OFF_AXIS_M, OFF_AXIS_SDS * typical):
+        level = levels[worst]
         text = message(
             "level_off_axis",
             "the centre of {level_m:g} m on course {course!r} stands {away_mm:.0f} mm off the axis"
             " through the others: are its readings those of another level?",
-            level_m=one.level_m,
-            course=one.course,
-            away_mm=1000 * away[worst],
+            level_m=level.level_m,
+            course=level.course,
+            away_mm=1000 * distances[worst],
         )
         yield Problem(FILE, text, column="level_m")
 
 
-def _of_scope(job, lean):
-    size, most = float(np.hypot(lean.x, lean.y)), limits_of(RULES)["most_lean"]
-    if size > most:
+def _check_scope(job, lean):
+    """Warn of a lean or a diameter outside the scope of the method."""
+    lean_size, most = float(np.hypot(lean.x, lean.y)), limits_of(RULES)["most_lean"]
+    if lean_size > most:
         text = message(
             "leans_too_much",
             "the shell leans by {lean:.1f} %; the method is meant for at most {most:g} %",
-            lean=100 * size,
+            lean=100 * lean_size,
             most=100 * most,
         )
         yield Problem(FILE, text, column="offset_mm")
@@ -311,15 +335,15 @@ def _of_scope(job, lean):
         yield Problem("lines.csv", text)
 
 
-def _of_plummets(job):
-    """Collimations by both faces that are not what the certificate says."""
-    used = [one for one in job.lines.offsets if not one.check]
+def _check_plummets(job):
+    """Warn of collimations, determined in two faces, that differ from the certificate."""
+    used = [offset for offset in job.lines.offsets if not offset.check]
     for name, plummet in job.lines.plummets.items():
-        found = collimation_by_faces(job.lines, used, name)
+        collimation = collimation_by_faces(job.lines, used, name)
         u = plummet.u_collimation_rad
-        if found is None or u is None:
+        if collimation is None or u is None:
             continue
-        kappa, sd = found
+        kappa, sd = collimation
         if abs(kappa) > UNLIKE_SDS * np.hypot(u, sd):
             text = message(
                 "collimation_unlike_certificate",
@@ -331,26 +355,28 @@ def _of_plummets(job):
             yield Problem("instruments.toml", text, column=f"{name}.u_collimation_arcsec")
 
 
-def _of_straps(job, wall, levels):
-    """Straps that the lines contradict: unlike the levels of their course by more than a bulge."""
-    reference = next(one for one in job.lines.offsets if one.reference)
-    risen = {reference.course: [(reference.level_m, 0.0)]}
-    for one in levels:
-        risen.setdefault(one.course, []).append((one.level_m, one.rise_m))
-    zeros = {}  # radius at the reference level, by each strap
-    for place, reading in zip(
-        wall.straps.adjusted, wall.readings, strict=False
-    ):  # straps come first
+def _check_straps(job, wall, levels):
+    """Warn of straps that differ from the levels of their course by more than a bulge."""
+    reference = next(offset for offset in job.lines.offsets if offset.reference)
+    rises = {reference.course: [(reference.level_m, 0.0)]}
+    for level in levels:
+        rises.setdefault(level.course, []).append((level.level_m, level.rise_m))
+    zeros = {}  # {course: [(radius at the reference level, strap)]}
+    # The readings list straps first.
+    for place, reading in zip(wall.straps.adjusted, wall.readings, strict=False):
         strap = wall.reduced[place].strap
-        if strap.course in risen:
-            nearest = min(risen[strap.course], key=lambda one: abs(one[0] - strap.level_m))
+        if strap.course in rises:
+            nearest = min(rises[strap.course], key=lambda rise: abs(rise[0] - strap.level_m))
             zeros.setdefault(strap.course, []).append((reading.radius_m - nearest[1], strap))
     if not zeros:
         return
     course = reference.course if reference.course in zeros else next(iter(zeros))
-    own = sorted(zeros.pop(course), key=lambda one: one[0])
-    apart, (first, second) = own[-1][0] - own[0][0], (own[0][1], own[-1][1])
-    if apart > OFF_LEVEL_M and first.name != second.name:  # of repeats another check tells
+    pairs_of_course = sorted(zeros.pop(course), key=lambda pair: pair[0])
+    apart, (first, second) = (
+        pairs_of_course[-1][0] - pairs_of_course[0][0],
+        (pairs_of_course[0][1], pairs_of_course[-1][1]),
+    )
+    if apart > OFF_LEVEL_M and first.name != second.name:  # another check compares repeats
         text = message(
             "straps_apart_by_lines",
             "circumferences {first!r} and {second!r} of course {course!r} differ by {apart_mm:.1f}"
@@ -362,8 +388,8 @@ def _of_straps(job, wall, levels):
             apart_mm=1000 * apart,
         )
         yield Problem("circumferences.csv", text, row=second.row, column="reading_m")
-    zero = np.mean([radius for radius, _ in own])
-    for radius, strap in (one for those in zeros.values() for one in those):
+    zero = np.mean([radius for radius, _ in pairs_of_course])
+    for radius, strap in (pair for pairs in zeros.values() for pair in pairs):
         if abs(radius - zero) > OFF_LEVEL_M:
             text = message(
                 "strap_against_lines",

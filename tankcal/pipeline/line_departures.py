@@ -1,7 +1,7 @@
-"""Reference lines that are wrong as a whole: no reading of them departs from its neighbours.
+"""Checks for reference lines with a common error in all their readings.
 
-A scale that was read from its other end, a sign, a unit, a plummet that touched something: the
-readings of a line, or of all lines, hang together, and the test of single readings is blind.
+A scale read from its other end, a wrong sign or unit, or a plummet in contact with an obstacle
+changes all readings of a line, or of all lines. The test of single readings cannot detect this.
 """
 
 import numpy as np
@@ -13,43 +13,56 @@ from tankcal.pipeline.survey_limits import limits_of
 from tankcal.survey.reference_line import rises_of
 
 FILE, RULES = "offsets.csv", "reference_line"
-STEPS_IN, STEPS_IN_SDS = -0.4, 2.0  # of a plate's step that the wall steps in: no build does
-HARDLY, SURE_SDS = (
-    0.25,
-    4.0,
-)  # of a step that shows outside, and sds that it is short of a whole one
-FEWEST_COURSES, LEAST_STEP_M = 4, 1e-3  # whose plates tell that, and by how much these differ
-FEWEST_LINES = 6  # of which one is told from the others
-APART, APART_M = 5.0, 6e-3  # times the rms of most lines, and at least: a line that is apart
+# No construction steps inwards where plates are thicker: warn if the share of the plate step is
+# below this value, by so many sds.
+STEPS_IN, STEPS_IN_SDS = -0.4, 2.0
+# Lines inside: the wall shows less than this share of the plate step, and is so many sds short of
+# the whole step.
+HARDLY, SURE_SDS = 0.25, 4.0
+# Smallest number of courses for these tests, and smallest range of their plates, m.
+FEWEST_COURSES, LEAST_STEP_M = 4, 1e-3
+FEWEST_LINES = 6  # smallest number of lines for the test of a single line
+# Largest rms of a line: as multiple of the median rms of all lines, and m.
+APART, APART_M = 5.0, 6e-3
 
 
 def check_scale(job):
-    """`Problem`s of lines that stand nearer to the wall than anybody can work."""
+    """Yield a warning of lines closer to the wall than is practicable."""
     least = limits_of(RULES)["least_offset_mm"] / 1000
-    read = [abs(one.offset_m) for one in job.lines.offsets]
-    if max(read) < least:
+    distances_m = [abs(offset.offset_m) for offset in job.lines.offsets]
+    if max(distances_m) < least:
         text = message(
             "offsets_small",
             "the largest offset is {most_mm:g} mm; lines stand {least_mm:g} mm or more off the"
             " wall: are these centimetres or inches?",
-            most_mm=1000 * max(read),
+            most_mm=1000 * max(distances_m),
             least_mm=1000 * least,
         )
         yield Problem(FILE, text, column="offset_mm")
 
 
 def check_lines_apart(job, collimations):
-    """`Problem`s of lines whose readings depart together from the circles of all other lines.
+    """Yield warnings of lines whose readings all differ from the circles of all other lines.
 
-    collimations  {plummet: (kappa, sd), rad}
+    Parameters
+    ----------
+    job : Job
+    collimations : dict
+        {plummet: (collimation, standard deviation), rad}.
+
+    Yields
+    ------
+    Problem
     """
-    departures = departures_of(job.lines, {name: one[0] for name, one in collimations.items()})
+    departures = departures_of(
+        job.lines, {name: estimate[0] for name, estimate in collimations.items()}
+    )
     if len(departures) < FEWEST_LINES:
         return
-    rms = {line: float(np.sqrt(np.mean(each**2))) for line, each in departures.items()}
-    usual = float(np.median(list(rms.values())))
+    rms = {line: float(np.sqrt(np.mean(departure**2))) for line, departure in departures.items()}
+    typical = float(np.median(list(rms.values())))
     for line, size in rms.items():
-        if size > max(APART * usual, APART_M):
+        if size > max(APART * typical, APART_M):
             text = message(
                 "line_apart",
                 "line {line!r} departs by {size_mm:.0f} mm (rms) from the circles of all others,"
@@ -57,59 +70,72 @@ def check_lines_apart(job, collimations):
                 " scale read from its other end or in another unit?",
                 line=line,
                 size_mm=1000 * size,
-                usual_mm=1000 * usual,
+                usual_mm=1000 * typical,
             )
-            row = next((one.row for one in job.lines.offsets if one.line == line), None)
+            row = next((offset.row for offset in job.lines.offsets if offset.line == line), None)
             yield Problem(FILE, text, row=row, column="line")
 
 
-def departures_of(given, collimations):
-    """By how much the rise of each line departs from the circle through those of all others.
+def departures_of(lines, collimations):
+    """Return the differences of the rises of each line from the circle through all other lines.
 
     Parameters
     ----------
-    given : ReferenceLines
+    lines : ReferenceLines
     collimations : dict
-        {plummet: kappa, rad}.
+        {plummet: collimation, rad}.
 
     Returns
     -------
     dict
-        {line: (levels,) radial departures over the reference level, m}.
+        {line: (levels,) radial differences, relative to the reference level, m}.
     """
-    used = [one for one in given.offsets if not one.check]
-    found = {}
-    for level in rises_of(given, used, collimations):
+    used = [offset for offset in lines.offsets if not offset.check]
+    departures = {}
+    for level in rises_of(lines, used, collimations):
         if len(level) < FEWEST_LINES:
             continue
         rise = np.array([rise for _, rise, _ in level])
-        design = harmonics([given.lines[line].azimuth_rad for line, _, _ in level], 1)
+        design = harmonics([lines.lines[line].azimuth_rad for line, _, _ in level], 1)
         for place, (line, _, _) in enumerate(level):
             others = np.arange(len(level)) != place
+            # A circle with a shifted centre is a constant and the first harmonic of the azimuth.
             fit = np.linalg.lstsq(design[others], rise[others], rcond=None)[0]
-            found.setdefault(line, []).append(rise[place] - design[place] @ fit)
-    return {line: np.array(each) for line, each in found.items()}
+            departures.setdefault(line, []).append(rise[place] - design[place] @ fit)
+    return {line: np.array(values) for line, values in departures.items()}
 
 
 def check_sign(job, levels):
-    """`Problem`s of lines that make the wall narrower where its plates are thicker: a wrong sign.
+    """Yield warnings of lines with a wrong sign, according to the plates of the courses.
 
-    Seen from outside the wall steps out with its plates, from inside it does not, unless they are
-    flush outside. Nothing else tells the sign where one course alone was strapped.
+    Seen from outside, the wall steps outwards with thicker plates; seen from inside it does not,
+    unless the plates are flush outside. If only one course was strapped, no other check detects a
+    wrong sign.
+
+    Parameters
+    ----------
+    job : Job
+    levels : sequence of Level
+
+    Yields
+    ------
+    Problem
     """
-    reference = next(one.course for one in job.lines.offsets if one.reference)
+    reference = next(offset.course for offset in job.lines.offsets if offset.reference)
     rises = {reference: [0.0]}
-    for one in levels:
-        rises.setdefault(one.course, []).append(one.rise_m)
-    known = [one for one in job.courses if one.name in rises]
-    plates = np.array([one.thickness_m + one.paint_m for one in known])
-    if len(known) < FEWEST_COURSES or np.ptp(plates) < LEAST_STEP_M:
+    for level in levels:
+        rises.setdefault(level.course, []).append(level.rise_m)
+    courses = [course for course in job.courses if course.name in rises]
+    plates = np.array([course.thickness_m + course.paint_m for course in courses])
+    if len(courses) < FEWEST_COURSES or np.ptp(plates) < LEAST_STEP_M:
         return
-    risen = np.array([np.mean(rises[one.name]) for one in known])
+    mean_rises = np.array([np.mean(rises[course.name]) for course in courses])
     steps = plates - plates.mean()
-    slope = float(risen @ steps / (steps @ steps))
-    left = risen - risen.mean() - slope * steps
-    sd = float(np.sqrt(left @ left / (len(known) - 2) / (steps @ steps)))
+    # Regression of the rise of each course on its plate: 1 for plates flush inside, 0 for flush
+    # outside.
+    slope = float(mean_rises @ steps / (steps @ steps))
+    residuals = mean_rises - mean_rises.mean() - slope * steps
+    sd = float(np.sqrt(residuals @ residuals / (len(courses) - 2) / (steps @ steps)))
     if slope < STEPS_IN and slope < -STEPS_IN_SDS * sd:
         text = message(
             "lines_turned_about",
@@ -134,4 +160,5 @@ def check_sign(job, levels):
 
 
 def _any_inside(job):
+    """Whether any line stands inside the tank."""
     return any(line.inside for line in job.lines.lines.values())

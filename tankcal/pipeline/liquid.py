@@ -1,8 +1,8 @@
-"""Calibration by liquid in a job: its steps, what they say of the tank, and which body is printed.
+"""Calibration by liquid in a job: its steps, its results, and the body of the printed table.
 
-measured = measure_by_liquid(job, survey)     None: nothing was metered
-measured.body                                  the one that the table is made of
-result = measured.result(levels_m)             `LiquidResult`, beside the rows of the table
+measured = measure_by_liquid(job, survey)     None: the job has no metered runs
+measured.body                                  body of the table
+result = measured.result(levels_m)             `LiquidResult` at the rows of the table
 """
 
 from dataclasses import dataclass, replace
@@ -38,21 +38,23 @@ from tankcal.pipeline.tanks import body_of, zero_height
 from tankcal.tank.liquid import fill_of, name_causes
 from tankcal.tank.liquid.readings import batch_sd_m3
 
-OF_NO_WEIGHT_M = 1.0  # standard deviation of a dip that does not count
-CONTROLLED = ("meter", "leak")  # causes that change all volumes: what hides of them is stated
+OF_NO_WEIGHT_M = 1.0  # standard deviation of a dip without weight, m
+# Causes that change all volumes: the effect of an undetectable size of them is reported.
+CONTROLLED = ("meter", "leak")
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A tank that liquid measured, before its table is made.
+    """A tank measured by liquid, before its table is computed.
 
     Attributes
     ----------
     job : Job
     survey : object
     joint : LiquidFound
+        Adjustment of geometry and liquid together.
     alone : LiquidFound or None
-        None where liquid alone does not tell the tank.
+        Adjustment of liquid alone; None if it does not determine the tank.
     """
 
     job: object
@@ -67,32 +69,32 @@ class Measured:
 
     @cached_property
     def body_alone(self):
-        """`JointBody` of liquid alone; None where it does not tell the tank."""
+        """`JointBody` of liquid alone; None if it does not determine the tank."""
         return self.alone and join_body(self.alone.known)
 
     @property
     def body(self):
-        """`Body` of the table that is printed."""
-        certified = self.job.liquid.certified
-        if certified == "geometry":
+        """`Body` of the printed table."""
+        basis = self.job.liquid.certified
+        if basis == "geometry":
             return body_of(self.job, self.survey)
-        return self.body_alone if certified == "liquid" else self.joint_body
+        return self.body_alone if basis == "liquid" else self.joint_body
 
     def body_for(self, density_kg_m3):
-        """The same for another liquid of the table."""
-        certified = self.job.liquid.certified
-        if certified == "geometry":
+        """Return the `Body` of the printed table for a liquid of another density."""
+        basis = self.job.liquid.certified
+        if basis == "geometry":
             return body_of(filled_with(self.job, density_kg_m3), self.survey)
-        printed = self.alone if certified == "liquid" else self.joint
+        printed = self.alone if basis == "liquid" else self.joint
         return join_body(printed.known, density_kg_m3)
 
     def result(self, levels_m):
-        """`LiquidResult` beside the rows of a table."""
-        return _result(self, np.asarray(levels_m, dtype=float))
+        """Return the `LiquidResult` at the rows of a table."""
+        return _compute_result(self, np.asarray(levels_m, dtype=float))
 
 
 def measure_by_liquid(job, survey):
-    """`Measured` tank of a job; None where nothing was metered.
+    """Return the `Measured` tank of a job, or None without metered runs.
 
     Raises
     ------
@@ -101,21 +103,25 @@ def measure_by_liquid(job, survey):
     """
     if job.liquid is None:
         return None
-    joint = _settled(adjust_liquid(geometry_beside(job, survey)))
+    joint = _require_convergence(adjust_liquid(geometry_beside(job, survey)))
 
     def adjust_alone():
-        return _settled(adjust_liquid(geometry_alone(job, survey)))
+        return _require_convergence(adjust_liquid(geometry_alone(job, survey)))
 
     alone = adjust_alone() if job.liquid.certified == "liquid" else or_none(adjust_alone)
     return Measured(job, survey, joint, alone)
 
 
-def _settled(found):
-    """What settled; SolutionError, with the likely cause, where liquid and sizes do not meet."""
-    if found.is_settled:
-        return found
-    named = [one for one in name_causes(found.adjusted, alternatives_of(found)) if one.is_named]
-    if not named:
+def _require_convergence(adjustment):
+    """Return an adjustment that converged, otherwise raise SolutionError with the likely cause."""
+    if adjustment.is_settled:
+        return adjustment
+    verdicts = [
+        verdict
+        for verdict in name_causes(adjustment.adjusted, alternatives_of(adjustment))
+        if verdict.is_named
+    ]
+    if not verdicts:
         raise SolutionError(
             message(
                 "liquid_does_not_settle",
@@ -128,32 +134,37 @@ def _settled(found):
             "liquid_does_not_settle_because",
             "the sizes of the tank do not settle with the runs by liquid; the likeliest cause is "
             "{cause}",
-            cause=causes_in_words(named),
+            cause=causes_in_words(verdicts),
         )
     )
 
 
-def _result(measured, levels):
-    job, found = measured.job, measured.joint
-    adjusted, run = found.adjusted, found.run_effect
-    tables = _tables(measured, levels)
-    causes = _with_reliability(
-        measured, name_causes(adjusted, alternatives_of(found)), tables, levels
+def _compute_result(measured, levels):
+    """`LiquidResult` of a measured tank at given levels."""
+    job, adjustment = measured.job, measured.joint
+    adjusted, run_effect = adjustment.adjusted, adjustment.run_effect
+    tables = _compute_tables(measured, levels)
+    causes = _add_reliability(
+        measured, name_causes(adjusted, alternatives_of(adjustment)), tables, levels
     )
-    radii = next((one for one in causes if one.cause.kind == "radii"), None)
-    detectable = radii.detectable if radii and np.isfinite(radii.detectable) else None
+    radius_verdict = next((verdict for verdict in causes if verdict.cause.kind == "radii"), None)
+    detectable = (
+        radius_verdict.detectable
+        if radius_verdict and np.isfinite(radius_verdict.detectable)
+        else None
+    )
     return LiquidResult(
         certified=job.liquid.certified,
-        steps=_steps(found),
-        dips=_dips(found),
-        checks=_checks(found),
-        runs=_runs(found),
-        run_sd=run.sd,
-        run_dof=run.dof,
-        factors=_factors(found),
-        bottom_flex=_one(found, FLEX, found.known.flex_sd),
-        bottom_m3=_one(found, BOTTOM, 1.0, is_free=True),
-        sizes=_sizes(found),
+        steps=_list_steps(adjustment),
+        dips=_list_dips(adjustment),
+        checks=_compare_dips(adjustment),
+        runs=_estimate_runs(adjustment),
+        run_sd=run_effect.sd,
+        run_dof=run_effect.dof,
+        factors=_estimate_factors(adjustment),
+        bottom_flex=_estimate_of_effect(adjustment, FLEX, adjustment.known.flex_sd),
+        bottom_m3=_estimate_of_effect(adjustment, BOTTOM, 1.0, is_free=True),
+        sizes=_estimate_sizes(adjustment),
         chi2=adjusted.chi2,
         dof=adjusted.dof,
         probability=float(gammaincc(adjusted.dof / 2, adjusted.chi2 / 2)) if adjusted.dof else 1.0,
@@ -164,48 +175,58 @@ def _result(measured, levels):
     )
 
 
-def _with_reliability(measured, causes, tables, levels):
-    """The `Verdict`s with `undetected_U`: what an error that no test shows does to the table."""
-    certified = measured.job.liquid.certified
-    if certified == "geometry":  # no reading of the liquid moves it
+def _add_reliability(measured, causes, tables, levels):
+    """Add `undetected_U` to each `Verdict`: effect of an undetectable error on the table, in U."""
+    basis = measured.job.liquid.certified
+    if basis == "geometry":  # readings of the liquid do not change this table
         return causes
-    body, U = measured.body, tables[certified].U_m3
+    body, U = measured.body, tables[basis].U_m3
     known = np.isfinite(U) & (U > 0)
+    # The effect of an error is its smallest detectable size, times its column, times the
+    # sensitivity of the volumes to the misclosures.
     by_y = body.by_misclosures(np.clip(levels[known], body.lowest_m, body.highest_m))
 
-    def undetected(one):
-        if one.cause.kind not in CONTROLLED or not np.any(known):
+    def undetected(verdict):
+        if verdict.cause.kind not in CONTROLLED or not np.any(known):
             return None
-        if not np.isfinite(one.detectable):
+        if not np.isfinite(verdict.detectable):
             return np.inf
-        return float(one.detectable * np.max(np.abs(by_y @ one.cause.column) / U[known]))
+        return float(verdict.detectable * np.max(np.abs(by_y @ verdict.cause.column) / U[known]))
 
-    return tuple(replace(one, undetected_U=undetected(one)) for one in causes)
+    return tuple(replace(verdict, undetected_U=undetected(verdict)) for verdict in causes)
 
 
-def _tables(measured, levels):
+def _compute_tables(measured, levels):
+    """Tables by geometry, by liquid alone and by both."""
     job, probability = measured.job, measured.job.table.coverage_probability
     low, high = filled_range_m(job.liquid)
     dips = levels - zero_height(job, measured.survey)
-    inside = (dips >= low - 1e-9) & (dips <= high + 1e-9)
-    alone = measured.body_alone
-    if alone is not None:
-        alone = beside_table("liquid", alone, levels, probability, inside)
+    # Liquid alone gives volumes only between its lowest and highest dips.
+    is_filled = (dips >= low - 1e-9) & (dips <= high + 1e-9)
+    liquid = measured.body_alone
+    if liquid is not None:
+        liquid = beside_table("liquid", liquid, levels, probability, is_filled)
     geometry = measured.joint.known.geometry.moved_to({}).body()
     return {
         "geometry": beside_table("geometry", geometry, levels, probability),
-        "liquid": alone,
+        "liquid": liquid,
         "joint": beside_table("joint", measured.joint_body, levels, probability),
     }
 
 
-def _steps(found):
-    metering, fill, before = found.known.geometry.job.liquid, found.fill, found.before
+def _list_steps(adjustment):
+    """`LiquidSteps` of an adjustment."""
+    metering, fill, before = (
+        adjustment.known.geometry.job.liquid,
+        adjustment.fill,
+        adjustment.before,
+    )
     rows = metering.row[fill.dip_row]
     dips = metering.dip_m[fill.dip_row]
-    by_head = _by_head(found)
+    by_head = _head_corrections(adjustment)
     sd = batch_sd_m3(metering, fill)
-    size, sd_of_size, w = found.adjusted.test(-np.eye(len(fill)))
+    # An error of one batch changes its own misclosure only: the column of a unit vector.
+    error, sd_of_error, w = adjustment.adjusted.test(-np.eye(len(fill)))
     return LiquidSteps(
         row=rows[fill.end],
         run=tuple(fill.runs[i] for i in fill.run),
@@ -220,32 +241,36 @@ def _steps(found):
         by_head_m3=by_head,
         reference_m3=before.increment_m3 + by_head,
         misclosure_m3=before.misclosure_m3,
-        misclosure_sd_m3=found.before_sd_m3,
-        misclosure_w=before.misclosure_m3 / found.before_sd_m3,
-        residual_m3=size * (sd / sd_of_size) ** 2,
+        misclosure_sd_m3=adjustment.before_sd_m3,
+        misclosure_w=before.misclosure_m3 / adjustment.before_sd_m3,
+        # The redundancy is the variance of the batch over the variance of its estimated error.
+        residual_m3=error * (sd / sd_of_error) ** 2,
         sd_m3=sd,
-        redundancy=(sd / sd_of_size) ** 2,
+        redundancy=(sd / sd_of_error) ** 2,
         w=w,
-        detectable_m3=noncentrality() * sd_of_size,
+        detectable_m3=noncentrality() * sd_of_error,
     )
 
 
-def _by_head(found):
-    """(n,) what the geometry's increments gain from the calibrating liquid to the table's."""
-    geometry, fill = found.known.geometry, found.fill
-    volumes = geometry.body().volume_m3(found.loaded.level_m)
-    return fill.differences() @ (volumes - found.loaded.volume_m3)
+def _head_corrections(adjustment):
+    """Change (n,) of the increments by geometry, from the calibrating liquid to the table's."""
+    geometry, fill = adjustment.known.geometry, adjustment.fill
+    volumes = geometry.body().volume_m3(adjustment.loaded.level_m)
+    return fill.differences() @ (volumes - adjustment.loaded.volume_m3)
 
 
-def _dips(found):
-    metering, fill = found.known.geometry.job.liquid, found.fill
+def _list_dips(adjustment):
+    """`LiquidDips` of an adjustment."""
+    metering, fill = adjustment.known.geometry.job.liquid, adjustment.fill
     rows = fill.dip_row
     sd = metering.s_dip_m[rows]
-    effect = next((one for one in found.adjusted.noise if one.kind == "dip_readings"), None)
-    nothing = np.zeros(len(rows))
-    deviates, redundancy, w = nothing, nothing, nothing
+    effect = next(
+        (group for group in adjustment.adjusted.noise if group.kind == "dip_readings"), None
+    )
+    zeros = np.zeros(len(rows))
+    deviates, redundancy, w = zeros, zeros, zeros
     if effect is not None:
-        deviates, redundancy, w = found.adjusted.residuals(effect)
+        deviates, redundancy, w = adjustment.adjusted.residuals(effect)
     return LiquidDips(
         row=metering.row[rows],
         run=tuple(metering.run[i] for i in rows),
@@ -257,27 +282,33 @@ def _dips(found):
     )
 
 
-def _checks(found):
-    """What a dip that does not count would have been: one that counts, of no weight."""
-    geometry = found.known.geometry
+def _compare_dips(adjustment):
+    """`LiquidChecks` of dips that are only compared.
+
+    A dip without weight in an adjustment gets the residual it would have as a check.
+    """
+    geometry = adjustment.known.geometry
     metering = geometry.job.liquid
     compared = ~metering.used & np.isfinite(metering.dip_m)
     if not np.any(compared):
         return None
-    loose = replace(
+    with_checks = replace(
         metering,
         used=np.full(len(metering), True),
         s_dip_m=np.where(compared, OF_NO_WEIGHT_M, metering.s_dip_m),
     )
-    geometry = replace(geometry, job=replace(geometry.job, liquid=loose))
-    again = adjusted_at(geometry, fill_of(loose), lambda *_: found.run_effect, found.corrections_m)
-    effect = next(one for one in again.adjusted.noise if one.kind == "dip_readings")
-    deviates, redundancy, _ = again.adjusted.residuals(effect)
-    mine = compared[again.fill.dip_row]
-    places = again.fill.dip_row[mine]
-    left = OF_NO_WEIGHT_M * np.sqrt(np.maximum(1 - redundancy[mine], 0.0))
-    sd = np.hypot(left, metering.s_dip_m[places])
-    difference = -OF_NO_WEIGHT_M * deviates[mine]
+    geometry = replace(geometry, job=replace(geometry.job, liquid=with_checks))
+    repeated = adjusted_at(
+        geometry, fill_of(with_checks), lambda *_: adjustment.run_effect, adjustment.corrections_m
+    )
+    effect = next(group for group in repeated.adjusted.noise if group.kind == "dip_readings")
+    deviates, redundancy, _ = repeated.adjusted.residuals(effect)
+    is_check = compared[repeated.fill.dip_row]
+    places = repeated.fill.dip_row[is_check]
+    # The residual has the uncertainty of the predicted dip; add the uncertainty of the reading.
+    sd_of_prediction = OF_NO_WEIGHT_M * np.sqrt(np.maximum(1 - redundancy[is_check], 0.0))
+    sd = np.hypot(sd_of_prediction, metering.s_dip_m[places])
+    difference = -OF_NO_WEIGHT_M * deviates[is_check]
     return LiquidChecks(
         row=metering.row[places],
         run=tuple(metering.run[i] for i in places),
@@ -288,51 +319,59 @@ def _checks(found):
     )
 
 
-def _runs(found):
-    place, run = found.adjusted.place(RUNS), found.run_effect
+def _estimate_runs(adjustment):
+    """Estimates of the effects of the runs, relative."""
+    place, run_effect = adjustment.adjusted.place(RUNS), adjustment.run_effect
     if place.stop == place.start:
-        return tuple(Estimate(name, 0.0, 0.0, 0.0, 0.0) for name in found.fill.runs)
-    pairs = zip(found.adjusted.estimate[place], found.adjusted.sd[place], strict=True)
+        return tuple(Estimate(name, 0.0, 0.0, 0.0, 0.0) for name in adjustment.fill.runs)
+    pairs = zip(adjustment.adjusted.estimate[place], adjustment.adjusted.sd[place], strict=True)
     return tuple(
-        Estimate(name, 0.0, run.sd, float(run.sd * z), float(run.sd * sd))
-        for name, (z, sd) in zip(found.fill.runs, pairs, strict=True)
+        Estimate(name, 0.0, run_effect.sd, float(run_effect.sd * z), float(run_effect.sd * sd))
+        for name, (z, sd) in zip(adjustment.fill.runs, pairs, strict=True)
     )
 
 
-def _factors(found):
-    metering, place = found.known.geometry.job.liquid, found.adjusted.place("meter_factor")
-    z, sd = found.adjusted.estimate[place], found.adjusted.sd[place]
-    told = []
-    for number, name in enumerate(found.fill.meters):
+def _estimate_factors(adjustment):
+    """Estimates of the meter factors."""
+    metering, place = (
+        adjustment.known.geometry.job.liquid,
+        adjustment.adjusted.place("meter_factor"),
+    )
+    z, sd = adjustment.adjusted.estimate[place], adjustment.adjusted.sd[place]
+    estimates = []
+    for number, name in enumerate(adjustment.fill.meters):
         meter = metering.meters[name]
-        after, left = (z[number], sd[number]) if len(z) else (0.0, 1.0)
-        told.append(
+        after, sd_left = (z[number], sd[number]) if len(z) else (0.0, 1.0)
+        estimates.append(
             Estimate(
                 name,
                 meter.factor,
                 meter.u_factor * meter.factor,
                 float(meter.factor * (1 + meter.u_factor * after)),
-                float(meter.u_factor * meter.factor * left),
+                float(meter.u_factor * meter.factor * sd_left),
             )
         )
-    return tuple(told)
+    return tuple(estimates)
 
 
-def _one(found, kind, u, *, is_free=False):
-    place = found.adjusted.place(kind)
+def _estimate_of_effect(adjustment, kind, u, *, is_free=False):
+    """Estimate of a single effect, or None if it is not in the adjustment."""
+    place = adjustment.adjusted.place(kind)
     if place.stop == place.start:
         return None
-    z, sd = found.adjusted.estimate[place][0], found.adjusted.sd[place][0]
+    z, sd = adjustment.adjusted.estimate[place][0], adjustment.adjusted.sd[place][0]
     return Estimate(kind, 0.0, np.inf if is_free else u, float(u * z), float(u * sd))
 
 
-def _sizes(found):
-    """Inputs that were moved: by how much, with their u."""
-    adjusted, told = found.adjusted, []
+def _estimate_sizes(adjustment):
+    """Estimates of moved inputs, with their standard uncertainties."""
+    adjusted, estimates = adjustment.adjusted, []
     columns = adjusted.effects[0].columns
-    for place, deviate in found.known.moved:
+    for place, deviate in adjustment.known.moved:
         seen = columns @ place.row
-        left = float(place.row @ place.row - seen @ adjusted.weight @ seen)
-        u = place.u * np.sqrt(max(left, 0.0))
-        told.append(Estimate(place.name, 0.0, place.u, float(place.u * deviate), float(u)))
-    return tuple(told)
+        # Posterior variance of the deviate: its prior variance less the part that the misclosures
+        # determine.
+        variance = float(place.row @ place.row - seen @ adjusted.weight @ seen)
+        u = place.u * np.sqrt(max(variance, 0.0))
+        estimates.append(Estimate(place.name, 0.0, place.u, float(place.u * deviate), float(u)))
+    return tuple(estimates)

@@ -1,14 +1,15 @@
-"""Metered runs of a job adjusted with its geometry: what liquid and geometry make of the tank.
+"""Adjustment of the metered runs of a job together with its geometry.
 
 found = adjust_liquid(Geometry(job, survey))
 body = join_body(found.known)
 
-Volumes and columns are taken at the adjusted dips h + e, not at the dips as read (Gauss-Helmert):
+Volumes and columns are computed at the adjusted dips h + e, not at the dips as read (Gauss-Helmert
+model):
 
     metered - T V(h + e0) + T A e0  =  T C z + T A e + ...,    V, A, C all at h + e0.
 
-Columns at the dips as read share their errors with the misclosures. With many steps that makes the
-scale of the tank too small by n u^2, n steps and u its relative standard uncertainty.
+Columns at the dips as read would share their errors with the misclosures. For n steps with relative
+standard uncertainty u, that would make the scale of the tank too small by n u^2.
 """
 
 from dataclasses import dataclass, replace
@@ -42,39 +43,46 @@ from tankcal.tank.liquid.readings import ReadingEffects
 from tankcal.tank.liquid.reduction import load_densities
 from tankcal.uncertainty import Source
 
-MOST_ROUNDS, SETTLED = 30, 1e-3  # steps to the joint values; the last, in sds
-LEAST_GAIN, MOST_LEFT = 1e-7, 1e-2  # of a fit: by a step, and by all that could follow
-HALVINGS = 12  # of a step that leads to no tank, or to a worse fit
-ROUNDS = 6  # of the sizes, the run effect and the adjusted dips in turn
-RUN_SETTLED, DIPS_SETTLED = 0.01, 0.01  # last change: relative; in sds of a dip
-ROUNDING = 1e-9  # of a fit
-LOST = 1e-12  # of the largest effect of readings: less is none
+MOST_ROUNDS, SETTLED = 30, 1e-3  # largest number of steps of the sizes, and size of the last in sds
+# Smallest decrease of chi-square by a step, and largest decrease that further steps may bring, both
+# relative to chi-square over its degrees of freedom.
+LEAST_GAIN, MOST_LEFT = 1e-7, 1e-2
+HALVINGS = 12  # largest number of halvings of a step that leads to no tank or to a worse fit
+ROUNDS = 6  # largest number of rounds over sizes, run effect and adjusted dips
+# Largest changes in the last round: of the run effect, relative, and of a dip, in its sds.
+RUN_SETTLED, DIPS_SETTLED = 0.01, 0.01
+ROUNDING = 1e-9  # rounding error of chi-square
+LOST = 1e-12  # smallest effect of readings, relative to the largest, that is kept
 BOTTOM, FLEX, RUNS = "bottom_volume", "bottom_flex", "run_effect"
-OUTSIDE_M = 0.001  # that a dip may stand above or below the tank
+OUTSIDE_M = 0.001  # largest distance of a dip above or below the tank
 
 
 @dataclass(frozen=True)
 class LiquidFound:
-    """Metered runs, adjusted with one geometry.
+    """Adjustment of metered runs with one geometry.
 
     Attributes
     ----------
     known : Known
     fill : Fill
+        Steps between the dips.
     reduced : Reduced
-        Against the geometry, its sizes where liquid has them.
+        Steps against the geometry with its adjusted sizes.
     loaded : Loaded
+        Geometry under the calibrating liquid.
     readings : ReadingEffects
     adjusted : LiquidAdjustment
     run_effect : RunEffect
     before : Reduced
-        Against the geometry as it was before; before_sd_m3 (n,) of its misclosures.
-    corrections_m : ndarray, shape (rows,)
-        Of the dips of all rows, at which the geometry was taken; 0: as read.
+        Steps against the geometry with its initial sizes.
+    before_sd_m3 : ndarray, shape (n,)
+        Standard deviations of the misclosures of `before`.
     misfit : float
-        Chi-square with the sizes held where they are, and of the sizes.
+        Chi-square of the misclosures with the sizes held, plus chi-square of the sizes.
+    corrections_m : ndarray, shape (rows,)
+        Corrections of the dips of all rows at which the geometry was computed; 0: as read.
     is_settled : bool
-        Whether no step of the sizes would make a better fit.
+        True if no step of the sizes would improve the fit.
     """
 
     known: Known
@@ -92,24 +100,34 @@ class LiquidFound:
 
     @property
     def adjusted_m(self):
-        """(rows,) corrections of the dips that the adjustment asks for; 0 where none counts."""
-        metering, found = self.known.geometry.job.liquid, np.zeros(len(self.corrections_m))
-        effect = next((one for one in self.adjusted.noise if one.kind == "dip_readings"), None)
+        """Corrections (rows,) of the dips according to the adjustment, m; 0 for unused dips."""
+        metering, corrections = self.known.geometry.job.liquid, np.zeros(len(self.corrections_m))
+        effect = next(
+            (group for group in self.adjusted.noise if group.kind == "dip_readings"), None
+        )
         if effect is not None:
             rows = self.fill.dip_row
-            found[rows] = metering.s_dip_m[rows] * self.adjusted.residuals(effect)[0]
-        return found
+            corrections[rows] = metering.s_dip_m[rows] * self.adjusted.residuals(effect)[0]
+        return corrections
 
 
 def adjust_liquid(geometry):
-    """`LiquidFound` of the metered runs of a job beside a `Geometry`.
+    """Adjust the metered runs of a job together with a `Geometry`.
+
+    Parameters
+    ----------
+    geometry : Geometry
+
+    Returns
+    -------
+    LiquidFound
 
     Raises
     ------
     InputError
-        For dips outside the tank, and for a run effect that nothing tells.
+        If a dip lies outside the tank, or if the runs do not determine the run effect.
     SolutionError
-        When steps cannot be adjusted.
+        If the steps cannot be adjusted.
     """
     fill = fill_of(geometry.job.liquid)
     if not len(fill):
@@ -119,74 +137,96 @@ def adjust_liquid(geometry):
             "empty start and a dip",
         )
         raise InputError(Problem(geometry.job.liquid.file, expected))
-    found = first = adjusted_at(geometry, fill, _run_effect)
+    latest = first = adjusted_at(geometry, fill, _run_effect)
     for _ in range(ROUNDS):
-        before, settled = found, True
+        # Sizes, run effect and adjusted dips depend on each other: iterate until none of them
+        # changes.
+        before, settled = latest, True
         if geometry.movable:
-            found = _settled(found, fill)
-            settled = found.is_settled
-        found = adjusted_at(found.known.geometry, fill, _run_effect, found.adjusted_m)
-        found = replace(found, is_settled=settled)
-        if _is_steady(before, found):
+            latest = _move_sizes(latest, fill)
+            settled = latest.is_settled
+        latest = adjusted_at(latest.known.geometry, fill, _run_effect, latest.adjusted_m)
+        latest = replace(latest, is_settled=settled)
+        if _is_steady(before, latest):
             break
-    if found.is_settled:
-        _refuse_dips_outside(found.known.geometry, fill)
-    return replace(found, before=first.before, before_sd_m3=first.before_sd_m3)
+    if latest.is_settled:
+        _refuse_dips_outside(latest.known.geometry, fill)
+    return replace(latest, before=first.before, before_sd_m3=first.before_sd_m3)
 
 
-def _is_steady(before, found):
-    """Whether a round changed neither the run effect nor the dips that the next one would take."""
-    sd = found.known.geometry.job.liquid.s_dip_m
-    moved = np.abs(found.adjusted_m - found.corrections_m)
-    change = abs(found.run_effect.sd - before.run_effect.sd)
+def _is_steady(before, latest):
+    """Whether a round changed neither the run effect nor the dips of the next round."""
+    sd = latest.known.geometry.job.liquid.s_dip_m
+    change_of_dips = np.abs(latest.adjusted_m - latest.corrections_m)
+    change = abs(latest.run_effect.sd - before.run_effect.sd)
     is_same_run = change <= RUN_SETTLED * before.run_effect.sd
-    return is_same_run and bool(np.all(moved <= DIPS_SETTLED * np.nan_to_num(sd)))
+    return is_same_run and bool(np.all(change_of_dips <= DIPS_SETTLED * np.nan_to_num(sd)))
 
 
-def _settled(found, fill):
-    """The same with the sizes where liquid has them, by steps that never fit worse."""
+def _move_sizes(latest, fill):
+    """Return the adjustment with the sizes at their estimates, by steps that never fit worse."""
 
     def same_run(*_):
-        return found.run_effect
+        return latest.run_effect
 
-    names = found.known.geometry.movable
+    names = latest.known.geometry.movable
     for _ in range(MOST_ROUNDS):
-        at = found.known.geometry.moves
-        wanted, sd = _moves_of(found, names)
-        if max(abs(wanted[name] - at.get(name, 0.0)) / sd[name] for name in names) < SETTLED:
-            return found
-        better = _better(found, wanted, fill, same_run)
-        if better is None or found.misfit - better.misfit < LEAST_GAIN * _spread(found):
+        present = latest.known.geometry.moves
+        targets, sd = _moves_of(latest, names)
+        if max(abs(targets[name] - present.get(name, 0.0)) / sd[name] for name in names) < SETTLED:
+            return latest
+        improved = _search_step(latest, targets, fill, same_run)
+        if improved is None or latest.misfit - improved.misfit < LEAST_GAIN * _spread(latest):
             break
-        found = better
-    left = found.misfit - found.adjusted.chi2
-    return replace(found, is_settled=bool(left < MOST_LEFT * _spread(found)))
+        latest = improved
+    # Decrease of chi-square that further linear steps could bring.
+    possible_gain = latest.misfit - latest.adjusted.chi2
+    return replace(latest, is_settled=bool(possible_gain < MOST_LEFT * _spread(latest)))
 
 
-def _spread(found):
-    """Chi-square over its degrees of freedom, 1 or more."""
-    return max(found.adjusted.chi2 / max(found.adjusted.dof, 1), 1.0)
+def _spread(adjustment):
+    """Chi-square over its degrees of freedom, at least 1."""
+    return max(adjustment.adjusted.chi2 / max(adjustment.adjusted.dof, 1), 1.0)
 
 
-def _better(found, wanted, fill, run_effect):
-    """The best `LiquidFound` on the way to what is wanted; None: nothing there fits better."""
-    geometry, best = found.known.geometry, None
-    at = {name: geometry.moves.get(name, 0.0) for name in wanted}
+def _search_step(latest, targets, fill, run_effect):
+    """Best `LiquidFound` between the present sizes and the targets, or None if all fit worse."""
+    geometry, best = latest.known.geometry, None
+    present = {name: geometry.moves.get(name, 0.0) for name in targets}
+    # Halve the step until the fit gets worse again after an improvement.
     for share in (0.5**halving for halving in range(HALVINGS)):
-        moves = {name: at[name] + share * (value - at[name]) for name, value in wanted.items()}
+        moves = {
+            name: present[name] + share * (value - present[name]) for name, value in targets.items()
+        }
         try:
-            one = adjusted_at(geometry.moved_to(moves), fill, run_effect, found.corrections_m)
-        except SolutionError:  # no such tank
+            candidate = adjusted_at(
+                geometry.moved_to(moves), fill, run_effect, latest.corrections_m
+            )
+        except SolutionError:  # no tank has these sizes
             continue
-        if best is not None and one.misfit >= best.misfit:
+        if best is not None and candidate.misfit >= best.misfit:
             break
-        if one.misfit <= found.misfit * (1 + ROUNDING) + ROUNDING:
-            best = one
+        if candidate.misfit <= latest.misfit * (1 + ROUNDING) + ROUNDING:
+            best = candidate
     return best
 
 
 def adjusted_at(geometry, fill, run_effect, corrections_m=None):
-    """`LiquidFound` with the geometry linear where it is now, at dips with corrections (rows,)."""
+    """Adjust the runs with the geometry linearized at its present sizes.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    fill : Fill
+    run_effect : callable
+        Function from (metering, misclosure, readings, effects) to a `RunEffect`.
+    corrections_m : ndarray, shape (rows,), optional
+        Corrections of the dips at which the geometry is computed; None: zero.
+
+    Returns
+    -------
+    LiquidFound
+    """
     metering = geometry.job.liquid
     if corrections_m is None:
         corrections_m = np.zeros(len(metering))
@@ -195,99 +235,107 @@ def adjusted_at(geometry, fill, run_effect, corrections_m=None):
     dips = metering.dip_m[rows] + corrections_m[rows]
     loaded = load_geometry(geometry, densities, dips, metering.shell_c[rows])
     reduced = reduce_steps(metering, fill, loaded.volume_m3, loaded.growth)
-    about = loaded.volume_m3, loaded.area_m2 * loaded.growth, loaded.growth
-    readings = reading_effects(metering, fill, reduced, *about)
-    over = fill.differences(reduced.carried)
-    sources = tuple(one.weighted(over) for one in loaded.sources)
+    linearization = loaded.volume_m3, loaded.area_m2 * loaded.growth, loaded.growth
+    readings = reading_effects(metering, fill, reduced, *linearization)
+    by_step = fill.differences(reduced.carried)
+    sources = tuple(source.weighted(by_step) for source in loaded.sources)
     places = places_of(sources, geometry.job.inputs)
-    moved = tuple(
+    moved_inputs = tuple(
         (places[name], geometry.moves.get(name, 0.0) / places[name].u) for name in geometry.movable
     )
-    held = reduced.misclosure_m3 + over @ (about[1] * corrections_m[rows])
+    # The term T A e0 of the equation above: the dips are unknown about their values as read.
+    held = reduced.misclosure_m3 + by_step @ (linearization[1] * corrections_m[rows])
+    # Sizes already moved are unknowns about their initial values: restore their linear effect.
     misclosure = held.copy()
-    for place, deviate in moved:
+    for place, deviate in moved_inputs:
         misclosure += deviate * column_of(sources, place)
     effects = [Effect("geometry", stacked(sources, len(fill))), *readings.common]
-    effects += _of_the_bottom(geometry, metering, fill, loaded, over)
-    by_density = over @ (loaded.by_density * metering.u_density_kg_m3)
+    effects += _bottom_effects(geometry, metering, fill, loaded, by_step)
+    by_density = by_step @ (loaded.by_density * metering.u_density_kg_m3)
     if np.any(by_density):
         effects.append(Effect("calibration_density", by_density[:, None]))
-    run = run_effect(metering, misclosure, readings, effects)
-    if run.sd > 0:
-        effects.append(Effect(RUNS, readings.run_m3 * run.sd))
+    run_result = run_effect(metering, misclosure, readings, effects)
+    if run_result.sd > 0:
+        effects.append(Effect(RUNS, readings.run_m3 * run_result.sd))
     adjusted = adjust_steps(misclosure, readings.noise, effects)
-    every = [one.columns for one in (*readings.noise, *effects) if not one.is_free]
+    columns = [effect.columns for effect in (*readings.noise, *effects) if not effect.is_free]
     return LiquidFound(
-        known=_known(geometry, (loaded, sources, moved), adjusted, (metering, fill, run)),
+        known=_results_for_body(
+            geometry, (loaded, sources, moved_inputs), adjusted, (metering, fill, run_result)
+        ),
         fill=fill,
         reduced=reduced,
         loaded=loaded,
         readings=readings,
         adjusted=adjusted,
-        run_effect=run,
+        run_effect=run_result,
         before=reduced,
-        before_sd_m3=np.linalg.norm(np.hstack(every), axis=1),
-        misfit=_misfit(adjusted, held, sources, moved),
+        before_sd_m3=np.linalg.norm(np.hstack(columns), axis=1),
+        misfit=_misfit(adjusted, held, sources, moved_inputs),
         corrections_m=corrections_m,
     )
 
 
 def _misfit(adjusted, misclosure, sources, moved):
-    """Chi-square of misclosures (n,) with the moved inputs held where they are, and of these."""
+    """Chi-square of misclosures (n,) with the moved inputs held, plus their own chi-square."""
     if not moved:
         return adjusted.chi2
-    held = np.stack([column_of(sources, place) for place, _ in moved], axis=1)
-    every = [one.columns for one in (*adjusted.noise, *adjusted.effects)]
-    whole = np.hstack(every)
-    covariance = whole @ whole.T - held @ held.T
+    held_columns = np.stack([column_of(sources, place) for place, _ in moved], axis=1)
+    columns = [effect.columns for effect in (*adjusted.noise, *adjusted.effects)]
+    all_columns = np.hstack(columns)
+    # Inputs held at their values add no covariance to the misclosures; their deviates count.
+    covariance = all_columns @ all_columns.T - held_columns @ held_columns.T
     deviates = np.array([deviate for _, deviate in moved])
     fit = misclosure @ np.linalg.solve(covariance, misclosure)
     return float(fit + deviates @ deviates)
 
 
-def _of_the_bottom(geometry, metering, fill, loaded, over):
-    """What lies below the first dip, where no geometry tells it, and what the bottom gives."""
-    found = []
+def _bottom_effects(geometry, metering, fill, loaded, by_step):
+    """Effects of the bottom: its flexing, and the unknown volume below the first dip."""
+    effects = []
     if metering.flex_sd_m3_per_m:
-        head = over @ np.maximum(loaded.level_m, 0.0)
-        found.append(Effect(FLEX, metering.flex_sd_m3_per_m * head[:, None]))
+        head = by_step @ np.maximum(loaded.level_m, 0.0)
+        effects.append(Effect(FLEX, metering.flex_sd_m3_per_m * head[:, None]))
     if bottom_is_free(geometry.job, fill):
-        found.append(Effect(BOTTOM, over.sum(axis=1, keepdims=True), is_free=True))
-    return found
+        effects.append(Effect(BOTTOM, by_step.sum(axis=1, keepdims=True), is_free=True))
+    return effects
 
 
 def bottom_is_free(job, fill):
-    """Whether a run from the empty tank measures what lies below the first dip, and nothing else.
+    """Whether a run from the empty tank alone determines the volume below the first dip.
 
-    A bottom that was surveyed, or is declared as a cone or a dish, says that itself.
+    A surveyed bottom, or a declared cone or dish, determines this volume itself.
     """
-    untold = job.bottom.form in ("flat", "leaning") or not job.switches.bottom
-    return job.tank.kind == "vertical" and untold and bool(np.any(fill.from_empty))
+    is_unknown = job.bottom.form in ("flat", "leaning") or not job.switches.bottom
+    return job.tank.kind == "vertical" and is_unknown and bool(np.any(fill.from_empty))
 
 
 def _run_effect(metering, misclosure, readings, effects):
-    """`RunEffect` as declared, else as the runs show it."""
+    """`RunEffect` as declared, otherwise as estimated from the runs."""
     if metering.run_sd is not None:
         return RunEffect(metering.run_sd, np.inf, metering.run_sd)
-    without = adjust_steps(misclosure, readings.noise, effects)
-    found = estimate_run_effect(without.weight, misclosure, readings.run_m3)
-    if found is None:
+    first = adjust_steps(misclosure, readings.noise, effects)
+    estimated = estimate_run_effect(first.weight, misclosure, readings.run_m3)
+    if estimated is None:
         expected = message(
             "run_effect_untold",
             "blank; expected by how much whole runs differ (0: not at all): the runs do not show "
             "it themselves",
         )
         raise InputError(Problem(SETTINGS_FILE, expected, column="liquid.run_ppm"))
-    return found
+    return estimated
 
 
-def _known(geometry, of_geometry, adjusted, of_liquid):
-    loaded, sources, moved = of_geometry
-    metering, fill, run = of_liquid
+def _results_for_body(geometry, geometry_parts, adjusted, liquid_parts):
+    """`Known` of an adjustment, sufficient to compute any row."""
+    loaded, sources, moved_inputs = geometry_parts
+    metering, fill, run = liquid_parts
     place = adjusted.place("geometry")
     bottom, flex = adjusted.place(BOTTOM), adjusted.place(FLEX)
     has_bottom, has_flex = bottom.stop > bottom.start, flex.stop > flex.start
-    by_flex = next((one.columns[:, 0] for one in adjusted.effects if one.kind == FLEX), None)
+    by_flex = next(
+        (effect.columns[:, 0] for effect in adjusted.effects if effect.kind == FLEX), None
+    )
     sd = metering.flex_sd_m3_per_m
     return Known(
         geometry=geometry,
@@ -295,7 +343,7 @@ def _known(geometry, of_geometry, adjusted, of_liquid):
         gain=adjusted.gain[place],
         sources=sources,
         liquid=_sources_of_liquid(adjusted, metering, fill, run),
-        moved=moved,
+        moved=moved_inputs,
         first_m=float(np.min(loaded.level_m)) if has_bottom else None,
         bottom_m3=float(adjusted.estimate[bottom][0]) if has_bottom else 0.0,
         bottom_gain=adjusted.gain[bottom][0] if has_bottom else None,
@@ -308,62 +356,87 @@ def _known(geometry, of_geometry, adjusted, of_liquid):
 
 
 def _sources_of_liquid(adjusted, metering, fill, run):
-    """Sources of what liquid itself leaves uncertain, columns by the misclosures."""
-    found = [Source(one.kind, _telling(adjusted, one.columns), type="B") for one in adjusted.noise]
-    for one in adjusted.effects:
-        if one.kind == "meter_factor":
-            found += _of_meters(one, metering, fill)
-        elif one.kind == RUNS:
+    """Sources of the uncertainty of the liquid itself, with columns by the misclosures."""
+    sources = [
+        Source(effect.kind, _reduce_columns(adjusted, effect.columns), type="B")
+        for effect in adjusted.noise
+    ]
+    for effect in adjusted.effects:
+        if effect.kind == "meter_factor":
+            sources += _meter_sources(effect, metering, fill)
+        elif effect.kind == RUNS:
             kind = "B" if np.isinf(run.dof) else "A"
-            found.append(Source(RUNS, one.columns, run.dof, type=kind))
-        elif one.kind in COMMON:
-            u, unit, value = COMMON[one.kind](metering)
-            found.append(Source(one.kind, one.columns, u=u, unit=unit, type="B", estimate=value))
-    return tuple(found)
+            sources.append(Source(RUNS, effect.columns, run.dof, type=kind))
+        elif effect.kind in COMMON:
+            u, unit, value = COMMON[effect.kind](metering)
+            sources.append(
+                Source(effect.kind, effect.columns, u=u, unit=unit, type="B", estimate=value)
+            )
+    return tuple(sources)
 
 
-def _telling(adjusted, columns):
-    """(n, r) the same readings in as few columns as any estimate can tell apart."""
-    names = [one.kind for one in adjusted.effects]
-    used = [adjusted.place(kind) for kind in ("geometry", BOTTOM, FLEX) if kind in names]
-    seen = np.vstack([adjusted.gain[place] for place in used]) @ columns
-    _, size, turn = np.linalg.svd(seen, full_matrices=False)
-    return columns @ turn[size > LOST * np.max(size, initial=0.0)].T
+def _reduce_columns(adjusted, columns):
+    """Columns (n, r) of readings, reduced to as many as affect the estimates."""
+    names = [effect.kind for effect in adjusted.effects]
+    places = [adjusted.place(kind) for kind in ("geometry", BOTTOM, FLEX) if kind in names]
+    by_readings = np.vstack([adjusted.gain[place] for place in places]) @ columns
+    _, singular_values, rotation = np.linalg.svd(by_readings, full_matrices=False)
+    return columns @ rotation[singular_values > LOST * np.max(singular_values, initial=0.0)].T
 
 
+# Standard uncertainty, unit and estimate of common causes.
 COMMON = {
-    "dip_zero": lambda one: (1000 * one.u_dip_zero_m, "mm", 0.0),
-    "liquid_expansion": lambda one: (one.u_expansion_per_k, "1/K", one.expansion_per_k),
-    "calibration_density": lambda one: (one.u_density_kg_m3, "kg/m3", one.density_kg_m3),
+    "dip_zero": lambda metering: (1000 * metering.u_dip_zero_m, "mm", 0.0),
+    "liquid_expansion": lambda metering: (
+        metering.u_expansion_per_k,
+        "1/K",
+        metering.expansion_per_k,
+    ),
+    "calibration_density": lambda metering: (
+        metering.u_density_kg_m3,
+        "kg/m3",
+        metering.density_kg_m3,
+    ),
 }
 
 
-def _of_meters(effect, metering, fill):
-    found = []
+def _meter_sources(effect, metering, fill):
+    """One source per meter, from its certificate."""
+    sources = []
     for name, column in zip(fill.meters, effect.columns.T, strict=True):
         meter = metering.meters[name]
         u, note = 1e6 * meter.u_factor, meter.certificate or name
-        found.append(Source("meter_factor", column[:, None], u=u, unit="ppm", type="B", note=note))
-    return found
+        sources.append(
+            Source("meter_factor", column[:, None], u=u, unit="ppm", type="B", note=note)
+        )
+    return sources
 
 
-def _moves_of(found, names):
-    """({input: its move in all}, {input: sd}) that the adjustment asks for, SI."""
-    adjusted, places = found.adjusted, {}
-    for place in places_of(found.known.sources, found.known.geometry.job.inputs).values():
+def _moves_of(adjustment, names):
+    """Total moves of inputs and their standard deviations, according to the adjustment.
+
+    Both are dicts {input: value, SI}.
+    """
+    result, places = adjustment.adjusted, {}
+    for place in places_of(adjustment.known.sources, adjustment.known.geometry.job.inputs).values():
         places[place.name] = place
-    wanted, sds = {}, {}
-    geometry = adjusted.effects[0].columns
+    moves, sds = {}, {}
+    geometry = result.effects[0].columns
     for name in names:
         place = places[name]
-        wanted[name] = float(place.u * (place.row @ found.known.z))
-        seen = geometry @ place.row
-        left = max(float(place.row @ place.row - seen @ adjusted.weight @ seen), 1e-12)
-        sds[name] = place.u * np.sqrt(left)
-    return wanted, sds
+        moves[name] = float(place.u * (place.row @ adjustment.known.z))
+        by_misclosures = geometry @ place.row
+        # Posterior variance of the deviate: its prior variance less the part that the misclosures
+        # determine.
+        variance = max(
+            float(place.row @ place.row - by_misclosures @ result.weight @ by_misclosures), 1e-12
+        )
+        sds[name] = place.u * np.sqrt(variance)
+    return moves, sds
 
 
 def _refuse_dips_outside(geometry, fill):
+    """Raise InputError for dips above or below the tank."""
     metering, body = geometry.job.liquid, geometry.body()
     levels = metering.dip_m[fill.dip_row] + geometry.zero_m + geometry.shift_m
     low, high = body.lowest_m, body.highest_m

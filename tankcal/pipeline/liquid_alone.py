@@ -1,8 +1,8 @@
-"""A tank of which liquid alone tells the volumes: its geometry only declared, and hardly known.
+"""Geometry of a tank for a table by liquid alone: declared only, with wide uncertainties.
 
-Within the filled dips such a geometry interpolates, and does no more: an upright tank keeps its
-courses, each with a radius of its own; a lying one its form, with sizes, tilt and zero unknown; a
-sphere its diameter and zero, a mesh its scale and zero.
+Within the dips of the runs, such a geometry only interpolates. A vertical tank keeps its courses,
+each with a free radius. A horizontal tank keeps its form, with unknown sizes, tilt and zero. A
+sphere has an unknown diameter and zero, a mesh an unknown scale and zero.
 """
 
 from dataclasses import replace
@@ -15,7 +15,7 @@ from tankcal.pipeline.scan import Scan
 from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.tanks.solid import sized_job
 
-KEPT = (  # inputs that say nothing of the wall, but of what it holds and how it gives way
+KEPT = (  # inputs that describe the liquid, the parts and the elasticity, not the shape of the wall
     *("plate_thickness", "shell_temperature", "expansion", "youngs_modulus"),
     *("liquid_density", "roof_mass", "deadwood", "interpolation", "rounding"),
 )
@@ -23,21 +23,26 @@ SIZES = ("diameter", "length", "end_depth", "tilt", "dip_position", "datum", "sc
 
 
 def geometry_beside(job, survey):
-    """`Geometry` that is adjusted with the runs of a job; sizes nothing speaks for are wide."""
+    """Return the `Geometry` that is adjusted with the runs of a job.
+
+    Sizes without any information get wide uncertainties.
+    """
     if isinstance(survey, NominalWall):
         return Geometry(job, survey, told_by_liquid=SIZES)
     if job.tank.kind == "vertical" or job.points is not None:
         return Geometry(job, survey)
-    if any(one.name in SIZES for one in job.inputs):
+    if any(declared.name in SIZES for declared in job.inputs):
         return Geometry(job, survey)
-    wide = replace(job, inputs=(*job.inputs, *_wide(job)))
-    return Geometry(wide, survey, told_by_liquid=SIZES)
+    widened = replace(job, inputs=(*job.inputs, *_wide_inputs(job)))
+    return Geometry(widened, survey, told_by_liquid=SIZES)
 
 
 def geometry_alone(job, survey):
-    """`Geometry` that hardly anything is known of, for the table of liquid alone."""
-    kept = tuple(one for one in job.inputs if one.name in KEPT)
-    bare = replace(job, inputs=kept, correlations=_among(job.correlations, kept))
+    """Return a `Geometry` with almost no information, for the table of liquid alone."""
+    kept_inputs = tuple(declared for declared in job.inputs if declared.name in KEPT)
+    bare = replace(
+        job, inputs=kept_inputs, correlations=_correlations_between(job.correlations, kept_inputs)
+    )
     if job.tank.kind == "vertical":
         bare = replace(
             bare, points=None, strapping=None, lines=None, hits=None, tangents=None, clouds=None,
@@ -47,12 +52,12 @@ def geometry_alone(job, survey):
         return Geometry(bare, wall, told_by_liquid=(*SIZES, "course_heights"))
     if isinstance(survey, Scan):
         bare, survey = replace(sized_job(bare, survey), points=None), None
-    wide = replace(bare, inputs=(*kept, *_wide(bare)))
-    return Geometry(wide, survey, told_by_liquid=SIZES)
+    widened = replace(bare, inputs=(*kept_inputs, *_wide_inputs(bare)))
+    return Geometry(widened, survey, told_by_liquid=SIZES)
 
 
-def _wide(job):
-    """Inputs of sizes, of which next to nothing is known."""
+def _wide_inputs(job):
+    """Inputs of sizes with almost no information."""
     wide = limits_of("liquid")["wide"]
     zero = wide_input("datum", wide["zero_mm"] / 1000, "mm", wide["zero_mm"])
     if job.horizontal is not None:
@@ -71,12 +76,15 @@ def _wide(job):
     return (wide_input("scale", wide["scale"], "ppm", 1e6 * wide["scale"]), zero)
 
 
-def _among(correlations, kept):
-    names = {one.name for one in kept}
-    return tuple(one for one in correlations if {one[0], one[1]} <= names)
+def _correlations_between(correlations, kept):
+    """Correlations between the kept inputs only."""
+    names = {declared.name for declared in kept}
+    return tuple(
+        correlation for correlation in correlations if {correlation[0], correlation[1]} <= names
+    )
 
 
 def filled_range_m(metering):
-    """(lowest, highest) dip that counts."""
+    """Return the lowest and the highest dip used, m."""
     dips = metering.dip_m[metering.used & np.isfinite(metering.dip_m)]
     return float(dips.min()), float(dips.max())

@@ -1,4 +1,4 @@
-"""What a sound calibration by liquid hardly has: steps that disagree, causes that can be named."""
+"""Warnings of a calibration by liquid: steps that disagree, and their probable causes."""
 
 import numpy as np
 
@@ -9,37 +9,41 @@ from tankcal.messages import message
 from tankcal.pipeline.liquid_naming import causes_in_words, is_steady_leak, leak_unit
 from tankcal.pipeline.survey_limits import limits_of
 
-TOLD = 3  # steps that are told one by one
-FAR = 2 * CRITICAL  # test quantity of a cause, from which it moves the table beyond U
-CONTROLLED = 1e-6  # redundancy of a reading below which nothing tests it
-HIDDEN_U = 2.0  # change of a volume, in its U, by an error that no test shows: more is told
+TOLD = 3  # largest number of steps reported individually
+FAR = 2 * CRITICAL  # test quantity from which a cause changes the table by more than U
+CONTROLLED = 1e-6  # smallest redundancy of a reading that can be tested
+HIDDEN_U = 2.0  # largest change of a volume by an undetectable error without warning, in U
 
 
-def check_liquid_result(job, found):
-    """`Problem`s of a `LiquidResult`; () without one.
+def check_liquid_result(job, result):
+    """Return the warnings of a `LiquidResult`; () for None.
 
     Parameters
     ----------
     job : Job
-    found : LiquidResult or None
+    result : LiquidResult or None
+
+    Returns
+    -------
+    tuple of Problem
     """
-    if found is None:
+    if result is None:
         return ()
     return (
-        *_disagreement(job.liquid, found),
-        *_single_readings(job.liquid, found),
-        *_compared(job.liquid, found),
-        *_leak(job.liquid, found),
-        *_meters(job.liquid, found),
-        *_bottom(job, found),
-        *_alone(job.liquid, found),
+        *_check_agreement(job.liquid, result),
+        *_check_readings(job.liquid, result),
+        *_check_compared_dips(job.liquid, result),
+        *_check_leak(job.liquid, result),
+        *_check_meters(job.liquid, result),
+        *_check_bottom(job, result),
+        *_check_liquid_table(job.liquid, result),
     )
 
 
-def _disagreement(metering, found):
-    """Liquid and geometry together: the test of all steps, and the cause, where one stands out."""
-    named = [one for one in found.causes if one.is_named]
-    if found.probability >= limits_of("liquid")["global_probability"] and not named:
+def _check_agreement(metering, result):
+    """Warn if liquid and geometry disagree, by the test of all steps or by a named cause."""
+    named = [verdict for verdict in result.causes if verdict.is_named]
+    if result.probability >= limits_of("liquid")["global_probability"] and not named:
         return
     if named:
         template = (
@@ -56,55 +60,58 @@ def _disagreement(metering, found):
             "liquid_disagrees",
             "liquid and geometry disagree: chi-square of the steps is {chi2:.1f} with {dof} "
             "degrees of freedom; no single cause stands out: check the uncertainties declared",
-            chi2=found.chi2,
-            dof=found.dof,
+            chi2=result.chi2,
+            dof=result.dof,
         )
     yield Problem(metering.file, text)
 
 
-def _leak(metering, found):
-    """A drift with time that is not named among all causes: a test of its own, of one in 1000."""
-    steady = next((one for one in found.causes if is_steady_leak(one)), None)
-    is_named = any(one.is_named for one in found.causes)
-    if steady is None or is_named or abs(steady.w) <= CRITICAL:
+def _check_leak(metering, result):
+    """Warn of a drift with time, by a test at the level of one in 1000, if no cause is named."""
+    leak = next((verdict for verdict in result.causes if is_steady_leak(verdict)), None)
+    is_named = any(verdict.is_named for verdict in result.causes)
+    if leak is None or is_named or abs(leak.w) <= CRITICAL:
         return
     text = message(
         "liquid_drifts",
         "the steps differ from the geometry as if a valve passed {size:+.3f} {unit}, at {w:.1f} "
         "times the standard deviation: read the dip before and after hours at rest (use = rest)",
-        size=steady.size,
-        unit=leak_unit(steady.cause),
-        w=abs(steady.w),
+        size=leak.size,
+        unit=leak_unit(leak.cause),
+        w=abs(leak.w),
     )
     yield Problem(metering.file, text)
 
 
-def _meters(metering, found):
-    """Meters that neither a second proving nor the steps control."""
-    for one in found.causes:
-        hidden = one.undetected_U
-        if one.cause.kind != "meter" or hidden is None or hidden <= HIDDEN_U:
+def _check_meters(metering, result):
+    """Warn of meters that neither a second proving nor the steps control."""
+    for verdict in result.causes:
+        hidden_U = verdict.undetected_U
+        if verdict.cause.kind != "meter" or hidden_U is None or hidden_U <= HIDDEN_U:
             continue
-        if metering.meters[one.cause.of].factor_after is not None:
+        if metering.meters[verdict.cause.of].factor_after is not None:
             continue
         text = message(
             "meter_unchecked",
             "nothing checks the factor of meter {name}: an error of {percent:.2g} % would not "
             "show, and would change a volume by {times:.1f} times its U; prove it again afterwards "
             "(factor_after), or fill a part through a second meter",
-            name=one.cause.of,
-            percent=100 * one.detectable,
-            times=hidden,
+            name=verdict.cause.of,
+            percent=100 * verdict.detectable,
+            times=hidden_U,
         )
-        yield Problem(metering.meters_file, text, column=f"{one.cause.of}.factor_after")
+        yield Problem(metering.meters_file, text, column=f"{verdict.cause.of}.factor_after")
 
 
-def _single_readings(metering, found):
-    """Batches and dips that the joint adjustment finds wrong, the worst first."""
+def _check_readings(metering, result):
+    """Warn of outlying batches and dips of the joint adjustment, the largest first."""
     rows = [
+        # The estimated error of a reading is w times its sd over the square root of its redundancy.
         (abs(w), row, w * sd / np.sqrt(redundancy), column)
-        for one, column in ((found.steps, "volume_m3"), (found.dips, "dip_m"))
-        for row, w, sd, redundancy in zip(one.row, one.w, one.sd, one.redundancy, strict=True)
+        for readings, column in ((result.steps, "volume_m3"), (result.dips, "dip_m"))
+        for row, w, sd, redundancy in zip(
+            readings.row, readings.w, readings.sd, readings.redundancy, strict=True
+        )
         if abs(w) > CRITICAL and redundancy > CONTROLLED
     ]
     for w, row, size, column in sorted(rows, reverse=True)[:TOLD]:
@@ -119,45 +126,47 @@ def _single_readings(metering, found):
         yield Problem(metering.file, text, int(row), column)
 
 
-def _compared(metering, found):
-    """Dips that are only compared, and differ."""
-    checks = found.checks
+def _check_compared_dips(metering, result):
+    """Warn of dips that are only compared and differ."""
+    checks = result.checks
     if checks is None:
         return
-    for place in np.flatnonzero(np.abs(checks.w) > CRITICAL):
+    for number in np.flatnonzero(np.abs(checks.w) > CRITICAL):
         text = message(
             "check_dip_differs",
             "a dip to compare: {difference:+.1f} mm from what all that counts says, {w:.1f} "
             "standard deviations",
-            difference=1000 * checks.difference_m[place],
-            w=abs(checks.w[place]),
+            difference=1000 * checks.difference_m[number],
+            w=abs(checks.w[number]),
         )
-        yield Problem(metering.file, text, int(checks.row[place]), "dip_m")
+        yield Problem(metering.file, text, int(checks.row[number]), "dip_m")
 
 
-def _bottom(job, found):
+def _check_bottom(job, result):
+    """Warn of a bottom that was neither surveyed nor filled from empty."""
     untold = job.bottom.form in ("flat", "leaning")
-    if job.tank.kind == "vertical" and untold and found.bottom_m3 is None:
+    if job.tank.kind == "vertical" and untold and result.bottom_m3 is None:
         text = message(
             "bottom_not_filled",
             "no run began in the empty tank, and nobody surveyed the bottom: what is below the "
             "first dip, {dip:g} m, is that of a flat bottom, and its error is not in U",
-            dip=found.filled_m[0],
+            dip=result.filled_m[0],
         )
         yield Problem(job.liquid.file, text)
 
 
-def _alone(metering, found):
-    if found.tables["liquid"] is None:
+def _check_liquid_table(metering, result):
+    """Warn about the table of liquid alone: missing, or extrapolated."""
+    if result.tables["liquid"] is None:
         text = message("liquid_alone_untold", "liquid alone does not tell the volumes of this "
                        "tank: there is no table of it beside the joint one")  # fmt: skip
         yield Problem(metering.file, text)
-    if found.certified == "liquid":
+    if result.certified == "liquid":
         text = message(
             "liquid_certified",
             "the table is that of liquid alone: beyond its dips, {low:g} to {high:g} m, it goes "
             "by the drawing",
-            low=found.filled_m[0],
-            high=found.filled_m[1],
+            low=result.filled_m[0],
+            high=result.filled_m[1],
         )
         yield Problem(SETTINGS_FILE, text, column="liquid.table")

@@ -1,8 +1,8 @@
-"""A tank as liquid sees it: its body under the calibrating liquid, at the dips of the runs.
+"""Body of a tank under the calibrating liquid, at the dips of the runs.
 
-The inputs of lying tanks and spheres that bend volumes (sizes, tilt, the table's zero) are moved to
-what liquid says of them, step by step (Gauss-Newton); all others, of which the volumes are as good
-as linear, stay where geometry has them.
+Some inputs of horizontal tanks and spheres have a nonlinear effect on volumes: sizes, tilt and the
+zero of the table. They are moved to their estimates by liquid, step by step (Gauss-Newton). All
+other inputs have an almost linear effect and keep their values.
 """
 
 from dataclasses import dataclass, field, replace
@@ -15,22 +15,28 @@ from tankcal.pipeline.tanks import body_of, zero_height
 from tankcal.tank.service import shell_factor, solid_factor
 from tankcal.uncertainty import triangular
 
-MOVED = ("diameter", "length", "end_depth", "tilt", "dip_position")  # of one solid; and its zero
+MOVED = (
+    "diameter",
+    "length",
+    "end_depth",
+    "tilt",
+    "dip_position",
+)  # nonlinear inputs of a solid, with ZERO
 ZERO = "datum"
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """What says of the volumes of a tank all that liquid does not.
+    """Information on the volumes of a tank that is independent of the liquid.
 
     Attributes
     ----------
     job : Job
     survey : Wall, StrappedWall, NominalWall, Scan, mesh or None
     moves : dict
-        {input: by how much it is moved, SI}.
+        {input: its move, SI}.
     told_by_liquid : tuple of str
-        Inputs that need no declared u: the dips themselves say what they do.
+        Inputs without declared u, because the dips determine them.
     """
 
     job: object
@@ -43,14 +49,22 @@ class Geometry:
         """Names of the declared inputs that are moved."""
         if self.job.tank.kind == "vertical":
             return ()
-        sizes = [one.name for one in self.job.inputs if one.name in MOVED and one.u > 0]
+        sizes = [
+            declared.name
+            for declared in self.job.inputs
+            if declared.name in MOVED and declared.u > 0
+        ]
         sizes = [name for name in sizes if vary_input(self.job, name, 0.0) is not None]
-        zero = [one.name for one in self.job.inputs if one.name == ZERO and one.u > 0]
+        zero = [
+            declared.name
+            for declared in self.job.inputs
+            if declared.name == ZERO and declared.u > 0
+        ]
         return (*sizes, *zero)
 
     @property
     def moved_job(self):
-        """The job with its sizes where liquid has them."""
+        """The job with its sizes as adjusted by liquid."""
         job = self.job
         for name, change in self.moves.items():
             if name != ZERO:
@@ -59,25 +73,28 @@ class Geometry:
 
     @property
     def shift_m(self):
-        """Height of the table's zero above where the job has it."""
+        """Height of the zero of the table above its height in the job, m."""
         return self.moves.get(ZERO, 0.0)
 
     @property
     def zero_m(self):
-        """Level of dip 0 in the frame of the parts, as the job has it."""
+        """Level of dip 0 in the frame of the parts, according to the job."""
         return zero_height(self.job, self.survey)
 
     def body(self, density_kg_m3=None):
-        """`tank.body.Body` under a liquid; None: that of the table."""
+        """Return the `tank.body.Body` under a liquid; None: liquid of the table."""
         return body_of(filled_with(self.moved_job, density_kg_m3), self.survey)
 
     def moved_to(self, moves):
-        """The same with other moves; SolutionError where there is no such tank."""
+        """Return the geometry with other moves.
+
+        Its other methods raise SolutionError if no tank has the moved sizes.
+        """
         return replace(self, moves=moves)
 
 
 def filled_with(job, density_kg_m3):
-    """The job of a tank that holds another liquid, in which its floating roof floats."""
+    """Return the job with another liquid, which also supports the floating roof."""
     if density_kg_m3 is None:
         return job
     density = float(density_kg_m3)
@@ -92,14 +109,15 @@ class Loaded:
     Attributes
     ----------
     level_m : ndarray, shape (d,)
-        In the frame of the parts.
-    volume_m3, area_m2, by_density, by_offset : ndarray, shape (d,)
-        Volume (of the liquid's own density at its temperature), free surface, and derivatives by
-        that density and by an offset of all radii (0: there is none).
+        Level in the frame of the parts.
+    volume_m3, area_m2 : ndarray, shape (d,)
+        Volume at the density of the liquid at its temperature, and free surface.
+    by_density, by_offset : ndarray, shape (d,)
+        Derivatives of the volume by the density, and by an offset of all radii (0 without radii).
     growth : ndarray, shape (d,)
-        Factor of the volume by the temperature of the shell.
+        Factor of the volume due to the temperature of the shell.
     sources : tuple of Source
-        What geometry leaves uncertain of the volumes.
+        Sources of the uncertainty of the volumes by geometry.
     """
 
     level_m: np.ndarray
@@ -112,24 +130,31 @@ class Loaded:
 
 
 def load_geometry(geometry, densities_kg_m3, dips_m, shell_c):
-    """`Loaded` geometry at d dips.
+    """Compute the `Loaded` geometry at d dips.
 
     Parameters
     ----------
     geometry : Geometry
     densities_kg_m3 : ndarray, shape (1 + d,)
-        Of the calibrating liquid as declared, and at each dip.
-    dips_m, shell_c : ndarray, shape (d,)
-        nan: temperature not known.
+        Density of the calibrating liquid as declared, and at each dip.
+    dips_m : ndarray, shape (d,)
+        Dips.
+    shell_c : ndarray, shape (d,)
+        Temperature of the shell, degree Celsius; nan: not known.
+
+    Returns
+    -------
+    Loaded
     """
     declared, at_dips = densities_kg_m3[0], densities_kg_m3[1:]
     body = geometry.body(declared)
     dips = dips_m + geometry.zero_m
     levels = np.clip(dips + geometry.shift_m, body.lowest_m, body.highest_m)
-    volume = body.moved_m3(dips, geometry.shift_m)  # whole dips may stand above a declared top
+    volume = body.moved_m3(dips, geometry.shift_m)  # dips above a declared top are valid
     derivatives = body.derivatives(levels)
-    nothing = np.zeros(len(levels))
-    by_density = derivatives.get("liquid_density", nothing)
+    zeros = np.zeros(len(levels))
+    by_density = derivatives.get("liquid_density", zeros)
+    # The head of the liquid depends on its density at each dip: linear correction.
     volume = volume + by_density * (at_dips - declared)
     area = body.area_m2(levels)
     return Loaded(
@@ -137,54 +162,89 @@ def load_geometry(geometry, densities_kg_m3, dips_m, shell_c):
         volume_m3=volume,
         area_m2=area,
         by_density=by_density,
-        by_offset=_by_offset(body, derivatives, nothing),
-        growth=_growth(geometry.job, body, levels, shell_c),
+        by_offset=_offset_derivatives(body, derivatives, zeros),
+        growth=_thermal_growth(geometry.job, body, levels, shell_c),
         sources=sources_at(geometry, body, levels, without=("liquid_density",)),
     )
 
 
 def volumes_at(body, levels_m, shift_m):
-    """(rows,) volumes at levels, with the table's zero moved."""
+    """Return the volumes at given levels with the zero of the table moved.
+
+    Parameters
+    ----------
+    body : Body
+    levels_m : ndarray, shape (rows,)
+    shift_m : float
+        Move of the zero, m.
+
+    Returns
+    -------
+    ndarray, shape (rows,)
+    """
     if shift_m:
         return body.moved_m3(levels_m, shift_m)
     return body.volume_m3(np.clip(levels_m, body.lowest_m, None))
 
 
 def sources_at(geometry, body, levels_m, without=()):
-    """Sources of a body of a geometry, the same in number and order under whatever liquid."""
-    return body.sources_by(levels_m, [one.name for one in geometry.job.inputs], without)
+    """Return the sources of a body, the same in number and order for any liquid.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    body : Body
+    levels_m : ndarray, shape (rows,)
+    without : sequence of str, optional
+        Sources to omit.
+
+    Returns
+    -------
+    sequence of Source
+    """
+    return body.sources_by(levels_m, [declared.name for declared in geometry.job.inputs], without)
 
 
-def _by_offset(body, derivatives, nothing):
-    """Derivative of volumes by a metre in all inside radii."""
+def _offset_derivatives(body, derivatives, zeros):
+    """Derivative of the volumes by an offset of all inside radii, m3/m."""
     if body.shell is not None:
+        # A scale changes a radius r by r times the scale: divide by the mean radius.
         return derivatives.get("offset", derivatives["scale"] / _mean_radius(body))
     if "diameter" in derivatives:
         return 2 * derivatives["diameter"]
-    return derivatives.get("surface", nothing)
+    return derivatives.get("surface", zeros)
 
 
 def _mean_radius(body):
+    """Mean inside radius of a shell, m."""
     areas = body.shell.volume.features
     return float(np.sqrt(np.mean(areas) / np.pi)) / body.shell.scale
 
 
-def _growth(job, body, levels_m, shell_c):
-    """Factor of volumes by the shell's temperature at a fixed level."""
-    base, expansion = job.table.reference_temperature_c, job.material.expansion_per_k
-    warm = np.where(np.isfinite(shell_c), shell_c, base)
+def _thermal_growth(job, body, levels_m, shell_c):
+    """Factor of the volumes due to the temperature of the shell, at a fixed level."""
+    reference_c, expansion = job.table.reference_temperature_c, job.material.expansion_per_k
+    temperature_c = np.where(np.isfinite(shell_c), shell_c, reference_c)
     if job.tank.kind == "vertical":
-        return shell_factor(warm, base, expansion)
-    return solid_factor(body, levels_m, warm, base, expansion)
+        return shell_factor(temperature_c, reference_c, expansion)
+    return solid_factor(body, levels_m, temperature_c, reference_c, expansion)
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a declared input stands among the deviates of the sources.
+    """Position of a declared input among the deviates of the sources.
 
-    name, u  of the input, SI; part  (rows,) -> columns: see `places_of`
-    row      (c,) combination of all deviates that makes its own: z of the input
-    source, part   numbers of the source, and of its part (None: it has none)
+    Attributes
+    ----------
+    name : str
+    u : float
+        Standard uncertainty of the input, SI.
+    row : ndarray, shape (c,)
+        Combination of all deviates that is the deviate of the input.
+    source : int
+        Number of the source.
+    part : int or None
+        Number of the part of a source of correlated inputs; None: the source has no parts.
     """
 
     name: str
@@ -195,37 +255,59 @@ class Place:
 
 
 def places_of(sources, inputs):
-    """{name: `Place`} of declared inputs among sources; correlated ones share theirs."""
-    known = {one.name: one.u for one in inputs}
-    count, start, found = sum(one.columns_m3.shape[1] for one in sources), 0, {}
+    """Map each declared input among sources to its `Place`.
+
+    Correlated inputs share a source.
+    """
+    u_of_input = {declared.name: declared.u for declared in inputs}
+    count, start, places = sum(source.columns_m3.shape[1] for source in sources), 0, {}
     for number, source in enumerate(sources):
         width = source.columns_m3.shape[1]
         if source.parts:
-            mixing = triangular(source.correlation)
-            for place, part in enumerate(source.parts):
+            # The parts of a source are correlated: a triangular factor turns its independent
+            # deviates into theirs.
+            factor = triangular(source.correlation)
+            for part_number, part in enumerate(source.parts):
                 row = np.zeros(count)
-                row[start : start + width] = mixing[place]
-                found[part.kind] = Place(part.kind, known[part.kind], row, number, place)
-        elif source.kind in known and source.u is not None and width == 1:
+                row[start : start + width] = factor[part_number]
+                places[part.kind] = Place(
+                    part.kind, u_of_input[part.kind], row, number, part_number
+                )
+        elif source.kind in u_of_input and source.u is not None and width == 1:
             row = np.zeros(count)
             row[start] = 1.0
-            found[source.kind] = Place(source.kind, known[source.kind], row, number, None)
+            places[source.kind] = Place(source.kind, u_of_input[source.kind], row, number, None)
         start += width
-    return found
+    return places
 
 
 def column_of(sources, place):
-    """(rows,) what one u of a declared input does, alone, m3."""
+    """Effect (rows,) of one standard uncertainty of a declared input, m3."""
     source = sources[place.source]
     part = source if place.part is None else source.parts[place.part]
     return part.columns_m3[:, 0]
 
 
 def wide_input(name, u, unit, as_read):
-    """A `DeclaredInput` that stands for not knowing."""
+    """Return a `DeclaredInput` with a wide uncertainty, for an unknown value.
+
+    Parameters
+    ----------
+    name : str
+    u : float
+        Standard uncertainty, SI.
+    unit : str
+        Unit for reports.
+    as_read : float
+        Standard uncertainty in this unit.
+
+    Returns
+    -------
+    DeclaredInput
+    """
     return DeclaredInput(name, u, unit, as_read, is_default=True)
 
 
 def stacked(sources, rows):
-    """(rows, c) columns of all sources."""
-    return np.hstack([np.zeros((rows, 0)), *(one.columns_m3 for one in sources)])
+    """Return the columns of all sources side by side, shape (rows, c)."""
+    return np.hstack([np.zeros((rows, 0)), *(source.columns_m3 for source in sources)])

@@ -1,4 +1,4 @@
-"""What metered runs and geometry say of a tank: the parts of `Result.liquid`."""
+"""Results of a calibration by liquid: the parts of `Result.liquid`."""
 
 from dataclasses import dataclass
 
@@ -10,28 +10,30 @@ from tankcal.tank.liquid import Verdict
 
 @dataclass(frozen=True)
 class LiquidSteps:
-    """Steps between dips that count, (n,) each; volumes in m3.
+    """Steps between used dips, arrays of shape (n,); volumes in m3.
 
     Attributes
     ----------
     row : ndarray of int
-        Row of the input at its end.
+        Input row at the end of the step.
     run, meter : tuple of str
     from_dip_m, to_dip_m : ndarray
-        nan: from the empty tank.
-    indicated_m3, by_factor_m3, by_meter_temperature_m3, by_shell_m3, by_tank_temperature_m3,
-    by_head_m3 : ndarray
-        As the meter showed it, and what brings it to the reference: the table's temperature and its
-        liquid.
+        Dips before and after the step; nan: from the empty tank.
+    indicated_m3 : ndarray
+        Indication of the meter.
+    by_factor_m3, by_meter_temperature_m3, by_shell_m3, by_tank_temperature_m3, by_head_m3 : ndarray
+        Corrections of the indication to the reference temperature and the liquid of the table.
     reference_m3 : ndarray
-        Their sum.
+        Sum of the indication and its corrections.
     misclosure_m3, misclosure_sd_m3, misclosure_w : ndarray
         Liquid less geometry before the adjustment, its standard deviation, and their ratio.
-    residual_m3, sd_m3, redundancy, w : ndarray
-        Of the batch in the joint adjustment: what it lacks, its standard deviation before, which
-        part of an error shows, and the test of it.
+    residual_m3 : ndarray
+        Volume missing from the batch according to the joint adjustment.
+    sd_m3, redundancy, w : ndarray
+        Standard deviation of the batch before the adjustment, its redundancy, and its test
+        quantity.
     detectable_m3 : ndarray
-        Smallest error of the batch that the test would show; inf: none.
+        Smallest error of the batch that the test would detect; inf: none.
     """
 
     row: np.ndarray
@@ -63,9 +65,19 @@ class LiquidSteps:
 
 @dataclass(frozen=True)
 class LiquidDips:
-    """Dips that count, (d,) each: row, run, dip, residual, sd before, redundancy, w.
+    """Used dips, arrays of shape (d,).
 
-    residual_m is what is to be added to a dip.
+    Attributes
+    ----------
+    row : ndarray of int
+        Input row.
+    run : tuple of str
+    dip_m : ndarray
+        Dip as read.
+    residual_m : ndarray
+        Correction to add to the dip.
+    sd_m, redundancy, w : ndarray
+        Standard deviation before the adjustment, redundancy and test quantity.
     """
 
     row: np.ndarray
@@ -78,22 +90,23 @@ class LiquidDips:
 
     @property
     def sd(self):
-        """As of `LiquidSteps`, in m."""
+        """Standard deviation of each dip, m."""
         return self.sd_m
 
 
 @dataclass(frozen=True)
 class LiquidChecks:
-    """Dips that are only compared, (c,) each.
+    """Dips that are only compared, arrays of shape (c,).
 
     Attributes
     ----------
     row : ndarray of int
+        Input row.
     run : tuple of str
     dip_m : ndarray
-        As read.
+        Dip as read.
     difference_m, sd_m, w : ndarray
-        Read less what all that counts says; its standard deviation; their ratio.
+        Reading less prediction by all used readings, its standard deviation, and their ratio.
     """
 
     row: np.ndarray
@@ -106,7 +119,7 @@ class LiquidChecks:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with its standard uncertainty, before and after."""
+    """A quantity with its value and standard uncertainty before and after the adjustment."""
 
     name: str
     before: float
@@ -117,38 +130,40 @@ class Estimate:
 
 @dataclass(frozen=True)
 class LiquidResult:
-    """What metered runs and geometry say of a tank.
+    """Results of metered runs and geometry of a tank.
 
     Attributes
     ----------
     certified : {"joint", "liquid", "geometry"}
-        Whose table is printed.
+        Basis of the printed table.
     steps : LiquidSteps
     dips : LiquidDips
     checks : LiquidChecks or None
         Dips that are only compared; None: there are none.
     runs : tuple of Estimate
-        The effect of each run, relative.
+        Effect of each run, relative.
     run_sd, run_dof : float
-        Of the run effect, relative, with its degrees of freedom (inf: declared).
+        Standard deviation of the run effect, relative, and its degrees of freedom (inf: declared).
     factors : tuple of Estimate
-        Of each meter.
+        Factor of each meter.
     bottom_flex : Estimate or None
-        m3 per metre of head.
+        Flexing of the bottom, m3 per metre of head.
     bottom_m3 : Estimate or None
-        The volume below the first dip beyond geometry's; None: geometry says it.
+        Volume below the first dip beyond the volume by geometry; None: geometry determines it.
     sizes : tuple of Estimate
-        Inputs of the geometry that liquid moved, in SI.
+        Moves of inputs of the geometry by liquid, in SI.
     chi2, dof, probability : float
-        Of all misclosures together, and the probability of a larger one.
+        Chi-square of all misclosures, its degrees of freedom, and the probability of a larger
+        value.
     detectable_radius_m : float or None
-        Smallest offset of all radii that the liquid would have shown; None: it has no meaning.
+        Smallest offset of all radii that the liquid would detect; None: without meaning.
     causes : tuple of Verdict
-        Of misclosures, the likeliest first; those with `is_named` are told.
+        Possible causes of the misclosures, the likeliest first; causes with `is_named` are
+        reported.
     filled_m : tuple of (float, float)
-        Lowest and highest dip that counts.
+        Lowest and highest used dip.
     tables : dict of {str: BesideTable}
-        "geometry", "liquid" (None where liquid alone does not tell the tank) and "joint".
+        "geometry", "liquid" (None if liquid alone does not determine the tank) and "joint".
     """
 
     certified: str

@@ -1,7 +1,7 @@
-"""Hits of set-ups that see a line of the wall, one above another, and what would make them do so.
+"""Vertical lines of wall hits that are straight only if their readings are interpreted otherwise.
 
-The horizontal distances of such a line hardly change with height, nor do its hits leave the courses
-that they are said to be of: not so with zenith angles or distances in another unit.
+The horizontal distances of such a line hardly change with height, and the hits lie within their
+stated courses. Zenith angles or distances in another unit break both properties.
 """
 
 import numpy as np
@@ -12,89 +12,102 @@ from tankcal.messages import list_some, message
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.diagnosis.misread_files import OTHER_UNITS
 
-GON_IN_DEG, DEG_IN_GON = 0.9, 1 / 0.9  # what turns an angle that is read so into what was meant
-NARROW_RAD, FEWEST, LEAST_RISE_M = 0.1, 5, 1.0  # of a line: its directions, hits, and height
-OFF_M, CLOSER = 0.05, 0.2  # rms from a straight line that needs a cause; part of it that tells one
-IN_COURSE_M, FEW, MANY = 0.1, 0.5, 0.9  # of hits in their courses: as they are read, as meant
-SHOWN = 4  # names of set-ups
+# Factors that convert an angle read as degrees but given in gon, and the reverse.
+GON_IN_DEG, DEG_IN_GON = 0.9, 1 / 0.9
+# Limits of a line: largest range of directions, smallest number of hits, smallest height.
+NARROW_RAD, FEWEST, LEAST_RISE_M = 0.1, 5, 1.0
+# Rms from a line that needs an explanation; largest part of it left in another interpretation.
+OFF_M, CLOSER = 0.05, 0.2
+# Tolerance of hits beyond the joints; share of hits in their courses as read, and in another unit.
+IN_COURSE_M, FEW, MANY = 0.1, 0.5, 0.9
+SHOWN = 4  # set-ups named in a message
 
 
 def refuse_misread_lines(hits):
-    """Raise InputError where the hits of set-ups lie one above another in another unit only.
+    """Raise InputError for set-ups whose hits form a straight line only in another interpretation.
 
-    hits  WallHits
+    Parameters
+    ----------
+    hits : WallHits
     """
-    found, setup = {}, np.array(hits.setup)
+    setups_by_cause, setup = {}, np.array(hits.setup)
     for name in dict.fromkeys(hits.setup):
-        mine = np.flatnonzero(setup == name)
-        if len(mine) >= FEWEST and _is_narrow(hits.direction_rad[mine]):
-            cause = _cause_of_line(hits.zenith_rad[mine], hits.distance_m[mine])
+        rows_of_setup = np.flatnonzero(setup == name)
+        if len(rows_of_setup) >= FEWEST and _is_narrow(hits.direction_rad[rows_of_setup]):
+            cause = _cause_of_line(hits.zenith_rad[rows_of_setup], hits.distance_m[rows_of_setup])
             if cause is not None:
-                found.setdefault(cause, []).append(name)
+                setups_by_cause.setdefault(cause, []).append(name)
     texts = {
         GON_IN_DEG: ("zenith", _zeniths_in_gon),
         DEG_IN_GON: ("zenith", _zeniths_in_degrees),
         "horizontal": ("distance_m", _horizontal),
     }
-    _refuse(hits, [(*texts[cause], names) for cause, names in found.items()])
+    _refuse(hits, [(*texts[cause], names) for cause, names in setups_by_cause.items()])
 
 
 def refuse_misread_heights(job, sighting):
-    """Raise InputError where the hits of set-ups are in their courses with distances in another
-    unit only.
-    """
+    """Raise InputError for hits that lie in their courses only with another unit of distance."""
     hits = job.hits
     names = {course.name: i for i, course in enumerate(job.courses)}
-    course = np.array([names.get(one, -1) for one in hits.course])
+    course = np.array([names.get(course_name, -1) for course_name in hits.course])
     joints = job.datum.bottom_z_m + joints_of(job)
     z, station_z = sighting.points.xyz_m[:, 2], sighting.poses.xyz_m[sighting.pose, 2]
-    found, setup = {}, np.array(hits.setup)
+    setups_by_unit, setup = {}, np.array(hits.setup)
     for name in dict.fromkeys(hits.setup):
-        mine = np.flatnonzero((setup == name) & (course >= 0))
-        if len(mine) < FEWEST or len(set(course[mine].tolist())) < 2:
+        rows_of_setup = np.flatnonzero((setup == name) & (course >= 0))
+        if len(rows_of_setup) < FEWEST or len(set(course[rows_of_setup].tolist())) < 2:
             continue
 
-        def share(factor, mine=mine):
-            height = station_z[mine] + factor * (z - station_z)[mine]
-            low, high = joints[course[mine]], joints[course[mine] + 1]
+        def share(factor, rows_of_setup=rows_of_setup):
+            height = station_z[rows_of_setup] + factor * (z - station_z)[rows_of_setup]
+            low, high = joints[course[rows_of_setup]], joints[course[rows_of_setup] + 1]
             return np.mean((height > low - IN_COURSE_M) & (height < high + IN_COURSE_M))
 
         if share(1.0) < FEW:
-            best = max(OTHER_UNITS, key=lambda one: share(one[0]))
+            best = max(OTHER_UNITS, key=lambda unit: share(unit[0]))
             if share(best[0]) > MANY:
-                found.setdefault(best[1], []).append(name)
-    _refuse(hits, [("distance_m", _other_length(unit), each) for unit, each in found.items()])
+                setups_by_unit.setdefault(best[1], []).append(name)
+    _refuse(
+        hits,
+        [
+            ("distance_m", _other_length(unit), setup_names)
+            for unit, setup_names in setups_by_unit.items()
+        ],
+    )
 
 
 def _is_narrow(direction_rad):
-    away = direction_rad - direction_rad[0]
-    return np.ptp(away - FULL_TURN * np.round(away / FULL_TURN)) < NARROW_RAD
+    """Whether all directions lie within `NARROW_RAD`, across a full turn as well."""
+    difference = direction_rad - direction_rad[0]
+    return np.ptp(difference - FULL_TURN * np.round(difference / FULL_TURN)) < NARROW_RAD
 
 
 def _cause_of_line(zenith, distance):
-    """What makes a straight line of hits, with which they are far from one; None: nothing."""
-    usual = _off_line(distance * np.sin(zenith), distance * np.cos(zenith))
-    if usual < OFF_M or np.ptp(distance * np.cos(zenith)) < LEAST_RISE_M:
+    """Interpretation in which the hits form a straight line, or None if none is needed or found."""
+    rms_as_read_m = _rms_from_line(distance * np.sin(zenith), distance * np.cos(zenith))
+    if rms_as_read_m < OFF_M or np.ptp(distance * np.cos(zenith)) < LEAST_RISE_M:
         return None
-    off = {
-        factor: _off_line(distance * np.sin(factor * zenith), distance * np.cos(factor * zenith))
+    rms_m = {
+        factor: _rms_from_line(
+            distance * np.sin(factor * zenith), distance * np.cos(factor * zenith)
+        )
         for factor in (GON_IN_DEG, DEG_IN_GON)
     }
-    off["horizontal"] = _off_line(distance, distance / np.tan(zenith))
-    best = min(off, key=off.get)
-    return best if off[best] < CLOSER * usual else None
+    rms_m["horizontal"] = _rms_from_line(distance, distance / np.tan(zenith))
+    best = min(rms_m, key=rms_m.get)
+    return best if rms_m[best] < CLOSER * rms_as_read_m else None
 
 
-def _off_line(away, height):
-    """Rms of horizontal distances from a straight line up the wall."""
+def _rms_from_line(distance, height):
+    """Root mean square distance of hits from a straight line up the wall, m."""
     design = np.column_stack([np.ones(len(height)), height])
-    left = away - design @ np.linalg.lstsq(design, away, rcond=None)[0]
-    return float(np.sqrt(np.mean(left**2)))
+    residuals = distance - design @ np.linalg.lstsq(design, distance, rcond=None)[0]
+    return float(np.sqrt(np.mean(residuals**2)))
 
 
-def _refuse(hits, found):
-    """Raise InputError of (column, text of set-ups, their names), where there are any."""
-    if found:
+def _refuse(hits, causes):
+    """Raise InputError for causes given as (column, text function, set-up names), if any."""
+    if causes:
         raise InputError(
             [
                 Problem(
@@ -103,7 +116,7 @@ def _refuse(hits, found):
                     hits.rows[hits.setup.index(names[0])] if hits.rows else None,
                     column,
                 )
-                for column, text, names in found
+                for column, text, names in causes
             ]
         )
 

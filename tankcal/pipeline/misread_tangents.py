@@ -1,7 +1,8 @@
-"""Tangents that touch no circle as they are read: what would make them touch one.
+"""Tangents that touch a circle only if their readings are interpreted otherwise.
 
-Directions in another unit or counted anticlockwise, limbs that are exchanged: each is tried, for
-all set-ups and for each of them, and told where it explains what nothing else does.
+The checks try other units of direction, anticlockwise directions and exchanged limbs, for all
+set-ups together and for each. They report an interpretation that reduces the residuals
+sufficiently.
 """
 
 import numpy as np
@@ -11,18 +12,25 @@ from tankcal.messages import message
 from tankcal.survey.diagnosis.misread_files import OTHER_UNITS
 from tankcal.survey.tangents import circle_of_sights
 
-GON_IN_DEG, DEG_IN_GON, BACKWARDS = 0.9, 1 / 0.9, -1.0  # of a direction, to what was meant
-CLOSER = 0.2  # residuals, of those as it is read, from which on another reading is told
-LEAST = 0.004  # of the radius: residuals that need no explanation
-OFF_LEVEL_M = 0.3  # of the height of a sight from its level: so far it needs no explanation
-NEAR_NOMINAL = 0.1  # of the radius: a circle so far from the nominal one is not the tank
-MANY = 0.5  # of the limbs: so many are exchanged as a whole
+# Factors of a direction: read as degrees but given in gon, the reverse, and anticlockwise.
+GON_IN_DEG, DEG_IN_GON, BACKWARDS = 0.9, 1 / 0.9, -1.0
+CLOSER = 0.2  # largest ratio of residuals to those as read, to report another interpretation
+LEAST = 0.004  # median residual over the radius that needs no explanation
+OFF_LEVEL_M = 0.3  # discrepancy between a sight and its level that needs no explanation
+NEAR_NOMINAL = 0.1  # largest relative difference between the circle and the nominal radius
+MANY = 0.5  # share of wrong limbs above which all limbs are reported as exchanged
 
 
 def refuse_misread(tangents, poses, nominal_m):
-    """Raise InputError where directions touch a circle in another unit or sense only.
+    """Raise InputError for directions that touch a circle only in another unit or sense.
 
-    poses  `Poses` of their set-ups
+    Parameters
+    ----------
+    tangents : Tangents
+    poses : Poses
+        Positions and orientations of the set-ups.
+    nominal_m : float
+        Nominal radius, m.
     """
     pose = poses.place_of(tangents)
     station = poses.xyz_m[pose][:, :2]
@@ -31,39 +39,39 @@ def refuse_misread(tangents, poses, nominal_m):
 
     def residuals(factor):
         azimuth = zero + factor * tangents.direction_rad
-        curve, _, left = circle_of_sights(station, azimuth, nominal_m)
+        curve, _, residuals_m = circle_of_sights(station, azimuth, nominal_m)
         if abs(curve.radius_m - nominal_m) > NEAR_NOMINAL * nominal_m:
-            return np.full(len(left), np.inf)
-        return np.abs(left)
+            return np.full(len(residuals_m), np.inf)
+        return np.abs(residuals_m)
 
     ones, names = np.ones(len(tangents)), tuple(dict.fromkeys(tangents.setup))
-    usual = residuals(ones)
-    if np.median(usual) > LEAST * nominal_m:
-        chosen = [(np.ones(len(setup), dtype=bool), names[0])]
+    residuals_as_read = residuals(ones)
+    if np.median(residuals_as_read) > LEAST * nominal_m:
+        candidates = [(np.ones(len(setup), dtype=bool), names[0])]
     else:
-        chosen = [
+        candidates = [
             (setup == name, name)
             for name in names
-            if np.median(usual[setup == name]) > LEAST * nominal_m
+            if np.median(residuals_as_read[setup == name]) > LEAST * nominal_m
         ]
     problems = []
-    for mine, name in chosen:
-        before = np.median(usual[mine])
-        tried = {
-            factor: np.median(residuals(np.where(mine, factor, 1.0))[mine])
+    for is_of_setup, name in candidates:
+        median_as_read = np.median(residuals_as_read[is_of_setup])
+        median_by_factor = {
+            factor: np.median(residuals(np.where(is_of_setup, factor, 1.0))[is_of_setup])
             for factor in (GON_IN_DEG, DEG_IN_GON, BACKWARDS)
         }
-        best = min(tried, key=tried.get)
-        most = CLOSER * before if np.isfinite(before) else LEAST * nominal_m
-        if np.isfinite(tried[best]) and not tried[best] > most:
+        best = min(median_by_factor, key=median_by_factor.get)
+        most = CLOSER * median_as_read if np.isfinite(median_as_read) else LEAST * nominal_m
+        if np.isfinite(median_by_factor[best]) and not median_by_factor[best] > most:
             row = tangents.rows[tangents.setup.index(name)] if tangents.rows else None
             problems.append(Problem(tangents.file, _text(best), row, "direction"))
     if problems:
         raise InputError(problems)
-    if not np.isfinite(np.median(usual)):
+    if not np.isfinite(np.median(residuals_as_read)):
         azimuth = zero + tangents.direction_rad
-        curve, _, left = circle_of_sights(station, azimuth, nominal_m)
-        _refuse_other_length(tangents, curve.radius_m, nominal_m, np.median(np.abs(left)))
+        curve, _, residuals_m = circle_of_sights(station, azimuth, nominal_m)
+        _refuse_other_length(tangents, curve.radius_m, nominal_m, np.median(np.abs(residuals_m)))
         text = message(
             "tangents_show_no_circle",
             "the tangents touch no circle of about the nominal diameter {diameter_m:.3f} m: check"
@@ -73,12 +81,12 @@ def refuse_misread(tangents, poses, nominal_m):
         raise InputError(Problem(tangents.file, text))
 
 
-def _refuse_other_length(tangents, radius_m, nominal_m, left_m):
-    """Raise InputError where the circle is that of a tank whose traverse is in another unit."""
+def _refuse_other_length(tangents, radius_m, nominal_m, residual_m):
+    """Raise InputError if the circle has the nominal size in another unit of the traverse."""
     for factor, unit in OTHER_UNITS:
         is_close = abs(radius_m * factor - nominal_m) < NEAR_NOMINAL * nominal_m
-        if is_close and left_m < LEAST * radius_m:
-            told = message(
+        if is_close and residual_m < LEAST * radius_m:
+            text = message(
                 "tangents_of_other_length",
                 "the tangents touch a circle of {diameter_m:.3f} m, which is the nominal"
                 " {nominal_m:.3f} m if the distances of the traverse, or its bar, are in {unit}: is"
@@ -87,38 +95,45 @@ def _refuse_other_length(tangents, radius_m, nominal_m, left_m):
                 nominal_m=2 * nominal_m,
                 unit=unit,
             )
-            raise InputError(Problem("slope_distances.csv", told, None, "distance_m"))
+            raise InputError(Problem("slope_distances.csv", text, None, "distance_m"))
 
 
 def refuse_misread_zeniths(tangents, poses, touching, zero_z_m):
-    """Raise InputError where zenith angles reach their levels in another unit only.
+    """Raise InputError for zenith angles that reach the stated levels only in another unit.
 
-    poses     `Poses` of their set-ups
-    touching  `Touching`, whose places in plan need no zenith angle
-    zero_z_m  z of the zero of levels
+    Parameters
+    ----------
+    tangents : Tangents
+    poses : Poses
+        Positions of the set-ups.
+    touching : Touching
+        Points of tangency; their plan coordinates do not depend on zenith angles.
+    zero_z_m : float
+        Height of the zero of the levels, m.
     """
     station = poses.xyz_m[poses.place_of(tangents)]
     length = np.linalg.norm(touching.points.xyz_m[:, :2] - station[:, :2], axis=1)
     level, setup = zero_z_m + tangents.level_m, np.array(tangents.setup)
     problems = []
     for name in dict.fromkeys(tangents.setup):
-        mine = (setup == name) & np.isfinite(tangents.zenith_rad) & np.isfinite(level)
-        if not mine.any():
+        is_of_setup = (setup == name) & np.isfinite(tangents.zenith_rad) & np.isfinite(level)
+        if not is_of_setup.any():
             continue
-        off = {}
+        misfit_m = {}
         for factor in (1.0, GON_IN_DEG, DEG_IN_GON):
-            up = np.pi / 2 - factor * tangents.zenith_rad[mine]
-            z = station[mine, 2] + length[mine] * np.tan(up)
-            off[factor] = np.median(np.abs(z - level[mine]))
-        best = min(off, key=off.get)
-        if off[1.0] > OFF_LEVEL_M and off[best] <= CLOSER * off[1.0]:
-            row = tangents.rows[int(np.argmax(mine))] if tangents.rows else None
+            elevation = np.pi / 2 - factor * tangents.zenith_rad[is_of_setup]
+            z = station[is_of_setup, 2] + length[is_of_setup] * np.tan(elevation)
+            misfit_m[factor] = np.median(np.abs(z - level[is_of_setup]))
+        best = min(misfit_m, key=misfit_m.get)
+        if misfit_m[1.0] > OFF_LEVEL_M and misfit_m[best] <= CLOSER * misfit_m[1.0]:
+            row = tangents.rows[int(np.argmax(is_of_setup))] if tangents.rows else None
             problems.append(Problem(tangents.file, _text_of_zenith(best), row, "zenith"))
     if problems:
         raise InputError(problems)
 
 
 def _text_of_zenith(factor):
+    """Message that proposes the unit of zenith angles of the given factor."""
     if factor == GON_IN_DEG:
         return message(
             "tangent_zeniths_in_gon",
@@ -131,6 +146,7 @@ def _text_of_zenith(factor):
 
 
 def _text(factor):
+    """Message that proposes the unit or sense of directions of the given factor."""
     if factor == GON_IN_DEG:
         return message("tangents_in_gon", "the sights touch one circle if these are gon: is it so?")
     if factor == DEG_IN_GON:
@@ -144,7 +160,7 @@ def _text(factor):
 
 
 def refuse_limbs(tangents, touching):
-    """Raise InputError for sights that pass the tank at the other limb than it is said."""
+    """Raise InputError for sights that pass the tank on the limb opposite to the stated limb."""
     wrong = np.flatnonzero(touching.seen_right != tangents.is_right)
     if not len(wrong):
         return
@@ -164,7 +180,7 @@ def refuse_limbs(tangents, touching):
     }
     raise InputError(
         [
-            Problem(tangents.file, texts[bool(touching.seen_right[one])], rows[one], "side")
-            for one in wrong
+            Problem(tangents.file, texts[bool(touching.seen_right[row])], rows[row], "side")
+            for row in wrong
         ]
     )

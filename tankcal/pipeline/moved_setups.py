@@ -1,14 +1,17 @@
-"""Set-ups that were disturbed after the network: tested by the form that all others show.
+"""Test of set-ups that were disturbed after the network, by the form that the other set-ups show.
 
-A circle that was turned, or a station that was moved, changes all sights of a set-up to a wall
-together, and no single one departs from its neighbours. With P the precision of the readings y of
-the wall, without what is free, and A their derivative by the turn and the shift of a set-up,
+A rotated horizontal circle or a displaced station changes all sights of a set-up to a wall
+together. No single sight then differs from its neighbours. Let P be the reduced weight matrix of
+the wall readings y, with the free parameters eliminated. Let A be the derivative of y by the
+rotation and the displacement of a set-up. Then
 
-    s = (A' P A)^-1 A' P y,     w^2 = s' A' P A s,  a chi-square of three where nothing moved.
+    s = (A' P A)^-1 A' P y,     w^2 = s' A' P A s,
 
-A set-up that sees few places takes waves of the wall for a shift of its own: of six hits round a
-ring five or seven waves look like one. Where the others see enough to tell them, the waves that
-shells and foundations have are all but free, whatever the spectrum of the field says of them.
+and w^2 follows a chi-square distribution with three degrees of freedom for an undisturbed set-up.
+
+A set-up that sees few places can show waves of the wall as an apparent displacement: of six hits
+round a ring, five or seven waves look like one. If the other set-ups determine these waves, the
+test gives them a large prior variance, whatever the estimated spectrum of the field.
 """
 
 from dataclasses import replace
@@ -21,163 +24,175 @@ from tankcal.geometry.field.amplitudes import estimate_amplitudes
 from tankcal.geometry.field.blunders import restricted_precision
 from tankcal.geometry.field.sites import free_design
 
-ALPHA = 0.001  # of the test of a set-up, over the number of set-ups
-ALPHA_RANGED = 0.01  # the same of its distances, in which slips are more common
-WAVES = np.arange(2, 9)  # round a wall, of every course alike
+ALPHA = 0.001  # significance of the movement test, divided by the number of set-ups
+ALPHA_RANGED = 0.01  # significance of the distance test; mistakes in distances are more common
+WAVES = np.arange(2, 9)  # long waves round the wall, the same in all courses
 
 
 def moved_setups(field, whole, names, columns, suspect_from, *, wave_m=0.0):
-    """How much each set-up looks as if it had moved.
+    """Test whether each set-up was rotated or displaced.
 
     Parameters
     ----------
     field : WallField
-        Its first readings are those of set-ups.
+        Field whose first k readings are those of the set-ups.
     whole : ndarray, shape (n, n)
-        Covariance of its readings, of the wall and their own.
+        Covariance of the readings, m2: form of the wall and noise.
     names : ndarray of str, shape (k,)
-        Set-ups of the first k readings.
+        Set-up of each of the first k readings.
     columns : ndarray, shape (k, 3)
-        Derivative of these by the turn of the set-up's circle, rad, and its shift in x and y, m.
+        Derivatives of these readings by the rotation of the horizontal circle, rad, and by the
+        displacement of the set-up in x and y, m.
     suspect_from : float
-        Test quantity of the worst set-up, from which it is tested by all others alone.
+        Test statistic above which the worst set-up is tested again by the other set-ups alone.
     wave_m : float
-        Standard deviation of each long wave of the wall, beside what the field has of it.
+        Standard deviation of each long wave of the wall, in addition to the field, m.
 
     Returns
     -------
     dict
-        {set-up: (w, its turn alone rad, its shift alone (2,) m)}.
+        {set-up: (w, rotation alone in rad, displacement alone (2,) in m)}.
     """
-    test = partial(_as_if_moved, columns)
-    return _by_setup(field, whole, names, suspect_from, wave_m, test)[0]
+    test = partial(_test_of_movement, columns)
+    return _test_setups(field, whole, names, suspect_from, wave_m, test)[0]
 
 
 def moved_or_ranged(field, whole, names, columns, along, suspect_from, *, wave_m=0.0):
-    """The same, and how much each looks as if all its distances were too long, or too short.
+    """Test each set-up for movement, as in `moved_setups`, and for an offset of its distances.
 
     Parameters
     ----------
     field, whole, names, columns, suspect_from, wave_m
-        As of `moved_setups`.
+        See `moved_setups`.
     along : ndarray, shape (k,)
         Derivative of the readings by an offset of the distances of their set-up.
 
     Returns
     -------
     moved : dict
-        What `moved_setups` finds.
+        Result of `moved_setups`.
     ranged : dict
-        {set-up: (w, by how much too long m)}.
+        {set-up: (w, offset of its distances in m)}.
     """
-    tests = partial(_as_if_moved, columns), partial(_as_if_longer, along)
-    return _by_setup(field, whole, names, suspect_from, wave_m, *tests)
+    tests = partial(_test_of_movement, columns), partial(_test_of_distances, along)
+    return _test_setups(field, whole, names, suspect_from, wave_m, *tests)
 
 
-def _by_setup(field, whole, names, suspect_from, wave_m, *tests):
-    """For each test {set-up: test(which readings are its own, P, P y)}; the worst one of each by
-    all other set-ups alone.
+def _test_setups(field, whole, names, suspect_from, wave_m, *tests):
+    """Results {set-up: test(mask of its readings, P, P y)} of each test.
+
+    The worst set-up of each test is tested again by the other set-ups alone.
     """
     count, whole = len(names), whole + _waves(field.sites, wave_m)
-    every, by_others = tested(field, whole, count), {}
-    found = [
-        {name: test(names == name, *every) for name in dict.fromkeys(names.tolist())}
+    by_all, by_others = tested(field, whole, count), {}
+    tests_by_setup = [
+        {name: test(names == name, *by_all) for name in dict.fromkeys(names.tolist())}
         for test in tests
     ]
-    for test, one in zip(tests, found, strict=True):
-        suspect = max(one, key=lambda name, one=one: one[name][0])
-        if one[suspect][0] <= suspect_from:
+    for test, statistics in zip(tests, tests_by_setup, strict=True):
+        suspect = max(statistics, key=lambda name, statistics=statistics: statistics[name][0])
+        if statistics[suspect][0] <= suspect_from:
             continue
-        mine = names == suspect
+        is_of_setup = names == suspect
         if suspect not in by_others:
-            other = _without(field, whole - field.covariance_m2, mine)
-            by_others[suspect] = None if other is None else tested(field, other, count)
+            covariance = _covariance_by_others(field, whole - field.covariance_m2, is_of_setup)
+            by_others[suspect] = None if covariance is None else tested(field, covariance, count)
         if by_others[suspect] is not None:
-            one[suspect] = test(mine, *by_others[suspect])
-    return found
+            statistics[suspect] = test(is_of_setup, *by_others[suspect])
+    return tests_by_setup
 
 
-def tested(field, whole, count):
-    """P and P y of the first readings of a field (`field.blunders`)."""
-    precision = restricted_precision(whole, free_design(field.sites)[0])
+def tested(field, covariance, count):
+    """P and P y of the first `count` readings of a field (see `field.blunders`)."""
+    precision = restricted_precision(covariance, free_design(field.sites)[0])
     pull = precision @ (field.radius_m - field.radius_m.mean())
     return precision[:count, :count], pull[:count]
 
 
 def _waves(sites, wave_m):
-    """(n, n) covariance of the radii by waves of that height; none of a whole turn."""
+    """Covariance (n, n) of radii by waves of standard deviation `wave_m`, m2.
+
+    Readings without an azimuth, which are means round the wall, have no such waves.
+    """
     angles = np.outer(sites.azimuth_rad, WAVES)
     columns = wave_m * np.nan_to_num(np.hstack([np.cos(angles), np.sin(angles)]))
     columns[~np.isfinite(sites.azimuth_rad)] = 0.0
     return columns @ columns.T
 
 
-def _without(field, more_m2, mine):
-    """Covariance of the readings with amplitudes that those of a set-up do not tell; None: the
-    others tell nothing.
+def _covariance_by_others(field, extra_m2, is_of_setup):
+    """Covariance of the readings, m2, with amplitudes estimated without those of one set-up.
 
-    A set-up that was moved looks like a form of the wall, if it is asked itself how large that is.
+    A disturbed set-up looks like a form of the wall if its own readings determine the amplitudes.
+    The result is None if the other readings do not cover all courses.
 
-    more_m2  of the readings beside the field and its noise: what shares causes, and waves
+    Parameters
+    ----------
+    field : WallField
+    extra_m2 : ndarray, shape (n, n)
+        Covariance in addition to field and noise: shared causes and long waves, m2.
+    is_of_setup : ndarray of bool, shape (k,)
+        Readings of the set-up.
     """
     keep = np.ones(len(field.radius_m), dtype=bool)
-    keep[: len(mine)] = ~mine
-    noise = (field.noise_m2 + more_m2)[np.ix_(keep, keep)]
+    keep[: len(is_of_setup)] = ~is_of_setup
+    noise = (field.noise_m2 + extra_m2)[np.ix_(keep, keep)]
     if len(np.unique(field.sites.course[keep])) < len(np.unique(field.sites.course)):
         return None
-    known = estimate_amplitudes(
+    amplitudes = estimate_amplitudes(
         field.sites.take(keep), field.radius_m[keep], noise, field.nominal_m
     )
-    return replace(field, amplitudes=known).covariance_m2 + more_m2
+    # Of `covariance_m2` only the amplitudes change; the noise of the set-up itself stays.
+    return replace(field, amplitudes=amplitudes).covariance_m2 + extra_m2
 
 
-def _as_if_moved(columns, mine, precision, pull):
-    """(w, turn, shift) of a set-up whose readings are mine: of all that may move at once, and of
-    its circle, or its station, alone.
-    """
-    columns = columns * mine[:, None]
+def _test_of_movement(columns, is_of_setup, precision, pull):
+    """Test statistic w, rotation alone and displacement alone of one set-up."""
+    columns = columns * is_of_setup[:, None]
+    # Equal scales of rotation and displacement: the pseudo-inverse then drops undetermined
+    # directions.
     scale = np.maximum(np.abs(columns).max(axis=0), 1e-9)
     columns = columns / scale
     normal, right = columns.T @ precision @ columns, columns.T @ pull
     statistic = float(right @ np.linalg.pinv(normal, rcond=1e-6, hermitian=True) @ right)
-    turn = right[0] / max(normal[0, 0], 1e-300) / scale[0]
+    rotation = right[0] / max(normal[0, 0], 1e-300) / scale[0]
     shift = np.linalg.pinv(normal[1:, 1:], rcond=1e-6, hermitian=True) @ right[1:] / scale[1:]
-    return np.sqrt(max(statistic, 0.0)), float(turn), tuple(shift.tolist())
+    return np.sqrt(max(statistic, 0.0)), float(rotation), tuple(shift.tolist())
 
 
-def _as_if_longer(along, mine, precision, pull):
-    """(w, by how much too long) of a set-up whose readings are mine."""
-    column = along * mine
+def _test_of_distances(along, is_of_setup, precision, pull):
+    """Test statistic w and offset of the distances of one set-up, m."""
+    column = along * is_of_setup
     weight = max(column @ precision @ column, 1e-300)
     value = float(column @ pull) / weight
     return float(abs(value) * np.sqrt(weight)), value
 
 
 def worst_setup(tests):
-    """What `moved_setups` found of the set-up that looks most as if it had moved.
+    """Result of `moved_setups` for the set-up with the largest test statistic.
 
     Returns
     -------
     dict or None
-        setup, w, turn_arcsec, shift_mm, as messages have them; None where no test is significant.
+        Keys setup, w, turn_arcsec and shift_mm; None if no test is significant.
     """
-    name = max(tests, key=lambda one: tests[one][0])
-    w, turn, shift = tests[name]
+    name = max(tests, key=lambda setup: tests[setup][0])
+    w, rotation, shift = tests[name]
     if w <= critical_of_setup(len(tests)):
         return None
     return {
         "setup": name,
         "w": w,
-        "turn_arcsec": float(np.degrees(turn) * 3600),
+        "turn_arcsec": float(np.degrees(rotation) * 3600),
         "shift_mm": 1000 * float(np.hypot(*shift)),
     }
 
 
 def critical_of_setup(count):
-    """Test quantity from which one of so many set-ups counts as disturbed."""
+    """Critical value of w for a disturbed set-up, among `count` set-ups."""
     return float(np.sqrt(chdtri(3, ALPHA / max(count, 1))))
 
 
 def critical_of_ranging(count):
-    """Test quantity from which one of so many set-ups counts as one that ranged otherwise."""
+    """Critical value of w for an offset of distances, among `count` set-ups."""
     return float(np.sqrt(chdtri(1, ALPHA_RANGED / max(count, 1))))

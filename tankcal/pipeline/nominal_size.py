@@ -1,6 +1,6 @@
-"""The size of a surveyed tank against its drawing: the rule that every method uses.
+"""Comparison of the surveyed size of a tank with its drawing, by one rule for all methods.
 
-An offset, a scale or a unit that is wrong in all readings of a survey shows in its size alone.
+An offset, a scale or a unit that is wrong in all readings of a survey affects only the size.
 """
 
 from dataclasses import dataclass
@@ -13,20 +13,24 @@ from tankcal.messages import list_some, message
 from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.wall_straps import mean_radii
 
-SHOWN = 5  # names in a message
+SHOWN = 5  # courses named in a message
 
 
 @dataclass(frozen=True)
 class InsideRadii:
-    """Surveyed inside radii against which a drawing is compared.
+    """Surveyed inside radii to compare with a drawing.
 
     Attributes
     ----------
     names : tuple of str
-        Of the courses or rings; one "" of a shape that has one radius.
-    radius_m, plate_m, sd_m : ndarray, shape (n,)
-        Inside radii, plates with their paint, and standard uncertainties of the radii (0 where
-        they are far below what a drawing allows).
+        Names of the n courses or rings; a single "" for a shape with one radius.
+    radius_m : ndarray, shape (n,)
+        Inside radii, m.
+    plate_m : ndarray, shape (n,)
+        Plate thicknesses including paint, m.
+    sd_m : ndarray, shape (n,)
+        Standard uncertainties of the radii, m; 0 where negligible beside the allowance of a
+        drawing.
     """
 
     names: tuple[str, ...]
@@ -36,52 +40,70 @@ class InsideRadii:
 
 
 def allowed_departure_m(job, sd_m=0.0):
-    """By how much an inside radius of a standard uncertainty may differ from the nominal one, m."""
+    """Largest accepted difference between a surveyed and a nominal inside radius, m.
+
+    Parameters
+    ----------
+    job : Job
+        Job with a nominal diameter.
+    sd_m : float
+        Standard uncertainty of the surveyed radius, m.
+    """
     limits, within = limits_of("nominal_size"), job.diameter_within_m
     share = limits["share"] * job.tank.nominal_diameter_m
     return max(share, within or 0.0) / 2 + limits["sds"] * sd_m
 
 
 def nominal_radius_m(job, plate_m):
-    """Inside radius by the drawing, m; the nominal one where the job does not say which it is.
+    """Nominal inside radius, m, for a first course of thickness `plate_m` including paint.
 
-    plate_m  of the first course, with its paint
+    A nominal diameter of unstated kind is taken as the inside diameter.
     """
     return job.tank.nominal_diameter_m / 2 - PLATES_TO_INSIDE[job.diameter_is or INSIDE] * plate_m
 
 
 def departure_of_size(job, inside_m, plate_m, sd_m=0.0):
-    """Departure of an inside radius from the nominal one, m; 0 where the drawing allows it.
+    """Difference between an inside radius and the nominal one, m; 0 within the allowance.
 
-    Where the job does not say which diameter the nominal one is, it may be that of the outside:
-    the departure counts from the nearer of the two.
+    A nominal diameter of unstated kind may be the outside diameter. The difference is then taken to
+    the nearer of the two.
 
     Parameters
     ----------
     job : Job
-        With a nominal diameter.
+        Job with a nominal diameter.
     inside_m, plate_m, sd_m : float
-        Radius, plate with its paint, and standard uncertainty of the radius, m.
+        Inside radius, plate thickness including paint, and standard uncertainty of the radius, m.
+
+    Returns
+    -------
+    float
     """
     nominal = nominal_radius_m(job, plate_m)
+    # An unstated diameter may be inside or outside, so any radius between the two is accepted.
     least = nominal if job.diameter_is is not None else nominal - plate_m
     miss = inside_m - min(max(inside_m, least), nominal)
     return miss if abs(miss) > allowed_departure_m(job, sd_m) else 0.0
 
 
 def inside_radii(job, survey):
-    """`InsideRadii` of what was surveyed; None: of no size, or of one that only the drawing has.
+    """`InsideRadii` of a survey; None if the survey determines no size.
 
     Parameters
     ----------
     job : Job
     survey : Wall, StrappedWall, RingedWall, RadiiWall, StrappedSphere, Scan, mesh or None
+        Object whose `surveyed_as` names the kind of survey.
+
+    Returns
+    -------
+    InsideRadii or None
     """
     kind = None if survey is None else survey.surveyed_as
     if kind in ("wall", "strapped", "radii", "rings"):
         parts = job.rings if kind == "rings" else job.courses
-        plates = np.array([one.thickness_m + one.paint_m for one in parts])
-        names = tuple(getattr(one, "name", str(i)) for i, one in enumerate(parts, 1))
+        plates = np.array([part.thickness_m + part.paint_m for part in parts])
+        names = tuple(getattr(part, "name", str(i)) for i, part in enumerate(parts, 1))
         if kind == "radii":
             radius = survey.radius_m
         elif kind == "rings":
@@ -91,37 +113,37 @@ def inside_radii(job, survey):
         sd = _sds_of_courses(survey, len(parts)) if kind == "wall" else np.zeros(len(parts))
         return InsideRadii(names, radius, plates, sd)
     if kind in ("scan", "circles"):
-        given = job.horizontal or job.sphere
-        plate = given.thickness_m
+        solid = job.horizontal or job.sphere
+        plate = solid.thickness_m
         if kind == "circles":
             radius = survey.solid(plate).diameter_m / 2
         else:
             diameter = dict(zip(survey.names, survey.values, strict=True))["diameter"]
             radius = diameter / 2 - plate * (job.survey.side == "outside")
-        return InsideRadii(("",), *(np.array([float(one)]) for one in (radius, plate, 0.0)))
+        return InsideRadii(("",), *(np.array([float(value)]) for value in (radius, plate, 0.0)))
     return None
 
 
 def _sds_of_courses(wall, count):
-    """(courses,) standard uncertainty of the mean radius of each course by its circles, m."""
-    found = np.zeros(count)
+    """Standard uncertainty of the mean radius of each course from its circles, m."""
+    sd_m = np.zeros(count)
     for course in range(count):
-        circles = [one.circle for one in wall.sections if one.group.course == course]
+        circles = [section.circle for section in wall.sections if section.group.course == course]
         if circles:
-            found[course] = np.sqrt(np.mean([one.cofactor_m2[2, 2] for one in circles]))
-    return found
+            sd_m[course] = np.sqrt(np.mean([circle.cofactor_m2[2, 2] for circle in circles]))
+    return sd_m
 
 
 def refuse_other_size(job, survey):
-    """Raise InputError for a surveyed size that cannot be that of the drawing: another unit."""
-    found, nominal = inside_radii(job, survey), job.tank.nominal_diameter_m
-    if found is None or nominal is None:
+    """Raise InputError for a surveyed size so far from the drawing that a unit must be wrong."""
+    surveyed, nominal = inside_radii(job, survey), job.tank.nominal_diameter_m
+    if surveyed is None or nominal is None:
         return
-    ratio = 2 * found.radius_m / nominal
+    ratio = 2 * surveyed.radius_m / nominal
     wrong = np.flatnonzero((ratio > 1 + IMPOSSIBLE_MISS) | (ratio < 1 / (1 + IMPOSSIBLE_MISS)))
     if len(wrong) == 0:
         return
-    names = [found.names[place] for place in wrong]
+    names = [surveyed.names[place] for place in wrong]
     is_whole = len(wrong) == len(ratio)
     worst = wrong[int(np.argmax(np.abs(np.log(np.maximum(ratio[wrong], 1e-6)))))]
     text = message(
@@ -129,7 +151,7 @@ def refuse_other_size(job, survey):
         "found {nominal_m:g} m, but the survey gives {found_m:.4g} m {where}; expected diameters"
         " within {percent:g} %{guess}",
         nominal_m=nominal,
-        found_m=2 * float(np.median(found.radius_m) if is_whole else found.radius_m[worst]),
+        found_m=2 * float(np.median(surveyed.radius_m) if is_whole else surveyed.radius_m[worst]),
         where=_where([] if is_whole else names),
         percent=100 * IMPOSSIBLE_MISS,
         guess=unit_guess(float(np.median(ratio) if is_whole else ratio[worst])),
@@ -144,35 +166,40 @@ def _where(names):
 
 
 def check_size(job, survey):
-    """`Problem`s of a surveyed size that differs from the drawing's by more than it allows.
+    """`Problem`s for a surveyed size that differs from the drawing by more than the allowance.
 
-    Straps, sights to a bare wall and great circles have lines of their own for the whole of the
-    tank, by the same rule.
+    Straps, sights to a bare wall and great circles have checks of their own for the whole tank, by
+    the same rule.
     """
-    found = inside_radii(job, survey)
-    if found is None or job.tank.nominal_diameter_m is None:
+    surveyed = inside_radii(job, survey)
+    if surveyed is None or job.tank.nominal_diameter_m is None:
         return
-    plate = float(found.plate_m[0])
-    whole = float(np.median(found.radius_m))
-    miss = departure_of_size(job, whole, plate, float(np.median(found.sd_m)))
+    plate = float(surveyed.plate_m[0])
+    median_m = float(np.median(surveyed.radius_m))
+    miss = departure_of_size(job, median_m, plate, float(np.median(surveyed.sd_m)))
     if miss:
         if not _has_own_line(job, survey):
-            yield _unlike_drawing(job, whole, miss)
+            yield _unlike_drawing(job, median_m, miss)
         return
-    if survey.surveyed_as not in ("wall", "radii") or len(found.names) == 1:
+    if survey.surveyed_as not in ("wall", "radii") or len(surveyed.names) == 1:
         return
-    each = zip(found.radius_m, found.sd_m, strict=True)
-    missed = np.array([departure_of_size(job, float(r), plate, float(sd)) for r, sd in each])
-    if np.any(missed):
-        yield _courses_unlike_drawing(job, found.names, missed)
+    radii_and_sds = zip(surveyed.radius_m, surveyed.sd_m, strict=True)
+    # Single courses are compared only when the tank as a whole agrees with the drawing.
+    departures_m = np.array(
+        [departure_of_size(job, float(r), plate, float(sd)) for r, sd in radii_and_sds]
+    )
+    if np.any(departures_m):
+        yield _courses_unlike_drawing(job, surveyed.names, departures_m)
 
 
 def _has_own_line(job, survey):
+    """Whether another check compares the whole tank of this survey with the drawing."""
     is_sighted = job.hits is not None or job.tangents is not None
     return is_sighted or survey.surveyed_as in ("strapped", "rings", "circles")
 
 
 def _unlike_drawing(job, radius_m, miss_m):
+    """Problem of a tank whose median diameter differs from the drawing."""
     text = message(
         "points_unlike_drawing",
         "{nominal_m:g} m, but the survey gives {found_m:.4f} m inside, {miss_mm:+.0f} mm from the"
@@ -185,13 +212,14 @@ def _unlike_drawing(job, radius_m, miss_m):
     return Problem("job.toml", text, column="tank.nominal_diameter_m")
 
 
-def _courses_unlike_drawing(job, names, missed_m):
+def _courses_unlike_drawing(job, names, departures_m):
+    """Problem of single courses whose diameters differ from the drawing."""
     text = message(
         "course_unlike_drawing",
         "{nominal_m:g} m, but the survey gives diameters of courses {courses} up to {miss_mm:+.0f}"
         " mm from the drawing, and of the others not: is a plate or a reading of them wrong?",
         nominal_m=job.tank.nominal_diameter_m,
-        courses=list_some([names[place] for place in np.flatnonzero(missed_m)], SHOWN),
-        miss_mm=2000 * float(missed_m[np.argmax(np.abs(missed_m))]),
+        courses=list_some([names[place] for place in np.flatnonzero(departures_m)], SHOWN),
+        miss_mm=2000 * float(departures_m[np.argmax(np.abs(departures_m))]),
     )
     return Problem("job.toml", text, column="tank.nominal_diameter_m")

@@ -1,8 +1,8 @@
-"""An upright tank of which only the drawing is known: its courses, nominal, with wide doubt.
+"""Wall of an upright tank known from its drawing alone: nominal courses with large uncertainty.
 
-Between the dips of a calibration by liquid it says how the wall goes on, and no more: each course
-is a cylinder whose radius departs from the nominal one by the sd that the job has, and what a
-course does besides (bulge, taper) is in the doubt, as of a strapped wall.
+Such a wall interpolates between the dips of a calibration by liquid. Each course is a cylinder. Its
+radius differs from the nominal radius by the standard uncertainty in the job. Bulge and taper of a
+course are covered by prior components, as in a strapped wall.
 """
 
 from dataclasses import dataclass, replace
@@ -25,12 +25,12 @@ from tankcal.pipeline.wall_readings import (
 )
 from tankcal.pipeline.wall_straps import mean_radii
 
-COMMON = 0.8  # share of the variance of a course's radius that all courses have in common
+COMMON = 0.8  # share of the variance of a radius that is common to all courses
 
 
 @dataclass(frozen=True)
 class NominalWall(ReadWall):
-    """The wall by its drawing, with what a `ReadWall` has; its readings are the nominal radii."""
+    """Wall from the drawing; a `ReadWall` whose readings are the nominal radii."""
 
     surveyed_as = "nominal"
     shell = UprightAxis()
@@ -39,27 +39,39 @@ class NominalWall(ReadWall):
 
     @cached_property
     def radius_m(self):
-        """(courses,) radius of each course, on the side of the survey."""
+        """Radius of each course on the side of the survey, m, shape (courses,)."""
         return mean_radii(self.field)
 
     def lowest_outline(self, azimuth_rad):
-        """(x, y) of the axis, and (n,) radii of the first course, m."""
+        """Position (x, y) of the axis and radii (n,) of the first course, m."""
         return 0.0, 0.0, np.full(len(azimuth_rad), self.radius_m[0])
 
     def factors(self, job, weights):
-        """`Factor`s of what the drawing leaves uncertain: all courses together, and each."""
-        return tuple(replace(one, type="B") for one in factors_of_readings(self.accepted, weights))
+        """`Factor`s of the uncertainty of the drawing: common to all courses and of each."""
+        return tuple(
+            replace(factor, type="B") for factor in factors_of_readings(self.accepted, weights)
+        )
 
     def read_with(self, weights):
-        """Nothing was read with anything."""
+        """Return no derivatives: no instrument input affects a nominal wall."""
         return {}
 
 
 def find_nominal_wall(job, progress=lambda text: None):
-    """`NominalWall` of an upright job by its nominal diameter and courses.
+    """`NominalWall` of an upright job from its nominal diameter and courses.
 
-    The sd of a radius is that of the job's liquid; all courses have most of it in common, for what
-    is wrong of a nominal diameter is wrong of all.
+    The job's liquid section gives the standard uncertainty of a radius. Most of its variance is
+    common to all courses, because an error of the nominal diameter affects all courses.
+
+    Parameters
+    ----------
+    job : Job
+    progress : callable
+        Called with a line of text when the step begins.
+
+    Returns
+    -------
+    NominalWall
     """
     progress(message("nominal_wall", "taking the wall of the drawing, which liquid will measure"))
     joints, zero, sd = joints_of(job), shell_zero(job, None), job.liquid.u_radius_m
@@ -82,9 +94,9 @@ def find_nominal_wall(job, progress=lambda text: None):
     def field_of(accepted):
         return field_of_readings(sites, readings, noise, job.tank.nominal_diameter_m / 2)
 
-    all_of_them = np.zeros(len(readings), dtype=bool)
-    radius = np.array([one.radius_m for one in readings])
+    none_rejected = np.zeros(len(readings), dtype=bool)
+    radius = np.array([reading.radius_m for reading in readings])
     field, tested = settle_readings(
-        field_of(all_of_them), field_of, (sites, radius, noise), all_of_them
+        field_of(none_rejected), field_of, (sites, radius, noise), none_rejected
     )
     return NominalWall(joints, zero, tuple(readings), np.arange(len(readings)), tested, field)

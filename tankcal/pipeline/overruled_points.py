@@ -1,4 +1,4 @@
-"""What was decided by hand about points of the wall and about readings, as the chain takes it."""
+"""Manual decisions about points of the wall and about readings, applied to the data of a job."""
 
 from dataclasses import replace
 
@@ -9,63 +9,69 @@ from tankcal.messages import message
 
 
 def decisions_of(job):
-    """(n,) of the points of a job: 1 kept, -1 left out, 0 not decided.
+    """Decision about each point of a job, shape (n,): 1 kept, -1 left out, 0 undecided.
 
-    Raises InputError for a name that none of them has.
+    Raises InputError for a decision about an unknown point.
     """
     decided, problems = np.zeros(len(job.points.names), dtype=int), []
     place = {name: i for i, name in enumerate(job.points.names)}
-    for one in _of_points(job):
-        if one.point in place:
-            decided[place[one.point]] = 1 if one.is_kept else -1
+    for decision in _point_decisions(job):
+        if decision.point in place:
+            decided[place[decision.point]] = 1 if decision.is_kept else -1
             continue
         text = message(
             "overruled_not_of_wall",
             "found {point!r}; expected a point of the wall: this one was not adjusted, or is only"
             " compared",
-            point=one.point,
+            point=decision.point,
         )
-        problems.append(Problem(one.file, text, one.row, "point"))
+        problems.append(Problem(decision.file, text, decision.row, "point"))
     if problems:
         raise InputError(problems)
     return decided
 
 
 def refuse_kept(job, off_m, most_m, reason=None):
-    """Raise InputError where a point was kept that no wall can have.
+    """Raise InputError for kept points that cannot belong to a wall.
 
-    off_m   (n,) of the points from the wall
-    most_m  that a wall departs
-    reason  (n,) code of `geometry.shell.Shell`; None: none is refused for its place alone
+    Parameters
+    ----------
+    job : Job
+    off_m : ndarray, shape (n,)
+        Distances of the points from the wall, m.
+    most_m : float
+        Largest possible distance of a wall point, m.
+    reason : ndarray of str, shape (n,), optional
+        Codes of `geometry.shell.Shell`; None: refuse points for their distance only.
     """
     decided = decisions_of(job)
     reason = np.full(len(off_m), "", dtype=object) if reason is None else reason
-    at_fault = {}
+    reasons_by_name = {}
     for i in np.flatnonzero((decided > 0) & ((np.abs(off_m) > most_m) | (reason != ""))):
-        at_fault[job.points.names[i]] = _why_not(reason[i], float(off_m[i]), most_m)
-    if at_fault:
+        reasons_by_name[job.points.names[i]] = _why_not(reason[i], float(off_m[i]), most_m)
+    if reasons_by_name:
         raise InputError(
-            Problem(one.file, at_fault[one.point], one.row, "point")
-            for one in _of_points(job)
-            if one.point in at_fault
+            Problem(decision.file, reasons_by_name[decision.point], decision.row, "point")
+            for decision in _point_decisions(job)
+            if decision.point in reasons_by_name
         )
 
 
-def _why_not(reason, off_m, most_m):
-    """What is said of a kept point that no wall can have."""
-    if reason == "above_shell":
+def _why_not(code, off_m, most_m):
+    """Message about a kept point that cannot belong to a wall."""
+    if code == "above_shell":
         return message(
             "kept_above_shell",
             "found keep, but it stands above the top of the shell; expected a point between bottom"
             " and top: look at the heights of the courses",
         )
-    if reason == "below_shell":
+    if code == "below_shell":
         return message(
             "kept_below_shell",
             "found keep, but it stands below the bottom of the shell; expected a point between"
             " bottom and top: look at datum.bottom_z_m",
         )
-    if reason == "same_place":
+    if code == "same_place":
         return message(
             "kept_same_place",
             "found keep, but another point stands at the same place; expected a point of its own:"
@@ -80,88 +86,110 @@ def _why_not(reason, off_m, most_m):
     )
 
 
-def _of_points(job):
-    return [one for one in job.overrulings if one.table is None]
+def _point_decisions(job):
+    """Decisions of a job about points, not readings."""
+    return [decision for decision in job.overrulings if decision.table is None]
 
 
 def with_decided_readings(measurements, overrulings):
-    """Measurements in which readings that are left out are only compared, and kept ones marked.
+    """Mark excluded readings as check readings and record kept readings.
 
     Parameters
     ----------
     measurements : Measurements
     overrulings : tuple of Overruling
+
+    Returns
+    -------
+    Measurements
+        With the check flags set, and the kept readings as pairs (file, row).
     """
     rows = {True: {}, False: {}}
-    for one in overrulings:
-        if one.table is not None:
-            rows[one.is_kept].setdefault(one.table, set()).add(one.reading_row)
+    for decision in overrulings:
+        if decision.table is not None:
+            rows[decision.is_kept].setdefault(decision.table, set()).add(decision.reading_row)
     if not (rows[True] or rows[False]):
         return measurements
 
-    def compared(of, name):
-        if of is None or not of.rows or name not in rows[False]:
-            return of
-        return replace(of, check=np.asarray(of.check) | np.isin(of.rows, [*rows[False][name]]))
+    def compared(readings, name):
+        if readings is None or not readings.rows or name not in rows[False]:
+            return readings
+        return replace(
+            readings,
+            check=np.asarray(readings.check) | np.isin(readings.rows, [*rows[False][name]]),
+        )
 
-    tables = [(one, one.table) for one in measurements.readings]
+    tables = [(reading, reading.table) for reading in measurements.readings]
     tables.append((measurements.image_points, "image_points"))
-    kept = {
-        (one.file, row)
-        for one, name in tables
-        if one is not None and _is_own(one, name)
+    kept_keys = {
+        (readings.file, row)
+        for readings, name in tables
+        if readings is not None and _is_from_table(readings, name)
         for row in rows[True].get(name, ())
     }
-    *readings, images = (compared(one, name) if _is_own(one, name) else one for one, name in tables)
+    *readings, images = (
+        compared(readings, name) if _is_from_table(readings, name) else readings
+        for readings, name in tables
+    )
     return replace(
-        measurements, readings=tuple(readings), image_points=images, kept=frozenset(kept)
+        measurements, readings=tuple(readings), image_points=images, kept=frozenset(kept_keys)
     )
 
 
 def refuse_kept_readings(job, adjustment):
-    """Raise InputError for kept readings that are none of their own in the adjustment, or whose
-    point the search left without the others.
+    """Raise InputError for kept readings that do not appear in the adjustment.
+
+    Either the reading was averaged with others, or the search rejected so many readings of its
+    point that the point is not adjusted.
     """
-    found = set(zip(*(adjustment.readings.columns[one] for one in ("file", "row")), strict=True))
-    files = {one.table: one.file for one in job.measurements.readings if _is_own(one, one.table)}
+    adjusted = set(
+        zip(*(adjustment.readings.columns[column] for column in ("file", "row")), strict=True)
+    )
+    files = {
+        reading.table: reading.file
+        for reading in job.measurements.readings
+        if _is_from_table(reading, reading.table)
+    }
     if job.measurements.image_points is not None:
         files["image_points"] = job.measurements.image_points.file
     problems = []
-    for one in job.overrulings:
-        place = files.get(one.table), one.reading_row
-        if one.table is None or not one.is_kept or place in found:
+    for decision in job.overrulings:
+        reading_key = files.get(decision.table), decision.reading_row
+        if decision.table is None or not decision.is_kept or reading_key in adjusted:
             continue
-        text = _not_adjusted(one, is_tried=place in _tried(adjustment.adjusted.survey))
-        problems.append(Problem(one.file, text, one.row, "row"))
+        text = _not_adjusted(
+            decision, is_tried=reading_key in _initial_readings(adjustment.adjusted.survey)
+        )
+        problems.append(Problem(decision.file, text, decision.row, "row"))
     if problems:
         raise InputError(problems)
 
 
-def _tried(survey):
-    """{(file, row)} of all readings that an adjustment began with."""
-    traces = [one.trace for one in survey.tables.values() if one.trace is not None]
+def _initial_readings(survey):
+    """Set of (file, row) of all readings at the start of an adjustment."""
+    traces = [table.trace for table in survey.tables.values() if table.trace is not None]
     return {(trace.file, row) for trace in traces for row in trace.rows}
 
 
-def _not_adjusted(one, *, is_tried):
-    """What is said of a kept reading that was not adjusted."""
+def _not_adjusted(decision, *, is_tried):
+    """Message about a kept reading that was not adjusted."""
     if is_tried:
         return message(
             "kept_point_lost",
             "found keep for row {row} of {table}, but the search set so many others of its point"
             " aside that it is no longer adjusted; expected to keep those, too, or not this one",
-            row=one.reading_row,
-            table=one.table,
+            row=decision.reading_row,
+            table=decision.table,
         )
     return message(
         "kept_no_reading",
         "found row {row} of {table}; it was not adjusted by itself: expected the first of the"
         " readings that were averaged with it, of points that are adjusted",
-        row=one.reading_row,
-        table=one.table,
+        row=decision.reading_row,
+        table=decision.table,
     )
 
 
-def _is_own(of, name):
-    """Do rows of the table of that name stand in it, and not those of a bar's readings?"""
-    return of is None or name in of.file
+def _is_from_table(readings, name):
+    """Whether readings come from the file of that table, not from the readings of a bar."""
+    return readings is None or name in readings.file

@@ -1,7 +1,7 @@
-"""What overruling the search changed: what the search said of each, and the volume without it.
+"""Effect of manual decisions: what the search does without them, and how they change the volume.
 
-The job is found once more without any decision, which is what the search says, and once more
-without each: the volume is not linear in who is of the wall. Only volumes are computed for that.
+The job is solved again without any decision, and once without each decision. The volume is not
+linear in the accepted points, so separate solutions are needed. Only volumes are computed.
 """
 
 from dataclasses import dataclass, replace
@@ -15,30 +15,30 @@ from tankcal.messages import message
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.tanks import body_of
 
-SHOWN = 10  # names in a sentence
+SHOWN = 10  # names listed in a message
 NO_SOLUTION = "no_solution"
-MOST_ALONE = 10  # overrulings whose effect is computed one by one
-OUTRAGEOUS = 10.0  # w of a kept reading beyond which it is told
-OUTRAGEOUS_M = 0.030  # from the wall: the same of a kept point, whatever its w
+MOST_ALONE = 10  # largest number of decisions whose effects are computed separately
+OUTRAGEOUS = 10.0  # |w| of a kept point or reading that causes a warning
+OUTRAGEOUS_M = 0.030  # distance of a kept point from the wall that causes a warning
 
 
 @dataclass(frozen=True)
 class Overruled:
-    """A decision, what the search says of the same without any, and what it is worth.
+    """A decision, the result of the search without decisions, and the effect on the volume.
 
     Attributes
     ----------
     decision : Overruling
     searched : str
-        What the search does with it: "" it is used, else the code of a reason ("removed" of a
-        reading); "no_solution" where the search alone finds none, or none with it.
+        Result of the search: "" if used, else the code of a reason ("removed" for a reading);
+        "no_solution" if the search alone finds no solution, or none with this point or reading.
     off_m : float
-        From the wall as the search has it, outwards, m; nan of a reading.
+        Distance from the wall that the search finds, outwards, m; nan for a reading.
     w : float
-        Its normalised residual there; nan: none was computed.
+        Normalised residual in that solution; nan if not computed.
     moved_m3 : float
-        The volume at the top of the table less what it is without this decision, m3; nan: not
-        computed, or without it there is no sound solution.
+        Change of the volume at the top of the table due to this decision, m3; nan if not computed
+        or if no valid solution exists without the decision.
     """
 
     decision: Overruling
@@ -49,9 +49,9 @@ class Overruled:
 
     @property
     def is_outrageous(self):
-        """Is it kept, and so far off that it must be told?"""
-        far = abs(self.w) > OUTRAGEOUS or abs(self.off_m) > OUTRAGEOUS_M
-        return self.decision.is_kept and bool(far)
+        """Whether the decision keeps a point or reading so discrepant that a warning is due."""
+        is_discrepant = abs(self.w) > OUTRAGEOUS or abs(self.off_m) > OUTRAGEOUS_M
+        return self.decision.is_kept and bool(is_discrepant)
 
 
 @dataclass(frozen=True)
@@ -63,10 +63,10 @@ class Overrulings:
     each : tuple of Overruled
         In the order of the file.
     moved_m3 : float
-        The volume at the top of the table less what the search alone gives, m3; nan where that
-        gives no sound solution.
+        Change of the volume at the top of the table due to all decisions, m3; nan if the search
+        alone gives no valid solution.
     others : tuple of str
-        Points and readings that nobody decided about and that changed sides by these decisions.
+        Points and readings without a decision whose acceptance changes because of the decisions.
     """
 
     each: tuple[Overruled, ...]
@@ -74,45 +74,52 @@ class Overrulings:
     others: tuple[str, ...] = ()
 
 
-def effect_of(job, found, volume_m3, level_m, progress):
-    """`Overrulings` of a job; None where nothing was decided.
+def effect_of(job, surveyed, volume_m3, level_m, progress):
+    """`Overrulings` of a job; None without decisions.
 
     Parameters
     ----------
     job : Job
-        As it was read.
-    found : Surveyed
-        With the decisions.
+        As read.
+    surveyed : Surveyed
+        Solution with the decisions.
     volume_m3, level_m : float
-        Of the top row of its table: the volume, and its level in the frame of the parts.
+        Volume of the top row of the table, and its level in the frame of the parts.
     progress : callable
         Called with a line of text as each step begins.
+
+    Returns
+    -------
+    Overrulings or None
     """
     decisions = job.overrulings
     if not decisions:
         return None
     progress(message("overruling", "computing what overruling the search changed"))
-    plain = _Attempt.of(job, (), level_m)
-    each = [Overruled(one, *plain.says(one)) for one in decisions]
-    together = volume_m3 - plain.volume_m3
+    by_search = _Attempt.of(job, (), level_m)
+    effects = [Overruled(decision, *by_search.says(decision)) for decision in decisions]
+    together = volume_m3 - by_search.volume_m3
     if len(decisions) == 1:
-        each = [replace(each[0], moved_m3=together)]
-    elif len(decisions) <= MOST_ALONE and _is_small(found.job):
-        for i, one in enumerate(each):
-            others = (*decisions[:i], *decisions[i + 1 :])
-            without = _Attempt.of(job, others, level_m).volume_m3
-            each[i] = replace(one, moved_m3=volume_m3 - without)
-    return Overrulings(tuple(each), together, _changed(found, plain.found, decisions))
+        effects = [replace(effects[0], moved_m3=together)]
+    elif len(decisions) <= MOST_ALONE and _is_small(surveyed.job):
+        for i, effect in enumerate(effects):
+            remaining = (*decisions[:i], *decisions[i + 1 :])
+            without = _Attempt.of(job, remaining, level_m).volume_m3
+            effects[i] = replace(effect, moved_m3=volume_m3 - without)
+    return Overrulings(tuple(effects), together, _changed(surveyed, by_search.found, decisions))
 
 
 def _is_small(job):
+    """Whether the job has few enough points to solve it once more for each decision."""
     return job.points is None or len(job.points.names) <= MOST_SITES
 
 
 @dataclass(frozen=True)
 class _Attempt:
-    """A job with some of its decisions: `Surveyed`, or None where there is no sound solution, and
-    its volume.
+    """Solution of a job with some of its decisions.
+
+    `found` is a `Surveyed`, or None without a valid solution; `volume_m3` is its volume at the
+    level.
     """
 
     found: object
@@ -120,90 +127,97 @@ class _Attempt:
 
     @classmethod
     def of(cls, job, decisions, level_m):
-        """With these decisions only."""
+        """Solve a job with the given decisions only."""
         try:
-            found = find_survey(replace(job, overrulings=decisions), lambda text: None)
+            surveyed = find_survey(replace(job, overrulings=decisions), lambda text: None)
             if job.liquid is None:
-                body = body_of(found.job, found.survey, uncertain=False)
+                body = body_of(surveyed.job, surveyed.survey, uncertain=False)
             else:
                 from tankcal.pipeline.liquid import measure_by_liquid
 
-                body = measure_by_liquid(found.job, found.survey).body
-            return cls(found, float(body.volume_m3(np.array([level_m]))[0]))
+                body = measure_by_liquid(surveyed.job, surveyed.survey).body
+            return cls(surveyed, float(body.volume_m3(np.array([level_m]))[0]))
         except (InputError, SolutionError, HeightError):
             return cls(None, np.nan)
 
-    def says(self, one):
-        """(what the search does, distance from the wall m, w) of what was decided."""
+    def says(self, decision):
+        """(Result of the search, distance from the wall in m, w) for the object of a decision."""
         if self.found is None:
             return NO_SOLUTION, np.nan, np.nan
-        if one.table is not None:
-            return self._of_reading(one)
+        if decision.table is not None:
+            return self._state_of_reading(decision)
         points = self.found.job.points
         names = () if points is None else points.names
-        if one.point not in names:
+        if decision.point not in names:
             return NO_SOLUTION, np.nan, np.nan
-        return _states(self.found)[names.index(one.point)]
+        return _states(self.found)[names.index(decision.point)]
 
-    def _of_reading(self, one):
-        file = _file_of(self.found.job.measurements, one.table)
+    def _state_of_reading(self, decision):
+        """Result of the search for the reading of a decision, like `says`."""
+        file = _file_of(self.found.job.measurements, decision.table)
         readings = self.found.adjustment.readings
-        is_it = (readings.columns["file"] == file) & (readings.columns["row"] == one.reading_row)
-        mine = readings.where(is_it)
-        if not len(mine):
+        is_decided = (readings.columns["file"] == file) & (
+            readings.columns["row"] == decision.reading_row
+        )
+        readings_of_row = readings.where(is_decided)
+        if not len(readings_of_row):
             return NO_SOLUTION, np.nan, np.nan
-        worst = max(mine, key=lambda reading: abs(reading.w) if np.isfinite(reading.w) else 0.0)
+        worst = max(
+            readings_of_row, key=lambda reading: abs(reading.w) if np.isfinite(reading.w) else 0.0
+        )
         return "removed" if worst.removed else "", np.nan, float(worst.w)
 
 
 def _file_of(measurements, table):
+    """Name of the file of a table of readings."""
     if table == "image_points":
         return measurements.image_points.file
-    return next(one.file for one in measurements.readings if one.table == table)
+    return next(reading.file for reading in measurements.readings if reading.table == table)
 
 
-def _states(found):
-    """[(reason, distance from the wall m, w)] of all points of a `Surveyed`."""
-    survey = found.survey
-    wall = getattr(survey, "surveyed", survey)  # of declared radii, what was measured again
+def _states(surveyed):
+    """List of (reason, distance from the wall in m, w) of all points of a `Surveyed`."""
+    survey = surveyed.survey
+    wall = getattr(survey, "surveyed", survey)  # for declared radii: the wall measured again
     if hasattr(wall, "shell"):
         shell = wall.shell
         return list(zip(shell.reason, shell.residual_m.tolist(), shell.w.tolist(), strict=True))
-    used = np.isin(np.arange(len(wall.residuals_m)), wall.accepted)
+    is_used = np.isin(np.arange(len(wall.residuals_m)), wall.accepted)
     w = wall.residuals_m / wall.noise_m
-    reason = np.where(used, "", "far_off").tolist()
+    reason = np.where(is_used, "", "far_off").tolist()
     return list(zip(reason, wall.residuals_m.tolist(), w.tolist(), strict=True))
 
 
-def _changed(found, plain, decisions):
-    """What nobody decided about and the search judges differently now: points, then readings."""
-    if plain is None:
+def _changed(surveyed, by_search, decisions):
+    """Undecided points, then readings, whose acceptance differs from that by the search alone."""
+    if by_search is None:
         return ()
-    decided = {one.what for one in decisions}
+    decided = {decision.what for decision in decisions}
     changed = []
-    if found.job.points is not None and plain.job.points.names == found.job.points.names:
-        states = zip(found.job.points.names, _states(found), _states(plain), strict=True)
-        changed += [name for name, (now, *_), (before, *_) in states if now != before]
-    if found.adjustment is not None:
-        changed += sorted(_removed(found.adjustment) ^ _removed(plain.adjustment))
-    return tuple(one for one in changed if one not in decided)
+    if surveyed.job.points is not None and by_search.job.points.names == surveyed.job.points.names:
+        states = zip(surveyed.job.points.names, _states(surveyed), _states(by_search), strict=True)
+        changed += [name for name, (now, *_), (former, *_) in states if now != former]
+    if surveyed.adjustment is not None:
+        changed += sorted(_removed(surveyed.adjustment) ^ _removed(by_search.adjustment))
+    return tuple(name for name in changed if name not in decided)
 
 
 def _removed(adjustment):
-    """Readings that were rejected, as an `Overruling` names them."""
-    return {f"{one.file.removesuffix('.csv')} {one.row}" for one in adjustment.removed}
+    """Rejected readings, named as in an `Overruling`."""
+    return {
+        f"{removed_reading.file.removesuffix('.csv')} {removed_reading.row}"
+        for removed_reading in adjustment.removed
+    }
 
 
 def warn_of_overrulings(job, overrulings):
-    """Warnings about kept points and readings that are outrageous, and about others that changed
-    sides.
-    """
+    """Warnings of very discrepant kept points and readings, and of changed acceptance of others."""
     if overrulings is None:
         return ()
-    told = [
-        Problem(one.decision.file, _outrageous(one), one.decision.row, "decision")
-        for one in overrulings.each
-        if one.is_outrageous
+    problems = [
+        Problem(effect.decision.file, _outrageous(effect), effect.decision.row, "decision")
+        for effect in overrulings.each
+        if effect.is_outrageous
     ]
     if overrulings.others:
         text = message(
@@ -212,24 +226,24 @@ def warn_of_overrulings(job, overrulings):
             count=len(overrulings.others),
             points=list(overrulings.others[:SHOWN]),
         )
-        told.append(Problem(job.overrulings[0].file, text))
-    return tuple(told)
+        problems.append(Problem(job.overrulings[0].file, text))
+    return tuple(problems)
 
 
-def _outrageous(one):
-    """What is said of it."""
-    if np.isnan(one.off_m):
+def _outrageous(effect):
+    """Message about a very discrepant point or reading that was kept."""
+    if np.isnan(effect.off_m):
         return message(
             "kept_outrageous_reading",
             "{what} was kept, but contradicts all others (w = {w:.1f}): U holds only if it is"
             " right; the certificate says by how much it moves the volume",
-            what=one.decision.what,
-            w=one.w,
+            what=effect.decision.what,
+            w=effect.w,
         )
     return message(
         "kept_outrageous",
         "{what} was kept, but stands {off_mm:.0f} mm off the wall that the others show: U holds"
         " only if it is wall; the certificate says by how much it moves the volume",
-        what=one.decision.what,
-        off_mm=1000 * one.off_m,
+        what=effect.decision.what,
+        off_mm=1000 * effect.off_m,
     )

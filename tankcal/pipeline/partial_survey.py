@@ -1,9 +1,8 @@
-"""An upright tank of which some courses were measured again: former radii, how they may have
-changed, and what the survey of these courses finds (`radii_update`).
+"""Upright tank with former radii, some of whose courses were measured again (see `radii_update`).
 
-What was found of a course is compared as its radius is defined: of the mean area from joint to
-joint, inside, the shell empty, at the temperature of the former radii. The tank of the survey alone
-gives it, with the names of all that it leaves uncertain.
+The new and the former radius of a course are compared under one definition: radius of the mean area
+from joint to joint, inside, shell empty, at the temperature of the former radii. The survey gives
+this radius from a tank of its own, with all its causes of uncertainty.
 """
 
 from dataclasses import dataclass, replace
@@ -22,25 +21,27 @@ from tankcal.pipeline.wall_straps import told_courses
 from tankcal.tank.factors import Factor
 
 CHANGE_OWN, CHANGE_COMMON, SHARED = "radii_change", "radii_change_common", "course_radii_shared"
-FORM = "measured_form"  # of the courses that were measured, between their readings
-LEAST = 1e-9  # of the largest cause: a smaller one is rounding
-NO_MEANING = ("datum", "course_heights")  # between joints: they move with what they bound
-UNKNOWN_M = 1.0  # standard uncertainty of a radius that nobody knew
+FORM = "measured_form"  # form of the measured courses between their readings
+LEAST = 1e-9  # relative size below which a cause counts as rounding
+# These inputs move the joints together with the courses, so mean radii do not depend on them.
+NO_MEANING = ("datum", "course_heights")
+UNKNOWN_M = 1.0  # prior standard uncertainty of a radius that was not known
 
 
 @dataclass(frozen=True)
 class Found:
-    """Radii of some courses as a survey alone finds them.
+    """Radii of some courses determined by a survey alone.
 
     Attributes
     ----------
     radius_m : ndarray, shape (k,)
+        Radii, m.
     causes : tuple of Factor
-        Of the survey's own, (k, c) m.
+        Causes of uncertainty of the survey, with columns (k, c), m.
     by_inputs : dict
-        {declared input: (k,) derivative of the radii}.
+        {declared input: derivative (k,) of the radii}.
     noise_m2 : ndarray, shape (k, k)
-        Of all that.
+        Covariance of the radii by all causes and inputs, m2.
     """
 
     radius_m: np.ndarray
@@ -50,54 +51,61 @@ class Found:
 
 
 def update_by_survey(job, surveyed):
-    """`RadiiWall` of a job whose radii stand beside a survey of some courses.
+    """`RadiiWall` of a job that has former radii and a survey of some courses.
 
     Parameters
     ----------
     job : Job
-        With radii and change.
+        Job with radii and change.
     surveyed : Wall or StrappedWall
-        Of that survey.
+        Wall of the new survey.
+
+    Returns
+    -------
+    RadiiWall
 
     Raises
     ------
     SolutionError
-        Where the former radii do not explain what was found, or share more with the survey than
-        that leaves uncertain.
+        If the former radii do not explain the new radii, or if the declared shared uncertainty
+        exceeds the uncertainty common to the new radii.
     """
     measured = measured_courses(job, surveyed)
-    found, radii, change = _found(job, surveyed, measured), job.radii, job.change
+    measured_radii, radii, change = _radii_by_survey(job, surveyed, measured), job.radii, job.change
     former = np.where(radii.is_known, radii.radius_m, job.tank.nominal_diameter_m / 2)
-    before = _causes_before(radii, change)
-    prior = sum(one.columns @ one.columns.T for one in before)
-    new = _without_shared(found.causes, change.shared_m)
-    misclosure = found.radius_m - former[measured]
-    update = update_radii(prior, measured, misclosure, found.noise_m2, change.shared_m)
+    former_causes = _former_causes(radii, change)
+    prior = sum(cause.columns @ cause.columns.T for cause in former_causes)
+    survey_causes = _subtract_shared(measured_radii.causes, change.shared_m)
+    misclosure = measured_radii.radius_m - former[measured]
+    update = update_radii(prior, measured, misclosure, measured_radii.noise_m2, change.shared_m)
     _refuse_surprise(job, update)
-    causes = [one.mapped(lambda columns: update.kept @ columns) for one in before]
-    causes += [one.mapped(lambda columns: update.gain @ columns) for one in new]
+    causes = [cause.mapped(lambda columns: update.kept @ columns) for cause in former_causes]
+    causes += [cause.mapped(lambda columns: update.gain @ columns) for cause in survey_causes]
     if change.shared_m:
-        both = (update.kept.sum(axis=1) + update.gain.sum(axis=1))[:, None] * change.shared_m
-        causes = [_less_shared(one, radii, change.shared_m) for one in causes]
-        causes.append(Factor(SHARED, both, u=1000 * change.shared_m, unit="mm", type="B"))
-    by_inputs = {name: update.gain @ column for name, column in found.by_inputs.items()}
+        shared_columns = (update.kept.sum(axis=1) + update.gain.sum(axis=1))[
+            :, None
+        ] * change.shared_m
+        causes = [_less_shared(cause, radii, change.shared_m) for cause in causes]
+        causes.append(Factor(SHARED, shared_columns, u=1000 * change.shared_m, unit="mm", type="B"))
+    by_inputs = {name: update.gain @ column for name, column in measured_radii.by_inputs.items()}
     wall = wall_of_radii(job, former + update.change_m, causes, by_inputs)
-    u_found = np.sqrt(np.diag(found.noise_m2))
-    more = Updated(surveyed, update, found.radius_m, u_found, np.sqrt(np.diag(prior)))
-    return replace(wall, updated=more)
+    u_found = np.sqrt(np.diag(measured_radii.noise_m2))
+    updated = Updated(surveyed, update, measured_radii.radius_m, u_found, np.sqrt(np.diag(prior)))
+    return replace(wall, updated=updated)
 
 
 def measured_courses(job, surveyed):
-    """(k,) indices of the courses that the survey tells, from the bottom up."""
-    seen = set()
+    """Indices (k,) of the courses that the survey determines, from the bottom up."""
+    courses_of_points = set()
     if not isinstance(surveyed, StrappedWall):
-        seen = {section.group.course for section in surveyed.sections}
-    return np.array(sorted(told_courses(job, seen)), dtype=int)
+        courses_of_points = {section.group.course for section in surveyed.sections}
+    return np.array(sorted(told_courses(job, courses_of_points)), dtype=int)
 
 
-def _found(job, surveyed, measured):
-    """`Found` of the courses: sqrt(A / pi), A their mean area from joint to joint."""
-    alone = replace(
+def _radii_by_survey(job, surveyed, measured):
+    """`Found` of the measured courses: sqrt(A / pi), with A the mean area from joint to joint."""
+    # No bottom, deadwood, roof or liquid: the radii then describe the empty shell alone.
+    job_of_survey = replace(
         job,
         radii=None,
         change=None,
@@ -111,7 +119,7 @@ def _found(job, surveyed, measured):
             other_densities_kg_m3=(),
         ),
     )
-    body = body_of(alone, surveyed)
+    body = body_of(job_of_survey, surveyed)
     courses = body.shell.volume.courses
     levels = np.array([courses[0].bottom_m, *(course.top_m for course in courses)])
     heights = np.diff(levels)[measured]
@@ -120,49 +128,54 @@ def _found(job, surveyed, measured):
         return np.diff(values, axis=0)[measured]
 
     radius = np.sqrt(of_courses(body.volume_m3(levels)) / (np.pi * heights))
+    # Derivative of r = sqrt(V / (pi h)) by the volume V of a course of height h.
     per_m3 = 1 / (2 * np.pi * radius * heights)
     causes = [
         Factor(
-            one.kind, per_m3[:, None] * of_courses(one.columns_m3), one.dof, one.u, one.unit,
-            type=one.type, note=one.note, is_default=one.is_default,
+            cause.kind, per_m3[:, None] * of_courses(cause.columns_m3), cause.dof, cause.u,
+            cause.unit,
+            type=cause.type, note=cause.note, is_default=cause.is_default,
         )
-        for one in body.shell.sources(levels)
+        for cause in body.shell.sources(levels)
     ]  # fmt: skip
-    causes = _named(causes)
-    derivatives, declared = body.derivatives(levels), {one.name: one.u for one in job.inputs}
+    causes = _significant_causes(causes)
+    derivatives, declared = (
+        body.derivatives(levels),
+        {declared_input.name: declared_input.u for declared_input in job.inputs},
+    )
     by_inputs = {
         name: per_m3 * of_courses(derivatives[name])
         for name in declared
         if name in derivatives and name not in NO_MEANING
     }
-    by_inputs = {name: one for name, one in by_inputs.items() if np.any(one)}
-    noise = sum(one.columns @ one.columns.T for one in causes)
+    by_inputs = {name: column for name, column in by_inputs.items() if np.any(column)}
+    noise = sum(cause.columns @ cause.columns.T for cause in causes)
     for name, column in by_inputs.items():
         noise = noise + declared[name] ** 2 * np.outer(column, column)
     return Found(radius, causes, by_inputs, noise)
 
 
-def _named(causes):
-    """Causes that bear, the form of the wall between readings as one."""
-    felt = LEAST * max(np.abs(one.columns).max(initial=0.0) for one in causes)
-    causes = [one for one in causes if np.abs(one.columns).max(initial=0.0) > felt]
-    of_form = [one for one in causes if one.kind in KINDS]
-    others = tuple(one for one in causes if one.kind not in KINDS)
-    if not of_form:
-        return others
-    columns = np.hstack([one.columns for one in of_form])
-    by = "B" if any(one.type == "B" for one in of_form) else "A"
-    return (*others, Factor(FORM, columns, type=by))
+def _significant_causes(causes):
+    """Causes above rounding, with all components of the form of the wall merged into `FORM`."""
+    least_column_m = LEAST * max(np.abs(cause.columns).max(initial=0.0) for cause in causes)
+    causes = [cause for cause in causes if np.abs(cause.columns).max(initial=0.0) > least_column_m]
+    form_causes = [cause for cause in causes if cause.kind in KINDS]
+    other_causes = tuple(cause for cause in causes if cause.kind not in KINDS)
+    if not form_causes:
+        return other_causes
+    columns = np.hstack([cause.columns for cause in form_causes])
+    type_ = "B" if any(cause.type == "B" for cause in form_causes) else "A"
+    return (*other_causes, Factor(FORM, columns, type=type_))
 
 
-def _causes_before(radii, change):
-    """`Factor`s of the former radii, and of how they may have changed since."""
+def _former_causes(radii, change):
+    """`Factor`s of the former radii and of their change since."""
     count, unknown = len(radii.radius_m), np.flatnonzero(~radii.is_known)
-    common, own = causes_of(radii)
-    wide = np.hstack([own.columns, UNKNOWN_M * np.eye(count)[:, unknown]])
+    common, separate = causes_of(radii)
+    columns = np.hstack([separate.columns, UNKNOWN_M * np.eye(count)[:, unknown]])
     return (
         common,
-        replace(own, columns=wide),
+        replace(separate, columns=columns),
         Factor(
             CHANGE_COMMON, np.full((count, 1), change.common_m), u=1000 * change.common_m,
             unit="mm", type="B",
@@ -172,45 +185,47 @@ def _causes_before(radii, change):
 
 
 def _less_shared(cause, radii, shared_m):
-    """The common cause of the former radii without what the new survey shares with it."""
+    """The common cause of the former radii, without the part shared with the new survey."""
     if cause.kind != COMMON or not radii.u_common_m:
         return cause
     return cause.mapped(lambda columns: columns * np.sqrt(1 - (shared_m / radii.u_common_m) ** 2))
 
 
-def _without_shared(causes, shared_m):
-    """Causes of the survey without one that all of its courses share: F F' less shared^2 1 1'.
+def _subtract_shared(causes, shared_m):
+    """Causes of the survey without the shared part of all courses: F F' - shared^2 1 1'.
 
-    With F a = shared 1 the rest is F (I - a a')^(1/2).
+    With F a = shared 1 the remainder is F (I - a a')^(1/2).
     """
     if not shared_m:
         return causes
-    whole = np.hstack([one.columns for one in causes])
-    all_of_them = np.full(len(whole), shared_m)
-    a = np.linalg.lstsq(whole, all_of_them, rcond=None)[0]
-    size = float(a @ a)
-    if size > 1 or not np.allclose(whole @ a, all_of_them, rtol=1e-6):
+    columns = np.hstack([cause.columns for cause in causes])
+    shared = np.full(len(columns), shared_m)
+    a = np.linalg.lstsq(columns, shared, rcond=None)[0]
+    norm2 = float(a @ a)
+    if norm2 > 1 or not np.allclose(columns @ a, shared, rtol=1e-6):
         raise SolutionError(
             message(
                 "shared_beyond_survey",
                 "change.shared_mm = {shared:g} is more than the new survey leaves uncertain of all"
                 " its courses together, {most:.2g} mm: a part of it was expected",
                 shared=1000 * shared_m,
-                most=1000 * shared_m / np.sqrt(size),
+                most=1000 * shared_m / np.sqrt(norm2),
             )
         )
-    rest = whole - (1 - np.sqrt(1 - size)) / size * np.outer(whole @ a, a)
-    ends = np.cumsum([one.columns.shape[1] for one in causes])[:-1]
-    parts = np.split(rest, ends, axis=1)
-    return tuple(replace(one, columns=part) for one, part in zip(causes, parts, strict=True))
+    # Rank-one square root of I - a a', applied from the right: F (I - (1 - sqrt(1 - a'a)) a a' /
+    # a'a).
+    remaining = columns - (1 - np.sqrt(1 - norm2)) / norm2 * np.outer(columns @ a, a)
+    ends = np.cumsum([cause.columns.shape[1] for cause in causes])[:-1]
+    parts = np.split(remaining, ends, axis=1)
+    return tuple(replace(cause, columns=part) for cause, part in zip(causes, parts, strict=True))
 
 
 def _refuse_surprise(job, update):
-    """Raise SolutionError for courses that the former radii do not explain."""
-    far = np.flatnonzero(np.abs(update.w) > LARGEST_W)
-    if not len(far):
+    """Raise SolutionError for courses whose new radius the former radii do not explain."""
+    discrepant = np.flatnonzero(np.abs(update.w) > LARGEST_W)
+    if not len(discrepant):
         return
-    told = [
+    texts = [
         message(
             "former_radius_surprise",
             "course {course} was found {found:+.2f} mm from its former radius, {w:.2f} times the"
@@ -222,11 +237,11 @@ def _refuse_surprise(job, update):
             w=abs(update.w[i]),
             most=LARGEST_W,
         )
-        for i in far
+        for i in discrepant
     ]
     measure_all = message(
         "former_radii_refused",
         "the former radii do not explain what was found: measure all courses, or declare in"
         " [change] how far the tank may have changed",
     )
-    raise SolutionError(measure_all, *told)
+    raise SolutionError(measure_all, *texts)

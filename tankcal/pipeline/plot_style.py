@@ -1,6 +1,6 @@
-"""The one style of drawings, for notebooks and papers: colours, width, margins, round factors.
+"""Common style of drawings in notebooks and reports: colours, width, margins, round factors.
 
-Lengths of the page are inches.
+Page lengths are in inches.
 """
 
 import io
@@ -11,7 +11,8 @@ from math import ceil, floor, log10
 import matplotlib
 from matplotlib.figure import Figure
 
-logging.getLogger("matplotlib").setLevel(logging.ERROR)  # no remark about its font cache on paper
+# Keeps remarks on the font cache out of reports.
+logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 STYLE = {
     "font.family": ["STIXGeneral", "DejaVu Serif"],
@@ -29,12 +30,12 @@ STYLE = {
 INK, RED, PALE = "#1f4e79", "#b03a2e", "#9db8d2"
 GREY, FAINT = "#445566", "#9aa5b1"
 WIDTH = 6.5
-MANY = 500  # points in a panel: from here on their picture is smaller than their outlines
+MANY = 500  # points in a panel above which an image is smaller than vector outlines
 _DPI_ON_SCREEN = 110
 
 
 def styled(draw, **more):
-    """A function that draws in the one style of notebooks and papers; `more` adds to that style."""
+    """Wrap a drawing function so that it uses `STYLE`, extended by `more`."""
 
     @wraps(draw)
     def drawing(*arguments, **options):
@@ -53,13 +54,13 @@ class Drawing(Figure):
         return image.getvalue()
 
 
-def round_factor(wanted):
-    """The largest of 1, 2, 5 times a power of ten that is at most `wanted`, and at least 1.
+def round_factor(limit):
+    """Largest of 1, 2, 5 times a power of ten that is at most `limit`, and at least 1.
 
     Parameters
     ----------
-    wanted : float
-        Above 0.
+    limit : float
+        Positive.
 
     Returns
     -------
@@ -70,18 +71,19 @@ def round_factor(wanted):
     >>> round_factor(470.0), round_factor(0.3)
     (200, 1)
     """
-    power = 10.0 ** floor(log10(wanted))
-    return max(1, round(power * max(step for step in (1, 2, 5) if step * power <= wanted)))
+    power = 10.0 ** floor(log10(limit))
+    return max(1, round(power * max(step for step in (1, 2, 5) if step * power <= limit)))
 
 
 def even_groups(items, most):
-    """Split items into groups of nearly equal size: sections into figures, columns into tables.
+    """Split items into groups of nearly equal size.
 
     Parameters
     ----------
     items : sequence
+        For example sections of figures, or columns of tables.
     most : int
-        Items in one group.
+        Largest number of items in a group.
 
     Returns
     -------
@@ -98,12 +100,12 @@ def even_groups(items, most):
 
 
 def rasterize_many(points):
-    """Very many points are drawn as a picture inside the figure."""
+    """Plot options that draw more than `MANY` points as an image inside a vector figure."""
     return {"rasterized": len(points) > MANY}
 
 
 def set_margins(figure, left, right, bottom, top, **spaces):
-    """Margins of a figure in inches."""
+    """Set the margins of a figure, in inches."""
     width, height = figure.get_size_inches()
     figure.subplots_adjust(
         left=left / width, right=1 - right / width, bottom=bottom / height, top=1 - top / height,

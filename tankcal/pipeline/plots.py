@@ -1,7 +1,7 @@
-"""Drawings of a calibrated tank: sections, the wall unrolled, the table and its budget.
+"""Drawings of a calibrated tank: sections, unrolled wall, capacity table and uncertainty budget.
 
-Plain numbers go in, `Drawing`s come out, in the one style of `tankcal.pipeline.plot_style`. The
-words at the axes are those of WORDS, or of `words(key, **values)`.
+The functions take plain numbers and return `Drawing`s in the style of
+`tankcal.pipeline.plot_style`. Axis labels come from WORDS, or from `words(key, **values)`.
 """
 
 import textwrap
@@ -37,32 +37,32 @@ WORDS = {
     "section": "Section {section}",
     "section_height": "height {height}",
 }
-LEAST_SHARE = 1e-3  # of the variance: less is no bar
-LETTERS_OF_A_BAR = 46  # in a line of its name
-SHELL_SHARE = 0.03  # of its cut: so far the cut of a shell changes with height
-BOTTOM_SHARE = 0.8  # of the cut of the shell: below it the curve of a bottom would hide the shell's
-_TURN = (-4, 364)  # degrees: points at north are not cut off
+LEAST_SHARE = 1e-3  # share of the variance below which no bar is drawn
+LETTERS_OF_A_BAR = 46  # characters in a line of a bar's label
+SHELL_SHARE = 0.03  # largest relative change of the area of a shell with height
+BOTTOM_SHARE = 0.8  # area over that of the shell below which a bottom gets its own panel
+_TURN = (-4, 364)  # azimuth axis in degrees; wider than a turn to show points at north whole
 
 
 def english_label(key, **values):
-    """The word of WORDS at an axis, its places filled."""
+    """Axis label from WORDS with its placeholders filled."""
     return WORDS[key].format(**values)
 
 
 @dataclass(frozen=True)
 class Ring:
-    """A section as it is drawn: its circle, its outline, and the residuals of its points.
+    """A section to be drawn: its circle, its outline and the residuals of its points.
 
     Attributes
     ----------
     name, height : str
-        What stands beside it.
+        Title of the drawing.
     radius_m : float
-        Of the circle, m.
+        Radius of the circle, m.
     azimuth_deg, residual_m : ndarray, shape (n,)
-        Of the points: azimuth, and distance from the circle, outwards positive, m.
+        Azimuths of the points, degrees, and distances from the circle, outwards positive, m.
     outline_deg, outline_m : ndarray, shape (m,)
-        Azimuths of the outline and its radii about the centre of the circle, m.
+        Azimuths of the outline, degrees, and radii about the centre of the circle, m.
     """
 
     name: str
@@ -75,11 +75,11 @@ class Ring:
 
     @property
     def deviation_m(self):
-        """(m,) the outline less the circle."""
+        """Outline radii minus the radius of the circle, m, shape (m,)."""
         return np.asarray(self.outline_m) - self.radius_m
 
     def title(self, words):
-        """[name, height] as they stand at its drawing."""
+        """Labels [name, height] of the drawing."""
         return [
             words("section", section=self.name),
             words("section_height", height=self.height),
@@ -87,15 +87,15 @@ class Ring:
 
 
 def residual_panels(rings, words=english_label, most=8):
-    """Residuals in mm against azimuth, one panel a section.
+    """Plot residuals in mm against azimuth, with one panel per section.
 
     Parameters
     ----------
     rings : sequence of Ring
     words : callable, optional
-        words(key, **values) gives the texts at the axes; English by default.
+        words(key, **values) gives the axis labels; English by default.
     most : int, default 8
-        Panels in one figure.
+        Largest number of panels in a figure.
 
     Returns
     -------
@@ -110,6 +110,7 @@ def residual_panels(rings, words=english_label, most=8):
 
 @styled
 def _residual_panels(rings, limit_mm, words):
+    """Figure with one panel of residuals per section, all with the same limits."""
     figure = Drawing(figsize=(WIDTH, 0.55 * len(rings) + 0.55))
     axes = figure.subplots(len(rings), 1, sharex=True, squeeze=False)[:, 0]
     for ax, ring in zip(axes, rings, strict=True):
@@ -129,9 +130,12 @@ def _residual_panels(rings, limit_mm, words):
 
 
 def polar_factor(rings):
-    """How many times `polar` enlarges the deviations: 1, 2 or 5 times a power of ten."""
+    """Factor by which `polar` enlarges deviations: 1, 2 or 5 times a power of ten."""
     largest = max(
-        max(np.max(np.abs(of), initial=0.0) for of in (ring.deviation_m, ring.residual_m))
+        max(
+            np.max(np.abs(distances_m), initial=0.0)
+            for distances_m in (ring.deviation_m, ring.residual_m)
+        )
         / ring.radius_m
         for ring in rings
     )
@@ -139,15 +143,15 @@ def polar_factor(rings):
 
 
 def polar(rings, words=english_label, most=12):
-    """The sections about their circles, deviations enlarged by `polar_factor`.
+    """Plot the sections about their circles, with deviations enlarged by `polar_factor`.
 
     Parameters
     ----------
     rings : sequence of Ring
     words : callable, optional
-        words(key, **values) gives the texts; English by default.
+        words(key, **values) gives the labels; English by default.
     most : int, default 12
-        Sections in one figure.
+        Largest number of sections in a figure.
 
     Returns
     -------
@@ -159,20 +163,21 @@ def polar(rings, words=english_label, most=12):
 
 @styled
 def _polar_panels(rings, factor, words):
-    across = 3 if len(rings) <= 6 else 4
-    down = ceil(len(rings) / across)
-    figure = Drawing(figsize=(WIDTH, 5.4 / across * down))
-    axes = figure.subplots(down, across, squeeze=False).ravel()
-    turn = np.linspace(0, 2 * np.pi, 361)
+    """Figure of sections about their circles, with a common enlargement."""
+    columns = 3 if len(rings) <= 6 else 4
+    rows = ceil(len(rings) / columns)
+    figure = Drawing(figsize=(WIDTH, 5.4 / columns * rows))
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    angle = np.linspace(0, 2 * np.pi, 361)
     for ax, ring in zip(axes, rings, strict=False):
-        ax.plot(np.sin(turn), np.cos(turn), color=FAINT, linewidth=0.6)
+        ax.plot(np.sin(angle), np.cos(angle), color=FAINT, linewidth=0.6)
         line = _enlarged(ring.outline_deg, ring.deviation_m / ring.radius_m, factor)
         closed = np.concatenate([line, line[:, :1]], axis=1)
         ax.plot(*closed, color=INK)
         residual = np.asarray(ring.residual_m) / ring.radius_m
         points = _enlarged(ring.azimuth_deg, residual, factor)
-        few = points.shape[1] <= 200  # many would hide the outline: smaller, and below it
-        style = {"markersize": 2.2, "zorder": 3} if few else {"markersize": 1.0, "zorder": 1}
+        are_few = points.shape[1] <= 200  # many points would hide the outline
+        style = {"markersize": 2.2, "zorder": 3} if are_few else {"markersize": 1.0, "zorder": 1}
         ax.plot(*points, ".", color=RED, **style, **rasterize_many(points[0]))
         ax.set(aspect="equal", xlim=(-1.32, 1.32), ylim=(-1.32, 1.32))
         title = "\n".join(ring.title(words))
@@ -184,6 +189,7 @@ def _polar_panels(rings, factor, words):
 
 
 def _enlarged(azimuth_deg, deviation, factor):
+    """Plan coordinates (2, n) of unit-circle points with enlarged relative deviations."""
     azimuth = np.radians(azimuth_deg)
     radius = 1 + factor * deviation
     return np.array([radius * np.sin(azimuth), radius * np.cos(azimuth)])
@@ -191,16 +197,16 @@ def _enlarged(azimuth_deg, deviation, factor):
 
 @styled
 def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english_label):
-    """The wall unrolled: azimuth by height, every point coloured by its residual.
+    """Plot the unrolled wall, azimuth against height, with points coloured by their residuals.
 
     Parameters
     ----------
     azimuth_deg, height_m, residual_m : ndarray, shape (n,)
-        Of the points.
+        Azimuths of the points, degrees, heights and residuals, m.
     joints_m : ndarray
         Heights of the joints between courses, m.
     words : callable, optional
-        words(key, **values) gives the texts at the axes; English by default.
+        words(key, **values) gives the axis labels; English by default.
 
     Returns
     -------
@@ -211,37 +217,37 @@ def deviation_map(azimuth_deg, height_m, residual_m, joints_m, words=english_lab
     figure = Drawing(figsize=(WIDTH, 2.6))
     ax = figure.subplots()
     size = 14 if len(azimuth_deg) <= 300 else 6
-    if len(azimuth_deg) > 3000:  # no room for edges: grey behind the points shows white ones
+    if len(azimuth_deg) > 3000:  # no edges: a grey background shows white points
         size = 2
         ax.set_facecolor("#d5dae0")
-    shown = ax.scatter(
+    dots = ax.scatter(
         azimuth_deg, height_m, c=residual_mm, s=size, cmap="RdBu_r", vmin=-limit, vmax=limit,
         edgecolors=GREY, linewidths=0.25 if size > 2 else 0, zorder=3,
         **rasterize_many(azimuth_deg),
     )  # fmt: skip
     ax.hlines(joints_m, *_TURN, color=GREY, linewidth=0.5)
     ax.set(xlim=_TURN, xticks=range(0, 361, 45))
-    return _unrolled(figure, ax, shown, words, "residual")
+    return _unrolled(figure, ax, dots, words, "residual")
 
 
 @styled
 def field_map(azimuth_deg, height_m, departure_m, points, joints_m, words=english_label):
-    """The wall that the table is made of, unrolled: what it departs from the mean of each course.
+    """Plot the unrolled wall of the table: deviations of the radius from the mean of each course.
 
     Parameters
     ----------
     azimuth_deg : ndarray, shape (g,)
-        Even.
+        Equally spaced azimuths, degrees.
     height_m : ndarray, shape (h,)
-        From the bottom up, m.
+        Heights from the bottom upwards, m.
     departure_m : ndarray, shape (h, g)
-        Radius less the mean radius of the course, m.
+        Radius minus the mean radius of the course, m.
     points : tuple of ndarray
         Azimuths, degrees, and heights, m, of the points.
     joints_m : ndarray
         Heights of the joints between courses, m.
     words : callable, optional
-        words(key, **values) gives the texts at the axes; English by default.
+        words(key, **values) gives the axis labels; English by default.
 
     Returns
     -------
@@ -251,41 +257,41 @@ def field_map(azimuth_deg, height_m, departure_m, points, joints_m, words=englis
     limit = np.max(np.abs(departure_mm)) or 1.0
     figure = Drawing(figsize=(WIDTH, 2.6))
     ax = figure.subplots()
-    shown = ax.pcolormesh(
+    mesh = ax.pcolormesh(
         azimuth_deg, height_m, departure_mm, cmap="RdBu_r", vmin=-limit, vmax=limit,
         shading="gouraud", rasterized=True,
     )  # fmt: skip
     ax.plot(*points, ".", color=GREY, markersize=1.2, **rasterize_many(points[0]))
     ax.hlines(joints_m, 0, 360, color=GREY, linewidth=0.5)
     ax.set(xlim=(0, 360), xticks=range(0, 361, 45), ylim=(joints_m[0], joints_m[-1]))
-    return _unrolled(figure, ax, shown, words, "departure")
+    return _unrolled(figure, ax, mesh, words, "departure")
 
 
-def _unrolled(figure, ax, shown, words, colours):
-    """The figure of a wall unrolled, with its axes and its bar of colours named."""
+def _unrolled(figure, ax, mappable, words, colours):
+    """Label the axes and the colour bar of an unrolled wall."""
     ax.set_xlabel(words("azimuth"))
     ax.set_ylabel(words("height"))
-    bar = figure.colorbar(shown, ax=ax, pad=0.02, aspect=30)
+    bar = figure.colorbar(mappable, ax=ax, pad=0.02, aspect=30)
     bar.set_label(words(colours))
     figure.subplots_adjust(left=0.075, right=1.04, bottom=0.14, top=0.98)
     return figure
 
 
 def bottom_rows(area_m2):
-    """How many rows of a table, from the lowest on, lie in a bottom.
+    """Number of table rows, from the lowest, that lie in a bottom.
 
-    Above it the cut hardly changes. Beside a cut that grows from nothing, what distinguishes the
-    courses of a shell cannot be seen.
+    Above the bottom the cross-section hardly changes. On a common scale with the bottom,
+    differences between courses would be invisible.
 
     Parameters
     ----------
     area_m2 : array_like, shape (rows,)
-        Area of the cut at each row, m2.
+        Area of the cross-section at each row, m2.
 
     Returns
     -------
     int
-        0: the tank has no such bottom.
+        0 if the tank has no such bottom.
 
     Examples
     --------
@@ -294,26 +300,26 @@ def bottom_rows(area_m2):
     """
     area = np.array(area_m2, dtype=float)
     shell = np.median(area)
-    off = np.flatnonzero(np.abs(area - shell) > SHELL_SHARE * shell)
+    differing = np.flatnonzero(np.abs(area - shell) > SHELL_SHARE * shell)
     if (
-        not len(off)
-        or off[-1] + 1 > len(area) / 2
-        or area[: off[-1] + 1].min() > BOTTOM_SHARE * shell
+        not len(differing)
+        or differing[-1] + 1 > len(area) / 2
+        or area[: differing[-1] + 1].min() > BOTTOM_SHARE * shell
     ):
         return 0
-    return int(off[-1]) + 1
+    return int(differing[-1]) + 1
 
 
 @styled
 def capacity_curves(height_m, area_m2, U_m3, words=english_label):
-    """Litres per centimetre, and U, against height; a bottom has a panel of its own.
+    """Plot litres per centimetre and U against height, with a separate panel for a bottom.
 
     Parameters
     ----------
     height_m, area_m2, U_m3 : ndarray, shape (rows,)
-        Of the table: dips, m, area of the cut, m2, and expanded uncertainty, m3.
+        Dips of the table, m, area of the cross-section, m2, and expanded uncertainty, m3.
     words : callable, optional
-        words(key, **values) gives the texts at the axes; English by default.
+        words(key, **values) gives the axis labels; English by default.
 
     Returns
     -------
@@ -321,8 +327,8 @@ def capacity_curves(height_m, area_m2, U_m3, words=english_label):
     """
     height_m = np.asarray(height_m)
     litres_per_cm = 10.0 * np.array(area_m2, dtype=float)  # 1 m2 is 10 L/cm
-    of_bottom = bottom_rows(area_m2)
-    parts = [slice(of_bottom + 1), slice(of_bottom, None)] if of_bottom else [slice(None)]
+    bottom_count = bottom_rows(area_m2)
+    parts = [slice(bottom_count + 1), slice(bottom_count, None)] if bottom_count else [slice(None)]
     figure = Drawing(figsize=(WIDTH, 2.4))
     *left, right = figure.subplots(1, len(parts) + 1)
     for ax, rows in zip(left, parts, strict=True):
@@ -330,7 +336,7 @@ def capacity_curves(height_m, area_m2, U_m3, words=english_label):
         ax.ticklabel_format(useOffset=False)
         ax.set_xlim(height_m[rows][0], height_m[rows][-1])
     left[0].set_ylabel(words("litres_per_cm"))
-    if of_bottom:
+    if bottom_count:
         left[0].set_ylim(bottom=0)
     right.plot(height_m, U_m3, color=INK)
     right.set_ylabel(words("U_m3"))
@@ -346,25 +352,25 @@ def capacity_curves(height_m, area_m2, U_m3, words=english_label):
 
 @styled
 def budget_bars(bars, words=english_label):
-    """The share of the variance of each input, in percent; defaults are pale.
+    """Plot the share of each input in the variance, in percent; default values are pale.
 
     Parameters
     ----------
     bars : iterable of tuple
         (name, share of the variance, whether it is a default) of each input.
     words : callable, optional
-        words(key, **values) gives the texts at the axes; English by default.
+        words(key, **values) gives the axis labels; English by default.
 
     Returns
     -------
     Drawing
     """
-    bars = sorted((one for one in bars if abs(one[1]) >= LEAST_SHARE), key=lambda one: -one[1])
+    bars = sorted((bar for bar in bars if abs(bar[1]) >= LEAST_SHARE), key=lambda bar: -bar[1])
     names = [textwrap.fill(name, LETTERS_OF_A_BAR) for name, _, _ in bars]
-    high = 0.24 if not any("\n" in name for name in names) else 0.32
+    bar_height = 0.24 if not any("\n" in name for name in names) else 0.32
     colours = [PALE if is_default else INK for _, _, is_default in bars]
     shares = [100 * share for _, share, _ in bars]
-    figure = Drawing(figsize=(WIDTH, high * len(bars) + 0.6))
+    figure = Drawing(figsize=(WIDTH, bar_height * len(bars) + 0.6))
     ax = figure.subplots()
     ax.barh(range(len(bars)), shares, color=colours, height=0.6)
     ax.set_yticks(range(len(bars)), names, parse_math=False)
@@ -379,11 +385,22 @@ def budget_bars(bars, words=english_label):
 
 @styled
 def network(names, xy_m, covariance_m2, most_names=60):
-    """Points from above with their standard error ellipses, enlarged.
+    """Plot points in plan with enlarged standard error ellipses.
 
-    names          (n,) of the points, written where there are at most `most_names`
-    xy_m           (n, 2)
-    covariance_m2  (n, 2, 2) of x and y of each point
+    Parameters
+    ----------
+    names : sequence of str, length n
+        Point names; written if there are at most `most_names`.
+    xy_m : ndarray, shape (n, 2)
+        Plan coordinates, m.
+    covariance_m2 : ndarray, shape (n, 2, 2)
+        Covariance of x and y of each point, m2.
+    most_names : int
+        Largest number of names that are written.
+
+    Returns
+    -------
+    Drawing
     """
     xy_m = np.asarray(xy_m, dtype=float)
     variances, axes = np.linalg.eigh(covariance_m2)
@@ -394,17 +411,18 @@ def network(names, xy_m, covariance_m2, most_names=60):
     figure = Drawing(figsize=(WIDTH, 4.6))
     ax = figure.subplots()
     width, height = 2 * factor * half_m[:, 1], 2 * factor * half_m[:, 0]
-    turn = np.degrees(np.arctan2(axes[:, 1, 1], axes[:, 0, 1]))
+    # Inclination of the major axis: `eigh` returns the larger eigenvalue last.
+    angle_deg = np.degrees(np.arctan2(axes[:, 1, 1], axes[:, 0, 1]))
     ellipses = EllipseCollection(
-        width, height, turn, units="xy", offsets=xy_m, offset_transform=ax.transData,
+        width, height, angle_deg, units="xy", offsets=xy_m, offset_transform=ax.transData,
         facecolors="none", edgecolors=RED, linewidths=0.6,
     )  # fmt: skip
     ax.add_collection(ellipses)
     ax.plot(*xy_m.T, ".", color=INK, markersize=2.5, **rasterize_many(xy_m))
     if len(names) <= most_names:
-        for name, place in zip(names, xy_m, strict=True):
+        for name, position_m in zip(names, xy_m, strict=True):
             ax.annotate(
-                name, place, (2, 2), textcoords="offset points", fontsize=6, parse_math=False
+                name, position_m, (2, 2), textcoords="offset points", fontsize=6, parse_math=False
             )
     ax.set(aspect="equal", xlabel="x / m", ylabel="y / m")
     ax.set_title(f"standard error ellipses, {factor} times", loc="left", fontsize=8)

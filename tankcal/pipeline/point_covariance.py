@@ -1,4 +1,4 @@
-"""The covariance of surveyed points: as given, among themselves, and their scatter in plan."""
+"""Covariance of surveyed points: as given, by S-transformation, and as scatter in plan."""
 
 from dataclasses import replace
 
@@ -9,13 +9,13 @@ from tankcal.sections import coordinates_of
 
 
 def s_transform(points):
-    """Adjusted points with the covariance that they have among themselves.
+    """Adjusted points with the covariance of their relative positions (S-transformation).
 
         C' = S C S + s2 D D',   S = I - D D'
 
-    D is an orthonormal basis of their common shift and their turn about the vertical, s2 the mean
-    variance that is left. No volume depends on these four, but a datum that holds one photo or one
-    point gives them whatever variance it has: sections fitted with it would depend on that choice.
+    D is an orthonormal basis of the common shift and rotation about the vertical, and s2 is the
+    mean remaining variance. No volume depends on these four parameters. A datum fixed by one photo
+    or one point would give them an arbitrary variance, on which the fitted sections would depend.
 
     Parameters
     ----------
@@ -27,18 +27,18 @@ def s_transform(points):
     Points
         With C', and with the columns of their causes projected by S.
     """
-    basis, given = common_motions(points.xyz_m), points.covariance_m2
-    across = s_transform_factors(basis, given @ basis, np.trace(given))
+    basis, covariance = common_motions(points.xyz_m), points.covariance_m2
+    across = s_transform_factors(basis, covariance @ basis, np.trace(covariance))
     change = np.hstack([basis, across]) @ np.hstack([across, basis]).T
     causes = tuple(
         replace(cause, column_m=cause.column_m - basis @ (basis.T @ cause.column_m))
         for cause in points.causes
     )
-    return replace(points, covariance_m2=np.subtract(given, change, out=change), causes=causes)
+    return replace(points, covariance_m2=np.subtract(covariance, change, out=change), causes=causes)
 
 
 def common_motions(xyz_m):
-    """Orthonormal basis of the shifts of points and their turn about the vertical.
+    """Orthonormal basis of the shifts of points and of their rotation about the vertical.
 
     Parameters
     ----------
@@ -64,18 +64,18 @@ def common_motions(xyz_m):
 
 
 def s_transform_factors(basis, spread, trace):
-    """A of C' = C - D A' - A D', the covariance of `s_transform`, without forming S C S.
+    """Matrix A of C' = C - D A' - A D', the covariance of `s_transform`, without forming S C S.
 
         A = C D - D (D'C D + s2 I) / 2
 
     Parameters
     ----------
     basis : ndarray, shape (3 n, 4)
-        D, of `common_motions`.
+        D, from `common_motions`.
     spread : ndarray, shape (3 n, 4)
         C D, m2.
     trace : float
-        Of C, m2.
+        Trace of C, m2.
 
     Returns
     -------
@@ -90,12 +90,13 @@ def s_transform_factors(basis, spread, trace):
     True
     """
     across = spread - 0.5 * basis @ (basis.T @ spread)
-    left = trace - 2 * np.sum(basis * across)
-    return across - 0.5 * max(left, 0.0) / (len(basis) - 4) * basis
+    remaining_trace = trace - 2 * np.sum(basis * across)
+    # The trace of C' shared equally by the 3n - 4 remaining parameters gives s2.
+    return across - 0.5 * max(remaining_trace, 0.0) / (len(basis) - 4) * basis
 
 
 def radial_sds(points):
-    """(n,) standard deviations of the points in plan, or None when the file gives none."""
+    """Standard deviations (n,) of the points in plan, m; None if the file gives none."""
     if points.covariance_m2 is not None:
         variances = points.covariance_m2.diagonal().reshape(-1, 3)
     elif points.sd_m is not None:
@@ -106,12 +107,12 @@ def radial_sds(points):
 
 
 def median_sd(sds):
-    """Median standard deviation of the points in plan; one metre when the file gives none."""
+    """Median standard deviation of the points in plan, m; 1 m if the file gives none."""
     return 1.0 if sds is None else float(np.median(sds))
 
 
 def given_covariance(points, wall):
-    """(3m, 3m) as in the file; one metre for every coordinate when the file gives none."""
+    """Covariance (3m, 3m) from the file, m2; 1 m for each coordinate if the file gives none."""
     if points.covariance_m2 is not None:
         index = coordinates_of(wall)
         return points.covariance_m2[np.ix_(index, index)]

@@ -1,36 +1,37 @@
-"""Former radii brought up to date by a survey of some courses: linear, and least in variance.
+"""Best linear unbiased update of former radii by a survey of some courses.
 
-The radii r of n courses were found once with an error, and changed since. So the former ones are
-r_f = r + p, p of covariance P; a new survey finds some of them, y = H r + q, q of covariance R.
-What both share (one tape) is C = cov(p, q). Then
+The radii r of n courses were determined once with an error and may have changed since. The former
+radii are r_f = r + p, with p of covariance P. A new survey measures some of them, y = H r + q, with
+q of covariance R. Both errors share causes such as the scale of a tape, with C = cov(p, q). Then
 
     misclosure  v = y - H r_f,  S = H P H' + R - H C - C' H',
     G = (P H' - C) S^-1,        r = r_f + G v,
-    its error   (I - G H) p + G q,
+    error of r  (I - G H) p + G q,
 
-so that each cause of p and of q goes on with its own name. Source: Robinson 1991 (best linear
-unbiased prediction); of one course, without C, recalibration by conditioning on one observation.
+so each cause of p and of q propagates under its own name. Source: Robinson 1991 (best linear
+unbiased prediction). For one course and C = 0 this is recalibration by conditioning on one
+observation.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-LARGEST_W = 3.0  # of a course: beyond it the former radius does not explain what was found
+LARGEST_W = 3.0  # |w| of a course above which its former radius is rejected
 
 
 @dataclass(frozen=True)
 class RadiiUpdate:
-    """What a survey of some courses makes of former radii.
+    """Update of former radii by a survey of some courses.
 
     Attributes
     ----------
     measured : ndarray of int, shape (k,)
-        Courses that were measured again.
+        Indices of the courses measured again.
     misclosure_m, sd_m : ndarray, shape (k,)
-        Found less former, and the standard deviation that it was expected with.
+        New minus former radius, m, and its prior standard deviation, m.
     gain : ndarray, shape (courses, k)
-        G.
+        Gain matrix G.
     """
 
     measured: np.ndarray
@@ -40,20 +41,20 @@ class RadiiUpdate:
 
     @property
     def w(self):
-        """(k,) misclosures over their standard deviations."""
+        """Misclosures divided by their standard deviations, shape (k,)."""
         return self.misclosure_m / self.sd_m
 
     @property
     def change_m(self):
-        """(courses,) by which the radii are other than the former ones: G v."""
+        """Change G v of the former radii, m, shape (courses,)."""
         return self.gain @ self.misclosure_m
 
     @property
     def kept(self):
-        """(courses, courses) I - G H: derivative of the radii by the former ones."""
-        found = np.eye(len(self.gain))
-        found[:, self.measured] -= self.gain
-        return found
+        """Derivative I - G H of the updated radii by the former radii, shape (courses, courses)."""
+        derivative = np.eye(len(self.gain))
+        derivative[:, self.measured] -= self.gain
+        return derivative
 
 
 def update_radii(prior_m2, measured, misclosure_m, noise_m2, shared_m=0.0):
@@ -62,14 +63,15 @@ def update_radii(prior_m2, measured, misclosure_m, noise_m2, shared_m=0.0):
     Parameters
     ----------
     prior_m2 : ndarray, shape (courses, courses)
-        P: of the former radii and of how they may have changed, m2.
+        Covariance P of the former radii, including their possible change, m2.
     measured : ndarray of int, shape (k,)
+        Indices of the courses measured again.
     misclosure_m : ndarray, shape (k,)
-        Found less former, m.
+        New minus former radii, m.
     noise_m2 : ndarray, shape (k, k)
-        R: of what was found, m2.
+        Covariance R of the new radii, m2.
     shared_m : float
-        Standard uncertainty that all of them share, the former and the new: C = shared^2 1 1'.
+        Standard uncertainty common to all former and new radii, m: C = shared^2 1 1'.
 
     Returns
     -------
@@ -77,7 +79,8 @@ def update_radii(prior_m2, measured, misclosure_m, noise_m2, shared_m=0.0):
 
     Examples
     --------
-    Six courses, 0.7 and 0.3 mm as they were, 0.8 and 0.3 mm of change, one found with 0.5 mm:
+    Six courses with uncertainties of 0.7 mm (common) and 0.3 mm (each), changes of 0.8 mm (common)
+    and 0.3 mm (each), and one course measured again with 0.5 mm:
 
     >>> prior = 1.13 * np.ones((6, 6)) + 0.18 * np.eye(6)
     >>> found = update_radii(prior, np.array([0]), np.array([1.2]), np.array([[0.25]]))
@@ -87,5 +90,6 @@ def update_radii(prior_m2, measured, misclosure_m, noise_m2, shared_m=0.0):
     measured = np.asarray(measured, dtype=int)
     common = shared_m**2
     spread = prior_m2[np.ix_(measured, measured)] + noise_m2 - 2 * common
+    # The transposed system: S is symmetric, and P H' - C = (H P - C')'.
     gain = np.linalg.solve(spread, prior_m2[measured] - common).T
     return RadiiUpdate(measured, misclosure_m, np.sqrt(np.diag(spread)), gain)

@@ -1,9 +1,11 @@
-"""An upright tank whose wall is the radii of its courses: out of a former table, of a record, or
-declared; alone, or brought up to date by a survey of some courses (`partial_survey`).
+"""Upright tank defined by the radii of its courses.
 
-A radius is that of the circle of a course's mean area, inside, the shell empty, at a temperature of
-its own. So the volume up to a joint is by the radii alone; between joints the doubt has what a
-course may do besides (`geometry.field.mean_field`).
+The radii come from a former table or record, or are declared. They are used alone, or updated by a
+survey of some courses (`partial_survey`).
+
+Each radius is that of the circle of the mean area of a course, inside, shell empty, at its own
+reference temperature. The volume up to a joint therefore depends on the radii alone. Between joints
+the uncertainty includes the possible form of a course (`geometry.field.mean_field`).
 """
 
 from dataclasses import dataclass
@@ -19,22 +21,22 @@ from tankcal.pipeline.wall import joints_of
 from tankcal.tank.factors import Factor
 from tankcal.uncertainty import factor_of
 
-OWN, COMMON = "course_radii", "course_radii_common"  # their names in a budget
+OWN, COMMON = "course_radii", "course_radii_common"  # names of the causes in a budget
 
 
 @dataclass(frozen=True)
 class Updated:
-    """What brought former radii up to date.
+    """Survey that updated former radii.
 
     Attributes
     ----------
     surveyed : Wall or StrappedWall
-        Of the survey of some courses.
+        Wall from the survey of some courses.
     update : RadiiUpdate
     found_m, u_found_m : ndarray, shape (k,)
-        Radii of the measured courses by the survey alone, and their standard uncertainties.
+        Radii of the measured courses by the survey alone, and their standard uncertainties, m.
     u_before_m : ndarray, shape (courses,)
-        Of the former radii, with the change that was declared.
+        Standard uncertainties of the former radii, with the declared change, m.
     """
 
     surveyed: object
@@ -46,21 +48,22 @@ class Updated:
 
 @dataclass(frozen=True)
 class RadiiWall:
-    """A wall of declared radii.
+    """Wall of declared radii.
 
     Attributes
     ----------
     joints_m : ndarray, shape (courses + 1,)
         Heights of the joints above the bottom, m.
     zero_m : float
-        Of the table's zero above it.
+        Height of the table's zero above the bottom, m.
     radius_m : ndarray, shape (courses,)
+        Radii, m.
     causes : tuple of Factor
-        What is uncertain of these radii, (courses, c) m.
+        Causes of uncertainty of the radii, with columns (courses, c), m.
     by_inputs : dict
-        {input of an uncertainty budget: (courses,) derivative of the radii}, of a survey.
+        {declared input: derivative (courses,) of the radii}, if a survey contributed.
     updated : Updated or None
-        By a survey of some courses.
+        Survey of some courses.
     """
 
     joints_m: np.ndarray
@@ -81,50 +84,54 @@ class RadiiWall:
 
     @property
     def surveyed(self):
-        """The wall of the survey beside the radii; None: there was none."""
+        """Wall of the survey of some courses, or None without a survey."""
         return None if self.updated is None else self.updated.surveyed
 
     @property
     def covariance_m2(self):
-        """(courses, courses) of the radii, without what declared inputs add."""
-        nothing = np.zeros((len(self.radius_m), len(self.radius_m)))
-        return sum((one.columns @ one.columns.T for one in self.causes), start=nothing)
+        """Covariance of the radii without declared inputs, m2, shape (courses, courses)."""
+        zero = np.zeros((len(self.radius_m), len(self.radius_m)))
+        return sum((cause.columns @ cause.columns.T for cause in self.causes), start=zero)
 
     def covariance_with(self, inputs):
-        """(courses, courses) of the radii, with what declared inputs add, m2."""
-        known = {one.name: one.u for one in inputs}
-        found = self.covariance_m2
+        """Covariance of the radii with declared inputs, m2, shape (courses, courses)."""
+        u_of_inputs = {declared_input.name: declared_input.u for declared_input in inputs}
+        covariance_m2 = self.covariance_m2
         for name, column in self.by_inputs.items():
-            found = found + known.get(name, 0.0) ** 2 * np.outer(column, column)
-        return found
+            covariance_m2 = covariance_m2 + u_of_inputs.get(name, 0.0) ** 2 * np.outer(
+                column, column
+            )
+        return covariance_m2
 
     def lowest_outline(self, azimuth_rad):
-        """(x, y) of the axis, and (n,) radii of the first course, m."""
+        """Position (x, y) of the axis and radii (n,) of the first course, m."""
         return 0.0, 0.0, np.full(len(azimuth_rad), self.radius_m[0])
 
     def factors(self, job, weights):
-        """`Factor`s of what the radii leave uncertain about features, (f, courses) by them."""
-        return tuple(one.mapped(lambda columns: weights @ columns) for one in self.causes)
+        """`Factor`s of the uncertainty of features, with weights (f, courses) of the radii."""
+        return tuple(cause.mapped(lambda columns: weights @ columns) for cause in self.causes)
 
     def read_with(self, weights):
-        """{input: (f,) derivative of features}: of what a survey of some courses depends on."""
+        """Derivatives (f,) of features by the inputs that affect a survey of some courses."""
         return {name: weights @ column for name, column in self.by_inputs.items()}
 
 
 def find_radii_wall(job, progress):
-    """`RadiiWall` of a job whose courses have declared radii, and no survey beside them."""
+    """`RadiiWall` of a job with declared radii and no survey."""
     progress(message("taking_radii", "taking the radii of {file}", file=job.radii.file))
     return wall_of_radii(job, job.radii.radius_m, causes_of(job.radii))
 
 
 def wall_of_radii(job, radius_m, causes, by_inputs=None):
-    """`RadiiWall` of radii (courses,); causes and by_inputs as there."""
-    found = tuple(one for one in causes if np.any(one.columns))
-    return RadiiWall(joints_of(job), shell_zero(job, None), radius_m, found, by_inputs or {})
+    """`RadiiWall` of radii (courses,), m, with causes and derivatives as in `RadiiWall`."""
+    nonzero_causes = tuple(cause for cause in causes if np.any(cause.columns))
+    return RadiiWall(
+        joints_of(job), shell_zero(job, None), radius_m, nonzero_causes, by_inputs or {}
+    )
 
 
 def causes_of(radii):
-    """`Factor`s of what is uncertain of `Radii`: what all have in common, and each for itself."""
+    """`Factor`s of the uncertainty of `Radii`: common to all courses, and separate for each."""
     common = np.full((len(radii.radius_m), 1), radii.u_common_m)
     return (
         Factor(COMMON, common, u=1000 * radii.u_common_m, unit="mm", type="B"),

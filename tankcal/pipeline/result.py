@@ -1,4 +1,4 @@
-"""What a job gave: the capacity table, what it was made of, and what is read off it."""
+"""Result of a job: the capacity table, the data behind it, and functions that read it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -49,64 +49,64 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Result:
-    """Everything that a job gave; `capacity` is the table as a DataFrame.
+    """Result of a job; `capacity` is the table as a DataFrame.
 
     Attributes
     ----------
     job : Job
-        As it was computed: the points are in it, too, where they came from an adjustment.
+        The job as computed, with its points if these came from an adjustment.
     wall : surveyed_wall.Wall or None
-        The surveyed wall of a vertical tank; None for other kinds.
+        Wall of a vertical tank surveyed by points; None for other kinds.
     scan : scan.Scan or None
-        What points say of a lying cylinder or a sphere.
+        Solid fitted to the points of a horizontal cylinder or a sphere.
     strapped : strapped_wall.StrappedWall or None
-        The wall of a vertical tank that a tape was put round.
+        Wall of a vertical tank measured by strapping.
     sighting : sighting.Sighting or None
-        Bare hits of the wall as points, and where they were taken from.
+        Reflectorless hits of the wall as points, with their set-ups.
     touching : tangents.Touching or None
-        Tangents as points of the wall, and where they were sighted from.
+        Tangents as points of the wall, with their set-ups.
     clouded : cloud_wall.Clouded or None
-        Clouds as points of the wall: their scans, cells and what hides the wall.
+        Point clouds as points of the wall: scans, cells and obstructions.
     liquid : liquid.LiquidResult or None
-        What metered runs say of the tank, beside its geometry.
+        Calibration by metered liquid, in addition to the geometry.
     nominal : nominal_wall.NominalWall or None
-        The wall of the drawing, of an upright tank that only liquid tells.
+        Wall from the drawing, for an upright tank calibrated by liquid alone.
     radii : radii_wall.RadiiWall or None
-        The wall of declared radii, with what was measured again in them.
+        Wall of declared radii, with the courses measured again.
     rings : ringed_wall.RingedWall or None
-        The rings of a lying cylinder that a tape was put round.
+        Rings of a horizontal cylinder measured by strapping.
     ship : ship.ShipTables or None
-        Corrections of soundings for trim and list, of a tank of a ship.
+        Corrections of soundings for trim and list of a ship's tank.
     circles : strapped_sphere.StrappedSphere or None
-        The sphere that a tape was put round.
+        Sphere measured by strapping.
     body : body.Body
-        The tank as the sum of its parts, with all corrections that are on.
+        Tank as the sum of its parts, with all enabled corrections.
     zero_m : float
-        Level of the table's zero: dip 0 in the frame of the parts, m.
+        Level of the table's zero (dip 0) in the frame of the parts, m.
     table : capacity.Capacity
         Rows with the factor of their covariance.
     straightness : Straightness
-        How far linear interpolation between the rows is from the exact volume.
+        Error of linear interpolation between the rows.
     proportional_parts : tuple of ProportionalParts
-        What millimetres add to a row, zone by zone; () for no centimetre table.
+        Volumes of millimetres to add to a row, for each zone; () without a centimetre table.
     corrections : tuple of Correction
-        Each with its size at the top row.
+        Corrections with their size at the top row.
     by_density : dict of {float: ndarray}
-        {density kg/m3: (rows,) volumes m3}: the same table for other densities.
+        {density in kg/m3: volumes (rows,) in m3}: the table for other densities.
     stated : statements.Statements
-        Budgets, worst deliveries.
+        Uncertainty budgets and worst deliveries.
     simulation : simulation.TableSimulation or None
-        The table by Monte Carlo; None where it is off.
+        Monte Carlo simulation of the table; None if disabled.
     intervals : simulation.Intervals
-        Of the rows, as they are printed.
+        Coverage intervals of the rows as printed.
     rule : rules.RuleVerdict or None
-        Verdict of the job's decision rule on them.
+        Verdict of the job's decision rule.
     warnings : tuple of Problem
-        What a sound survey of a sound tank hardly has.
+        Observations that are unlikely for a valid survey of a tank without defects.
     adjustment : survey.Adjustment or None
-        The adjusted survey; None where points were handed in.
+        Adjusted survey; None if points were supplied.
     overrulings : overruling.Overrulings or None
-        What was decided against the search for blunders, and what that changed.
+        Manual decisions against the outlier search, and their effect.
 
     Examples
     --------
@@ -158,10 +158,15 @@ class Result:
 
     def _repr_html_(self) -> str:
         rows = [
-            [one.code, "yes" if one.applied else "no", one.size_m3, one.size_percent]
-            for one in self.corrections
+            [
+                correction.code,
+                "yes" if correction.applied else "no",
+                correction.size_m3,
+                correction.size_percent,
+            ]
+            for correction in self.corrections
         ]
-        warnings = "".join(f"<li>{escape(str(one))}</li>" for one in self.warnings)
+        warnings = "".join(f"<li>{escape(str(warning))}</li>" for warning in self.warnings)
         return (
             f"<p><b>{escape(str(self))}</b></p>"
             + table_html("Corrections at the top", ["correction", "made", "m3", "%"], rows)
@@ -169,7 +174,7 @@ class Result:
         )
 
     def plot(self, what: str | None = None) -> "Figure":
-        """A drawing of the result, by the names that `tankcal.plot` takes."""
+        """Draw a figure of the result, chosen by the names that `tankcal.plot` accepts."""
         from tankcal.pipeline.views import plot
 
         return plot(self, what)
@@ -182,23 +187,28 @@ class Result:
         reading: bool = False,
         factors: Sequence[float] | None = None,
     ) -> Budget:
-        """What the uncertainty of a volume, or of a delivery, consists of.
+        """Uncertainty budget of a volume or of a delivery.
 
         Parameters
         ----------
         high_m, low_m : float, optional
-            Dips, m; without `high_m` the top row, without `low_m` the volume below `high_m`.
+            Dips, m. The default of `high_m` is the top row. Without `low_m` the budget is that of
+            the volume below `high_m`.
         reading : bool
-            Whether what reading the table adds (interpolation, rounding) is in it.
+            Whether to include the uncertainty of reading the table (interpolation, rounding).
         factors : sequence of float, optional
-            What if the u of each line of this budget were so many times what it is.
+            Factors that multiply the u of each line of this budget, to study their effect.
+
+        Returns
+        -------
+        Budget
 
         Raises
         ------
         HeightError
             For a dip outside the table.
         ValueError
-            For another number of factors than lines.
+            If the number of factors differs from the number of lines.
         """
         high_m = float(self.table.height_m[-1]) if high_m is None else high_m
         largest_m3 = self.straightness.largest_m3
@@ -208,35 +218,36 @@ class Result:
     @property
     def accepted(self) -> np.ndarray | None:
         """(m,) indices of the points that are of the wall; None where none were surveyed."""
-        found = self.wall or self.scan
-        return None if found is None else found.accepted
+        survey = self.wall or self.scan
+        return None if survey is None else survey.accepted
 
     @property
     def gross(self) -> ShellVolume | None:
-        """The shell as surveyed, without any correction (`volumes.ShellVolume`); else None."""
+        """Surveyed shell without corrections (`volumes.ShellVolume`), or None for other tanks."""
         wall = self.radii or self.wall or self.strapped or self.nominal
         return None if wall is None else shell_volume(wall)
 
     @property
     def straps(self) -> "Straps | None":
-        """Circumferences by tape, and what the wall says of them; None where none were read."""
+        """Circumferences by tape and their tests against the wall; None without straps."""
         wall = self.wall or self.strapped or self.rings
         return None if wall is None else wall.straps
 
     @property
     def read(self) -> "ReadWall | None":
-        """What a tape and reference lines read of a wall, alone or beside points; None: nothing."""
+        """Wall with readings of tapes and reference lines; None without such readings."""
         return self.strapped if self.wall is None else self.wall.read
 
     @property
     def capacity(self) -> "pandas.DataFrame":
-        """The capacity table, with the U that every paper states: the columns of capacity.csv.
+        """Capacity table with the U of all reports, in the columns of capacity.csv.
 
-        height_m, volume_m3 and u_m3, the standard uncertainty; k, not a number where U is not k u
-        but Monte Carlo's; U_m3, low_m3 and high_m3; interval, "gum" or "monte_carlo": whose these
-        are; with a floating roof for_use.
+        The columns are height_m, volume_m3, u_m3 (standard uncertainty), k, U_m3, low_m3, high_m3
+        and interval. The value of k is nan in rows whose U comes from Monte Carlo instead of k u.
+        The column interval is "gum" or "monte_carlo" and states the origin of U. A tank with a
+        floating roof has the additional column for_use.
         """
-        import pandas  # takes long to load, and no result needs it
+        import pandas  # slow to load and not needed for a result
 
         table, stated = self.table, self.intervals
         columns = {
@@ -254,7 +265,7 @@ class Result:
         return pandas.DataFrame(columns)
 
     def at(self, height_m: float) -> Quantity:
-        """Volume at a dip, with the U that is stated (`capacity.Quantity`); HeightError outside."""
+        """Volume at a dip with its stated U (`capacity.Quantity`); HeightError outside."""
         return stated_volume(self.table, self.intervals, height_m)
 
     def in_service_m3(
@@ -265,30 +276,48 @@ class Result:
         *,
         insulated: bool = False,
     ) -> float:
-        """Volume at a dip of a shell that the liquid keeps at another temperature: V times CTSh,
-        of a tank that is one solid as it grows all over (`service.solid_factor`).
+        """Volume at a dip for a shell at the temperature of its liquid, m3: V times CTSh.
 
-        ambient_c  needed for a shell that is not insulated (`service.shell_temperature_c`)
+        A tank that is a single solid expands in all directions (`service.solid_factor`).
+
+        Parameters
+        ----------
+        height_m : float
+            Dip, m.
+        liquid_c : float
+            Temperature of the liquid, degrees Celsius.
+        ambient_c : float, optional
+            Ambient temperature; required for a shell without insulation
+            (`service.shell_temperature_c`).
+        insulated : bool
+            Whether the shell is insulated.
+
+        Returns
+        -------
+        float
         """
         shell_c = shell_temperature_c(liquid_c, ambient_c, insulated=insulated)
         reference, expansion = self.job.table.reference_temperature_c, self.job.material
-        expands = expansion.expansion_per_k
+        expansion_per_k = expansion.expansion_per_k
         if self.job.tank.kind == "vertical":
-            factor = shell_factor(shell_c, reference, expands)
+            factor = shell_factor(shell_c, reference, expansion_per_k)
         else:
             levels = np.array([height_m + self.zero_m])
-            factor = float(solid_factor(self.body, levels, shell_c, reference, expands)[0])
+            factor = float(solid_factor(self.body, levels, shell_c, reference, expansion_per_k)[0])
         return self.at(height_m).value_m3 * factor
 
     def dip_of(self, volume_m3: float | np.ndarray) -> Dips:
-        """(n,) dips of volumes, with their standard uncertainties (`dips.Dips`); HeightError."""
+        """Dips (n,) of volumes with their standard uncertainties (`dips.Dips`).
+
+        Raises HeightError for a volume outside the table.
+        """
         table = self.table
         return dips.dips_of(table.height_m, table.volume_m3, table.factor_m3, volume_m3)
 
     def at_ullage(self, ullage_m: float) -> Quantity:
         """Volume at an ullage, measured down from the reference point of the gauge.
 
-        Raises HeightError outside the table, and without a reference height in the job.
+        Raises HeightError outside the table, and if the job has no reference height.
         """
         reference = self.job.datum.reference_height_m
         if reference is None:
@@ -298,5 +327,5 @@ class Result:
         return self.at(float(dips.ullage_m(reference, ullage_m)))
 
     def delivery(self, low_m: float, high_m: float) -> Quantity:
-        """Volume between two dips, with its own uncertainty; HeightError outside."""
+        """Volume between two dips with its own uncertainty; HeightError outside the table."""
         return stated_delivery(self.table, self.simulation, low_m, high_m)

@@ -1,7 +1,7 @@
-"""Warnings about the rings of a lying tank: what a sound crew on a sound tank hardly brings home.
+"""Warnings about the rings of a horizontal tank that are unlikely for a valid survey.
 
-Lap-jointed rings are inner and outer in turn: the inside radius of an outer ring is larger by the
-plate of its inner neighbours. Rings that were exchanged in a file break that order.
+Lap-jointed rings are inner and outer in turn. The inside radius of an outer ring is larger by the
+plate thickness of its inner neighbours. Rings exchanged in a file break this order.
 """
 
 import numpy as np
@@ -23,8 +23,10 @@ from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.tape_checks import check_tapes
 from tankcal.pipeline.wall_readings import names_of
 
-LIMITS = "repeats_lying"  # of the rule file
-FITS = 0.5  # of a plate: mean step that is left where an order of laps fits; a step of laps
+LIMITS = "repeats_lying"  # table of the rule file
+# Mean remaining step, as a share of a plate, below which an order of laps fits; also the least
+# step in the wrong direction that counts as a contradiction of rings.csv.
+FITS = 0.5
 
 
 def check_rings(job, wall):
@@ -33,10 +35,10 @@ def check_rings(job, wall):
     return (
         *check_tapes(job, straps),
         *check_repeats(straps, LIMITS),
-        *_of_pairs(job, straps),
-        *_of_others(job, straps),
-        *_of_laps(job, straps),
-        *_of_nominal(job, straps),
+        *_check_pairs(job, straps),
+        *_check_other_rings(job, straps),
+        *_check_laps(job, straps),
+        *_check_nominal(job, straps),
         *_uncontrolled(job, wall),
     )
 
@@ -45,22 +47,22 @@ def _problem(text, row=None, column="reading_m"):
     return Problem(FILE, text, row=row, column=column)
 
 
-def _of_pairs(job, straps):
-    """A strap that stands far from the others of its ring, further than rings taper."""
-    for size, one, count, usual in straps_apart(names_of(job.rings), straps):
+def _check_pairs(job, straps):
+    """Problems of straps that differ from the other straps of their ring by more than taper."""
+    for size, strap, count, typical in straps_apart(names_of(job.rings), straps):
         template = (
             "the {count} straps of ring {ring!r} differ by {apart_mm:.1f} mm, those of other rings"
             " by {usual_mm:.1f} mm: is one of them misread, over an obstruction or not square to"
             " the axis?"
         )
-        ring, apart, least = one.strap.course, 1000 * size, 1000 * usual
-        if size > FAR_LIMITS * limit_of_repeats(one.circumference_m, LIMITS):
+        ring, apart_mm, least = strap.strap.course, 1000 * size, 1000 * typical
+        if size > FAR_LIMITS * limit_of_repeats(strap.circumference_m, LIMITS):
             text = message(
                 "strap_of_ring_far",
                 template,
                 count=count,
                 ring=ring,
-                apart_mm=apart,
+                apart_mm=apart_mm,
                 usual_mm=least,
             )
         else:
@@ -69,15 +71,17 @@ def _of_pairs(job, straps):
                 template,
                 count=count,
                 ring=ring,
-                apart_mm=apart,
+                apart_mm=apart_mm,
                 usual_mm=least,
             )
-        yield _problem(text, one.strap.row)
+        yield _problem(text, strap.strap.row)
 
 
-def _of_others(job, straps):
-    """A ring whose radius differs from the median of the others of its lap by more than a part of
-    a plate and a tolerance; where laps are not given, by a plate more.
+def _check_other_rings(job, straps):
+    """Problems of rings whose radius differs from the median of the other rings of the same lap.
+
+    The tolerance is a nominal share plus part of a plate, or a whole plate if the laps are not
+    given.
     """
     plates = np.array([ring.thickness_m + ring.paint_m for ring in job.rings])
     inside, names = straps.radius_m - plates, names_of(job.rings)
@@ -86,10 +90,10 @@ def _of_others(job, straps):
     if np.any(laps == ""):
         laps[:] = ""
     for lap in dict.fromkeys(laps.tolist()):
-        alike = np.flatnonzero(laps == lap)
-        median = float(np.median(inside[alike]))
+        same_lap = np.flatnonzero(laps == lap)
+        median = float(np.median(inside[same_lap]))
         allowed = limits_of("nominal_size")["share"] * median + step
-        for place in alike[np.abs(inside[alike] - median) > allowed]:
+        for place in same_lap[np.abs(inside[same_lap] - median) > allowed]:
             text = message(
                 "ring_far",
                 "ring {ring!r} comes out {miss_mm:+.1f} mm of radius from the others, more than a"
@@ -101,14 +105,14 @@ def _of_others(job, straps):
             yield _problem(text, column="ring")
 
 
-def _of_laps(job, straps):
-    """Rings that look exchanged, and an order that is not that of rings.csv."""
+def _check_laps(job, straps):
+    """Problems of rings that appear exchanged, and of an order that contradicts rings.csv."""
     plates = np.array([ring.thickness_m + ring.paint_m for ring in job.rings])
     laps = [ring.lap for ring in job.rings]
     thickness = np.array([ring.thickness_m for ring in job.rings])
     names = names_of(job.rings)
     if None not in laps and len(names) > 1:
-        outer = np.array([one == "outer" for one in laps])
+        outer = np.array([lap == "outer" for lap in laps])
         if _steps_of_laps(straps.radius_m - plates, thickness, outer) < -FITS:
             yield _problem(
                 message(
@@ -119,55 +123,55 @@ def _of_laps(job, straps):
                 column="ring",
             )
             return
-    found = exchanged_rings(straps.radius_m, plates, thickness, laps)
-    if found:
-        pairs = "; ".join(f"{names[one]} - {names[other]}" for one, other, *_ in found)
+    pairs_found = exchanged_rings(straps.radius_m, plates, thickness, laps)
+    if pairs_found:
+        pairs = "; ".join(f"{names[first]} - {names[second]}" for first, second, *_ in pairs_found)
         text = message(
             "rings_exchanged",
             "with the readings of two rings exchanged ({pairs}) the rings would be inner and outer"
             " in turn, and steps that laps do not explain would add up to {left_mm:.1f} mm in place"
             " of {steps_mm:.1f} mm: are they mixed up?",
             pairs=pairs,
-            left_mm=1000 * found[0][2],
-            steps_mm=1000 * found[0][3],
+            left_mm=1000 * pairs_found[0][2],
+            steps_mm=1000 * pairs_found[0][3],
         )
         yield _problem(text, column="ring")
 
 
 def _steps_of_laps(inside_m, thickness_m, outer):
-    """Mean of how much wider outer rings are than their neighbours, over the plate of the inner;
-    0 without such neighbours.
-    """
-    found = []
+    """Mean step from inner to outer neighbours over the inner plate; 0 without such neighbours."""
+    steps = []
     for i in range(len(outer) - 1):
         if outer[i] != outer[i + 1]:
-            wide, narrow = (i, i + 1) if outer[i] else (i + 1, i)
-            if thickness_m[narrow] > 0:
-                found.append((inside_m[wide] - inside_m[narrow]) / thickness_m[narrow])
-    return float(np.mean(found)) if found else 0.0
+            outer_ring, inner_ring = (i, i + 1) if outer[i] else (i + 1, i)
+            if thickness_m[inner_ring] > 0:
+                steps.append(
+                    (inside_m[outer_ring] - inside_m[inner_ring]) / thickness_m[inner_ring]
+                )
+    return float(np.mean(steps)) if steps else 0.0
 
 
 def exchanged_rings(outside_m, plates_m, thickness_m, laps):
-    """The pairs of rings that look exchanged, by the steps that laps leave between neighbours.
+    """Pairs of rings that appear exchanged, from the steps that laps leave between neighbours.
 
-    Rings that fit one order as they stand (butt-jointed, or inner and outer in turn, as `laps` say
-    or either way where these say nothing) are sound. Of rings that do not, each pair is tried in
-    each order.
+    The rings are valid if they fit an order: butt-jointed, or inner and outer in turn. The order is
+    that in `laps`, or either order if `laps` states none. Otherwise each pair is tried in each
+    order.
 
     Parameters
     ----------
     outside_m, plates_m : ndarray, shape (rings,)
-        Radius of the outside, and plate with paint.
+        Outside radii, and plate thicknesses including paint, m.
     thickness_m : ndarray, shape (rings,)
-        Of the plates.
+        Plate thicknesses, m.
     laps : sequence of str or None
-        "inner" or "outer" of each ring.
+        "inner" or "outer" for each ring.
 
     Returns
     -------
     list of (int, int, float, float)
-        The pair, the sum of the steps with it exchanged, and as it is, m; two of them where rings
-        that begin with an inner or with an outer one explain the readings as well.
+        The pair, and the sums of the steps with the pair exchanged and as read, m. Two entries if
+        orders that begin with an inner or an outer ring explain the readings equally well.
 
     Examples
     --------
@@ -183,31 +187,33 @@ def exchanged_rings(outside_m, plates_m, thickness_m, laps):
         first = np.arange(count) % 2 == 0
         orders = [np.zeros(count, dtype=bool), first, ~first]
     else:
-        orders = [np.array([one == "outer" for one in laps])]
+        orders = [np.array([lap == "outer" for lap in laps])]
+    # In the true order, outer rings are wider by the inner plates; after subtraction no step
+    # remains.
     shifts = [outer * _inner_plates(thickness_m, outer) for outer in orders]
     inside = outside_m - plates_m
     steps = [np.abs(np.diff(inside - shift)).sum() for shift in shifts]
     if min(steps) < FITS * float(np.median(thickness_m)) * (count - 1):
         return []
-    found = [exchanged_courses(outside_m, plates_m + shift, range(count)) for shift in shifts]
-    found = [one for one in found if one is not None]
-    least = min((left for _, _, left, _ in found), default=0.0)
-    alike = least + FITS * float(np.median(thickness_m))
-    return list({one[:2]: one for one in found if one[2] <= alike}.values())
+    exchanged = [exchanged_courses(outside_m, plates_m + shift, range(count)) for shift in shifts]
+    exchanged = [result for result in exchanged if result is not None]
+    least = min((sum_m for _, _, sum_m, _ in exchanged), default=0.0)
+    limit = least + FITS * float(np.median(thickness_m))
+    return list({result[:2]: result for result in exchanged if result[2] <= limit}.values())
 
 
 def _inner_plates(thickness_m, outer):
-    """(rings,) mean plate of the inner rings that each touches; of none its own."""
-    found = thickness_m.astype(float)
+    """Mean plate of the inner neighbours of each ring, or its own plate without any, m."""
+    plates_m = thickness_m.astype(float)
     for i in range(len(outer)):
-        beside = [k for k in (i - 1, i + 1) if 0 <= k < len(outer) and not outer[k]]
-        if beside:
-            found[i] = np.mean(thickness_m[beside])
-    return found
+        inner_neighbours = [k for k in (i - 1, i + 1) if 0 <= k < len(outer) and not outer[k]]
+        if inner_neighbours:
+            plates_m[i] = np.mean(thickness_m[inner_neighbours])
+    return plates_m
 
 
-def _of_nominal(job, straps):
-    """The mean inside diameter against the drawing's."""
+def _check_nominal(job, straps):
+    """Problems of a mean inside diameter that differs from the drawing."""
     nominal = job.tank.nominal_diameter_m
     if nominal is None:
         return
@@ -225,12 +231,12 @@ def _of_nominal(job, straps):
 
 
 def _uncontrolled(job, wall):
-    """Rings of one reading alone: a blunder in it nothing would show."""
-    alone = read_once(names_of(job.rings), wall)
-    if alone:
+    """Problems of rings with a single reading, in which no other reading reveals a blunder."""
+    single = read_once(names_of(job.rings), wall)
+    if single:
         text = message(
             "rings_controlled_by_nothing",
             "rings {rings}: a single reading, which nothing controls; a second strap would",
-            rings=", ".join(alone),
+            rings=", ".join(single),
         )
         yield _problem(text, column="ring")

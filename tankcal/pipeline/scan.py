@@ -1,4 +1,4 @@
-"""A scanned lying cylinder or sphere: the shape that its points have, and the wall about it."""
+"""Scanned horizontal cylinder or sphere: the fitted shape and the wall about it."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -17,25 +17,38 @@ from tankcal.sections import covariance_of
 from tankcal.tank.factors import Factor
 from tankcal.tank.surveyed_form import SurveyedForm
 
-FAR = 5.0  # standard deviations: a point further off is not of the wall
+FAR = 5.0  # standard deviations from the wall above which a point is rejected
 MOST_ROUNDS = 30
-KEPT_PART = 0.03  # of the radius: farther off no point can be kept
-NEVER_PART, NEVER_M = 0.02, 0.01  # of the radius, and more: no point further off is of the wall
+KEPT_PART = 0.03  # largest distance of a kept point from the shape, as a share of the radius
+# Largest distance of a wall point from the shape: a share of the radius, plus a length.
+NEVER_PART, NEVER_M = 0.02, 0.01
 
 
 @dataclass(frozen=True)
 class Scan:
-    """What the points of a wall say of a solid.
+    """Solid fitted to the points of a wall.
 
-    names        of the inputs that they give: "diameter", and "tilt" of a lying cylinder
-    values       (len(names),) of the surface as surveyed
-    factors      what the points leave uncertain about them (`body.Factor`)
-    form         how the wall departs from that solid, with what is uncertain of its volumes
-    accepted     (m,) indices of the points that were used
-    residuals_m  (n,) of all points, outwards positive; noise_m their standard deviation
-    fit          the sphere or cylinder; reach_m of the used points along the cylinder's axis
-    foot_m       distance of the nearest used point from where the dip meets the bottom of a
-                 cylinder
+    Attributes
+    ----------
+    names : tuple of str
+        Inputs that the points determine: "diameter", and "tilt" for a horizontal cylinder.
+    values : ndarray, shape (names,)
+        Values of the surface as surveyed.
+    factors : tuple of Factor
+        Uncertainty of the values from the points (`body.Factor`).
+    form : SurveyedForm
+        Deviation of the wall from the solid, with the uncertainty of its volumes.
+    accepted : ndarray of int, shape (m,)
+        Indices of the accepted points.
+    residuals_m : ndarray, shape (n,)
+        Residuals of all points, outwards positive, m.
+    noise_m : float
+        Standard deviation of the residuals, m.
+    fit : sphere or cylinder
+    reach_m : (float, float)
+        Range of the accepted points along the axis of a cylinder, m.
+    foot_m : float or None
+        Distance of the nearest accepted point from the bottom at the dip of a cylinder, m.
     """
 
     names: tuple[str, ...]
@@ -51,41 +64,57 @@ class Scan:
     surveyed_as = "scan"
 
     def is_within(self, places_m):
-        """(n,) whether places lie within the wall, and between the ends of what was surveyed."""
+        """Whether positions (n, 3) lie inside the wall and between the ends of the survey."""
         along = _along(self.fit, places_m)
         low, high = self.reach_m
         return (offsets(self.fit, places_m) < 0) & (along > low) & (along < high)
 
 
 def fit_scan(job, dof=np.inf):
-    """`Scan` of the points of a lying cylinder or a sphere; points far off are left out.
+    """`Scan` of the points of a horizontal cylinder or a sphere.
 
-    Rounds of fit and test leave out points over 5 robust standard deviations off, until nothing
-    changes. Of what is within 2 % of the radius and 10 mm of that shape, all points are then held
-    against the wall that the others show (`scanned_wall.agreeing`), so a dent stays in. Without
-    snooping every point is used. dof: degrees of freedom of the points' covariance, where it was
-    given. A full covariance is the fit's weight and its propagation. Points that somebody decided
-    to keep stay, and those to leave out take no part. Raises InputError when the points make no
-    such solid.
+    Repeated fits reject points over 5 robust standard deviations off, until the selection is
+    stable. All points within 2 % of the radius plus 10 mm of that shape are then compared with the
+    wall that the other points show (`scanned_wall.agreeing`). Points in a dent thus remain. Without
+    snooping all points are used. A full covariance serves as weight and for propagation. Points
+    kept by decision stay, and excluded points take no part.
+
+    Parameters
+    ----------
+    job : Job
+    dof : float
+        Degrees of freedom of the covariance of the points, if supplied.
+
+    Returns
+    -------
+    Scan
+
+    Raises
+    ------
+    InputError
+        If the points do not form such a solid.
     """
     decided = decisions_of(job)
-    chosen, kept = decided >= 0, decided > 0
+    is_used, is_kept = decided >= 0, decided > 0
     for _ in range(MOST_ROUNDS):
-        fit, names, values, by_shape, residuals = _told(job, chosen)
-        now = (_near(residuals, chosen) | kept) & (decided >= 0) if job.snooping else chosen
-        if np.array_equal(now, chosen):
+        fit, names, values, by_shape, residuals = _fit_or_refuse(job, is_used)
+        is_near = (
+            (_near(residuals, is_used) | is_kept) & (decided >= 0) if job.snooping else is_used
+        )
+        if np.array_equal(is_near, is_used):
             break
-        chosen = now
-    _refuse_scatter(job, fit, values, residuals[chosen])  # before neighbours make up their own wall
+        is_used = is_near
+    # Before points in groups can define a wall of their own.
+    _refuse_scatter(job, fit, values, residuals[is_used])
     if job.snooping:
-        may_be = chosen | (np.abs(residuals) <= NEVER_PART * fit.radius_m + NEVER_M)
-        may_be &= decided >= 0
-        own = partial(_covariance, job.points)
-        chosen = agreeing(job, fit, may_be, own, FAR, kept)
-        fit, names, values, by_shape, residuals = _told(job, chosen)
+        is_candidate = is_used | (np.abs(residuals) <= NEVER_PART * fit.radius_m + NEVER_M)
+        is_candidate &= decided >= 0
+        covariance_of_points = partial(_covariance, job.points)
+        is_used = agreeing(job, fit, is_candidate, covariance_of_points, FAR, is_kept)
+        fit, names, values, by_shape, residuals = _fit_or_refuse(job, is_used)
     refuse_kept(job, residuals, KEPT_PART * fit.radius_m)
-    index = np.flatnonzero(chosen)
-    noise = _refuse_scatter(job, fit, values, residuals[chosen])
+    index = np.flatnonzero(is_used)
+    noise = _refuse_scatter(job, fit, values, residuals[is_used])
     fitted = Fitted(fit, names, values, by_shape)
     wall = scanned_wall(job, fitted, index, _covariance(job.points, index), dof)
     return Scan(
@@ -97,36 +126,37 @@ def fit_scan(job, dof=np.inf):
         residuals,
         noise,
         fit,
-        _reach(fit, job.points.xyz_m[chosen]),
+        _reach(fit, job.points.xyz_m[is_used]),
         wall.foot_m,
     )
 
 
-def _refuse_scatter(job, fit, values, used):
-    """Standard deviation of the used points about the shape; refused where it is no wall's."""
-    noise = float(np.sqrt(used @ used / max(fit.dof, 1)))
+def _refuse_scatter(job, fit, values, residuals):
+    """Standard deviation of the accepted points about the shape, m; InputError if excessive."""
+    noise = float(np.sqrt(residuals @ residuals / max(fit.dof, 1)))
     refuse_misfit(job.points, noise, float(values[0]))
     return noise
 
 
 def _along(fit, xyz_m):
-    """(n,) places along the axis of a cylinder, m; 0 for a sphere."""
+    """Positions (n,) along the axis of a cylinder, m; 0 for a sphere."""
     if isinstance(fit, FittedCylinder):
         return (xyz_m - fit.point_m) @ fit.direction
     return np.zeros(len(xyz_m))
 
 
 def _reach(fit, xyz_m):
-    """Least and greatest place along a cylinder; without end for a sphere."""
+    """Smallest and largest position along a cylinder, m; infinite for a sphere."""
     if not isinstance(fit, FittedCylinder):
         return -np.inf, np.inf
     along = _along(fit, xyz_m)
     return float(along.min()), float(along.max())
 
 
-def _told(job, chosen):
+def _fit_or_refuse(job, is_used):
+    """`_fitted`, with InputError in place of SolutionError."""
     try:
-        return _fitted(job, chosen)
+        return _fitted(job, is_used)
     except SolutionError as error:
         problem = Problem(
             origin_of(job.points),
@@ -135,13 +165,14 @@ def _told(job, chosen):
         raise InputError(problem) from error
 
 
-def _near(residuals, chosen):
-    spread = SCALE_OF_MEDIAN * np.median(np.abs(residuals[chosen]))
-    return np.abs(residuals) <= FAR * max(spread, 1e-6)
+def _near(residuals, is_used):
+    """Mask of the points within `FAR` robust standard deviations of the shape."""
+    robust_sd = SCALE_OF_MEDIAN * np.median(np.abs(residuals[is_used]))
+    return np.abs(residuals) <= FAR * max(robust_sd, 1e-6)
 
 
 def _covariance(points, index):
-    """Of points (m,): (3m,) variances, or (3m, 3m) and positive definite."""
+    """Covariance of points (m,): variances (3m,) or a positive definite matrix (3m, 3m)."""
     if points.covariance_m2 is not None:
         return covariance_of(index, points.covariance_m2)
     if points.sd_m is None:
@@ -149,13 +180,13 @@ def _covariance(points, index):
     return points.sd_m[index].ravel() ** 2
 
 
-def _fitted(job, chosen):
-    """Fit, names, values, their derivative by its unknowns, and the residuals of all points."""
-    own, xyz = _covariance(job.points, np.flatnonzero(chosen)), job.points.xyz_m
+def _fitted(job, is_used):
+    """Fit, names, values, their derivatives by the unknowns, and residuals of all points."""
+    covariance, xyz = _covariance(job.points, np.flatnonzero(is_used)), job.points.xyz_m
     if job.sphere is not None:
-        ball = fit_sphere(xyz[chosen], own)
+        ball = fit_sphere(xyz[is_used], covariance)
         by_shape = np.array([[0.0, 0.0, 0.0, 2.0]])
         return ball, ("diameter",), [2 * ball.radius_m], by_shape, offsets(ball, xyz)
-    lying = lying_cylinder(xyz[chosen], own, job.horizontal.azimuth_rad)
+    lying = lying_cylinder(xyz[is_used], covariance, job.horizontal.azimuth_rad)
     fit, values = lying.cylinder, [lying.diameter_m, lying.tilt]
     return fit, ("diameter", "tilt"), values, lying.by_cylinder, offsets(fit, xyz)

@@ -1,14 +1,15 @@
-"""Whether the noise of the sections is homogeneous, and whether it is as stated.
+"""Tests whether the noise of the sections is homogeneous and agrees with its stated covariance.
 
-The table takes the covariance of the points as stated, and sizes of form that all courses share:
-the scatter of a section about its circle or about the wall enters U of no row. Two tests show
-where that is not justified:
+The table uses the stated covariance of the points and amplitudes common to all courses. The scatter
+of a section about its circle or about the wall enters U of no row. Two tests show where this is not
+justified:
 
-- of all sections together: Bartlett's, on the variance factors of their noise apart from the form
-  of the wall. A section takes part where noise is at least half of what its points show; elsewhere
-  form that the model of the wall lacks would count as noise.
-- of each section: chi-square against its stated covariance, two-sided. Too small is judged about
-  the circle, because form can only add to that scatter; too large apart from the form.
+- Bartlett's test of all sections together, on the variance factors of their noise apart from the
+  form of the wall. A section takes part if noise is at least half of the scatter of its points.
+  Otherwise form that the model lacks would count as noise.
+- A two-sided chi-square test of each section against its stated covariance. A small scatter is
+  judged about the circle, because form can only add to it. A large scatter is judged apart from the
+  form.
 """
 
 from dataclasses import dataclass
@@ -20,9 +21,10 @@ from tankcal.geometry.field.section_noise import bartlett
 from tankcal.messages import list_some, message
 from tankcal.pipeline.survey_warnings import SHOWN, noise_is_estimated, of_points
 
-OF_SCATTER = ("sections_inhomogeneous", "sections_off_stated")  # of measured points alone
-LEVEL = 0.01  # of either test; of 500 valid surveys of generated walls 3 are called unequal
-LEAST_SHARE = 0.5  # of noise: without it 9 % of the surveys with 0.3 mm are called unequal
+# Keys of the warnings that only measured points, not planned points, can cause.
+OF_SCATTER = ("sections_inhomogeneous", "sections_off_stated")
+LEVEL = 0.01  # significance of both tests; rejects 3 of 500 valid simulated surveys
+LEAST_SHARE = 0.5  # least share of noise; without it 9 % of the surveys with 0.3 mm fail
 
 
 @dataclass(frozen=True)
@@ -32,20 +34,21 @@ class SectionTest:
     Attributes
     ----------
     section : str
+        Name of the section.
     factor : float
-        Variance of the noise apart from the form, over the stated one.
+        Variance of the noise apart from the form, divided by the stated variance.
     dof : float
-        Its degrees of freedom.
+        Degrees of freedom of `factor`.
     share : float
-        Part of the redundancy of the circle that is noise, not form.
+        Share of noise in the redundancy of the circle; the rest is form.
     chi2, chi2_dof : float, int
         v'Pv about the circle, and n - 3.
     p : float or None
-        Of the stated covariance, two-sided; None where the covariance was estimated.
+        Two-sided p value of the stated covariance; None if the covariance was estimated.
     is_compared : bool
         Whether the section takes part in Bartlett's test.
     differs : bool
-        Whether the section disagrees with its stated covariance (Holm 1979, all at 1 %).
+        Whether the section disagrees with its stated covariance (Holm 1979, all sections at 1 %).
     """
 
     section: str
@@ -68,7 +71,7 @@ class Homogeneity:
     sections : tuple of SectionTest
         From the bottom up.
     statistic, dof, p : float or None, int or None, float or None
-        Bartlett's; None where fewer than two sections take part.
+        Result of Bartlett's test; None if fewer than two sections take part.
     """
 
     sections: tuple[SectionTest, ...]
@@ -79,11 +82,11 @@ class Homogeneity:
     @property
     def compared(self):
         """Sections that take part in Bartlett's test."""
-        return [one for one in self.sections if one.is_compared]
+        return [section for section in self.sections if section.is_compared]
 
 
 def homogeneity_of(job, wall):
-    """`Homogeneity` of the sections of a wall that was surveyed by points.
+    """`Homogeneity` of the sections of a wall surveyed by points.
 
     Parameters
     ----------
@@ -93,8 +96,8 @@ def homogeneity_of(job, wall):
     Returns
     -------
     Homogeneity or None
-        None where points share unknowns of instruments (hits, clouds, tangents) or were averaged
-        in cells, so that no section has a noise of its own.
+        None if points share unknowns of instruments (hits, clouds, tangents) or were averaged in
+        cells, because sections then have no separate noise.
     """
     shares_unknowns = job.hits or job.clouds or job.tangents or job.points.unbound
     if shares_unknowns or wall.points_read != len(wall.accepted):
@@ -102,31 +105,32 @@ def homogeneity_of(job, wall):
     noise = wall.section_noise
     is_stated = not noise_is_estimated(job)
     p = [
-        _two_sided(section.circle, one) if is_stated else None
-        for section, one in zip(wall.sections, noise, strict=True)
+        _two_sided(section.circle, section_noise) if is_stated else None
+        for section, section_noise in zip(wall.sections, noise, strict=True)
     ]
     differs = _rejected_by_holm(p) if is_stated else np.zeros(len(p), dtype=bool)
     tests = tuple(_test_of(*parts) for parts in zip(wall.sections, noise, p, differs, strict=True))
-    compared = [(one.factor, one.dof) for one in tests if one.is_compared]
+    compared = [(test.factor, test.dof) for test in tests if test.is_compared]
     if len(compared) < 2:
         return Homogeneity(tests)
     return Homogeneity(tests, *bartlett(*zip(*compared, strict=True)))
 
 
 def _is_noisy(circle, noise):
-    """Whether noise is at least half of what the points of a section show."""
+    """Whether noise is at least half of the scatter of the points of a section."""
     return noise.redundancy >= LEAST_SHARE * circle.dof
 
 
 def _two_sided(circle, noise):
-    """Probability of a scatter that is as far from the stated covariance of a section."""
+    """Two-sided p value of the scatter of a section under its stated covariance."""
     lower = float(chdtr(circle.dof, circle.dof * circle.variance_factor))
     upper = noise.upper_p if _is_noisy(circle, noise) else 1.0
+    # Doubling the smaller tail gives a two-sided p value; its bound of 1 keeps it a probability.
     return min(2 * min(lower, upper), 1.0)
 
 
 def _rejected_by_holm(p):
-    """(k,) whether each of k hypotheses is rejected, all together at `LEVEL` (Holm 1979)."""
+    """Mask (k,) of the hypotheses rejected at a joint significance `LEVEL` (Holm 1979)."""
     p, order = np.array(p), np.argsort(p)
     passed = p[order] > LEVEL / np.arange(len(p), 0, -1)
     rejected = np.zeros(len(p), dtype=bool)
@@ -135,6 +139,7 @@ def _rejected_by_holm(p):
 
 
 def _test_of(section, noise, p, differs):
+    """`SectionTest` of a section."""
     circle = section.circle
     return SectionTest(
         section=section.group.name,
@@ -161,12 +166,12 @@ def warn_of_sections(job, wall):
     -------
     list of Problem
     """
-    found = homogeneity_of(job, wall)
-    if found is None:
+    homogeneity = homogeneity_of(job, wall)
+    if homogeneity is None:
         return []
     texts = []
-    if found.p is not None and found.p < LEVEL:
-        quiet, *_, loud = sorted(found.compared, key=lambda one: one.factor)
+    if homogeneity.p is not None and homogeneity.p < LEVEL:
+        quiet, *_, loud = sorted(homogeneity.compared, key=lambda test: test.factor)
         texts.append(
             message(
                 "sections_inhomogeneous",
@@ -177,9 +182,9 @@ def warn_of_sections(job, wall):
                 " near section {low} the part by the points is too large (the true sd is"
                 " {quiet:.1f} times the one taken), near section {high} too small ({loud:.1f}"
                 " times): find the cause, or give the points of each section their own sd",
-                statistic=found.statistic,
-                dof=found.dof,
-                p=found.p,
+                statistic=homogeneity.statistic,
+                dof=homogeneity.dof,
+                p=homogeneity.p,
                 least=quiet.factor,
                 low=quiet.section,
                 most=loud.factor,
@@ -188,17 +193,17 @@ def warn_of_sections(job, wall):
                 loud=np.sqrt(loud.factor),
             )
         )
-    off = [one for one in found.sections if one.differs]
-    if off:
-        shown = [
+    differing = [section for section in homogeneity.sections if section.differs]
+    if differing:
+        texts_of_sections = [
             message(
                 "section_off_stated",
                 "{section} ({times:.2f} times, p = {p:.1g})",
-                section=one.section,
-                times=np.sqrt(_ratio(one)),
-                p=one.p,
+                section=test.section,
+                times=np.sqrt(_ratio(test)),
+                p=test.p,
             )
-            for one in sorted(off, key=lambda one: one.p)
+            for test in sorted(differing, key=lambda test: test.p)
         ]
         texts.append(
             message(
@@ -206,13 +211,14 @@ def warn_of_sections(job, wall):
                 "sections whose points scatter more or less than their stated standard deviations"
                 " allow (chi-square, all sections together at 1 %): {sections}; U takes the"
                 " stated standard deviations: correct them",
-                sections=list_some(shown, SHOWN),
+                sections=list_some(texts_of_sections, SHOWN),
             )
         )
     return of_points(job.points, texts)
 
 
 def _ratio(test):
-    """Variance over the stated one: about the circle where that is too small."""
+    """Variance over the stated one: about the circle if too small, else apart from the form."""
+    # Form can only add to the scatter about the circle, so a ratio below 1 there is due to noise.
     about_circle = test.chi2 / test.chi2_dof
     return about_circle if about_circle < 1 else test.factor

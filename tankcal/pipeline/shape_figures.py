@@ -1,7 +1,7 @@
-"""What all figures of a wall's shape are sums of: radii at spots and centres, with one covariance.
+"""Radii and centres of a surveyed wall with joint covariance, from which shape figures follow.
 
-Radii that were read count as they were read, the others are estimated; plate and paint are taken
-off, and the head of the survey's liquid.
+Measured radii are used as read, other radii are estimated. Plate, paint and the head of the liquid
+during the survey are subtracted.
 """
 
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ from tankcal.pipeline.tanks.vertical import bearing_inputs, insets_of
 from tankcal.tank.hydrostatics import LiquidHead
 from tankcal.uncertainty import Source, combine, declared_source, group_correlated
 
-SAME_PLACE_M = 0.1  # along the arc: a reading as near as that to a generatrix is on it
-LEAST_U_M = 1e-9  # of a value: rounding
+SAME_PLACE_M = 0.1  # largest distance along the arc of a reading from its generatrix
+LEAST_U_M = 1e-9  # lower bound of a standard uncertainty, against rounding
 
 
 @dataclass(frozen=True)
@@ -28,19 +28,19 @@ class Level:
     Attributes
     ----------
     height_m : float
-        Above the bottom of the shell.
+        Height above the bottom of the shell, m.
     course : int
-        From 0 on.
+        Index of the course, from 0.
     zeta : float
-        Height within its course, -1 to 1.
+        Relative height within the course, -1 to 1.
     azimuth_rad : ndarray, shape (a,)
-        Ascending: of its readings where they are level.
+        Azimuths in ascending order, of the readings if these lie on one level.
     ring : int
-        Of the field; -1: no points have this height, and its centre is not known.
+        Ring of the field; -1 if no points have this height, so that the centre is unknown.
     site : ndarray of int, shape (a,)
-        Reading of the field at each azimuth; -1: the radius there is estimated.
+        Reading of the field at each azimuth; -1 if the radius is estimated.
     is_low : bool
-        Whether it is the one whose low radii are judged.
+        Whether the low radii are judged at this level.
     """
 
     height_m: float
@@ -54,19 +54,19 @@ class Level:
 
 @dataclass(frozen=True)
 class Figures:
-    """Values with their uncertainty: value_m, u_m, dof, each of the same shape."""
+    """Values with standard uncertainties and degrees of freedom, three arrays of one shape."""
 
     value_m: np.ndarray
     u_m: np.ndarray
     dof: np.ndarray
 
     def part(self, start, end):
-        """Those of some rows."""
+        """The figures of some rows."""
         return Figures(self.value_m[start:end], self.u_m[start:end], self.dof[start:end])
 
 
 class ShapeBase:
-    """Radii at spots, then centres, of a job's wall, with their uncertainty.
+    """Radii at spots, then centres, of the wall of a job, with their uncertainty.
 
     Parameters
     ----------
@@ -74,59 +74,59 @@ class ShapeBase:
     wall : Wall
     levels : sequence of Level
     plumbed : list of int
-        Which of them have a centre.
+        Indices of the levels that have a centre.
     pairs : sequence of (int, int)
-        Levels that are compared along the generatrices of the first.
+        Levels to be compared along the generatrices of the first.
     """
 
     def __init__(self, job, wall, levels, plumbed, pairs):
         self._job, self._wall, self._levels = job, wall, levels
         self._place, spots = {}, []
-        for i, one in enumerate(levels):
-            for angle, site in zip(one.azimuth_rad, one.site, strict=True):
+        for i, spot_level in enumerate(levels):
+            for angle, site in zip(spot_level.azimuth_rad, spot_level.site, strict=True):
                 self._add(spots, i, angle, site)
         for low, high in pairs:
             for angle in levels[low].azimuth_rad:
                 self._add(spots, high, angle, self._reading_near(levels[high], angle))
         self._count = len(spots)
         self._centre_of = {i: number for number, i in enumerate(plumbed)}
-        at, angle, site = map(np.array, zip(*spots, strict=True))
+        level_of_spot, angle, site = map(np.array, zip(*spots, strict=True))
         self._site = site
         sites = wall.field.sites
-        zeta = np.array([one.zeta for one in levels])[at]
+        zeta = np.array([level.zeta for level in levels])[level_of_spot]
         spots = Spots(
-            course=np.array([one.course for one in levels])[at],
+            course=np.array([level.course for level in levels])[level_of_spot],
             zeta=np.where(site >= 0, sites.zeta[site], zeta),
             azimuth_rad=np.where(site >= 0, sites.azimuth_rad[site], angle),
             site=site,
         )
         rings = [(levels[i].ring, levels[i].zeta) for i in plumbed]
         self._found = FieldValues(wall.field, spots, rings)
-        self._height_m = np.array([one.height_m for one in levels])[at]
+        self._height_m = np.array([level.height_m for level in levels])[level_of_spot]
         inset = np.array(insets_of(job, job.switches))[spots.course]
         self._head_m, self.state = self._widening()
         self._surveyed = self._found.value_m.copy()
-        # the field has no ellipse of the lean; these are radii of horizontal sections
+        # Radii of the field are square to the axis; these are radii of horizontal sections.
         self._surveyed[: self._count] /= radii_square_to_axis(spots.azimuth_rad, 1.0, self._slope)
         self._value_m = self._surveyed.copy()
         self._value_m[: self._count] += self._head_m - inset
         self._sources = self._causes()
 
     def _add(self, spots, level, angle, site):
-        """A spot of a level at an azimuth, once; as read where there is a reading."""
+        """Add a spot of a level at an azimuth, unless present, with its reading if there is one."""
         if (level, float(angle)) not in self._place:
             self._place[level, float(angle)] = len(spots)
             spots.append((level, float(angle), int(site)))
 
     def _reading_near(self, level, angle):
-        """The reading of a level that is on a generatrix; -1: none."""
-        away = np.abs((level.azimuth_rad - angle + np.pi) % FULL_TURN - np.pi)
-        nearest = int(np.argmin(away))
-        is_near = away[nearest] * self._wall.field.nominal_m <= SAME_PLACE_M
+        """Reading of a level on a generatrix, or -1 without such a reading."""
+        difference = np.abs((level.azimuth_rad - angle + np.pi) % FULL_TURN - np.pi)
+        nearest = int(np.argmin(difference))
+        is_near = difference[nearest] * self._wall.field.nominal_m <= SAME_PLACE_M
         return level.site[nearest] if is_near else -1
 
     def _widening(self):
-        """(p,) what taking off the liquid of the survey adds to the radii, and the state."""
+        """Increase (p,) of the radii when the survey's liquid is removed, m, and the state."""
         job = self._job
         is_loaded = job.survey.liquid_density_kg_m3 and job.survey.liquid_level_m
         if not (is_loaded and job.switches.head):
@@ -136,103 +136,111 @@ class ShapeBase:
         return head.with_density(0.0).widening_m(self._height_m, 0.0), "unloaded"
 
     def centre(self, level):
-        """(x, y) of the centre of a level in the frame of the survey."""
-        one, wall = self._levels[level], self._wall
-        at = self._count + 2 * self._centre_of[level]
-        up = one.height_m - wall.sections[one.ring].group.height_m
-        return wall.origins_m[one.ring] + self._surveyed[at : at + 2] + up * self._slope
+        """Position (x, y) of the centre of a level in the frame of the survey, m."""
+        chosen, wall = self._levels[level], self._wall
+        column = self._count + 2 * self._centre_of[level]
+        height_above = chosen.height_m - wall.sections[chosen.ring].group.height_m
+        return (
+            wall.origins_m[chosen.ring]
+            + self._surveyed[column : column + 2]
+            + height_above * self._slope
+        )
 
     def radii(self, level, azimuth):
-        """(a, f) rows of the radii of a level."""
-        found = np.zeros((len(azimuth), len(self._value_m)))
-        places = [self._place[level, float(angle)] for angle in azimuth]
-        found[np.arange(len(azimuth)), places] = 1.0
-        return found
+        """Rows (a, f) that select the radii of a level."""
+        rows = np.zeros((len(azimuth), len(self._value_m)))
+        spots = [self._place[level, float(angle)] for angle in azimuth]
+        rows[np.arange(len(azimuth)), spots] = 1.0
+        return rows
 
     def plumb(self, low, high):
-        """(g, f) rows of the departures of one level from the plumb of another."""
+        """Rows (g, f) of the deviations of one level from the plumb of another."""
         azimuth = self._levels[low].azimuth_rad
-        turn = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
-        found = self.radii(high, azimuth) - self.radii(low, azimuth)
+        direction = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
+        rows = self.radii(high, azimuth) - self.radii(low, azimuth)
         for level, sign in ((high, 1.0), (low, -1.0)):
-            at = self._count + 2 * self._centre_of[level]
-            found[:, at : at + 2] += sign * turn
-        return found
+            column = self._count + 2 * self._centre_of[level]
+            rows[:, column : column + 2] += sign * direction
+        return rows
 
     def is_read(self, low, high):
-        """(g,) whether two levels have readings on the generatrices of the lower one."""
+        """Mask (g,) of the generatrices on which both levels have readings."""
         pairs = [[self._site[self._place[i, float(angle)]] for i in (low, high)]
                  for angle in self._levels[low].azimuth_rad]  # fmt: skip
         return np.all(np.array(pairs) >= 0, axis=1)
 
     def axis(self, low, high):
-        """(3, f) rows of x and y between the centres of two levels, and along their direction."""
-        found = np.zeros((3, len(self._value_m)))
+        """Rows (3, f) of x and y between the centres of two levels, and of their distance."""
+        rows = np.zeros((3, len(self._value_m)))
         for level, sign in ((high, 1.0), (low, -1.0)):
-            at = self._count + 2 * self._centre_of[level]
-            found[:2, at : at + 2] += sign * np.eye(2)
-        apart = self.centre(high) - self.centre(low)
-        away = np.hypot(*apart)
-        found[2] = (apart / away if away > 0 else np.array([1.0, 0.0])) @ found[:2]
-        return found
+            column = self._count + 2 * self._centre_of[level]
+            rows[:2, column : column + 2] += sign * np.eye(2)
+        between = self.centre(high) - self.centre(low)
+        distance = np.hypot(*between)
+        # The distance changes only by displacements along the line between the centres.
+        rows[2] = (between / distance if distance > 0 else np.array([1.0, 0.0])) @ rows[:2]
+        return rows
 
     def figures(self, rows):
-        """`Figures` of rows (r, f), each of which is of a few places."""
+        """`Figures` of rows (r, f) with few nonzero elements each."""
         rows = scipy.sparse.csr_array(rows)
         value = rows @ self._value_m
         value += rows[:, self._count :] @ self._origins()
         unseen = self._found.unseen_of(rows)
-        kinds = np.array([one.kind for one in COMPONENTS])
+        kinds = np.array([component.kind for component in COMPONENTS])
         variances = [unseen[kinds == kind].sum(axis=0) for kind in KINDS]
-        parts = [Source("", np.sqrt(np.maximum(one, 0.0))[:, None]) for one in variances]
-        by_survey = [one.mapped(lambda columns: rows @ columns) for one in self._sources]
-        told = combine([*by_survey, *parts], len(value))
-        return Figures(value, np.maximum(told.u, LEAST_U_M), told.effective_dof)
+        parts = [Source("", np.sqrt(np.maximum(variance, 0.0))[:, None]) for variance in variances]
+        by_survey = [cause.mapped(lambda columns: rows @ columns) for cause in self._sources]
+        combined = combine([*by_survey, *parts], len(value))
+        return Figures(value, np.maximum(combined.u, LEAST_U_M), combined.effective_dof)
 
     def _origins(self):
-        """(2 c,) what the centres count from, in the frame of the survey."""
-        found = [
+        """Reference points (2c,) of the centres in the frame of the survey, m."""
+        origins = [
             self.centre(i) - self._surveyed[self._count + 2 * c : self._count + 2 * c + 2]
             for i, c in self._centre_of.items()
         ]
-        return np.concatenate(found) if found else np.zeros(0)
+        return np.concatenate(origins) if origins else np.zeros(0)
 
     def _causes(self):
-        """`Source`s of what the survey leaves uncertain, and of what was declared."""
+        """`Source`s of the uncertainty from the survey and from declared inputs."""
         job, wall = self._job, self._wall
         factors = wall.factors(job, self._found.weights)
-        by = self._derivatives()
+        derivatives = self._derivatives()
         declared = {
-            one.name: declared_source(one, by[one.name])
-            for one in job.inputs
-            if one.name in by and one.name not in wall.without_inputs
+            declared_input.name: declared_source(declared_input, derivatives[declared_input.name])
+            for declared_input in job.inputs
+            if declared_input.name in derivatives and declared_input.name not in wall.without_inputs
         }
-        survey = [one.source(one.columns) for one in factors]
+        survey = [factor.source(factor.columns) for factor in factors]
         return [*survey, *group_correlated(declared, job.correlations)]
 
     def _derivatives(self):
-        """{input: (f,) derivative of the radii and centres by it}."""
+        """{input: derivative (f,) of the radii and centres}."""
         job, count = self._job, self._count
         is_radius = np.arange(len(self._value_m)) < count
-        found = {"offset": 1.0 * is_radius, "scale": np.where(is_radius, self._surveyed, 0.0)}
+        derivatives = {"offset": 1.0 * is_radius, "scale": np.where(is_radius, self._surveyed, 0.0)}
         bearing, outside = bearing_inputs(job, job.switches), job.survey.side == "outside"
         for name in ("plate_thickness", "paint"):
             if name in bearing:
-                found[name] = -float(outside) * is_radius
+                derivatives[name] = -float(outside) * is_radius
         for name, column in self._wall.read_with(self._found.weights).items():
             if name in bearing:
-                found[name] = found.get(name, 0.0) + column
-        for name, column in self._by_head().items():
+                derivatives[name] = derivatives.get(name, 0.0) + column
+        for name, column in self._derivatives_of_head().items():
             full = np.append(column, np.zeros(len(self._value_m) - count))
-            found[name] = found.get(name, 0.0) + full
-        return found
+            derivatives[name] = derivatives.get(name, 0.0) + full
+        return derivatives
 
-    def _by_head(self):
-        """{input: (p,) derivative of the head taken off}: K rho (h - z), K as 1 / (E t)."""
+    def _derivatives_of_head(self):
+        """{input: derivative (p,) of the subtracted head}.
+
+        The head is K rho (h - z), with K proportional to 1 / (E t).
+        """
         if self.state == "as_found":
             return {}
         job, head = self._job, self._head_m
-        plate = np.array([one.thickness_m for one in job.courses])
+        plate = np.array([course.thickness_m for course in job.courses])
         course = np.searchsorted(self._wall.joints_m[1:-1], self._height_m, side="right")
         above = job.survey.liquid_level_m + job.datum.plate_level_m - self._height_m
         return {

@@ -1,4 +1,4 @@
-"""Tables of corrections for trim and list of a tank of a ship, with what is uncertain of them."""
+"""Correction tables for trim and list of a ship's tank, with their uncertainty."""
 
 from dataclasses import dataclass, replace
 from math import ceil, floor, tan
@@ -15,40 +15,41 @@ from tankcal.tank.ships.corrections import FULL
 from tankcal.uncertainty import combine
 
 STEPS_M = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-ABOUT = 100  # soundings of a table whose step is not given
-MOST = 400_000  # corrections in all
-SLACK_M = (
-    0.01  # that the lower end of a pipe may stand below the mesh, or its upper end below the top
-)
-OF_SHIP = ("trim", "list")  # inputs that even keel does not have
-CLOSE = 1e-9  # of the capacity: a volume that falls by no more falls by rounding
+ABOUT = 100  # largest number of steps of a table without a given step
+MOST = 400_000  # largest number of corrections
+# Tolerance of a pipe that ends below the mesh or below the top of the tank.
+SLACK_M = 0.01
+OF_SHIP = ("trim", "list")  # inputs without effect at even keel
+CLOSE = 1e-9  # fall of a volume, relative to the capacity, that counts as rounding
 CORRECTING = message("correcting_soundings", "correcting soundings for trim and list")
 
 
 @dataclass(frozen=True)
 class ShipTables:
-    """Corrections of soundings, added to one to read the table at even keel.
+    """Corrections of soundings; a sounding plus its correction is read in the table at even keel.
 
-    Of arrays (trims, lists, soundings) each is nan where a sounding cannot be corrected.
+    Arrays (trims, lists, soundings) are nan where a sounding cannot be corrected.
 
     Attributes
     ----------
     sounding_m : ndarray, shape (s,)
-        Along the pipe from its lower end.
+        Soundings along the pipe from its lower end, m.
     trim_m, list_rad : ndarray, shape (t,), (g,)
-        By the stern, to starboard positive.
+        Trim by the stern, m, and list to starboard, rad, both positive.
     state : ndarray of str, shape (t, g, s)
-        "", "full" (the tank is, to the millimetre that the table ends with) or "below" (the table
-        begins with more).
+        "", "full" (the tank is full, within the last millimetre of the table) or "below" (the table
+        begins with a larger volume).
     correction_m, u_correction_m, U_correction_m : ndarray, shape (t, g, s)
+        Corrections, their standard and expanded uncertainties, m.
     volume_m3, u_m3, U_m3 : ndarray, shape (t, g, s)
-        Of the tank as it lies; without u where it is full.
+        Volumes in the inclined tank and their uncertainties, m3; no uncertainty if the tank is
+        full.
     dry_m3, full_m : ndarray, shape (t, g)
-        Volume at which the pipe becomes dry, and sounding at which the tank becomes full.
+        Volume at which the pipe runs dry, m3, and sounding at which the tank is full, m.
     interpolated_m : float
-        Largest error of a correction that is interpolated half way between two soundings.
+        Largest error of a correction interpolated midway between two soundings, m.
     undeclared : tuple of str
-        Inputs that move corrections and have no u.
+        Inputs that affect corrections and have no standard uncertainty.
     """
 
     sounding_m: np.ndarray
@@ -68,7 +69,7 @@ class ShipTables:
 
 
 def check_pipe(job, mesh):
-    """InputError for a pipe that does not open into the mesh, or ends below its top."""
+    """Raise InputError for a pipe that does not open into the mesh or ends below its top."""
     if job.ship is None:
         return
     turned = in_ship_frame(mesh.vertices_m, job.ship.bow_azimuth_rad)
@@ -86,13 +87,13 @@ def check_pipe(job, mesh):
             high=_place(high),
         )
         problems.append(Problem("job.toml", expected, column="ship.pipe_bottom_m"))
-    above = float(turned[:, 2].max() - pipe.top_m[2])
-    if above > SLACK_M:
+    shortfall_m = float(turned[:, 2].max() - pipe.top_m[2])
+    if shortfall_m > SLACK_M:
         expected = message(
             "ship_pipe_short",
             "the pipe ends {above:.3f} m below the top of the tank; expected it to reach the top, "
             "for the table goes there",
-            above=above,
+            above=shortfall_m,
         )
         problems.append(Problem("job.toml", expected, column="ship.pipe_top_m"))
     if problems:
@@ -104,35 +105,39 @@ def _place(xyz):
 
 
 def ship_tables(job, survey, body, table, progress=None):
-    """The `ShipTables` of a job with a ship.
+    """`ShipTables` of a job with a ship.
 
     Parameters
     ----------
     job : Job
     survey : meshes.Mesh
     body : Body
-        The tank at even keel.
+        Tank at even keel.
     table : Capacity
-        Of that body.
+        Capacity table of that body.
     progress : callable, optional
         Called as progress(text, done, total).
+
+    Returns
+    -------
+    ShipTables
 
     Raises
     ------
     InputError
-        For more corrections than can be tabled.
+        If there are too many corrections, or if the volume falls as the sounding rises.
     """
     ship = job.ship
     trims, lists = np.array(ship.trim_m), np.array(ship.list_rad)
     tangents = [
         (trim / ship.length_between_marks_m, tan(list_)) for trim in trims for list_ in lists
     ]
-    cells = [heeled_body(job, survey, *one) for one in tangents]
+    cells = [heeled_body(job, survey, *tangents_of_cell) for tangents_of_cell in tangents]
     soundings = _soundings(job, cells)
     solids, level = [cell.parts[0].solid for cell in cells], body.parts[0].solid
-    found = corrections_of(solids, level, soundings, table.height_m[-1])
-    _refuse_falling(job, found, level)
-    made = _uncertainties(cells, found, soundings, body, table.probability, progress)
+    corrections = corrections_of(solids, level, soundings, table.height_m[-1])
+    _refuse_falling(job, corrections, level)
+    uncertainties = _uncertainties(cells, corrections, soundings, body, table.probability, progress)
     shape = len(trims), len(lists)
 
     def on_grid(values):
@@ -142,20 +147,23 @@ def ship_tables(job, survey, body, table, progress=None):
         soundings,
         trims,
         lists,
-        on_grid([one.state for one in found]),
-        on_grid([one.even_m - soundings for one in found]),
-        *(on_grid([one[name] for one in made]) for name in ("u_correction", "U_correction")),
-        on_grid([one.volume_m3 for one in found]),
-        *(on_grid([one[name] for one in made]) for name in ("u", "U")),
-        on_grid([one.dry_m3 for one in found]),
-        on_grid([one.full_m for one in found]),
-        max(one.interpolated_m for one in found),
+        on_grid([cell_result.state for cell_result in corrections]),
+        on_grid([cell_result.even_m - soundings for cell_result in corrections]),
+        *(
+            on_grid([cell_result[name] for cell_result in uncertainties])
+            for name in ("u_correction", "U_correction")
+        ),
+        on_grid([cell_result.volume_m3 for cell_result in corrections]),
+        *(on_grid([cell_result[name] for cell_result in uncertainties]) for name in ("u", "U")),
+        on_grid([cell_result.dry_m3 for cell_result in corrections]),
+        on_grid([cell_result.full_m for cell_result in corrections]),
+        max(cell_result.interpolated_m for cell_result in corrections),
         undeclared_of_ship(job, survey),
     )
 
 
 def undeclared_of_ship(job, survey):
-    """Names of inputs that move corrections at the steepest trim and list and have no u."""
+    """Inputs without a standard uncertainty that affect corrections at largest trim and list."""
     if job.ship is None:
         return ()
     trim = max(job.ship.trim_m, key=abs) / job.ship.length_between_marks_m
@@ -163,16 +171,17 @@ def undeclared_of_ship(job, survey):
 
 
 def _soundings(job, cells):
-    """From 0 by the step to the highest sounding at which a tank becomes full, within the pipe.
+    """Soundings from 0, in equal steps, to the highest sounding at which a tank becomes full.
 
-    Where the last step is beyond the pipe's end, the last sounding is that of a whole millimetre.
+    The soundings stay within the pipe. If the last step exceeds the end of the pipe, the last
+    sounding is a whole millimetre.
     """
     ship = job.ship
     length = ship_pipe(ship).length_m
     highest = min(max(cell.highest_m for cell in cells), length)
     step = ship.correction_step_m
     if step is None:
-        step = next((one for one in STEPS_M if highest / one <= ABOUT), STEPS_M[-1])
+        step = next((step_m for step_m in STEPS_M if highest / step_m <= ABOUT), STEPS_M[-1])
     count = ceil(highest / step - 1e-9) + 1
     if count * len(cells) > MOST:
         expected = message(
@@ -186,16 +195,16 @@ def _soundings(job, cells):
         )
         raise InputError(Problem("job.toml", expected, column="ship.correction_step_m"))
     soundings = np.round(step * np.arange(count), 9)
-    if soundings[-1] > length * (1 + 1e-12):  # no step ends within the pipe: its last millimetre
+    if soundings[-1] > length * (1 + 1e-12):  # the last step ends beyond the pipe
         last = min(ceil(1e3 * highest - 1e-6), floor(1e3 * length + 1e-6)) / 1e3
         soundings = np.append(soundings[:-1], last if last > soundings[-2] else [])
     return soundings
 
 
-def _refuse_falling(job, found, level):
-    """InputError where a volume falls as its sounding rises: the mesh crosses itself."""
-    for one in found:
-        if np.any(np.diff(one.volume_m3) < -CLOSE * level.capacity_m3):
+def _refuse_falling(job, corrections, level):
+    """Raise InputError if a volume falls as its sounding rises: the mesh intersects itself."""
+    for cell_result in corrections:
+        if np.any(np.diff(cell_result.volume_m3) < -CLOSE * level.capacity_m3):
             expected = message(
                 "ship_volume_falls",
                 "the volume falls with a rising sounding at a trim and list, the mesh crosses "
@@ -204,51 +213,75 @@ def _refuse_falling(job, found, level):
             raise InputError(Problem(job.mesh.file, expected))
 
 
-def _uncertainties(cells, found, soundings, body, probability, progress):
-    """What `_uncertainty` gives of each cell; the table at even keel is read for all at once."""
-    readable = [one.even_m[np.isfinite(one.even_m)] for one in found]
+def _uncertainties(cells, corrections, soundings, body, probability, progress):
+    """Results of `_uncertainty` for each cell; the table at even keel is evaluated once for all."""
+    readable = [cell_result.even_m[np.isfinite(cell_result.even_m)] for cell_result in corrections]
     even_m, ends = np.concatenate(readable), np.cumsum([0, *map(len, readable)])
     inputs = tuple(body.derivatives(np.zeros(1)))
-    even, made = None, []
+    even, uncertainties = None, []
     if len(even_m):
         even = body.sources_by(even_m, inputs, without=OF_SHIP), body.area_m2(even_m)
-    for index, (cell, one) in enumerate(zip(cells, found, strict=True)):
+    for index, (cell, cell_result) in enumerate(zip(cells, corrections, strict=True)):
         rows = slice(ends[index], ends[index + 1])
-        made.append(_uncertainty(cell, one, soundings, even, rows, inputs, probability))
+        uncertainties.append(
+            _uncertainty(cell, cell_result, soundings, even, rows, inputs, probability)
+        )
         if progress is not None:
             progress(CORRECTING, index + 1, len(cells))
-    return made
+    return uncertainties
 
 
-def _uncertainty(cell, found, soundings, even, rows, inputs, probability):
-    """{name: (rows,)} u and U of the volumes and of the corrections of one trim and list.
+def _uncertainty(cell, corrected, soundings, even, rows, inputs, probability):
+    """{name: (rows,)} u and U of the volumes and corrections at one trim and list.
 
-    even  sources and areas of the table at even keel, all cells' one after the other, None where
-          nothing is corrected; rows: the cell's in them
+    Parameters
+    ----------
+    cell : Body
+        Inclined tank.
+    corrected : object
+        Corrections of the cell.
+    soundings : ndarray, shape (s,)
+        Soundings, m.
+    even : tuple or None
+        Sources and areas of the table at even keel for all cells in sequence; None without any
+        corrections.
+    rows : slice
+        Rows of the cell in `even`.
+    inputs : tuple of str
+    probability : float
+        Coverage probability.
+
+    Returns
+    -------
+    dict
     """
     names = ("u_correction", "U_correction", "u", "U")
     columns = {name: np.full(len(soundings), np.nan) for name in names}
-    known, some = found.state != FULL, np.isfinite(found.even_m)
-    if not known.any():
+    is_not_full, is_corrected = corrected.state != FULL, np.isfinite(corrected.even_m)
+    if not is_not_full.any():
         return columns
-    sources = cell.sources_by(soundings[known], inputs)
-    volume = combine(sources, int(known.sum()))
-    columns["u"][known], columns["U"][known] = volume.u, volume.expanded(probability)
-    if not some.any():
+    sources = cell.sources_by(soundings[is_not_full], inputs)
+    volume = combine(sources, int(is_not_full.sum()))
+    columns["u"][is_not_full], columns["U"][is_not_full] = volume.u, volume.expanded(probability)
+    if not is_corrected.any():
         return columns
-    moved = combine(_differences(sources, some[known], even, rows), int(some.sum()))
-    columns["u_correction"][some] = moved.u
-    columns["U_correction"][some] = moved.expanded(probability)
+    moved = combine(
+        _differences(sources, is_corrected[is_not_full], even, rows), int(is_corrected.sum())
+    )
+    columns["u_correction"][is_corrected] = moved.u
+    columns["U_correction"][is_corrected] = moved.expanded(probability)
     return columns
 
 
-def _differences(sources, some, even, rows):
-    """Sources of corrections, m: what the volumes have in common cancels in their difference."""
+def _differences(sources, is_corrected, even, rows):
+    """Sources of corrections, m; causes common to both volumes cancel in their difference."""
     of_even, area = even[0], even[1][rows]
     per_area = np.divide(1.0, area, out=np.full(len(area), np.nan), where=area > 0)[:, None]
     return [
         replace(
-            one, columns_m3=(one.columns_m3[some] - other.columns_m3[rows]) * per_area, parts=()
+            inclined,
+            columns_m3=(inclined.columns_m3[is_corrected] - level.columns_m3[rows]) * per_area,
+            parts=(),
         )
-        for one, other in zip(sources, of_even, strict=True)
+        for inclined, level in zip(sources, of_even, strict=True)
     ]

@@ -1,4 +1,4 @@
-"""The exchange rule of a stadia: a base comes out the same from both of its ends, and again."""
+"""Check of a stadia base: both ends and repeated readings must give the same length."""
 
 from itertools import chain
 
@@ -9,14 +9,14 @@ from tankcal.job.contract.stadia import KIND
 from tankcal.messages import message
 from tankcal.pipeline.survey_limits import limits_of
 
-UNLIKE_SDS = 3.0  # of the difference of two readings of a base
+UNLIKE_SDS = 3.0  # largest difference of two readings of a base, in standard deviations
 
 
 def check_bases(measurements):
-    """`Problem`s of the bases that stadias were read over."""
+    """`Problem`s of the bases measured with stadia bars."""
     if measurements is None:
         return ()
-    bars = {one.name for one in measurements.instruments if one.kind == KIND}
+    bars = {instrument.name for instrument in measurements.instruments if instrument.kind == KIND}
     bases = {}
     for table in measurements.readings:
         if table.table != "distances":
@@ -27,21 +27,22 @@ def check_bases(measurements):
                 row = table.rows[i] if table.rows else None
                 reading = table.start[i], float(table.value[i]), row, table.file, float(table.sd[i])
                 bases.setdefault(key, []).append(reading)
-    return tuple(chain.from_iterable(_of_base(*item) for item in bases.items()))
+    return tuple(chain.from_iterable(_check_base(*item) for item in bases.items()))
 
 
 def check_rejected_bases(measurements, readings):
-    """`Problem`s of bases that the adjustment rejected: two scales contradict each other.
+    """`Problem`s of bases that the adjustment rejected, because two scales contradict each other.
 
-    The few bases of a survey are outvoted by its many distances, whichever of them is wrong.
+    A survey has few bases and many distances. The distances therefore prevail, whichever scale is
+    wrong.
 
     Parameters
     ----------
     measurements : Measurements
     readings : Readings
-        Of their adjustment.
+        Readings of the adjustment.
     """
-    bars = {one.name for one in measurements.instruments if one.kind == KIND}
+    bars = {instrument.name for instrument in measurements.instruments if instrument.kind == KIND}
     bases = {
         (table.file, row)
         for table in measurements.readings
@@ -49,22 +50,23 @@ def check_rejected_bases(measurements, readings):
         for row, name in zip(table.rows, table.instrument, strict=True)
         if name in bars
     }
-    for one in readings.where(readings.removed):
-        if (one.file, one.row) in bases:
+    for rejected in readings.where(readings.removed):
+        if (rejected.file, rejected.row) in bases:
             text = message(
                 "base_rejected",
                 "the base {first} to {second} was rejected, {off_mm:+.1f} mm from the other"
                 " distances (|w| = {w:.1f}): is the length of the bar or the scale of the"
                 " distances wrong?",
-                first=one.ids[0],
-                second=one.ids[1],
-                off_mm=-1000 * one.residual,
-                w=abs(one.w),
+                first=rejected.ids[0],
+                second=rejected.ids[1],
+                off_mm=-1000 * rejected.residual,
+                w=abs(rejected.w),
             )
-            yield Problem(one.file, text, one.row, "to")
+            yield Problem(rejected.file, text, rejected.row, "to")
 
 
-def _of_base(ends, readings):
+def _check_base(ends, readings):
+    """`Problem`s of one base, from its readings (start, length, row, file, standard deviation)."""
     starts, lengths, rows, files, sds = zip(*readings, strict=True)
     if len(set(starts)) < 2:
         text = message(
@@ -75,7 +77,7 @@ def _of_base(ends, readings):
             second=ends[1],
         )
         yield Problem(files[0], text, rows[0], "to")
-    scatter = UNLIKE_SDS * np.sqrt(2) * float(np.median(sds))  # of long bases more than the limit
+    scatter = UNLIKE_SDS * np.sqrt(2) * float(np.median(sds))  # exceeds the limit for long bases
     limit, spread = max(limits_of("tangents")["base_mm"] / 1000, scatter), float(np.ptp(lengths))
     if spread > limit * (1 + 1e-9):
         worst = int(np.argmax(np.abs(np.array(lengths) - np.median(lengths))))

@@ -1,4 +1,4 @@
-"""What is stated of a table beside its rows: budgets, the worst deliveries, a rule's verdict."""
+"""Statements that accompany the rows of a table: budgets, worst deliveries and the rule verdict."""
 
 from dataclasses import dataclass, replace
 
@@ -12,15 +12,21 @@ from tankcal.tank.capacity import SAME_M
 from tankcal.tank.deliveries import WorstDeliveries, worst_deliveries
 from tankcal.tank.rules import Printed, StatedVolume, deliveries_to_check, judge
 
-MINIMA_M = (1.5, 2.0, 3.0)  # of deliveries, where the job names none
-QUARTERS = (0.25, 0.5, 0.75, 1.0)  # of the table, where the job names no dips
-INCLINED = 0.010  # tilt from which a lying tank is an inclined one, m/m
+MINIMA_M = (1.5, 2.0, 3.0)  # default minimum heights of deliveries
+QUARTERS = (0.25, 0.5, 0.75, 1.0)  # default dips, relative to the top of the table
+INCLINED = 0.010  # tilt above which a horizontal tank counts as inclined, m/m
 
 
 @dataclass(frozen=True)
 class Statements:
-    """volumes, deliveries  `Budget`s of dips and of pairs of dips, as the job asks or by default
-    worst  `WorstDeliveries` of each minimum height, ascending
+    """Statements about a table.
+
+    Attributes
+    ----------
+    volumes, deliveries : tuple of Budget
+        Budgets of dips and of pairs of dips, requested in the job or by default.
+    worst : tuple of WorstDeliveries
+        For each minimum height, in ascending order.
     """
 
     volumes: tuple[Budget, ...]
@@ -29,26 +35,29 @@ class Statements:
 
     @property
     def pairs(self):
-        """((low_m, high_m), ...) of the deliveries."""
-        return tuple((one.low_m, one.high_m) for one in self.deliveries)
+        """Pairs (low_m, high_m) of the deliveries."""
+        return tuple(
+            (stated_delivery.low_m, stated_delivery.high_m) for stated_delivery in self.deliveries
+        )
 
 
 def statements(job, table, largest_interpolation_m3):
-    """What is stated of a table beside its rows, as the job asks or by default.
+    """Statements about a table, requested in the job or by default.
 
     Parameters
     ----------
     job : Job
     table : Capacity
-        Made from it.
+        Capacity table of the job.
     largest_interpolation_m3 : float
         Largest error of linear interpolation between two rows, m3.
 
     Returns
     -------
     Statements
-        Volumes at the dips of stated.csv, else at the rows next to the quarters of the table. The
-        deliveries of stated.csv, then of each minimum height the worst one by U over its volume.
+        Volumes at the dips of stated.csv, or by default at the rows next to the quarters of the
+        table. Deliveries of stated.csv, then for each minimum height the delivery with the largest
+        U relative to its volume.
 
     Raises
     ------
@@ -57,10 +66,20 @@ def statements(job, table, largest_interpolation_m3):
     """
     _refuse_outside(job.stated, table)
     reading = reading_sources(job.inputs, largest_interpolation_m3)
-    dips = [one.high_m for one in job.stated if one.low_m is None] or _quarters(table)
+    dips = [
+        stated_delivery.high_m for stated_delivery in job.stated if stated_delivery.low_m is None
+    ] or _quarters(table)
     worst = _worst(job, table)
-    pairs = [(one.low_m, one.high_m) for one in job.stated if one.low_m is not None]
-    pairs += [(one.at_minimum.low_m, one.at_minimum.high_m) for one in worst if one.at_minimum]
+    pairs = [
+        (stated_delivery.low_m, stated_delivery.high_m)
+        for stated_delivery in job.stated
+        if stated_delivery.low_m is not None
+    ]
+    pairs += [
+        (deliveries_of_height.at_minimum.low_m, deliveries_of_height.at_minimum.high_m)
+        for deliveries_of_height in worst
+        if deliveries_of_height.at_minimum
+    ]
     return Statements(
         volumes=tuple(budget(table, dip, reading=reading) for dip in dips),
         deliveries=tuple(
@@ -71,39 +90,49 @@ def statements(job, table, largest_interpolation_m3):
 
 
 def pairs_to_simulate(stated, job, body, table):
-    """((low_m, high_m), ...) of the `Statements`, then of the deliveries a rule is decided by."""
+    """Pairs (low_m, high_m) of the `Statements` and of the deliveries that decide a rule."""
     judged = () if job.rule is None else deliveries_to_check(job.rule, table, _tank(job, body))
     return tuple(dict.fromkeys((*stated.pairs, *judged)))
 
 
 def stated_volume(table, intervals, height_m):
-    """The volume at a dip with the U that is printed (`capacity.Quantity`), reading left out.
+    """Volume at a dip with its printed U (`capacity.Quantity`), without the reading.
 
-    That of its row; between two rows, of which one has Monte Carlo's, the largest of all.
+    U is that of the row. Between two rows, one of which has a Monte Carlo result, U is the largest
+    of all.
 
     Parameters
     ----------
     table : Capacity
     intervals : simulation.Intervals
-        Of the rows of the table.
+        Intervals of the rows of the table.
     height_m : float
-        Dip, m; HeightError outside the table.
+        Dip, m.
+
+    Returns
+    -------
+    Quantity
+
+    Raises
+    ------
+    HeightError
+        For a dip outside the table.
     """
-    found, rows = table.at(height_m), table.rows_of(height_m)
+    quantity, rows = table.at(height_m), table.rows_of(height_m)
     if np.all(intervals.by_gum[rows]):
-        return found
-    U = Printed(intervals.U_m3, intervals.by_gum).of(table, None, height_m, found.U_m3)
+        return quantity
+    U = Printed(intervals.U_m3, intervals.by_gum).of(table, None, height_m, quantity.U_m3)
     if len(rows) == 1:
         ends = float(intervals.low_m3[rows[0]]), float(intervals.high_m3[rows[0]])
-        return _by_monte_carlo(found, U, ends)
-    return found if found.U_m3 == U else _by_monte_carlo(found, U, None)
+        return _replace_interval(quantity, U, ends)
+    return quantity if quantity.U_m3 == U else _replace_interval(quantity, U, None)
 
 
 def stated_delivery(table, simulation, low_m, high_m):
-    """The volume between two dips with the U that is printed (`capacity.Quantity`).
+    """Volume between two dips with its printed U (`capacity.Quantity`), without the readings.
 
-    Reading is left out. One that was not simulated has the U of the law of propagation, and says
-    so. HeightError outside the table.
+    A delivery that was not simulated has the U of the law of propagation, and its interval states
+    this.
 
     Parameters
     ----------
@@ -111,30 +140,51 @@ def stated_delivery(table, simulation, low_m, high_m):
     simulation : simulation.TableSimulation or None
     low_m, high_m : float
         Dips, m.
+
+    Returns
+    -------
+    Quantity
+
+    Raises
+    ------
+    HeightError
+        For a dip outside the table.
     """
-    found = table.delivery(low_m, high_m)
+    quantity = table.delivery(low_m, high_m)
     if simulation is None:
-        return found
-    one = simulation.delivered
-    same = np.isclose(one.low_m, low_m, rtol=0, atol=SAME_M)
-    same &= np.isclose(one.high_m, high_m, rtol=0, atol=SAME_M)
-    if not np.any(same):
-        return replace(found, interval="gum_not_simulated")
-    place, of_delivered = int(np.argmax(same)), simulation.of_delivered
+        return quantity
+    delivered = simulation.delivered
+    is_same = np.isclose(delivered.low_m, low_m, rtol=0, atol=SAME_M)
+    is_same &= np.isclose(delivered.high_m, high_m, rtol=0, atol=SAME_M)
+    if not np.any(is_same):
+        return replace(quantity, interval="gum_not_simulated")
+    place, of_delivered = int(np.argmax(is_same)), simulation.of_delivered
     if of_delivered.by_gum[place]:
-        return found
+        return quantity
     ends = float(of_delivered.low_m3[place]), float(of_delivered.high_m3[place])
-    return _by_monte_carlo(found, float(of_delivered.U_m3[place]), ends)
+    return _replace_interval(quantity, float(of_delivered.U_m3[place]), ends)
 
 
-def _by_monte_carlo(found, U_m3, ends_m3):
-    return replace(found, k=None, U_m3=U_m3, interval="monte_carlo", ends_m3=ends_m3)
+def _replace_interval(quantity, U_m3, ends_m3):
+    """Replace U and interval of a quantity by those of the Monte Carlo method."""
+    return replace(quantity, k=None, U_m3=U_m3, interval="monte_carlo", ends_m3=ends_m3)
 
 
 def verdict_of(job, body, table, intervals, simulation):
-    """`rules.RuleVerdict` of the job's decision rule, with the U that is printed; None without one.
+    """`rules.RuleVerdict` of the job's decision rule with the printed U; None without a rule.
 
-    intervals  `simulation.Intervals` of the rows; simulation  `TableSimulation` or None
+    Parameters
+    ----------
+    job : Job
+    body : Body
+    table : Capacity
+    intervals : simulation.Intervals
+        Intervals of the rows.
+    simulation : simulation.TableSimulation or None
+
+    Returns
+    -------
+    RuleVerdict or None
     """
     if job.rule is None:
         return None
@@ -143,12 +193,13 @@ def verdict_of(job, body, table, intervals, simulation):
 
 
 def _printed(intervals, simulation):
-    """`rules.Printed`: of the rows, and of the deliveries that were simulated."""
+    """`rules.Printed` of the rows and of the simulated deliveries."""
     if simulation is None:
         return Printed(intervals.U_m3)
     delivered = simulation.delivered
     U = delivered.U_m3
     printed = simulation.of_delivered.U_m3
+    # Deliveries that were not simulated get the largest ratio of the smooth simulated deliveries.
     ratio = np.divide(printed, U, out=np.ones(len(U)), where=U > 0)
     factor = np.max(ratio[simulation.smooth], initial=1.0)
     pairs = zip(delivered.low_m.tolist(), delivered.high_m.tolist(), strict=True)
@@ -157,15 +208,17 @@ def _printed(intervals, simulation):
 
 
 def _worst(job, table):
-    """`WorstDeliveries` of the least heights; InputError for one that the job names and none is of.
+    """`WorstDeliveries` of the minimum heights.
 
-    Of the heights that are looked at where it names none, those count that fit. The height of the
-    table rounded to a millimetre counts as its height.
+    Raises InputError for a height in the job without any delivery. Default heights without a
+    delivery are omitted. The height of the table rounded to a millimetre counts as its height.
     """
     height = float(np.ptp(table.height_m))
-    found = {
-        one: worst_deliveries(table, min(one, height) if one <= round(height, 3) else one)
-        for one in _minima(job)
+    worst_by_height = {
+        height_m: worst_deliveries(
+            table, min(height_m, height) if height_m <= round(height, 3) else height_m
+        )
+        for height_m in _minima(job)
     }
     if job.table.minimum_delivery_m is not None:
         problems = [
@@ -175,25 +228,25 @@ def _worst(job, table):
                     "no_such_delivery",
                     "found {one:g}; expected at most {height:g} m: no two usable dips of the "
                     "table are further apart",
-                    one=one,
+                    one=height_m,
                     height=height,
                 ),
                 column="table.minimum_delivery_m",
             )
-            for one, worst in found.items()
+            for height_m, worst in worst_by_height.items()
             if worst is None
         ]
         if problems:
             raise InputError(problems)
-    return tuple(worst for worst in found.values() if worst is not None)
+    return tuple(worst for worst in worst_by_height.values() if worst is not None)
 
 
 def _refuse_outside(stated, table):
-    """Raise InputError for every dip that the table, whose top is the shell's own, lacks."""
+    """Raise InputError for stated dips outside the table, which ends at the top of the shell."""
     top = max(round(table.height_m[-1], 3), table.height_m[-1])
     problems = [
         Problem(
-            one.file,
+            stated_delivery.file,
             message(
                 "stated_outside_table",
                 "found {dip:g}; expected {low:g} to {top:g}, the dips of the table",
@@ -201,11 +254,11 @@ def _refuse_outside(stated, table):
                 low=table.height_m[0],
                 top=top,
             ),
-            one.row,
+            stated_delivery.row,
             column,
         )
-        for one in stated
-        for column, dip in (("low_m", one.low_m), ("high_m", one.high_m))
+        for stated_delivery in stated
+        for column, dip in (("low_m", stated_delivery.low_m), ("high_m", stated_delivery.high_m))
         if dip is not None and not table.height_m[0] <= dip <= top
     ]
     if problems:
@@ -213,28 +266,29 @@ def _refuse_outside(stated, table):
 
 
 def _minima(job):
-    given = job.table.minimum_delivery_m
-    return MINIMA_M if given is None else tuple(sorted(given))
+    """Minimum delivery heights of the job in ascending order, or the default heights, m."""
+    heights_m = job.table.minimum_delivery_m
+    return MINIMA_M if heights_m is None else tuple(sorted(heights_m))
 
 
 def _quarters(table):
-    """Dips of the rows next to the quarters, the top row last; a short table has fewer."""
-    wanted = np.array(QUARTERS) * table.height_m[-1]
-    rows = np.argmin(np.abs(table.height_m[:, None] - wanted), axis=0)
+    """Dips of the rows next to the quarters, with the top row last; a short table has fewer."""
+    dips_m = np.array(QUARTERS) * table.height_m[-1]
+    rows = np.argmin(np.abs(table.height_m[:, None] - dips_m), axis=0)
     return table.height_m[np.unique(rows)].tolist()
 
 
 def _stated(job):
-    """The volumes that an earlier table or a contract states."""
+    """Volumes stated by an earlier table or a contract."""
     return tuple(
-        StatedVolume(one.volume_m3, one.high_m, one.low_m)
-        for one in job.stated
-        if one.volume_m3 is not None
+        StatedVolume(stated_delivery.volume_m3, stated_delivery.high_m, stated_delivery.low_m)
+        for stated_delivery in job.stated
+        if stated_delivery.volume_m3 is not None
     )
 
 
 def _tank(job, body):
-    """The kind of tank in the words of the rules; that of a scanned one by its own tilt."""
+    """Kind of tank in the terms of the rules; a scanned tank is classified by its measured tilt."""
     if job.tank.kind == "vertical":
         return "vertical_fixed_roof" if job.roof is None else "vertical_floating_roof"
     if job.tank.kind == "horizontal":

@@ -1,9 +1,9 @@
-"""A sphere that a tape was put round: an upright ellipsoid, and what a tape does not see of it.
+"""Sphere measured by strapping: an upright ellipsoid with the form that a tape does not show.
 
-A circumference is 2 pi times the mean radius of its great circle. The degree 2 of the form is the
-ellipsoid through all circles (`geometry.great_ellipses`); what a sphere has beyond that (plates,
-seams, legs) is a random field of an assumed size, which moves the mean of each circle a little and
-the volumes below a dip more. Nothing of it is estimated: it is in the doubt alone.
+A circumference is 2 pi times the mean radius of its great circle. The degree-2 form is the
+ellipsoid fitted to all circles (`geometry.great_ellipses`). The remaining form of a sphere (plates,
+seams, legs) is a random field of assumed size. It changes the mean of each circle slightly, and the
+volumes below a dip more. This field is not estimated; it contributes to the uncertainty only.
 """
 
 from dataclasses import dataclass
@@ -35,33 +35,33 @@ from tankcal.tank.factors import Factor
 from tankcal.tank.surveyed_form import SurveyedForm, node_levels
 from tankcal.uncertainty import factor_of
 
-OVALITY_SHARE = 1e-3  # of the radius: degree 2 of a sphere where nobody measured or declared it
-NO_AREA_TERM = AreaTerm(0.0, 0.0)  # the field has it: a tape on a sphere is a mean of radii
-ROUNDING = 1e-7  # of the volume: a column that is smaller is none
+OVALITY_SHARE = 1e-3  # prior degree-2 form over the radius, if neither measured nor declared
+NO_AREA_TERM = AreaTerm(0.0, 0.0)  # included in the field: a reading is a mean of radii
+ROUNDING = 1e-7  # size of a column, relative to the capacity, that counts as zero
 
 
 @dataclass(frozen=True)
 class StrappedSphere:
-    """What great circles say of a sphere, on the painted outside at the warmth of the survey.
+    """Sphere determined by great circles, on the painted outside at the temperature of the survey.
 
     Attributes
     ----------
     reduced : tuple of Reduced
-        Of every reading, in the order of the file.
+        All readings, in the order of the file.
     adjusted : ndarray of int, shape (k,)
-        Which of them count; the others are only compared.
+        Indices of the adjusted readings; the other readings are checks.
     azimuth_rad : ndarray, shape (n,)
-        Of each reading; nan: the equator.
+        Azimuth of each reading; nan for the equator.
     readings : tuple of WallReading
-        Of those that count: mean radii.
+        Adjusted readings, as mean radii.
     places : OnGreatCircles
-        Of these.
+        Positions of the adjusted readings.
     variances_m2 : ndarray, shape (departures,)
-        Assumed, of the form beyond degree 2.
+        Assumed variances of the form beyond degree 2, m2.
     prior : FormPrior
     fit : FittedEllipsoid
     tapes : tuple of (Tape, float)
-        Those that were read, and the standard uncertainty of their scale by a master.
+        Tapes used, and the standard uncertainties of their scale from a master.
     """
 
     reduced: tuple[Reduced, ...]
@@ -76,37 +76,42 @@ class StrappedSphere:
     surveyed_as = "circles"
 
     def solid(self, plate_m=0.0, scale=1.0):
-        """The `Ellipsoid` inside the plates, its lengths to scale."""
+        """`Ellipsoid` inside the plates, with lengths multiplied by `scale`."""
         return Ellipsoid(*(scale * (axis - plate_m) for axis in self.fit.axes_m))
 
     @cached_property
     def length_m(self):
-        """(n,) circumferences of the ellipsoid where each reading was taken, m."""
+        """Circumferences (n,) of the ellipsoid at the readings, m."""
         return great_circle_lengths(self.fit.unknowns, self.azimuth_rad)[0]
 
     @cached_property
     def w(self):
-        """(k,) departures of the lengths that count from what all others show over their sds; nan:
-        no other circle controls this one.
+        """Normalised discrepancies (k,) of the adjusted lengths from the other readings.
+
+        The value is nan if no other circle controls the reading.
         """
-        own = np.diag(self.fit.precision)
-        whole = np.diag(np.linalg.inv(self._lengths_m2))
+        diagonal = np.diag(self.fit.precision)
+        covariance_diagonal = np.diag(np.linalg.inv(self._lengths_m2))
+        # Leave-one-out test: w = P v / sqrt(P_ii), undefined where P_ii vanishes.
         pull = -self.fit.precision @ self.fit.residuals_m
-        told = own > 1e-6 * whole
-        return np.where(told, pull / np.sqrt(np.where(told, own, 1.0)), np.nan)
+        is_determined = diagonal > 1e-6 * covariance_diagonal
+        return np.where(
+            is_determined, pull / np.sqrt(np.where(is_determined, diagonal, 1.0)), np.nan
+        )
 
     def sd_of_check_m(self, place):
-        """Standard deviation of a reading that is only compared from the ellipsoid, m."""
+        """Standard deviation of the difference between a check reading and the ellipsoid, m."""
         azimuth = self.azimuth_rad[place : place + 1]
-        _, by = great_circle_lengths(self.fit.unknowns, azimuth)
-        here = OnGreatCircles(self.places.radius_m, _normals(azimuth))
-        form = FULL_TURN**2 * _parts(here, self.variances_m2).sum(axis=0)
-        own = self.reduced[place]
-        shared = sum(effect.by_m**2 for effect in own.effects)
-        of_fit = by @ self.fit.weights
-        prior = by @ self.fit.by_prior
-        found = form + of_fit @ self._lengths_m2 @ of_fit.T + prior @ prior.T
-        return float(np.sqrt(found[0, 0] + own.sd_m**2 + shared))
+        _, derivative = great_circle_lengths(self.fit.unknowns, azimuth)
+        place_of_check = OnGreatCircles(self.places.radius_m, _normals(azimuth))
+        form = FULL_TURN**2 * _parts(place_of_check, self.variances_m2).sum(axis=0)
+        reading = self.reduced[place]
+        shared = sum(effect.by_m**2 for effect in reading.effects)
+        of_fit = derivative @ self.fit.weights
+        prior = derivative @ self.fit.by_prior
+        # The form at the check, the fitted ellipsoid and its prior are independent contributions.
+        variance = form + of_fit @ self._lengths_m2 @ of_fit.T + prior @ prior.T
+        return float(np.sqrt(variance[0, 0] + reading.sd_m**2 + shared))
 
     @property
     def _lengths_m2(self):
@@ -117,8 +122,9 @@ class StrappedSphere:
         return _parts(self.places, self.variances_m2)
 
     def part_of_volumes(self, plate_m):
-        """`SurveyedForm` of the ellipsoid inside the plates, and {input: (nodes,) derivative of
-        the volumes} of inputs that the readings depend on.
+        """`SurveyedForm` of the ellipsoid inside the plates, and derivatives of its volumes.
+
+        The derivatives are {input: (nodes,)} by the inputs on which the readings depend.
         """
         solid = self.solid(plate_m)
         levels = node_levels(solid.top_m)
@@ -126,8 +132,8 @@ class StrappedSphere:
         weights = FULL_TURN * by_lengths  # by mean radii
         factors = (
             *factors_of_readings(self.readings, weights),
-            *self._beyond(solid, levels, weights),
-            *self._not_told(solid, levels),
+            *self._factors_of_form(solid, levels, weights),
+            *self._factors_of_prior(solid, levels),
         )
         none = np.zeros(len(levels))
         form = SurveyedForm.of_volumes(
@@ -136,58 +142,68 @@ class StrappedSphere:
         return form, inputs_read_with(self.readings, weights)
 
     def _by_unknowns(self, solid, levels):
-        """(nodes, 4) derivative of the volumes by m, A, B, c."""
+        """Derivatives (nodes, 4) of the volumes by m, A, B, c."""
         mean, cos, sin = self.fit.unknowns[:3]
         mean = mean - (self.fit.axes_m[0] - solid.a_m)  # inside
         by_product = solid.volume_m3(levels) / (solid.a_m * solid.b_m)
         of_c = solid.by_axes(levels)[:, 2]
-        return np.column_stack([*(by_product * 2 * one for one in (mean, -cos, -sin)), of_c])
+        return np.column_stack(
+            [*(by_product * 2 * coefficient for coefficient in (mean, -cos, -sin)), of_c]
+        )
 
-    def _beyond(self, solid, levels, weights):
-        """A `Factor` of each kind of departure beyond degree 2."""
+    def _factors_of_form(self, solid, levels, weights):
+        """`Factor` of each kind of deviation beyond degree 2."""
         volumes = cap_volumes(levels, solid.area_m2(levels), solid.top_m / 2)
-        for kind in dict.fromkeys(one.kind for one in self.places.departures):
-            whole = 0.0
-            for size, part, one in zip(
+        for kind in dict.fromkeys(departure.kind for departure in self.places.departures):
+            covariance = 0.0
+            for size, part, departure in zip(
                 self.variances_m2, self._parts, self.places.departures, strict=True
             ):
-                if one.kind == kind:
-                    seen = size * self.places.across(one, volumes) @ weights.T
-                    own = size * self.places.within(one, volumes)
-                    whole = whole + own - seen - seen.T + weights @ part @ weights.T
-            if np.any(whole):
-                yield Factor(kind, factor_of(whole), type="B", note="assumed")
+                if departure.kind == kind:
+                    cross_covariance = size * self.places.across(departure, volumes) @ weights.T
+                    variance = size * self.places.within(departure, volumes)
+                    covariance = (
+                        covariance
+                        + variance
+                        - cross_covariance
+                        - cross_covariance.T
+                        + weights @ part @ weights.T
+                    )
+            if np.any(covariance):
+                yield Factor(kind, factor_of(covariance), type="B", note="assumed")
 
-    def _not_told(self, solid, levels):
-        """A `Factor` of the degree 2 as far as no strap tells it."""
+    def _factors_of_prior(self, solid, levels):
+        """`Factor` of the part of degree 2 that the straps do not determine."""
         columns = self._by_unknowns(solid, levels) @ self.fit.by_prior
-        told = np.abs(columns).max(axis=0) < ROUNDING * solid.capacity_m3
-        if not np.all(told):
-            yield Factor("oblateness", columns[:, ~told], type="B", note="assumed")
+        is_negligible = np.abs(columns).max(axis=0) < ROUNDING * solid.capacity_m3
+        if not np.all(is_negligible):
+            yield Factor("oblateness", columns[:, ~is_negligible], type="B", note="assumed")
 
 
 def find_strapped_sphere(job, progress):
     """`StrappedSphere` of a job with great circles."""
-    given = job.great_circles
+    circles = job.great_circles
     progress(
         message(
             "strapping_sphere",
             "fitting an ellipsoid to {count} readings of great circles",
-            count=len(given.strapping.straps),
+            count=len(circles.strapping.straps),
         )
     )
-    radius = float(np.median([one.reading_m for one in given.strapping.straps])) / FULL_TURN
-    reduced = reduce_straps(given.strapping, job.survey.shell_temperature_c, 2 * radius)
-    azimuth = given.azimuths([one.strap for one in reduced])
-    adjusted = np.array([i for i, one in enumerate(reduced) if not one.strap.check])
+    radius = float(np.median([strap.reading_m for strap in circles.strapping.straps])) / FULL_TURN
+    reduced = reduce_straps(circles.strapping, job.survey.shell_temperature_c, 2 * radius)
+    azimuth = circles.azimuths([reduced_strap.strap for reduced_strap in reduced])
+    adjusted = np.array(
+        [i for i, reduced_strap in enumerate(reduced) if not reduced_strap.strap.check]
+    )
     readings = tuple(readings_of_straps([reduced[i] for i in adjusted], KINDS, NO_AREA_TERM))
     places = OnGreatCircles(radius, _normals(azimuth[adjusted]))
     variances = _assumed_variances(places.departures, job.sphere.form_m)
     size = job.sphere.ovality_m or OVALITY_SHARE * radius
     prior = FormPrior(size, size)
-    lengths = FULL_TURN * np.array([one.radius_m for one in readings])
-    whole = FULL_TURN**2 * (noise_of(readings) + _parts(places, variances).sum(axis=0))
-    fit = fit_ellipsoid(azimuth[adjusted], lengths, whole, prior)
+    lengths = FULL_TURN * np.array([reading.radius_m for reading in readings])
+    covariance = FULL_TURN**2 * (noise_of(readings) + _parts(places, variances).sum(axis=0))
+    fit = fit_ellipsoid(azimuth[adjusted], lengths, covariance, prior)
     return StrappedSphere(
         reduced=reduced,
         adjusted=adjusted,
@@ -197,21 +213,21 @@ def find_strapped_sphere(job, progress):
         variances_m2=variances,
         prior=prior,
         fit=fit,
-        tapes=tapes_used(given.strapping),
+        tapes=tapes_used(circles.strapping),
     )
 
 
 def _normals(azimuth):
-    """(n, 3) of the planes: the vertical of the equator, level ones of meridians."""
+    """Unit normals (n, 3) of the planes: vertical for the equator, horizontal for meridians."""
     equator = np.isnan(azimuth)
-    turn = np.where(equator, 0.0, azimuth)
-    level = np.column_stack([np.cos(turn), -np.sin(turn), np.zeros(len(turn))])
+    angle = np.where(equator, 0.0, azimuth)
+    level = np.column_stack([np.cos(angle), -np.sin(angle), np.zeros(len(angle))])
     return np.where(equator[:, None], [0.0, 0.0, 1.0], level)
 
 
 def _assumed_variances(departures, form_m):
-    """(departures,) of a sphere that nobody saw: of the medians, or to a declared size, m2."""
-    sizes = np.array([one.median_m for one in departures]) ** 2
+    """Assumed variances (departures,), from medians or scaled to a declared size, m2."""
+    sizes = np.array([departure.median_m for departure in departures]) ** 2
     if form_m is not None:
         return sizes * form_m**2 / sizes.sum()
     return sizes
@@ -219,5 +235,5 @@ def _assumed_variances(departures, form_m):
 
 def _parts(places, variances):
     """(departures, k, k) their covariances of the mean radii."""
-    each = zip(variances, places.departures, strict=True)
-    return np.array([size * places.covariance(one) for size, one in each])
+    pairs = zip(variances, places.departures, strict=True)
+    return np.array([size * places.covariance(departure) for size, departure in pairs])

@@ -1,11 +1,11 @@
-"""A wall that a tape was put round, with lines of sight beside it or without.
+"""Wall measured by strapping, with or without reference lines.
 
-A circumference is the mean radius of one level but for the area term (`geometry.girth`): the circle
-of its perimeter has a larger area than the wall. So each reading counts as the radius of the circle
-of equal area. Where straps alone were read, the courses are cylinders of such radii, as the
-standards of strapping have them: what a course does between its straps (bulge, taper) is in the
-doubt, and the field of the wall says how much it may. Offsets from reference lines carry the radius
-of the strapped course to all others; then the wall is a surface of revolution.
+A circumference is the mean radius of one level, except for the area term (`geometry.girth`): the
+circle of the perimeter has a larger area than the wall. Each reading is therefore converted to the
+radius of the circle of equal area. With straps alone the courses are cylinders of these radii, as
+in the strapping standards. Form between the straps of a course (bulge, taper) is covered in the
+uncertainty, with the prior size of the wall field. Offsets from reference lines transfer the radius
+of the strapped course to the other courses. The wall is then a surface of revolution.
 """
 
 from dataclasses import dataclass, replace
@@ -49,7 +49,7 @@ STATED_BY_STRAPS, STATED_BY_LINES = (), ("mean",)
 
 @dataclass(frozen=True)
 class UprightAxis:
-    """The axis of a shell whose lean nobody measured."""
+    """Axis of a shell whose tilt was not measured."""
 
     slope: tuple[float, float] = (0.0, 0.0)
     axis_m: tuple[float, float] = (0.0, 0.0)
@@ -60,21 +60,20 @@ class UprightAxis:
 
 @dataclass(frozen=True)
 class TapedWall(ReadWall):
-    """The courses of an upright tank, or the rings of a lying one, as strapped, with what a
-    `ReadWall` has.
+    """Strapped courses of an upright tank or rings of a horizontal tank; extends `ReadWall`.
 
     Attributes
     ----------
     reduced : tuple of Reduced
-        Of every reading of the tape, in the order of the file.
+        All readings of the tape, in the order of the file.
     area_term : AreaTerm
     plate_sd_m : dict
-        {course index: standard uncertainty of its plate by a gauge}.
+        {course index: standard uncertainty of its gauged plate, m}.
     tapes : tuple of (Tape, float)
-        Those that were read, as they were corrected, and the standard uncertainty of their scale by
-        the comparison with a master.
+        Tapes used, with their corrections, and the standard uncertainties of their scale from the
+        comparison with a master.
     shape_sd_m : float
-        Declared: standard deviation of the radius round the wall.
+        Declared standard deviation of the radius round the wall, m.
     """
 
     reduced: tuple[Reduced, ...]
@@ -85,20 +84,20 @@ class TapedWall(ReadWall):
 
     @cached_property
     def radius_m(self):
-        """(courses,) mean radius of each course as measured, of the circle of equal area."""
+        """Mean radius of each course, as the circle of equal area, m, shape (courses,)."""
         return mean_radii(self.field)
 
     @cached_property
     def straps(self):
-        """`Straps`: the circumferences, and what the wall says of them."""
-        mine, tested = self.are("straps"), self.tested
+        """`Straps`: the circumferences with their tests against the wall."""
+        is_strap, tested = self.are("straps"), self.tested
         return Straps(
             reduced=self.reduced,
-            adjusted=self.places[mine],
-            accepted=tested.accepted[mine],
+            adjusted=self.places[is_strap],
+            accepted=tested.accepted[is_strap],
             w=self.tests_of("straps")[0],
-            sd_m=tested.sd_m[mine],
-            departure_m=tested.departure_m[mine],
+            sd_m=tested.sd_m[is_strap],
+            departure_m=tested.departure_m[is_strap],
             area_term=self.area_term,
             shape_sd_m=self.shape_sd_m,
             radius_m=self.radius_m,
@@ -107,36 +106,48 @@ class TapedWall(ReadWall):
         )
 
     def factors(self, job, weights):
-        """`Factor`s of what the readings leave uncertain about features, (f, n) by their radii."""
-        used, names = self.accepted, names_of(job.courses or job.rings)
-        sees = 1 - np.array([one.by_inputs.get("plate_thickness", 0.0) for one in used])
+        """`Factor`s of the uncertainty of features, with derivatives (f, n) by the readings."""
+        accepted, names = self.accepted, names_of(job.courses or job.rings)
+        sees = 1 - np.array([reading.by_inputs.get("plate_thickness", 0.0) for reading in accepted])
         plates = factors_of_plates(names, self.field, weights * sees, self.plate_sd_m)
-        return (*factors_of_readings(used, weights), *plates)
+        return (*factors_of_readings(accepted, weights), *plates)
 
     def read_with(self, weights):
-        """{input: (f,) derivative of features}: a tape that has the shell's temperature, plates
-        that lines inside do not see.
+        """Derivatives (f,) of features by inputs on which the readings depend.
+
+        Such inputs are the temperature that a tape shares with the shell, and plates that inside
+        lines do not see.
         """
         return inputs_read_with(self.accepted, weights)
 
 
 @dataclass(frozen=True)
 class StrappedWall(TapedWall):
-    """The wall of an upright tank as strapped."""
+    """Strapped wall of an upright tank."""
 
     surveyed_as = "strapped"
     shell = UprightAxis()
-    without_inputs = ("offset",)  # of points; a tape has one of its own
+    without_inputs = ("offset",)  # the offset of points; a tape has its own offset
 
     def lowest_outline(self, azimuth_rad):
-        """(x, y) of the axis, and (n,) radii of the first course, m."""
+        """Position (x, y) of the axis and radii (n,) of the first course, m."""
         return 0.0, 0.0, np.full(len(azimuth_rad), self.radius_m[0])
 
 
 def find_strapped_wall(job, progress, amplitudes=None):
-    """`StrappedWall` of a job whose circumferences were measured by tape.
+    """`StrappedWall` of a job with strapped circumferences.
 
-    amplitudes  of the wall's components where they are known beforehand; None: the readings tell
+    Parameters
+    ----------
+    job : Job
+    progress : callable
+        Called with a line of text when a step begins.
+    amplitudes : Amplitudes, optional
+        Known amplitudes of the wall components; None: estimated from the readings.
+
+    Returns
+    -------
+    StrappedWall
     """
     straps, lines = job.strapping, job.lines
     progress(
@@ -146,9 +157,9 @@ def find_strapped_wall(job, progress, amplitudes=None):
             count=len(straps.straps),
         )
     )
-    nominal, courses = job.tank.nominal_diameter_m / 2, [one.name for one in job.courses]
+    nominal, courses = job.tank.nominal_diameter_m / 2, [course.name for course in job.courses]
     reduced = reduce_straps(straps, job.survey.shell_temperature_c, 2 * nominal)
-    places = [i for i, one in enumerate(reduced) if not one.strap.check]
+    places = [i for i, reduced_strap in enumerate(reduced) if not reduced_strap.strap.check]
     shape_m = typical_shape_m() if straps.shape_sd_m is None else straps.shape_sd_m
     term = AreaTerm(*perimeter_excess(shape_m, nominal))
     joints, zero = joints_of(job), shell_zero(job, None)
@@ -162,13 +173,13 @@ def find_strapped_wall(job, progress, amplitudes=None):
                 lines=len(lines.lines),
             )
         )
-        kept = [i for i, one in enumerate(lines.offsets) if not one.check]
-        used = [lines.offsets[i] for i in kept]
+        adjusted_offsets = [i for i, offset in enumerate(lines.offsets) if not offset.check]
+        adjusted = [lines.offsets[i] for i in adjusted_offsets]
         insets = insets_of(job, job.switches)
-        readings += readings_of_offsets(lines, used, courses, insets)
-        places += kept
-    former = readings_of_untold(job, told_courses(job, set()), joints, zero)
-    readings, places = readings + former, places + [-1] * len(former)
+        readings += readings_of_offsets(lines, adjusted, courses, insets)
+        places += adjusted_offsets
+    unmeasured = readings_of_untold(job, told_courses(job, set()), joints, zero)
+    readings, places = readings + unmeasured, places + [-1] * len(unmeasured)
     readings, tested, field = adjust_readings(
         readings, (joints, zero, nominal), amplitudes, snooping=job.snooping
     )
@@ -188,49 +199,83 @@ def find_strapped_wall(job, progress, amplitudes=None):
 
 
 def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):
-    """Readings with the eccentricity of their rings, what became of each, and `WallField`.
+    """Adjust readings of a wall, correct the eccentricity of their rings, and test them.
 
-    sizes        joints, the table's zero above the bottom, and the nominal radius, m
-    bulge_scale  sizes of the bulges before the survey, over those of upright walls
+    Parameters
+    ----------
+    readings : list of WallReading
+    sizes : tuple
+        Heights of the joints, (courses + 1,), height of the table's zero above the bottom, and
+        nominal radius, m.
+    amplitudes : Amplitudes or None
+        Known amplitudes; None: estimated from the readings.
+    snooping : bool
+        Whether offsets may be rejected.
+    bulge_scale : float
+        Prior size of the bulges relative to upright walls.
+
+    Returns
+    -------
+    readings : list of WallReading
+        With the radii corrected for eccentricity.
+    tested : Tested
+    field : WallField
     """
     joints_m, zero_m, nominal_m = sizes
     sites = replace(sites_of(readings, joints_m, zero_m), bulge_scale=bulge_scale)
     noise = noise_of(readings)
     if amplitudes is not None:
         amplitudes = amplitudes.with_bulges(bulge_scale)
-    may_go = snooping * np.array([one.of == "offsets" for one in readings])
+    may_go = snooping * np.array([reading.of == "offsets" for reading in readings])
 
     def field_of(accepted):
-        some = np.flatnonzero(accepted)
-        kept, own = [readings[i] for i in some], noise[np.ix_(some, some)]
-        return field_of_readings(sites.take(accepted), kept, own, nominal_m, amplitudes)
+        """Field of the accepted readings."""
+        rows = np.flatnonzero(accepted)
+        rows_kept, noise_of_rows = [readings[i] for i in rows], noise[np.ix_(rows, rows)]
+        return field_of_readings(
+            sites.take(accepted), rows_kept, noise_of_rows, nominal_m, amplitudes
+        )
 
     accepted = np.ones(len(readings), dtype=bool)
     field = field_of(accepted)
     if np.any(sites.ring >= 0):
+        # The centres of the rings are known only from a first solution.
         readings = off_centre(readings, field)
         field = field_of(accepted)
-    radius = np.array([one.radius_m for one in readings])
+    radius = np.array([reading.radius_m for reading in readings])
     field, tested = settle_readings(field, field_of, (sites, radius, noise), may_go)
     return readings, tested, field
 
 
 def field_of_readings(sites, readings, noise_m2, nominal_m, amplitudes=None):
-    """`WallField` of readings; SolutionError where they tell nothing.
+    """`WallField` of readings; SolutionError if the readings do not determine a wall.
 
-    amplitudes  None: those that the readings tell
+    Parameters
+    ----------
+    sites : Sites
+    readings : sequence of WallReading, length n
+    noise_m2 : ndarray, shape (n, n)
+        Covariance of the radii, m2.
+    nominal_m : float
+        Nominal radius, m.
+    amplitudes : Amplitudes, optional
+        None: estimated from the readings.
+
+    Returns
+    -------
+    WallField
     """
-    radius = np.array([one.radius_m for one in readings])
-    by_lines = any(one.of == "offsets" for one in readings)
+    radius = np.array([reading.radius_m for reading in readings])
+    by_lines = any(reading.of == "offsets" for reading in readings)
     stated = STATED_BY_LINES if by_lines else STATED_BY_STRAPS
     try:
         if amplitudes is None:
             amplitudes = estimate_amplitudes(sites, radius, noise_m2, nominal_m)
         field = WallField(sites, radius, noise_m2, amplitudes, nominal_m, stated=stated)
-        sound = np.all(np.isfinite(field.outlines_m))
+        is_valid = np.all(np.isfinite(field.outlines_m))
     except np.linalg.LinAlgError:
-        sound = False
-    if not sound and by_lines:
+        is_valid = False
+    if not is_valid and by_lines:
         raise SolutionError(
             message(
                 "lines_tell_nothing",
@@ -239,7 +284,7 @@ def field_of_readings(sites, readings, noise_m2, nominal_m, amplitudes=None):
                 " instruments.toml",
             )
         )
-    if not sound:
+    if not is_valid:
         raise SolutionError(
             message(
                 "straps_tell_nothing",

@@ -1,6 +1,4 @@
-"""The figures of rule files: what a sound survey keeps to, as far as it was remembered or read, and
-by how much its repeats may differ.
-"""
+"""Limits from rule files for valid surveys, and the allowed difference between repeats."""
 
 import tomllib
 from functools import cache
@@ -9,24 +7,37 @@ from importlib.resources import files
 import numpy as np
 from scipy.special import ndtri
 
-BY_CHANCE = 0.01  # of sound surveys in which something seems to have moved by readings' scatter
+BY_CHANCE = 0.01  # share of valid surveys with an apparent movement due to scatter
 
 
 @cache
 def limits_of(survey):
-    """The figures of a kind of survey, by the name of its file in limits/."""
+    """Limits of a kind of survey, by the name of its file in limits/."""
     text = files("tankcal.pipeline").joinpath(f"limits/{survey}.toml").read_text("utf-8")
     return tomllib.loads(text)
 
 
 def limit_at(survey, table, figure, circumference_m):
-    """A figure of a rule file that depends on the circumference: of the first row that holds it."""
+    """Limit that depends on the circumference, from the first applicable row of a rule file.
+
+    Parameters
+    ----------
+    survey, table, figure : str
+        Name of the rule file, of its table, and of the limit in a row.
+    circumference_m : float
+        Circumference of the tank, m.
+
+    Returns
+    -------
+    float
+    """
     rows = limits_of(survey)[table]
     return next(row[figure] for row in rows if circumference_m <= row.get("up_to_m", np.inf))
 
 
 def repeat_factor(count):
-    """By how many standard deviations one of so many repeats differs from what was read first, in
-    one of a hundred sound surveys.
+    """Difference between `count` repeats and their first readings, in standard deviations.
+
+    At least one repeat exceeds it in one of a hundred valid surveys.
     """
     return np.sqrt(2) * -ndtri(BY_CHANCE / 2 / count)

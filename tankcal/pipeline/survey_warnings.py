@@ -1,4 +1,4 @@
-"""Warnings: what a sound survey of a sound tank hardly has. None of them stops a job."""
+"""Warnings that are unlikely for a valid survey of a tank without defects; none stops a job."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from tankcal.job.plausibility import VOLUME_MISS
 from tankcal.messages import list_some, message
 from tankcal.tank.body import OWN_SCALE
 
-SHOWN = 5  # names in a message
+SHOWN = 5  # names listed in a message
 CERTIFICATE_NEEDS = ("number", "laboratory", "customer", "method")
-LARGE_NOISE_M = 0.010
-CONFIRMED = 0.5  # scatter over given sds, or the other way round, from which on they agree
-VAGUE = 5.0  # times the median sd: what a point with one poor ray too few has
+LARGE_NOISE_M = 0.010  # median standard deviation in plan that causes a warning
+CONFIRMED = 0.5  # least ratio of scatter and stated standard deviation, either way, to agree
+VAGUE = 5.0  # standard deviation of a poorly determined point, relative to the median
 OF_VERTICAL = message(
     "gives_vertical",
     "plumb lines, height differences, vertical or zenith angles, or control points with "
@@ -25,34 +25,34 @@ OF_SCALE = message(
 
 
 def noise_is_estimated(job):
-    """Whether the points' covariance is scaled by what their residuals say.
+    """Whether the covariance of the points is scaled by their residuals.
 
-    That of an adjustment has been scaled there, by all its residuals.
+    An adjustment scales its covariance itself, by all its residuals.
     """
     points = job.points
-    given = points.sd_m is not None or points.covariance_m2 is not None
-    return not given or (job.scale == "a_posteriori" and not points.from_adjustment)
+    has_covariance = points.sd_m is not None or points.covariance_m2 is not None
+    return not has_covariance or (job.scale == "a_posteriori" and not points.from_adjustment)
 
 
 def origin_of(points):
-    """Where points come from, as messages name it."""
+    """Origin of the points, as named in messages."""
     if points.file:
         return points.file
     return "adjusted points" if points.from_adjustment else "points.csv"
 
 
 def refuse_undetermined(datum):
-    """Refuse a capacity while the vertical or the scale of a survey is not determined.
+    """Raise SolutionError while the vertical or the scale of a survey is not determined.
 
     Parameters
     ----------
     datum : DatumReport
-        Of the adjusted survey.
+        Datum of the adjusted survey.
 
     Raises
     ------
     SolutionError
-        With what would determine them.
+        Its message names observations that would determine the vertical or the scale.
     """
     missing = []
     if not datum.vertical:
@@ -76,13 +76,13 @@ def refuse_undetermined(datum):
 
 
 def open_questions(job, datum, causes):
-    """What a user must decide about an adjusted survey: its heights, a scale given twice.
+    """Questions about an adjusted survey that the user must decide: heights and scale.
 
     Parameters
     ----------
     job : Job
     datum : DatumReport
-        Of the adjusted survey.
+        Datum of the adjusted survey.
     causes : sequence of Cause
         Causes of uncertainty of its points.
 
@@ -105,11 +105,11 @@ def open_questions(job, datum, causes):
         )
         problems.append(Problem("job.toml", text, column="datum.bottom_z_m"))
     scales = [
-        message("with_u", "{name} ({u:g} {unit})", name=one.name, u=one.u, unit=one.unit)
-        for one in causes
-        if one.what == OWN_SCALE
+        message("with_u", "{name} ({u:g} {unit})", name=cause.name, u=cause.u, unit=cause.unit)
+        for cause in causes
+        if cause.what == OWN_SCALE
     ]
-    if scales and any(one.name == "scale" for one in job.inputs):
+    if scales and any(declared_input.name == "scale" for declared_input in job.inputs):
         text = message(
             "scale_twice",
             "scale is declared, and that of {instruments} in instruments.toml is already in "
@@ -127,13 +127,14 @@ def _held(names):
 
 
 def warn_of_vague_vertical(points):
-    """A vertical that adjusted points have, but hardly know: the sd of their common lean."""
+    """Warning of adjusted points whose common tilt has a large standard deviation."""
     if not points.from_adjustment:
         return []
     x, y, z = (points.xyz_m - points.xyz_m.mean(axis=0)).T
     lean = np.zeros((len(x), 3, 2))
     lean[:, 0, 0], lean[:, 2, 0] = z, -x
     lean[:, 1, 1], lean[:, 2, 1] = z, -y
+    # The common tilt is the least squares estimate from the displacements of the points.
     angle = np.linalg.pinv(lean.reshape(-1, 2))
     sd = np.sqrt(np.linalg.eigvalsh(angle @ (points.covariance_m2 @ angle.T))[-1])
     if sd <= VAGUE_TILT:
@@ -149,19 +150,32 @@ def warn_of_vague_vertical(points):
 
 
 def warn_of_vague_points(points, accepted, sds_m, noise_m):
-    """Points of the wall that the survey hardly determines, and a wall of such points.
+    """Warnings of wall points with large standard deviations.
 
-    accepted (m,) indices of the points of the wall; sds_m (n,) in plan, or None; noise_m scatter
-    of the points about the shell's form. Large standard deviations that were handed in and that the
-    scatter confirms are no doubt: they are what the survey is, and U has them.
+    Large standard deviations of supplied points that the scatter confirms cause no warning. They
+    describe the survey, and U includes them.
+
+    Parameters
+    ----------
+    points : Points
+    accepted : ndarray of int, shape (m,)
+        Indices of the wall points.
+    sds_m : ndarray, shape (n,), or None
+        Standard deviations of all points in plan, m.
+    noise_m : float
+        Scatter of the points about the form of the shell, m.
+
+    Returns
+    -------
+    list of Problem
     """
     if sds_m is None:
         return []
-    own = sds_m[accepted]
-    middle, texts = np.median(own), []
-    vague = np.flatnonzero(own > VAGUE * middle)
+    sds_of_wall = sds_m[accepted]
+    median_m, texts = np.median(sds_of_wall), []
+    vague = np.flatnonzero(sds_of_wall > VAGUE * median_m)
     if len(vague):
-        worst = vague[np.argsort(-own[vague])]
+        worst = vague[np.argsort(-sds_of_wall[vague])]
         texts.append(
             message(
                 "points_vague",
@@ -169,20 +183,20 @@ def warn_of_vague_points(points, accepted, sds_m, noise_m):
                 " ({median_mm:.1f} mm): {points}; more or better rays are needed there",
                 count=len(vague),
                 times=VAGUE,
-                median_mm=1000 * middle,
+                median_mm=1000 * median_m,
                 points=list_some(
-                    [_with_sd(points.names[accepted[i]], own[i]) for i in worst], SHOWN
+                    [_with_sd(points.names[accepted[i]], sds_of_wall[i]) for i in worst], SHOWN
                 ),
             )
         )
-    is_confirmed = CONFIRMED * middle < noise_m < middle / CONFIRMED
-    if middle > LARGE_NOISE_M and (points.from_adjustment or not is_confirmed):
+    is_confirmed = CONFIRMED * median_m < noise_m < median_m / CONFIRMED
+    if median_m > LARGE_NOISE_M and (points.from_adjustment or not is_confirmed):
         texts.append(
             message(
                 "points_noisy",
                 "the points of the wall are known to {sd_mm:.1f} mm (median sd in plan): "
                 "dents and ovality of that size cannot be told from noise",
-                sd_mm=1000 * middle,
+                sd_mm=1000 * median_m,
             )
         )
     return of_points(points, texts)
@@ -193,9 +207,9 @@ def _with_sd(name, sd_m):
 
 
 def warn_of_undeclared(undeclared):
-    """A warning that names what U does not contain.
+    """Warning that names the inputs without a declared uncertainty, which U does not include.
 
-    undeclared  names of the inputs that bear on the tank and have no declared uncertainty
+    The names in `undeclared` are those of the inputs that affect the tank.
     """
     if not undeclared:
         return ()
@@ -204,20 +218,20 @@ def warn_of_undeclared(undeclared):
 
 
 def incomplete_certificate(job):
-    """A warning that names what a certificate lacks."""
-    lacking = [key for key in CERTIFICATE_NEEDS if not job.certificate.get(key)]
-    if not lacking:
+    """Warning that names the missing entries of a certificate."""
+    missing = [key for key in CERTIFICATE_NEEDS if not job.certificate.get(key)]
+    if not missing:
         return ()
     text = message(
         "certificate_incomplete",
         "not given: {entries}; ISO/IEC 17025, 7.8.2, requires them",
-        entries=lacking,
+        entries=missing,
     )
     return (Problem("job.toml", text, column="certificate"),)
 
 
 def against_nominal(tank, capacity_m3):
-    """A warning when the capacity is far from the nominal volume."""
+    """Warning of a capacity far from the nominal volume."""
     nominal = tank.nominal_volume_m3
     if nominal is None or abs(capacity_m3 / nominal - 1) <= VOLUME_MISS:
         return ()
@@ -233,4 +247,5 @@ def against_nominal(tank, capacity_m3):
 
 
 def of_points(points, texts):
+    """`Problem`s with the given texts, located at the points."""
     return [Problem(origin_of(points), text) for text in texts]

@@ -1,6 +1,6 @@
-"""From what was measured to what was surveyed of a tank: points, then its wall.
+"""From the measurements to the survey of a tank: points, then the wall.
 
-The readings may be those of a survey or what one that is only planned foresees.
+The readings may be those of a survey or the predicted readings of a plan.
 """
 
 from dataclasses import dataclass, replace
@@ -26,23 +26,24 @@ if TYPE_CHECKING:
     from tankcal.survey.sighting import Sighting
     from tankcal.survey.tangents import Touching
 
-# Each kind of survey is imported where a job has it: most jobs have one, and all take long to load.
+# Each kind of survey is imported when needed: most jobs have one kind, and all are slow to load.
 
-TOLD = 10  # warnings of the adjustment that are told when there is no wall
+TOLD = 10  # warnings of the adjustment repeated when no wall is found
 
 
 @dataclass(frozen=True)
 class Surveyed:
-    """What was surveyed of a tank.
+    """Survey of a tank.
 
     Attributes
     ----------
     job : Job
-        With the points that its adjustment, its hits or its tangents gave.
+        Job with the points from its adjustment, hits, tangents or clouds.
     survey : Wall, StrappedWall, Scan, mesh or None
-        None where declared sizes alone describe the tank.
+        None if the tank is described by declared sizes alone.
     adjustment : Adjustment or None
     sighting : Sighting or None
+        Wall hits as points of the wall.
     touching : Touching or None
         Tangents as points of the wall.
     clouded : Clouded or None
@@ -58,12 +59,12 @@ class Surveyed:
 
 
 def is_surveyed_as(survey, kind):
-    """Whether what was surveyed of a tank, or None, is of a kind, as a Result has it."""
+    """Whether a survey, or None, is of a kind named as in a Result."""
     return survey is not None and survey.surveyed_as == kind
 
 
 def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=None):
-    """`Surveyed` of a job: its survey adjusted, its wall found.
+    """`Surveyed` of a job: adjust its survey and find its wall.
 
     Parameters
     ----------
@@ -71,10 +72,13 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     progress : callable
         Called with a line of text as each step begins.
     amplitudes : Amplitudes, optional
-        Of the components of an upright wall where they are known beforehand; None: the readings
-        tell them.
+        Known amplitudes of the components of an upright wall; None: estimated from the readings.
     cluster, part_progress : optional
-        Who reads files of clouds, and who is told: those of `cloud_passes.Reading`.
+        Workers that read cloud files, and callback for their progress; see `cloud_passes.Reading`.
+
+    Returns
+    -------
+    Surveyed
 
     Raises
     ------
@@ -82,7 +86,7 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
         As `chain.run`.
     """
     adjustment = sighting = touching = clouded = None
-    is_sighted = any(one is not None for one in (job.hits, job.tangents, job.clouds))
+    is_sighted = any(table is not None for table in (job.hits, job.tangents, job.clouds))
     if job.measurements is not None:
         adjustment = _adjusted(job, progress)
     if not is_sighted and adjustment is not None:
@@ -117,8 +121,8 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise
-        told = (one.text for one in placed(job, adjustment.warnings[:TOLD]))
-        raise SolutionError(*error.args, *told) from error
+        texts = (warning.text for warning in placed(job, adjustment.warnings[:TOLD]))
+        raise SolutionError(*error.args, *texts) from error
     if adjustment is not None and not is_sighted and is_surveyed_as(survey, "wall"):
         refuse_other_side(job, partial(is_within_wall, survey), adjustment)
     elif adjustment is not None and not is_sighted and is_surveyed_as(survey, "scan"):
@@ -133,14 +137,14 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
 
 
 def placed(job, problems):
-    """Problems by workbook and sheet where the job stands in one."""
+    """Problems located by workbook and sheet if the job is in a workbook."""
     if not job.source.endswith(".xlsx"):
         return tuple(problems)
-    return tuple(in_book(one, job.source) for one in problems)
+    return tuple(in_book(problem, job.source) for problem in problems)
 
 
 def _adjusted(job, progress):
-    """The adjusted survey of a job; SolutionError where it leaves the vertical or a scale open."""
+    """Adjusted survey of a job; SolutionError if the vertical or the scale is undetermined."""
     if job.points is not None and not job.points.from_adjustment:
         expected = message(
             "points_beside_survey",
@@ -154,12 +158,12 @@ def _adjusted(job, progress):
 
 
 def adjust_decided(job, progress):
-    """The adjusted survey of a job, its readings overruled as the job says.
+    """Adjusted survey of a job with its manual decisions about readings.
 
     Raises
     ------
     InputError
-        For what cannot be meant, and for a kept reading that is not one of the adjustment.
+        For impossible input, and for a kept reading that is not in the adjustment.
     SolutionError
         As `adjust_survey`.
     """
@@ -172,7 +176,7 @@ def adjust_decided(job, progress):
 
 
 def _survey(job, progress, dof, amplitudes):
-    """What was surveyed: a wall of courses, a mesh, the scan of another wall; None: sizes alone."""
+    """Survey of the tank: wall of courses, mesh or scan; None for declared sizes alone."""
     if job.rings:
         from tankcal.pipeline.ringed_wall import find_ringed_wall
 

@@ -1,6 +1,6 @@
-"""From what was surveyed to the capacity table: rows, their volumes and what makes them uncertain.
+"""From the survey to the capacity table: rows, volumes and their causes of uncertainty.
 
-The wall may be that of an adjusted survey or that of a survey that is only planned.
+The wall may be that of an adjusted survey or of a plan.
 """
 
 from dataclasses import dataclass
@@ -29,8 +29,8 @@ from tankcal.tank.dips import (
 from tankcal.tank.falling_capacity import refuse_falling
 from tankcal.uncertainty import ROUNDING, combine
 
-CLOSED = 1e-3  # of its largest free surface: one that is smaller at the top counts as none
-SAME_DIP_M = 1e-6  # of a row and a joint
+CLOSED = 1e-3  # area at the top, relative to the largest area, below which a tank is closed
+SAME_DIP_M = 1e-6  # largest difference of dips of a row and a joint that coincide
 
 
 @dataclass(frozen=True)
@@ -40,16 +40,16 @@ class ComputedTable:
     Attributes
     ----------
     body : Body
-        The tank as the sum of its parts.
+        Tank as the sum of its parts.
     zero_m : float
-        Level of the table's zero, m: dip 0 in the frame of the parts.
+        Level of the table's zero (dip 0) in the frame of the parts, m.
     levels_m : ndarray, shape (rows,)
-        Levels of the rows there, m.
+        Levels of the rows in that frame, m.
     breakpoints_m : ndarray
         Dips between empty and full at which the area jumps, m.
     table : Capacity
     straightness : Straightness
-        How far linear interpolation between the rows is from the exact volume.
+        Error of linear interpolation between the rows.
     """
 
     body: Body
@@ -61,16 +61,16 @@ class ComputedTable:
 
     @property
     def top_m(self):
-        """Dip of the last row: that of the full tank as a whole millimetre."""
+        """Dip of the last row: the full tank, in whole millimetres."""
         return float(self.table.height_m[-1])
 
     @property
     def over_m(self):
-        """How far the last row stands above the top of the tank; below 0: below it."""
+        """Height of the last row above the top of the tank, m; negative below the top."""
         return float(self.levels_m[-1] - self.body.highest_m)
 
     def volume_m3(self, dips_m):
-        """(n,) exact volumes at dips."""
+        """Exact volumes (n,) at dips, m3."""
         return _exact(self.body, self.zero_m)(dips_m)
 
 
@@ -81,11 +81,11 @@ def compute_table(job, survey, progress=lambda text: None, body=None):
     ----------
     job : Job
     survey : Wall, Scan, mesh or None
-        What was found of the tank; None where declared sizes alone describe it.
+        Survey of the tank; None if declared sizes alone describe it.
     progress : callable, optional
         Called with a line of text as each step begins.
     body : Body, optional
-        The tank where more is known of it (by liquid); None: as the survey has it.
+        Tank with additional information, such as metered liquid; None: from the survey.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def compute_table(job, survey, progress=lambda text: None, body=None):
     Raises
     ------
     InputError, SolutionError
-        When the capacity falls with rising dips: see `refuse_falling`.
+        If the capacity falls with rising dips: see `refuse_falling`.
     """
     progress(message("integrating", "integrating volumes"))
     if body is None:
@@ -108,7 +108,7 @@ def compute_table(job, survey, progress=lambda text: None, body=None):
     exact = _exact(body, zero)
     heights = _rows(spec, exact, top, breakpoints)
     levels = heights + zero
-    volumes, areas, sources = _without_rounding(*body.rows(levels))
+    volumes, areas, sources = _remove_rounding(*body.rows(levels))
     table = Capacity(
         height_m=heights,
         volume_m3=volumes,
@@ -124,34 +124,34 @@ def compute_table(job, survey, progress=lambda text: None, body=None):
 
 
 def distinct_dips(heights_m, breakpoints_m):
-    """Rows, and breakpoints that do not coincide with a row but for rounding.
+    """Rows, and the breakpoints that differ from a row by more than rounding.
 
-    Across a joint the table of geometry and liquid steps by the difference of the areas times the
-    estimated error of the joint's height, a few millilitres, which only two dips closer than that
-    would take for a fall.
+    Across a joint, a table of geometry and liquid has a step: the difference of the areas times the
+    estimated error of the joint's height, a few millilitres. Two dips closer than this would show
+    the step as a falling volume.
 
     Examples
     --------
     >>> distinct_dips(np.array([4.79, 4.8]), np.array([4.795, 4.8 + 1e-15])).tolist()
     [4.79, 4.795, 4.8]
     """
-    above = np.searchsorted(heights_m, breakpoints_m)
-    near = heights_m[np.clip([above - 1, above], 0, len(heights_m) - 1)]
-    apart = np.abs(near - breakpoints_m).min(axis=0)
-    return np.union1d(heights_m, breakpoints_m[apart > SAME_DIP_M])
+    next_row = np.searchsorted(heights_m, breakpoints_m)
+    neighbours = heights_m[np.clip([next_row - 1, next_row], 0, len(heights_m) - 1)]
+    distance = np.abs(neighbours - breakpoints_m).min(axis=0)
+    return np.union1d(heights_m, breakpoints_m[distance > SAME_DIP_M])
 
 
-def check_table(job, survey, made, sighting=None):
-    """Warnings about a survey and the capacity table that was computed from it.
+def check_table(job, survey, computed, sighting=None):
+    """Warnings about a survey and the capacity table computed from it.
 
     Parameters
     ----------
     job : Job
     survey : Wall, Scan, mesh or None
-        As `compute_table` was given it.
-    made : ComputedTable
+        As passed to `compute_table`.
+    computed : ComputedTable
     sighting : Sighting, Touching or Clouded, optional
-        Of a wall that was hit without targets, whose limbs were sighted, or that was scanned.
+        For a wall surveyed by reflectorless hits, by tangents or by clouds.
 
     Returns
     -------
@@ -162,15 +162,15 @@ def check_table(job, survey, made, sighting=None):
         survey = survey.surveyed
     return (
         *of_size,
-        *_doubts_of_survey(job, survey, made.top_m),
-        *_doubts_of_sights(job, survey, sighting),
-        *warn_of_undeclared(_undeclared(job, survey, made.body)),
-        *against_nominal(job.tank, made.table.volume_m3[-1]),
+        *_check_survey(job, survey, computed.top_m),
+        *_check_sights(job, survey, sighting),
+        *warn_of_undeclared(_undeclared(job, survey, computed.body)),
+        *against_nominal(job.tank, computed.table.volume_m3[-1]),
     )
 
 
 def _undeclared(job, survey, body):
-    """Inputs without u, those of the table first, then what moves only corrections of a ship."""
+    """Inputs without u: those of the table, then those that affect only corrections of a ship."""
     of_ship = ()
     if job.ship is not None:
         from tankcal.pipeline.ship import undeclared_of_ship
@@ -179,7 +179,8 @@ def _undeclared(job, survey, body):
     return tuple(dict.fromkeys((*body.undeclared(), *of_ship)))
 
 
-def _doubts_of_sights(job, survey, sighting):
+def _check_sights(job, survey, sighting):
+    """Warnings about the sights or clouds of a wall."""
     if sighting is None:
         return ()
     if job.hits is not None:
@@ -195,14 +196,15 @@ def _doubts_of_sights(job, survey, sighting):
     return check_clouds(job, survey, sighting)
 
 
-def _doubts_of_survey(job, survey, top_m):
+def _check_survey(job, survey, top_m):
+    """Warnings about a survey, by its kind."""
     kind = None if survey is None else survey.surveyed_as
     if kind == "wall":
-        return _doubts_of_wall(job, survey)
+        return _check_wall_of_points(job, survey)
     if kind == "strapped":
         from tankcal.pipeline.strapping_checks import check_strapped
 
-        return (*check_strapped(job, survey), *_doubts_of_lines(job, survey))
+        return (*check_strapped(job, survey), *_check_reference_lines(job, survey))
     if kind == "circles":
         from tankcal.pipeline.great_circle_checks import check_circles
 
@@ -216,28 +218,30 @@ def _doubts_of_survey(job, survey, top_m):
     return () if survey is None else check_mesh(job, top_m)
 
 
-def _doubts_of_wall(job, wall):
+def _check_wall_of_points(job, wall):
+    """Warnings about a wall surveyed by points, with its straps and reference lines."""
     from tankcal.pipeline.wall import warnings_of
 
-    beside = leans = ()
+    straps_problems = lean_problems = ()
     if wall.straps is not None:
         from tankcal.pipeline.strapping_checks import check_straps_beside_points
 
-        beside = check_straps_beside_points(job, wall)
+        straps_problems = check_straps_beside_points(job, wall)
     if job.lines is not None:
         from tankcal.pipeline.line_checks import check_leans
 
-        leans = check_leans(job, wall)
+        lean_problems = check_leans(job, wall)
     return (
         *warnings_of(job, wall),
         *check_wall(job, wall),
-        *beside,
-        *_doubts_of_lines(job, wall.read),
-        *leans,
+        *straps_problems,
+        *_check_reference_lines(job, wall.read),
+        *lean_problems,
     )
 
 
-def _doubts_of_lines(job, wall):
+def _check_reference_lines(job, wall):
+    """Warnings about reference lines."""
     if job.lines is None:
         return ()
     from tankcal.pipeline.line_checks import check_lines
@@ -245,19 +249,20 @@ def _doubts_of_lines(job, wall):
     return check_lines(job, wall)
 
 
-def _without_rounding(volumes, areas, sources):
-    """The rows with exact zeros where nothing but rounding stands.
+def _remove_rounding(volumes, areas, sources):
+    """Rows with exact zeros in place of rounding errors.
 
-    Below a raised bottom the volume is a difference of volumes: it came out as -9e-16 m3 with u of
-    3e-20 m3, and was written with twenty decimals. A row whose volume is 0 but unsure stays so.
+    Below a raised bottom the volume is a difference of volumes, such as -9e-16 m3 with u of 3e-20
+    m3. It would be written with twenty decimals. A row with volume 0 and a significant u is not
+    changed.
     """
     u = combine(sources, len(volumes)).u
-    least = ROUNDING * np.max(np.abs(volumes), initial=0.0)
-    empty = (np.abs(volumes) <= least) & (u <= least)
-    flat = np.abs(areas) <= ROUNDING * np.max(np.abs(areas), initial=0.0)
-    rows = empty[:, None]
-    sources = tuple(one.mapped(lambda columns: np.where(rows, 0.0, columns)) for one in sources)
-    return np.where(empty, 0.0, volumes), np.where(flat, 0.0, areas), sources
+    largest_rounding = ROUNDING * np.max(np.abs(volumes), initial=0.0)
+    is_empty = (np.abs(volumes) <= largest_rounding) & (u <= largest_rounding)
+    has_no_area = np.abs(areas) <= ROUNDING * np.max(np.abs(areas), initial=0.0)
+    rows = is_empty[:, None]
+    sources = tuple(cause.mapped(lambda columns: np.where(rows, 0.0, columns)) for cause in sources)
+    return np.where(is_empty, 0.0, volumes), np.where(has_no_area, 0.0, areas), sources
 
 
 def _exact(body, zero_m):
@@ -266,14 +271,14 @@ def _exact(body, zero_m):
 
 
 def _is_closed(body):
-    """Whether a tank narrows to nothing at its top, as a sphere or a lying cylinder does."""
+    """Whether a tank narrows to zero at its top, as a sphere or a horizontal cylinder does."""
     span = np.linspace(body.lowest_m, body.highest_m, 9)
     areas = body.area_m2(span)
     return bool(areas[-1] < CLOSED * areas.max())
 
 
 def _rows(spec, exact, top_m, breakpoints_m):
-    """Dips of the rows: by the step asked for, or by the bound on linear interpolation."""
+    """Dips of the rows: by the requested step, or by the bound on linear interpolation."""
     step = spec.step_m
     if step is None and spec.height_unit != "m":
         step = float(HEIGHT_STEPS_M[spec.height_unit])

@@ -1,4 +1,4 @@
-"""How tangents agree with the wall and with each other, and what is to be said about it."""
+"""Agreement of tangents with the wall and with each other, and the resulting warnings."""
 
 from dataclasses import dataclass
 
@@ -22,31 +22,31 @@ from tankcal.pipeline.wall import joints_of
 
 RULES = "tangents"
 SHOWN = 5
-SUSPECT = 2.0  # test quantity of the worst set-up, from which it is tested by all others
-MANY_LEVELS = 0.5  # of them, off: it is the heights as a whole
-TOGETHER = 0.5  # of what one sight may be off its level: all those of a set-up
-LOST = 0.5  # of the tangents of a set-up, rejected: the set-up is to blame
-WAVES = np.arange(2, 9)  # round a wall: longer than a plate
+SUSPECT = 2.0  # w of the worst set-up above which it is tested by the other set-ups
+MANY_LEVELS = 0.5  # share of wrong levels above which the heights as a whole are wrong
+TOGETHER = 0.5  # limit of a whole set-up, relative to the limit of a single sight
+LOST = 0.5  # share of used tangents below which a set-up is reported
+WAVES = np.arange(2, 9)  # numbers of waves round a wall, longer than a plate
 
 
 @dataclass(frozen=True)
 class TangentTests:
-    """What became of tangents; n sights, in the order of their file.
+    """Tests of n sights, in the order of their file.
 
     Attributes
     ----------
     used : ndarray of bool, shape (n,)
-        The wall is known from them.
+        Whether the sight determines the wall.
     departure_m : ndarray, shape (n,)
-        Outwards, from the wall as all others have it; nan: only compared.
+        Outward discrepancy from the wall of the other sights, m; nan for check sights.
     w : ndarray, shape (n,)
-        That over its standard deviation; nan: no test was made.
+        Discrepancy over its standard deviation; nan if not tested.
     redundancy : ndarray, shape (n,)
-        Share of a change of the reading that shows in it; nan: no test was made.
+        Share of an error of the reading that appears in the discrepancy; nan if not tested.
     mdb_m : ndarray, shape (n,)
-        Smallest blunder of the tangent's distance that the test finds; nan: no test was made.
+        Minimal detectable bias of the tangent's distance, m; nan if not tested.
     setups : dict
-        {set-up: (w of a disturbed set-up, its turn rad, or its shift (2,) m)} (`moved_setups`).
+        {set-up: (w of movement, rotation in rad, displacement (2,) in m)} (`moved_setups`).
     """
 
     used: np.ndarray
@@ -58,102 +58,105 @@ class TangentTests:
 
 
 def least_tangents(job):
-    """How many tangents a level of a tank of that circumference should have."""
+    """Recommended number of tangents per level for the circumference of the tank."""
     return limit_at(RULES, "tangents", "least", girth_m(job))
 
 
 def judge_tangents(job, wall, touching):
     """`TangentTests` of the tangents of a wall."""
     n = len(job.tangents)
-    counted = np.flatnonzero(~job.tangents.check)  # the order of the job's points
+    adjusted = np.flatnonzero(~job.tangents.check)  # in the order of the job's points
     departure, w, redundancy, mdb = np.full((4, n), np.nan)
-    departure[counted], w[counted] = wall.shell.residual_m, wall.shell.w
+    departure[adjusted], w[adjusted] = wall.shell.residual_m, wall.shell.w
     used = np.zeros(n, dtype=bool)
-    used[counted[wall.accepted]] = True
-    order = np.concatenate([one.group.members for one in wall.sections])
+    used[adjusted[wall.accepted]] = True
+    order = np.concatenate([section.group.members for section in wall.sections])
     sites = len(wall.field.radius_m) - len(wall.readings)
-    if sites != len(order):  # several in a cell
+    if sites != len(order):  # several sights share a cell
         return TangentTests(used, departure, w, redundancy, mdb, {})
-    at = counted[wall.accepted[order]]  # of each reading of the field, among all sights
+    sight = adjusted[wall.accepted[order]]  # sight of each reading of the field
     field = wall.field
-    whole = field.covariance_m2 + noise_of_wall(wall) - field.noise_m2
-    precision, pull = tested(field, whole, sites)
+    # A field of points alone has its noise section by section; the tests include all covariances.
+    covariance = field.covariance_m2 + noise_of_wall(wall) - field.noise_m2
+    precision, pull = tested(field, covariance, sites)
     weight = np.maximum(np.diag(precision), 1e-300)
-    departure[at], w[at] = pull / weight, pull / np.sqrt(weight)
-    own = (job.tangents.sd_rad * touching.length_m) ** 2 + touching.hull.own_sd_m**2
-    redundancy[at] = np.clip(own[at] * weight, 0, 1)
-    mdb[at] = noncentrality() / np.sqrt(weight)
+    # Leave-one-out discrepancy P y / P_ii, and w = P y / sqrt(P_ii), as in data snooping.
+    departure[sight], w[sight] = pull / weight, pull / np.sqrt(weight)
+    variance_m2 = (job.tangents.sd_rad * touching.length_m) ** 2 + touching.hull.own_sd_m**2
+    redundancy[sight] = np.clip(variance_m2[sight] * weight, 0, 1)
+    mdb[sight] = noncentrality() / np.sqrt(weight)
     setups = moved_setups(
-        field, whole, np.array(job.tangents.setup)[at], _columns(touching, at), SUSPECT
+        field, covariance, np.array(job.tangents.setup)[sight], _columns(touching, sight), SUSPECT
     )
     return TangentTests(used, departure, w, redundancy, mdb, setups)
 
 
-def _columns(touching, at):
-    """(k, 3) derivative of tangents by the turn of the circle and the shift of the station."""
-    f = touching.normal_rad[at]
-    length = np.where(touching.seen_right[at], 1.0, -1.0) * touching.length_m[at]
-    return np.column_stack([length, np.sin(f), np.cos(f)])
+def _columns(touching, sights):
+    """Derivatives (k, 3) of tangents by the rotation of the circle and shift of the station."""
+    azimuth = touching.normal_rad[sights]
+    length = np.where(touching.seen_right[sights], 1.0, -1.0) * touching.length_m[sights]
+    return np.column_stack([length, np.sin(azimuth), np.cos(azimuth)])
 
 
 def check_tangents(job, wall, touching):
     """`Problem`s of the tangents of a wall."""
     tests = judge_tangents(job, wall, touching)
     return (
-        *_of_levels(job, wall),
-        *_of_places(job, touching),
-        *_of_heights(job, touching),
-        *_of_setups(job, tests),
+        *_check_levels(job, wall),
+        *_check_limbs(job, touching),
+        *_check_heights(job, touching),
+        *_check_setups(job, tests),
         *check_nominal(job, wall, job.tangents.file),
-        *_of_scale(job),
+        *_check_scale(job),
     )
 
 
-def _of_scale(job):
-    """A traverse whose distances one instrument measured, without a tape or a bar."""
-    read = () if job.measurements is None else job.measurements.readings
-    names = {one.instrument for one in job.tangents.setups.values()}
-    is_alone = len(names) == 1 and "distances" not in {table.table for table in read}
+def _check_scale(job):
+    """Problems of a traverse measured with one instrument, without a tape or a bar."""
+    readings = () if job.measurements is None else job.measurements.readings
+    names = {setup.instrument for setup in job.tangents.setups.values()}
+    is_alone = len(names) == 1 and "distances" not in {table.table for table in readings}
     return check_size_told(job, [*names]) if is_alone else ()
 
 
-def _of_levels(job, wall):
+def _check_levels(job, wall):
+    """Problems of levels with few tangents and courses with few levels."""
     least = least_tangents(job)
-    few = levels_with_few(wall, least)
-    if few:
+    weak_levels = levels_with_few(wall, least)
+    if weak_levels:
         text = message(
             "few_tangents",
             "levels {levels} have fewer than {least} tangents, as many as a circumference of"
             " {girth_m:.0f} m asks for",
-            levels=few,
+            levels=weak_levels,
             least=least,
             girth_m=girth_m(job),
         )
         yield Problem(job.tangents.file, text)
     least = limits_of(RULES)["levels_a_course"]
-    short = courses_with_few(job, wall, least)
-    if short:
+    weak_courses = courses_with_few(job, wall, least)
+    if weak_courses:
         text = message(
             "few_levels_of_tangents",
             "courses {courses} were sighted at fewer than {least} levels: nothing shows a taper"
             " there",
-            courses=short,
+            courses=weak_courses,
             least=least,
         )
         yield Problem(job.tangents.file, text)
 
 
-def _of_places(job, touching):
-    """Limbs that fall on the same places of the wall: a wave round it looks like its radius."""
+def _check_limbs(job, touching):
+    """Problem of limbs that coincide on the wall, so that a wave looks like the radius."""
     level, levels = job.tangents.levels
-    least, found = least_tangents(job), []
-    for one in range(len(levels)):
-        normals = touching.normal_rad[(level == one) & ~job.tangents.check]
-        if len(normals) >= least:  # of fewer another check tells
-            found.append(wave_in_radius(normals))
-    if not found:
+    least, waves = least_tangents(job), []
+    for number in range(len(levels)):
+        normals = touching.normal_rad[(level == number) & ~job.tangents.check]
+        if len(normals) >= least:  # otherwise another check warns
+            waves.append(wave_in_radius(normals))
+    if not waves:
         return
-    wave, share = sorted(found, key=lambda each: each[1])[len(found) // 2]
+    wave, share = sorted(waves, key=lambda wave_and_share: wave_and_share[1])[len(waves) // 2]
     if share > limits_of(RULES)["wave_in_radius"]:
         text = message(
             "limbs_coincide",
@@ -167,18 +170,19 @@ def _of_places(job, touching):
 
 
 def wave_in_radius(normal_rad):
-    """The wave round a wall that looks most like its radius to tangents, and by how much.
+    """Wave round a wall that tangents confuse most with the radius, and by how much.
 
     Parameters
     ----------
     normal_rad : ndarray, shape (n,)
-        Azimuths of their normals.
+        Azimuths of the normals of the tangents, rad.
 
     Returns
     -------
     wave : int
+        Number of waves round the wall.
     share : float
-        Of its amplitude that may go into the mean of the tangents, |mean of exp(i k f)|.
+        Share of its amplitude that may appear in the mean of the tangents, |mean of exp(i k f)|.
 
     Examples
     --------
@@ -192,15 +196,15 @@ def wave_in_radius(normal_rad):
     return int(WAVES[np.argmax(shares)]), round(float(np.max(shares)), 12)
 
 
-def _of_heights(job, touching):
-    """Tangents that touch the wall at another height than their level, or on another course."""
+def _check_heights(job, touching):
+    """Problems of tangents that touch the wall away from their level or on another course."""
     tangents, names = job.tangents, [course.name for course in job.courses]
-    above = touching.points.xyz_m[:, 2] - job.datum.bottom_z_m
-    off = above - job.datum.plate_level_m - tangents.level_m
-    there = course_of(above, joints_of(job))
-    most, setup = limits_of(RULES)["level_m"], np.array(tangents.setup)
-    far, high = np.abs(off) > most, _high_setups(setup, off, most)
-    for name, by_m in high.items():
+    height = touching.points.xyz_m[:, 2] - job.datum.bottom_z_m
+    off_m = height - job.datum.plate_level_m - tangents.level_m
+    course_index = course_of(height, joints_of(job))
+    most_m, setup = limits_of(RULES)["level_m"], np.array(tangents.setup)
+    is_far, off_by_setup = np.abs(off_m) > most_m, _high_setups(setup, off_m, most_m)
+    for name, by_m in off_by_setup.items():
         text = message(
             "tangents_of_high_setup",
             "the tangents of set-up {setup!r} touch the wall {off:+.2f} m from their levels, those"
@@ -209,21 +213,25 @@ def _of_heights(job, touching):
             off=by_m,
         )
         yield Problem("setups.csv", text, tangents.setups[name].row, "instrument_height_m")
-    far &= ~np.isin(setup, list(high))
-    wrong = {}
-    for place in np.flatnonzero(far):
-        key = tangents.course[place], float(tangents.level_m[place]), names[int(there[place])]
-        wrong.setdefault(key, []).append(place)
-    if len(wrong) > MANY_LEVELS * len(tangents.levels[1]):
+    is_far &= ~np.isin(setup, list(off_by_setup))
+    places_by_key = {}
+    for place in np.flatnonzero(is_far):
+        key = (
+            tangents.course[place],
+            float(tangents.level_m[place]),
+            names[int(course_index[place])],
+        )
+        places_by_key.setdefault(key, []).append(place)
+    if len(places_by_key) > MANY_LEVELS * len(tangents.levels[1]):
         text = message(
             "tangents_off_levels",
             "the tangents touch the wall {off:+.2f} m from their levels: are bottom_z_m, the"
             " heights of the stations or those of the instruments wrong?",
-            off=float(np.median(off[far])),
+            off=float(np.median(off_m[is_far])),
         )
         yield Problem(tangents.file, text, None, "level_m")
         return
-    for (course, level, other), places in wrong.items():
+    for (course, level, other_course), places in places_by_key.items():
         text = message(
             "tangents_at_other_level",
             "tangents of {level:g} m on course {course!r} ({count}) touch the wall {off:+.2f} m"
@@ -232,46 +240,60 @@ def _of_heights(job, touching):
             count=len(places),
             level=level,
             course=course,
-            off=float(np.median(off[places])),
-            other=other,
+            off=float(np.median(off_m[places])),
+            other=other_course,
         )
         yield Problem(tangents.file, text, _row(tangents, places[0]), "level_m")
 
 
 def _high_setups(setup, off_m, most_m):
-    """{set-up: by how much} of those whose sights all touch the wall so far from their levels, each
-    by about as much; {}: most set-ups do, or none.
+    """Height errors {set-up: m} of set-ups whose sights are all off by about the same amount.
 
-    setup, off_m  (n,) of each sight; nan: it has no zenith angle
-    most_m        that one sight may
+    The result is empty if at least half of the set-ups are concerned, or none.
+
+    Parameters
+    ----------
+    setup : ndarray of str, shape (n,)
+        Set-up of each sight.
+    off_m : ndarray, shape (n,)
+        Height of each sight above its level, m; nan without a zenith angle.
+    most_m : float
+        Largest accepted difference of a single sight, m.
+
+    Returns
+    -------
+    dict
     """
-    found, names = {}, np.unique(setup)
+    off_by_setup, names = {}, np.unique(setup)
     for name in names:
-        own = off_m[(setup == name) & np.isfinite(off_m)]
-        by = float(np.median(own)) if len(own) else 0.0
-        if abs(by) > TOGETHER * most_m and np.median(np.abs(own - by)) < abs(by) / 4:
-            found[str(name)] = by
-    return found if 2 * len(found) < len(names) else {}
+        off_of_setup = off_m[(setup == name) & np.isfinite(off_m)]
+        median_m = float(np.median(off_of_setup)) if len(off_of_setup) else 0.0
+        if (
+            abs(median_m) > TOGETHER * most_m
+            and np.median(np.abs(off_of_setup - median_m)) < abs(median_m) / 4
+        ):
+            off_by_setup[str(name)] = median_m
+    return off_by_setup if 2 * len(off_by_setup) < len(names) else {}
 
 
 def _row(tangents, place):
     return tangents.rows[place] if tangents.rows else None
 
 
-def _of_setups(job, tests):
-    """The set-up that contradicts all others most, where one does."""
+def _check_setups(job, tests):
+    """Problem of a set-up whose tangents were mostly rejected, or else that contradicts most."""
     counts = {name: [] for name in dict.fromkeys(job.tangents.setup)}
     for name, check, used in zip(job.tangents.setup, job.tangents.check, tests.used, strict=True):
         if not check:
             counts[name].append(used)
-    for name, kept in counts.items():
-        if kept and np.mean(kept) < LOST:
+    for name, used_sights in counts.items():
+        if used_sights and np.mean(used_sights) < LOST:
             text = message(
                 "setup_rejected",
                 "{count} of the {all} tangents from set-up {setup!r} contradict all others: was it"
                 " disturbed, or is its station or the zero of its circle wrong?",
-                count=len(kept) - sum(kept),
-                all=len(kept),
+                count=len(used_sights) - sum(used_sights),
+                all=len(used_sights),
                 setup=name,
             )
             yield Problem("setups.csv", text, job.tangents.setups[name].row, "setup")

@@ -1,4 +1,4 @@
-"""Warnings of tapes and of how they were read: units, certificates, readings that were copied."""
+"""Warnings about tapes and their readings: units, certificates and copied readings."""
 
 from itertools import combinations
 
@@ -10,32 +10,33 @@ from tankcal.messages import message
 from tankcal.pipeline.survey_limits import limits_of
 
 FILE, TAPES, COMPARED = "circumferences.csv", "instruments.toml", "tape_checks.csv"
-FAHRENHEIT_K = 8.0  # from the shell's: so near a temperature in Fahrenheit is that of the shell
-UNLIKE_K = 20.0  # a tape that is warmer or colder than its shell by more
-CERTIFIED_C = (0.0, 40.0)  # temperatures that certificates are for
-PULL = 2.0  # a pull so many times that of the certificate, or one part in so many of it
+FAHRENHEIT_K = 8.0  # largest difference from the shell of a temperature read as Fahrenheit
+UNLIKE_K = 20.0  # difference of tape and shell temperatures that causes a warning
+CERTIFIED_C = (0.0, 40.0)  # range of plausible temperatures in certificates
+PULL = 2.0  # ratio of a pull to that of the certificate, either way, that causes a warning
 UNITS_N = {"kgf": 9.80665, "lbf": 4.4482216}
-THICKNESS_M = (5e-5, 1.2e-3)  # of tapes
-STIFFNESS_N = (1e5, 5e6)  # of tapes: 0.5 to 25 mm2 of steel
-BY_CHANCE = 0.02  # as many equal repeats, or more, so rarely come by chance
+THICKNESS_M = (5e-5, 1.2e-3)  # range of plausible tape thicknesses
+STIFFNESS_N = (1e5, 5e6)  # range of plausible tape stiffnesses: 0.5 to 25 mm2 of steel
+BY_CHANCE = 0.02  # probability of as many equal repeats below which copying is suspected
 
 
 def check_tapes(job, straps):
-    """`Problem`s of the tapes of a strapping and of their readings, whatever the wall is."""
+    """`Problem`s of the tapes of a strapping and of their readings, independent of the wall."""
     return (
-        *_of_temperatures(job, straps),
-        *_of_no_shell_temperature(job, straps),
-        *_of_pulls(straps),
-        *_of_certificates(straps),
-        *_of_comparisons(job, straps),
-        *_of_copies([one.strap for one in straps.reduced]),
+        *_check_temperatures(job, straps),
+        *_check_shell_temperature(job, straps),
+        *_check_pulls(straps),
+        *_check_certificates(straps),
+        *_check_comparisons(job, straps),
+        *_of_copies([reduced_strap.strap for reduced_strap in straps.reduced]),
     )
 
 
-def _of_temperatures(job, straps):
+def _check_temperatures(job, straps):
+    """Problems of tape temperatures far from that of the shell."""
     shell = job.survey.shell_temperature_c
-    for one in straps.reduced:
-        tape = one.strap.temperature_c
+    for reduced_strap in straps.reduced:
+        tape = reduced_strap.strap.temperature_c
         if tape is None or shell is None or abs(tape - shell) <= UNLIKE_K:
             continue
         celsius = (tape - 32) / 1.8
@@ -56,18 +57,18 @@ def _of_temperatures(job, straps):
                 tape=tape,
                 shell=shell,
             )
-        yield Problem(FILE, text, one.strap.row, "temperature_c")
+        yield Problem(FILE, text, reduced_strap.strap.row, "temperature_c")
 
 
-def _of_no_shell_temperature(job, straps):
-    """Tapes far from the table's temperature, and nobody says that of their shell."""
-    read = [one.strap.temperature_c for one in straps.reduced]
-    read = [one for one in read if one is not None]
+def _check_shell_temperature(job, straps):
+    """Problem of tapes far from the table's temperature if the shell temperature is not given."""
+    temperatures = [reduced_strap.strap.temperature_c for reduced_strap in straps.reduced]
+    temperatures = [value for value in temperatures if value is not None]
     base = job.table.reference_temperature_c
     is_given = job.survey.shell_temperature_c is not None or not job.switches.temperature
-    if is_given or not read:
+    if is_given or not temperatures:
         return
-    tape = float(np.median(read))
+    tape = float(np.median(temperatures))
     if abs(tape - base) > limits_of("strapping")["shell_unlike_tape_k"]:
         text = message(
             "shell_temperature_of_tapes",
@@ -80,39 +81,37 @@ def _of_no_shell_temperature(job, straps):
         yield Problem("job.toml", text, column="survey.shell_temperature_c")
 
 
-def _of_pulls(straps):
-    """Pulls that are no multiple of that of the certificate that a crew would choose: one line for
-    each tape and pull.
-    """
-    certified, seen = {tape.name: tape.tension_n for tape, _ in straps.tapes}, set()
-    for one in straps.reduced:
-        pull, of_tape = one.strap.tension_n, certified.get(one.strap.tape)
+def _check_pulls(straps):
+    """Problems of pulls unlike that of the certificate, once for each tape and pull."""
+    certified, reported = {tape.name: tape.tension_n for tape, _ in straps.tapes}, set()
+    for reduced_strap in straps.reduced:
+        pull, of_tape = reduced_strap.strap.tension_n, certified.get(reduced_strap.strap.tape)
         if not (pull and of_tape) or 1 / PULL <= pull / of_tape <= PULL:
             continue
-        if (one.strap.tape, pull) in seen:
+        if (reduced_strap.strap.tape, pull) in reported:
             continue
-        seen.add((one.strap.tape, pull))
+        reported.add((reduced_strap.strap.tape, pull))
         text = message(
             "pull_unlike_certificate",
             "{pull_n:g} N, and {certified_n:g} N in the certificate of {tape!r}: is one of them in"
             " {units}?",
             pull_n=pull,
             certified_n=of_tape,
-            tape=one.strap.tape,
+            tape=reduced_strap.strap.tape,
             units=_units_near(pull, of_tape),
         )
-        yield Problem(FILE, text, one.strap.row, "tension_n")
+        yield Problem(FILE, text, reduced_strap.strap.row, "tension_n")
 
 
 def _units_near(first_n, second_n):
-    """Names of the units in which the smaller of two forces would be like the larger."""
+    """Names of the units in which the smaller of two forces resembles the larger."""
     low, high = sorted((first_n, second_n))
-    near = [name for name, size in UNITS_N.items() if 1 / PULL <= size * low / high <= PULL]
-    return " / ".join(near or UNITS_N)
+    units = [name for name, size in UNITS_N.items() if 1 / PULL <= size * low / high <= PULL]
+    return " / ".join(units or UNITS_N)
 
 
-def _of_certificates(straps):
-    """What no tape is: its certified temperature, thickness, section, and correction."""
+def _check_certificates(straps):
+    """Problems of impossible certificates: temperature, thickness, section or correction."""
     for tape, _ in straps.tapes:
         temperature = tape.temperature_c
         if temperature is not None and not _within(temperature, CERTIFIED_C):
@@ -157,54 +156,64 @@ def _of_certificates(straps):
             )
             yield Problem(TAPES, text, column=f"{tape.name}.correction")
         else:
-            yield from _of_whole_correction(tape, straps)
+            yield from _check_whole_correction(tape, straps)
 
 
-def _of_whole_correction(tape, straps):
-    """Both corrections of a tape together against the length that was read with it."""
-    read = [one.strap.reading_m for one in straps.reduced if one.strap.tape == tape.name]
-    length = float(np.median(read))
+def _check_whole_correction(tape, straps):
+    """Problem of the combined corrections of a tape, relative to the measured length."""
+    readings_m = [
+        reduced_strap.strap.reading_m
+        for reduced_strap in straps.reduced
+        if reduced_strap.strap.tape == tape.name
+    ]
+    length = float(np.median(readings_m))
     limit = limits_of("strapping")["class_ii"]
     most = (limit["mm"] + limit["mm_per_m"] * length) / 1000
-    whole = tape.correction_m + tape.correction * length
-    if tape.correction_m and abs(whole) > most:
+    correction_m = tape.correction_m + tape.correction * length
+    if tape.correction_m and abs(correction_m) > most:
         text = message(
             "tape_correction_mm_strange",
             "with correction {found_mm:+.1f} mm of the {length_m:.1f} m that were read; a tape that"
             " passed a verification is off by no more than {most_mm:.1f} mm: is it in another"
             " unit, or that of another tape?",
-            found_mm=1000 * whole,
+            found_mm=1000 * correction_m,
             length_m=length,
             most_mm=1000 * most,
         )
         yield Problem(TAPES, text, column=f"{tape.name}.correction_mm")
 
 
-def _of_comparisons(job, straps):
-    """Comparisons with a master that differ by more than their standard deviations allow."""
-    used = [tape for tape, _ in straps.tapes if tape.master]
+def _check_comparisons(job, straps):
+    """Problem of comparisons with a master that differ beyond their standard deviations."""
+    compared_tapes = [tape for tape, _ in straps.tapes if tape.master]
     strapping = job.strapping if job.great_circles is None else job.great_circles.strapping
-    many = [one for one in strapping.comparisons if one.sd_m > 0]
-    if not used or len(many) < 2:
+    comparisons = [comparison for comparison in strapping.comparisons if comparison.sd_m > 0]
+    if not compared_tapes or len(comparisons) < 2:
         return
-    apart = np.array([one.master_m - one.working_m for one in many])
-    length = np.array([one.working_m for one in many])
-    weight = (length / np.array([one.sd_m for one in many])) ** 2
-    scale = np.sum(weight * apart / length) / np.sum(weight)
-    square = float(np.sum(weight * (apart / length - scale) ** 2))
-    if chdtrc(len(many) - 1, square) < limits_of("strapping")["comparisons_by_chance"]:
-        away = 1000 * (apart - scale * length)
-        worst, least = many[int(np.argmax(away))], many[int(np.argmin(away))]
+    differences = np.array(
+        [comparison.master_m - comparison.working_m for comparison in comparisons]
+    )
+    length = np.array([comparison.working_m for comparison in comparisons])
+    weight = (length / np.array([comparison.sd_m for comparison in comparisons])) ** 2
+    # Weighted mean of the relative differences: a tape's error is proportional to length.
+    scale = np.sum(weight * differences / length) / np.sum(weight)
+    square = float(np.sum(weight * (differences / length - scale) ** 2))
+    if chdtrc(len(comparisons) - 1, square) < limits_of("strapping")["comparisons_by_chance"]:
+        residuals_mm = 1000 * (differences - scale * length)
+        worst, least = (
+            comparisons[int(np.argmax(residuals_mm))],
+            comparisons[int(np.argmin(residuals_mm))],
+        )
         text = message(
             "comparisons_apart",
             "{name!r} against its master: the comparisons {one!r} and {other!r} differ by"
             " {apart_mm:.1f} mm, with standard deviations of {sd_mm:g} mm: was one misread, or the"
             " tape overstretched between?",
-            name=used[0].name,
+            name=compared_tapes[0].name,
             one=" ".join(filter(None, (worst.level, worst.when))),
             other=" ".join(filter(None, (least.level, least.when))),
-            apart_mm=float(np.ptp(away)),
-            sd_mm=1000 * float(np.median([one.sd_m for one in many])),
+            apart_mm=float(np.ptp(residuals_mm)),
+            sd_mm=1000 * float(np.median([comparison.sd_m for comparison in comparisons])),
         )
         yield Problem(COMPARED, text, column="working_m")
 
@@ -214,66 +223,76 @@ def _within(value, limits):
 
 
 def _of_copies(straps):
-    """Readings equal to the last digit, more of them than chance makes: of one circumference, or
-    all readings of a circumference those of another one.
+    """Problems of readings equal to the last digit more often than chance permits.
+
+    The readings may be of one circumference, or all readings of a circumference may repeat those of
+    another circumference.
     """
     by_name, digit = {}, _digit_m(straps)
     for strap in straps:
         by_name.setdefault(strap.name, []).append(strap)
-    again, chances = [], []
-    for several in by_name.values():
-        for place, strap in enumerate(several[1:], 1):
-            equal = [one for one in several[:place] if one.reading_m == strap.reading_m]
-            again += [(equal[0], strap)] if equal else []
+    copies, chances = [], []
+    for straps_of_name in by_name.values():
+        for place, strap in enumerate(straps_of_name[1:], 1):
+            equal = [
+                earlier
+                for earlier in straps_of_name[:place]
+                if earlier.reading_m == strap.reading_m
+            ]
+            copies += [(equal[0], strap)] if equal else []
             chances.append(min(1.0, place * chance_of_equal(strap.sd_m, digit)))
-    if again and bdtrc(len(again) - 1, len(chances), np.mean(chances)) < BY_CHANCE:
-        yield from (_copied(*pair) for pair in again)
-    yield from _of_copied_circumferences(tuple(by_name.values()), digit)
+    if copies and bdtrc(len(copies) - 1, len(chances), np.mean(chances)) < BY_CHANCE:
+        yield from (_copied(*pair) for pair in copies)
+    yield from _check_copied_circumferences(tuple(by_name.values()), digit)
 
 
-def _of_copied_circumferences(read, digit_m):
-    """Circumferences (lists of straps) whose readings are all those of another one.
+def _check_copied_circumferences(circumferences, digit_m):
+    """Problems of circumferences (lists of straps) whose readings all equal those of another.
 
-    Of a single reading only those of its own course are compared.
+    Single readings are compared within their own course only.
     """
-    near = {
-        alike: chance_of_equal(max(spread_m, digit_m), digit_m)
-        for alike, spread_m in _spreads_m([each[0] for each in read]).items()
+    chance_by_course = {
+        same_course: chance_of_equal(max(spread_m, digit_m), digit_m)
+        for same_course, spread_m in _spreads_m([straps[0] for straps in circumferences]).items()
     }
-    found, expected = [], 0.0
-    for first, second in combinations(read, 2):
-        alike = first[0].course == second[0].course
-        if len(first) != len(second) or (len(first) == 1 and not alike):
+    copies, expected = [], 0.0
+    for first, second in combinations(circumferences, 2):
+        same_course = first[0].course == second[0].course
+        if len(first) != len(second) or (len(first) == 1 and not same_course):
             continue
-        expected += near[alike] * np.prod([chance_of_equal(one.sd_m, digit_m) for one in first[1:]])
-        if [one.reading_m for one in first] == [one.reading_m for one in second]:
-            found.append(_copied(first[0], second[0]))
-    if found and pdtrc(len(found) - 1, expected) < BY_CHANCE:
-        yield from found
+        expected += chance_by_course[same_course] * np.prod(
+            [chance_of_equal(strap.sd_m, digit_m) for strap in first[1:]]
+        )
+        if [strap.reading_m for strap in first] == [strap.reading_m for strap in second]:
+            copies.append(_copied(first[0], second[0]))
+    if copies and pdtrc(len(copies) - 1, expected) < BY_CHANCE:
+        yield from copies
 
 
 def _spreads_m(straps):
-    """{True: standard deviation of circumferences within their courses, False: of all}, m."""
-    whole, by_course = float(np.std([one.reading_m for one in straps])), {}
-    for one in straps:
-        by_course.setdefault(one.course, []).append(one.reading_m)
+    """{True: standard deviation of circumferences within courses, False: of all}, m."""
+    sd_of_all, by_course = float(np.std([strap.reading_m for strap in straps])), {}
+    for strap in straps:
+        by_course.setdefault(strap.course, []).append(strap.reading_m)
     free = len(straps) - len(by_course)
-    squares = sum(len(each) * np.var(each) for each in by_course.values())
-    return {True: float(np.sqrt(squares / free)) if free else whole, False: whole}
+    squares = sum(len(readings) * np.var(readings) for readings in by_course.values())
+    return {True: float(np.sqrt(squares / free)) if free else sd_of_all, False: sd_of_all}
 
 
 def chance_of_equal(sd_m, digit_m):
-    """Probability that two readings of this standard deviation are equal once they are rounded.
+    """Probability that two readings are equal after rounding.
 
     Parameters
     ----------
-    sd_m, digit_m : float
-        Of one reading; to which it is rounded.
+    sd_m : float
+        Standard deviation of one reading, m.
+    digit_m : float
+        Unit to which a reading is rounded, m.
 
     Returns
     -------
     float
-        The mean of max(0, 1 - abs(d) / digit) over their normal differences d.
+        Mean of max(0, 1 - abs(d) / digit) over the normally distributed difference d.
 
     Examples
     --------
@@ -286,12 +305,13 @@ def chance_of_equal(sd_m, digit_m):
 
 
 def _digit_m(straps):
-    """The last digit that a crew wrote."""
-    most = max(len(f"{one.reading_m:.6f}".rstrip("0").partition(".")[2]) for one in straps)
-    return 10.0**-most
+    """Unit of the last digit in the readings, m."""
+    decimals = max(len(f"{strap.reading_m:.6f}".rstrip("0").partition(".")[2]) for strap in straps)
+    return 10.0**-decimals
 
 
 def _copied(first, second):
+    """Problem of a reading that repeats another reading."""
     text = message(
         "reading_copied",
         "{reading_m:g} m again, as in row {row}, to the last digit: was it copied?",

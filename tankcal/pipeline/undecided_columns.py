@@ -1,8 +1,8 @@
-"""Columns of points that may be of the wall or of a fitting: how they count, and what is told.
+"""Columns of points that belong either to the wall or to a fitting, and their uncertainty.
 
-The table lies halfway between the wall with such a column and the wall without it, and half of the
-difference is its standard uncertainty: that is what a quantity has that is one of two values, each
-as likely. It covers both, for U is about the whole half.
+The table lies midway between the wall with such a column and the wall without it. Half of the
+difference is the standard uncertainty, as for a quantity with two equally probable values. U is
+about twice this half and covers both.
 """
 
 import numpy as np
@@ -11,37 +11,37 @@ from tankcal.geometry.shell import UNDECIDED
 from tankcal.messages import list_some, message
 from tankcal.tank.body import Factor
 
-ALIKE = 1 / 3  # correlation of two columns: the share that is wall may be any from 0 to 1
+ALIKE = 1 / 3  # correlation of two columns, for a share of wall uniform from 0 to 1
 
 
 def undecided_halves(shell, accepted, groups):
-    """Half of what points in undecided columns depart by from the wall without them.
+    """Half of the deviation of points in undecided columns from the wall without them.
 
     Parameters
     ----------
     shell : Shell
     accepted : ndarray of int, shape (m,)
-        Points on the wall, or on such columns.
+        Points on the wall, or in such columns.
     groups : sequence of Group
-        With indices into `accepted`.
+        Groups of indices into `accepted`.
 
     Returns
     -------
     ndarray, shape (m, columns)
         In the order of the groups' members, m.
     """
-    order = accepted[np.concatenate([one.members for one in groups])]
+    order = accepted[np.concatenate([group.members for group in groups])]
     columns = np.arange(shell.column.max(initial=-1) + 1)
     return 0.5 * shell.residual_m[order, None] * np.equal.outer(shell.column[order], columns)
 
 
 def factors_of_undecided(halves):
-    """`Factor`s of what undecided columns leave uncertain; () without any.
+    """`Factor`s of the uncertainty due to undecided columns; () without any.
 
     Parameters
     ----------
     halves : ndarray, shape (f, columns)
-        Half of what each changes of features.
+        Half of the change of the features due to each column.
 
     Returns
     -------
@@ -49,9 +49,9 @@ def factors_of_undecided(halves):
 
     Notes
     -----
-    Column i is wall with a probability p that nobody knows: of a p that may as well be any from 0
-    to 1 its variance is 1/4, and the covariance of two is that of p, 1/12. So neither many seams
-    nor many pipes of one tank average out.
+    Column i belongs to the wall with an unknown probability p. For p uniform from 0 to 1 its
+    variance is 1/4. The covariance of two columns is the variance of p, 1/12. Therefore many seams
+    or many pipes of a tank do not average out.
 
     Examples
     --------
@@ -61,17 +61,31 @@ def factors_of_undecided(halves):
     """
     if not np.any(halves):
         return ()
-    own, common = np.sqrt(1 - ALIKE) * halves, np.sqrt(ALIKE) * halves.sum(axis=1, keepdims=True)
-    return (Factor("undecided", np.hstack([own, common]), type="B"),)
+    # One part per column and one common part give equal correlations `ALIKE`.
+    separate, common = (
+        np.sqrt(1 - ALIKE) * halves,
+        np.sqrt(ALIKE) * halves.sum(axis=1, keepdims=True),
+    )
+    return (Factor("undecided", np.hstack([separate, common]), type="B"),)
 
 
 def tell_undecided(names, shell, most):
-    """(text,) of a warning that names the points; () without any.
+    """Text of a warning that names the points in undecided columns, in a tuple; () without any.
 
-    names  (n,) of the points; most  that are named
+    Parameters
+    ----------
+    names : sequence of str, length n
+        Names of the points.
+    shell : Shell
+    most : int
+        Largest number of names in the text.
+
+    Returns
+    -------
+    tuple
     """
-    found = np.flatnonzero(shell.reason == UNDECIDED)
-    if not len(found):
+    undecided = np.flatnonzero(shell.reason == UNDECIDED)
+    if not len(undecided):
         return ()
     return (
         message(
@@ -79,8 +93,8 @@ def tell_undecided(names, shell, most):
             "{count} points one above another, up to {deep_mm:.0f} mm off the wall, may be a seam "
             "of it, or a pipe or bracket before it ({points}): the table lies halfway, and U has "
             "the difference; take out the points of fittings, or keep all with snooping = false",
-            count=len(found),
-            deep_mm=1000 * np.abs(shell.residual_m[found]).max(),
-            points=list_some([names[i] for i in found], most),
+            count=len(undecided),
+            deep_mm=1000 * np.abs(shell.residual_m[undecided]).max(),
+            points=list_some([names[i] for i in undecided], most),
         ),
     )

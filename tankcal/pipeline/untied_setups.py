@@ -1,8 +1,8 @@
-"""What the readings of a wall share that nothing binds beforehand: free offsets, poses of set-ups.
+"""Unknowns without a prior that readings of a wall share: free offsets and poses of set-ups.
 
-They are unknowns of the wall beside its radii and the centres of its rings. A pose moves radii in
-ways that these can take up (all lines outwards is a larger tank) and in ways that hardly move any:
-only the rest of its ways are unknowns.
+They are estimated together with the radii and the centres of the rings. Some displacements of
+set-ups act like a change of radii or centres (all lines outwards give a larger tank). Others hardly
+change any radius. Only the remaining displacements are unknowns.
 """
 
 from dataclasses import dataclass, replace
@@ -15,20 +15,20 @@ from tankcal.geometry.field.sites import free_design
 from tankcal.messages import message
 from tankcal.sections import coordinates_of
 
-MOVED_M, TURNED_RAD = 0.3, 0.05  # how far off a pose that the wall alone ties may be
-LEAST_MOTION_M = 0.005  # of all its radii together by that: less is no unknown of the wall
+MOVED_M, TURNED_RAD = 0.3, 0.05  # prior range of position and orientation of an untied set-up
+LEAST_MOTION_M = 0.005  # least joint change of all radii, over the prior range, of an unknown
 
 
 @dataclass(frozen=True)
 class Unbound:
-    """Derivatives of n radii by what nothing binds.
+    """Derivatives of n radii by unknowns without a prior.
 
     Attributes
     ----------
     offsets : ndarray, shape (n, k)
         By free offsets and scales, in their order.
     poses : ndarray, shape (n, m)
-        By x, y and orientation of set-ups, each as far as it may be off.
+        By x, y and orientation of set-ups, each multiplied by its prior range.
     """
 
     offsets: np.ndarray
@@ -36,28 +36,34 @@ class Unbound:
 
     @property
     def first_apart(self):
-        """Number of the first ring whose centre is no part of an outline: 0 where set-ups may move,
-        for then a common shift of centres and set-ups is of neither; None: there is no such ring.
+        """Number of the first ring whose centre is not part of an outline, or None.
+
+        It is 0 if set-ups may move, because a common shift of centres and set-ups then belongs to
+        neither.
         """
         return 0 if self.poses.shape[1] else None
 
     def padded(self, more):
-        """The same with more readings, which nothing of it moves."""
-        return Unbound(*(np.pad(one, ((0, more), (0, 0))) for one in (self.offsets, self.poses)))
+        """Copy with `more` rows of zeros for readings that do not depend on the unknowns."""
+        return Unbound(
+            *(np.pad(columns, ((0, more), (0, 0))) for columns in (self.offsets, self.poses))
+        )
 
     def shared_by(self, sites):
-        """The `Sites` with it as what their readings share, offsets first.
+        """`Sites` with these unknowns as shared columns, offsets first.
 
-        Raises SolutionError where set-ups may move as all radii do, and nothing tells them apart.
+        Raises SolutionError if set-ups may move like all radii together, so that the size is
+        undetermined.
         """
         if not self.offsets.shape[1] + self.poses.shape[1]:
             return sites
         design, radii = free_design(replace(sites, shared=None))
-        others = np.hstack([design, self.offsets])
-        taken = np.linalg.lstsq(others, self.poses, rcond=None)[0]
-        _, size, ways = np.linalg.svd(self.poses - others @ taken, full_matrices=False)
-        alike = taken[radii] @ ways[size <= LEAST_MOTION_M].T
-        if np.abs(alike).max(initial=0.0) > LEAST_MOTION_M:
+        absorbing = np.hstack([design, self.offsets])
+        absorbed = np.linalg.lstsq(absorbing, self.poses, rcond=None)[0]
+        # Singular values measure how much a displacement changes radii beyond sizes and centres.
+        _, size, directions = np.linalg.svd(self.poses - absorbing @ absorbed, full_matrices=False)
+        radius_change = absorbed[radii] @ directions[size <= LEAST_MOTION_M].T
+        if np.abs(radius_change).max(initial=0.0) > LEAST_MOTION_M:
             raise SolutionError(
                 message(
                     "radius_of_lines",
@@ -66,39 +72,50 @@ class Unbound:
                     " (circumferences.csv), or tie them by targets",
                 )
             )
-        chosen = self.poses @ ways[size > LEAST_MOTION_M].T  # not `left`: radii stay what they are
-        return replace(sites, shared=np.hstack([self.offsets, chosen]))
+        # Full columns, not residuals: the radii keep their meaning.
+        columns = self.poses @ directions[size > LEAST_MOTION_M].T
+        return replace(sites, shared=np.hstack([self.offsets, columns]))
 
     def ways_of(self, sites):
-        """(k + m, s) by what of each of these the columns move that sites share, but for those of
-        lines: they move no point.
+        """Matrix (k + m, s) from the shared columns of `sites` to the offsets and poses.
+
+        Columns of reference lines are excluded, because they move no point.
         """
         count, k = self.offsets.shape
         columns = sites.shared[:count]
-        chosen = columns[:, columns.any(axis=0)][:, k:]
-        ways = np.linalg.lstsq(self.poses, chosen, rcond=None)[0]
+        of_poses = columns[:, columns.any(axis=0)][:, k:]
+        ways = np.linalg.lstsq(self.poses, of_poses, rcond=None)[0]
         return scipy.linalg.block_diag(np.eye(k), ways)
 
 
 def unbound_of(points, by_points, accepted):
     """`Unbound` of the radii of a wall.
 
-    by_points  (n, 3 m) their derivative by the coordinates of the accepted points (m,)
+    Parameters
+    ----------
+    points : Points
+    by_points : ndarray, shape (n, 3 m)
+        Derivative of the radii by the coordinates of the accepted points.
+    accepted : ndarray of int, shape (m,)
+
+    Returns
+    -------
+    Unbound
     """
     index = coordinates_of(accepted)
     columns = {False: [], True: []}
-    for one in offsets_then_poses(points):
-        columns[one.what == "pose"].append(size_of(one) * (by_points @ one.column_m[index]))
+    for cause in offsets_then_poses(points):
+        columns[cause.what == "pose"].append(size_of(cause) * (by_points @ cause.column_m[index]))
     return Unbound(*(_stacked(columns[is_pose], by_points.shape[0]) for is_pose in (False, True)))
 
 
 def offsets_then_poses(points):
-    """What nothing binds of points, in the order of the columns that a field shares."""
-    return sorted(points.unbound, key=lambda one: one.what == "pose")
+    """Unknowns of points without a prior, in the order of the shared columns of a field."""
+    return sorted(points.unbound, key=lambda cause: cause.what == "pose")
 
 
 def size_of(cause):
-    """How far off it may be, m or rad; of an offset the unit."""
+    """Prior range of a pose, m or rad; the unit for an offset."""
     if cause.what != "pose":
         return 1.0
     return MOVED_M if cause.unit == "m" else TURNED_RAD

@@ -1,4 +1,4 @@
-"""The drawings of results, by name, for notebooks."""
+"""Drawings of results for notebooks, by name."""
 
 from typing import TYPE_CHECKING
 
@@ -6,23 +6,24 @@ import numpy as np
 
 from tankcal.survey import Adjustment
 
-LEVELS_OF_A_COURSE = 21  # at which its wall is drawn
+LEVELS_OF_A_COURSE = 21  # heights of a course at which its wall is drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 def plot(result, what: str | None = None) -> "Figure":
-    """A drawing of a result, or of an adjusted survey, as a matplotlib Figure.
+    """Draw a result or an adjusted survey as a matplotlib Figure.
 
     Parameters
     ----------
     result : Result or Adjustment
-        Of an Adjustment its points from above are drawn, with their error ellipses.
+        For an Adjustment, the points are drawn in plan with their error ellipses.
     what : {"capacity", "budget", "sections", "residuals", "wall", "field"}, optional
-        Of a Result: litres per centimetre and U against the dip (this one without a name); what U
-        at the top consists of; of a surveyed wall the sections about their circles, the residuals
-        of their points, these on the wall unrolled, and the wall that the table is made of.
+        Drawing of a Result. "capacity" (default): litres per centimetre and U against the dip.
+        "budget": uncertainty budget at the top. For a surveyed wall, "sections": sections about
+        their circles; "residuals": residuals of the points; "wall": residuals on the unrolled wall;
+        "field": the wall of the table.
 
     Returns
     -------
@@ -31,7 +32,7 @@ def plot(result, what: str | None = None) -> "Figure":
     Raises
     ------
     ValueError
-        For another name, or a drawing of the wall where none was surveyed.
+        For an unknown name, or a drawing of the wall without a surveyed wall.
 
     Examples
     --------
@@ -70,7 +71,7 @@ def _capacity(plots, result):
 
 def _budget(plots, result):
     lines = result.budget().lines
-    return plots.budget_bars([(one.name, one.share, one.is_default) for one in lines])
+    return plots.budget_bars([(line.name, line.share, line.is_default) for line in lines])
 
 
 def _sections(plots, result):
@@ -82,6 +83,7 @@ def _residuals(plots, result):
 
 
 def _wall(plots, result):
+    """Residuals on the unrolled wall."""
     wall, rings = result.wall, _rings(plots, result)
     members = np.concatenate([section.group.members for section in wall.sections])
     height_m = result.job.points.xyz_m[wall.accepted[members], 2] - result.job.datum.bottom_z_m
@@ -91,6 +93,7 @@ def _wall(plots, result):
 
 
 def _field(plots, result):
+    """Wall of the table, unrolled."""
     wall, field = result.wall, result.wall.field
     zeta, joints = np.linspace(-1, 1, LEVELS_OF_A_COURSE), wall.joints_m
     outlines = field.outlines_at(zeta)
@@ -98,19 +101,21 @@ def _field(plots, result):
     middle, half = (joints[1:] + joints[:-1]) / 2, np.diff(joints) / 2
     heights = middle[:, None] + half[:, None] * zeta
     sites = field.sites
-    places = middle[sites.course] + half[sites.course] * sites.zeta
-    around = np.append(np.degrees(field.grid_rad), 360.0)
-    flat = departures.reshape(-1, departures.shape[2])
+    height_of_sites = middle[sites.course] + half[sites.course] * sites.zeta
+    azimuth_deg = np.append(np.degrees(field.grid_rad), 360.0)
+    rows = departures.reshape(-1, departures.shape[2])
     return plots.field_map(
-        around,
+        azimuth_deg,
         heights.ravel(),
-        np.column_stack([flat, flat[:, 0]]),
-        (np.degrees(sites.azimuth_rad) % 360, places),
+        # The first azimuth is repeated at 360 degrees to close the turn.
+        np.column_stack([rows, rows[:, 0]]),
+        (np.degrees(sites.azimuth_rad) % 360, height_of_sites),
         joints,
     )
 
 
 def _rings(plots, result):
+    """`Ring`s of the sections of a result."""
     every_degree = np.arange(360.0)
     return [
         plots.Ring(

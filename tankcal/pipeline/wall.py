@@ -1,4 +1,4 @@
-"""From surveyed points to the wall: told from clutter, its axis, covariance, field and sections."""
+"""From surveyed points to the wall: separation from clutter, axis, field and sections."""
 
 from dataclasses import replace
 from functools import partial
@@ -59,11 +59,11 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None, *, sizes=None):
     progress : callable
         Called with a line of text as each step begins.
     dof : float, default inf
-        Degrees of freedom of the points' covariance, where it was given.
+        Degrees of freedom of the supplied covariance of the points.
     amplitudes : Amplitudes, optional
-        Of the wall's components, where they are known beforehand; None: they are estimated.
+        Known amplitudes of the wall components; None: estimated.
     sizes : Amplitudes, optional
-        That the same readings have shown before; None: they are estimated from these points.
+        Amplitudes estimated before from the same readings; None: estimated from these points.
 
     Returns
     -------
@@ -72,9 +72,9 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None, *, sizes=None):
     Raises
     ------
     InputError
-        When a course is left with too few points.
+        If a course has too few points.
     SolutionError
-        When the points show no wall.
+        If the points show no wall.
     """
     with threads_for(MOST_SITES):
         progress(
@@ -101,13 +101,13 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None, *, sizes=None):
 
 
 def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
-    """Fit field and sections to the points of a job that are known to be of its wall.
+    """Fit field and sections to the points of a job that belong to its wall.
 
     Parameters
     ----------
     job : Job
     shell : Shell
-        Which points are of the wall, and its axis.
+        Axis and classification of the points.
     dof, amplitudes, sizes
         As in `find_wall`.
 
@@ -118,29 +118,33 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     Raises
     ------
     InputError
-        When a course is left with too few points.
+        If a course has too few points.
     """
     accepted = np.flatnonzero(shell.on_wall)
-    joints = joints_of(job) / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(angle)
+    # Course heights are along the leaning shell, point heights along the vertical.
+    joints = joints_of(job) / np.hypot(1.0, shell.tilt)  # along the vertical: times cos(tilt)
     groups = _groups(job, shell, accepted, joints)
     sds, estimated = radial_sds(job.points), noise_is_estimated(job)
     covariance = given_covariance(job.points, accepted)
-    if estimated:  # what is given counts in relation; about as large as the points scatter
+    if estimated:  # given covariances are relative; scale them to the scatter
         covariance = covariance * (shell.noise_m / median_sd(sds)) ** 2
     to_fit = _to_fit(job, shell, accepted, groups, covariance)
     nominal = job.tank.nominal_diameter_m / 2
-    samples = [sample_of(*one) for one in to_fit]
+    samples = [sample_of(*section) for section in to_fit]
     of_wall = {"welds_rad": _welds(job), "spans": spans_of(joints), "smoothed": is_smoothed(job)}
+    # Many points are averaged in cells; `means` are the weights, the identity for few points.
     sites, means = _sites(groups, samples, nominal, of_wall)
+    # Undecided columns enter midway between the wall with and without them.
     undecided = means @ undecided_halves(shell, accepted, groups)
-    radius = means @ np.concatenate([one.radius_m for one in samples]) - undecided.sum(axis=1)
+    radius = means @ np.concatenate([sample.radius_m for sample in samples]) - undecided.sum(axis=1)
     noise = (means @ scipy.sparse.block_diag(_blocks(samples)) @ means.T).toarray()
     is_known = amplitudes is not None
     amplitudes = amplitudes if is_known else sizes
     if amplitudes is None:
-        alone = sites.take(np.ones(len(sites), dtype=bool))  # without courses that have no point
+        # Without courses that lack points.
+        measured_sites = sites.take(np.ones(len(sites), dtype=bool))
         amplitudes = estimate_amplitudes(
-            alone,
+            measured_sites,
             radius,
             noise,
             nominal,
@@ -148,39 +152,39 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
             start_m2=_sizes_of(shell),
         )
     if has_loose_poses(job) and not is_known:
-        # set-ups take up the waves that are as many round the tank as they are, so the readings
-        # show less of the common form than there is: its prior median stays the least of it
+        # Free set-ups absorb waves as numerous as themselves, so that the readings show too little
+        # of the common form: its prior median is the lower bound.
         amplitudes = amplitudes.with_least("common ovality")
-    if amplitudes.noise != 1.0:  # it may be half a gigabyte
+    if amplitudes.noise != 1.0:  # avoid a copy of up to half a gigabyte
         covariance = covariance * amplitudes.noise
         noise *= amplitudes.noise
         to_fit = _to_fit(job, shell, accepted, groups, covariance)
     form_m2 = _form_m2(amplitudes)
-    sections = tuple(fit_section(*one, form_m2) for one in to_fit)
+    sections = tuple(fit_section(*section, form_m2) for section in to_fit)
     by_points = means @ _radii_by_points(sections, len(accepted))
-    by_inputs = _by_inputs(job.points, by_points, accepted)
+    by_inputs = _derivatives_by_inputs(job.points, by_points, accepted)
     is_read = job.strapping is not None or job.lines is not None
     is_read = is_read or (
-        job.radii is not None and len({one.course for one in groups}) < len(job.courses)
+        job.radii is not None and len({group.course for group in groups}) < len(job.courses)
     )
     if is_read or job.points.unbound or by_inputs or job.tangents is not None:
         unbound = unbound_of(job.points, by_points, accepted)
-        noise = by_points @ (covariance @ by_points.T)  # between sections, too
+        noise = by_points @ (covariance @ by_points.T)  # includes covariances between sections
         noise = noise.toarray() if scipy.sparse.issparse(noise) else noise
     if not is_read:
-        apart = unbound.first_apart if job.points.unbound else None
+        first_apart = unbound.first_apart if job.points.unbound else None
         sites = unbound.shared_by(sites) if job.points.unbound else sites
         if by_inputs:
             noise = noise + noise_by_inputs(job.inputs, by_inputs, len(radius))
-        field = WallField(sites, radius, noise, amplitudes, nominal, plumbed=apart)
+        field = WallField(sites, radius, noise, amplitudes, nominal, plumbed=first_apart)
         read = straps = None
     else:
         points = PointsOfWall(sites, radius, noise, unbound, by_inputs)
         read, straps = join_readings(job, points, amplitudes, joints, is_known=is_known)
-        field, more = read.field, len(read.accepted)
-        by_points = _padded(by_points, more)
-        by_inputs = {name: np.pad(one, (0, more)) for name, one in by_inputs.items()}
-        undecided = np.pad(undecided, ((0, more), (0, 0)))
+        field, count = read.field, len(read.accepted)
+        by_points = _padded(by_points, count)
+        by_inputs = {name: np.pad(column, (0, count)) for name, column in by_inputs.items()}
+        undecided = np.pad(undecided, ((0, count), (0, 0)))
     told = None
     if job.points.unbound:
         told = told_unknowns(job.points, unbound, field, (accepted, by_points, covariance))
@@ -198,81 +202,97 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         straps=straps,
         read=read,
         by_inputs=by_inputs,
-        without_inputs=("offset",) if job.hits or job.clouds else (),  # instruments have their own
-        origins_m=np.array([one.centre_m for one in samples]),
+        # Hits and clouds have instrument offsets of their own.
+        without_inputs=("offset",) if job.hits or job.clouds else (),
+        origins_m=np.array([sample.centre_m for sample in samples]),
         told=told,
     )
 
 
 def is_smoothed(job):
-    """Whether the readings show the wall smoother than it is: limbs pass over its valleys, set-ups
-    that nothing but the wall ties are fitted to what they see of it.
+    """Whether the readings show the wall smoother than it is.
+
+    Limbs pass over the valleys of a wall. Set-ups tied by the wall alone are fitted to what they
+    see.
     """
     return job.tangents is not None or has_loose_poses(job)
 
 
 def has_loose_poses(job):
     """Whether some set-ups of hits are tied to the wall alone."""
-    return any(one.what == "pose" for one in job.points.unbound)
+    return any(cause.what == "pose" for cause in job.points.unbound)
 
 
 def _sizes_of(shell):
-    """Sizes near which those of the wall are looked for, the noise as a factor; None: not known."""
+    """Start values of the amplitudes, with the noise as a factor, or None if unknown."""
     if shell.sizes_m2 is None:
         return None
     return np.append(shell.sizes_m2[:-1], shell.sizes_m2[-1] / shell.noise_m**2)
 
 
-def _by_inputs(points, by_points, accepted):
-    """{input of the budget: (n,) derivative of the radii by it}, of what the points depend on."""
+def _derivatives_by_inputs(points, by_points, accepted):
+    """{input of the budget: derivative (n,) of the radii}, for inputs that affect the points."""
     index = coordinates_of(accepted)
     return {name: by_points @ column[index] for name, column in points.by_inputs.items()}
 
 
 def _padded(by_points, more):
-    """Derivatives by points (n, 3 m) of readings, and of some more that no point moves."""
+    """Derivatives of readings by points (n, 3 m), with rows of zeros for `more` other readings."""
     empty = scipy.sparse.csr_array((more, by_points.shape[1]))
     return scipy.sparse.vstack([by_points, empty], format="csr")
 
 
 def _clear_of_welds(job, shell, decided):
-    """The shell without the sights beside vertical welds, where the plate is drawn in or out, but
-    for those that are kept.
+    """Shell without the sights next to vertical welds, where the plate is deformed.
+
+    Points kept by decision stay.
     """
     points, least = job.points, limits_of("wall_hits")["weld_distance_m"]
-    every, reason = np.arange(len(points.names)), shell.reason.copy()
-    azimuth = _azimuths(job, shell, every)
+    all_points, reason = np.arange(len(points.names)), shell.reason.copy()
+    azimuth = _azimuths(job, shell, all_points)
     course = course_of(points.xyz_m[:, 2] - job.datum.bottom_z_m, joints_of(job))
     for index, welds in enumerate(_welds(job)):
-        away = np.abs((azimuth[:, None] - welds + np.pi) % FULL_TURN - np.pi)
-        near = away.min(axis=1, initial=np.inf) * job.tank.nominal_diameter_m / 2 < least
-        reason[near & (course == index) & (reason == "") & (decided <= 0)] = "weld"
+        distance = np.abs((azimuth[:, None] - welds + np.pi) % FULL_TURN - np.pi)
+        is_near = distance.min(axis=1, initial=np.inf) * job.tank.nominal_diameter_m / 2 < least
+        reason[is_near & (course == index) & (reason == "") & (decided <= 0)] = "weld"
     return replace(shell, reason=reason)
 
 
 def joints_of(job):
-    """(courses + 1,) heights of the joints above the bottom, along the shell."""
+    """Heights of the joints above the bottom, along the shell, m, shape (courses + 1,)."""
     return np.cumsum([0.0] + [course.height_m for course in job.courses])
 
 
 def _welds(job):
-    """Azimuths of the welds of each course; (): nobody gave any."""
-    given = tuple(np.array(course.welds_rad or ()) for course in job.courses)
-    return given if any(map(len, given)) else ()
+    """Azimuths of the welds of each course; () if none were given."""
+    welds = tuple(np.array(course.welds_rad or ()) for course in job.courses)
+    return welds if any(map(len, welds)) else ()
 
 
 def _sites(groups, samples, nominal_m, of_wall):
-    """`Sites` of the field, and (sites, points) weights of the points in each: one, or a cell.
+    """`Sites` of the field, with one point or a cell of points per site, and weights of the points.
 
-    of_wall  what the sites have of the whole wall, by the names of their attributes
+    Parameters
+    ----------
+    groups : sequence of Group
+    samples : sequence of Sample
+    nominal_m : float
+        Nominal radius, m.
+    of_wall : dict
+        Attributes of the sites that belong to the whole wall.
+
+    Returns
+    -------
+    sites : Sites
+    means : sparse array, shape (sites, points)
     """
-    counts = [len(one.radius_m) for one in samples]
+    counts = [len(sample.radius_m) for sample in samples]
     sites = Sites(
-        course=np.repeat([one.course for one in groups], counts),
+        course=np.repeat([group.course for group in groups], counts),
         ring=np.repeat(np.arange(len(groups)), counts),
-        zeta=np.concatenate([one.zeta for one in samples]),
-        azimuth_rad=np.concatenate([one.azimuth_rad for one in samples]),
-        leans=np.repeat([one.degree > 0 for one in groups], counts),
+        zeta=np.concatenate([sample.zeta for sample in samples]),
+        azimuth_rad=np.concatenate([sample.azimuth_rad for sample in samples]),
+        leans=np.repeat([group.degree > 0 for group in groups], counts),
         **of_wall,
     )
     if len(sites) <= MOST_SITES:
@@ -283,31 +303,32 @@ def _sites(groups, samples, nominal_m, of_wall):
 
 
 def _blocks(samples):
-    """Covariance of the radii of each sample."""
+    """Covariance of the radii of each sample, m2."""
     return [
-        scipy.sparse.diags_array(one.covariance_m2)
-        if np.ndim(one.covariance_m2) == 1
-        else one.covariance_m2
-        for one in samples
+        scipy.sparse.diags_array(sample.covariance_m2)
+        if np.ndim(sample.covariance_m2) == 1
+        else sample.covariance_m2
+        for sample in samples
     ]
 
 
 def _form_m2(amplitudes):
-    """Amplitude of k^-3 that has all departures from a circle: what smooths an outline."""
-    chosen = [one.shape in ROUND_SHAPES for one in COMPONENTS]
-    return float(np.sum(amplitudes.likely_m2[chosen])) / np.sum(OVALITY_MODES**-3)
+    """Variance factor of a k^-3 spectrum with the form of the wall, to smooth outlines, m2."""
+    is_round = [component.shape in ROUND_SHAPES for component in COMPONENTS]
+    return float(np.sum(amplitudes.likely_m2[is_round])) / np.sum(OVALITY_MODES**-3)
 
 
 def _radii_by_points(sections, count):
-    """(m, 3 m) derivative of the radii of all sections, one after another, by all points."""
-    rows = scipy.sparse.block_diag([one.radii_by_points for one in sections], format="csc")
-    order = np.concatenate([coordinates_of(one.group.members) for one in sections])
+    """Derivative (m, 3 m) of the radii of all sections, in sequence, by all points."""
+    rows = scipy.sparse.block_diag([section.radii_by_points for section in sections], format="csc")
+    order = np.concatenate([coordinates_of(section.group.members) for section in sections])
     place = np.empty(3 * count, dtype=int)
     place[order] = np.arange(len(order))
     return rows[:, place].tocsr()
 
 
 def _shell(job, heights, sds, decided):
+    """`Shell` of the points; SolutionError with a hint if no shell is found."""
     try:
         return find_shell(
             job.points.xyz_m,
@@ -320,14 +341,14 @@ def _shell(job, heights, sds, decided):
         )
     except SolutionError as error:
         if job.hits is not None or job.tangents is not None:
-            found = error.args[0]
-            if not isinstance(found, Message):  # of the adjustment, by its unknowns
-                found = message("no_upright_shell", "the sights show no upright shell")
+            text = error.args[0]
+            if not isinstance(text, Message):  # a message of the solver about its unknowns
+                text = message("no_upright_shell", "the sights show no upright shell")
             hint = message(
                 "told_by_heights",
                 "{error}; look also at bottom_z_m, survey.side, the heights of the instruments and"
                 " the units of angles and distances",
-                error=found,
+                error=text,
             )
             raise SolutionError(hint) from error
         if job.points.from_adjustment:
@@ -341,7 +362,7 @@ def _shell(job, heights, sds, decided):
 
 
 def warnings_of(job, wall):
-    """What a sound survey of a sound wall hardly has."""
+    """Warnings that are unlikely for a valid survey of a wall without defects."""
     groups = [section.group for section in wall.sections]
     sds = radial_sds(job.points)
     return (
@@ -355,7 +376,7 @@ def warnings_of(job, wall):
 
 
 def _groups(job, shell, wall, joints):
-    """Groups of indices into `wall`; raises InputError for courses and sections with too few."""
+    """Groups of indices into `wall`; InputError for courses and sections with too few points."""
     points = job.points
     height = points.xyz_m[wall, 2] - job.datum.bottom_z_m
     azimuth = _azimuths(job, shell, wall)
@@ -369,12 +390,14 @@ def _groups(job, shell, wall, joints):
 
 
 def _refuse_weak(job, groups, height):
-    """Raise InputError for sections of too few points or too tall, and courses that neither points
-    nor straps nor lines tell.
+    """Raise InputError for invalid sections and for courses without any measurement.
+
+    A section must have enough points and fit into its course. A course needs points, straps or
+    lines.
     """
     problems, courses = [], job.courses
     for group in groups:
-        count, tall = len(group.members), np.ptp(height[group.members])
+        count, height_range = len(group.members), np.ptp(height[group.members])
         if count < FEWEST_POINTS:
             problems.append(
                 message(
@@ -387,7 +410,7 @@ def _refuse_weak(job, groups, height):
                     advised=ADVISED_POINTS,
                 )
             )
-        if tall > 1.2 * courses[group.course].height_m:
+        if height_range > 1.2 * courses[group.course].height_m:
             height_m = courses[group.course].height_m
             problems.append(
                 message(
@@ -395,11 +418,11 @@ def _refuse_weak(job, groups, height):
                     "section {name} is {tall:.3f} m tall, expected points within one course "
                     "({height_m:.3f} m)",
                     name=group.name,
-                    tall=tall,
+                    tall=height_range,
                     height_m=height_m,
                 )
             )
-    seen = told_courses(job, {group.course for group in groups})
+    measured = told_courses(job, {group.course for group in groups})
     problems += [
         message(
             "course_without_section",
@@ -408,27 +431,29 @@ def _refuse_weak(job, groups, height):
             fewest=FEWEST_POINTS,
         )
         for index, course in enumerate(courses)
-        if index not in seen and job.radii is None
+        if index not in measured and job.radii is None
     ]
     if problems:
         raise InputError([Problem(origin_of(job.points), text) for text in problems])
 
 
 def _azimuths(job, shell, wall):
-    """Azimuths of the wall points about the axis at their own height."""
+    """Azimuths of the wall points about the axis at their own height, rad."""
     xyz = job.points.xyz_m[wall]
     axis = np.array(shell.axis_m) + np.outer(xyz[:, 2] - shell.z_m, shell.slope)
     return polar(xyz[:, :2] - axis, 0.0, 0.0)[0]
 
 
 def _to_fit(job, shell, accepted, groups, covariance):
-    """Arguments of `fit_section`, but for the form, of each group."""
-    xyz, own = job.points.xyz_m[accepted], own_covariances(covariance)
+    """Arguments of `fit_section`, except the form, for each group."""
+    xyz, covariances = job.points.xyz_m[accepted], own_covariances(covariance)
     return [
         (
             group,
             xyz[group.members],
-            covariance_of(group.members, covariance) if own is None else own[group.members],
+            covariance_of(group.members, covariance)
+            if covariances is None
+            else covariances[group.members],
             shell.slope,
             job.datum.bottom_z_m + group.height_m,
         )

@@ -1,8 +1,8 @@
-"""Readings of a wall that name no point: each a radius of it, somewhere, with what it shares.
+"""Readings of a wall without a point: each is a radius of the wall, with effects it shares.
 
-Straps are the mean of a whole turn. Offsets are radii at the azimuth of their line, but for a
-constant of that line. What readings share is a column: an effect of a known standard uncertainty,
-or an unknown that nothing binds beforehand.
+A strap is the mean radius of a whole turn. An offset is the radius at the azimuth of its line,
+apart from a constant of the line. A shared effect is a column of derivatives: by a cause of known
+standard uncertainty, or by an unknown without a prior.
 """
 
 from dataclasses import dataclass, field, replace
@@ -14,33 +14,34 @@ from tankcal.geometry.field.sites import Sites, free_design, spans_of
 from tankcal.survey.reference_line import level_names
 from tankcal.tank.factors import Factor
 
-FORMER, FORMER_SD_M = "former_radius", 0.01  # of courses that were not measured again
-UNCONTROLLED = 1e-6  # of a reading's variance: what the others leave of it where there are none
+FORMER, FORMER_SD_M = "former_radius", 0.01  # courses not measured again: kind, and sd
+UNCONTROLLED = 1e-6  # least share of a reading's variance that other readings control
 
 
 @dataclass(frozen=True)
 class WallReading:
-    """A radius of the wall as one reading has it.
+    """A radius of the wall from one reading.
 
     Attributes
     ----------
     of : str
-        "straps" or "offsets": its name in a budget.
+        "straps" or "offsets": name in a budget.
     course : int
+        Index of the course.
     level_m : float
-        Above the table's zero.
+        Height above the table's zero, m.
     radius_m, sd_m : float
-        Of the painted shell outside; the sd is of what it shares with none.
+        Radius of the painted outside, and its standard deviation without shared effects, m.
     azimuth_rad : float
-        nan: of a whole turn.
+        Azimuth; nan for the mean of a whole turn.
     ring : int
-        Readings that have a centre of their own; below 0: none.
+        Ring of readings with a common centre; negative without a centre.
     effects : dict
-        {(kind, name): (u, unit, what one u of it does, m)}.
+        {(kind, name): (u, unit, change of the radius for one u, m)}.
     free : dict
-        {name: derivative by an unknown that nothing binds beforehand}.
+        {name: derivative by an unknown without a prior}.
     by_inputs : dict
-        {input of an uncertainty budget: derivative by it}.
+        {input of an uncertainty budget: derivative by the input}.
     """
 
     of: str
@@ -56,57 +57,75 @@ class WallReading:
 
 
 def readings_of_straps(used, courses, term):
-    """`WallReading` of each reduced circumference: of the circle of equal area.
+    """`WallReading` of each reduced circumference, as the circle of equal area.
 
         r = C / (2 pi sqrt(1 + excess))
 
-    used     Reduced circumferences
-    courses  names of the courses
-    term     `AreaTerm`
+    Parameters
+    ----------
+    used : sequence of Reduced
+        Reduced circumferences.
+    courses : list of str
+        Names of the courses.
+    term : AreaTerm
+
+    Returns
+    -------
+    list of WallReading
     """
-    found = []
-    for one in used:
+    readings = []
+    for reading in used:
         per_m = 1 / (2 * np.pi * np.sqrt(1 + term.mean))
-        radius = per_m * one.circumference_m
+        radius = per_m * reading.circumference_m
         effects = {
             (effect.kind, effect.name): (effect.u, effect.unit, effect.by_m * per_m)
-            for effect in one.effects
+            for effect in reading.effects
         }
         if term.sd:
+            # Derivative of C / (2 pi sqrt(1 + e)) by the excess e, times its standard deviation.
             by_m = -radius / (2 * (1 + term.mean)) * term.sd
             effects["area_term", ""] = (1e6 * term.sd, "ppm", by_m)
-        by = {"shell_temperature": one.by_shell_temperature_m * per_m}
-        found.append(
+        derivatives = {"shell_temperature": reading.by_shell_temperature_m * per_m}
+        readings.append(
             WallReading(
                 "straps",
-                courses.index(one.strap.course),
-                one.strap.level_m,
+                courses.index(reading.strap.course),
+                reading.strap.level_m,
                 radius,
-                one.sd_m * per_m,
+                reading.sd_m * per_m,
                 effects=effects,
-                by_inputs={name: value for name, value in by.items() if value},
+                by_inputs={name: value for name, value in derivatives.items() if value},
             )
         )
-    return found
+    return readings
 
 
-def readings_of_offsets(given, used, courses, insets_m):
+def readings_of_offsets(lines, used, courses, insets_m):
     """`WallReading` of each offset from a reference line.
 
-    given     `ReferenceLines`
-    used      offsets that count
-    courses   names of the courses
-    insets_m  (courses,) of plate and paint: an inside line sees the radius without them
+    The reference level has no centre of its own, because the constants of the lines absorb it.
 
-    The reference level has no centre of its own: the constants of the lines take it up.
+    Parameters
+    ----------
+    lines : ReferenceLines
+    used : list of Offset
+        Adjusted offsets.
+    courses : list of str
+        Names of the courses.
+    insets_m : sequence of float, length courses
+        Plate and paint, m. An inside line shows the radius without them.
+
+    Returns
+    -------
+    list of WallReading
     """
-    found, levels = [], level_names(used)
-    reference = {int(level) for level, one in zip(levels, used, strict=True) if one.reference}
-    for level, one in zip(levels, used, strict=True):
-        line, plummet = given.of(one)
-        course, radial = courses.index(one.course), given.radial_m(one)
-        effects, free = {}, {("line", one.line): 1.0}
-        by_angle = given.by_collimation_m(one)
+    readings, levels = [], level_names(used)
+    reference = {int(level) for level, offset in zip(levels, used, strict=True) if offset.reference}
+    for level, offset in zip(levels, used, strict=True):
+        line, plummet = lines.of(offset)
+        course, radial = courses.index(offset.course), lines.radial_m(offset)
+        effects, free = {}, {("line", offset.line): 1.0}
+        by_angle = lines.by_collimation_m(offset)
         if plummet.u_scale:
             by_m = radial * plummet.u_scale
             effects["instrument_scale", plummet.name] = (1e6 * plummet.u_scale, "ppm", by_m)
@@ -115,13 +134,13 @@ def readings_of_offsets(given, used, courses, insets_m):
         elif plummet.u_collimation_rad:
             u = plummet.u_collimation_rad
             effects["collimation", plummet.name] = (np.degrees(u) * 3600, "arcsec", by_angle * u)
-        found.append(
+        readings.append(
             WallReading(
                 "offsets",
                 course,
-                one.level_m,
+                offset.level_m,
                 radial + line.inside * insets_m[course],
-                one.sd_m,
+                offset.sd_m,
                 line.azimuth_rad,
                 -1 if int(level) in reference else int(level),
                 effects,
@@ -129,53 +148,70 @@ def readings_of_offsets(given, used, courses, insets_m):
                 {"plate_thickness": 1.0, "paint": 1.0} if line.inside else {},
             )
         )
-    return found
+    return readings
 
 
-def readings_of_untold(job, told, joints_m, zero_m):
-    """`WallReading`s of courses that a survey beside former radii does not tell: these, in wide
-    doubt, so that there is a wall.
+def readings_of_untold(job, measured, joints_m, zero_m):
+    """`WallReading`s of former radii for courses that a new survey does not measure.
 
-    Each has a free radius of its own, so that they say nothing of the courses that were measured.
+    Their large standard deviation merely completes the wall. Each has a free radius, so that it
+    does not affect the measured courses.
 
-    told  indices of the courses that are told
+    Parameters
+    ----------
+    job : Job
+    measured : set of int
+        Indices of the measured courses.
+    joints_m : ndarray, shape (courses + 1,)
+        Heights of the joints, m.
+    zero_m : float
+        Height of the table's zero above the bottom, m.
+
+    Returns
+    -------
+    list of WallReading
     """
     if job.radii is None:
         return []
-    known = np.where(job.radii.is_known, job.radii.radius_m, job.tank.nominal_diameter_m / 2)
+    former_m = np.where(job.radii.is_known, job.radii.radius_m, job.tank.nominal_diameter_m / 2)
     return [
         WallReading(
-            FORMER, i, (joints_m[i] + joints_m[i + 1]) / 2 - zero_m, float(known[i]), FORMER_SD_M
+            FORMER, i, (joints_m[i] + joints_m[i + 1]) / 2 - zero_m, float(former_m[i]), FORMER_SD_M
         )
         for i in range(len(job.courses))
-        if i not in told
+        if i not in measured
     ]
 
 
 def off_centre(readings, field):
-    """The readings as from the centre of their level: R lacks (e x n)^2 / (2 rho) of a circle."""
-    centres, found = field.centres_m, []
-    for one in readings:
-        if one.ring < 0:
-            found.append(one)
+    """Readings reduced to the centre of their level.
+
+    A reading lacks (e x n)^2 / (2 rho) of the radius of a circle with eccentricity e.
+    """
+    centres, reduced = field.centres_m, []
+    for reading in readings:
+        if reading.ring < 0:
+            reduced.append(reading)
             continue
-        x, y = centres[one.ring]
-        across = x * np.cos(one.azimuth_rad) - y * np.sin(one.azimuth_rad)
-        found.append(replace(one, radius_m=one.radius_m + across**2 / (2 * field.nominal_m)))
-    return found
+        x, y = centres[reading.ring]
+        across = x * np.cos(reading.azimuth_rad) - y * np.sin(reading.azimuth_rad)
+        reduced.append(
+            replace(reading, radius_m=reading.radius_m + across**2 / (2 * field.nominal_m))
+        )
+    return reduced
 
 
 def sites_of(readings, joints_m, zero_m):
-    """`Sites` of readings; zero_m is the height of the table's zero above the bottom."""
-    course = np.array([one.course for one in readings], dtype=int)
-    level = np.array([one.level_m for one in readings]) + zero_m
+    """`Sites` of readings; `zero_m` is the height of the table's zero above the bottom, m."""
+    course = np.array([reading.course for reading in readings], dtype=int)
+    level = np.array([reading.level_m for reading in readings]) + zero_m
     low, high = joints_m[course], joints_m[course + 1]
-    free = columns_of([one.free for one in readings])
+    free = columns_of([reading.free for reading in readings])
     return Sites(
         course=course,
-        ring=np.array([one.ring for one in readings], dtype=int),
+        ring=np.array([reading.ring for reading in readings], dtype=int),
         zeta=2 * (level - low) / (high - low) - 1,
-        azimuth_rad=np.array([one.azimuth_rad for one in readings]),
+        azimuth_rad=np.array([reading.azimuth_rad for reading in readings]),
         leans=np.zeros(len(readings), dtype=bool),
         shared=np.column_stack(list(free.values())) if free else None,
         spans=spans_of(joints_m),
@@ -183,113 +219,145 @@ def sites_of(readings, joints_m, zero_m):
 
 
 def names_of(courses):
-    """Names of courses, or of rings."""
-    return [one.name for one in courses]
+    """Names of courses or of rings."""
+    return [course.name for course in courses]
 
 
 def noise_of(readings):
-    """(n, n) covariance of the radii: what each reading has of its own, and what they share."""
+    """Covariance (n, n) of the radii from separate and shared causes, m2."""
     shared = shared_effects(readings).values()
     common = np.column_stack([np.zeros(len(readings)), *(column for *_, column in shared)])
-    return np.diag([one.sd_m**2 for one in readings]) + common @ common.T
+    return np.diag([reading.sd_m**2 for reading in readings]) + common @ common.T
 
 
 def noise_by_inputs(inputs, columns, count):
-    """(n, n) covariance of n radii by declared inputs that they depend on, so that readings weigh
-    no more than plates and temperature let them.
+    """Covariance (n, n) of radii due to declared inputs, m2.
 
-    inputs   with name and u, SI
-    columns  {input: (n,) derivative of the radii}
+    It limits the weight of readings to what the uncertainty of plates and temperature permits.
+
+    Parameters
+    ----------
+    inputs : sequence
+        Inputs with name and u, in SI units.
+    columns : dict
+        {input: derivative (n,) of the radii}.
+    count : int
+        n.
+
+    Returns
+    -------
+    ndarray, shape (n, n)
     """
-    known = {one.name: one.u for one in inputs}
-    found = np.zeros((count, count))
+    u_of_inputs = {declared_input.name: declared_input.u for declared_input in inputs}
+    covariance = np.zeros((count, count))
     for name, column in columns.items():
-        found += known.get(name, 0.0) ** 2 * np.outer(column, column)
-    return found
+        covariance += u_of_inputs.get(name, 0.0) ** 2 * np.outer(column, column)
+    return covariance
 
 
 def shared_effects(readings):
-    """{(kind, name): (u, unit, (n,) what one u of it does to the radii)} of common causes."""
-    columns = columns_of([{key: one[2] for key, one in each.effects.items()} for each in readings])
-    told = {key: one[:2] for each in readings for key, one in each.effects.items()}
-    return {key: (*told[key], column) for key, column in columns.items()}
+    """{(kind, name): (u, unit, change (n,) of the radii for one u, m)} of common causes."""
+    columns = columns_of(
+        [{key: effect[2] for key, effect in reading.effects.items()} for reading in readings]
+    )
+    u_and_unit = {
+        key: effect[:2] for reading in readings for key, effect in reading.effects.items()
+    }
+    return {key: (*u_and_unit[key], column) for key, column in columns.items()}
 
 
-def settle_readings(field, field_of, given, may_go):
-    """The field of a wall and what became of its readings: each tested by all others, and the field
-    found again, until none changes sides.
+def settle_readings(field, field_of, parts, may_go):
+    """Field of a wall and tests of its readings, iterated until no reading changes acceptance.
+
+    Each reading is tested by the other readings.
 
     Parameters
     ----------
     field : WallField
-        Of all readings.
+        Field of all readings.
     field_of : callable
-        field_of(accepted) -> WallField of some.
-    given : tuple
-        Sites, (n,) radii and (n, n) noise of all.
+        field_of(accepted) gives the WallField of the accepted readings.
+    parts : tuple
+        Sites, radii (n,), m, and noise (n, n), m2, of all readings.
     may_go : ndarray, shape (n,)
-        Which of them may be rejected.
+        Readings that may be rejected.
 
     Returns
     -------
     field : WallField
-        Of those that are accepted.
+        Field of the accepted readings.
     tested : Tested
-        An infinite sd_m of those that no other reading controls.
+        With an infinite sd_m for uncontrolled readings.
     """
-    sites, radius, noise = given
+    sites, radius, noise = parts
     accepted = np.ones(len(radius), dtype=bool)
     for _ in range(MOST_ROUNDS):
-        whole = replace(field, sites=sites, radius_m=radius, noise_m2=noise).covariance_m2
-        precision = restricted_precision(whole, free_design(sites)[0])
-        pull, most = precision @ (radius - radius.mean()), np.sqrt(np.diag(whole) / UNCONTROLLED)
+        covariance = replace(field, sites=sites, radius_m=radius, noise_m2=noise).covariance_m2
+        # The weight matrix with free parameters eliminated is needed for leave-one-out tests.
+        precision = restricted_precision(covariance, free_design(sites)[0])
+        pull, most = (
+            precision @ (radius - radius.mean()),
+            np.sqrt(np.diag(covariance) / UNCONTROLLED),
+        )
         tested = snoop_wall(precision, pull, accepted, may_go, most)
         if np.all(tested.accepted == accepted):
             break
         accepted = tested.accepted
         field = field_of(accepted)
-    controlled = tested.sd_m**-2.0 * np.diag(whole) > UNCONTROLLED
+    # A reading without redundancy has no test, so its standard deviation is set to infinity.
+    controlled = tested.sd_m**-2.0 * np.diag(covariance) > UNCONTROLLED
     return field, replace(tested, sd_m=np.where(controlled, tested.sd_m, np.inf))
 
 
 def factors_of_readings(readings, weights):
-    """`Factor`s of what readings leave uncertain about features: of their own, and what they share.
+    """`Factor`s of the uncertainty of features due to separate and shared causes of readings.
 
-    weights  (f, n) derivative of the features by their radii
+    The weights (f, n) are the derivatives of the features by the radii.
     """
-    found = []
-    for kind in dict.fromkeys(one.of for one in readings):
-        own = weights * np.array([one.sd_m * (one.of == kind) for one in readings])
-        found.append(Factor(kind, own))
+    factors = []
+    for kind in dict.fromkeys(reading.of for reading in readings):
+        separate = weights * np.array([reading.sd_m * (reading.of == kind) for reading in readings])
+        factors.append(Factor(kind, separate))
     for (kind, name), (u, unit, column) in shared_effects(readings).items():
-        by = (weights @ column)[:, None]
-        found.append(Factor(kind, by, u=u, unit=unit, type="B", note=name))
-    return tuple(one for one in found if np.any(one.columns))
+        column_of_features = (weights @ column)[:, None]
+        factors.append(Factor(kind, column_of_features, u=u, unit=unit, type="B", note=name))
+    return tuple(factor for factor in factors if np.any(factor.columns))
 
 
 def factors_of_plates(names, field, weights, plate_sd_m):
-    """`Factor`s of plates that a gauge read, (f, n) weights being of readings that see them.
+    """`Factor`s of gauged plates, for weights (f, n) of readings that contain the plate.
 
-    names       of the courses
-    plate_sd_m  {course index: standard uncertainty}
+    Parameters
+    ----------
+    names : list of str
+        Names of the courses.
+    field : WallField
+    weights : ndarray, shape (f, n)
+        Derivatives of the features by the radii, zero for readings without the plate.
+    plate_sd_m : dict
+        {course index: standard uncertainty, m}.
+
+    Returns
+    -------
+    tuple of Factor
     """
-    found = []
+    factors = []
     for course, sd in plate_sd_m.items():
-        by = weights @ (sd * (field.sites.course == course))
-        found.append(Factor("plate_readings", by[:, None], note=names[course]))
-    return tuple(one for one in found if np.any(one.columns))
+        column = weights @ (sd * (field.sites.course == course))
+        factors.append(Factor("plate_readings", column[:, None], note=names[course]))
+    return tuple(factor for factor in factors if np.any(factor.columns))
 
 
 def inputs_read_with(readings, weights):
-    """{input of a budget: (f,) derivative of features}, of inputs that readings depend on."""
-    rows = columns_of([one.by_inputs for one in readings])
+    """{input of a budget: derivative (f,) of features}, for inputs that affect readings."""
+    rows = columns_of([reading.by_inputs for reading in readings])
     return {name: weights @ column for name, column in rows.items()}
 
 
 def columns_of(rows):
-    """{name: (n,) its values} of n dicts; 0 where one has none."""
-    found = {}
+    """{name: values (n,)} of n dicts, with 0 for missing names."""
+    columns = {}
     for place, row in enumerate(rows):
         for name, value in row.items():
-            found.setdefault(name, np.zeros(len(rows)))[place] = value
-    return found
+            columns.setdefault(name, np.zeros(len(rows)))[place] = value
+    return columns

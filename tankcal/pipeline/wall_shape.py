@@ -1,12 +1,13 @@
-"""The shape of an upright wall for an inspection: radii about the own centres, and the plumb.
+"""Shape of an upright wall for an inspection: radii about the level centres, and plumb.
 
-At the levels that were surveyed, and 0.3 m above the bottom, the inside radius r about the own
-centre of the level; between levels l and m, along the generatrix of azimuth t with n its direction,
+At each surveyed level, and 0.3 m above the bottom, the shape is the inside radius r about the
+centre of that level. Between levels l and m, along the generatrix at azimuth t with direction n, it
+is
 
     r_m(t) - r_l(t) + n(t) . (c_m - c_l),
 
-c the centres of the levels. All with one covariance, by what the survey leaves uncertain and by
-what it did not see of the wall, so that plates, offsets and scales drop out of differences.
+with c the centres of the levels. All values have one covariance, from the survey and from form that
+the survey did not see. Common plates, offsets and scales therefore cancel in differences.
 """
 
 from dataclasses import dataclass, replace
@@ -18,23 +19,27 @@ from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.shape_figures import Figures, Level, ShapeBase
 from tankcal.pipeline.surveyed_wall import Wall
 
-LOW_M = 0.3048  # a foot above the bottom weld, where the low radii are judged
-SAME_LEVEL_M = 0.05  # a level as near as that to another is the same
-MOST_AZIMUTHS, EVEN_AZIMUTHS = 72, 36  # of a level as measured; of one with more points
-LEAST_HEIGHT = 0.2  # of a course: levels nearer than that tell nothing of its plumb
-NEAR_M = 0.1  # from the wall: what stands there may be a dent
+LOW_M = 0.3048  # height of the low radii: one foot above the bottom weld
+SAME_LEVEL_M = 0.05  # largest height difference of equal levels
+# Largest number of measured azimuths of a level; number after thinning.
+MOST_AZIMUTHS, EVEN_AZIMUTHS = 72, 36
+LEAST_HEIGHT = 0.2  # least distance of two levels for a plumb, relative to the course height
+NEAR_M = 0.1  # largest distance from the wall of a point that may be a dent
 
 
 @dataclass(frozen=True)
 class Plumb:
-    """Departures of the upper of two levels from the plumb, outwards positive, by azimuth.
+    """Deviations of the upper of two levels from the plumb, outwards positive, by azimuth.
 
+    Attributes
+    ----------
     low, high : int
-        Which of the levels of the `WallShape`.
+        Indices of the levels in the `WallShape`.
     azimuth_rad : ndarray, shape (g,)
     is_read : ndarray of bool, shape (g,)
-        Whether there is a reading at both ends; else at least one end is estimated by its
-        neighbours.
+        Whether both ends were measured; otherwise at least one end is estimated from neighbours.
+    figures : Figures
+        Deviations with their uncertainty.
     """
 
     low: int
@@ -46,16 +51,16 @@ class Plumb:
 
 @dataclass(frozen=True)
 class SetAside:
-    """A point near the wall that was not taken for it: of a fitting, a slip, or a dent.
+    """Rejected point near the wall: a fitting, a mistake or a dent.
 
     Attributes
     ----------
     point : str
         Name.
     height_m, azimuth_rad : float
-        Where: above the bottom of the shell, about the axis.
+        Height above the bottom of the shell, m, and azimuth about the axis.
     residual_m : float
-        Outwards from the wall as all other points show it.
+        Outward distance from the wall of the accepted points, m.
     """
 
     point: str
@@ -66,27 +71,27 @@ class SetAside:
 
 @dataclass(frozen=True)
 class WallShape:
-    """What an inspection asks of a wall.
+    """Shape of a wall for an inspection.
 
     Attributes
     ----------
     set_aside : tuple of SetAside
-        Points near the wall that were not taken for it.
+        Rejected points near the wall.
     state : str
-        "as_found": loaded as it was surveyed; "unloaded": the head of the survey's liquid taken
-        off.
+        "as_found": loaded as during the survey; "unloaded": without the head of the survey's
+        liquid.
     levels : tuple of Level
         From the bottom up.
     radii : tuple of Figures
-        Of each level at its azimuths: inside, about its own centre.
+        Inside radii of each level about its centre, at its azimuths.
     centres_m : tuple
-        (x, y) of each level in the frame of the survey; None where it is not known.
+        (x, y) of each level in the frame of the survey; None if unknown.
     plumbs : tuple of Plumb
-        Of each level with a centre against the lowest of these; (): fewer than two.
+        Each level with a centre against the lowest such level; () for fewer than two.
     axis : Figures or None
-        x and y of the highest centre less the lowest, then its length.
+        x and y of the highest centre minus the lowest, then the length of this difference.
     courses : tuple of Plumb
-        Of each course with two levels far enough apart, its highest against its lowest.
+        Highest against lowest level of each course with two levels sufficiently far apart.
     """
 
     set_aside: tuple[SetAside, ...]
@@ -100,25 +105,25 @@ class WallShape:
 
 
 def wall_shape_of(job, wall):
-    """The `WallShape` of a job's wall; None where no wall of points was surveyed."""
+    """`WallShape` of a job's wall; None unless the wall was surveyed by points."""
     if not isinstance(wall, Wall) or job.radii is not None:
         return None
     levels = _levels(job, wall)
-    plumbed = [i for i, one in enumerate(levels) if one.ring >= 0]
-    pairs = [(plumbed[0], one) for one in plumbed[1:]]
+    plumbed = [i for i, level in enumerate(levels) if level.ring >= 0]
+    pairs = [(plumbed[0], upper) for upper in plumbed[1:]]
     of_courses = _pairs_of_courses(wall, levels, plumbed)
     base = ShapeBase(job, wall, levels, plumbed, (*pairs, *of_courses))
-    rows = [base.radii(i, one.azimuth_rad) for i, one in enumerate(levels)]
+    rows = [base.radii(i, level.azimuth_rad) for i, level in enumerate(levels)]
     rows += [base.plumb(*pair) for pair in (*pairs, *of_courses)]
     if pairs:
         rows.append(base.axis(*pairs[-1]))
-    whole = base.figures(np.vstack(rows))
+    all_figures = base.figures(np.vstack(rows))
     ends = np.cumsum([0, *map(len, rows)])
-    found = [whole.part(*pair) for pair in pairwise(ends)]
-    radii, others = found[: len(levels)], found[len(levels) :]
+    figures = [all_figures.part(*pair) for pair in pairwise(ends)]
+    radii, differences = figures[: len(levels)], figures[len(levels) :]
     plumbs = [
         Plumb(low, high, levels[low].azimuth_rad, base.is_read(low, high), part)
-        for (low, high), part in zip((*pairs, *of_courses), others, strict=False)
+        for (low, high), part in zip((*pairs, *of_courses), differences, strict=False)
     ]
     return WallShape(
         tuple(_set_aside(job, wall)),
@@ -127,16 +132,16 @@ def wall_shape_of(job, wall):
         tuple(radii),
         tuple(base.centre(i) if i in plumbed else None for i in range(len(levels))),
         tuple(plumbs[: len(pairs)]),
-        others[-1] if pairs else None,
+        differences[-1] if pairs else None,
         tuple(plumbs[len(pairs) :]),
     )
 
 
 def _set_aside(job, wall):
-    """Points near the wall that were not taken for it."""
+    """Rejected points near the wall."""
     shell, xyz = wall.shell, job.points.xyz_m
-    near = (shell.reason != "") & (np.abs(shell.residual_m) <= NEAR_M)
-    for i in np.flatnonzero(near):
+    is_near = (shell.reason != "") & (np.abs(shell.residual_m) <= NEAR_M)
+    for i in np.flatnonzero(is_near):
         axis = np.array(shell.axis_m) + (xyz[i, 2] - shell.z_m) * np.array(shell.slope)
         x, y = xyz[i, :2] - axis
         yield SetAside(
@@ -148,26 +153,28 @@ def _set_aside(job, wall):
 
 
 def _levels(job, wall):
-    """Levels of the sections, and the low one; a section that is not level has two."""
-    found = []
+    """Levels of the sections, and the low level; an inclined section has two levels."""
+    levels = []
     for ring, section in enumerate(wall.sections):
-        group, chosen = section.group, _readings_of(wall.field.sites, ring)
-        azimuth = wall.field.sites.azimuth_rad[chosen] % FULL_TURN
+        group, sites_of_ring = section.group, _readings_of(wall.field.sites, ring)
+        azimuth = wall.field.sites.azimuth_rad[sites_of_ring] % FULL_TURN
         if group.degree == 0:
             height, zeta = group.height_m, float(group.zeta(group.height_m))
-            found.append(Level(height, group.course, zeta, azimuth, ring, chosen))
+            levels.append(Level(height, group.course, zeta, azimuth, ring, sites_of_ring))
             continue
         points = wall.accepted[group.members]
         heights = job.points.xyz_m[points, 2] - job.datum.bottom_z_m
-        for one in np.quantile(heights, [0.1, 0.9]).tolist():
-            zeta = float(group.zeta(one))
-            found.append(Level(one, group.course, zeta, azimuth, ring, np.full(len(chosen), -1)))
-    found.sort(key=lambda one: one.height_m)
-    return _with_low(found, wall.joints_m[1])
+        for height_m in np.quantile(heights, [0.1, 0.9]).tolist():
+            zeta = float(group.zeta(height_m))
+            levels.append(
+                Level(height_m, group.course, zeta, azimuth, ring, np.full(len(sites_of_ring), -1))
+            )
+    levels.sort(key=lambda level: level.height_m)
+    return _with_low(levels, wall.joints_m[1])
 
 
 def _with_low(levels, top_m):
-    """The levels with the low one marked, or added where none is near; first course to top_m."""
+    """Levels with the low level marked, or added; `top_m` is the top of the first course."""
     place = min(range(len(levels)), key=lambda i: abs(levels[i].height_m - LOW_M))
     nearest = levels[place]
     if abs(nearest.height_m - LOW_M) <= SAME_LEVEL_M:
@@ -182,27 +189,31 @@ def _with_low(levels, top_m):
             site=np.full(len(levels[0].site), -1),
             is_low=True,
         )
-        levels = sorted([*levels, low], key=lambda one: one.height_m)
+        levels = sorted([*levels, low], key=lambda level: level.height_m)
     return tuple(levels)
 
 
 def _readings_of(sites, ring):
-    """Readings of a ring by azimuth; of many some that are about evenly spread."""
-    own = np.flatnonzero(sites.ring == ring)
-    azimuth = sites.azimuth_rad[own] % FULL_TURN
-    own = own[np.argsort(azimuth, kind="stable")]
-    if len(own) <= MOST_AZIMUTHS:
-        return own
-    even = np.arange(EVEN_AZIMUTHS) * FULL_TURN / EVEN_AZIMUTHS
-    away = np.abs((np.sort(azimuth)[:, None] - even + np.pi) % FULL_TURN - np.pi)
-    return own[np.unique(np.argmin(away, axis=0))]
+    """Readings of a ring by azimuth, thinned to an even spacing if numerous."""
+    of_ring = np.flatnonzero(sites.ring == ring)
+    azimuth = sites.azimuth_rad[of_ring] % FULL_TURN
+    of_ring = of_ring[np.argsort(azimuth, kind="stable")]
+    if len(of_ring) <= MOST_AZIMUTHS:
+        return of_ring
+    targets = np.arange(EVEN_AZIMUTHS) * FULL_TURN / EVEN_AZIMUTHS
+    distance = np.abs((np.sort(azimuth)[:, None] - targets + np.pi) % FULL_TURN - np.pi)
+    return of_ring[np.unique(np.argmin(distance, axis=0))]
 
 
 def _pairs_of_courses(wall, levels, plumbed):
-    """(lowest, highest) level of each course in which two stand far enough apart."""
+    """(Lowest, highest) level of each course in which two levels are sufficiently far apart."""
     pairs = []
-    for course, tall in enumerate(np.diff(wall.joints_m)):
-        own = [i for i in plumbed if levels[i].course == course]
-        if own and levels[own[-1]].height_m - levels[own[0]].height_m >= LEAST_HEIGHT * tall:
-            pairs.append((own[0], own[-1]))
+    for course, height in enumerate(np.diff(wall.joints_m)):
+        of_course = [i for i in plumbed if levels[i].course == course]
+        if (
+            of_course
+            and levels[of_course[-1]].height_m - levels[of_course[0]].height_m
+            >= LEAST_HEIGHT * height
+        ):
+            pairs.append((of_course[0], of_course[-1]))
     return pairs

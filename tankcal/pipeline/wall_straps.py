@@ -1,9 +1,8 @@
-"""Straps and offsets of a wall that points show, too: readings of the same field, each tested by
-all others.
+"""Straps and offsets of a wall with points: readings of one field, each tested by the others.
 
-A circumference is the mean radius of its level but for the area term, whose size the points tell:
-the ovality and the seams that they were found to have. Inside points see the shell without plate
-and paint, which a tape outside does not.
+A circumference is the mean radius of its level, except for the area term. The size of the area term
+follows from the ovality and the seams that the points show. Inside points see the shell without
+plate and paint, whereas a tape outside includes them.
 """
 
 from dataclasses import dataclass, field, replace
@@ -38,35 +37,54 @@ from tankcal.quadrature import panels
 from tankcal.survey.reference_line import courses_told
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 
-FEWEST_CIRCUMFERENCES = 3  # where they alone tell an offset: of two nobody knows which is wrong
-MOST_OF_RING = 200  # points of a ring that are asked what the wall looks like
+# Least number of circumferences to reject one if they alone determine an offset of the points: of
+# two contradictory circumferences either may be wrong.
+FEWEST_CIRCUMFERENCES = 3
+MOST_OF_RING = 200  # largest number of points of a ring for area term and hull
 
 
 @dataclass(frozen=True)
 class AreaTerm:
-    """By how much the circle of a perimeter is larger than the wall: mean and sd, relative."""
+    """Relative excess of the circle of a perimeter over the area of the wall: mean and sd."""
 
     mean: float
     sd: float
 
 
 def typical_shape_m():
-    """Standard deviation of the radius round a typical shell, m: what `COMPONENTS` assume.
+    """Standard deviation of the radius round a typical shell, from `COMPONENTS`, m.
 
     It is the root of the summed median variances of ovality, settlement and seams, 6.1 mm.
     """
-    return float(np.sqrt(sum(one.median_m**2 for one in COMPONENTS if one.shape in ROUND_SHAPES)))
+    return float(
+        np.sqrt(
+            sum(
+                component.median_m**2 for component in COMPONENTS if component.shape in ROUND_SHAPES
+            )
+        )
+    )
 
 
 def area_term(shape_sd_m, amplitudes, nominal_m, points=None):
-    """`AreaTerm` of a wall, and the standard deviation of its radius that it follows from.
+    """`AreaTerm` of a wall, and the underlying standard deviation of its radius, m.
 
-    shape_sd_m  as declared; None: of the ovality and the seams that it has by its amplitudes
-    points      `PointsOfWall`, whose outlines it has where none is declared; None: of a plan
+    Parameters
+    ----------
+    shape_sd_m : float or None
+        Declared standard deviation, m; None: from the ovality and seams of the amplitudes.
+    amplitudes : Amplitudes
+    nominal_m : float
+        Nominal radius, m.
+    points : PointsOfWall, optional
+        Points whose outlines are used if no shape is declared; None for a plan.
+
+    Returns
+    -------
+    (AreaTerm, float)
     """
     is_declared = shape_sd_m is not None
     if not is_declared:
-        waves = [one.shape in ROUND_SHAPES for one in COMPONENTS]
+        waves = [component.shape in ROUND_SHAPES for component in COMPONENTS]
         shape_sd_m = float(np.sqrt(amplitudes.likely_m2[waves].sum()))
     if is_declared or points is None:
         return AreaTerm(*perimeter_excess(shape_sd_m, nominal_m)), shape_sd_m
@@ -74,45 +92,48 @@ def area_term(shape_sd_m, amplitudes, nominal_m, points=None):
 
 
 def rings_of(points):
-    """`Ring`s of a `WallField`, or of `PointsOfWall`: no more than MOST_OF_RING readings each."""
-    found, sites = [], points.sites
+    """`Ring`s of a `WallField` or of `PointsOfWall`, with at most MOST_OF_RING readings each."""
+    rings, sites = [], points.sites
     for ring in np.unique(sites.ring[sites.ring >= 0]):
-        mine = np.flatnonzero(sites.ring == ring)
-        mine = mine[np.argsort(sites.azimuth_rad[mine] % FULL_TURN)]  # what is drawn hangs on it
-        mine = mine[:: -(-len(mine) // MOST_OF_RING)]
-        noise = points.noise_m2[np.ix_(mine, mine)]
-        up = float(sites.heights.up[mine].mean())
-        found.append(Ring(sites.azimuth_rad[mine], points.radius_m[mine], noise, up))
-    return found
+        of_ring = np.flatnonzero(sites.ring == ring)
+        # The simulated outlines depend on this order.
+        of_ring = of_ring[np.argsort(sites.azimuth_rad[of_ring] % FULL_TURN)]
+        of_ring = of_ring[:: -(-len(of_ring) // MOST_OF_RING)]
+        noise = points.noise_m2[np.ix_(of_ring, of_ring)]
+        relative_height = float(sites.heights.up[of_ring].mean())
+        rings.append(
+            Ring(sites.azimuth_rad[of_ring], points.radius_m[of_ring], noise, relative_height)
+        )
+    return rings
 
 
 @dataclass(frozen=True)
 class Straps:
-    """Circumferences by tape, and what the wall that they are readings of says of them.
+    """Circumferences by tape with their tests against the wall.
 
     Attributes
     ----------
     reduced : tuple of Reduced
-        Of every reading, in the order of the file.
+        All readings, in the order of the file.
     adjusted : ndarray of int, shape (k,)
-        Which of these are readings of the wall; the others are only compared.
+        Indices of the adjusted readings; the other readings are checks.
     accepted : ndarray of bool, shape (k,)
-        False: rejected, for all others contradict it.
+        False if rejected because the other readings contradict it.
     w : ndarray, shape (k,)
-        Departure from what all others show over its sd; nan: no other controls it.
+        Normalised discrepancy from the other readings; nan if uncontrolled.
     sd_m : ndarray, shape (k,)
-        That, of its radius; inf of such.
+        Standard deviation of the discrepancy in radius, m; infinite if uncontrolled.
     departure_m : ndarray, shape (k,)
-        Of its radius from what all others show.
+        Discrepancy in radius from the other readings, m.
     area_term : AreaTerm
     shape_sd_m : float
-        Standard deviation of the radius round the wall, which that follows from.
+        Standard deviation of the radius round the wall that gives the area term, m.
     radius_m : ndarray, shape (courses,)
-        Mean radius of the painted shell, of the circle of equal area.
+        Mean radius of the painted shell, as the circle of equal area, m.
     plate_sd_m : dict
-        {course index: standard uncertainty of its plate by a gauge}.
+        {course index: standard uncertainty of its gauged plate, m}.
     tapes : tuple of (Tape, float)
-        Those that were read, and the standard uncertainty of their scale by a master.
+        Tapes used, and the standard uncertainties of their scale from a master.
     """
 
     reduced: tuple[Reduced, ...]
@@ -129,46 +150,47 @@ class Straps:
 
     @property
     def per_radius(self):
-        """Circumference over the radius of equal area."""
+        """Circumference divided by the radius of equal area."""
         return FULL_TURN * np.sqrt(1 + self.area_term.mean)
 
     @property
     def mdb_m(self):
-        """(k,) smallest blunder of each circumference that its test finds; inf: no test."""
+        """Minimal detectable bias (k,) of each circumference, m; infinite if uncontrolled."""
         return noncentrality() * self.sd_m * self.per_radius
 
     @property
     def circumference_m(self):
-        """(courses,) mean circumference of each, of the painted shell."""
+        """Mean circumference of each course of the painted shell, m, shape (courses,)."""
         return self.radius_m * self.per_radius
 
 
 def gauged_plates(job):
-    """{index of a course or ring: standard uncertainty of its plate by a gauge} of a strapped
-    job.
-    """
-    read, parts = job.strapping.plate_sd_m, job.courses or job.rings
-    return {i: read[one.name] for i, one in enumerate(parts) if one.name in read}
+    """{index of a course or ring: standard uncertainty of its gauged plate, m} of a job."""
+    plate_sd_m, parts = job.strapping.plate_sd_m, job.courses or job.rings
+    return {i: plate_sd_m[part.name] for i, part in enumerate(parts) if part.name in plate_sd_m}
 
 
 def mean_radii(field):
-    """(courses,) mean radius of each course as measured."""
+    """Mean radius of each course, m, shape (courses,)."""
     return field.outlines_m.mean(axis=2) @ panels([0.0, 1.0], LEVELS)[1]
 
 
 @dataclass(frozen=True)
 class PointsOfWall:
-    """What points say of a wall.
+    """Radii of a wall from points.
 
     Attributes
     ----------
     sites : Sites
+        Positions of the radii.
     radius_m : ndarray, shape (n,)
+        Radii, m.
     noise_m2 : ndarray, shape (n, n)
+        Covariance of the radii, m2.
     unbound : Unbound
-        What of them nothing binds.
+        Derivatives by unknowns without a prior.
     by_inputs : dict
-        {input of the budget: (n,) derivative of the radii}.
+        {input of the budget: derivative (n,) of the radii}.
     """
 
     sites: Sites
@@ -179,146 +201,201 @@ class PointsOfWall:
 
 
 def told_courses(job, seen):
-    """Indices of the courses that points (of a set of them), straps or reference lines tell."""
-    place, strapped, read = {one.name: i for i, one in enumerate(job.courses)}, (), ()
+    """Indices of the courses measured by points (the set `seen`), straps or reference lines."""
+    place, strapped, of_lines = {course.name: i for i, course in enumerate(job.courses)}, (), ()
     if job.strapping is not None:
-        strapped = (one.course for one in job.strapping.straps if not one.check)
+        strapped = (strap.course for strap in job.strapping.straps if not strap.check)
     if job.lines is not None:
-        read = (one.course for one in job.lines.offsets if not one.check)
-    return courses_told(seen, {place[one] for one in strapped}, {place[one] for one in read})
+        of_lines = (offset.course for offset in job.lines.offsets if not offset.check)
+    return courses_told(
+        seen, {place[strap] for strap in strapped}, {place[offset] for offset in of_lines}
+    )
 
 
 def join_readings(job, points, amplitudes, joints_m, *, is_known):
-    """The field of a wall from its points, its straps and its offsets from reference lines.
+    """Field of a wall from its points, straps and offsets from reference lines.
 
     Parameters
     ----------
     job : Job
-        Whose wall was strapped, read from lines, or both.
+        Job with straps, reference lines or both.
     points : PointsOfWall
     amplitudes : Amplitudes
-        Of the wall, as its points tell them.
+        Amplitudes of the wall from its points.
     joints_m : ndarray, shape (courses + 1,)
+        Heights of the joints, m.
     is_known : bool
-        Whether the amplitudes are known beforehand, as those of a plan; False: where points do not
-        lie on every course they are found again, from all.
+        Whether the amplitudes are known, as in a plan. If not, and if some courses lack points,
+        they are estimated again from all readings.
 
     Returns
     -------
     read : ReadWall
-        Its field is of the points, then of the accepted readings, on the surface that the points
-        are on.
+        Its field contains the points, then the accepted readings, on the surface of the points.
     straps : Straps or None
     """
-    nominal, names = job.tank.nominal_diameter_m / 2, [one.name for one in job.courses]
-    inner = np.array([one.thickness_m + one.paint_m for one in job.courses])
+    nominal, names = job.tank.nominal_diameter_m / 2, [course.name for course in job.courses]
+    inner = np.array([course.thickness_m + course.paint_m for course in job.courses])
     inner *= job.survey.side == "inside"
     zero = job.datum.plate_level_m
-    taped, readings, places = None, [], []
+    tape_results, readings, places = None, [], []
     if job.strapping is not None:
-        given = job.strapping
-        reduced = reduce_straps(given, job.survey.shell_temperature_c, 2 * nominal)
-        places = [i for i, one in enumerate(reduced) if not one.strap.check]
-        seen = None if is_known else points  # those of a plan are nominal and show no form
-        term, shape = area_term(given.shape_sd_m, amplitudes, nominal, seen)
+        strapping = job.strapping
+        reduced = reduce_straps(strapping, job.survey.shell_temperature_c, 2 * nominal)
+        places = [i for i, reduced_strap in enumerate(reduced) if not reduced_strap.strap.check]
+        # Points of a plan are nominal, without form.
+        points_with_form = None if is_known else points
+        term, shape = area_term(strapping.shape_sd_m, amplitudes, nominal, points_with_form)
         readings = readings_of_straps([reduced[i] for i in places], names, term)
-        taped = reduced, term, shape
+        tape_results = reduced, term, shape
     if job.lines is not None:
         insets = inner if inner.any() else insets_of(job, job.switches)
         offsets, of_offsets = _offsets_of(job.lines, names, insets, points.sites)
         readings, places = readings + offsets, places + of_offsets
-    told = told_courses(job, set(points.sites.course.tolist()))
-    former = readings_of_untold(job, told, joints_m, zero)
+    measured = told_courses(job, set(points.sites.course.tolist()))
+    former = readings_of_untold(job, measured, joints_m, zero)
     readings, places = readings + former, places + [-1] * len(former)
-    readings = [_on_surface(one, inner[one.course], job.survey.side) for one in readings]
+    readings = [
+        _on_surface(reading, inner[reading.course], job.survey.side) for reading in readings
+    ]
     if not is_known and len(np.unique(points.sites.course)) < len(names):
         amplitudes = None
     field, tested, readings = _joined_field(job, points, readings, amplitudes, (joints_m, zero))
-    read = ReadWall(
+    read_wall = ReadWall(
         joints_m, zero, tuple(readings), np.array(places, dtype=int), tested, field, inner_m=inner
     )
-    return read, None if taped is None else _straps_of(job, read, taped, inner)
+    return read_wall, None if tape_results is None else _straps_of(
+        job, read_wall, tape_results, inner
+    )
 
 
 def _offsets_of(lines, names, insets, sites):
-    """`WallReading`s of the offsets that count, and their places; rings after those of points."""
-    places = [i for i, one in enumerate(lines.offsets) if not one.check]
-    found = readings_of_offsets(lines, [lines.offsets[i] for i in places], names, insets)
+    """`WallReading`s of the adjusted offsets and their indices; rings follow those of points."""
+    places = [i for i, offset in enumerate(lines.offsets) if not offset.check]
+    readings = readings_of_offsets(lines, [lines.offsets[i] for i in places], names, insets)
     first = int(sites.ring.max(initial=-1)) + 1
-    return [one if one.ring < 0 else replace(one, ring=one.ring + first) for one in found], places
+    return [
+        reading if reading.ring < 0 else replace(reading, ring=reading.ring + first)
+        for reading in readings
+    ], places
 
 
 def _joined_field(job, points, readings, amplitudes, heights):
-    """`WallField` of points and accepted readings, `Tested` of these, and they, about the centres
-    of their levels.
+    """`WallField` of points and accepted readings, `Tested` of the readings, and centred readings.
 
-    amplitudes  None: those that all of them tell
-    heights     joints, and the table's zero above the bottom, m
+    Parameters
+    ----------
+    job : Job
+    points : PointsOfWall
+    readings : list of WallReading, length k
+    amplitudes : Amplitudes or None
+        None: estimated from all readings.
+    heights : tuple
+        Heights of the joints, (courses + 1,), and of the table's zero above the bottom, m.
+
+    Returns
+    -------
+    field : WallField
+    tested : Tested
+    readings : list of WallReading
+        Reduced to the centres of their levels.
     """
     n, k, nominal = len(points.radius_m), len(readings), job.tank.nominal_diameter_m / 2
     sites = sites_of(readings, *heights)
-    both = points.unbound.padded(k).shared_by(_joined(points.sites, sites))
-    is_bound = both.shared is None
-    if sites.shared is not None:  # of lines: the last, as `ReadWall` has them
-        own = np.pad(sites.shared, ((n, 0), (0, 0)))
-        both = replace(both, shared=own if is_bound else np.hstack([both.shared, own]))
-    columns = columns_of([one.by_inputs for one in readings])
+    all_sites = points.unbound.padded(k).shared_by(_joined(points.sites, sites))
+    is_bound = all_sites.shared is None
+    if sites.shared is not None:  # unknowns of lines are last, as `ReadWall` expects
+        line_columns = np.pad(sites.shared, ((n, 0), (0, 0)))
+        all_sites = replace(
+            all_sites,
+            shared=line_columns if is_bound else np.hstack([all_sites.shared, line_columns]),
+        )
+    columns = columns_of([reading.by_inputs for reading in readings])
     columns = {
         name: np.append(points.by_inputs.get(name, np.zeros(n)), columns.get(name, np.zeros(k)))
         for name in dict.fromkeys((*points.by_inputs, *columns))
     }
+    # Readings and points are independent, except for declared inputs such as plates and
+    # temperature.
     noise = scipy.linalg.block_diag(points.noise_m2, noise_of(readings))
     noise += noise_by_inputs(job.inputs, columns, n + k)
+    # If straps alone determine a free offset, two of them cannot show which is wrong.
     straps_may = is_bound or _circumferences(job) >= FEWEST_CIRCUMFERENCES
     may = [
-        job.snooping and one.of != FORMER and (straps_may or one.of == "offsets")
-        for one in readings
+        job.snooping and reading.of != FORMER and (straps_may or reading.of == "offsets")
+        for reading in readings
     ]
     may_go = np.append(np.zeros(n), may)
 
+    # Rings of offsets have centres of their own, which are not part of the outlines of the points.
     apart = points.unbound.first_apart
     if apart is None:
         apart = int(points.sites.ring.max(initial=-1)) + 1
 
     def field_of(accepted):
-        some = np.flatnonzero(accepted)
-        own, size = noise[np.ix_(some, some)], amplitudes
-        if size is None:
-            size = estimate_amplitudes(both.take(accepted), radius[some], own, nominal)
-        return WallField(both.take(accepted), radius[some], own, size, nominal, plumbed=apart)
+        """Field of the points and the accepted readings."""
+        rows = np.flatnonzero(accepted)
+        noise_of_rows, amplitudes_used = noise[np.ix_(rows, rows)], amplitudes
+        if amplitudes_used is None:
+            amplitudes_used = estimate_amplitudes(
+                all_sites.take(accepted), radius[rows], noise_of_rows, nominal
+            )
+        return WallField(
+            all_sites.take(accepted),
+            radius[rows],
+            noise_of_rows,
+            amplitudes_used,
+            nominal,
+            plumbed=apart,
+        )
 
-    radius, every = np.append(points.radius_m, [one.radius_m for one in readings]), np.ones(n + k)
-    field = field_of(every > 0)
+    radius, accepted_at_first = (
+        np.append(points.radius_m, [reading.radius_m for reading in readings]),
+        np.ones(n + k),
+    )
+    field = field_of(accepted_at_first > 0)
     if np.any(sites.ring >= 0):
+        # The centres of the rings are known only from a first solution.
         readings = off_centre(readings, field)
-        radius = np.append(points.radius_m, [one.radius_m for one in readings])
-        field = field_of(every > 0)
-    field, tested = settle_readings(field, field_of, (both, radius, noise), may_go)
+        radius = np.append(points.radius_m, [reading.radius_m for reading in readings])
+        field = field_of(accepted_at_first > 0)
+    field, tested = settle_readings(field, field_of, (all_sites, radius, noise), may_go)
     parts = (tested.accepted, tested.departure_m, tested.w, tested.sd_m)
-    return field, Tested(*(one[n:] for one in parts)), readings
+    return field, Tested(*(part[n:] for part in parts)), readings
 
 
 def _circumferences(job):
-    """How many were strapped and count; repeats are one."""
+    """Number of adjusted circumferences; repeats count once."""
     if job.strapping is None:
         return 0
-    return len({one.name for one in job.strapping.straps if not one.check})
+    return len({strap.name for strap in job.strapping.straps if not strap.check})
 
 
 def _straps_of(job, read, taped, inner_m):
     """`Straps` of a `ReadWall`.
 
-    taped  reduced circumferences, `AreaTerm`, and the shape that it follows from
+    Parameters
+    ----------
+    job : Job
+    read : ReadWall
+    taped : tuple
+        Reduced circumferences, `AreaTerm`, and the standard deviation of the shape, m.
+    inner_m : ndarray, shape (courses,)
+        Plate and paint between the surface of the points and the outside, m.
+
+    Returns
+    -------
+    Straps
     """
     reduced, term, shape = taped
-    mine, tested = read.are("straps"), read.tested
+    is_strap, tested = read.are("straps"), read.tested
     return Straps(
         reduced=reduced,
-        adjusted=read.places[mine],
-        accepted=tested.accepted[mine],
+        adjusted=read.places[is_strap],
+        accepted=tested.accepted[is_strap],
         w=read.tests_of("straps")[0],
-        sd_m=tested.sd_m[mine],
-        departure_m=tested.departure_m[mine],
+        sd_m=tested.sd_m[is_strap],
+        departure_m=tested.departure_m[is_strap],
         area_term=term,
         shape_sd_m=shape,
         radius_m=mean_radii(read.field) + inner_m,
@@ -328,15 +405,19 @@ def _straps_of(job, read, taped, inner_m):
 
 
 def _on_surface(reading, inner_m, side):
-    """A reading's radius on the surface that points are on: inside without plate and paint."""
+    """Reading with its radius on the surface of the points: inside without plate and paint."""
     if side == "outside":
         return reading
-    by = {name: reading.by_inputs.get(name, 0.0) - 1.0 for name in ("plate_thickness", "paint")}
-    return replace(reading, radius_m=reading.radius_m - inner_m, by_inputs=reading.by_inputs | by)
+    by_inputs = {
+        name: reading.by_inputs.get(name, 0.0) - 1.0 for name in ("plate_thickness", "paint")
+    }
+    return replace(
+        reading, radius_m=reading.radius_m - inner_m, by_inputs=reading.by_inputs | by_inputs
+    )
 
 
 def _joined(points, straps):
-    """`Sites` of points, then of straps, without what they share."""
+    """`Sites` of points, then of straps, without shared columns."""
     names = ("course", "ring", "zeta", "azimuth_rad", "leans")
     return Sites(
         **{name: np.concatenate([getattr(points, name), getattr(straps, name)]) for name in names},

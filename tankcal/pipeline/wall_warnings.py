@@ -1,4 +1,4 @@
-"""Warnings of the wall that was found: its sections, how it was measured, what was rejected."""
+"""Warnings about a fitted wall: sections, arrangement of the readings and rejected points."""
 
 from itertools import pairwise
 
@@ -9,35 +9,41 @@ from tankcal.messages import list_some, message
 from tankcal.pipeline.survey_warnings import LARGE_NOISE_M, SHOWN, of_points
 from tankcal.pipeline.undecided_columns import tell_undecided
 
-FEWEST_POINTS, ADVISED_POINTS = 5, 10  # of a section
+FEWEST_POINTS, ADVISED_POINTS = 5, 10  # least and recommended number of points of a section
 WIDE_GAP_DEG = 45
 LARGE_JUMP_M, MANY_SNOOPED = 0.020, 0.03
-TOLD_ALONE = 3  # sections of a kind that are told one by one
-ONE_HEIGHT, OFF_MIDDLE = 0.2, 0.1  # of a course's height: within one height; off its middle
+TOLD_ALONE = 3  # largest number of sections that get a warning each
+# Relative to a course: range of one height; mean distance from the middle that matters.
+ONE_HEIGHT, OFF_MIDDLE = 0.2, 0.1
 
 
 def weak_sections(job, groups, azimuth_rad):
-    """Sections with few points, or with a part of the turn that nobody measured.
+    """Warnings of sections with few points or with a large gap.
 
-    Each is told by itself, or all of a kind at once where they are more than `TOLD_ALONE`.
+    Sections are named individually, or together if there are more than `TOLD_ALONE` of a kind.
     """
-    few, gaps = [], []
+    sparse, gaps = [], []
     for group in groups:
         ordered = np.sort(azimuth_rad[group.members])
         gap = np.degrees(np.max(np.diff(ordered, append=ordered[0] + 2 * np.pi)))
         named = {"section": _shown(job, group), "course": job.courses[group.course].name}
         if len(ordered) < ADVISED_POINTS:
-            few.append((len(ordered), named))
+            sparse.append((len(ordered), named))
         if gap > WIDE_GAP_DEG:
             gaps.append((gap, named))
-    kinds = (few, _with_few, _all_with_few), (gaps, _with_gap, _all_with_gaps)
+    kinds = (sparse, _with_few, _all_with_few), (gaps, _with_gap, _all_with_gaps)
     texts = []
-    for found, of_one, of_all in kinds:
-        texts += [of_all(found)] if len(found) > TOLD_ALONE else [of_one(*one) for one in found]
+    for sections, text_of_section, text_of_sections in kinds:
+        texts += (
+            [text_of_sections(sections)]
+            if len(sections) > TOLD_ALONE
+            else [text_of_section(*section) for section in sections]
+        )
     return of_points(job.points, texts)
 
 
 def _with_few(count, named):
+    """Message about a section with few points."""
     return message(
         "section_weak",
         "section {section} (course {course}) has only {count} points; {advised} or more are "
@@ -48,19 +54,21 @@ def _with_few(count, named):
     )
 
 
-def _all_with_few(found):
+def _all_with_few(sections):
+    """Message about all sections with few points."""
     return message(
         "sections_weak",
         "{all} sections have fewer than {advised} points, {count} at least: {sections}; {advised} "
         "or more are advised",
-        all=len(found),
-        count=min(count for count, _ in found),
-        sections=_listed(found),
+        all=len(sections),
+        count=min(count for count, _ in sections),
+        sections=_listed(sections),
         advised=ADVISED_POINTS,
     )
 
 
 def _with_gap(gap_deg, named):
+    """Message about a section with a gap."""
     return message(
         "section_gap",
         "section {section} (course {course}) has no point over {gap_deg:.0f} deg of its "
@@ -70,27 +78,29 @@ def _with_gap(gap_deg, named):
     )
 
 
-def _all_with_gaps(found):
+def _all_with_gaps(sections):
+    """Message about all sections with a gap."""
     return message(
         "sections_gap",
         "{all} sections have no point over a part of their circumference, {gap_deg:.0f} deg at "
         "most: {sections}; measure there",
-        all=len(found),
-        gap_deg=max(gap_deg for gap_deg, _ in found),
-        sections=_listed(found),
+        all=len(sections),
+        gap_deg=max(gap_deg for gap_deg, _ in sections),
+        sections=_listed(sections),
     )
 
 
-def _listed(found):
-    """Names of sections with those of their courses, the first of them."""
+def _listed(sections):
+    """Names of the first sections, with those of their courses."""
     names = [
-        message("section_of_course", "{section} (course {course})", **named) for _, named in found
+        message("section_of_course", "{section} (course {course})", **named)
+        for _, named in sections
     ]
     return list_some(names, SHOWN)
 
 
 def _shown(job, group):
-    """Name of a section; of tangents, which have that of their course and level, the level."""
+    """Name of a section in messages; the level for a section of tangents."""
     level = group.name.removeprefix(f"{job.courses[group.course].name} ")
     if job.tangents is None or level == group.name:
         return group.name
@@ -98,18 +108,18 @@ def _shown(job, group):
 
 
 def warn_of_taper(job, field):
-    """Courses that were measured at one height each, all off their middles to the same side.
+    """Warning of courses measured at one height each, mostly off their middles to the same side.
 
-    A taper that all courses share moves the table then. Lapped plates have more of it than U has,
-    which knows how far butt-welded ones may taper.
+    A taper common to all courses would then change the table. U includes the taper of butt-welded
+    plates; lapped plates have more.
     """
-    if any(one.name == "taper" for one in job.inputs):
+    if any(declared_input.name == "taper" for declared_input in job.inputs):
         return []
     sites = field.sites
-    parts = [(sites.zeta[members] + 1) / 2 for members in sites.members if len(members)]
-    flat = [np.ptp(part) < ONE_HEIGHT for part in parts]
-    off = np.mean([np.median(part) for part in parts]) - 0.5
-    if np.mean(flat) <= 0.5 or abs(off) < OFF_MIDDLE:
+    heights = [(sites.zeta[members] + 1) / 2 for members in sites.members if len(members)]
+    is_flat = [np.ptp(height) < ONE_HEIGHT for height in heights]
+    mean_offset = np.mean([np.median(height) for height in heights]) - 0.5
+    if np.mean(is_flat) <= 0.5 or abs(mean_offset) < OFF_MIDDLE:
         return []
     text = message(
         "taper_unseen",
@@ -117,26 +127,39 @@ def warn_of_taper(job, field):
         " course's height from the middle: a taper that all courses share would move the table, and"
         " U has one of {taper_mm:.1f} mm (sd, from the middle to an end); lapped plates have more:"
         " measure a second height, or declare taper in uncertainty.csv",
-        count=sum(flat),
-        all=len(parts),
-        percent=100 * off,
+        count=sum(is_flat),
+        all=len(heights),
+        percent=100 * mean_offset,
         taper_mm=1000 * np.sqrt(3 * _variance_m2(field, "common taper")),
     )
     return of_points(job.points, [text])
 
 
 def _variance_m2(field, component):
-    names = [one.name for one in COMPONENTS]
+    """Variance of a component of the form by its name, m2."""
+    names = [entry.name for entry in COMPONENTS]
     return field.amplitudes.variances_m2[names.index(component)]
 
 
 def check_shell(job, shell, sections, given_sd_m):
-    """A tilt that is not determined, large scatter, many outliers, radii that jump.
+    """Warnings of an undetermined tilt, large scatter, many outliers, or jumps of the radius.
 
-    given_sd_m (n,) standard deviations of the points in plan, or None. Those of an adjustment are
-    tested there, by all its residuals: a wall whose courses differ proves nothing against them.
+    Standard deviations from an adjustment are tested there, by all residuals. The form of a wall
+    with different courses is no evidence against them.
+
+    Parameters
+    ----------
+    job : Job
+    shell : Shell
+    sections : sequence of Section
+    given_sd_m : ndarray, shape (n,), or None
+        Standard deviations of the points in plan, m.
+
+    Returns
+    -------
+    list of Problem
     """
-    texts = _of_scatter(shell, None if job.points.from_adjustment else given_sd_m)
+    texts = _texts_of_scatter(shell, None if job.points.from_adjustment else given_sd_m)
     if not shell.tilt_known:
         texts.append(
             message(
@@ -173,7 +196,8 @@ def check_shell(job, shell, sections, given_sd_m):
     return of_points(job.points, texts)
 
 
-def _of_scatter(shell, given_sd_m):
+def _texts_of_scatter(shell, given_sd_m):
+    """Warning of a large scatter about the form, against stated standard deviations if given."""
     noise_mm = 1000 * shell.noise_m
     if given_sd_m is not None:
         given_mm = 1000 * np.median(given_sd_m)

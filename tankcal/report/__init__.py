@@ -1,6 +1,6 @@
-"""From the record to paper: executed notebook, certificate, working papers, report, web page.
+"""Reports of a record: executed notebook, certificate, working papers, report and web page.
 
-Nothing here computes a number: the record's values are formatted (docs/report.md).
+The reports format the values of the record and compute no results (docs/report.md).
 """
 
 from pathlib import Path
@@ -9,9 +9,9 @@ FILES = (
     *("report.ipynb", "certificate.pdf", "working-papers.pdf", "field-table.pdf"),
     *("report.pdf", "report.html"),
 )
-LETTERHEAD = "letterhead.json"  # there when a letterhead was given
-WORKERS = 2  # that set PDFs: each goes on with what the ones before it have in common with it
-_NOT_IN_ALL = (
+LETTERHEAD = "letterhead.json"  # written only if the user gives a letterhead
+WORKERS = 2  # threads that typeset PDFs; the typesetter reuses the layout of earlier PDFs
+_NOT_IN_ALL = (  # keys that some kinds of record, or records of earlier versions, do not have
     "top",
     "budgets",
     "deliveries",
@@ -29,41 +29,47 @@ _NOT_IN_ALL = (
     "great_circles",
     "overrulings",
 )
-_PARTS = (
+_PARTS = (  # name of each PDF and the part of the notebook that it contains
     ("certificate.pdf", "certificate"),
     ("working-papers.pdf", "working-papers"),
     ("field-table.pdf", "field-table"),
     ("report.pdf", ""),
 )
+# Papers of a record without a capacity table.
 _PARTS_OF_SURVEY = (("working-papers.pdf", "working-papers"),)
 
 
 def build(record_path, directory, progress=None, language=None, letterhead=None, record=None):
-    """Write the files of FILES into `directory`, from the record alone; give their paths.
+    """Write the report files of a record into a folder and return their paths.
 
-    A record without a capacity, of a survey that was only adjusted, has no certificate: it gets
-    working papers, notebook and web page.
+    The record of a survey without a capacity table has no certificate. Its report consists of
+    the working papers, the notebook and the web page.
 
     Parameters
     ----------
-    record_path
-        Path of a record.json; it is copied beside the notebook when it is not there yet.
-    directory
-        A workbook that lies there, too, is held inside the PDFs.
-    progress : optional
-        Called as progress(done, total) while it works.
-    language : optional
-        Of the papers; None: that of the job.
-    letterhead : optional
-        A letterhead.Letterhead, or None.
-    record : optional
-        The record as loaded from there, when it is at hand.
+    record_path : str or Path
+        Path of a record.json; the file is copied into `directory` if it lies elsewhere.
+    directory : str or Path
+        Folder of the report. The PDFs embed an Excel workbook that lies in this folder.
+    progress : callable, optional
+        Called as progress(done, total) after each step.
+    language : str, optional
+        Language of the report; None: the language of the job.
+    letterhead : letterhead.Letterhead, optional
+        Letterhead of the laboratory.
+    record : dict, optional
+        The loaded record, if it has been read before.
+
+    Returns
+    -------
+    list of Path
+        Notebook, PDFs and web page.
 
     Raises
     ------
     TankcalError
-        When a cell of the notebook fails or a page cannot be set; then none of the files is
-        written.
+        If a cell of the notebook fails or a page cannot be typeset. No file of FILES is written in
+        this case.
     """
     from tankcal import record as records
     from tankcal.report.notebook import joined
@@ -85,38 +91,42 @@ def build(record_path, directory, progress=None, language=None, letterhead=None,
 
 
 def missing(record):
-    """Names of what a record has nothing of, or, of an earlier version, does not know.
+    """Keys of a record without content (list of str).
 
-    Parameters
-    ----------
-    record : dict
-
-    Returns
-    -------
-    list of str
+    The keys include those that a record of an earlier version lacks.
     """
     known = dict.fromkeys(_NOT_IN_ALL) | record
     return [part for part, value in known.items() if not value]
 
 
-def set_papers(notebook, directory, parts, progress=None, **handed):
-    """Execute a notebook in `directory` and write it there with its PDFs and web page.
+def set_papers(notebook, directory, parts, progress=None, **parameters):
+    """Execute a notebook in a folder and write the notebook, its PDFs and its web page.
 
-    A PDF is set as soon as the cells of its part are done, while the others are executed.
-
-    Gives the paths, and raises, as `build` does.
+    The typesetting of a PDF starts as soon as the cells of its part have been executed.
 
     Parameters
     ----------
-    notebook
-        As `notebook.joined` gives it.
+    notebook : dict
+        Notebook of `notebook.joined`.
+    directory : Path
+        Folder of the report.
     parts : sequence of (str, str)
-        Name of each PDF, and the part of the notebook that it is of; part "" is all of it but the
-        field table, and so is the web page.
-    progress : optional
-        Called as progress(done, total) while it works.
-    **handed
-        Parameters of the notebook, as `notebook.execute` takes them.
+        Name of each PDF and the part of the notebook that it contains. Part "" is the whole
+        notebook without the field table. The web page also has this extent.
+    progress : callable, optional
+        Called as progress(done, total) after each step.
+    **parameters
+        Parameters of the notebook, as in `notebook.execute`.
+
+    Returns
+    -------
+    list of Path
+        Notebook, PDFs and web page.
+
+    Raises
+    ------
+    TankcalError
+        As `build` does.
     """
     from concurrent.futures import ThreadPoolExecutor
 
@@ -127,25 +137,29 @@ def set_papers(notebook, directory, parts, progress=None, **handed):
     from tankcal.report.web import page
 
     cells = len(notebook["cells"])
-    total = cells + len(parts) + 2
+    total = cells + len(parts) + 2  # cells, PDFs, the notebook file and the web page
     progress = progress or (lambda done, total: None)
     ends = {name: last_cell(notebook, part) for name, part in parts}
     pages, packed = {}, Packed()
 
     def on_cell(done):
+        # Start a PDF when the last cell of its part is done.
         for name, part in parts:
             if ends[name] == done:
-                again = bool(part) and part not in BESIDE
-                pages[name] = pool.submit(pdf, blocks_of(notebook, part), directory, again, packed)
+                is_reused = bool(part) and part not in BESIDE
+                pages[name] = pool.submit(
+                    pdf, blocks_of(notebook, part), directory, is_reused, packed
+                )
         progress(done, total)
 
-    with ThreadPoolExecutor(WORKERS) as pool:  # the typesetter works outside Python
-        execute(notebook, directory, on_cell, **handed)
+    with ThreadPoolExecutor(WORKERS) as pool:  # the typesetter runs outside Python
+        execute(notebook, directory, on_cell, **parameters)
         contents = {"report.ipynb": written(notebook).encode("utf-8")}
         contents["report.html"] = page(blocks_of(notebook)).encode("utf-8")
         for name, _ in parts:
             contents[name] = pages[name].result()
             progress(cells + len(contents), total)
+    # All files exist in memory before the first file is written.
     for name, content in contents.items():
         (directory / name).write_bytes(content)
     progress(total, total)

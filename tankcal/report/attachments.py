@@ -1,8 +1,8 @@
-"""Files that a PDF holds inside, byte for byte: the record, and what was made from it.
+"""Files embedded in a PDF, byte for byte: the record and the files derived from it.
 
-The typesetter would pack them anew for each paper. It is given their digests instead, and sets with
-them all that says what a file is; the files come into the place of the digests afterwards, packed
-once for all papers of a run.
+The typesetter would compress each file again for each paper. It therefore receives the SHA-256
+digests of the files and writes all entries that describe a file. Each digest is then replaced by
+its file, which is compressed once for all papers of a run.
 """
 
 import hashlib
@@ -16,7 +16,7 @@ from tankcal.errors import TankcalError
 from tankcal.report.pdf_objects import objects_of
 
 _WORKBOOK = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
-KINDS = {  # name of the file: MIME type, what it is to the paper (PDF 2.0, 7.11.3)
+KINDS = {  # name of the file: MIME type, relationship to the paper (PDF 2.0, 7.11.3)
     "record.json": ("application/json", "source"),
     "record_tables.npz": ("application/zip", "source"),
     "capacity.xlsx": (_WORKBOOK, "data"),
@@ -33,11 +33,12 @@ OF_RECORD = (
     *("record.json", "record_tables.npz"),
     *("capacity.xlsx", "adjustment.xlsx", "certificate.xml"),
 )
-LARGEST = 20_000_000  # bytes: a larger file stays beside the PDF, which names its digest
-LARGEST_PACKED = 5_000_000  # of long tables: the size that such a record.json has by them
-ZIP = b"PK\x03\x04"  # so begins a file that is packed already
-LEVEL = 1  # of packing: the typesetter's own, 6, takes five times as long for 6 % less
+LARGEST = 20_000_000  # bytes; a larger file is not embedded, and the PDF states its digest only
+LARGEST_PACKED = 5_000_000  # bytes; largest file of long tables that is embedded
+ZIP = b"PK\x03\x04"  # first bytes of a file that is already compressed
+LEVEL = 1  # level of compression; level 6 of the typesetter takes five times as long for 6 % less
 _TYPE, _DEFLATED = b"/Type/EmbeddedFile", b"/Filter/FlateDecode"
+# An embedded file as typst writes it: filter, description, size, content.
 _HELD = re.compile(
     rb"<</Length \d+/Type/EmbeddedFile(/Filter/FlateDecode)?(/Subtype/[^/<>]+/Params<</Size )\d+"
     rb"([^<>]*>>>>\nstream\n)(.+)\nendstream",
@@ -47,7 +48,7 @@ _HELD = re.compile(
 
 @dataclass(frozen=True)
 class Attachment:
-    """A file beside the notebook: its name, type, relationship, description and SHA-256."""
+    """Description of a file in the folder of the notebook, with its SHA-256."""
 
     name: str
     mime: str
@@ -56,14 +57,23 @@ class Attachment:
     sha256: str
 
     def data(self):
-        """The attachment as plain data: what a document block holds."""
+        """Return the attachment as a dict for a document block."""
         return asdict(self)
 
 
 def beside(folder, described):
-    """Attachments of the files in `folder` that are known and not too large for a PDF.
+    """Return an Attachment for each existing file that is small enough for a PDF.
 
-    described  {name: description}
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the files.
+    described : dict
+        {name of the file: description}.
+
+    Returns
+    -------
+    list of Attachment
     """
     paths = [Path(folder) / name for name in described]
     return [
@@ -74,41 +84,57 @@ def beside(folder, described):
 
 
 def _largest(path):
+    """Largest size of an embedded file, bytes."""
     return LARGEST_PACKED if path.suffix == ".npz" else LARGEST
 
 
 def contents(blocks, folder):
-    """{name: (SHA-256, bytes)} of what the document blocks attach, read in `folder`.
+    """Read the files that the document blocks attach.
 
-    Raises TankcalError for one that is absent, or is not the one that the notebook found.
+    Parameters
+    ----------
+    blocks : list of dict
+        Blocks of a paper.
+    folder : str or Path
+        Folder of the notebook and of the files.
+
+    Returns
+    -------
+    dict
+        {name: (SHA-256, bytes)}.
+
+    Raises
+    ------
+    TankcalError
+        If a file is absent or has changed since the notebook was executed.
     """
-    found = {}
-    for one in named(blocks):
-        path = Path(folder) / one["name"]
-        if Path(one["name"]).name != one["name"] or not path.is_file():
+    files = {}
+    for file in named(blocks):
+        path = Path(folder) / file["name"]
+        if Path(file["name"]).name != file["name"] or not path.is_file():
             raise TankcalError(
-                f"the PDF holds {one['name']!r} inside, and there is no such file beside the "
+                f"the PDF holds {file['name']!r} inside, and there is no such file beside the "
                 "notebook; expected it there"
             )
         content = path.read_bytes()
-        found[one["name"]] = one["sha256"], content
-        if sha256(content) != one["sha256"]:
+        files[file["name"]] = file["sha256"], content
+        if sha256(content) != file["sha256"]:
             raise TankcalError(
-                f"{one['name']} beside the notebook was changed since the notebook was executed; "
+                f"{file['name']} beside the notebook was changed since the notebook was executed; "
                 "execute it again"
             )
-    return found
+    return files
 
 
 class Packed:
-    """Files as PDFs hold them, each packed once however many papers of a run hold it."""
+    """Compressed files of a run; each file is compressed once for all papers."""
 
     def __init__(self):
-        self._streams, self._alone = {}, Lock()
+        self._streams, self._lock = {}, Lock()
 
     def stream(self, digest, content):
-        """(entry of the filter, stream) of the file with that SHA-256."""
-        with self._alone:  # of two papers that are set at once the second waits for the first
+        """Return (filter entry, stream) of the file with this SHA-256."""
+        with self._lock:  # a second paper waits for the compression by the first
             if digest not in self._streams:
                 zipped = content.startswith(ZIP)
                 self._streams[digest] = (
@@ -118,59 +144,67 @@ class Packed:
 
 
 def hold(pdf, files, packed):
-    """A PDF that holds files in the place of their digests.
+    """Replace the digests in a PDF by the files themselves.
 
     Parameters
     ----------
     pdf : bytes
-        As typst sets it of files that hold the SHA-256 of others.
+        PDF of typst, with a digest as the content of each embedded file.
     files : dict
-        The others, {SHA-256: bytes}.
+        Files to embed, {SHA-256: bytes}.
     packed : Packed
+        Compressed files of the run.
 
     Returns
     -------
     bytes or None
-        None where the digests are not found in the PDF, which then has another form.
+        None if the PDF does not contain all digests in the expected form.
     """
     objects = objects_of(pdf)
     if objects is None:
         return None
-    changed, missing, at = {}, set(files), pdf.find(_TYPE)
-    while at >= 0:
-        number, stream = objects.around(at) or (None, b"")
-        found = _HELD.fullmatch(stream)
-        digest = found and _unpacked(*found.group(1, 4))
+    # Find each embedded file by its type entry, and its digest in the stream of the object.
+    changed, missing, position = {}, set(files), pdf.find(_TYPE)
+    while position >= 0:
+        number, stream = objects.around(position) or (None, b"")
+        match = _HELD.fullmatch(stream)
+        digest = match and _unpacked(*match.group(1, 4))
         if digest in files:
-            changed[number] = _stream(found, packed.stream(digest, files[digest]), files[digest])
+            changed[number] = _stream(match, packed.stream(digest, files[digest]), files[digest])
             missing.discard(digest)
-        at = pdf.find(_TYPE, at + len(_TYPE))
+        position = pdf.find(_TYPE, position + len(_TYPE))
     return None if missing else objects.with_contents(changed)
 
 
 def _unpacked(deflated, content):
-    """The text of a stream."""
+    """Return the text of a stream, decompressed if necessary."""
     return (zlib.decompress(content) if deflated else content).decode("ascii", "replace")
 
 
-def _stream(found, packed, content):
-    """The object of a file: what typst wrote of a digest, with another size and stream."""
-    (deflated, stream), (_, kind, rest, _) = packed, found.groups()
+def _stream(match, packed, content):
+    """Return the PDF object of a file: the object of its digest with a new size and stream."""
+    (deflated, stream), (_, kind, rest, _) = packed, match.groups()
     head = b"<</Length %d/Type/EmbeddedFile%s%s%d%s"
     head %= len(stream), deflated, kind, len(content), rest
     return b"%s%s\nendstream" % (head, stream)
 
 
 def named(blocks):
-    """The data of the attachments of all document blocks, each file once."""
+    """Return the attachments of all document blocks (list of dict), each file once."""
     documents = [block for block in blocks if block["kind"] == "document"]
-    return list({one["name"]: one for block in documents for one in _of(block)}.values())
+    return list(
+        {
+            attachment["name"]: attachment
+            for block in documents
+            for attachment in _attachments(block)
+        }.values()
+    )
 
 
-def _of(document):
+def _attachments(document):
     return document.get("attachments", [])
 
 
 def sha256(data):
-    """The SHA-256 of bytes, in hexadecimal digits."""
+    """Return the SHA-256 of bytes as hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()

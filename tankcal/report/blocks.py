@@ -1,7 +1,7 @@
-"""Blocks: what a notebook cell returns so that Jupyter, the PDF and the HTML page show it well.
+"""Blocks: results of notebook cells that Jupyter, the PDF and the HTML page can display.
 
-A block is plain data. Jupyter shows its HTML; the exporters take the data itself from the output's
-`application/vnd.tankcal.block+json`, so that no text of a user is ever read as markup.
+A block is a dict. Jupyter displays its HTML. The exporters read the dict from the output of type
+`application/vnd.tankcal.block+json`, so that user text is never interpreted as markup.
 
     blocks.table([["height", "m"], ["volume", "m³"]], [["0.010", "1.31"]], caption="Capacity")
     blocks.table(data_frame, caption="My own table")
@@ -16,17 +16,17 @@ from tankcal.text.digits import NOTHING
 
 MIME = "application/vnd.tankcal.block+json"
 ALIGNMENTS = ("left", "center", "right", "decimal")
-WEB_ONLY = (
+WEB_ONLY = (  # kinds that the PDF omits (report/web writes them)
     "calculator",
     "tank_view",
     "cloud_map",
     "wall_map",
-)  # kinds that the PDF leaves out (report/web makes them)
+)
 
 
 @dataclass(frozen=True)
 class Block:
-    """One block: `data` is its JSON, {"kind": ..., ...}."""
+    """A block with its content `data`, {"kind": ..., ...}."""
 
     data: dict
 
@@ -44,14 +44,29 @@ class Block:
 
 
 def document(**properties):
-    """The start of a document: part, title, author, date (ISO), language, notice, running lines.
+    """Block at the start of a document, with its title and page style.
 
-    part      "certificate", "working-papers", "field-table", or "" for a notebook of one's own
-    running   [left, right] texts at the top of every page
-    footer    text with {page} and {pages}
-    letterhead   data of a letterhead.Letterhead, or None
-    record_sha256  hexadecimal digits, "" for none: a keyword of the PDF
-    attachments  files beside the notebook that its PDF holds inside (attachments.Attachment.data)
+    Parameters
+    ----------
+    **properties
+        part : "certificate", "working-papers", "field-table", or "" for a notebook of the user.
+        title, author, notice : str.
+        date : ISO date, or "".
+        language : code of the language.
+        running : [left, right], texts at the top of every page.
+        footer : text with {page} and {pages}.
+        letterhead : dict of a letterhead.Letterhead, or None.
+        record_sha256 : hexadecimal digits for the keywords of the PDF, or "".
+        attachments : embedded files (attachments.Attachment.data).
+
+    Returns
+    -------
+    Block
+
+    Raises
+    ------
+    TankcalError
+        For an unknown property.
     """
     known = {
         "part": "",
@@ -73,7 +88,21 @@ def document(**properties):
 
 
 def masthead(title, subtitle="", laboratory="", number_label="", number=None):
-    """The head of the first page; an absent number leaves a line to write on, if it has a label."""
+    """Head of the first page; a labelled number that is None becomes a blank line to fill in.
+
+    Parameters
+    ----------
+    title, subtitle, laboratory : str
+        Texts of the head.
+    number_label : str, optional
+        Label of the number; "": no number.
+    number : str, optional
+        Number of the document.
+
+    Returns
+    -------
+    Block
+    """
     return Block(
         {
             "kind": "masthead",
@@ -87,78 +116,111 @@ def masthead(title, subtitle="", laboratory="", number_label="", number=None):
 
 
 def heading(text, level=1):
-    """A heading; level 1 to 3."""
+    """Heading of level 1, 2 or 3."""
     if level not in (1, 2, 3):
         raise TankcalError(f"a heading has level 1, 2 or 3, not {level!r}")
     return Block({"kind": "heading", "text": _text(text), "level": level})
 
 
 def paragraph(text):
-    """One paragraph of plain text."""
+    """Paragraph of plain text."""
     return Block({"kind": "paragraph", "text": _text(text)})
 
 
 def with_next(block):
-    """The same block, on the page on which the next one begins."""
+    """Return the block, to be kept on the page on which the next block begins."""
     return Block({**block.data, "with_next": True})
 
 
 def whole(block):
-    """The same table, which is no longer than a page, with all its rows on one."""
+    """Return the table, to be kept on one page; it must not be longer than a page."""
     return Block({**block.data, "whole": True})
 
 
 def listing(items):
-    """A list of sentences."""
+    """List of sentences."""
     return Block({"kind": "list", "items": [_text(item) for item in items]})
 
 
 def notice(text):
-    """A line in a frame that cannot be overlooked."""
+    """Framed line of text that draws attention."""
     return Block({"kind": "notice", "text": _text(text)})
 
 
 def result(label, text, note=""):
-    """The main result in a frame: what it is, the result itself, and a note below it."""
+    """Framed main result with its label above and a note below.
+
+    Parameters
+    ----------
+    label : str
+        Label of the result.
+    text : str
+        The result.
+    note : str, optional
+        Text below the result.
+
+    Returns
+    -------
+    Block
+    """
     return Block(
         {"kind": "result", "label": _text(label), "text": _text(text), "note": _text(note)}
     )
 
 
 def signature(labels, field=""):
-    """Empty lines to sign on, side by side, each over its label.
+    """Empty lines for signatures, side by side, each above its label.
 
-    field   what the field for an electronic signature over the last line is called; "": none
+    Parameters
+    ----------
+    labels : list of str
+        Labels of the lines.
+    field : str, optional
+        Name of the field for an electronic signature above the last line; "": no field.
+
+    Returns
+    -------
+    Block
     """
-    made = {"kind": "signature", "labels": [_text(label) for label in labels]}
-    return Block(made | ({"field": _text(field)} if field else {}))
+    data = {"kind": "signature", "labels": [_text(label) for label in labels]}
+    return Block(data | ({"field": _text(field)} if field else {}))
 
 
 def hash_code(digest, text, alt):
-    """The SHA-256 of a file as a QR code of "sha256:...", with the digits and what they are beside.
+    """QR code of the SHA-256 of a file, "sha256:...", with the digits and a description beside it.
 
-    text   what the file is
-    alt    the description for readers who cannot see it; {text} in it is what the code says
+    Parameters
+    ----------
+    digest : str
+        SHA-256 of the file, hexadecimal digits.
+    text : str
+        Description of the file.
+    alt : str
+        Alternative text for readers who cannot see the code; {text} stands for its content.
+
+    Returns
+    -------
+    Block
     """
-    said = f"sha256:{digest}"
+    content = f"sha256:{digest}"
     return Block(
         {
             "kind": "hash_code",
-            "svg": _qr_svg(said),
-            "code": said,
+            "svg": _qr_svg(content),
+            "code": content,
             "text": _text(text),
-            "alt": _text(alt.format(text=said)),
+            "alt": _text(alt.format(text=content)),
         }
     )
 
 
 def end_mark(text):
-    """The mark after the last line of a document."""
+    """Mark after the last line of a document."""
     return Block({"kind": "end", "text": _text(text)})
 
 
 def key_values(items, caption=""):
-    """Names and what they are, in two columns; `items` is a list of (name, text)."""
+    """Names and values in two columns; `items` is a list of (name, text)."""
     return Block(
         {
             "kind": "key_values",
@@ -169,23 +231,50 @@ def key_values(items, caption=""):
 
 
 def table(columns, rows=None, caption="", align=None, decimal_mark=".", formulas=()):
-    """A table with one heading row; or, from a pandas DataFrame alone, the same.
+    """Table with one row of headings.
 
-    columns   a heading each, or [heading, unit]
-    rows      lists of text, as long as `columns`; None is printed as a dash
-    align     "left", "center", "right" or "decimal" for each column; default: numbers to the right
-    decimal_mark  on which the numbers of a "decimal" column stand in line
-    formulas  numbers of the columns, from 0, whose known formulas are set (report/plain_formulas)
+    Parameters
+    ----------
+    columns : list of str or [str, str], or pandas DataFrame
+        Heading, or [heading, unit], of each column. A DataFrame needs no `rows`.
+    rows : list of list of str, optional
+        Texts of the cells; None is printed as a dash.
+    caption : str, optional
+        Caption of the table.
+    align : list of str, optional
+        "left", "center", "right" or "decimal" for each column. By default, numbers are aligned
+        right and texts left.
+    decimal_mark : str, optional
+        Mark at which the numbers of a "decimal" column are aligned.
+    formulas : sequence of int, optional
+        Indices, from 0, of the columns with formulas to typeset (report/plain_formulas).
+
+    Returns
+    -------
+    Block
+
+    Raises
+    ------
+    TankcalError
+        If the numbers of cells, alignments and columns disagree.
     """
     more = {"formulas": list(formulas)} if formulas else {}
     return _table("table", columns, rows, caption, align, decimal_mark, **more)
 
 
 def form(columns, rows):
-    """A table that is filled in by pen.
+    """Empty table to fill in by hand.
 
-    columns   (heading, unit, share of the width) of each
-    rows      how many empty ones
+    Parameters
+    ----------
+    columns : list of (str, str, float)
+        Heading, unit and relative width of each column.
+    rows : int
+        Number of empty rows.
+
+    Returns
+    -------
+    Block
     """
     heads = [
         {"heading": _text(heading), "unit": _text(unit), "share": share}
@@ -195,15 +284,45 @@ def form(columns, rows):
 
 
 def columns_table(columns, rows=None, caption="", align=None, across=4, decimal_mark="."):
-    """A long narrow table, set in `across` columns on each page, the headings over each of them."""
+    """Long narrow table, with several parts side by side on each page.
+
+    Parameters
+    ----------
+    columns, rows, caption, align, decimal_mark
+        As in `table`.
+    across : int, optional
+        Number of parts side by side; each part has the headings.
+
+    Returns
+    -------
+    Block
+    """
     across = int(across)
     return _table("columns_table", columns, rows, caption, align, decimal_mark, across=across)
 
 
 def figure(figure, caption, alt, width=1.0):
-    """A matplotlib figure (or the text of an SVG) with its caption and a description in words.
+    """Figure with its caption and alternative text.
 
-    width   part of the width of the text, 0 < width <= 1
+    Parameters
+    ----------
+    figure : matplotlib Figure or str
+        Figure, or the text of an SVG.
+    caption : str
+        Caption of the figure.
+    alt : str
+        Description for readers who cannot see the figure.
+    width : float, optional
+        Width relative to the width of the text, 0 < width <= 1.
+
+    Returns
+    -------
+    Block
+
+    Raises
+    ------
+    TankcalError
+        For an empty `alt` or a width outside this range.
     """
     if not str(alt).strip():
         raise TankcalError("a figure needs `alt`: what it shows, for readers who cannot see it")
@@ -222,18 +341,19 @@ def figure(figure, caption, alt, width=1.0):
 
 
 def code(text):
-    """Text as a program printed it, in a fixed-width font."""
+    """Output of a program in a fixed-width font."""
     return Block({"kind": "code", "text": without_controls(text.replace("\t", "    "))})
 
 
 def without_controls(text):
-    """`text` with control characters, which no font has, as spaces; line ends stay."""
+    """Replace control characters, which no font contains, by spaces; keep line ends."""
     return "".join(c if c.isprintable() or c in "\n\u2007\u2009\u202f\xa0" else " " for c in text)
 
 
 def _table(kind, columns, rows, caption, align, decimal_mark, **more):
-    if rows is None:
-        columns, rows, align = _of_data_frame(columns, align)
+    """Return the Block of a table after checks of its dimensions."""
+    if rows is None:  # `columns` is a DataFrame
+        columns, rows, align = _read_data_frame(columns, align)
     heads = [[_text(column), ""] if isinstance(column, str) else list(column) for column in columns]
     cells = [[_text(cell) for cell in row] for row in rows]
     for number, row in enumerate(cells, 1):
@@ -251,7 +371,8 @@ def _table(kind, columns, rows, caption, align, decimal_mark, **more):
     return Block(data)
 
 
-def _of_data_frame(frame, align):
+def _read_data_frame(frame, align):
+    """Return headings, rows and alignments of a DataFrame; NaN becomes a dash."""
     if not hasattr(frame, "itertuples"):
         raise TankcalError("a table needs rows, or a pandas DataFrame alone")
     numeric = [kind.kind in "iuf" for kind in frame.dtypes]
@@ -263,7 +384,7 @@ def _of_data_frame(frame, align):
 
 
 def _natural_alignment(rows, column, mark):
-    """Numbers to the right, anything else to the left."""
+    """Return "right" for a column of numbers and "left" for any other column."""
     cells = [row[column] for row in rows if row[column] != NOTHING]
     numbers = all(cell.lstrip("\N{MINUS SIGN}-+").replace(mark, "", 1).isdigit() for cell in cells)
     return "right" if cells and numbers else "left"
@@ -274,7 +395,7 @@ def _text(value):
 
 
 def _qr_svg(text):
-    """The QR code of a text as SVG, a module being one unit, with its quiet zone."""
+    """Return the QR code of a text as SVG, with its quiet zone; a module has the side 1."""
     import segno
 
     code = segno.make(text, error="m", micro=False, boost_error=False)
@@ -284,7 +405,7 @@ def _qr_svg(text):
 
 
 def _svg_of(figure):
-    """The figure as SVG: text stays text, and the same figure gives the same bytes."""
+    """Return a figure as reproducible SVG, in which text remains text."""
     import matplotlib
 
     bare = {"Date": None, "Creator": None, "Format": None, "Type": None}

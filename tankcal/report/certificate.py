@@ -1,6 +1,7 @@
-"""What a certificate says beside its results: ISO/IEC 17025:2017, 7.8.2.1 and 7.8.4.1.
+"""Statements of a certificate besides its results: ISO/IEC 17025:2017, 7.8.2.1 and 7.8.4.1.
 
-Printed when given, never invented: what is not given is a line to write on, or named as missing.
+The certificate prints only statements of the job. A missing statement becomes a blank line or is
+listed as missing.
 """
 
 from tankcal.job.plausibility_table import CODES
@@ -14,12 +15,14 @@ from tankcal.report.tables.facts import (
     tank_facts,
 )
 
-TO_WRITE_ON = ""
+TO_WRITE_ON = ""  # value that the page style prints as a blank line
+# Entries of [certificate] that other parts of the paper print.
 _ELSEWHERE = ("number", "notice", "authorised_by", "authorised_role")
 _PARTIES = (
     *("laboratory", "laboratory_address", "country", "accreditation_number"),
     *("customer", "customer_address", "customer_contact", "place", "date_of_issue", "replaces"),
 )
+# Blank lines to fill in by hand if the job does not give these entries.
 _WRITTEN_BY_HAND = ("laboratory", "laboratory_address", "customer", "customer_address", "place")
 _CALIBRATION = (
     *("method", "procedure", "deviations", "operator", "equipment", "instruments"),
@@ -29,44 +32,46 @@ _ASKED_FOR = ("method", "traceability", "conditions", "condition_of_tank")
 
 
 def parties(paper):
-    """Who issues the certificate, for whom, where and when; then what a job adds of its own."""
+    """Block of laboratory, customer, place, date of issue, and additional entries of the job."""
     certificate = paper.record["job"]["certificate"]
     given = certificate | {
         "place": certificate.get("place") or paper.record["job"]["tank"]["details"].get("location"),
         "date_of_issue": paper.day(certificate.get("date_of_issue")),
     }
-    keys = [key for key in _PARTIES if not _in_the_head(paper, key, certificate)]
-    own = [key for key in certificate if key not in (*_PARTIES, *_CALIBRATION, *_ELSEWHERE)]
-    return _facts(paper, given, [*keys, *own], (*_WRITTEN_BY_HAND, "date_of_issue"))
+    keys = [key for key in _PARTIES if not _is_in_head(paper, key, certificate)]
+    additional_keys = [
+        key for key in certificate if key not in (*_PARTIES, *_CALIBRATION, *_ELSEWHERE)
+    ]
+    return _facts(paper, given, [*keys, *additional_keys], (*_WRITTEN_BY_HAND, "date_of_issue"))
 
 
-def _in_the_head(paper, key, certificate):
-    """Whether the head of the first page says it: the laboratory, the letterhead's address."""
+def _is_in_head(paper, key, certificate):
+    """Return whether the head of the first page prints this entry already."""
     if key == "laboratory":
         return bool(certificate.get(key) or paper.letterhead)
     return key == "laboratory_address" and paper.letterhead and not certificate.get(key)
 
 
 def doubtful_input(paper):
-    """Implausible input, and what no reading checks, under the result; [] where there is neither.
+    """Blocks that warn of implausible input and of quantities without a check; [] if none.
 
-    Such a number may move the volume by far more than U says: it stands where nobody misses it.
+    Such input can change the volume by far more than U. The blocks therefore follow the result.
     """
-    told, hidden, found = doubts_of(paper.record["warnings"]), hidden_errors(paper), []
-    if told:
-        found += [
+    lines, hidden, notices = doubts_of(paper.record["warnings"]), hidden_errors(paper), []
+    if lines:
+        notices += [
             blocks.notice(paper.word("certificate.doubtful")),
             blocks.paragraph(paper.word("certificate.implausible")),
-            blocks.listing(told),
+            blocks.listing(lines),
         ]
     if hidden:
-        found += [blocks.notice(paper.word("certificate.unchecked")), blocks.listing(hidden)]
-    return found
+        notices += [blocks.notice(paper.word("certificate.unchecked")), blocks.listing(hidden)]
+    return notices
 
 
 def doubts_of(warnings):
-    """Lines of those warnings of a record that speak of implausible numbers."""
-    return [_line(one) for one in warnings if one.get("code") in CODES]
+    """Return a line of text for each warning of implausible input (list of str)."""
+    return [_line(warning) for warning in warnings if warning.get("code") in CODES]
 
 
 def _line(warning):
@@ -75,13 +80,13 @@ def _line(warning):
 
 
 def tank(paper):
-    """The tank, and what its table refers to."""
+    """Block of the tank and of the reference conditions of its table."""
     shown = (tank_facts(paper.record), REFERENCES)
     return paper.facts([fact for table in shown for fact in paper.facts_of(table, CERTIFICATE)])
 
 
 def calibration(paper):
-    """How, in which conditions and with what the tank was measured."""
+    """Block of the calibration: method, conditions and instruments."""
     given = paper.record["job"]["certificate"] | {"instruments": _instruments(paper)}
     declared = [(key, given[key]) for key in _CALIBRATION if given.get(key)]
     date, measured = map(paper.facts_of, (SURVEY_DATE, SURVEY))
@@ -89,7 +94,7 @@ def calibration(paper):
 
 
 def _instruments(paper):
-    """The instruments with their certificates in one text; "" where there are none."""
+    """Return a text of the instruments with their certificates; "" without instruments."""
     return "; ".join(
         paper.word(
             "certificate.instrument",
@@ -101,43 +106,43 @@ def _instruments(paper):
 
 
 def instruments_of(record):
-    """{instrument: its certificate, or None} of an adjusted survey, of tapes, scanners, meters."""
+    """Return {instrument: certificate or None} of all instruments of a record."""
     adjustment = record["adjustment"]
     strapping, lines = (record.get(key) for key in ("strapping", "lines"))
     sighted = (record.get("hits"), record.get("tangents"))
     used = {}
-    for one in adjustment["instruments"] if adjustment else ():
-        used[one["instrument"]] = one["details"].get("certificate")
-    for one in lines["plummets"] if lines else ():
-        if one["plummet"]:  # else nobody described it
-            used[one["plummet"]] = one["certificate"]
-    for one in (setup for sights in sighted if sights for setup in sights["setups"]):
-        if one["instrument"]:
-            used[one["instrument"]] = one["certificate"]
-    for one in (record.get("clouds") or {}).get("scanners", ()):
-        used[one["scanner"]] = one["certificate"]
-    for one in (record.get("liquid") or {}).get("meters", ()):
-        used[one["meter"]] = one["certificate"]
-    taped = [one for one in (strapping, record.get("great_circles")) if one]
-    for one in (tape for given in taped for tape in given["tapes"]):
-        used[one["tape"]] = one["certificate"]
-        if one["master"]:
-            used[one["master"]] = one["master_certificate"]
+    for entry in adjustment["instruments"] if adjustment else ():
+        used[entry["instrument"]] = entry["details"].get("certificate")
+    for entry in lines["plummets"] if lines else ():
+        if entry["plummet"]:  # None: the job does not describe the plummet
+            used[entry["plummet"]] = entry["certificate"]
+    for entry in (setup for sights in sighted if sights for setup in sights["setups"]):
+        if entry["instrument"]:
+            used[entry["instrument"]] = entry["certificate"]
+    for entry in (record.get("clouds") or {}).get("scanners", ()):
+        used[entry["scanner"]] = entry["certificate"]
+    for entry in (record.get("liquid") or {}).get("meters", ()):
+        used[entry["meter"]] = entry["certificate"]
+    taped = [entry for entry in (strapping, record.get("great_circles")) if entry]
+    for entry in (tape for record_part in taped for tape in record_part["tapes"]):
+        used[entry["tape"]] = entry["certificate"]
+        if entry["master"]:
+            used[entry["master"]] = entry["master_certificate"]
     return used
 
 
 def statements(paper):
-    """What the results relate to, copies, and what is asked for and was not given."""
+    """List of statements: items calibrated, copies of the certificate, and missing entries."""
     certificate = paper.record["job"]["certificate"]
     missing = [paper.label(key) for key in _ASKED_FOR if not certificate.get(key)]
-    said = [paper.word("certificate.only_items"), paper.word("texts.copy")]
+    sentences = [paper.word("certificate.only_items"), paper.word("texts.copy")]
     if missing:
-        said.append(paper.word("certificate.not_given", missing=", ".join(missing)))
-    return blocks.listing(said)
+        sentences.append(paper.word("certificate.not_given", missing=", ".join(missing)))
+    return blocks.listing(sentences)
 
 
 def authorisation(paper):
-    """Lines to sign on; the name of who authorises stands below its line when it was given."""
+    """Signature lines, with the name and role of the authorising person if given."""
     certificate = paper.record["job"]["certificate"]
     name, role = (certificate.get(key) for key in ("authorised_by", "authorised_role"))
     person = paper.label("authorised_by")
@@ -148,7 +153,7 @@ def authorisation(paper):
 
 
 def hash_of_record(paper):
-    """The SHA-256 of the record that is printed, as a QR code; None without a file of it."""
+    """QR code of the SHA-256 of the record; None if the record has no file."""
     digest = paper.digest
     if digest is None:
         return None
@@ -156,7 +161,7 @@ def hash_of_record(paper):
 
 
 def _facts(paper, given, keys, to_write_on):
-    """Names and values; one that is not given is a line to write on when it is of those."""
+    """Block of names and values; a missing value of `to_write_on` becomes a blank line."""
     return blocks.key_values(
         [
             (paper.label(key), given.get(key) or TO_WRITE_ON)

@@ -1,4 +1,4 @@
-"""Point clouds on paper: U with and without what points share, and the wall unrolled."""
+"""Point clouds in the papers: facts, tables, and a map of the unrolled wall."""
 
 from math import ceil
 
@@ -9,19 +9,19 @@ from matplotlib.patches import Rectangle
 from tankcal.pipeline.plot_style import GREY, WIDTH, Drawing, styled
 from tankcal.report.tables import clouds as tables
 
-FULL_COLOUR = 98  # percentile of the departures, in size
-LEAST_LIMIT_MM = 0.5
+FULL_COLOUR = 98  # percentile of absolute deviations that has the last colour
+LEAST_LIMIT_MM = 0.5  # smallest deviation of the last colour
 HIDDEN, EDGE, WELD = "#c9ced4", "#1b1b1b", "#e08a00"
 
 
 def departures_mm(record):
-    """(rows, columns) departures of the map of a record, mm; nan where the wall is hidden."""
-    told = record["clouds"]["map"]["departure_tenths_mm"]
-    return np.array(told, dtype=float) / 10  # of None nan
+    """Deviations of the wall map, mm, shape (rows, columns); nan where the wall is hidden."""
+    tenths_mm = record["clouds"]["map"]["departure_tenths_mm"]
+    return np.array(tenths_mm, dtype=float) / 10  # None becomes nan
 
 
 def limit_mm(record):
-    """The departure that has the last colour, a whole number of half millimetres."""
+    """Deviation of the last colour, mm, rounded up to half millimetres."""
     size = np.abs(departures_mm(record))
     size = size[np.isfinite(size)]
     wanted = float(np.percentile(size, FULL_COLOUR)) if len(size) else 0.0
@@ -29,26 +29,26 @@ def limit_mm(record):
 
 
 def joints_m(record):
-    """Heights of the ends of the courses above the table's zero, m; [] of other tanks."""
+    """Heights of the course joints above the zero of the table, m; [] for tanks without courses."""
     courses = record["courses"]
     zero = record["capacity"]["zero_m"]
-    ends = [one["bottom_m"] for one in courses] + [one["top_m"] for one in courses[-1:]]
-    return [float(one - zero) for one in ends]
+    ends = [course["bottom_m"] for course in courses] + [course["top_m"] for course in courses[-1:]]
+    return [float(end - zero) for end in ends]
 
 
-def of_turn(one):
-    """(from, to) azimuths of an obstruction as drawn from 0 to 360, one or two pieces."""
-    low, high = one["azimuth_from_deg"], one["azimuth_to_deg"]
+def of_turn(obstruction):
+    """Azimuth intervals of an obstruction within 0 to 360 degrees, as (from, to) pairs."""
+    low, high = obstruction["azimuth_from_deg"], obstruction["azimuth_to_deg"]
     return [(low, min(high, 360.0))] + ([(0.0, high - 360)] if high > 360 else [])
 
 
 @styled
 def cloud_map(paper):
-    """The wall unrolled: departures coloured, hidden cells hatched, what hides it outlined."""
+    """Map of the unrolled wall with deviations, hidden cells (hatched) and obstructions."""
     record = paper.record
-    drawn = record["clouds"]["map"]
+    wall_map = record["clouds"]["map"]
     lying = record["job"]["tank"]["kind"] == "horizontal"
-    heights, turns = drawn["height_edges_m"], drawn["azimuth_edges_deg"]
+    heights, turns = wall_map["height_edges_m"], wall_map["azimuth_edges_deg"]
     limit = limit_mm(record)
     figure = Drawing(figsize=(WIDTH, 3.0))
     ax = figure.subplots()
@@ -75,34 +75,37 @@ def cloud_map(paper):
     return figure
 
 
-def _obstructions(ax, found):
-    for one in found:
-        for low, high in of_turn(one):
+def _obstructions(ax, obstructions):
+    """Draw the outlines of obstructions."""
+    for obstruction in obstructions:
+        for low, high in of_turn(obstruction):
             ax.add_patch(
                 Rectangle(
-                    (low, one["bottom_m"]), high - low, one["top_m"] - one["bottom_m"],
+                    (low, obstruction["bottom_m"]), high - low,
+                    obstruction["top_m"] - obstruction["bottom_m"],
                     fill=False, edgecolor=EDGE, linewidth=0.8, zorder=3,
                 )
             )  # fmt: skip
 
 
 def _welds(ax, record):
-    ends = {one["course"]: one for one in record["courses"]}
+    """Draw the vertical welds."""
+    courses = {course["course"]: course for course in record["courses"]}
     zero = record["capacity"]["zero_m"]
-    for one in record["clouds"]["welds"]:
-        course = ends.get(one["course"])
+    for weld in record["clouds"]["welds"]:
+        course = courses.get(weld["course"])
         if course:
             ax.vlines(
-                one["azimuth_deg"], course["bottom_m"] - zero, course["top_m"] - zero, color=WELD,
+                weld["azimuth_deg"], course["bottom_m"] - zero, course["top_m"] - zero, color=WELD,
                 linewidth=0.9, linestyle=(0, (4, 3)), zorder=3,
             )  # fmt: skip
 
 
 def facts(paper):
-    """U at the top of the table with and without what points share, and the registration."""
+    """Block of U at the top, with and without errors common to all points, and the registration."""
     clouds = paper.record["clouds"]
     part, dof = clouds["shared_part"], clouds["registration_dof"]
-    told = {
+    volumes = {
         "cloud_U": part["U_m3"],
         "cloud_without_U": part["without_U_m3"],
         "cloud_shared_u": part["shared_u_m3"],
@@ -110,18 +113,18 @@ def facts(paper):
     chi2 = paper.number(clouds["registration_chi2"], decimals=1)
     tied = f"{chi2} / {paper.number(dof, decimals=0)}" if clouds["targets"] else None
     return paper.facts(
-        [(key, paper.number(value, "m3", u=value or None)) for key, value in told.items()]
+        [(key, paper.number(value, "m3", u=value or None)) for key, value in volumes.items()]
         + [("cloud_registration", tied), *_facts_of_inside(paper)]
     )
 
 
 def _facts_of_inside(paper):
-    """The bottom as scans from inside show it, and a roof; [] where nobody asked for it."""
+    """Facts of the bottom and the roof in scans from inside; [] if not requested."""
     inside = paper.record["clouds"].get("inside")
     if inside is None:
         return []
     side = paper.number(inside["cell_m"], "m", decimals=2)
-    found = [
+    items = [
         ("cloud_bottom_share", paper.number(inside["seen_share"], "share", decimals=1)),
         ("cloud_bottom_cells", f"{paper.number(inside['cells'], decimals=0)} × {side}"),
         ("cloud_bottom_scatter", paper.number(inside["scatter_mm"], "image mm", decimals=2)),
@@ -129,12 +132,12 @@ def _facts_of_inside(paper):
     ]
     if inside["roof_share"] is not None:
         ends = (paper.number(inside[key], "m", decimals=2) for key in ("roof_low_m", "roof_high_m"))
-        found.append(("cloud_roof", " – ".join(ends)))
-    return found
+        items.append(("cloud_roof", " – ".join(ends)))
+    return items
 
 
 def blocks_of_tables(paper):
-    """The declared tables that have rows; U is among the facts."""
+    """Blocks of the tables with rows, except the share of U, which `facts` contains."""
     return [
         paper.show(table)
         for table in tables.TABLES
@@ -143,5 +146,5 @@ def blocks_of_tables(paper):
 
 
 def cells_of_map(record):
-    """How many cells of the wall the map shows."""
+    """Number of wall cells with a deviation in the map."""
     return int(np.isfinite(departures_mm(record)).sum())

@@ -1,4 +1,4 @@
-"""Where the dips are taken: on paper and in the sketch, from what the record has of it."""
+"""The dip point of a record, for the papers and the sketch."""
 
 from dataclasses import dataclass
 from math import atan2, degrees, hypot
@@ -8,11 +8,18 @@ from math import atan2, degrees, hypot
 class DipPoint:
     """A declared dip point.
 
-    share        where it lies in the tank seen from the side: from the axis (0) to the wall (1) of
-                 an upright tank, from the start (0) to the end (1) of a lying cylinder
-    off_m        distance from the axis; None for a lying tank
-    azimuth_deg  from the axis, clockwise from +y; None for a lying tank
-    along_m      along the axis of a lying tank, from the start of the cylinder at A; else None
+    Attributes
+    ----------
+    share : float
+        Relative position. Vertical tank: from the axis (0) to the wall (1). Horizontal tank: from
+        the start (0) to the end (1) of the cylinder.
+    off_m : float or None
+        Distance from the axis, m; None for a horizontal tank.
+    azimuth_deg : float or None
+        Azimuth from the axis, clockwise from +y, degrees; None for a horizontal tank.
+    along_m : float or None
+        Distance along the axis of a horizontal tank, from the start of the cylinder at A, m; None
+        for a vertical tank.
     """
 
     share: float
@@ -22,16 +29,16 @@ class DipPoint:
 
 
 def dip_point(record):
-    """The DipPoint of a record; None where none was declared or the kind of tank has none."""
+    """Return the DipPoint of a record, or None if no dip point is declared."""
     kind, datum = record["job"]["tank"]["kind"], record["job"]["datum"]
     if kind == "horizontal":
-        sizes = {one["code"]: one["value"] for one in record["solid"]}
+        sizes = {size["code"]: size["value"] for size in record["solid"]}
         along = sizes["dip_from_a"]
         share = along / sizes["cylinder_length"]
         return DipPoint(min(max(share, 0.0), 1.0), along_m=along)
     if kind != "vertical" or datum.get("dip_x_m") is None:
         return None
-    axis_m = record["shell"] or {"x_m": 0.0, "y_m": 0.0}  # a strapped tank: from its own axis
+    axis_m = record["shell"] or {"x_m": 0.0, "y_m": 0.0}  # strapped tank: the axis is the origin
     east, north = (datum[f"dip_{axis}_m"] - axis_m[f"{axis}_m"] for axis in "xy")
     off = hypot(east, north)
     share = min(off / record["courses"][0]["inside_radius_m"], 1.0)
@@ -39,17 +46,17 @@ def dip_point(record):
 
 
 def dip_point_text(paper):
-    """Where it is, in words; None for a kind of tank that has no dip point to declare."""
+    """Return the position of the dip point in words; None for kinds of tank without dip point."""
     kind, datum = paper.record["job"]["tank"]["kind"], paper.record["job"]["datum"]
     if kind not in ("vertical", "horizontal"):
         return None
-    found = dip_point(paper.record)
-    if found is None:
+    point = dip_point(paper.record)
+    if point is None:
         return paper.word("texts.dip_point_open")
-    if found.along_m is not None:
-        along = paper.number(found.along_m, "m", decimals=3)
+    if point.along_m is not None:
+        along = paper.number(point.along_m, "m", decimals=3)
         return paper.word("texts.dip_point_along", along=along)
     x, y = (paper.number(datum[key], "m", decimals=3) for key in ("dip_x_m", "dip_y_m"))
-    off = paper.number(found.off_m, "m", decimals=3)
-    azimuth = paper.number(found.azimuth_deg, "deg", decimals=0)
+    off = paper.number(point.off_m, "m", decimals=3)
+    azimuth = paper.number(point.azimuth_deg, "deg", decimals=0)
     return paper.word("texts.dip_point", x=x, y=y, off=off, azimuth=azimuth)

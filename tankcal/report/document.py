@@ -1,4 +1,4 @@
-"""From an executed notebook to the list of its blocks, whatever the paper is."""
+"""Conversion of an executed notebook into the list of its blocks."""
 
 import base64
 
@@ -8,37 +8,51 @@ from tankcal.report.letterhead import data_problem
 from tankcal.report.markdown import nodes
 
 PARTS = ("certificate", "working-papers", "field-table")
-BESIDE = ("field-table",)  # parts that say again what others say: not in the whole
+BESIDE = ("field-table",)  # parts that repeat other parts; the whole report omits them
 
 
 def blocks_of(notebook, part="", name="notebook"):
-    """The blocks of the notebook, in order, as data; the first one is its `document`.
+    """Return the blocks of a notebook in order.
 
-    part   "" for everything but BESIDE, else the cells of that part: those tagged with it, and the
-           untagged cells that follow them
-    name   title of a notebook that has no document block of its own
+    Parameters
+    ----------
+    notebook : dict
+        Executed notebook.
+    part : str, optional
+        Name of a part. A part consists of the cells with its tag and of the untagged cells that
+        follow. "" selects all parts except BESIDE.
+    name : str, optional
+        Title of a notebook without a document block.
 
-    Raises TankcalError for an unknown or empty part and for a cell that ended in an error.
+    Returns
+    -------
+    list of dict
+        Blocks; the first block has the kind "document".
+
+    Raises
+    ------
+    TankcalError
+        For an unknown or empty part, and for a cell that ended in an error.
     """
     if part not in ("", *PARTS):
         raise TankcalError(f"part {part!r} is not known; it is one of: {', '.join(PARTS)}")
-    found = []
+    shown = []
     for number, cell in _cells(notebook, part):
-        found += _blocks_of_cell(cell, f"cell {number}")
-    if part and not found:
+        shown += _blocks_of_cell(cell, f"cell {number}")
+    if part and not shown:
         raise TankcalError(f"the notebook has nothing to show that is tagged {part!r}")
-    if not found or found[0]["kind"] != "document":
-        found.insert(0, blocks.document(title=name).data)
-    return _headings_in_steps(found)
+    if not shown or shown[0]["kind"] != "document":
+        shown.insert(0, blocks.document(title=name).data)
+    return _headings_in_steps(shown)
 
 
 def last_cell(notebook, part=""):
-    """The number, from 1, of the last cell that `blocks_of` asks for; where none is, of all."""
+    """Number, from 1, of the last cell that `blocks_of` reads; the last cell if it reads none."""
     return max((number for number, _ in _cells(notebook, part)), default=len(notebook["cells"]))
 
 
-def _headings_in_steps(found):
-    """The blocks with no level of heading left out: a reader's program builds a tree of them."""
+def _headings_in_steps(shown):
+    """Return the blocks without gaps in heading levels, which screen readers need."""
     level = 0
 
     def stepped(item):
@@ -52,12 +66,12 @@ def _headings_in_steps(found):
         block | {"nodes": [stepped(node) for node in block["nodes"]]}
         if block["kind"] == "markdown"
         else stepped(block)
-        for block in found
+        for block in shown
     ]
 
 
 def _cells(notebook, part):
-    """(number, cell) of the cells that belong to `part`; a cell belongs with those before it."""
+    """Yield (number, cell) for the cells of a part; an untagged cell belongs to the part before."""
     current = ""
     for number, cell in enumerate(notebook["cells"], 1):
         tags = cell["metadata"].get("tags", [])
@@ -67,6 +81,7 @@ def _cells(notebook, part):
 
 
 def _blocks_of_cell(cell, place):
+    """Return the blocks of one cell; `place` names the cell in error messages."""
     if cell["cell_type"] == "markdown":
         return (
             [{"kind": "markdown", "nodes": nodes(cell["source"])}] if cell["source"].strip() else []
@@ -78,10 +93,11 @@ def _blocks_of_cell(cell, place):
 
 
 def _block_of_output(output, place):
+    """Return the block of an output of a cell, or None for an output that is not shown."""
     if output["output_type"] == "error":
         raise TankcalError(f"{place} of the notebook failed: {output['ename']}: {output['evalue']}")
     if output["output_type"] == "stream":
-        if output["name"] == "stderr":  # remarks of libraries; they stay in the notebook
+        if output["name"] == "stderr":  # remarks of libraries are kept in the notebook only
             return None
         return blocks.code(output["text"].rstrip("\n")).data if output["text"].strip() else None
     data = output.get("data", {})
@@ -97,14 +113,14 @@ def _block_of_output(output, place):
 
 
 def _picture(data, kind, content):
-    """A picture that a cell shows without our helper: no caption, described by its text."""
+    """Return the figure block of an image, with its text as the alternative text."""
     if kind == "png":
         content = base64.b64encode(base64.b64decode(content)).decode("ascii")
     alt = data.get("text/plain", "picture")
     return {"kind": "figure", kind: content, "caption": "", "alt": alt, "width": 1.0}
 
 
-_KEYS = {
+_KEYS = {  # keys that a block of each kind must have
     "document": {"part", "title", "author", "date", "language", "notice", "running", "footer"},
     "masthead": {"title", "subtitle", "laboratory", "number_label", "number"},
     "heading": {"text", "level"},
@@ -128,7 +144,7 @@ _KEYS = {
 
 
 def _checked(data, place):
-    """`data` when it is a block of this version; a notebook of a newer one is refused."""
+    """Return a valid block; raise TankcalError for a block of a later version."""
     kind = data.get("kind") if isinstance(data, dict) else None
     if kind not in _KEYS:
         raise TankcalError(f"{place} of the notebook shows a block of unknown kind: {kind!r}")

@@ -1,7 +1,7 @@
 """nbconvert exporters: `jupyter nbconvert --to tankcal-pdf report.ipynb`, and tankcal-html.
 
-They set an executed notebook without its input cells. `--PdfExporter.part=certificate` takes one
-part only.
+They typeset an executed notebook without its input cells. `--PdfExporter.part=certificate` selects
+a single part.
 """
 
 from nbconvert.exporters import Exporter
@@ -13,7 +13,7 @@ from tankcal.report.web import page
 
 
 class _BlocksExporter(Exporter):
-    """What both exporters share: from the notebook to the blocks of the part that is wanted."""
+    """Common base of the exporters: conversion of the selected part into blocks."""
 
     part = Unicode(
         "", help='Which part: "certificate", "working-papers", "field-table", or "" for the whole.'
@@ -28,7 +28,7 @@ def _metadata(resources):
 
 
 class PdfExporter(_BlocksExporter):
-    """Notebook to PDF/A-3a, PDF/UA-1, by typst."""
+    """Exporter of a notebook to PDF/A-3a and PDF/UA-1, typeset by typst."""
 
     export_from_notebook = "tankcal PDF"
     output_mimetype = "application/pdf"
@@ -44,7 +44,7 @@ class PdfExporter(_BlocksExporter):
 
 
 class HtmlExporter(_BlocksExporter):
-    """Notebook to one HTML page that needs no network and no script."""
+    """Exporter of a notebook to an HTML page that needs neither network nor scripts."""
 
     export_from_notebook = "tankcal HTML"
     output_mimetype = "text/html"

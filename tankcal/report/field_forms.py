@@ -1,4 +1,4 @@
-"""Field sheets of a starter job: its tables of readings as a crew fills them in by pen."""
+"""Field sheets of a starter job: empty tables of readings to fill in by hand on site."""
 
 from tankcal.job.contract import columns_of, tables_of_survey
 from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS
@@ -7,8 +7,9 @@ from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
 
 FILE = "field-sheets.pdf"
-BY_PEN = (*(one for one in OF_SHELLS if one != DECLARED), METERED)  # that a crew writes down
-FORMS = (  # tables of each, read in one go, and the rows that a sheet has room for
+# Surveys recorded by hand.
+BY_PEN = (*(survey for survey in OF_SHELLS if survey != DECLARED), METERED)
+FORMS = (  # input tables of each form, read together, and the number of rows on a sheet
     (("rings",), 12),
     (("lines",), 12),
     (("offsets",), 30),
@@ -25,25 +26,25 @@ FORMS = (  # tables of each, read in one go, and the rows that a sheet has room 
     (("tape_checks",), 4),
     (("liquid",), 26),
 )
-ROWS_BESIDE = {("tangents", "directions"): 20}  # where another form stands on the same page
-HEIGHTS_OF = ("tangents", "wall-hits")  # surveys whose stations are told from the bottom
-ROWS_OF_HEIGHTS = 4
-IN_THE_OFFICE = (  # columns that nobody fills in on site
+ROWS_BESIDE = {("tangents", "directions"): 20}  # rows if another form is on the same page
+HEIGHTS_OF = ("tangents", "wall-hits")  # surveys with heights of the stations above the bottom
+ROWS_OF_HEIGHTS = 4  # rows of the form for the heights of stations
+IN_THE_OFFICE = (  # columns that are not filled in on site
     *("use", "s_mm", "s_arcsec", "note", "s_dip_mm", "s_volume_l"),
-    "flow_m3_h",  # by volume and time
+    "flow_m3_h",  # computed from volume and time
 )
-UNIT_OF_CIRCLE = "_deg"  # of three columns of one angle the one that stands for all
-UNITS_OF_CIRCLES = "gon / ° / ° ′ ″"  # as the circle shows it: the others are struck out
+UNIT_OF_CIRCLE = "_deg"  # column that represents the three columns of an angle
+UNITS_OF_CIRCLES = "gon / ° / ° ′ ″"  # the crew strikes out the units that the circle does not show
 ANGLES = ("direction", "zenith", "angle")
 OTHER_UNITS = ("_gon", "_dms")
-WIDE = {"name": 1.5, "text": 2.0}  # shares of the width, beside one of a number
+WIDE = {"name": 1.5, "text": 2.0}  # widths of columns relative to a column of numbers
 FACTS = ("tank", "date", "crew", "weather", "shell_temperature", "instruments", "masters")
 FACTS_OF_LIQUID = ("tank", "date", "crew", "weather", "calibrating_liquid", "dipped_by")
-ROWS_OF_METERS, ROWS_OF_VALVES = 5, 8
+ROWS_OF_METERS, ROWS_OF_VALVES = 5, 8  # rows of the forms for meters and for the tightness test
 
 
 def is_filled_by_pen(survey):
-    """Are there field sheets for that kind of survey?"""
+    """Return whether field sheets exist for this kind of survey."""
     return survey in BY_PEN
 
 
@@ -53,26 +54,36 @@ def write_field_sheets(path, survey, language, kind="vertical"):
     Parameters
     ----------
     path : Path
-        Of the new file.
+        Path of the new file.
     survey : str
         "strapping", "reference-line", "wall-hits", "tangents" or "liquid".
     language : str
         One of `languages.LANGUAGES`.
     kind : str, optional
-        Of the tank.
+        Kind of the tank.
     """
     from tankcal.report.pdf import pdf
 
-    found = sheets(survey, language, kind)
-    path.write_bytes(pdf([block.data for block in found], path.parent))
+    forms = sheets(survey, language, kind)
+    path.write_bytes(pdf([block.data for block in forms], path.parent))
 
 
 def sheets(survey, language, kind="vertical"):
-    """The blocks of the field sheets."""
+    """Return the blocks of the field sheets.
+
+    Parameters
+    ----------
+    survey, language, kind
+        As in `write_field_sheets`.
+
+    Returns
+    -------
+    list of Block
+    """
     texts = texts_in(language)
     paper = PlainPaper(texts.words)
     title = paper.word("forms.title")
-    found = [
+    shown = [
         blocks.document(
             title=title,
             language=language,
@@ -84,23 +95,23 @@ def sheets(survey, language, kind="vertical"):
         blocks.paragraph(paper.word("forms.how")),
     ]
     if survey == METERED:
-        found.append(blocks.paragraph(paper.word("forms.batches")))
-        found += [*_meters(paper, texts), *_valves(paper)]
+        shown.append(blocks.paragraph(paper.word("forms.batches")))
+        shown += [*_meters(paper, texts), *_valves(paper)]
     tables = tables_of_survey(kind, survey)
     forms = [(names, rows) for names, rows in FORMS if set(names) <= set(tables)]
     if any(_is_angle(field) for names, _ in forms for field in _columns(names, kind)):
-        found.append(blocks.paragraph(paper.word("forms.angles")))
+        shown.append(blocks.paragraph(paper.word("forms.angles")))
     for names, rows in forms:
         titles = [texts.words["input"]["titles"][name] for name in names]
         columns = [_column(texts, field) for field in _columns(names, kind)]
-        found.append(blocks.heading("; ".join(titles)))
-        if names == ("liquid",):  # a meter shows a sum, of which the office takes differences
+        shown.append(blocks.heading("; ".join(titles)))
+        if names == ("liquid",):  # meters show totals; the office takes the differences
             columns = [(heading, unit, 1.0) for heading, unit, _ in columns]
             columns.insert(2, (paper.word("forms.meter_shows"), "", WIDE["name"]))
-        found.append(blocks.form(columns, ROWS_BESIDE.get((survey, names[0]), rows)))
+        shown.append(blocks.form(columns, ROWS_BESIDE.get((survey, names[0]), rows)))
         if names == ("setups",) and survey in HEIGHTS_OF:
-            found += _heights(paper, texts)
-    return [*found, blocks.signature([paper.word("forms.signed")])]
+            shown += _heights(paper, texts)
+    return [*shown, blocks.signature([paper.word("forms.signed")])]
 
 
 def _facts(survey):
@@ -108,7 +119,7 @@ def _facts(survey):
 
 
 def _meters(paper, texts):
-    """A form of the meters: it becomes meters.toml."""
+    """Form of the meters, for the file meters.toml."""
     labels = texts.words["input"]["labels"]
     columns = [
         (labels["meter"], "", WIDE["name"]),
@@ -125,7 +136,7 @@ def _meters(paper, texts):
 
 
 def _valves(paper):
-    """A form for the level with all valves shut, before the work and after it."""
+    """Form for the level with all valves shut, before and after the filling."""
     columns = [
         (paper.word("forms.time"), "", 1.0),
         (paper.word("forms.dip"), "m", 1.0),
@@ -141,7 +152,7 @@ def _valves(paper):
 
 
 def _heights(paper, texts):
-    """A form for the height of stations above the bottom: it becomes z_m of control.csv."""
+    """Form for the heights of stations above the bottom, for z_m of control.csv."""
     columns = [
         (texts.words["input"]["labels"]["station"], "", WIDE["name"]),
         (paper.word("forms.height"), "m", WIDE["name"]),
@@ -159,14 +170,14 @@ def _code(survey):
 
 
 def _columns(tables, kind):
-    """The columns of tables that are filled in side by side, each once; heights of targets last."""
-    found = {
+    """Return the columns of tables that share a form, each once; target heights come last."""
+    columns = {
         field.name: field
         for table in tables
         for field in columns_of(table, kind)
         if field.name not in IN_THE_OFFICE and not field.name.endswith(OTHER_UNITS)
     }
-    return sorted(found.values(), key=lambda field: field.name == "target_height_m")
+    return sorted(columns.values(), key=lambda field: field.name == "target_height_m")
 
 
 def _is_angle(field):
@@ -174,6 +185,7 @@ def _is_angle(field):
 
 
 def _column(texts, field):
+    """Return (heading, unit, relative width) of a column."""
     heading, (_, unit) = texts.heading(field), parted(field.name)
     if _is_angle(field):
         return heading, UNITS_OF_CIRCLES, WIDE["name"]

@@ -1,21 +1,21 @@
-"""The table that a gauger carries: heights and volumes, millimetres by proportional parts, no U."""
+"""The field table of a gauger: volumes without U, and proportional parts for millimetres."""
 
 from tankcal.report.numbers import unit
 from tankcal.report.tables.capacity import capacity_rows, capacity_table, parts_table
 from tankcal.report.tables.facts import FIELD_TABLE, REFERENCES, tank_facts
 from tankcal.report.uncertainty.capacity import note_on_use, times_across
 
-MOST_ACROSS = 6
+MOST_ACROSS = 6  # largest number of table columns side by side
 
 
 def facts(paper):
-    """What must be known to read a dip: tank, certificate, zero, reference height, temperature."""
+    """Block of tank, certificate, zero, reference height and reference temperature."""
     shown = (tank_facts(paper.record), REFERENCES)
     return paper.facts([fact for table in shown for fact in paper.facts_of(table, FIELD_TABLE)])
 
 
 def table(paper):
-    """Heights and volumes, to the litre, as many times side by side as there is room."""
+    """Blocks of the field table, set side by side as often as the page width allows."""
     record, name = paper.record, "field_table"
     declared, rows = capacity_table(record), capacity_rows(record)
     across = times_across(paper, rows, declared.on_paper(name, rows), most=MOST_ACROSS)
@@ -25,7 +25,7 @@ def table(paper):
 
 
 def proportional_parts(paper):
-    """What millimetres add to a row of a centimetre table, zone by zone; [] where nothing does."""
+    """Blocks of the proportional parts per zone; [] if the record has no zones."""
     parts, name = paper.record["proportional_parts"], paper.record["job"]["table"]["volume_unit"]
     if not parts["zones"]:
         return []

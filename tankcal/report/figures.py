@@ -1,7 +1,7 @@
-"""The figures of the working papers: the record's numbers, drawn by `tankcal.pipeline.plots`.
+"""Figures of the working papers, drawn by `tankcal.pipeline.plots` from the record.
 
-Each function takes a Paper and gives a matplotlib Figure, or a list of them when there are many
-sections; the words at the axes are those of the paper's language.
+Each function takes a Paper and returns a matplotlib Figure, or a list of figures if there are many
+sections. The labels of the axes are in the language of the paper.
 """
 
 import numpy as np
@@ -12,22 +12,22 @@ from tankcal.report.uncertainty.stated import stated_U_m3
 
 
 def residuals(paper, most=8):
-    """Residuals in mm against azimuth, one panel a section, up to `most` panels a figure."""
+    """Residuals, mm, against azimuth: a panel per section, at most `most` panels per figure."""
     return plots.residual_panels(_rings(paper), _words(paper), most)
 
 
 def polar_factor(paper):
-    """How many times larger than the tank the deviations of `polar` are drawn: 1, 2 or 5·10^n."""
+    """Enlargement of the deviations in `polar`: 1, 2 or 5·10^n."""
     return plots.polar_factor(_rings(paper))
 
 
 def polar(paper, most=12):
-    """The sections about their circles, deviations enlarged by `polar_factor`."""
+    """Outlines of the sections around their circles, deviations enlarged by `polar_factor`."""
     return plots.polar(_rings(paper), _words(paper), most)
 
 
 def deviation_map(paper):
-    """The wall unrolled: azimuth by height, every accepted point coloured by its residual."""
+    """Map of the unrolled wall: each accepted point, coloured by its residual."""
     record = paper.record
     z_m = {point["point"]: point["z_m"] for point in record["points"]}
     names = [name for section in record["sections"] for name in section["points"]]
@@ -40,9 +40,9 @@ def deviation_map(paper):
 
 
 def capacity_curves(paper):
-    """Litres per centimetre, and U, against height."""
+    """Litres per centimetre and U against height."""
     capacity, words = paper.record["capacity"], _words(paper)
-    U = [paper.volume_factor * one for one in stated_U_m3(capacity)]
+    U = [paper.volume_factor * U_m3 for U_m3 in stated_U_m3(capacity)]
     return plots.capacity_curves(
         capacity["height_m"],
         capacity["area_m2"],
@@ -52,13 +52,13 @@ def capacity_curves(paper):
 
 
 def capacity_curves_name(paper):
-    """Name of the caption: whether a bottom has a panel of its own."""
-    of_bottom = plots.bottom_rows(paper.record["capacity"]["area_m2"])
-    return "capacity_curves_bottom" if of_bottom else "capacity_curves"
+    """Key of the caption, which depends on whether the figure has a panel of the bottom."""
+    has_bottom_panel = plots.bottom_rows(paper.record["capacity"]["area_m2"])
+    return "capacity_curves_bottom" if has_bottom_panel else "capacity_curves"
 
 
 def budget_bars(paper):
-    """The share of the variance of each input, in percent; defaults are pale."""
+    """Share of each input in the variance, percent; defaults are pale."""
     bars = [
         (paper.input_name(row), row["share"], bool(row.get("is_default")))
         for row in paper.record["budget"]
@@ -86,7 +86,7 @@ def _words(paper):
 
 
 def with_decimal_mark(figure, mark):
-    """The figure with this decimal mark in the numbers at its axes; names there stay."""
+    """Set the decimal mark of the numbers at the axes; other labels remain unchanged."""
     for ax in figure.axes:
         for axis in (ax.xaxis, ax.yaxis):
             if isinstance(axis.get_major_formatter(), ScalarFormatter):
@@ -97,16 +97,16 @@ def with_decimal_mark(figure, mark):
 
 
 class _Marked(Formatter):
-    """The numbers of another formatter with a decimal mark."""
+    """Formatter that replaces the decimal mark of another formatter."""
 
-    def __init__(self, of_numbers, mark):
-        self._of_numbers, self._mark = of_numbers, mark
+    def __init__(self, formatter, mark):
+        self._formatter, self._mark = formatter, mark
 
     def __call__(self, x, pos=None):
-        return self._of_numbers(x, pos).replace(".", self._mark)
+        return self._formatter(x, pos).replace(".", self._mark)
 
     def get_offset(self):
-        return self._of_numbers.get_offset().replace(".", self._mark)
+        return self._formatter.get_offset().replace(".", self._mark)
 
     def set_locs(self, locs):
-        self._of_numbers.set_locs(locs)
+        self._formatter.set_locs(locs)

@@ -1,14 +1,14 @@
-"""Folders of results: written all or nothing, and only where nothing of somebody else lies.
+"""Folders of results, replaced as a whole and never if they contain files of the user.
 
-Whenever a program or a machine stops, the folder of results is whole: the earlier results, or the
-new ones. Beside it lies, while a command writes, a hidden folder:
+If a program or a machine stops, the folder contains either the complete earlier results or the
+complete new results. While a command writes, a hidden folder exists beside the results:
 
-.tankcal-xxx/lock         held by the process that writes; a killed one holds nothing
-.tankcal-xxx/made/NAME    the new results, as they are written
-.tankcal-xxx/before/NAME  whole results: the new ones, then, exchanged, the earlier ones
-.tankcal-xxx/rest         what is being removed
+.tankcal-xxx/lock         locked by the writing process; the lock ends with the process
+.tankcal-xxx/made/NAME    the new results, while they are written
+.tankcal-xxx/before/NAME  complete results: first the new, after the exchange the earlier results
+.tankcal-xxx/rest         files to be removed
 
-What a killed process leaves is put right by the next command that writes there.
+The next command that writes to the same place repairs the folders of a killed process.
 """
 
 import ctypes
@@ -28,17 +28,18 @@ from tankcal.messages import message
 from tankcal.record import manifest
 
 PREFIX, LOCK, MADE, BEFORE, REST = ".tankcal-", "lock", "made", "before", "rest"
-NEW_S = 60  # a folder without a lock is so new that its process is about to lock it
+NEW_S = 60  # age, s, up to which a folder without a lock may belong to a starting process
 EXCHANGE = 2  # RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS
-HERE = -100  # AT_FDCWD of Linux: paths are from the working directory
-NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)  # what a file system without it answers
+HERE = -100  # AT_FDCWD of Linux: paths are relative to the working directory
+# Errors of a file system without exchange.
+NO_EXCHANGE = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP)
 
 
 def default_folder(source):
-    """Where the results of a job (a Path) go by default.
+    """Return the default folder for the results of a job (Path).
 
-    `results` in a job folder, whichever form it has; NAME-results beside any other NAME.xlsx, since
-    several workbooks may lie in one folder.
+    The default is `results` in a job folder. For an Excel workbook NAME.xlsx it is NAME-results
+    beside the workbook, since a folder may contain several workbooks.
     """
     if source.name in (SETTINGS_FILE, WORKBOOK_FILE):
         return source.parent / "results"
@@ -48,9 +49,9 @@ def default_folder(source):
 
 
 def refuse_foreign(directory, known):
-    """Raise InputError when `directory` exists and holds a file that is not among `known`.
+    """Raise InputError if `directory` contains a file that is not among `known`.
 
-    SHA256SUMS is always known.
+    SHA256SUMS is always among the known files.
     """
     directory = Path(directory)
     if not directory.exists():
@@ -79,13 +80,22 @@ def refuse_foreign(directory, known):
 
 @contextmanager
 def replaced(directory, language=None):
-    """A folder to write to that takes the place of `directory` when the block ends without error.
+    """Context manager of a new folder that replaces `directory` if the block ends without error.
 
-    SHA256SUMS of all that was written is added. The folder lies beside `directory` (beside what a
-    link points to), which is made when missing. Files that somebody put into `directory` while the
-    block ran are kept: they lie in the new one.
+    The new folder lies beside `directory`, or beside the target of a link. It receives SHA256SUMS
+    of all its files. Files that the user puts into `directory` while the block runs are kept.
 
-    language  that the papers were asked in; None: that of the job
+    Parameters
+    ----------
+    directory : str or Path
+        Folder of the results; it is created if it does not exist.
+    language : str, optional
+        Language requested for the papers; None: the language of the job.
+
+    Yields
+    ------
+    Path
+        New folder to write to.
     """
     target = Path(directory).resolve()
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -93,15 +103,16 @@ def replaced(directory, language=None):
     work = Path(tempfile.mkdtemp(prefix=PREFIX, dir=target.parent))
     try:
         with open(work / LOCK, "w") as lock:
-            with suppress(OSError):  # some network drives have no locks: nobody recovers there
+            # Some network drives have no locks; `recover` does nothing there.
+            with suppress(OSError):
                 lock_file(lock)
             try:
-                made = work / MADE / target.name
-                made.mkdir(parents=True)
-                yield made
-                manifest.write_manifest(made, language)
-                _write_through(made)
-                _swap(made, target, work / BEFORE / target.name)
+                new_folder = work / MADE / target.name
+                new_folder.mkdir(parents=True)
+                yield new_folder
+                manifest.write_manifest(new_folder, language)
+                _write_through(new_folder)
+                _swap(new_folder, target, work / BEFORE / target.name)
             finally:
                 _put_right(work)
     finally:
@@ -109,7 +120,7 @@ def replaced(directory, language=None):
 
 
 def recover(place):
-    """Put right what killed processes left in a folder, `place`: nothing of theirs remains."""
+    """Repair and remove the hidden folders of killed processes in the folder `place`."""
     for work in Path(place).glob(f"{PREFIX}*"):
         if not work.is_dir() or work.is_symlink():
             continue
@@ -124,7 +135,7 @@ def recover(place):
 
 
 def lock_file(file):
-    """Lock an open file until it is closed or this process ends; False: another process has it."""
+    """Lock an open file until it is closed; return False if another process holds the lock."""
     try:
         import fcntl
     except ImportError:  # Windows
@@ -143,48 +154,49 @@ def lock_file(file):
     return True
 
 
-def _swap(made, target, before):
-    """Put the folder `made` in the place of `target`; the earlier one remains as `before`."""
+def _swap(new_folder, target, before):
+    """Move the folder `new_folder` to `target`; the earlier folder becomes `before`."""
     if not target.exists():
-        made.rename(target)
+        new_folder.rename(target)
     else:
+        # Stage the new folder at `before`, then exchange it with `target` in one step if possible.
         before.parent.mkdir()
-        made.rename(before)
+        new_folder.rename(before)
         if not _exchange(before, target):
-            before.rename(made)
+            before.rename(new_folder)
             target.rename(before)
-            made.rename(target)
+            new_folder.rename(target)
     _write_through(target.parent, files=False)
 
 
-def _exchange(one, other):
-    """Exchange two folders in one step; False where the system has no such step."""
+def _exchange(first, second):
+    """Exchange two folders in one step; return False if the system does not support it."""
     call = _call_of_exchange()
     if call is None:
         return False
-    if call(os.fsencode(one), os.fsencode(other)) == 0:
+    if call(os.fsencode(first), os.fsencode(second)) == 0:
         return True
     number = ctypes.get_errno()
     if number in NO_EXCHANGE:
         return False
-    raise OSError(number, os.strerror(number), str(other))
+    raise OSError(number, os.strerror(number), str(second))
 
 
 @functools.cache
 def _call_of_exchange():
-    """call(path, path) of the C library, 0 where it worked; None: it has none."""
+    """Return the exchange function of the C library (0 on success), or None if it has none."""
     with suppress(OSError, AttributeError, TypeError):  # no C library, or one without the function
         library = ctypes.CDLL(None, use_errno=True)
         if sys.platform == "darwin":
-            return lambda one, other: library.renamex_np(one, other, EXCHANGE)
+            return lambda first, second: library.renamex_np(first, second, EXCHANGE)
         renameat2 = library.renameat2
-        return lambda one, other: renameat2(HERE, one, HERE, other, EXCHANGE)
+        return lambda first, second: renameat2(HERE, first, HERE, second, EXCHANGE)
     return None
 
 
 def _write_through(folder, files=True):
-    """Wait until a folder, and the files below it, are on the disk and not only on their way."""
-    if os.name != "posix":  # Windows has no handle of a folder
+    """Flush a folder, and the files below it, to the disk."""
+    if os.name != "posix":  # Windows cannot open a folder
         return
     below = [path for path in folder.rglob("*") if not path.is_symlink()] if files else []
     for path in (*below, folder):
@@ -192,14 +204,14 @@ def _write_through(folder, files=True):
         try:
             os.fsync(handle)
         except OSError as error:
-            if error.errno != errno.EINVAL:  # some network drives cannot
+            if error.errno != errno.EINVAL:  # some network drives cannot flush
                 raise
         finally:
             os.close(handle)
 
 
 def _put_right(work):
-    """Put back earlier results that lack their place, keep files of others, remove the rest."""
+    """Restore earlier results without a successor, keep files of the user, remove the rest."""
     for earlier in (work / BEFORE).glob("*"):
         target = work.parent / earlier.name
         if target.exists():
@@ -207,18 +219,18 @@ def _put_right(work):
         else:
             earlier.rename(target)
     if (work / BEFORE).exists():
-        (work / BEFORE).rename(work / REST)  # once it is a part of it nothing is looked for in it
+        (work / BEFORE).rename(work / REST)  # after this step no results are restored from it
     for name in (MADE, REST):
         shutil.rmtree(work / name, ignore_errors=True)
 
 
 def _keep_foreign(earlier, target):
-    """Move the files that no SHA256SUMS of the two folders lists from the first to the second."""
+    """Move files listed in neither SHA256SUMS from the folder `earlier` to `target`."""
     listed = {manifest.FILE}
     for folder in (earlier, target):
         with suppress(InputError):
-            found = manifest.read_manifest(folder)
-            listed.update(found.digests if found else ())
+            listing = manifest.read_manifest(folder)
+            listed.update(listing.digests if listing else ())
     for path in sorted(earlier.rglob("*")):
         name = path.relative_to(earlier)
         is_folder = path.is_dir() and not path.is_symlink()
@@ -233,7 +245,7 @@ def _keep_foreign(earlier, target):
 
 
 def _remove(work):
-    """Remove a folder beside results, unless it holds any that could not be put right."""
+    """Remove the hidden folder, unless it contains results that could not be restored."""
     with suppress(OSError):
-        (work / LOCK).unlink(missing_ok=True)  # Windows keeps a lock as long as it is open
+        (work / LOCK).unlink(missing_ok=True)  # Windows cannot remove an open file
         work.rmdir()

@@ -1,6 +1,6 @@
-"""A checked subset of LaTeX mathematics, set as typst and as MathML.
+"""Conversion of a subset of LaTeX mathematics to typst and MathML.
 
-An unknown macro or character is an error: nothing that a reader did not intend is ever printed.
+An unknown macro or character is an error, so that no formula is printed incorrectly.
 """
 
 import re
@@ -66,12 +66,13 @@ _FUNCTIONS = ("sin", "cos", "tan", "arctan", "ln", "log", "exp", "min", "max")
 _SPACES = {",": "thin", ";": "med", "quad": "quad", " ": "space"}
 _ACCENTS = {"bar": ("overline", "¯"), "hat": ("hat", "^")}
 _OPERATORS = "+-=()[]|/<>,.!':"
+# Groups of a token: macro, number, other character, white space.
 _TOKEN = re.compile(r"\\([A-Za-z]+|.)|([0-9]+(?:(?:\.|\{,\})[0-9]+)?)|(\S)|(\s+)", re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Formula:
-    """One formula: its LaTeX source, and the same for typst's math mode and as MathML."""
+    """A formula as LaTeX source, in the math mode of typst, and as MathML."""
 
     latex: str
     typst: str
@@ -79,14 +80,14 @@ class Formula:
 
 
 def formula(latex):
-    """Read `latex`; raises TankcalError naming what is not in the subset."""
+    """Convert LaTeX source into a Formula; raise TankcalError for syntax outside the subset."""
     reader = _Reader(latex)
     typst, mathml = reader.sequence(until=None)
     return Formula(latex.strip(), typst, f"<mrow>{mathml}</mrow>")
 
 
 class _Reader:
-    """A recursive reader; every method returns (typst, MathML) of what it has read."""
+    """Recursive parser; the methods return (typst, MathML) of the parsed part."""
 
     def __init__(self, latex):
         self.latex = latex
@@ -94,12 +95,15 @@ class _Reader:
         self.at = 0
 
     def refuse(self, what):
+        """Raise TankcalError that names the formula."""
         raise TankcalError(f"formula {self.latex.strip()!r}: {what}")
 
     def peek(self):
+        """Return the next token without consuming it, or None at the end."""
         return self.tokens[self.at][0] if self.at < len(self.tokens) else None
 
     def sequence(self, until):
+        """Convert symbols up to the token `until`; None: up to the end."""
         parts = []
         while self.peek() != until:
             if self.peek() is None:
@@ -108,6 +112,7 @@ class _Reader:
         return " ".join(typst for typst, _ in parts), "".join(mathml for _, mathml in parts)
 
     def scripted(self):
+        """Convert a symbol with its subscript and superscript."""
         base = self.atom()
         scripts = {}
         while self.peek() in ("^", "_"):
@@ -124,6 +129,7 @@ class _Reader:
         return typst, f"<{tag}><mrow>{base[1]}</mrow>{inner}</{tag}>"
 
     def atom(self):
+        """Convert a number, letter, operator, group or macro."""
         if self.peek() is None:
             self.refuse("something is missing at the end")
         macro, number, character, _ = self.tokens[self.at].groups()
@@ -131,7 +137,7 @@ class _Reader:
         if macro:
             return self.macro(macro)
         if number:
-            typst = number.replace("{,}", ' class("normal", \\,) ')  # no gap behind the comma
+            typst = number.replace("{,}", ' class("normal", \\,) ')  # no space after the comma
             return typst, f"<mn>{number.replace('{,}', ',')}</mn>"
         if character == "{":
             inner = self.sequence(until="}")
@@ -145,6 +151,7 @@ class _Reader:
         return self.refuse(f"the character {character!r} is not supported")
 
     def macro(self, name):
+        """Convert a macro with its arguments."""
         if name in _GREEK:
             return name, f"<mi>{_GREEK[name]}</mi>"
         if name in _SYMBOLS:
@@ -172,12 +179,13 @@ class _Reader:
         return self.refuse(f"the macro \\{name} is not supported")
 
     def braced(self):
+        """Convert a group in braces."""
         if self.peek() != "{":
             self.refuse("'{' expected")
         return self.atom()
 
     def words(self):
-        """The text of \\text{...}, taken from the source as it stands."""
+        """Convert the text of \\text{...}, which is taken unchanged from the source."""
         if self.peek() != "{":
             self.refuse("'{' expected")
         start = self.tokens[self.at].end()

@@ -1,6 +1,7 @@
-"""The laboratory's letterhead: name, address, logo and colours, from one TOML file.
+"""Letterhead of the laboratory: name, address, logo and colours, from a TOML file.
 
-Checked when it is read; the papers take it from the document block of the executed notebook.
+The file is checked when it is read. The papers take the letterhead from the document block of the
+executed notebook.
 """
 
 import base64
@@ -19,8 +20,8 @@ from tankcal.report import LETTERHEAD
 from tankcal.report.logo import logo_problem
 from tankcal.text.decoding import read_json
 
-PLACE = "place"  # of a mark: an empty frame
-LEAST_CONTRAST = 4.5  # of text on white paper: WCAG 2.2, 1.4.3
+PLACE = "place"  # value of a mark that is an empty frame
+LEAST_CONTRAST = 4.5  # smallest contrast of text with white paper: WCAG 2.2, 1.4.3
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _LABORATORY = (
     Field("name", "text", "name of the laboratory", required=True),
@@ -40,7 +41,7 @@ _SECTIONS = {"laboratory": _LABORATORY, "colours": _COLOURS}
 
 @dataclass(frozen=True)
 class Logo:
-    """A logo that was checked: kind "svg" or "png", its text or base64, and what it shows."""
+    """A checked logo: kind "svg" or "png", content (text or base64), alternative text."""
 
     kind: str
     content: str
@@ -49,9 +50,19 @@ class Logo:
 
 @dataclass(frozen=True)
 class Letterhead:
-    """Name, lines of the address, Logo or None, and {"ink", "line"} as #rrggbb.
+    """Letterhead of a laboratory.
 
-    mark   accreditation mark of the certificate: Logo, PLACE for an empty frame, or None
+    Attributes
+    ----------
+    name : str
+        Name of the laboratory.
+    address : tuple of str
+        Lines of the address.
+    logo : Logo or None
+    colours : dict
+        Colours "ink" and "line" as #rrggbb.
+    mark : Logo, PLACE or None
+        Accreditation mark of the certificate; PLACE: an empty frame.
     """
 
     name: str
@@ -61,18 +72,18 @@ class Letterhead:
     mark: Logo | str | None = None
 
     def data(self):
-        """The letterhead as plain data: what a document block holds."""
+        """Return the letterhead as a dict for a document block."""
         return asdict(self) | {"address": list(self.address)}
 
     def save(self, directory):
-        """Write it, logo and all, beside the notebook that names it; give the file's name."""
+        """Write the letterhead into the folder of the notebook and return the file name."""
         text = json.dumps(self.data(), ensure_ascii=False, indent=1)
         (Path(directory) / LETTERHEAD).write_text(text + "\n", encoding="utf-8")
         return LETTERHEAD
 
 
 def load(path):
-    """The Letterhead of a TOML file; raises InputError with every problem of it."""
+    """Read the Letterhead of a TOML file; raise InputError that lists all problems."""
     path, log = Path(path), Log()
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     letterhead = None if data is None else _parsed(path, data, log)
@@ -81,6 +92,7 @@ def load(path):
 
 
 def _parsed(path, data, log):
+    """Return the Letterhead of TOML bytes, or None; problems go to the log."""
     settings, rows = read_toml(path.name, data, log)
     if settings is None:
         return None
@@ -92,15 +104,16 @@ def _parsed(path, data, log):
                 hint=_hint(section),
             )
             log.problem(path.name, expected, rows.get(section), f"[{section}]")
-    found = {
+    sections = {
         name: read_section(path.name, name, fields, settings.get(name, {}), rows.get(name), log)
         for name, fields in _SECTIONS.items()
     }
-    told = settings.get("colours", {})
+    given_colours = settings.get("colours", {})
     colours = {
-        field.name: _colour(path.name, field, found["colours"], told, log) for field in _COLOURS
+        field.name: _colour(path.name, field, sections["colours"], given_colours, log)
+        for field in _COLOURS
     }
-    laboratory = found["laboratory"]
+    laboratory = sections["laboratory"]
     given = settings.get("laboratory", {})
     logo, mark = (_logo(path, laboratory, given, log, key) for key in ("logo", "accreditation"))
     if log.problems:
@@ -115,6 +128,7 @@ def _hint(section):
 
 
 def _colour(file, field, values, given, log):
+    """Return a checked colour in lower case; problems go to the log."""
     colour = values[field.name] or field.start
     problem = colour_problem(field.name, colour)
     if problem:
@@ -123,7 +137,7 @@ def _colour(file, field, values, given, log):
 
 
 def colour_problem(name, colour):
-    """What is wrong with a colour, or None: no #rrggbb, or, of text, too light for white paper."""
+    """Return a message if a colour is not #rrggbb, or is text too light for white paper."""
     if not isinstance(colour, str) or not _COLOUR.fullmatch(colour):
         return message(
             "no_colour", "found {colour!r}; expected a colour such as #1a2b3c", colour=colour
@@ -141,15 +155,16 @@ def colour_problem(name, colour):
 
 
 def contrast_with_white(colour):
-    """Contrast of a colour #rrggbb with white, 1 to 21 (WCAG 2.2, relative luminance)."""
+    """Contrast ratio of a colour #rrggbb with white, 1 to 21 (WCAG 2.2, relative luminance)."""
     shares = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    # Gamma-corrected sRGB values become linear; their weighted sum is the luminance.
     linear = [s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares]
     weights = (0.2126, 0.7152, 0.0722)
     return 1.05 / (sum(w * s for w, s in zip(weights, linear, strict=True)) + 0.05)
 
 
 def _logo(path, laboratory, given, log, which):
-    """The checked logo, or accreditation mark, of the laboratory; None where there is none."""
+    """Return the checked logo or accreditation mark of the laboratory, or None."""
     key = which if which == "logo" else f"{which}_mark"
     name = laboratory[key]
     if name is None:
@@ -181,7 +196,7 @@ def _logo(path, laboratory, given, log, which):
 
 
 def read_saved(path):
-    """The data of a letterhead that `Letterhead.save` wrote; raises InputError for any other."""
+    """Read a letterhead written by `Letterhead.save` (dict); raise InputError if it is invalid."""
     name = Path(path).name
     try:
         data = read_json(path)
@@ -196,7 +211,8 @@ def read_saved(path):
                 ),
             )
         ) from error
-    data = {"mark": None} | data if isinstance(data, dict) else data  # of before there were marks
+    # Earlier versions wrote no mark.
+    data = {"mark": None} | data if isinstance(data, dict) else data
     problem = data_problem(data)
     if problem:
         raise InputError(Problem(name, problem))
@@ -204,10 +220,10 @@ def read_saved(path):
 
 
 def data_problem(data):
-    """What is wrong with the data of a letterhead, of a file or of a notebook; None: nothing."""
+    """Return a message about an invalid letterhead dict, or None if the dict is valid."""
     shape = {"name": str, "address": list, "logo": dict | None, "colours": dict}
     shape |= {"mark": dict | str | None} if isinstance(data, dict) and "mark" in data else {}
-    if not _has_shape(data, shape) or not all(isinstance(one, str) for one in data["address"]):
+    if not _has_shape(data, shape) or not all(isinstance(line, str) for line in data["address"]):
         return f"is no letterhead: expected {', '.join(shape)}"
     if set(data["colours"]) != {field.name for field in _COLOURS}:
         return f"expected the colours {', '.join(field.name for field in _COLOURS)}"

@@ -1,4 +1,4 @@
-"""Metered runs on paper: what was filled, misclosures by dip, three tables beside each other."""
+"""Calibration by metered liquid in the papers: facts, tables of steps, misclosures, figures."""
 
 import numpy as np
 
@@ -7,9 +7,9 @@ from tankcal.report import numbers
 from tankcal.report.metered_liquid import control_text, density_text, with_u
 from tankcal.report.tables import liquid as tables
 
-MOST_ROWS = 16  # of the table of volumes on paper; all are in the workbook
-MARKERS = "osD^vP*X"
-BEYOND = 4.0  # of the largest U of joint table and liquid: a wider band of geometry is cut off
+MOST_ROWS = 16  # rows of the table of volumes in the papers; the workbook has all rows
+MARKERS = "osD^vP*X"  # marker of each run, as matplotlib names it
+BEYOND = 4.0  # largest half-height of the frame, in largest |difference| + U without geometry
 COLOURS = {"geometry": FAINT, "liquid": RED, "joint": INK}
 
 
@@ -17,7 +17,7 @@ COLOURS = {"geometry": FAINT, "liquid": RED, "joint": INK}
 
 
 def facts(paper):
-    """The calibrating liquid, what was filled, run effect, bottom, and the test of all steps."""
+    """Block of calibrating liquid, filled range, run effect, bottom, and the test of all steps."""
     liquid = paper.record["liquid"]
     return paper.facts(
         [
@@ -39,18 +39,21 @@ def facts(paper):
 
 
 def _hidden(paper, liquid):
-    """What the steps would not show of errors that change all volumes; None of older records."""
-    return " ".join(control_text(paper, one) for one in liquid.get("controls") or ()) or None
+    """Return the sizes of undetected errors in words; None for records of earlier versions."""
+    return (
+        " ".join(control_text(paper, control) for control in liquid.get("controls") or ()) or None
+    )
 
 
 def range_text(paper):
-    """The dips that count, from the lowest to the highest."""
+    """Return the lowest and highest dip of the evaluation in words."""
     liquid = paper.record["liquid"]
     low, high = (paper.height(liquid[f"{end}_dip_m"]) for end in ("lowest", "highest"))
     return paper.word("texts.between_values", low=low, high=high)
 
 
 def _run_sd(paper, liquid):
+    """Return the standard deviation between runs in words, with its degrees of freedom."""
     sd = paper.number(liquid["run_sd"], "share ppm", digits=2)
     if liquid["run_dof"] is None:
         return paper.word("texts.liquid_run_declared", sd=sd)
@@ -59,11 +62,11 @@ def _run_sd(paper, liquid):
 
 
 def _estimate(paper, liquid, key, unit):
-    """An unknown with its u; None where it was none."""
+    """Return an estimate with its u in words; None if it was not estimated."""
     value, u = liquid[key], liquid[f"u_{key}"]
     if value is None:
         return None
-    value, u = (paper.number(one, unit, u=u) for one in (value, u))
+    value, u = (paper.number(number, unit, u=u) for number in (value, u))
     return paper.word("texts.liquid_with_u", value=value, u=u)
 
 
@@ -78,21 +81,21 @@ def _test(paper, liquid):
 
 
 def steps(paper):
-    """The steps three times: brought to the reference, against geometry, each batch tested."""
+    """Tables of the steps: volumes at reference conditions, misclosures, residuals of batches."""
     names = ("liquid_steps", "liquid_misclosures", "liquid_residuals")
     return [paper.show(tables.STEPS, on=name) for name in names]
 
 
 def unknowns(paper):
-    """Causes that misclosures may have, and the sizes that the liquid moved, where it did."""
-    found = [paper.show(tables.CAUSES)]
+    """Tables of possible causes of misclosures and of sizes that the liquid changed."""
+    shown = [paper.show(tables.CAUSES)]
     if tables.SIZES.rows(paper.record):
-        found.append(paper.show(tables.SIZES))
-    return found
+        shown.append(paper.show(tables.SIZES))
+    return shown
 
 
 def volumes(paper):
-    """Rows of the three tables: evenly chosen, with the ends of what was filled."""
+    """Table of volumes from geometry, liquid and both, at selected heights."""
     record = paper.record
     table = tables.volumes_table(record)
     rows = table.rows(record)
@@ -101,9 +104,10 @@ def volumes(paper):
 
 
 def chosen_rows(record):
-    """Places of the rows that paper shows: the ends of the filled dips, the top, some between."""
+    """Indices of the rows in the papers: evenly spaced rows and the ends of the filled range."""
     heights, liquid = np.array(record["capacity"]["height_m"]), record["liquid"]
     even = np.linspace(0, len(heights) - 1, min(MOST_ROWS, len(heights))).round().astype(int)
+    # A tolerance of 1e-9 m includes rows at the ends of the filled range.
     low = np.searchsorted(heights, liquid["lowest_dip_m"] - 1e-9)
     high = np.searchsorted(heights, liquid["highest_dip_m"] + 1e-9) - 1
     ends = [place for place in (low, high) if 0 <= place < len(heights)]
@@ -115,22 +119,22 @@ def chosen_rows(record):
 
 @styled
 def misclosures(paper):
-    """Misclosures of the steps, liquid less geometry, with U, over the dip at their end."""
-    found = paper.record["liquid"]["steps"]
+    """Figure of the misclosures of the steps, liquid minus geometry, with U, against the dip."""
+    steps = paper.record["liquid"]["steps"]
     figure = Drawing(figsize=(WIDTH, 2.9))
     ax = figure.subplots()
     ax.axhline(0, color=GREY, linewidth=0.6)
-    runs = list(dict.fromkeys(one["run"] for one in found))
+    runs = list(dict.fromkeys(step["run"] for step in steps))
     colours = (INK, RED, FAINT)
-    shift = _least_gap(found) * 0.12
+    shift = _least_gap(steps) * 0.12  # separates the error bars of runs at equal dips
     for number, run in enumerate(runs):
-        mine = [one for one in found if one["run"] == run]
-        at = np.array([one["to_dip_m"] for one in mine])
-        at = at + shift * (number - (len(runs) - 1) / 2) if len(runs) <= len(MARKERS) else at
+        run_steps = [step for step in steps if step["run"] == run]
+        dips = np.array([step["to_dip_m"] for step in run_steps])
+        dips = dips + shift * (number - (len(runs) - 1) / 2) if len(runs) <= len(MARKERS) else dips
         ax.errorbar(
-            at,
-            [1000 * one["misclosure_m3"] for one in mine],
-            [1000 * one["misclosure_U_m3"] for one in mine],
+            dips,
+            [1000 * step["misclosure_m3"] for step in run_steps],
+            [1000 * step["misclosure_U_m3"] for step in run_steps],
             color=colours[number % len(colours)],
             marker=MARKERS[number % len(MARKERS)],
             markersize=3,
@@ -148,18 +152,18 @@ def misclosures(paper):
     return figure
 
 
-def _least_gap(found):
-    """The least distance between dips of one run, m."""
+def _least_gap(steps):
+    """Smallest distance between dips of a run, m."""
     gaps = []
-    for run in {one["run"] for one in found}:
-        at = np.sort([one["to_dip_m"] for one in found if one["run"] == run])
-        gaps += np.diff(at)[np.diff(at) > 0].tolist()
+    for run in {step["run"] for step in steps}:
+        dips = np.sort([step["to_dip_m"] for step in steps if step["run"] == run])
+        gaps += np.diff(dips)[np.diff(dips) > 0].tolist()
     return min(gaps, default=0.0)
 
 
 @styled
 def differences(paper):
-    """The three tables less the joint one, each with its U: over the filled dips, and over all."""
+    """Figure of the three tables minus the joint table, each with its U."""
     record = paper.record
     rows = tables.rows_beside(record)
     column = {key: np.array([row[key] for row in rows], dtype=float) for key in rows[0]}
@@ -169,14 +173,15 @@ def differences(paper):
     }
     low, high = (record["liquid"][f"{end}_dip_m"] for end in ("lowest", "highest"))
     filled = (height >= low - 1e-9) & (height <= high + 1e-9)
+    # The first of two panels shows the filled range only.
     panels = [np.full(len(height), True)]
     if np.count_nonzero(filled) > 1 and not filled.all():
         panels = [filled, *panels]
     figure = Drawing(figsize=(WIDTH, 3.0))
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
     for ax, inside in zip(axes, panels, strict=True):
-        here = {kind: (middle[inside], U[inside]) for kind, (middle, U) in bands.items()}
-        _draw_bands(ax, height[inside], here, lambda kind: paper.word(f"axes.liquid_{kind}"))
+        shown_bands = {kind: (middle[inside], U[inside]) for kind, (middle, U) in bands.items()}
+        _draw_bands(ax, height[inside], shown_bands, lambda kind: paper.word(f"axes.liquid_{kind}"))
         ax.set_xlabel(paper.word("axes.height"))
     axes[0].set_ylabel(paper.word("axes.liquid_difference"))
     figure.legend(
@@ -187,7 +192,7 @@ def differences(paper):
 
 
 def _draw_bands(ax, height, bands, name_of):
-    """Differences with their U; the frame holds all of joint table and liquid."""
+    """Draw differences with their U; a wide band of the geometry may exceed the frame."""
     reach = {}
     for kind, (middle, U) in bands.items():
         if not np.isfinite(middle).any():
@@ -196,7 +201,7 @@ def _draw_bands(ax, height, bands, name_of):
         colour = COLOURS[kind]
         ax.plot(height, middle, color=colour, linewidth=1.2, label=name_of(kind))
         ax.fill_between(height, middle - U, middle + U, color=colour, alpha=0.18, linewidth=0)
-    needed = max(one for kind, one in reach.items() if kind != "geometry")
+    needed = max(size for kind, size in reach.items() if kind != "geometry")
     limit = max(needed, min(reach["geometry"], BEYOND * needed))
     if limit:
         ax.set_ylim(-1.08 * limit, 1.08 * limit)

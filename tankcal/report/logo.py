@@ -1,16 +1,16 @@
-"""What a logo may be: a picture of its own, without programs, and without links to anywhere."""
+"""Checks of a logo: a self-contained picture without programs and without external links."""
 
 import io
 import re
 import struct
 from xml.etree import ElementTree
 
-MAX_LOGO_BYTES = 500_000
-MAX_LOGO_PIXELS = 4000  # along a side
-MAX_DRAWN = 100_000  # elements of an SVG with every reference followed
+MAX_LOGO_BYTES = 500_000  # largest size of the file
+MAX_LOGO_PIXELS = 4000  # pixels along a side
+MAX_DRAWN = 100_000  # elements of an SVG after the expansion of its references
 _SVG = "{http://www.w3.org/2000/svg}"
-_PNG = b"\x89PNG\r\n\x1a\n"
-_ACTIVE = {
+_PNG = b"\x89PNG\r\n\x1a\n"  # first bytes of a PNG file
+_ACTIVE = {  # SVG elements with programs, animation or foreign content
     "script", "foreignObject", "set", "animate", "animateMotion", "animateTransform", "handler",
     "iframe", "embed", "object", "audio", "video", "discard",
 }  # fmt: skip
@@ -20,14 +20,14 @@ _REFERENCE = re.compile(r"url\s*\(\s*[\"']?\s*#([^\"')\s]+)", re.IGNORECASE)
 
 
 def logo_problem(kind, data):
-    """Why the bytes of a file of kind "svg" or "png" cannot be a logo, or None."""
+    """Return the reason why the bytes of an "svg" or "png" file are no valid logo, or None."""
     if len(data) > MAX_LOGO_BYTES:
         return f"has {len(data) / 1000:.0f} kB; expected at most {MAX_LOGO_BYTES / 1000:.0f} kB"
     return svg_problem(data) if kind == "svg" else png_problem(data)
 
 
 def svg_problem(data):
-    """Why the bytes of an SVG cannot be a logo, or None."""
+    """Return the reason why the bytes of an SVG are no valid logo, or None."""
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -43,8 +43,8 @@ def svg_problem(data):
         return "expected an SVG: <svg> of the SVG namespace outermost"
     if "viewBox" not in root.attrib and not {"width", "height"} <= set(root.attrib):
         return "has no size; expected a viewBox, or width and height"
-    found = (problem for element in root.iter() if (problem := _element_problem(element)))
-    return next(found, None) or _expansion_problem(root)
+    problems = (problem for element in root.iter() if (problem := _element_problem(element)))
+    return next(problems, None) or _expansion_problem(root)
 
 
 def _element_problem(element):
@@ -66,7 +66,7 @@ def _element_problem(element):
 
 
 def _leads_out(text):
-    """Whether a style or a value asks for another file; escapes could hide that."""
+    """Return whether a style or value may refer to another file; escapes could hide this."""
     if any(start != "#" for start in _URL.findall(text)):
         return True
     return "@import" in text.lower() or ("\\" in text and "(" in text)
@@ -77,17 +77,19 @@ def _local(name):
 
 
 def _expansion_problem(root):
-    """A problem where references lead in a circle, or to more than a logo can need."""
-    by_id = {one.attrib["id"]: one for one in root.iter() if "id" in one.attrib}
+    """Return a problem if references are circular or expand to too many elements."""
+    by_id = {part.attrib["id"]: part for part in root.iter() if "id" in part.attrib}
     sizes, open_ = {}, set()
 
     def size(element):
+        # An element that is still being counted refers to itself.
+        """Return the number of drawn elements, limited to MAX_DRAWN + 1."""
         if element in open_:
             return MAX_DRAWN + 1
         if element not in sizes:
             open_.add(element)
             inside = [*element, *(by_id[name] for name in _references(element) if name in by_id)]
-            sizes[element] = 1 + sum(min(size(one), MAX_DRAWN + 1) for one in inside)
+            sizes[element] = 1 + sum(min(size(part), MAX_DRAWN + 1) for part in inside)
             open_.discard(element)
         return sizes[element]
 
@@ -106,7 +108,7 @@ def _references(element):
 
 
 def png_problem(data):
-    """Why the bytes of a PNG cannot be a logo, or None."""
+    """Return the reason why the bytes of a PNG are no valid logo, or None."""
     if not data.startswith(_PNG) or data[12:16] != b"IHDR" or len(data) < 24:
         return "is no PNG file"
     size = struct.unpack(">II", data[16:24])
@@ -117,6 +119,6 @@ def png_problem(data):
 
     try:
         imread(io.BytesIO(data), format="png")
-    except Exception as error:  # whatever the reader of pictures raises for a broken one
+    except Exception as error:  # a broken image can raise any exception
         return f"cannot be read as a PNG ({error})"
     return None

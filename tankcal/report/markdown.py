@@ -1,11 +1,11 @@
-"""Markdown cells as plain nodes: {"t": kind, ...}, for the PDF and the HTML alike."""
+"""Conversion of markdown cells into nodes {"t": kind, ...} for the PDF and the web page."""
 
 import mistune
 
 from tankcal.errors import TankcalError
 from tankcal.report.latex_math import formula
 
-_SCHEMES = ("https:", "http:", "mailto:")
+_SCHEMES = ("https:", "http:", "mailto:")  # schemes of links that remain links
 _WRAPPERS = {
     "paragraph": "paragraph",
     "block_text": "plain",
@@ -17,10 +17,10 @@ _WRAPPERS = {
 
 
 def nodes(source):
-    """The nodes of a markdown text.
+    """Return the nodes of a markdown text (list of dict).
 
-    HTML inside it is printed as it is written, a link of an unusual kind as its text. Raises
-    TankcalError for what the report cannot show: images, unknown mathematics.
+    HTML is printed as text. A link with an unusual scheme is reduced to its text. Images and
+    unknown mathematics raise TankcalError.
     """
     parse = mistune.create_markdown(renderer=None, plugins=["math", "table"])
     return _children(parse(source))
@@ -32,6 +32,7 @@ def _children(tokens):
 
 
 def _node(token):
+    """Convert a token of mistune into a node."""
     kind, raw = token["type"], token.get("raw", "")
     if kind in _WRAPPERS:
         return {"t": _WRAPPERS[kind], "c": _children(token["children"])}

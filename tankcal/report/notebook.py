@@ -1,7 +1,7 @@
-"""The report's notebook: the templates joined, and executed within this process.
+"""The notebook of a report: templates are joined and executed within this process.
 
-A notebook is plain data here, {"cells": [...], "metadata": {...}, ...} as its file has it; one that
-`nbformat` read is such data, too.
+A notebook is a dict {"cells": [...], "metadata": {...}, ...} with the structure of its file. The
+notebooks of `nbformat` have this structure.
 """
 
 import ast
@@ -15,32 +15,51 @@ from tankcal.errors import CellError, TankcalError, VocabularyError
 from tankcal.text.shipped import shipped_folder
 
 TEMPLATES = ("certificate.ipynb", "working_papers.ipynb", "field_table.ipynb")
-FILES_IN_PARAMETERS = ("RECORD", "LETTERHEAD")  # they lie in the folder of the notebook
-BY_VALUES = (LookupError, TypeError, ValueError, AttributeError)  # a record holds something else
-_TEXTS = ("source", "text")
+# Parameters that name files in the folder of the notebook.
+FILES_IN_PARAMETERS = ("RECORD", "LETTERHEAD")
+# Exceptions of a record with unexpected content.
+BY_VALUES = (LookupError, TypeError, ValueError, AttributeError)
+_TEXTS = ("source", "text")  # keys whose texts a notebook file stores as lists of lines
 
 
 def joined(record_name, lacks=(), templates=TEMPLATES, **parameters):
-    """One notebook from the shipped templates, to be kept beside the record of that name.
+    """Join the templates into a notebook.
 
-    parameters   other names of the templates' parameters cell, and their values
+    Cells with the tag "parameters" or "setup" are taken from the first template only. A cell with
+    the tag "if:courses" is omitted if `lacks` contains "courses".
 
-    Cells tagged "parameters" or "setup" are taken from the first template only. A cell tagged
-    "if:courses" is left out when "courses" is among `lacks`, what the record has nothing of.
+    Parameters
+    ----------
+    record_name : str
+        File name of the record in the folder of the notebook.
+    lacks : collection of str, optional
+        Parts of the record without content.
+    templates : sequence of str, optional
+        Names of the templates.
+    **parameters
+        Values for other names of the parameters cell.
 
-    Raises TankcalError for a parameter that the templates do not have.
+    Returns
+    -------
+    dict
+        Notebook.
+
+    Raises
+    ------
+    TankcalError
+        For a parameter that the templates do not have.
     """
     folder = shipped_folder("report_templates")
-    whole, *others = (_read(folder / name) for name in templates)
-    cells = whole["cells"]
+    notebook, *others = (_read(folder / name) for name in templates)
+    cells = notebook["cells"]
     for other in others:
         cells += [c for c in other["cells"] if not _tags(c) & {"parameters", "setup"}]
-    unneeded = {f"if:{part}" for part in lacks}
-    whole["cells"] = [cell for cell in cells if not _tags(cell) & unneeded]
-    set_parameters(whole, {"RECORD": record_name, **parameters})
-    for number, cell in enumerate(whole["cells"], 1):
+    omitted_tags = {f"if:{part}" for part in lacks}
+    notebook["cells"] = [cell for cell in cells if not _tags(cell) & omitted_tags]
+    set_parameters(notebook, {"RECORD": record_name, **parameters})
+    for number, cell in enumerate(notebook["cells"], 1):
         cell["id"] = f"cell-{number}"
-    return whole
+    return notebook
 
 
 def _read(path):
@@ -51,9 +70,9 @@ def _read(path):
 
 
 def set_parameters(notebook, values):
-    """Give the names in the cell tagged "parameters" their values; those not named keep theirs.
+    """Set values in the cell with the tag "parameters"; other parameters keep their values.
 
-    Raises TankcalError when there is not one such cell, or when it has no such name.
+    TankcalError is raised unless there is exactly one such cell, and for an unknown name.
     """
     cells = [cell for cell in notebook["cells"] if "parameters" in _tags(cell)]
     if len(cells) != 1:
@@ -75,16 +94,33 @@ def _tags(cell):
     return set(cell["metadata"].get("tags", []))
 
 
-def execute(notebook, folder, on_cell=None, **handed):
-    """Execute a notebook of `joined` in place, as Jupyter would; `folder` is where it will lie.
+def execute(notebook, folder, on_cell=None, **objects):
+    """Execute a notebook of `joined` in place.
 
-    on_cell   called with the number of cells done, after each
-    handed    names of the parameters cell, and what they are in this process in place of what the
-              notebook says: a file that has been read
+    The templates are part of tankcal and run in this process. The start of a Jupyter kernel would
+    take as long as the execution of all cells. A notebook that a user has changed requires Jupyter
+    or nbconvert.
 
-    The templates are our own code: they run in this process, without a kernel, which takes as long
-    to start as all of their cells to run. A notebook that somebody changed is a matter for Jupyter
-    or nbconvert. Raises TankcalError naming the cell that failed, CellError where values made it.
+    Parameters
+    ----------
+    notebook : dict
+        Notebook; the outputs of its cells are replaced.
+    folder : Path
+        Folder of the notebook and of the files that it names.
+    on_cell : callable, optional
+        Called as on_cell(number of executed cells) after each cell.
+    **objects
+        Objects that replace parameters of the notebook in this process, such as a loaded record.
+
+    Returns
+    -------
+    dict
+        The notebook.
+
+    Raises
+    ------
+    TankcalError
+        If a cell fails; CellError if values of the record are the cause.
     """
     _load_matplotlib()
     shown = []
@@ -108,7 +144,7 @@ def execute(notebook, folder, on_cell=None, **handed):
                     f"{type(error).__name__}: {error}"
                 ) from error
             if "parameters" in _tags(cell):
-                names |= _files_beside(names, folder) | handed
+                names |= _files_beside(names, folder) | objects
             outputs = [_stream(name, text.getvalue()) for name, text in printed.items()]
             outputs += [*shown, _result(value, count)]
             cell["outputs"] = [output for output in outputs if output]
@@ -120,7 +156,7 @@ def execute(notebook, folder, on_cell=None, **handed):
 
 
 def _run_cell(source, names):
-    """Run the statements of a cell; the value of its last line where that is an expression."""
+    """Run the statements of a cell; return the value of a final expression, or None."""
     tree = ast.parse(source)
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
     exec(compile(tree, "<cell>", "exec"), names)
@@ -128,9 +164,9 @@ def _run_cell(source, names):
 
 
 def _files_beside(names, folder):
-    """The parameters that name files, with their paths: this process has a folder of its own."""
-    found = {name: names.get(name) for name in FILES_IN_PARAMETERS}
-    return {name: str(folder / value) for name, value in found.items() if value}
+    """Return file parameters as full paths, since the process may run in another folder."""
+    file_names = {name: names.get(name) for name in FILES_IN_PARAMETERS}
+    return {name: str(folder / value) for name, value in file_names.items() if value}
 
 
 def _display(value):
@@ -140,8 +176,8 @@ def _display(value):
 def _result(value, count):
     if value is None:
         return None
-    of = {"output_type": "execute_result", "execution_count": count}
-    return {**of, "data": _bundle(value), "metadata": {}}
+    header = {"output_type": "execute_result", "execution_count": count}
+    return {**header, "data": _bundle(value), "metadata": {}}
 
 
 def _stream(name, text):
@@ -149,14 +185,14 @@ def _stream(name, text):
 
 
 def _bundle(value):
-    """What Jupyter would keep of a value: the forms of a block, the text of anything else."""
+    """Return the output data that Jupyter would store for a value."""
     if hasattr(value, "_repr_mimebundle_"):
         return value._repr_mimebundle_()
     return {"text/plain": repr(value)}
 
 
 def _language_info():
-    """What a kernel of this Python says of its language."""
+    """Return the language metadata of a Python kernel."""
     return {
         "codemirror_mode": {"name": "ipython", "version": sys.version_info.major},
         "file_extension": ".py",
@@ -169,28 +205,31 @@ def _language_info():
 
 
 def written(notebook):
-    """The file of a notebook, as `nbformat.writes` makes it: long texts are lists of lines."""
-    cells = [_in_lines(cell) for cell in notebook["cells"]]
-    text = {"ensure_ascii": False, "indent": 1, "sort_keys": True, "separators": (",", ": ")}
-    return json.dumps({**notebook, "cells": cells}, **text)
+    """Return the file content of a notebook in the format of `nbformat.writes`."""
+    cells = [_split_cell(cell) for cell in notebook["cells"]]
+    # Texts become lists of lines; the options are the options of nbformat.
+    options = {"ensure_ascii": False, "indent": 1, "sort_keys": True, "separators": (",", ": ")}
+    return json.dumps({**notebook, "cells": cells}, **options)
 
 
-def _in_lines(cell):
-    made = {key: _lines(value) if key in _TEXTS else value for key, value in cell.items()}
+def _split_cell(cell):
+    cell_in_lines = {key: _lines(value) if key in _TEXTS else value for key, value in cell.items()}
     if "outputs" in cell:
-        made["outputs"] = [_output_in_lines(output) for output in cell["outputs"]]
-    return made
+        cell_in_lines["outputs"] = [_split_output(output) for output in cell["outputs"]]
+    return cell_in_lines
 
 
-def _output_in_lines(output):
-    made = {key: _lines(value) if key in _TEXTS else value for key, value in output.items()}
+def _split_output(output):
+    output_in_lines = {
+        key: _lines(value) if key in _TEXTS else value for key, value in output.items()
+    }
     if "data" in output:
-        of_text = {name: not name.endswith("json") for name in output["data"]}
-        made["data"] = {
-            name: _lines(value) if of_text[name] else value
+        is_text = {name: not name.endswith("json") for name in output["data"]}
+        output_in_lines["data"] = {
+            name: _lines(value) if is_text[name] else value
             for name, value in output["data"].items()
         }
-    return made
+    return output_in_lines
 
 
 def _lines(text):
@@ -198,7 +237,7 @@ def _lines(text):
 
 
 def _load_matplotlib():
-    """Load it without the remark that it made a temporary folder for its fonts."""
+    """Import matplotlib without its message about a temporary folder for fonts."""
     logger = logging.getLogger("matplotlib")
     level = logger.level
     logger.setLevel(logging.ERROR)

@@ -1,4 +1,4 @@
-"""Units as they are printed, and values with powers of ten beside their standard deviations."""
+"""Printed units, and values rounded to their standard deviations."""
 
 from dataclasses import dataclass
 from math import inf, pi
@@ -14,15 +14,22 @@ from tankcal.text.digits import (
     superscript,
 )
 
-_SHORT = range(-2, 6)  # powers of ten written out in a narrow column
-_MOST_DEGREES = 10_000  # of freedom: from there k is that of the normal distribution, to 0.03 %
+_SHORT = range(-2, 6)  # exponents of values that are written without a power of ten
+_MOST_DEGREES = 10_000  # degrees of freedom above which k agrees with the normal k to 0.03 %
 
 
 @dataclass(frozen=True)
 class Unit:
-    """How a value of the record (SI, or as its key says) is shown: its symbol, and the factor.
+    """Printed unit of a quantity of the record.
 
-    least  decimals that rows of a capacity table have in it at least: litres
+    Attributes
+    ----------
+    symbol : str
+        Printed symbol.
+    factor : float
+        Printed value divided by the value in the record.
+    least : int
+        Smallest number of decimals of volumes in a capacity table.
     """
 
     symbol: str
@@ -57,7 +64,7 @@ UNITS = {
     "ppm": Unit("ppm"),
     "share ppm": Unit("ppm", 1e6),
     "um": Unit("µm"),
-    "image mm": Unit("mm"),  # image coordinates are in millimetres in the record, too
+    "image mm": Unit("mm"),  # the record has image coordinates in millimetres
     "image um": Unit("µm", 1e3),
     "px": Unit("px"),
     "arcsec": Unit("″"),
@@ -68,28 +75,28 @@ UNITS = {
 }
 
 
-# Of what was observed and of its residuals: {unit in the record: (unit shown, factor)}.
+# Units of readings and of their residuals: {unit in the record: (printed unit, factor)}.
 _LARGE = {"mm": ("image mm", 1.0), "m": ("m", 1.0), "rad": ("deg", 180 / pi)}
 _SMALL = {"mm": ("um", 1e3), "m": ("image mm", 1e3), "rad": ("arcsec", 648000 / pi)}
 
 
 def large_unit(name):
-    """(unit, factor) in which readings of a unit are shown; ("", 1.0) where it has no such."""
+    """Return (unit, factor) for printed readings; ("", 1.0) for an unknown unit."""
     return _LARGE.get(name, ("", 1.0))
 
 
 def small_unit(name):
-    """The same of residuals and sds: micrometres, millimetres, arc seconds."""
+    """Return (unit, factor) for printed residuals and standard deviations of a unit."""
     return _SMALL.get(name, ("", 1.0))
 
 
 def spelled(name):
-    """A unit of large_unit or small_unit in ASCII, for programs."""
+    """Return a unit of `large_unit` or `small_unit` in ASCII, for programs."""
     return name.removeprefix("image ")
 
 
 def unit(name):
-    """The unit called `name`; raises VocabularyError when it is not one of UNITS."""
+    """Return the Unit of a name; raise VocabularyError for a name that is not in UNITS."""
     if name not in UNITS:
         raise VocabularyError(
             f"unit {name!r} is not known; there are: {', '.join(filter(None, UNITS))}"
@@ -98,8 +105,8 @@ def unit(name):
 
 
 def symbol(text):
-    """A unit as the record writes it, as it is printed: "m3/kg/m3" is "m³/(kg/m³)", "deg" "°"."""
-    if not text or text == "1":  # of a ratio
+    """Return the printed form of a unit of the record: "m3/kg/m3" gives "m³/(kg/m³)"."""
+    if not text or text == "1":  # a ratio has no unit
         return None
     text = text.replace("m3", "m³").replace("m2", "m²").replace("degC", "°C").replace("deg", "°")
     above, _, below = text.partition("/")
@@ -107,17 +114,40 @@ def symbol(text):
 
 
 def like_its_sd(value, sd, marks=ENGLISH):
-    """`value` down to two digits of its standard deviation; four digits when it has none."""
+    """Round a value to two digits of its standard deviation, or to four digits without it.
+
+    Parameters
+    ----------
+    value, sd : float
+        Value and standard deviation in equal units; sd 0 or None: without.
+    marks : Marks, optional
+        Decimal mark and separators of the language.
+
+    Returns
+    -------
+    str
+    """
     if not sd:
         return format_significant(value, 4, marks)
-    found = format_with_u(value, sd, marks, least=0, written_out=WITHOUT_U)
-    return found.value + found.power
+    rounded = format_with_u(value, sd, marks, least=0, written_out=WITHOUT_U)
+    return rounded.value + rounded.power
 
 
 def concise(value, sd, marks=ENGLISH):
-    """A value with two digits of its standard deviation in brackets: "4.3816(13)".
+    """Format a value with two digits of its standard deviation in brackets: "4.3816(13)".
 
-    Without a standard deviation seven digits and no bracket.
+    Without a standard deviation the value has seven digits and no brackets.
+
+    Parameters
+    ----------
+    value, sd : float
+        Value and standard deviation in equal units; sd 0 or None: without.
+    marks : Marks, optional
+        Decimal mark and separators of the language.
+
+    Returns
+    -------
+    str
     """
     if not sd:
         return format_significant(value, 7, marks)
@@ -125,15 +155,15 @@ def concise(value, sd, marks=ENGLISH):
 
 
 def powers(unit):
-    """A unit with powers as it is printed: "mm-2" is "mm⁻²"."""
+    """Return the printed form of a unit with exponents: "mm-2" gives "mm⁻²"."""
     return superscript(unit)
 
 
 def degrees_of_freedom(value, marks=ENGLISH):
-    """Effective degrees of freedom; so many that nobody can tell, or None, are written as ∞.
+    """Format effective degrees of freedom; None and values above 10 000 are printed as ∞.
 
     >>> degrees_of_freedom(2321.4), degrees_of_freedom(5.05e16)
     ('2321', '∞')
     """
-    many = inf if value is None else value
-    return "∞" if many > _MOST_DEGREES else shortest(many, marks, digits=3)
+    dof = inf if value is None else value
+    return "∞" if dof > _MOST_DEGREES else shortest(dof, marks, digits=3)

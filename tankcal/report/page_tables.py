@@ -1,22 +1,22 @@
-"""What the page style need not find out of tables: digits to fill up, widths of long columns.
+"""Preparation of tables for the page style: alignment of decimal marks and widths of columns.
 
-The typesetter asks for the place of a long table several times, and each time it would count the
-letters of every cell.
+The typesetter lays out a long table several times. Without this preparation, it would count the
+letters of every cell each time.
 """
 
 import re
 from unicodedata import combining
 
-_ON_ONE_LINE = re.compile(r"[0-9.,+*\N{MINUS SIGN}\N{NARROW NO-BREAK SPACE}]*")  # as wide as it is
+_ON_ONE_LINE = re.compile(r"[0-9.,+*\N{MINUS SIGN}\N{NARROW NO-BREAK SPACE}]*")  # cells of numbers
 
 
 def prepared(block):
-    """A block as `page.typ` takes it; what is no table as it is.
+    """Return a block in the form that `page.typ` requires; only tables change.
 
-    A cell whose number lacks digits behind its mark, by which it would stand in line with the
-    others of its column, is {"text": its own, "missing": what is set unseen}. A `columns_table` has
-    `shares`, the widths of its columns in proportion to their longest text, and says whether it is
-    `even`: of numbers alone, each row of which is as high as the others.
+    A number with fewer decimals than its column becomes {"text": number, "missing": digits}. The
+    page style sets the missing digits invisibly, so that the decimal marks are aligned. A
+    `columns_table` also has `shares`, relative widths of its columns, and `even`. `even` is True if
+    the table consists of numbers only, so that all rows have equal height.
 
     Examples
     --------
@@ -43,24 +43,24 @@ def prepared(block):
 
 
 def _filled(texts, mark):
-    """The numbers of a column, each with what it lacks behind its decimal mark."""
+    """Return the numbers of a column, with the decimals that each lacks to the longest."""
     decimals = [len(text.rpartition(mark)[2]) if mark in text else None for text in texts]
     known = [count for count in decimals if count is not None]
     if not known:
         return texts
     longest = max(known)
-    return [_cell(text, own, longest, mark) for text, own in zip(texts, decimals, strict=True)]
+    return [_cell(text, count, longest, mark) for text, count in zip(texts, decimals, strict=True)]
 
 
-def _cell(text, own, longest, mark):
-    if own == longest:
+def _cell(text, decimals, longest, mark):
+    if decimals == longest:
         return text
-    missing = mark + "0" * longest if own is None else "0" * (longest - own)
+    missing = mark + "0" * longest if decimals is None else "0" * (longest - decimals)
     return {"text": text, "missing": missing}
 
 
 def _share(column, cells):
-    """The letters of the longest text of a column, its heading and its unit among them."""
+    """Number of letters of the longest cell, heading or unit of a column, plus a margin of 1."""
     heads = map(_letters, (column["heading"], column["unit"]))
     return 1 + max(*heads, *map(_length, cells))
 

@@ -1,6 +1,6 @@
-"""A record on paper: its values with their units and digits, in the words of its language.
+"""Formatting of a record in a language: values with their units and digits, and blocks.
 
-The cells of the templates use it; nothing here computes a number.
+The cells of the templates use this module. It computes no results.
 
     paper = Paper("record.json")
     columns = [Column("course"), Column("height_m", "m", 3)]
@@ -25,26 +25,38 @@ from tankcal.text.words import (
 )
 
 __all__ = ["Column", "Paper"]
-_BLANK = "_" * 20  # to be filled in by hand
-_DIGITS_OF_DIGEST = 12
+_BLANK = "_" * 20  # line to fill in by hand
+_DIGITS_OF_DIGEST = 12  # digits of the SHA-256 in the footer
+# Decimals of the dimensions of a part, by unit.
 DECIMALS_OF_PARTS = {"m": 4, "m3": 4, "mm/m": 2, "mm": 2, "deg": 2, "kg/m3": 1}
 
 
 @dataclass(frozen=True)
 class ReadRecord:
-    """A record.json that has been read: its path, and what it holds."""
+    """A loaded record.json with its path."""
 
     path: Path
     record: dict = field(repr=False)
 
 
 class Paper(PlainPaper):
-    """A record with its language's words; raises InputError for another format.
+    """Formatter of a record in a language.
 
-    source      the path of a record.json, a ReadRecord, or a record as parsed
-    words       of a language; None: those of `language`
-    language    None: that which the record asks for
-    letterhead  the path of a saved letterhead, or None
+    Parameters
+    ----------
+    source : str, Path, ReadRecord or dict
+        Path of a record.json, or the loaded record.
+    words : dict, optional
+        Words of the language; None: the words of `language`.
+    language : str, optional
+        Code of the language; None: the language of the record.
+    letterhead : str or Path, optional
+        Path of a saved letterhead.
+
+    Raises
+    ------
+    InputError
+        If the file has another format.
     """
 
     def __init__(self, source, words=None, language=None, letterhead=None):
@@ -61,19 +73,19 @@ class Paper(PlainPaper):
 
     @property
     def volume_unit(self):
-        """The unit that the job chose for volumes."""
+        """Unit of volumes that the job specifies."""
         return (self.record["job"]["table"] or {}).get("volume_unit") or "m3"
 
     def input_name(self, row):
-        """The name of an input of the budget."""
+        """Return the name of an input quantity of the budget."""
         return input_name(self.words, row)
 
     def coverage(self):
-        """The coverage probability in percent."""
+        """Return the coverage probability in percent (str)."""
         return self.percent(self.record["job"]["table"]["coverage_probability"])
 
     def choices(self, code=None):
-        """One sentence for each choice of the record, or for that with the given code."""
+        """Return a sentence for each choice of the record, or for the choices with a code."""
         return [
             choice_sentence(self.words, choice)
             for choice in self.record["choices"]
@@ -82,21 +94,21 @@ class Paper(PlainPaper):
 
     @cached_property
     def readings(self):
-        """`ArrayColumns` of every reading of the adjustment."""
+        """Residuals of all readings of the adjustment (`ArrayColumns`)."""
         return as_columns(self.record["adjustment"]["residuals"])
 
     # ---- blocks
 
     def document(self, part):
-        """The start of the part: title, author, running head with the notice, page numbers."""
+        """Document block of a part, with title, author, running head and footer."""
         certificate, tank = self.record["job"]["certificate"], self.subject()
-        of_letterhead = self.letterhead["name"] if self.letterhead else ""
+        letterhead_name = self.letterhead["name"] if self.letterhead else ""
         number = certificate.get("number") or (_BLANK if part == "certificate" else "")
         left = f"{self.word('page.number')} {number}" if number else ""
         return blocks.document(
             part=part,
             title=f"{self.word(f'titles.{part}')}, {tank}",
-            author=str(certificate.get("laboratory") or of_letterhead),
+            author=str(certificate.get("laboratory") or letterhead_name),
             date=self.date(),
             language=self.words["language"]["code"],
             notice=str(certificate.get("notice", "")),
@@ -108,7 +120,7 @@ class Paper(PlainPaper):
         )
 
     def _footer(self):
-        """Page numbers, and the first digits of the SHA-256 of the record that is printed."""
+        """Return the footer: page numbers and the first digits of the SHA-256 of the record."""
         pages = self.words["page"]["footer"]
         if self.digest is None:
             return pages
@@ -117,37 +129,37 @@ class Paper(PlainPaper):
 
     @cached_property
     def digest(self):
-        """The SHA-256 of the file of the record; None for a record that was handed over parsed."""
+        """SHA-256 of the file of the record; None for a record without a file."""
         return attachments.sha256(self._path.read_bytes()) if self._path else None
 
     def _attachments(self, part):
-        """The files to be held inside the part's PDF; they lie beside the record."""
+        """Return the files beside the record that the PDF of a part embeds."""
         is_first = part == "certificate" or self.record["capacity"] is None
         if self._path is None or not is_first:
             return []
         names = attachments.OF_RECORD
         described = {name: self.word(f"attached.{Path(name).stem}") for name in names}
-        return [one.data() for one in attachments.beside(self._path.parent, described)]
+        return [file.data() for file in attachments.beside(self._path.parent, described)]
 
     def laboratory(self):
-        """Who issues the paper, for the head of its first page; "" where the letterhead says it."""
+        """Return the laboratory for the head of the first page; "" if the letterhead names it."""
         name = self.record["job"]["certificate"].get("laboratory", "")
         return "" if self.letterhead and self.letterhead["name"] == name else name
 
     def date(self):
-        """The date that the document bears: of issue when given, else of the survey (ISO)."""
+        """Return the date of issue if given, otherwise the date of the survey (ISO)."""
         job = self.record["job"]
         return str(job["certificate"].get("date_of_issue") or (job["survey"] or {}).get("date", ""))
 
     def subject(self):
-        """What the papers are about: the tank, or the survey alone by the name of its job."""
+        """Return the subject of the papers: the tank, or the survey by the name of its job."""
         tank = self.record["job"]["tank"]
         if tank is None:
             return f"{self.word('page.survey')} {self.record['job']['source']}"
         return f"{self.word('page.tank')} {tank['id']}"
 
     def subtitle(self, part):
-        """The line below the title of a part."""
+        """Return the line below the title of a part."""
         tank = self.record["job"]["tank"]
         if self.record["capacity"] is None:
             name = self.record["job"]["source"] if tank is None else self.subject()
@@ -155,17 +167,17 @@ class Paper(PlainPaper):
         return self.word(f"titles.{part}", value=self.word(f"kinds.{tank['kind']}"))
 
     def dimensions(self, described):
-        """What the record says of a part: [{code, value, unit}], a text where there is no unit.
+        """Block of the dimensions of a part, [{code, value, unit}].
 
-        A code that is a text is looked up in the words `parts`.
+        A value without a unit is a text; its translation is in the words `parts`.
         """
         return blocks.key_values(
-            [(self.label(one["code"]), self.size_text(one)) for one in described]
+            [(self.label(size["code"]), self.size_text(size)) for size in described]
         )
 
-    def size_text(self, one):
-        """What the record says of one size of a part: its value with its unit, or its words."""
-        value, unit = one["value"], one["unit"]
+    def size_text(self, size):
+        """Return a size of a part, {code, value, unit}, as a number with its unit or as words."""
+        value, unit = size["value"], size["unit"]
         if unit is None:
             return self.words["parts"].get(value, str(value))
         return self.number(value, unit, decimals=DECIMALS_OF_PARTS.get(unit, 0))

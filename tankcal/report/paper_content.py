@@ -1,7 +1,7 @@
-"""Words and numbers of a paper, whatever its file: what two makers of it must have in common.
+"""Words and numbers of a paper, for comparisons between versions of tankcal and of packages.
 
-The bytes of a paper depend on the packages that made it. Its words and numbers depend on the record
-and, for the words, on the version of tankcal.
+The bytes of a paper depend on the packages that wrote it. Its numbers depend on the record. Its
+words depend on the record and on the version of tankcal.
 """
 
 import io
@@ -14,55 +14,70 @@ from pathlib import PurePath
 NUMBER = re.compile(r"(?<![\w.,])\d[\d.,]*")
 WORD = re.compile(r"[^\W\d_]{2,}")
 PICTURE = re.compile(r"[A-Za-z0-9+/=\\n]{200,}")  # base64
-DIGITS = 5  # numbers of so many do not occur in a paper by chance
+DIGITS = 5  # numbers with at least so many digits do not agree by chance
 
 
 @dataclass(frozen=True)
 class PaperContent:
-    """The numbers and words of a paper, in their order, as they are printed."""
+    """Numbers and words of a paper in their printed order and form."""
 
     numbers: list[str]
     words: list[str]
     is_paged: bool
 
     def missing_in(self, other, *, same_version):
-        """What this paper has and `other` has not, or not so often, or not in that order; texts.
+        """Return the words and numbers of this paper that `other` lacks (list of str).
 
-        same_version  whether the same version of tankcal made both: then all words and numbers
-                      agree; else only the numbers of many digits are looked for
+        Parameters
+        ----------
+        other : PaperContent
+            Content of the other paper.
+        same_version : bool
+            Whether one version of tankcal wrote both papers. If so, all words and numbers must
+            agree. Otherwise only numbers with many digits are compared.
         """
         if not same_version:
-            there = set(other.numbers)
-            return sorted({one for one in self.numbers if _is_long(one)} - there)
-        if self.is_paged:  # other breaks of lines and pages: heads of pages elsewhere, hyphens
+            known = set(other.numbers)
+            return sorted({number for number in self.numbers if _is_long(number)} - known)
+        if self.is_paged:  # line and page breaks may differ, which changes the order and hyphens
             numbers = Counter(filter(_is_long, self.numbers)) - Counter(other.numbers)
             return [*numbers, *sorted(set(self.words) - set(other.words))]
         pairs = ((self.numbers, other.numbers), (self.words, other.words))
-        return [one for mine, theirs in pairs for one in _first_apart(mine, theirs)]
+        return [text for texts, others in pairs for text in _first_apart(texts, others)]
 
 
-def _first_apart(mine, theirs):
-    """The first of `mine` that is not the one of `theirs` in its place, in a list."""
-    for one, other in zip(mine, theirs, strict=False):
-        if one != other:
-            return [one]
-    return mine[len(theirs) :][:1]
+def _first_apart(texts, others):
+    """Return the first of `texts` that differs from its counterpart, as a list of at most one."""
+    for text, other in zip(texts, others, strict=False):
+        if text != other:
+            return [text]
+    return texts[len(others) :][:1]
 
 
 def _is_long(number):
-    return sum(one.isdigit() for one in number) >= DIGITS
+    return sum(character.isdigit() for character in number) >= DIGITS
 
 
 def content_of_paper(name, content, ignored=()):
-    """`PaperContent` of a file; raises ValueError for one that cannot be read.
+    """Return the `PaperContent` of a file.
 
     Parameters
     ----------
     name : str
-        Of the file; its ending says how it is read.
+        Name of the file; its suffix determines the format.
     content : bytes
-    ignored : collection of str
-        Words and numbers that are left out: versions of packages.
+        Content of the file.
+    ignored : collection of str, optional
+        Words and numbers to omit, such as versions of packages.
+
+    Returns
+    -------
+    PaperContent
+
+    Raises
+    ------
+    ValueError
+        If the file cannot be read.
 
     Examples
     --------
@@ -72,11 +87,11 @@ def content_of_paper(name, content, ignored=()):
     read = _READERS.get(PurePath(name).suffix, _plain)
     try:
         text = read(content)
-    except Exception as error:  # of a broken file the libraries raise whatever came of it
+    except Exception as error:  # a broken file can raise any exception
         raise ValueError(f"{name}: {type(error).__name__}") from error
-    for one in sorted(ignored, key=len, reverse=True):
-        text = text.replace(one, " ")
-    numbers = [one.rstrip(".,") for one in NUMBER.findall(text)]
+    for word in sorted(ignored, key=len, reverse=True):
+        text = text.replace(word, " ")
+    numbers = [number.rstrip(".,") for number in NUMBER.findall(text)]
     return PaperContent(numbers, WORD.findall(text), PurePath(name).suffix == ".pdf")
 
 
@@ -84,18 +99,19 @@ def _plain(content):
     return PICTURE.sub(" ", content.decode("utf-8", errors="replace"))
 
 
-def _of_cells(content):
+def _read_csv(content):
     return _plain(content).replace(",", "\n")
 
 
-def _of_pdf(content):
+def _read_pdf(content):
     import pypdf
 
     pages = [page.extract_text() for page in pypdf.PdfReader(io.BytesIO(content)).pages]
+    # Join words that the typesetter hyphenated.
     return re.sub(r"-\n(?=[^\W\d_])", "", "\n".join(pages))
 
 
-def _of_workbook(content):
+def _read_workbook(content):
     import openpyxl
 
     book = openpyxl.load_workbook(io.BytesIO(content), read_only=True)
@@ -109,7 +125,7 @@ def _of_workbook(content):
     return "\n".join(map(str, cells))
 
 
-def _of_page(content):
+def _read_page(content):
     reader = _Text()
     reader.feed(_plain(content))
     reader.close()
@@ -117,7 +133,7 @@ def _of_page(content):
 
 
 class _Text(HTMLParser):
-    """The texts of a page, those of its scripts too, without its drawings."""
+    """Parser for the texts of a page and of its scripts, without drawings."""
 
     def __init__(self):
         super().__init__()
@@ -134,4 +150,4 @@ class _Text(HTMLParser):
             self.parts.append(data)
 
 
-_READERS = {".csv": _of_cells, ".pdf": _of_pdf, ".xlsx": _of_workbook, ".html": _of_page}
+_READERS = {".csv": _read_csv, ".pdf": _read_pdf, ".xlsx": _read_workbook, ".html": _read_page}

@@ -1,6 +1,6 @@
-"""Blocks as a PDF, by typst: the page style is page.typ, the blocks reach it as JSON data.
+"""Conversion of blocks to PDF by typst, with the page style page.typ.
 
-No text of a user is ever read as markup, for typst sees it only as strings of that data.
+The page style reads the blocks as JSON data. User text is therefore never interpreted as markup.
 """
 
 import base64
@@ -26,12 +26,12 @@ from tankcal.report.plain_formulas import formula_nodes
 from tankcal.report.signature_field import with_signature_field
 from tankcal.text.shipped import shipped_folder
 
-STANDARDS = ["a-3a", "ua-1"]  # archival, and readable by a screen reader
-PLACES = ("asked", "tables", "no")  # who asks for its place on the page (page.typ)
-UNSETTLED = "did not converge"  # in typst's warning that places are not those it set last
-LONG = 5000  # rows of a table: set at once, two documents with more would take gigabytes
-FORGETTING = 12  # pages later the typesetter has thrown away what none of them used
-_ALONE = Lock()
+STANDARDS = ["a-3a", "ua-1"]  # archival PDF/A-3a and accessible PDF/UA-1
+PLACES = ("asked", "tables", "no")  # blocks that request their position on the page (page.typ)
+UNSETTLED = "did not converge"  # text in typst's warning that positions are not final
+LONG = 5000  # rows of a long table; two such documents at a time would need gigabytes
+FORGETTING = 12  # compilations after which typst discards unused cached data
+_ALONE = Lock()  # held while a document with a long table is typeset
 IN_A_PROCESS = """
 import sys
 from pathlib import Path
@@ -44,38 +44,55 @@ try:
 except TankcalError as error:
     (folder / "refused.txt").write_text(str(error), encoding="utf-8")
 """
-# an escaped backslash, which is kept, or a control character as JSON writes it
+# An escaped backslash, which is kept, or a control character in JSON notation.
 _CONTROL_IN_JSON = re.compile(r"(\\\\)|\\u00[01][0-9a-f]|\\[bf]|[\x7f-\x9f]")
 FONT_FILES = ("STIXGeneral*.ttf", "DejaVuSerif*.ttf", "DejaVuSans.ttf")
 
 
 def pdf(blocks, folder=".", again=False, packed=None):
-    """The blocks as the bytes of a PDF; the same blocks and attachments give the same bytes.
+    """Typeset blocks as a PDF.
 
-    folder   where the files lie that the document blocks attach
-    again    whether a later document has the same blocks: what is known of them is kept for it
-    packed   attachments.Packed, where other papers hold the same files inside
+    Equal blocks and attachments give equal bytes.
 
-    Raises TankcalError when the page cannot be set (a character that no font has, a broken SVG),
-    or a file to be attached is not the one that it was.
+    Parameters
+    ----------
+    blocks : list of dict
+        Blocks; the first block is the document.
+    folder : str or Path, optional
+        Folder of the files that the document blocks attach.
+    again : bool, optional
+        True if a later document contains these blocks, so that the typesetter keeps its cache.
+    packed : attachments.Packed, optional
+        Compressed files that other papers of the run also embed.
+
+    Returns
+    -------
+    bytes
+        PDF/A-3a and PDF/UA-1.
+
+    Raises
+    ------
+    TankcalError
+        If a page cannot be typeset (a character without font, a broken SVG), or if an attached
+        file has changed.
     """
     shown = [block for block in blocks if block["kind"] not in WEB_ONLY]
-    blocks = [prepared(_with_formulas(block)) for block in shown]
+    blocks = [prepared(_add_formulas(block)) for block in shown]
     attached = attachments.contents(blocks, folder)
     files, blocks = _pictures_as_files(blocks)
     files["main.typ"] = (shipped_folder("report_templates") / "page.typ").read_bytes()
     files["blocks.json"] = _spell_controls(json.dumps(blocks, ensure_ascii=False)).encode("utf-8")
     long = any("table" in block["kind"] and len(block["rows"]) > LONG for block in blocks)
     with _ALONE if long else nullcontext():
-        made = _set(files, attached, _timestamp(blocks[0]["date"]), packed)
+        content = _set(files, attached, _timestamp(blocks[0]["date"]), packed)
         if long and not again:
             _forget()
     field = next((block["field"] for block in blocks if block.get("field")), None)
-    return with_signature_field(made, field) if field else made
+    return with_signature_field(content, field) if field else content
 
 
 def _spell_controls(text):
-    """JSON in which control characters, which no font has, are spelt out as the text `\\x00`."""
+    """Replace control characters in JSON, which no font contains, by texts such as `\\x00`."""
     return _CONTROL_IN_JSON.sub(_spell_control, text)
 
 
@@ -86,27 +103,29 @@ def _spell_control(match):
 
 
 def _set(files, attached, timestamp, packed):
-    """Set the page with the digests of the attached files, which then come into their place.
+    """Typeset the pages with the digests of attached files and replace the digests by the files.
 
-    Where they find no place, for the typesetter wrote a PDF of another form, it holds them itself.
+    If the PDF has an unexpected form, the typesetter embeds the files itself.
     """
     if not attached:
         return _compile(files, timestamp)
     digests = {f"attached-{name}": digest.encode() for name, (digest, _) in attached.items()}
-    made = _compile(files | digests, timestamp)
-    held = attachments.hold(made, dict(attached.values()), packed or attachments.Packed())
-    if held is None:
-        whole = {f"attached-{name}": content for name, (_, content) in attached.items()}
-        held = _compile(files | whole, timestamp)
-    return held
+    draft = _compile(files | digests, timestamp)
+    content = attachments.hold(draft, dict(attached.values()), packed or attachments.Packed())
+    if content is None:
+        whole_files = {
+            f"attached-{name}": attached_content for name, (_, attached_content) in attached.items()
+        }
+        content = _compile(files | whole_files, timestamp)
+    return content
 
 
 def _compile(files, timestamp):
-    """Set the page, in a process of its own where the system limits the memory.
+    """Typeset the pages, in a separate process if the system limits the memory.
 
-    A typesetter that gets no more memory ends its process.
+    A typesetter that runs out of memory terminates its process.
     """
-    return_freed_memory()  # of which nothing would serve the typesetter
+    return_freed_memory()  # the typesetter cannot use memory that Python has freed but keeps
     with TemporaryDirectory(prefix="tankcal-page-") as folder:
         _copy_fonts(folder)
         for name, content in files.items():
@@ -115,16 +134,16 @@ def _compile(files, timestamp):
             return _compile_in(folder, timestamp)
         command = [sys.executable, "-c", IN_A_PROCESS, folder, str(timestamp)]
         subprocess.run(command, capture_output=True, check=False)
-        made, refused = Path(folder, "made.pdf"), Path(folder, "refused.txt")
-        if made.is_file():
-            return made.read_bytes()
-        if refused.is_file():
-            raise TankcalError(refused.read_text(encoding="utf-8"))
+        pdf_file, refusal = Path(folder, "made.pdf"), Path(folder, "refused.txt")
+        if pdf_file.is_file():
+            return pdf_file.read_bytes()
+        if refusal.is_file():
+            raise TankcalError(refusal.read_text(encoding="utf-8"))
         raise MemoryError
 
 
 def _is_memory_limited():
-    """Whether the system gives this process no more than so much memory."""
+    """Return whether the system limits the memory of this process."""
     if find_spec("resource") is None:  # Windows
         return False
     import resource
@@ -133,15 +152,16 @@ def _is_memory_limited():
 
 
 def _compile_in(folder, timestamp):
-    """The PDF of main.typ in a folder; fonts of the machine serve only letters that ours lack.
+    """Compile main.typ in a folder and return the PDF; raise TankcalError on failure.
 
-    Where tables and figures find no places that they all agree to, the figures no longer ask for
-    theirs, and where that is not enough no block does. Raises TankcalError.
+    Fonts of the system are used only for characters that the fonts of tankcal lack. If the
+    positions on the pages do not converge, figures no longer request their position. If this is
+    not sufficient, no block requests its position.
     """
     import typst
 
     def compiled(ignore_system_fonts, places=PLACES):
-        found, warnings = typst.compile_with_warnings(
+        content, warnings = typst.compile_with_warnings(
             Path(folder) / "main.typ",
             root=folder,
             font_paths=[folder],
@@ -152,7 +172,7 @@ def _compile_in(folder, timestamp):
         )
         if places[1:] and any(UNSETTLED in warning.message for warning in warnings):
             return compiled(ignore_system_fonts, places[1:])
-        return found
+        return content
 
     try:
         try:
@@ -166,7 +186,7 @@ def _compile_in(folder, timestamp):
 
 
 def _forget():
-    """Let the typesetter throw away what it has kept: of a long table a gigabyte."""
+    """Let the typesetter discard its cache, which holds a gigabyte for a long table."""
     import typst
 
     for _ in range(FORGETTING):
@@ -174,9 +194,9 @@ def _forget():
 
 
 def _copy_fonts(folder):
-    """The fonts of the figures, from matplotlib; not its font of boxes for unknown signs.
+    """Copy the fonts of the figures from matplotlib, except its fallback font.
 
-    It need not be loaded for them, which takes as long as setting several pages.
+    The import of matplotlib is avoided, since it takes as long as typesetting several pages.
     """
     (package,) = find_spec("matplotlib").submodule_search_locations
     fonts = Path(package) / "mpl-data" / "fonts" / "ttf"
@@ -185,10 +205,10 @@ def _copy_fonts(folder):
             shutil.copyfile(path, Path(folder) / path.name)
 
 
-def _with_formulas(block):
-    """A table with the nodes of each text in its columns of formulas: {column: {text: nodes}}.
+def _add_formulas(block):
+    """Add the formula nodes of a table, {column: {text: nodes}}.
 
-    They are made here from the text, so that no typst code is ever taken from a notebook.
+    The nodes are derived from the text, so that typst code of a notebook is never executed.
     """
     if block["kind"] != "table":
         return block
@@ -198,7 +218,7 @@ def _with_formulas(block):
 
 
 def _pictures_as_files(blocks):
-    """Pictures go into files of their own; a block then names its file."""
+    """Move images into separate files; return the files and the blocks that name them."""
     files, changed = {}, []
     for number, block in enumerate(blocks):
         if block["kind"] == "document":
@@ -217,7 +237,7 @@ def _pictures_as_files(blocks):
 
 
 def _letterhead_with_file(letterhead, files):
-    """The letterhead with the names of the files of logo and mark, which are added to `files`."""
+    """Add the files of logo and mark to `files`; return the letterhead with their names."""
     for key in ("logo", "mark"):
         picture = letterhead and letterhead.get(key)
         if not isinstance(picture, dict):
@@ -230,7 +250,7 @@ def _letterhead_with_file(letterhead, files):
 
 
 def _timestamp(date):
-    """Seconds of the ISO date's midnight, UTC; of 1970 when there is no date."""
+    """Return the Unix time, s, of midnight UTC of an ISO date; 0 without a date."""
     if not date:
         return 0
     try:

@@ -1,27 +1,28 @@
-"""Objects of a PDF as typst writes it: where each of them is, and what it holds."""
+"""Objects of a PDF of typst: their positions and contents."""
 
 import re
 from dataclasses import dataclass
 
 _START = re.compile(rb"startxref\n(\d+)\n%%EOF\s*\Z")
-_END = 64  # bytes at the end, in which the start of the table of places is told
+_END = 64  # bytes at the end of the file, which contain the position of the cross-reference table
 _TABLE = re.compile(rb"xref\s+0 (\d+)\r?\n")
-_LINE, _DIGITS = 20, 10  # bytes of an entry of that table, and of the place in it
+_LINE, _DIGITS = 20, 10  # bytes of an entry of the table and of its position
 
 
 @dataclass(frozen=True)
 class Objects:
-    """Where the objects of a PDF are (ISO 32000-1, 7.5.4).
+    """Positions of the objects of a PDF (ISO 32000-1, 7.5.4).
 
     Attributes
     ----------
     pdf : bytes
+        The file.
     table : int
-        Where the table of places starts.
+        Position of the cross-reference table.
     lines : int
-        Where its entries do.
+        Position of the first entry of the table.
     places : list of int
-        Of each object, by its number; 0 for none.
+        Position of each object, by its number; 0 for an unused number.
     """
 
     pdf: bytes
@@ -31,11 +32,11 @@ class Objects:
 
     @property
     def trailer(self):
-        """What follows the table."""
+        """Content after the cross-reference table."""
         return self.pdf[self.lines + _LINE * len(self.places) :]
 
     def around(self, at):
-        """(number, content) of the object that a place of the file is in; None for no place."""
+        """Return (number, content) of the object at a position; None for a negative position."""
         if at < 0:
             return None
         head = self.pdf.rfind(b" 0 obj", 0, at)
@@ -44,35 +45,38 @@ class Objects:
         return content and (number, content)
 
     def content(self, number):
-        """What is between `obj` and `endobj`; None where the object is not at its place."""
+        """Return the content between `obj` and `endobj`; None if the table is wrong."""
         head, start = head_of(number), self.places[number]
         if not self.pdf.startswith(head, start):
             return None
         return self.pdf[start + len(head) : self.pdf.index(b"\nendobj", start)]
 
     def with_contents(self, changed):
-        """The same PDF with other contents of some objects, {number: bytes}."""
+        """Return the PDF with new contents of some objects, {number: bytes}."""
         first = min(self.places[number] for number in changed)
-        behind = sorted((place, i) for i, place in enumerate(self.places) if place >= first)
+        later_objects = sorted((place, i) for i, place in enumerate(self.places) if place >= first)
         entries = bytearray(self.pdf[self.lines : self.lines + _LINE * len(self.places)])
-        pieces, done, moved = [], 0, 0
-        for place, number in behind:
-            entries[_LINE * number : _LINE * number + _DIGITS] = b"%010d" % (place + moved)
+        # Each replaced object shifts all later objects by the change of its length.
+        pieces, copied_to, shift = [], 0, 0
+        for place, number in later_objects:
+            entries[_LINE * number : _LINE * number + _DIGITS] = b"%010d" % (place + shift)
             if number in changed:
                 start, former = place + len(head_of(number)), self.content(number)
-                pieces += [self.pdf[done:start], changed[number]]
-                done = start + len(former)
-                moved += len(changed[number]) - len(former)
-        told = b"startxref\n%d"
-        trailer = self.trailer.replace(told % self.table, told % (self.table + moved))
-        return b"".join([*pieces, self.pdf[done : self.lines], entries, trailer])
+                pieces += [self.pdf[copied_to:start], changed[number]]
+                copied_to = start + len(former)
+                shift += len(changed[number]) - len(former)
+        position_line = b"startxref\n%d"
+        trailer = self.trailer.replace(
+            position_line % self.table, position_line % (self.table + shift)
+        )
+        return b"".join([*pieces, self.pdf[copied_to : self.lines], entries, trailer])
 
 
 def objects_of(pdf):
-    """The Objects of a PDF with a table of places; None for a file of another form."""
-    found = _START.search(pdf[-_END:])
-    table = found and int(found[1])
-    head = found and _TABLE.match(pdf, table)
+    """Return the Objects of a PDF with a cross-reference table; None for another form."""
+    start = _START.search(pdf[-_END:])
+    table = start and int(start[1])
+    head = start and _TABLE.match(pdf, table)
     if not head:
         return None
     lines, count = head.end(), int(head[1])
@@ -82,5 +86,5 @@ def objects_of(pdf):
 
 
 def head_of(number):
-    """The line that an object begins with."""
+    """Return the first line of an object."""
     return b"%d 0 obj\n" % number

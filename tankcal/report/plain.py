@@ -1,6 +1,6 @@
-"""Values with their units and digits, and blocks, in the words of a language.
+"""Formatting common to all papers: values with units and digits, and blocks, in a language.
 
-What every paper shares, whatever it is about; nothing here computes a number.
+The module computes no results.
 """
 
 from dataclasses import replace
@@ -17,7 +17,7 @@ _SPACE = "\N{NO-BREAK SPACE}"
 
 
 class PlainPaper:
-    """Formats values and makes blocks with the words {group: {key: template}} of a language."""
+    """Formatter of values and blocks with the words {group: {key: template}} of a language."""
 
     def __init__(self, words):
         self.words = words
@@ -25,31 +25,31 @@ class PlainPaper:
 
     # ---- the unit of volumes
 
-    volume_unit = "m3"  # of all volumes on this paper: m3, L or bbl
+    volume_unit = "m3"  # unit of all volumes in this paper: m3, L or bbl
 
     @property
     def volume_symbol(self):
-        """How the unit of volumes is printed: "m³"."""
+        """Printed unit of volumes, such as "m³"."""
         return numbers.unit(self.volume_unit).symbol
 
     @property
     def volume_factor(self):
-        """What a volume in m3 is multiplied by."""
+        """Factor from m3 to the unit of volumes."""
         return numbers.unit(self.volume_unit).factor
 
     def _shown_unit(self, unit):
-        """The unit that a value is shown in: one of volume becomes that of the paper."""
+        """Return the printed unit of a value; units of volume become the unit of the paper."""
         return unit.replace("m3", self.volume_unit, 1) if unit in ("m3", "m3/unit") else unit
 
     def _fewer(self, decimals):
-        """Decimals in the paper's unit of volume of those chosen for m3; None stays None."""
+        """Return the decimals in the unit of the paper for decimals in m3; None remains None."""
         if not isinstance(decimals, int):
             return decimals
-        lost = numbers.unit("m3").least - numbers.unit(self.volume_unit).least
-        return max(decimals - lost, 0)
+        difference = numbers.unit("m3").least - numbers.unit(self.volume_unit).least
+        return max(decimals - difference, 0)
 
-    def _in_unit(self, column):
-        """A Column of volumes in m3 in the unit of the paper; any other as it is."""
+    def _convert_column(self, column):
+        """Return a Column of volumes in the unit of the paper; other columns are unchanged."""
         unit = self._shown_unit(column.unit)
         if unit == column.unit:
             return column
@@ -59,9 +59,9 @@ class PlainPaper:
     # ---- words and numbers
 
     def word(self, name, /, **values):
-        """The word or sentence called "group.key", with whole numbers in the marks of its language.
+        """Return the word or sentence "group.key" with its values.
 
-        Raises VocabularyError when it is missing.
+        Integers are formatted in the language. A missing word raises VocabularyError.
         """
         group, key = name.split(".", 1)
         template = self.words.get(group, {}).get(key)
@@ -74,14 +74,29 @@ class PlainPaper:
         return template.format(**shown)
 
     def label(self, key):
-        """The label of a field; a field of the user's own keeps its name."""
+        """Return the label of a field; an additional field of the user keeps its name."""
         return self.words["labels"].get(key, str(key).replace("_", " "))
 
     def number(self, value, unit="", decimals=None, u=None, digits=None):
-        """A number with its unit; None gives None, so that a field not given can be left out.
+        """Format a number with its unit.
 
-        Beside its uncertainty `u` it keeps its whole digits; an uncertainty itself, `u` of its own
-        value, has two digits in every unit: 420 L.
+        Parameters
+        ----------
+        value : float or None
+            Value in the unit of the record; None returns None.
+        unit : str, optional
+            Unit, a key of numbers.UNITS.
+        decimals : int, optional
+            Number of decimals.
+        u : float, optional
+            Uncertainty that determines the decimals. If `u` equals `value`, the value is itself an
+            uncertainty and has two digits in every unit, such as 420 L.
+        digits : int, optional
+            Number of significant digits without `decimals` and `u`; default 6.
+
+        Returns
+        -------
+        str or None
         """
         if value is None:
             return None
@@ -97,49 +112,49 @@ class PlainPaper:
         return f"{text}{_SPACE}{shown.symbol}" if shown.symbol else text
 
     def height(self, value_m, unit="m"):
-        """A height in millimetres, or finer where it must be, with its unit; None gives None."""
+        """Format a height, m, to the millimetre or finer if necessary; None returns None."""
         if value_m is None:
             return None
         return self.number(value_m, unit, decimals=decimals_of_height(value_m))
 
     def day(self, iso):
-        """A date (YYYY-MM-DD) as it is written in the language; None gives None."""
+        """Format a date (YYYY-MM-DD) in the language; None returns None."""
         if not iso:
             return None
         day, dates = date.fromisoformat(str(iso)), self.words["language"]["dates"]
         return dates["form"].format(day=day.day, month=dates[str(day.month)], year=day.year)
 
     def plain(self, value, unit=""):
-        """A number that somebody chose: at most six digits, no zeros at its end; or None."""
+        """Format an input value with at most six digits, without final zeros; None returns None."""
         if value is None:
             return None
         text = shortest(value, self.marks)
         return f"{text}{_SPACE}{unit}" if unit else text
 
     def percent(self, share):
-        """A share in percent."""
+        """Format a share in percent."""
         return percent(self.words, share)
 
     # ---- blocks
 
     def heading(self, name, level=1):
-        """The heading `headings.<name>`."""
+        """Heading block with the text `headings.<name>`."""
         return blocks.heading(self.word(f"headings.{name}"), level)
 
     def paragraph(self, name, /, **values):
-        """The sentence `texts.<name>`."""
+        """Paragraph block with the sentence `texts.<name>`."""
         return blocks.paragraph(self.word(f"texts.{name}", **values))
 
     def facts(self, items):
-        """Labels and values, `items` a list of (key, text or None); what is None is left out."""
+        """Block of labels and values from a list of (key, text); None and "" are omitted."""
         return blocks.key_values(
             [(self.label(key), value) for key, value in items if value not in (None, "")]
         )
 
     def facts_of(self, table, on=None):
-        """(key, text) of a declared Table of one row, for `facts`: those that this paper shows."""
+        """Return (key, text) for each column that this paper shows of a Table with one row."""
         (row,) = table.rows(self.record)
-        return [(one.key, self._fact(one, row)) for one in table.on_paper(on, [row])]
+        return [(column.key, self._fact(column, row)) for column in table.on_paper(on, [row])]
 
     def _fact(self, column, row):
         if column.text is not None:
@@ -150,26 +165,39 @@ class PlainPaper:
         return self.word(f"{column.words}.{value}") if column.words else value
 
     def rows(self, table, keys):
-        """The rows of a table that the record holds as one list per column."""
+        """Return the rows of a table that the record stores as a list per column."""
         return [
             dict(zip(keys, values, strict=True))
             for values in zip(*(table[key] for key in keys), strict=True)
         ]
 
     def show(self, table, rows=None, *, on=None, across=None, **values):
-        """A declared Table as a block: of these rows (None: its own of the record).
+        """Block of a declared Table.
 
-        on      name of the paper's table, and of its caption; None: that of the Table
-        across  sets a long table in so many columns of the page
-        values  for the places in the caption
+        Parameters
+        ----------
+        table : Table
+            Declaration of the table.
+        rows : list of dict, optional
+            Rows; None: the rows of the record.
+        on : str, optional
+            Name of the table and of its caption in the paper; None: the name of the Table.
+        across : int, optional
+            Number of parts of a long table side by side on a page.
+        **values
+            Values in the caption.
+
+        Returns
+        -------
+        blocks.Block
         """
         rows = table.rows(self.record) if rows is None else rows
         columns = table.on_paper(on, rows)
         return self.table(on or table.name, rows, columns, across=across, **values)
 
     def table(self, name, rows, columns, /, across=None, **values):
-        """A table with caption `captions.<name>`; `across` sets a long one in columns."""
-        columns = [self._in_unit(column) for column in columns]
+        """Table block with caption `captions.<name>`; `across` sets parts side by side."""
+        columns = [self._convert_column(column) for column in columns]
         texts = [self.column_texts(rows, column) for column in columns]
         heads = [
             [self.word(f"table_headings.{c.heading or c.key}"), self._unit_in_words(c.unit)]
@@ -185,11 +213,11 @@ class PlainPaper:
         return blocks.table(heads, cells, caption, align, mark, formulas)
 
     def _unit_in_words(self, name):
-        """A unit at the head of a column; one that holds a word is in the language."""
+        """Return the unit in the heading of a column; units with words are translated."""
         return self.words["units"].get(name) or numbers.unit(name).symbol
 
     def column_texts(self, rows, column):
-        """The cells of a column, as text."""
+        """Return the cells of a column as texts."""
         if column.text is not None:
             values = texts = [column.text(self, row) for row in rows]
         else:
@@ -201,15 +229,15 @@ class PlainPaper:
         ]
 
     def _texts(self, values, column):
-        known = self.words[column.words] if column.words else {}
-        return [self._text(value, known) for value in values]
+        translations = self.words[column.words] if column.words else {}
+        return [self._text(value, translations) for value in values]
 
-    def _text(self, value, known):
+    def _text(self, value, translations):
         if isinstance(value, list):
             return ", ".join(map(str, value))
-        if isinstance(value, bool) and str(value) not in known:
+        if isinstance(value, bool) and str(value) not in translations:
             return self.words["yes_no"]["yes" if value else "no"]
-        return known.get(str(value), str(value))
+        return translations.get(str(value), str(value))
 
     def _numbers(self, rows, column):
         factor = numbers.unit(column.unit).factor
@@ -223,7 +251,7 @@ class PlainPaper:
         ]
 
     def figure(self, figure, name, /, width=1.0, **values):
-        """A matplotlib figure with caption `captions.<name>` and description `<name>_alt`."""
+        """Figure block with caption `captions.<name>` and alternative text `<name>_alt`."""
         from tankcal.report.figures import with_decimal_mark
 
         caption = self.word(f"captions.{name}", **values)
@@ -232,14 +260,14 @@ class PlainPaper:
 
 
 def words_with_part(words, part):
-    """The words with those of the group `part` before the groups of the same names."""
-    own = words[part]
-    merged = {name: _merged(words.get(name, {}), group) for name, group in own.items()}
+    """Return the words, in which the groups of `part` override groups of equal names."""
+    groups = words[part]
+    merged = {name: _merged(words.get(name, {}), group) for name, group in groups.items()}
     return {name: group for name, group in words.items() if name != part} | merged
 
 
-def _merged(common, own):
-    """Words of a group with those of its part; groups of groups alike."""
-    if any(isinstance(one, dict) for one in own.values()):
-        return common | {name: common.get(name, {}) | group for name, group in own.items()}
-    return common | own
+def _merged(common, part_words):
+    """Return the words of a group, overridden by the words of its part."""
+    if any(isinstance(word, dict) for word in part_words.values()):
+        return common | {name: common.get(name, {}) | group for name, group in part_words.items()}
+    return common | part_words

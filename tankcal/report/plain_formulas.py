@@ -1,7 +1,7 @@
-"""The formulas that the record writes in plain text, found in a sentence and set as mathematics.
+"""Typesetting of formulas that the record contains in plain text.
 
-Only the patterns below are set, and of a text only the word characters and numbers that they name
-get into them: whatever else a sentence holds stays text.
+Only the patterns below become mathematics. They take words and numbers from the text; the rest of a
+sentence remains text.
 """
 
 import re
@@ -10,7 +10,7 @@ from functools import cache
 from tankcal.report.latex_math import formula
 
 _NUMBER = r"(\d+[.,]\d+)"
-_SET_AS = (  # pattern of the plain text, LaTeX; a longer pattern before its own beginning
+_SET_AS = (  # pattern of the plain text and LaTeX; a longer pattern precedes its own beginning
     (r"\br_([^\W\d_]+) = r − t − ([^\W\d_]+)", r"r_\text{%s} = r - t - \text{%s}"),
     (r"\br_([^\W\d_]+) = r − t", r"r_\text{%s} = r - t"),
     (
@@ -39,15 +39,15 @@ def _patterns():
 
 
 def formula_nodes(text):
-    """The sentence as nodes, {"t": "text"} and {"t": "math"}, the latter read out as it stood."""
-    nodes, at = [], 0
+    """Split a sentence into nodes {"t": "text"} and {"t": "math"} (with alternative text)."""
+    nodes, end_of_last = [], 0
     for match in _patterns().finditer(text):
-        if match.start() > at:
-            nodes.append({"t": "text", "s": text[at : match.start()]})
+        if match.start() > end_of_last:
+            nodes.append({"t": "text", "s": text[end_of_last : match.start()]})
         nodes.append(_math(match))
-        at = match.end()
-    if at < len(text) or not nodes:
-        nodes.append({"t": "text", "s": text[at:]})
+        end_of_last = match.end()
+    if end_of_last < len(text) or not nodes:
+        nodes.append({"t": "text", "s": text[end_of_last:]})
     return nodes
 
 

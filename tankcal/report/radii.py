@@ -1,27 +1,27 @@
-"""Former radii on paper: where they come from, how they may have changed, what was found."""
+"""Former radii in the papers: source, assumed change, and results."""
 
 from tankcal.report.radii_source import source_text
 from tankcal.report.tables.radii import RADII
 
 
 def facts(paper):
-    """Source, temperature and common uncertainty of the radii; the change that was declared."""
+    """Block of source, temperature, common uncertainty and assumed change of the radii."""
     radii = paper.record["radii"]
     change = radii["change"] or {}
     return paper.facts(
         [
             ("radii_source", source_text(paper)),
             ("radii_temperature", paper.number(radii["temperature_c"], "degC", digits=3)),
-            ("radii_u_common", _of_type_b(paper, radii["u_common_m"])),
-            ("change_common", _of_type_b(paper, change.get("common_m"))),
-            ("change_own", _of_type_b(paper, change.get("own_m"))),
-            ("change_shared", _of_type_b(paper, change.get("shared_m") or None)),
+            ("radii_u_common", _type_b_text(paper, radii["u_common_m"])),
+            ("change_common", _type_b_text(paper, change.get("common_m"))),
+            ("change_own", _type_b_text(paper, change.get("own_m"))),
+            ("change_shared", _type_b_text(paper, change.get("shared_m") or None)),
         ]
     )
 
 
 def courses(paper):
-    """The table of courses; beside a new survey with what it found."""
+    """Table of the courses, with the results of a new survey if there is any."""
     change = paper.record["radii"]["change"]
     if change is None:
         return paper.show(RADII)
@@ -29,7 +29,7 @@ def courses(paper):
     return paper.show(RADII, on="radii_updated", limit=limit)
 
 
-def _of_type_b(paper, u_m):
+def _type_b_text(paper, u_m):
     if u_m is None:
         return None
     return paper.word("texts.of_type_b", u=paper.number(u_m, "mm", digits=2))

@@ -1,4 +1,4 @@
-"""A paper about one saved file that is no record: the head of its document, texts of users."""
+"""Paper of a saved file other than a record: head of the document and user texts."""
 
 from datetime import date
 from typing import ClassVar
@@ -7,18 +7,27 @@ from tankcal.report import attachments, blocks
 from tankcal.report.plain import PlainPaper
 from tankcal.text.words import message_sentence
 
-DIGITS_OF_DIGEST = 12
-LONGEST_WORD = 30  # letters of a name in a column of a page
+DIGITS_OF_DIGEST = 12  # digits of the SHA-256 in the footer
+LONGEST_WORD = 30  # largest number of letters of a word in a column
 
 
 class SavedPaper(PlainPaper):
-    """A saved file as plain data, `found`, with the words of a language and a letterhead.
+    """Formatter of a saved file in a language, with a letterhead.
 
-    kind      of its title and of its digest in the words: "comparison", "inspection"
-    file      name of the file that it is about
-    attached  {name of a file that the PDF holds inside: key of its description}
+    A subclass defines `subject()`, the subject of the paper, and `date()`, an ISO date or "".
 
-    A class of it says `subject()`, what the papers are about, and `date()`, ISO or "".
+    Attributes
+    ----------
+    kind : str
+        Key of the title in the words: "comparison", "inspection".
+    file : str
+        Name of the saved file.
+    attached : dict
+        {name of an embedded file: key of its description}.
+    found : dict
+        Content of the saved file.
+    letterhead : dict or None
+        Letterhead of the laboratory.
     """
 
     kind = file = ""
@@ -27,9 +36,9 @@ class SavedPaper(PlainPaper):
     letterhead: dict | None
 
     def head(self, folder=None):
-        """The start of the document, and the head of its first page.
+        """Document block and head of the first page.
 
-        folder  of the files that the PDF holds inside; None: none
+        The PDF embeds the files of `folder`; None: it embeds no files.
         """
         title = self.word(f"titles.{self.kind}")
         return [
@@ -48,44 +57,44 @@ class SavedPaper(PlainPaper):
         ]
 
     def _footer(self, folder):
-        """Page numbers, and the first digits of the SHA-256 of the file that is printed."""
-        made = f"{self.words['page']['footer']} · tankcal {self.found['tankcal']}"
+        """Return the footer: page numbers and the first digits of the SHA-256 of the file."""
+        footer = f"{self.words['page']['footer']} · tankcal {self.found['tankcal']}"
         if folder is None:
-            return made
+            return footer
         digest = attachments.sha256((folder / self.file).read_bytes())[:DIGITS_OF_DIGEST]
-        return f"{made} · {self.word('texts.digest', digest=digest)}"
+        return f"{footer} · {self.word('texts.digest', digest=digest)}"
 
     def _attachments(self, folder):
         if folder is None:
             return []
         described = {name: self.word(f"attached.{key}") for name, key in self.attached.items()}
-        return [one.data() for one in attachments.beside(folder, described)]
+        return [file.data() for file in attachments.beside(folder, described)]
 
-    def warning(self, one):
-        """A warning of the file in the language."""
-        said = message_sentence(self.words, one["text"], one["code"], one["values"])
-        place = f"{one['file']}: " if one["file"] else ""
-        return bearable(f"{place}{said}")
+    def warning(self, entry):
+        """Return a warning of the file in the language."""
+        sentence = message_sentence(self.words, entry["text"], entry["code"], entry["values"])
+        place = f"{entry['file']}: " if entry["file"] else ""
+        return bearable(f"{place}{sentence}")
 
 
 def bearable(text):
-    """A text of a user without words that no column holds: their middle is left out."""
+    """Shorten the words of a user text that exceed the width of a column."""
     return " ".join(map(shortened, str(text).split(" ")))
 
 
 def shortened(name):
-    """A name of at most LONGEST_WORD letters, its middle left out."""
+    """Shorten a name to at most LONGEST_WORD letters by omitting its middle."""
     half = LONGEST_WORD // 2
     return name if len(name) <= LONGEST_WORD else f"{name[:half]}…{name[1 - half :]}"
 
 
 def signed_text(value, text):
-    """The text of a number with a plus before it where it is above 0."""
+    """Prefix the text of a positive number with a plus sign."""
     return f"+{text}" if value > 0 else text
 
 
 def iso_day(text):
-    """The date that a text begins with, as text; "" where it begins with none."""
+    """Return the ISO date at the start of a text, or ""."""
     try:
         return date.fromisoformat(str(text or "")[:10]).isoformat()
     except ValueError:

@@ -1,19 +1,20 @@
-"""Which room makes papers of a saved file that is no record."""
+"""Package that writes the papers of a saved file other than a record."""
 
 
 def room_of(path):
-    """The room whose saved file a path names, itself or its folder, and that file.
+    """Return the package for a saved file, and the file.
 
     Parameters
     ----------
-    path : path
-        Such as comparison.json, or the folder that it lies in.
+    path : str or Path
+        A saved file, such as comparison.json, or its folder.
 
     Returns
     -------
     module or None
-        `report.comparison`, `inspection` or `history`: it has `load` and `rebuild`.
+        `report.comparison`, `inspection` or `history`, with the functions `load` and `rebuild`.
     Path or None
+        The saved file.
 
     Examples
     --------

@@ -1,15 +1,15 @@
-"""A tank of a ship on paper: her pipe, and tables of corrections for trim and list."""
+"""Tanks of ships in the papers: sounding pipe, and corrections for trim and list."""
 
 from tankcal.report import blocks
 from tankcal.report.tables import ship as tables
 from tankcal.text.digits import decimals_of_rows, fixed
 
-ACROSS = 8  # trims beside each other on a page
-DECIMALS = 1  # of a correction, mm
+ACROSS = 8  # largest number of trims in a table
+DECIMALS = 1  # decimals of a correction in mm
 
 
 def facts(paper):
-    """The pipe, the marks, the bow, a contraction, and how well corrections may be interpolated."""
+    """Block of draft marks, bow, sounding pipe, contraction, and interpolation error."""
     ship = paper.record["ship"]
     return paper.facts(
         [
@@ -24,19 +24,20 @@ def facts(paper):
 
 
 def _place(paper, xyz):
-    return "; ".join(paper.number(one, "m", decimals=3) for one in xyz)
+    return "; ".join(paper.number(coordinate, "m", decimals=3) for coordinate in xyz)
 
 
 def corrections(paper):
-    """A matrix for each list, so many trims wide: corrections and the largest U of each row.
+    """Tables of corrections for each list, with the largest U of each row.
 
-    Above them how often the tank becomes full beyond the end of the pipe, if anywhere.
+    A paragraph before them states the number of states in which the tank is full only beyond the
+    end of the pipe.
     """
-    found = _beyond_pipe(paper)
+    shown = _beyond_pipe(paper)
     for list_deg, cells in tables.by_list(paper.record):
         for start in range(0, len(cells), ACROSS):
-            found.append(_matrix(paper, list_deg, cells[start : start + ACROSS]))
-    return found
+            shown.append(_matrix(paper, list_deg, cells[start : start + ACROSS]))
+    return shown
 
 
 def _beyond_pipe(paper):
@@ -49,16 +50,17 @@ def _beyond_pipe(paper):
 
 
 def _matrix(paper, list_deg, cells):
+    """Return the table of a list: a row per sounding, a column per trim, and the largest U."""
     soundings = paper.record["ship"]["sounding_m"]
-    places = range(len(soundings))
+    indices = range(len(soundings))
     heads = [[paper.word("table_headings.ship_sounding_m"), "m"]]
-    columns = [[paper.number(one, decimals=3) for one in soundings]]
+    columns = [[paper.number(sounding, decimals=3) for sounding in soundings]]
     for cell in cells:
         trim = paper.number(cell["trim_m"], decimals=2)
         heads.append([paper.word("texts.ship_trim", trim=trim), "mm"])
-        columns.append([_correction(paper, cell, place) for place in places])
-    spread = [tables.largest_U_m(cells, place) for place in places]
-    in_mm = [None if U is None else 1000 * U for U in spread]
+        columns.append([_correction(paper, cell, index) for index in indices])
+    largest_U = [tables.largest_U_m(cells, index) for index in indices]
+    in_mm = [None if U is None else 1000 * U for U in largest_U]
     digits = decimals_of_rows([U or 0.0 for U in in_mm], least=0)
     heads.append([paper.word("table_headings.ship_U"), "mm"])
     columns.append(

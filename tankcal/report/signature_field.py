@@ -1,8 +1,9 @@
-"""The field for an electronic signature: typst makes none, so it is added to what it made.
+"""Field for an electronic signature, which is added to a PDF of typst.
 
-page.typ sets a link where the signature may come. An incremental update (ISO 32000-1, 7.5.6) makes
-of the link's annotation a widget of a signature field, and of its tag `Link` a tag `Form`: place,
-page, order and tag stay those that typst gave, so that the file is PDF/A-3a and PDF/UA-1 as before.
+page.typ sets a link at the place of the signature. An incremental update (ISO 32000-1, 7.5.6)
+replaces the annotation of the link by the widget of a signature field. It also replaces the tag
+`Link` by `Form`. Position, page and order remain unchanged, so that the file still conforms to
+PDF/A-3a and PDF/UA-1.
 """
 
 import hashlib
@@ -10,37 +11,38 @@ import re
 
 from tankcal.report.pdf_objects import head_of, objects_of
 
-LINK = b"/URI(tankcal:signature)"
-NAME = "signature"
-_PRINTED = 4  # flag of an annotation
+LINK = b"/URI(tankcal:signature)"  # link of page.typ at the place of the signature
+NAME = "signature"  # name of the field in the PDF
+_PRINTED = 4  # annotation flag: print
 
 
 def with_signature_field(pdf, name):
-    """A PDF of typst with a signature field in the place of its link; unchanged without one.
+    """Replace the signature link of a PDF by a signature field.
 
     Parameters
     ----------
     pdf : bytes
-        With a table of places, as typst writes it; a file of another form stays as it is.
+        PDF of typst. A file without the link, or of another form, remains unchanged.
     name : str
-        What the field is, for those who cannot see it.
+        Description of the field for readers who cannot see it.
 
     Returns
     -------
     bytes
-        The same file with an update behind it; the same bytes for the same file.
+        The PDF with an incremental update; the result is reproducible.
     """
-    at = pdf.find(LINK)
+    position = pdf.find(LINK)
     objects = objects_of(pdf)
-    if at < 0 or objects is None:
+    if position < 0 or objects is None:
         return pdf
-    annotation = objects.around(at)
+    annotation = objects.around(position)
     tag = annotation and objects.around(pdf.find(b"/Obj %d 0 R" % annotation[0]))
     root = re.search(rb"/Root (\d+) 0 R", objects.trailer)
     catalog = root and objects.content(int(root[1]))
     parts = _parts(annotation, tag)
     if parts is None or catalog is None or b"/AcroForm" in catalog:
         return pdf
+    # The tag becomes a form, and the catalogue lists the field.
     changed = {
         tag[0]: tag[1].replace(b"/S/Link", b"/S/Form", 1),
         int(root[1]): catalog[: catalog.rindex(b">>")]
@@ -52,7 +54,7 @@ def with_signature_field(pdf, name):
 
 
 def _field(name, parts, appearance):
-    """The widget of the field, and how it looks while nobody has signed: empty."""
+    """Return the widget of the field and its empty appearance before the signature."""
     rectangle, parent, page = parts
     left, bottom, right, top = map(float, rectangle.split())
     widget = (
@@ -65,40 +67,41 @@ def _field(name, parts, appearance):
 
 
 def _parts(annotation, tag):
-    """Rectangle, number in the tree of tags, and page of the link; None where it has not all."""
+    """Return rectangle, number in the structure tree and page of the link, or None."""
     if not annotation or not tag or b"/S/Link" not in tag[1]:
         return None
-    found = (
+    matches = (
         re.search(rb"/Rect\[([^]]+)\]", annotation[1]),
         re.search(rb"/StructParent (\d+)", annotation[1]),
         re.search(rb"/Pg (\d+ 0 R)", tag[1]),
     )
-    return [one[1] for one in found] if all(found) else None
+    return [match[1] for match in matches] if all(matches) else None
 
 
 def _text(words):
-    """A text as a PDF holds it in any script: UTF-16 in hexadecimal digits."""
+    """Return a text in PDF notation: UTF-16 in hexadecimal digits."""
     return b"<FEFF%s>" % words.encode("utf-16-be").hex().upper().encode()
 
 
 def _update(objects, changed):
-    """What is put behind a file so that the objects `changed` {number: content} are so."""
-    pdf, trailer, written, places = objects.pdf, objects.trailer, bytearray(b"\n"), {}
+    """Return the incremental update that sets the objects `changed`, {number: content}."""
+    pdf, trailer, update, places = objects.pdf, objects.trailer, bytearray(b"\n"), {}
     for number, content in sorted(changed.items()):
-        places[number] = len(pdf) + len(written)
-        written += b"%s%s\nendobj\n" % (head_of(number), content)
-    start = len(pdf) + len(written)
-    written += b"xref\n0 1\n0000000000 65535 f\r\n"
+        places[number] = len(pdf) + len(update)
+        update += b"%s%s\nendobj\n" % (head_of(number), content)
+    # A new cross-reference table lists the changed objects and refers to the former table.
+    start = len(pdf) + len(update)
+    update += b"xref\n0 1\n0000000000 65535 f\r\n"
     for number, place in places.items():
-        written += b"%d 1\n%010d 00000 n\r\n" % (number, place)
+        update += b"%d 1\n%010d 00000 n\r\n" % (number, place)
     keys = [re.search(rb"/(?:Root|Info) \d+ 0 R", trailer[i:])[0] for i in
             (trailer.index(b"/Root"), trailer.index(b"/Info"))]  # fmt: skip
     first = re.search(rb"/ID\[(\([^()]*\))", trailer)
     identity = b""
     if first:
-        second = hashlib.sha256(bytes(written)).hexdigest()[:32].encode()
+        second = hashlib.sha256(bytes(update)).hexdigest()[:32].encode()
         identity = b"/ID[%s<%s>]" % (first[1], second)
-    written += b"trailer\n<</Size %d%s%s/Prev %d>>\nstartxref\n%d\n%%%%EOF" % (
+    update += b"trailer\n<</Size %d%s%s/Prev %d>>\nstartxref\n%d\n%%%%EOF" % (
         max(changed) + 1, b"".join(keys), identity, objects.table, start,
     )  # fmt: skip
-    return bytes(written)
+    return bytes(update)

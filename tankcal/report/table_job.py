@@ -1,4 +1,4 @@
-"""The folder of a job that was made of a former table."""
+"""Folder of a job that is derived from a former table."""
 
 import json
 import re
@@ -18,21 +18,33 @@ FILES = (
 
 
 def refuse_foreign_job(directory):
-    """Raise InputError when `directory` holds what `write_job` did not write."""
+    """Raise InputError if `directory` contains files that `write_job` does not write."""
     refuse_foreign(directory, FILES)
 
 
 def write_job(job, directory, language=DEFAULT):
-    """Write the files of a `JobOfTable`, all or nothing; returns their names.
+    """Write the files of a `JobOfTable`, all or none.
 
-    language  of its papers, a code
+    Parameters
+    ----------
+    job : JobOfTable
+        Content of the job.
+    directory : str or Path
+        Folder of the job.
+    language : str, optional
+        Code of the language of the papers.
+
+    Returns
+    -------
+    list of str
+        Names of the files.
     """
     has_radii = job.covariance_m2 is not None
     names = [name for name in FILES if name in job.texts or (name == COVARIANCE and has_radii)]
     with replaced(directory) as folder:
         words = load_words(language)
         for name, text in job.texts.items():
-            text = _said(text, job.words, words)
+            text = _translated(text, job.words, words)
             if name == SETTINGS and language != DEFAULT:
                 text = text.replace("[table]\n", f'[table]\nlanguage = "{language}"\n', 1)
             (folder / name).write_text(text, encoding="utf-8")
@@ -45,11 +57,11 @@ def write_job(job, directory, language=DEFAULT):
     return names
 
 
-def _said(text, messages, words):
-    """A text of a file with its messages in the language of `words`."""
-    for one in messages:
-        english, own = (json.dumps(part, ensure_ascii=False)[1:-1] for part in
-                        (str(one), say(words, one)))  # fmt: skip
+def _translated(text, messages, words):
+    """Translate the messages in the text of a file."""
+    for message in messages:
+        english, translation = (json.dumps(part, ensure_ascii=False)[1:-1] for part in
+                        (str(message), say(words, message)))  # fmt: skip
         pattern = rf"(?<![\w-]){re.escape(english)}(?![\w-])"
-        text = re.sub(pattern, lambda _, own=own: own, text)
+        text = re.sub(pattern, lambda _, translation=translation: translation, text)
     return text

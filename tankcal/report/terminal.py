@@ -1,28 +1,28 @@
-"""Blocks as lines of a terminal: the tables of the papers, aligned, without their figures."""
+"""Conversion of blocks to lines of a terminal, with aligned tables and without figures."""
 
 from textwrap import wrap
 
-WIDTH = 100  # characters of a line of text; a table is as wide as it is
+WIDTH = 100  # characters of a line of text; tables may be wider
 _GAP = "  "
 _BLANKS = dict.fromkeys(
     map(ord, "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}\N{FIGURE SPACE}"), " "
 )
 
 
-def lines_of(found):
-    """Lines of text of a list of blocks (`report.blocks.Block`); figures are left out.
+def lines_of(shown):
+    """Return the lines of text of blocks (list of `report.blocks.Block`), without figures.
 
-    Spaces that hold words together do so here, too, and come out as plain ones.
+    Lines are not broken at no-break spaces, which are replaced by normal spaces.
     """
     lines = []
-    for block in found:
-        written = _WRITERS.get(block.data["kind"], _nothing)(block.data)
-        if written:
-            lines += [*([""] if lines else []), *written]
+    for block in shown:
+        block_lines = _WRITERS.get(block.data["kind"], _skip)(block.data)
+        if block_lines:
+            lines += [*([""] if lines else []), *block_lines]
     return [line.translate(_BLANKS).rstrip() for line in lines]
 
 
-def _nothing(block):
+def _skip(block):
     return []
 
 
@@ -38,12 +38,12 @@ def _listing(block):
     return [line for item in block["items"] for line in _wrapped(item, "- ", "  ")]
 
 
-def _wrapped(text, first="", then=""):
+def _wrapped(text, first="", later=""):
     return wrap(
         text,
         WIDTH,
         initial_indent=first,
-        subsequent_indent=then,
+        subsequent_indent=later,
         break_long_words=False,
         break_on_hyphens=False,
     )
@@ -56,13 +56,14 @@ def _result(block):
 
 def _key_values(block):
     width = max((len(name) for name, _ in block["items"]), default=0)
-    written = [block["caption"]] if block["caption"] else []
+    lines = [block["caption"]] if block["caption"] else []
     for name, value in block["items"]:
-        written += _wrapped(value or " ", f"{name:<{width}}{_GAP}", " " * (width + len(_GAP)))
-    return written
+        lines += _wrapped(value or " ", f"{name:<{width}}{_GAP}", " " * (width + len(_GAP)))
+    return lines
 
 
 def _table(block):
+    """Return the lines of a table with aligned columns."""
     heads = [column["heading"] for column in block["columns"]]
     units = [column["unit"] for column in block["columns"]]
     columns = [
@@ -71,7 +72,7 @@ def _table(block):
     ] or [()] * len(heads)
     rows = [heads, *([units] if any(units) else []), *zip(*columns, strict=True)]
     widths = [max(map(len, texts)) for texts in zip(*rows, strict=True)]
-    placed = [
+    lines = [
         _GAP.join(
             text.ljust(width) if align == "left" else text.rjust(width)
             for text, width, align in zip(row, widths, block["align"], strict=True)
@@ -81,11 +82,11 @@ def _table(block):
     below_head = 2 if any(units) else 1
     rule = "-" * (sum(widths) + len(_GAP) * (len(widths) - 1))
     caption = _wrapped(block["caption"]) if block["caption"] else []
-    return [*caption, *placed[:below_head], rule, *placed[below_head:]]
+    return [*caption, *lines[:below_head], rule, *lines[below_head:]]
 
 
 def _filled(texts, align, mark):
-    """Numbers of a column with spaces behind them, so that their decimal marks line up."""
+    """Pad the numbers of a column so that their decimal marks are aligned."""
     if align != "decimal":
         return texts
     tails = [len(text) - text.rfind(mark) if mark in text else 0 for text in texts]

@@ -1,8 +1,9 @@
-"""Whether the files of a run belong together, and come out again.
+"""Verification of the files of a run.
 
-By the hashes that each of them names, by SHA256SUMS, by making the papers again from the record,
-and by computing the record again from the input files. That all agree shows that the papers are of
-this record, and the record of these input files; who made them, only a signature shows.
+The verification has four parts: hashes that the files state, SHA256SUMS, the papers written again
+from the record, and the record computed again from the input files. If everything agrees, the
+papers belong to the record and the record to the input files. Only a signature proves who wrote
+them.
 """
 
 import tempfile
@@ -41,32 +42,33 @@ PAGES = ("report.html", "report.ipynb")
 
 @dataclass
 class Verification:
-    """What was compared, and what does not agree.
+    """Result of a verification.
 
     Attributes
     ----------
     digest : str or None
-        SHA-256 of the record that all was compared with; None: there is none.
+        SHA-256 of the record; None: no record exists.
     compared : list of str
-        Names of files, as they were found to be of that record, or not.
+        Names of the compared files.
     problems : list of Problem
-        One for each disagreement.
+        Discrepancies.
     inputs_found : bool
-        Whether any input file of the job was at hand.
+        Whether an input file of the job was available.
     saved_file : str
-        Name of the file that all else was made from.
+        Name of the file from which all other files are derived.
     manifest_sha256 : str or None
-        SHA-256 of SHA256SUMS; None: there is none.
+        SHA-256 of SHA256SUMS; None: the file does not exist.
     papers_again : bool
-        Whether the papers were made again.
+        Whether the papers were written again.
     recomputed : record.recomputation.Recomputation or None
-        What came of computing the job again; None: it was not.
+        Result of the recomputation; None: the job was not computed again.
     notes : list of Message
-        What could not be verified, and why.
+        Checks that were not possible, with the reasons.
     made_again : set of str
-        Names of files that were compared with the same made or computed again.
+        Names of the files that were compared with a new version of their content.
     by_hash, by_numbers : list of str
-        Names of files of which only the hash was compared, or only the numbers of many digits.
+        Names of the files of which only the hash, or only the numbers with many digits, were
+        compared.
     """
 
     digest: str | None = None
@@ -83,41 +85,42 @@ class Verification:
     by_numbers: list[str] = field(default_factory=list)
 
     def tell(self, name, text):
-        """Add a disagreement: the file, and what is wrong with it."""
+        """Add a discrepancy of a file."""
         self.problems.append(Problem(name, text))
 
     def note(self, text):
-        """Add something that could not be verified."""
+        """Add a message on a check that was not possible."""
         self.notes.append(text)
 
     @property
     def is_whole(self):
-        """Whether all was compared with what it was made of, and the record computed again."""
+        """Whether all files were compared with their sources and the record was computed again."""
         is_record = self.saved_file == RECORD
         return not (self.by_hash or self.by_numbers) and (self.recomputed or not is_record)
 
     def is_told(self, name):
-        """Whether something is wrong with a file."""
-        return any(one.file == name for one in self.problems)
+        """Return whether a file has a discrepancy."""
+        return any(problem.file == name for problem in self.problems)
 
     def add_compared(self, name):
-        """Count a file once."""
+        """Add a file to the compared files, once."""
         if name not in self.compared:
             self.compared.append(name)
 
 
 def verify(path, job=None, *, hashes_only=False, step=None, part=None):
-    """Compare the files of a folder of results, or a PDF with what it holds inside.
+    """Verify a folder of results, or a PDF with its embedded files.
 
     Parameters
     ----------
     path : path
-        Folder of results, of a comparison, an inspection, a history, a plan or the camera; or a
-        PDF of results: files beside it are compared with what it holds.
+        Folder of results of a job, a comparison, an inspection, a history, a plan or a camera. Or
+        a PDF, whose embedded files are compared with the files beside it.
     job : path, optional
-        Folder of the input files, or the job's workbook; None: the folder that the results lie in.
+        Folder of the input files, or the Excel workbook of the job; None: the parent folder of the
+        results.
     hashes_only : bool, optional
-        True: no paper is made again, and no number computed again.
+        True: compare hashes only; write no papers and compute no numbers again.
     step, part : callable, optional
         Progress: step(text), part(text, done, total).
 
@@ -128,124 +131,131 @@ def verify(path, job=None, *, hashes_only=False, step=None, part=None):
     Raises
     ------
     InputError
-        For a path that is neither, and for a saved file that cannot be read.
+        If the path is neither of the two, or if a saved file cannot be read.
     """
     path = Path(path)
-    found = Verification()
-    again = None if hashes_only else (step, part)
+    verification = Verification()
+    callbacks = None if hashes_only else (step, part)
     if path.is_dir():
         inputs = input_folder(job) if job else path.resolve().parent
-        _folder(found, path, inputs, again)
+        _folder(verification, path, inputs, callbacks)
     elif path.is_file():
-        _file(found, path, input_folder(job) if job else None, again)
+        _file(verification, path, input_folder(job) if job else None, callbacks)
     else:
         text = message("verify_nothing", "is not there; expected a folder of results or a PDF")
         raise InputError(Problem(path.name or str(path), text))
-    return found
+    return verification
 
 
-def _folder(found, folder, job, again):
+def _folder(verification, folder, job, callbacks):
+    """Verify a folder; `callbacks` is (step, part), or None to compare hashes only."""
     manifest = read_manifest(folder)
-    found.manifest_sha256 = manifest and manifest.sha256
+    verification.manifest_sha256 = manifest and manifest.sha256
     if (folder / RECORD).is_file():
-        _results(found, folder, job, again, manifest)
-    elif not saved_folder(found, folder, again, manifest):
+        _results(verification, folder, job, callbacks, manifest)
+    elif not saved_folder(verification, folder, callbacks, manifest):
         text = message("verify_no_record", "is missing; expected the record of the results")
         raise InputError(Problem(RECORD, text))
-    _listed(found, folder, manifest)
-    proved = {*found.made_again, RECORD, TABLES}  # the record names the hash of its long tables
-    found.by_hash = [name for name in files_below(folder) if name not in proved]
+    _listed(verification, folder, manifest)
+    # The record states the hash of its long tables.
+    proved = {*verification.made_again, RECORD, TABLES}
+    verification.by_hash = [name for name in files_below(folder) if name not in proved]
 
 
-def _results(found, folder, job, again, manifest):
-    """A folder of results: by the hashes that its files name, its papers and numbers made again."""
+def _results(verification, folder, job, callbacks, manifest):
+    """Verify a folder with a record: hashes, papers and numbers."""
     record = records.load(folder / RECORD, is_checked=False)
-    found.digest = sha256((folder / RECORD).read_bytes())
-    found.compared.append(RECORD)
-    told = problems_of_tables(record)
-    found.problems += told
+    verification.digest = sha256((folder / RECORD).read_bytes())
+    verification.compared.append(RECORD)
+    table_problems = problems_of_tables(record)
+    verification.problems += table_problems
     beside = {name: folder / name for name in KINDS}
     for name in PDFS:
         if (folder / name).is_file():
-            compare_pdf(found, name, (folder / name).read_bytes(), beside)
+            compare_pdf(verification, name, (folder / name).read_bytes(), beside)
     for name in WORKBOOKS:
         if (folder / name).is_file():
-            compare_workbook(found, name, (folder / name).read_bytes())
+            compare_workbook(verification, name, (folder / name).read_bytes())
     if (folder / dcc.FILE).is_file():
-        compare_certificate(found, dcc.FILE, (folder / dcc.FILE).read_bytes(), record)
+        compare_certificate(verification, dcc.FILE, (folder / dcc.FILE).read_bytes(), record)
     for name in PAGES:
         if (folder / name).is_file():
-            compare_page(found, name, (folder / name).read_bytes())
-    if not told:
-        compare_tables(found, folder, record)
-    compare_inputs(found, record, job)
-    if again is None or told:
+            compare_page(verification, name, (folder / name).read_bytes())
+    if not table_problems:
+        compare_tables(verification, folder, record)
+    compare_inputs(verification, record, job)
+    if callbacks is None or table_problems:
         return
-    _numbers(found, record, job, folder, again)
+    _numbers(verification, record, job, folder, callbacks)
 
     def rebuild(place, language, letterhead):
-        outputs.rebuild(folder / RECORD, place, again[1], language, letterhead)
+        outputs.rebuild(folder / RECORD, place, callbacks[1], language, letterhead)
 
     papers = (*PDFS, *WORKBOOKS, dcc.FILE, *PAGES)
-    if any((folder / name).is_file() for name in papers):  # not of a run without papers
+    if any((folder / name).is_file() for name in papers):  # a run may have no papers
         versions = {"tankcal": record["tankcal"], **record["versions"]}
-        make_papers_again(found, folder, manifest, rebuild, versions)
+        make_papers_again(verification, folder, manifest, rebuild, versions)
 
 
-def _numbers(found, record, job, folder, again):
-    """Compute the job again where all of its input files are those of the record."""
-    files = {one["file"] for one in record["files"]}
-    if not found.inputs_found:
+def _numbers(verification, record, job, folder, callbacks):
+    """Compute the job again if its input files agree with the record."""
+    files = {entry["file"] for entry in record["files"]}
+    if not verification.inputs_found:
         return
-    if any(one.file in files and one.expected.code in INPUT_CODES for one in found.problems):
+    if any(
+        problem.file in files and problem.expected.code in INPUT_CODES
+        for problem in verification.problems
+    ):
         text = message(
             "verify_inputs_differ",
             "the input files are not those of the record: nothing was computed again",
         )
-        found.note(text)
+        verification.note(text)
         return
-    step, part = again
-    compute_numbers_again(found, record, job, folder=folder, step=step, part=part)
+    step, part = callbacks
+    compute_numbers_again(verification, record, job, folder=folder, step=step, part=part)
 
 
-def _listed(found, folder, manifest):
-    """Every file of the folder by SHA256SUMS: missing, extra, altered."""
+def _listed(verification, folder, manifest):
+    """Report missing, extra and altered files according to SHA256SUMS."""
     if manifest is None:
         text = message(
             "verify_no_manifest_here",
             "no SHA256SUMS, which lists every file: files that are missing, extra or altered may "
             "not be seen",
         )
-        found.note(text)
+        verification.note(text)
         return
-    there = files_below(folder)
+    present = files_below(folder)
     for name in manifest.digests:
-        if name not in there and not found.is_told(name):
+        if name not in present and not verification.is_told(name):
             text = message("verify_missing", "is missing; SHA256SUMS lists it")
-            found.tell(name, text)
-    for name in there:
+            verification.tell(name, text)
+    for name in present:
         if name not in manifest.digests:
             text = message("verify_extra", "is extra; SHA256SUMS does not list it")
-            found.tell(name, text)
+            verification.tell(name, text)
             continue
-        found.add_compared(name)
-        if not found.is_told(name) and not _is_listed(folder / name, manifest.digests[name]):
+        verification.add_compared(name)
+        if not verification.is_told(name) and not _is_listed(folder / name, manifest.digests[name]):
             text = message(
                 "verify_altered", "was altered: its SHA-256 is not the one in SHA256SUMS"
             )
-            found.tell(name, text)
+            verification.tell(name, text)
 
 
 def _is_listed(path, digest):
-    """Whether something is a file, no pipe or broken link, of that SHA-256."""
+    """Return whether a path is a regular file with this SHA-256."""
     return path.is_file() and digest_of(path) == digest
 
 
-def _file(found, path, job, again):
-    """A PDF with what it holds inside: its record counts, and files beside it are compared."""
-    held = compare_pdf(found, path.name, path.read_bytes(), {n: path.with_name(n) for n in KINDS})
-    if RECORD not in held:
-        if not found.problems:
+def _file(verification, path, job, callbacks):
+    """Verify a PDF by its embedded record; compare the embedded files with the files beside it."""
+    embedded = compare_pdf(
+        verification, path.name, path.read_bytes(), {n: path.with_name(n) for n in KINDS}
+    )
+    if RECORD not in embedded:
+        if not verification.problems:
             text = message(
                 "verify_none_inside",
                 "holds no record.json inside; expected a certificate or report of tankcal, or the "
@@ -254,27 +264,28 @@ def _file(found, path, job, again):
             raise InputError(Problem(path.name, text))
         return
     with tempfile.TemporaryDirectory(prefix="tankcal-") as folder:
-        tables = held.get(TABLES) or content_of(path.with_name(TABLES))
-        for name, content in ((RECORD, held[RECORD]), (TABLES, tables)):
+        tables = embedded.get(TABLES) or content_of(path.with_name(TABLES))
+        for name, content in ((RECORD, embedded[RECORD]), (TABLES, tables)):
             if content is not None:
                 (Path(folder) / name).write_bytes(content)
         record = records.load(Path(folder) / RECORD, is_checked=False)
-        told = problems_of_tables(record)  # reads them while they are there
+        # Reads the tables while the temporary folder exists.
+        table_problems = problems_of_tables(record)
     for name in WORKBOOKS:
-        if name in held:
-            compare_workbook(found, f"{path.name}: {name}", held[name])
-    if dcc.FILE in held:
-        compare_certificate(found, f"{path.name}: {dcc.FILE}", held[dcc.FILE], record)
+        if name in embedded:
+            compare_workbook(verification, f"{path.name}: {name}", embedded[name])
+    if dcc.FILE in embedded:
+        compare_certificate(verification, f"{path.name}: {dcc.FILE}", embedded[dcc.FILE], record)
     if job:
-        compare_inputs(found, record, job)
-        if told and again is not None:
-            _note_missing_tables(found)
-        elif again is not None:
-            _numbers(found, record, job, None, again)
+        compare_inputs(verification, record, job)
+        if table_problems and callbacks is not None:
+            _note_missing_tables(verification)
+        elif callbacks is not None:
+            _numbers(verification, record, job, None, callbacks)
 
 
-def _note_missing_tables(found):
-    found.note(
+def _note_missing_tables(verification):
+    verification.note(
         message(
             "verify_tables_not_inside",
             "the long tables of the record are neither inside the PDF nor beside it: nothing was "

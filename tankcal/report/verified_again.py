@@ -1,4 +1,4 @@
-"""What `tankcal verify` makes again: the papers of a folder, byte for byte, and its numbers."""
+"""Reproduction of papers and numbers by `tankcal verify`."""
 
 import re
 import tempfile
@@ -13,13 +13,13 @@ from tankcal.report import LETTERHEAD
 from tankcal.report.paper_content import content_of_paper
 from tankcal.text.languages import LANGUAGES
 
-MOST_TOLD = 10  # numbers, or texts, that came out otherwise
+MOST_TOLD = 10  # largest number of reported numbers, and of texts, that differ
 
 
 def letterhead_of(folder):
-    """The Letterhead that a folder of results keeps; None where it keeps none.
+    """Return the Letterhead in a folder of results, or None.
 
-    Raises InputError for a file that is none.
+    An invalid file raises InputError.
     """
     from tankcal.report.letterhead import PLACE, Letterhead, Logo, read_saved
 
@@ -27,41 +27,44 @@ def letterhead_of(folder):
     if not path.is_file():
         return None
     data = read_saved(path)
-    logo, mark = (one if one in (None, PLACE) else Logo(**one)
-                  for one in (data["logo"], data["mark"]))  # fmt: skip
+    logo, mark = (part if part in (None, PLACE) else Logo(**part)
+                  for part in (data["logo"], data["mark"]))  # fmt: skip
     return Letterhead(data["name"], tuple(data["address"]), logo, data["colours"], mark)
 
 
-def make_papers_again(found, folder, manifest, rebuild, versions=None):
-    """Tell `found` of each file that its saved file does not give again.
+def make_papers_again(verification, folder, manifest, rebuild, versions=None):
+    """Write the papers again and report the files that differ.
+
+    SHA256SUMS states which versions of programs and packages wrote the papers. If these are the
+    present versions, every byte is compared. Otherwise the words and numbers are compared. Since
+    SHA256SUMS is not signed, a contradiction to the saved file is reported.
 
     Parameters
     ----------
-    found : Verification
+    verification : Verification
+        Receives the discrepancies.
     folder : path
+        Folder of results.
     manifest : Manifest or None
+        Content of SHA256SUMS.
     rebuild : callable
-        rebuild(folder to write, language, letterhead), from the saved file in `folder`.
+        rebuild(folder to write, language, letterhead) writes the papers from the saved file.
     versions : dict, optional
         {"tankcal", "python", "numpy", "scipy": version} that computed the saved file.
-
-    Where the same programs and packages made the papers, every byte is compared. SHA256SUMS says
-    so, and nobody signs it: what it calls the work of other versions is compared by its words and
-    numbers, and where it contradicts the saved file it is refused.
     """
     made_by = manifest.made_by if manifest else ""
-    _refuse_contradiction(found, made_by, versions)
-    is_same = made_by == manifests.maker()
-    with tempfile.TemporaryDirectory(prefix="tankcal-") as place:
-        again = Path(place) / "again"
+    _refuse_contradiction(verification, made_by, versions)
+    has_same_versions = made_by == manifests.maker()
+    with tempfile.TemporaryDirectory(prefix="tankcal-") as temporary:
+        new_folder = Path(temporary) / "again"
         language = manifest.language if manifest else language_of_page(folder)
         try:
-            rebuild(again, language, letterhead_of(folder))
+            rebuild(new_folder, language, letterhead_of(folder))
         except InputError as error:
-            found.problems += error.problems
+            verification.problems += error.problems
             return
         except TankcalError as error:
-            found.tell(
+            verification.tell(
                 manifests.FILE,
                 message(
                     "verify_papers_refused",
@@ -70,71 +73,73 @@ def make_papers_again(found, folder, manifest, rebuild, versions=None):
                 ),
             )
             return
-        found.papers_again = True
-        if not is_same:
-            _note_other_maker(found, made_by)
-        names = sorted({*manifests.files_below(folder), *manifests.files_below(again)})
+        verification.papers_again = True
+        if not has_same_versions:
+            _note_other_maker(verification, made_by)
+        names = sorted({*manifests.files_below(folder), *manifests.files_below(new_folder)})
         for name in names:
-            if name in (COVARIANCE_FILE, long_tables.FILE, found.saved_file):
-                continue  # copied: neither is made of the other
-            if not (again / name).is_file() or not (Path(folder) / name).is_file():
-                continue  # the manifest tells of what is missing or extra
-            found.add_compared(name)
-            found.made_again.add(name)
-            if found.is_told(name) or _same(again / name, Path(folder) / name):
+            if name in (COVARIANCE_FILE, long_tables.FILE, verification.saved_file):
+                continue  # copies cannot be reproduced
+            if not (new_folder / name).is_file() or not (Path(folder) / name).is_file():
+                continue  # the manifest reports missing and extra files
+            verification.add_compared(name)
+            verification.made_again.add(name)
+            if verification.is_told(name) or _same(new_folder / name, Path(folder) / name):
                 continue
-            if is_same:
-                found.tell(
+            if has_same_versions:
+                verification.tell(
                     name,
                     message(
                         "verify_other_paper",
                         "is not what {file} gives; expected every byte as tankcal makes it again",
-                        file=found.saved_file,
+                        file=verification.saved_file,
                     ),
                 )
             else:
-                _compare_content(found, name, Path(folder) / name, again / name, made_by)
+                _compare_content(
+                    verification, name, Path(folder) / name, new_folder / name, made_by
+                )
 
 
 def language_of_page(folder):
-    """The language that the web page of a folder of results says it is in; None: it has none."""
+    """Return the language of the web page in a folder of results, or None."""
     path = Path(folder) / "report.html"
     text = path.read_bytes()[:1000].decode("utf-8", "replace") if path.is_file() else ""
-    said = re.search(r'<html lang="([\w-]+)"', text)
-    return said[1] if said and said[1] in LANGUAGES else None
+    match = re.search(r'<html lang="([\w-]+)"', text)
+    return match[1] if match and match[1] in LANGUAGES else None
 
 
-def _refuse_contradiction(found, made_by, versions):
-    """Papers are not older than the record that they were made of."""
-    said = versions_in(made_by).get("tankcal")
-    if versions and said and _order(said) < _order(versions["tankcal"]):
-        found.tell(
+def _refuse_contradiction(verification, made_by, versions):
+    """Report papers that claim to be older than their record."""
+    paper_version = versions_in(made_by).get("tankcal")
+    if versions and paper_version and _order(paper_version) < _order(versions["tankcal"]):
+        verification.tell(
             manifests.FILE,
             message(
                 "verify_older_papers",
                 "names tankcal {said} as what made the papers; {file} is of tankcal {version}, "
                 "and papers cannot be older than it",
-                said=said,
+                said=paper_version,
                 version=versions["tankcal"],
-                file=found.saved_file,
+                file=verification.saved_file,
             ),
         )
 
 
 def _order(version):
-    """Numbers of a version, in their order: those of a release alone."""
+    """Return the numbers of a version for comparisons, without suffixes of development."""
     return tuple(map(int, re.findall(r"\d+", version.partition("+")[0].partition(".dev")[0])))
 
 
 def versions_in(made_by):
-    """{name: version} of the line that says what made the files."""
+    """Return {name: version} of the line with the versions that wrote the files."""
     parts = (part.split(" ", 1) for part in made_by.split(", ") if " " in part)
     return {name: version for name, version in parts}
 
 
-def _note_other_maker(found, made_by):
+def _note_other_maker(verification, made_by):
     if not made_by:
-        found.note(
+        verification.note(
             message(
                 "verify_maker_unknown",
                 "no SHA256SUMS says what made the papers: their words and numbers were compared, "
@@ -142,7 +147,7 @@ def _note_other_maker(found, made_by):
             )
         )
         return
-    found.note(
+    verification.note(
         message(
             "verify_other_maker",
             "the papers were made by other versions ({made_by}; here {here}): their words and "
@@ -153,68 +158,78 @@ def _note_other_maker(found, made_by):
     )
 
 
-def _compare_content(found, name, path, again, made_by):
-    """Hold the words and numbers of a paper against those of the same made again."""
-    here = versions_in(manifests.maker())
-    there = versions_in(made_by)
-    same_version = there.get("tankcal", here["tankcal"]) == here["tankcal"]
-    ignored = {*here.values(), *there.values()} - {"-"}
+def _compare_content(verification, name, path, new_path, made_by):
+    """Compare words and numbers of a paper with the paper written again."""
+    present_versions = versions_in(manifests.maker())
+    paper_versions = versions_in(made_by)
+    same_version = (
+        paper_versions.get("tankcal", present_versions["tankcal"]) == present_versions["tankcal"]
+    )
+    ignored = {*present_versions.values(), *paper_versions.values()} - {"-"}
     try:
-        was, now = (content_of_paper(name, one.read_bytes(), ignored) for one in (path, again))
+        former, present = (
+            content_of_paper(name, file.read_bytes(), ignored) for file in (path, new_path)
+        )
     except ValueError:
-        found.tell(name, message("verify_unreadable", "cannot be read; expected a file of tankcal"))
+        verification.tell(
+            name, message("verify_unreadable", "cannot be read; expected a file of tankcal")
+        )
         return
-    apart = was.missing_in(now, same_version=same_version)
-    if not apart and same_version:
-        apart = now.missing_in(was, same_version=True)
-    if apart:
-        found.tell(
+    differences = former.missing_in(present, same_version=same_version)
+    if not differences and same_version:
+        differences = present.missing_in(former, same_version=True)
+    if differences:
+        verification.tell(
             name,
             message(
                 "verify_other_words",
                 "differs from what tankcal {version} makes of {file}, in {count} words or numbers; "
                 "the first: {first!r}",
-                version=here["tankcal"],
-                file=found.saved_file,
-                count=len(apart),
-                first=apart[0][:40],
+                version=present_versions["tankcal"],
+                file=verification.saved_file,
+                count=len(differences),
+                first=differences[0][:40],
             ),
         )
     elif not same_version:
-        found.by_numbers.append(name)
+        verification.by_numbers.append(name)
 
 
-def only_in(one, other):
-    """Of two lists in a line, what only the first one has; "nothing said" for an empty one."""
-    others = other.split(", ")
-    return ", ".join(part for part in one.split(", ") if part not in others) or "-"
+def only_in(first, second):
+    """Return the items of the first comma-separated list that the second lacks; "-" if none."""
+    second_items = second.split(", ")
+    return ", ".join(part for part in first.split(", ") if part not in second_items) or "-"
 
 
-def _same(one, other):
-    return one.stat().st_size == other.stat().st_size and one.read_bytes() == other.read_bytes()
+def _same(first, second):
+    return (
+        first.stat().st_size == second.stat().st_size and first.read_bytes() == second.read_bytes()
+    )
 
 
-def compute_numbers_again(found, record, job, *, folder=None, step=None, part=None):
-    """Compute the job of a record again and tell `found` of what does not come out again.
+def compute_numbers_again(verification, record, job, *, folder=None, step=None, part=None):
+    """Compute the job of a record again and report differences.
 
     Parameters
     ----------
-    found : Verification
+    verification : Verification
+        Receives the discrepancies.
     record : dict
+        Record of the job.
     job : path
-        Folder of the input files, which are those of the record.
+        Folder of the input files, which agree with the record.
     folder : path, optional
-        Of the results.
+        Folder of results, whose covariance file is compared.
     step, part : callable, optional
-        Progress, as of `compute_again`.
+        Progress, as in `compute_again`.
     """
     from tankcal.record.recomputation import compute_again
 
     try:
-        again, adjustment = compute_again(record, job, step, part)
+        recomputation, adjustment = compute_again(record, job, step, part)
     except TankcalError as error:
-        found.tell(
-            found.saved_file,
+        verification.tell(
+            verification.saved_file,
             message(
                 "verify_not_computed",
                 "its job cannot be computed again by this version: {why}",
@@ -222,24 +237,24 @@ def compute_numbers_again(found, record, job, *, folder=None, step=None, part=No
             ),
         )
         return
-    found.recomputed = again
-    for one in again.beyond[:MOST_TOLD]:
-        found.tell(
-            found.saved_file,
+    verification.recomputed = recomputation
+    for number in recomputation.beyond[:MOST_TOLD]:
+        verification.tell(
+            verification.saved_file,
             message(
                 "verify_number_apart",
                 "{place} is {recorded}, computed again {computed}: {relative} of the largest "
                 "number there, expected at most {tolerance}",
-                place=one.place,
-                recorded=f"{one.recorded:.10g}",
-                computed=f"{one.computed:.10g}",
-                relative=f"{one.relative:.1e}",
-                tolerance=f"{one.tolerance:.0e}",
+                place=number.place,
+                recorded=f"{number.recorded:.10g}",
+                computed=f"{number.computed:.10g}",
+                relative=f"{number.relative:.1e}",
+                tolerance=f"{number.tolerance:.0e}",
             ),
         )
-    for place, recorded, computed in again.otherwise[:MOST_TOLD]:
-        found.tell(
-            found.saved_file,
+    for place, recorded, computed in recomputation.otherwise[:MOST_TOLD]:
+        verification.tell(
+            verification.saved_file,
             message(
                 "verify_text_apart",
                 "{place} is {recorded!r}, computed again {computed!r}; expected the same",
@@ -248,19 +263,19 @@ def compute_numbers_again(found, record, job, *, folder=None, step=None, part=No
                 computed=computed[:100],
             ),
         )
-    more = len(again.beyond[MOST_TOLD:]) + len(again.otherwise[MOST_TOLD:])
+    more = len(recomputation.beyond[MOST_TOLD:]) + len(recomputation.otherwise[MOST_TOLD:])
     if more:
-        found.tell(
-            found.saved_file,
+        verification.tell(
+            verification.saved_file,
             message("verify_more_apart", "{count} further keys came out otherwise", count=more),
         )
     if folder is not None:
-        _compare_covariance(found, Path(folder) / COVARIANCE_FILE, adjustment)
+        _compare_covariance(verification, Path(folder) / COVARIANCE_FILE, adjustment)
 
 
-def _compare_covariance(found, path, adjustment):
-    """Hold the covariance that no record keeps (points_cov.npz) against that computed again."""
-    if adjustment is None or not path.is_file() or found.is_told(path.name):
+def _compare_covariance(verification, path, adjustment):
+    """Compare points_cov.npz, which the record does not contain, with the new covariance."""
+    if adjustment is None or not path.is_file() or verification.is_told(path.name):
         return
     import numpy as np
 
@@ -272,20 +287,25 @@ def _compare_covariance(found, path, adjustment):
         again = Path(place) / path.name
         if not again.is_file():
             return
-        found.add_compared(path.name)
-        found.made_again.add(path.name)
+        verification.add_compared(path.name)
+        verification.made_again.add(path.name)
         if _same(again, path):
             return
         try:
-            with np.load(path, allow_pickle=False) as one, np.load(again) as other:
-                was, now = one["covariance_m2"], other["covariance_m2"]
-                same = was.shape == now.shape and list(one["points"]) == list(other["points"])
-                largest = float(np.abs(was).max(initial=0.0))
-                same = same and float(np.abs(was - now).max(initial=0.0)) <= TOLERANCE * largest
-        except Exception:  # of a broken archive numpy raises whatever came of it
-            same = False
-    if not same:
-        found.tell(
+            with np.load(path, allow_pickle=False) as former_file, np.load(again) as present_file:
+                former, present = former_file["covariance_m2"], present_file["covariance_m2"]
+                agrees = former.shape == present.shape and list(former_file["points"]) == list(
+                    present_file["points"]
+                )
+                largest = float(np.abs(former).max(initial=0.0))
+                agrees = (
+                    agrees
+                    and float(np.abs(former - present).max(initial=0.0)) <= TOLERANCE * largest
+                )
+        except Exception:  # a broken archive can raise any exception
+            agrees = False
+    if not agrees:
+        verification.tell(
             path.name,
             message(
                 "verify_covariance_apart",
@@ -294,11 +314,26 @@ def _compare_covariance(found, path, adjustment):
         )
 
 
-def saved_folder(found, folder, again, manifest):
-    """Verify a folder whose saved file is no record; gives whether it is one.
+def saved_folder(verification, folder, callbacks, manifest):
+    """Verify a folder with a saved file other than a record; return whether it is such a folder.
 
-    Comparison, inspection and history are made again from their file; of a plan, the results of
-    the camera, and any other folder with SHA256SUMS the hashes are compared.
+    The papers of comparisons, inspections and histories are written again from their file. For
+    plans, camera results and any other folder with SHA256SUMS, only the hashes are compared.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    folder : path
+        Folder to verify.
+    callbacks : tuple or None
+        Progress (step, part); None: compare hashes only.
+    manifest : Manifest or None
+        Content of SHA256SUMS.
+
+    Returns
+    -------
+    bool
     """
     from tankcal.record.camera_versions import CAMERA
     from tankcal.record.plan import PLAN
@@ -307,20 +342,20 @@ def saved_folder(found, folder, again, manifest):
     room, path = room_of(folder)
     if room is not None:
         room.load(path)
-        _take(found, path)
-        if again is not None:
-            make_papers_again(found, folder, manifest, _rebuild_of(room, path, again[0]))
-        found.note(_not_computed(path.name))
+        _take(verification, path)
+        if callbacks is not None:
+            make_papers_again(verification, folder, manifest, _rebuild_of(room, path, callbacks[0]))
+        verification.note(_not_computed(path.name))
         return True
     for name in (CAMERA.file, PLAN.file):
         path = Path(folder) / name
         if path.is_file():
-            _take(found, path)
-            found.note(_not_computed(name))
+            _take(verification, path)
+            verification.note(_not_computed(name))
             return True
     if manifest is not None:
-        found.saved_file = manifests.FILE
-        found.note(
+        verification.saved_file = manifests.FILE
+        verification.note(
             message("verify_no_saved_file", "nothing here but hashes: no file says what is inside")
         )
     return manifest is not None
@@ -333,11 +368,11 @@ def _rebuild_of(room, path, step):
     return rebuild
 
 
-def _take(found, path):
-    """The saved file that all else of a folder was made from."""
-    found.saved_file = path.name
-    found.digest = manifests.digest_of(path)
-    found.compared.append(path.name)
+def _take(verification, path):
+    """Register the saved file from which all other files of the folder are derived."""
+    verification.saved_file = path.name
+    verification.digest = manifests.digest_of(path)
+    verification.compared.append(path.name)
 
 
 def _not_computed(name):

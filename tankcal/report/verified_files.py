@@ -1,6 +1,6 @@
-"""What `tankcal verify` compares of each kind of file: the record that it names, what it says.
+"""Comparisons of `tankcal verify` for each kind of file: hash of the record, and content.
 
-Each function tells a `Verification`, here `found`, what does not agree.
+Each function adds discrepancies to a `Verification`.
 """
 
 import io
@@ -25,23 +25,40 @@ _DCC = f"{{{dcc.DCC}}}"
 
 
 def content_of(path):
-    """Bytes of a file; None where there is none."""
+    """Return the bytes of a file, or None if it does not exist."""
     return path.read_bytes() if path.is_file() else None
 
 
-def compare_pdf(found, name, content, beside):
-    """The hash that a PDF names, and what it holds inside; gives {name: bytes} of that."""
+def compare_pdf(verification, name, content, beside):
+    """Compare the hash in a PDF and its embedded files.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    name : str
+        Name of the PDF.
+    content : bytes
+        The PDF.
+    beside : dict
+        {name: Path} of the files beside the PDF.
+
+    Returns
+    -------
+    dict
+        Embedded files, {name: bytes}.
+    """
     import logging
 
     import pypdf
 
-    logging.getLogger("pypdf").setLevel(logging.CRITICAL)  # its remarks are not for the terminal
+    logging.getLogger("pypdf").setLevel(logging.CRITICAL)  # suppress its messages
     try:
         reader = pypdf.PdfReader(io.BytesIO(content))
-        said = str((reader.metadata or {}).get("/Keywords", ""))
-        held = {one: bytes(parts[-1]) for one, parts in reader.attachments.items()}
-    except Exception as error:  # of a broken file pypdf raises whatever came of it
-        found.tell(
+        keywords = str((reader.metadata or {}).get("/Keywords", ""))
+        embedded = {file: bytes(parts[-1]) for file, parts in reader.attachments.items()}
+    except Exception as error:  # a broken file can raise any exception
+        verification.tell(
             name,
             message(
                 "verify_no_pdf",
@@ -50,72 +67,94 @@ def compare_pdf(found, name, content, beside):
             ),
         )
         return {}
-    if found.digest is None and RECORD in held:
-        found.digest = sha256(held[RECORD])
-    found.compared.append(name)
-    _same_record(found, name, said)
-    for one, bytes_held in held.items():
-        place = beside.get(one)
-        lies_beside = content_of(place) if place else None
-        if lies_beside is not None and lies_beside != bytes_held:
-            found.tell(
+    if verification.digest is None and RECORD in embedded:
+        verification.digest = sha256(embedded[RECORD])
+    verification.compared.append(name)
+    _same_record(verification, name, keywords)
+    for file, embedded_bytes in embedded.items():
+        place = beside.get(file)
+        bytes_beside = content_of(place) if place else None
+        if bytes_beside is not None and bytes_beside != embedded_bytes:
+            verification.tell(
                 name,
                 message(
                     "verify_differs_inside",
                     "holds a {file} inside that differs from the one beside it (SHA-256 {inside} "
                     "and {outside}); expected the same file",
-                    file=one,
-                    inside=sha256(bytes_held)[:12],
-                    outside=sha256(lies_beside)[:12],
+                    file=file,
+                    inside=sha256(embedded_bytes)[:12],
+                    outside=sha256(bytes_beside)[:12],
                 ),
             )
-    return held
+    return embedded
 
 
-def _same_record(found, name, said):
-    """Whether a text names the SHA-256 of the record."""
-    named = _HASH.findall(said)
+def _same_record(verification, name, text):
+    """Report a text that does not state the SHA-256 of the record."""
+    named = _HASH.findall(text)
     if not named:
-        found.tell(
+        verification.tell(
             name,
             message(
                 "verify_names_none",
                 "names no record by its SHA-256; expected one that tankcal wrote, with its record",
             ),
         )
-    elif found.digest not in (None, *named):
-        found.tell(
+    elif verification.digest not in (None, *named):
+        verification.tell(
             name,
             message(
                 "verify_other_record",
                 "was made of another record: it names {named}, and record.json is {digest} "
                 "(SHA-256)",
                 named=named[0][:12],
-                digest=found.digest[:12],
+                digest=verification.digest[:12],
             ),
         )
 
 
-def compare_workbook(found, name, content):
-    """The property of the workbook that names its record."""
-    found.compared.append(name)
+def compare_workbook(verification, name, content):
+    """Compare the hash of the record in the properties of an Excel workbook.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    name : str
+        Name of the file.
+    content : bytes
+        Content of the file.
+    """
+    verification.compared.append(name)
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as parts:
-            said = parts.read("docProps/custom.xml").decode("utf-8")
+            properties = parts.read("docProps/custom.xml").decode("utf-8")
     except (zipfile.BadZipFile, KeyError, OSError, ValueError, RuntimeError, NotImplementedError):
-        said = ""
-    place = said.find(f'name="{RECORD_PROPERTY}"')
-    value = re.search(r"[0-9a-f]{64}", said[place:]) if place >= 0 else None
-    _same_record(found, name, f"sha256:{value[0]}" if value else "")
+        properties = ""
+    place = properties.find(f'name="{RECORD_PROPERTY}"')
+    value = re.search(r"[0-9a-f]{64}", properties[place:]) if place >= 0 else None
+    _same_record(verification, name, f"sha256:{value[0]}" if value else "")
 
 
-def compare_certificate(found, name, content, record):
-    """The digital certificate: its record, its input files, and that it is of that record."""
-    found.compared.append(name)
+def compare_certificate(verification, name, content, record):
+    """Compare a digital certificate with the record: hash, input files and content.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    name : str
+        Name of the file.
+    content : bytes
+        Content of the file.
+    record : dict
+        Record of the results.
+    """
+    verification.compared.append(name)
     try:
         root = ElementTree.fromstring(content)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        found.tell(
+        verification.tell(
             name,
             message(
                 "verify_no_xml",
@@ -126,42 +165,42 @@ def compare_certificate(found, name, content, record):
         return
     files = {
         text: reference
-        for one in root.iter(f"{_DCC}metaData")
-        for text in [one.findtext(f"{_DCC}description/{_DCC}content")]
-        for reference in [one.findtext(f"{_DCC}reference")]
+        for data in root.iter(f"{_DCC}metaData")
+        for text in [data.findtext(f"{_DCC}description/{_DCC}content")]
+        for reference in [data.findtext(f"{_DCC}reference")]
         if reference
     }
-    _same_record(found, name, files.get(RECORD, ""))
-    for one in record["files"]:
-        expected = f"sha256:{one['sha256']}"
-        if files.get(" ".join(one["file"].split()), expected) != expected:
-            found.tell(
+    _same_record(verification, name, files.get(RECORD, ""))
+    for entry in record["files"]:
+        expected = f"sha256:{entry['sha256']}"
+        if files.get(" ".join(entry["file"].split()), expected) != expected:
+            verification.tell(
                 name,
                 message(
                     "verify_other_input",
                     "names another SHA-256 of {file} than the record; expected the same",
-                    file=one["file"],
+                    file=entry["file"],
                 ),
             )
     if record["tankcal"] == tankcal.__version__ and _written_by(root) == tankcal.__version__:
-        _made_again(found, name, content, record, root)
+        _compare_again(verification, name, content, record, root)
 
 
 def _written_by(root):
-    """The version of tankcal that wrote a certificate; None where it does not say."""
+    """Return the version of tankcal in a certificate, or None."""
     release = root.findtext(f".//{_DCC}dccSoftware/{_DCC}software/{_DCC}release")
     return release and release.removeprefix("v")
 
 
-def _made_again(found, name, content, record, root):
-    """Whether the certificate is what the record gives, where this version wrote both."""
+def _compare_again(verification, name, content, record, root):
+    """Compare a certificate of this version with the certificate written again."""
     language = root.findtext(f".//{_DCC}mandatoryLangCodeISO639_1")
     try:
-        again = dcc.certificate_xml(record, found.digest, dcc.language_with(language))
+        again = dcc.certificate_xml(record, verification.digest, dcc.language_with(language))
     except (TankcalError, LookupError, TypeError, ValueError):
-        return  # a record that says otherwise was told of where it was loaded
+        return  # the loading of the record has reported its problems
     if again != content:
-        found.tell(
+        verification.tell(
             name,
             message(
                 "verify_other_content",
@@ -170,32 +209,52 @@ def _made_again(found, name, content, record, root):
         )
 
 
-def compare_page(found, name, content):
-    """Web page and notebook print the hash on the certificate; those of a survey alone do not."""
-    said = content.decode("utf-8", errors="replace")
-    if _HASH.search(said):
-        found.compared.append(name)
-        _same_record(found, name, said)
+def compare_page(verification, name, content):
+    """Compare the hash in a web page or notebook; pages without certificate have no hash.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    name : str
+        Name of the file.
+    content : bytes
+        Content of the file.
+    """
+    text = content.decode("utf-8", errors="replace")
+    if _HASH.search(text):
+        verification.compared.append(name)
+        _same_record(verification, name, text)
 
 
-def compare_tables(found, folder, record):
-    """The CSV files, which hold no hash: whether they are those that the record gives."""
+def compare_tables(verification, folder, record):
+    """Compare the CSV files, which contain no hash, with the tables of the record.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    folder : Path
+        Folder of the CSV files.
+    record : dict
+        Record of the results.
+    """
     if record["tankcal"] != tankcal.__version__:
-        return  # another version may have written them otherwise
-    there = [name for name in tables.FILES if name.endswith(".csv") and (folder / name).is_file()]
+        return  # another version may write another format
+    present = [name for name in tables.FILES if name.endswith(".csv") and (folder / name).is_file()]
     with tempfile.TemporaryDirectory(prefix="tankcal-") as again:
         try:
             tables.write_tables(record, Path(again))
         except (LookupError, TypeError, ValueError, AttributeError):
             text = message("verify_no_tables", "does not have the content of a record")
             raise InputError(Problem(RECORD, text)) from None
-        for name in there:
+        for name in present:
             expected = content_of(Path(again) / name)
             if expected is None:
                 continue
-            found.compared.append(name)
+            verification.compared.append(name)
             if expected != (folder / name).read_bytes():
-                found.tell(
+                verification.tell(
                     name,
                     message(
                         "verify_other_table",
@@ -204,15 +263,25 @@ def compare_tables(found, folder, record):
                 )
 
 
-def compare_inputs(found, record, job):
-    """The input files, by the hashes of the record, where the job is at hand."""
-    places = {one["file"]: job / one["file"] for one in record["files"]}
-    there = {file: place for file, place in places.items() if place.is_file()}
-    found.inputs_found = bool(there)
-    for one in record["files"] if there else ():
-        name = one["file"]
-        if name not in there:
-            found.tell(
+def compare_inputs(verification, record, job):
+    """Compare the input files, if available, with the hashes in the record.
+
+    Parameters
+    ----------
+    verification : Verification
+        Receives the discrepancies.
+    record : dict
+        Record of the results.
+    job : Path
+        Folder of the input files.
+    """
+    places = {entry["file"]: job / entry["file"] for entry in record["files"]}
+    present = {file: place for file, place in places.items() if place.is_file()}
+    verification.inputs_found = bool(present)
+    for entry in record["files"] if present else ():
+        name = entry["file"]
+        if name not in present:
+            verification.tell(
                 name,
                 message(
                     "verify_input_missing",
@@ -220,15 +289,15 @@ def compare_inputs(found, record, job):
                 ),
             )
             continue
-        found.compared.append(name)
-        digest = digest_of(there[name])
-        if digest != one["sha256"]:
-            found.tell(
+        verification.compared.append(name)
+        digest = digest_of(present[name])
+        if digest != entry["sha256"]:
+            verification.tell(
                 name,
                 message(
                     "verify_input_changed",
                     "was changed after the run: its SHA-256 is {found}, in the record {recorded}",
                     found=digest[:12],
-                    recorded=one["sha256"][:12],
+                    recorded=entry["sha256"][:12],
                 ),
             )

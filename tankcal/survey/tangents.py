@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.linalg
 
+from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.geometry.support import SupportCurve, fit_support
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
@@ -220,7 +221,7 @@ def circle_of_sights(station_m, azimuth_rad, nominal_m):
         curve, residuals = after, support - after.support_m(f)
         if moved < 1e-10 * nominal_m:
             break
-        spread = max(1.4826 * float(np.median(np.abs(residuals))), 1e-9 * nominal_m)
+        spread = max(SD_OVER_MEDIAN * float(np.median(np.abs(residuals))), 1e-9 * nominal_m)
         # Huber weights: residuals beyond FAR_SDS robust standard deviations have limited influence.
         weight = np.minimum(1.0, FAR_SDS * spread / np.maximum(np.abs(residuals), 1e-12))
     return curve, right, residuals

@@ -21,6 +21,7 @@ from itertools import combinations
 
 import numpy as np
 
+from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.field.components import SETTLEMENT_MODES
@@ -261,9 +262,8 @@ def _fitted(poses, sights, pose, untied, axis, *, is_even):
         round_m = distance + jacobian[:, first:constrained] @ waves
         radii = np.array([np.median(round_m[level == number]) for number in range(levels)])
         off = round_m - radii[level]
-        # Scale from the median absolute deviation (1.4826 for normal errors), at least that of a
-        # wall.
-        spread = max(WALL_SD_M, 1.4826 * float(np.median(np.abs(off))))
+        # Scale from the median absolute deviation, at least that of a wall.
+        spread = max(WALL_SD_M, SD_OVER_MEDIAN * float(np.median(np.abs(off))))
         weight = np.minimum(1.0, FAR_SDS * spread / np.maximum(np.abs(off), 1e-12)) / spread**2
         normals = jacobian.T @ (weight[:, None] * jacobian)
         normals[:constrained, :constrained] += prior

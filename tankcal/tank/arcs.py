@@ -1,15 +1,16 @@
-"""Arcs of a meridian, and what a plane cuts off a solid of revolution.
+"""Arcs of a meridian, and the volume that a plane cuts off a solid of revolution.
 
-A solid is described by its meridian, radius r(x) along the axis, made of arcs: straight lines and
-pieces of ellipses. The liquid's surface cuts the section at x in a chord at height c(x), counted
-from the axis, a straight line in x because the surface is a plane. With cos t = -c / r,
+A solid is described by its meridian, the radius r(x) along the axis, composed of arcs: straight
+lines and sections of ellipses. The liquid surface cuts the section at x in a chord at the height
+c(x) above the axis. The surface is a plane, so c is linear in x. With cos t = -c / r,
 
     S = r^2 t + c sqrt(r^2 - c^2),    dS/dc = 2 sqrt(r^2 - c^2),    dS/d(r^2) = t
 
-is the wet part of the section, and volumes and their derivatives are integrals of these along x.
-Each arc is broken exactly where the surface meets the meridian and where it runs parallel to it;
-there the integrands have square roots, which u = low + (high - low) sin^2 v takes away.
-Sources: Jones 2001, Computing fluid tank volumes; Davis & Rabinowitz 1984, 2.12 (singularities).
+is the wet area of the section; volumes and their derivatives are integrals of these along x. Each
+arc is divided exactly where the surface meets the meridian and where it is parallel to the
+meridian. The integrands have square roots at these points, which the substitution u = low + (high -
+low) sin^2 v removes. Sources: Jones 2001, Computing fluid tank volumes; Davis & Rabinowitz 1984,
+2.12 (singularities).
 """
 
 from dataclasses import dataclass, field
@@ -19,21 +20,21 @@ import numpy as np
 
 from tankcal.quadrature import panels
 
-NODES = 24  # of each panel
+NODES = 24  # Gauss nodes of each panel
 
 
 @dataclass(frozen=True)
 class Line:
-    """A straight piece of a meridian, r = radius_m + slope x; its parameter is x, m.
+    """Straight section of a meridian, r = radius_m + slope x; its parameter is x, m.
 
     Attributes
     ----------
     lift : float
-        Rise of the sections' centres above the axis by metre of x, as an oblique cone has it.
+        Rise of the centres of the sections above the axis per metre of x, as for an oblique cone.
     by_input : dict
-        {input: derivative of (radius_m, slope) by it}.
+        {input: derivative of (radius_m, slope)}.
     lift_by : dict
-        {input: derivative of the lift by it}.
+        {input: derivative of the lift}.
     """
 
     start: float
@@ -45,35 +46,39 @@ class Line:
     lift_by: dict = field(default_factory=dict)
 
     def at(self, x):
-        """x, r(x), and dx by the parameter."""
+        """Return x, r(x), and dx by the parameter."""
         return x, self.radius_m + self.slope * x, 1.0
 
     def square_by(self, name, x):
-        """Derivative of r(x)^2 by an input, m2 per unit of the input."""
+        """Return the derivative of r(x)^2 by an input, m2 per unit of the input."""
         at_zero, by_slope = self.by_input.get(name, (0.0, 0.0))
         return 2 * (self.radius_m + self.slope * x) * (at_zero + by_slope * x)
 
     def breaks(self, level_m, slope):
-        """(rows, 2) x where the line level_m - slope x meets r(x) and -r(x)."""
+        """Return x (rows, 2) where the line level_m - slope x meets r(x) and -r(x)."""
         columns = []
         for side in (1, -1):
             steepness = side * self.slope + slope
             parallel = abs(steepness) * self.stop <= 1e-18 * self.radius_m
-            over = level_m - side * self.radius_m
-            columns.append(np.full_like(over, self.start) if parallel else over / steepness)
+            difference = level_m - side * self.radius_m
+            # A parallel line has no intersection within the arc: return the start, which adds no
+            # break.
+            columns.append(
+                np.full_like(difference, self.start) if parallel else difference / steepness
+            )
         return np.column_stack(columns)
 
 
 @dataclass(frozen=True)
 class EllipseArc:
-    """A piece of an ellipse; its parameter is the angle u, 0 where the radius is greatest.
+    """Section of an ellipse; its parameter is the angle u, 0 at the largest radius.
 
     x = centre_m + along_m sin u, r = offset_m + across_m cos u, from start to stop, rad
 
     Attributes
     ----------
     by_input : dict
-        {input: derivative of (centre_m, offset_m, along_m, across_m) by it}.
+        {input: derivative of (centre_m, offset_m, along_m, across_m)}.
     """
 
     start: float
@@ -87,26 +92,32 @@ class EllipseArc:
     lift_by = MappingProxyType({})
 
     def at(self, u):
-        """x, r, and dx/du."""
+        """Return x, r, and dx/du."""
         sin, cos = np.sin(u), np.cos(u)
         return self.centre_m + self.along_m * sin, self._radius(cos), self.along_m * cos
 
     def square_by(self, name, u):
-        """Derivative of r(x)^2 at a fixed x by an input, m2 per unit of the input."""
-        centre, offset, along, across = self.by_input.get(name, (0.0, 0.0, 0.0, 0.0))
+        """Return the derivative of r(x)^2 at a fixed x by an input, m2 per unit of the input."""
+        by_centre, by_offset, by_along, by_across = self.by_input.get(name, (0.0, 0.0, 0.0, 0.0))
         sin, cos = np.sin(u), np.cos(u)
-        lean = (self.offset_m / cos + self.across_m) * self.across_m / self.along_m * sin
-        return 2 * lean * (centre + sin * along) + 2 * self._radius(cos) * (offset + cos * across)
+        # At fixed x, u changes by -(dcentre + sin u dalong) / (along cos u), and r by -across sin u
+        # du.
+        by_position = (self.offset_m / cos + self.across_m) * self.across_m / self.along_m * sin
+        return 2 * by_position * (by_centre + sin * by_along) + 2 * self._radius(cos) * (
+            by_offset + cos * by_across
+        )
 
     def breaks(self, level_m, slope):
-        """(rows, 6) u where the line level_m - slope x meets r and -r, or runs parallel to them."""
+        """Return u (rows, 6) where the line level_m - slope x meets or parallels r and -r."""
         columns = []
         for side in (1, -1):
             rise = side * slope * self.along_m
+            # rise sin u + across cos u = over is a cosine about the angle where the line is
+            # parallel.
             parallel = np.arctan2(rise, self.across_m)
-            over = side * (level_m - slope * self.centre_m) - self.offset_m
-            away = np.arccos(np.clip(over / np.hypot(rise, self.across_m), -1.0, 1.0))
-            columns += [parallel - away, parallel + 0.0 * away, parallel + away]
+            difference = side * (level_m - slope * self.centre_m) - self.offset_m
+            half_angle = np.arccos(np.clip(difference / np.hypot(rise, self.across_m), -1.0, 1.0))
+            columns += [parallel - half_angle, parallel + 0.0 * half_angle, parallel + half_angle]
         return np.column_stack(columns)
 
     def _radius(self, cos):
@@ -115,16 +126,16 @@ class EllipseArc:
 
 @dataclass(frozen=True)
 class Cut:
-    """Sections of one arc and the liquid in them; arrays of one shape.
+    """Sections of an arc and the liquid in them; arrays of equal shape.
 
     Attributes
     ----------
     parameter : ndarray
-        Of the arc, of which the sections are.
+        Parameter of the arc at each section.
     x_m, radius_m : ndarray
-        Place and radius of each section.
+        Position and radius of each section.
     height_m : ndarray
-        Of the liquid's surface above the centre of each section.
+        Height of the liquid surface above the centre of each section.
     """
 
     arc: Line | EllipseArc
@@ -134,30 +145,32 @@ class Cut:
     height_m: np.ndarray
 
     def segment(self):
-        """Wet part S of each section, m2."""
+        """Return the wet area S of each section, m2."""
         height = np.clip(self.height_m, -self.radius_m, self.radius_m)
         return self.radius_m**2 * self.wet_angle() + height * self.chord() / 2
 
     def chord(self):
-        """Width of the free surface in each section, m."""
+        """Return the width of the free surface in each section, m."""
+        # (r + c)(r - c) avoids the cancellation of r^2 - c^2 near the bottom and the top.
         return 2 * np.sqrt(self._above_bottom() * self._below_top())
 
     def chord_moment(self):
-        """Width of the free surface times x, m2."""
+        """Return the width of the free surface times x, m2."""
         return self.x_m * self.chord()
 
     def wet_angle(self):
-        """Half the angle that the wet arc of each section spans at the axis, 0 to pi."""
+        """Return half the angle of the wet arc of each section at the axis, 0 to pi."""
+        # Half-angle formula: accurate for nearly empty and nearly full sections.
         return 2 * np.arctan2(np.sqrt(self._above_bottom()), np.sqrt(self._below_top()))
 
     def by(self, name):
-        """Derivative of S by an input of the arc, m2 per m."""
-        found = self.arc.square_by(name, self.parameter) * self.wet_angle()
-        lifted = self.arc.lift_by.get(name)
-        return found if lifted is None else found - lifted * self.chord_moment()
+        """Return the derivative of S by an input of the arc, m2 per m."""
+        by_radius = self.arc.square_by(name, self.parameter) * self.wet_angle()
+        by_lift = self.arc.lift_by.get(name)
+        return by_radius if by_lift is None else by_radius - by_lift * self.chord_moment()
 
     def by_wave(self, order):
-        """Derivative of S by a wave cos(order a) of the radius, a from the bottom, m2 per m."""
+        """Return the derivative of S by a wave cos(order a) of the radius, m2 per m."""
         return 2 * self.radius_m * np.sin(order * self.wet_angle()) / order
 
     def _above_bottom(self):
@@ -168,56 +181,69 @@ class Cut:
 
 
 def integrate(arc, level_m, slope, integrands, nodes=NODES):
-    """Integrals over x along an arc, below the line level_m - slope x: (integrands, rows).
+    """Return integrals (integrands, rows) over x along an arc, below the line level_m - slope x.
 
-    Where the sections' centres rise, the line falls by as much more against them.
+    If the centres of the sections rise, the line falls more steeply relative to them.
 
     Parameters
     ----------
-    arc
-        Line or EllipseArc.
+    arc : Line or EllipseArc
     level_m : ndarray, shape (rows,)
-        Height of the liquid above the axis at x = 0.
-    slope
-        Fall of that height per metre of x, any number.
-    integrands
+        Height of the liquid above the axis at x = 0, m.
+    slope : float
+        Fall of that height per metre of x.
+    integrands : sequence of callable
         Functions of a `Cut`, such as Cut.segment.
+    nodes : int, optional
+        Gauss nodes of each panel.
+
+    Returns
+    -------
+    ndarray, shape (integrands, rows)
     """
     level_m, slope = np.asarray(level_m, dtype=float), slope + arc.lift
     row, parameter, weight = _wet_nodes(arc, level_m, slope, nodes)
     x, radius, step = arc.at(parameter)
-    cut = Cut(arc, parameter, x, radius, level_m[row, None] - slope * x)
-    sums = [np.einsum("pn,pn->p", step * weight, integrand(cut)) for integrand in integrands]
-    return np.array([np.bincount(row, one, minlength=len(level_m)) for one in sums])
+    sections = Cut(arc, parameter, x, radius, level_m[row, None] - slope * x)
+    sums = [np.einsum("pn,pn->p", step * weight, integrand(sections)) for integrand in integrands]
+    # Several panels belong to a row: add their sums.
+    return np.array(
+        [np.bincount(row, sums_of_panels, minlength=len(level_m)) for sums_of_panels in sums]
+    )
 
 
 def _wet_nodes(arc, level_m, slope, nodes):
-    """Row, parameters and weights of the panels that are not dry: (p,), (p, nodes), (p, nodes)."""
+    """Return row (p,), parameters (p, nodes) and weights (p, nodes) of the panels with liquid."""
     inner = np.clip(arc.breaks(level_m, slope), arc.start, arc.stop)
     ends = np.broadcast_to([arc.start, arc.stop], (len(level_m), 2))
     breaks = np.sort(np.hstack([inner, ends]), axis=1)
-    low, long = breaks[:, :-1], np.diff(breaks, axis=1)
-    x, radius, _ = arc.at(low + long / 2)
-    wet = (long > 0) & (level_m[:, None] - slope * x > -radius)
+    begin, length = breaks[:, :-1], np.diff(breaks, axis=1)
+    x, radius, _ = arc.at(begin + length / 2)
+    # A panel is either dry throughout or wet throughout: its middle decides.
+    wet = (length > 0) & (level_m[:, None] - slope * x > -radius)
     row = np.nonzero(wet)[0]
-    low, long = low[wet][:, None], long[wet][:, None]
+    begin, length = begin[wet][:, None], length[wet][:, None]
     if slope == 0 and isinstance(arc, Line) and arc.slope == 0:
-        return row, low + long / 2, long
+        # A cylinder parallel to the surface has constant sections: the midpoint rule is exact.
+        return row, begin + length / 2, length
+    # Substitution u = low + long sin^2 v, du = long sin(2 v) dv, removes the square roots at both
+    # ends.
     angle, share = panels((0.0, np.pi / 2), nodes)
-    return row, low + long * np.sin(angle) ** 2, long * (np.sin(2 * angle) * share)
+    return row, begin + length * np.sin(angle) ** 2, length * (np.sin(2 * angle) * share)
 
 
 def revolved(arc, start, integrands, nodes=NODES):
-    """Integrals over x along an arc turned about its axis, from some place on: (integrands, rows).
+    """Return integrals (integrands, rows) over x along an arc of revolution.
 
     Parameters
     ----------
-    arc
-        Line or EllipseArc.
+    arc : Line or EllipseArc
     start : ndarray, shape (rows,)
-        Values of its parameter; before the arc's own start counts as that.
-    integrands
+        Parameters at which the integrals start, limited to the range of the arc.
+    integrands : sequence of callable
         Functions of (arc, parameter).
+    nodes : int, optional
+        Gauss nodes.
 
     Returns
     -------
@@ -232,9 +258,11 @@ def revolved(arc, start, integrands, nodes=NODES):
     >>> revolved(half, np.zeros(1), [square]).round(6).tolist()
     [[2.094395]]
     """
-    low = np.clip(np.asarray(start, dtype=float), arc.start, arc.stop)[:, None]
+    begin = np.clip(np.asarray(start, dtype=float), arc.start, arc.stop)[:, None]
     share, weight = panels((0.0, 1.0), nodes)
-    parameter = low + (arc.stop - low) * share
+    parameter = begin + (arc.stop - begin) * share
     _, _, step = arc.at(parameter)
-    weight = weight * (arc.stop - low) * step
-    return np.array([np.sum(weight * one(arc, parameter), axis=1) for one in integrands])
+    weight = weight * (arc.stop - begin) * step
+    return np.array(
+        [np.sum(weight * integrand(arc, parameter), axis=1) for integrand in integrands]
+    )

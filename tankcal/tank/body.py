@@ -1,8 +1,9 @@
-"""A tank as the sum of its parts: shell, head, bottom, deadwood, roof, or one solid.
+"""Tank as the sum of its parts: shell, head, bottom, deadwood, roof, or a single solid.
 
-Every part gives volume, free surface and derivatives below any level; the table is their sum. An
-input that several parts share (a scale, the table's zero) moves all of them at once: it is one
-column of the covariance, the sum of their derivatives times its standard uncertainty.
+Each part has a volume, a free surface and derivatives below any level; the table is their sum. An
+input shared by several parts (a scale, the zero of the table) changes all of them at once. It is a
+single column of the factor of the covariance: the sum of the derivatives times the standard
+uncertainty.
 """
 
 from dataclasses import dataclass, field, replace
@@ -15,42 +16,43 @@ from tankcal.tank.surveyed_form import SurveyedForm
 from tankcal.tank.volumes import ShellVolume
 from tankcal.uncertainty import declared_source, group_correlated
 
-OWN_SCALE = "instrument_scale"  # kind of a cause that stands for the input "scale"
-MEASURED = (  # lengths at the warmth of the survey
+OWN_SCALE = "instrument_scale"  # kind of a cause that replaces the input "scale"
+MEASURED = (  # lengths at the temperature of the survey
     *("diameter", "length", "end_depth", "dish", "knuckle", "dip_position", "tube_offset"),
     *("plate_thickness", "paint", "ring_lengths", "ring_axes"),
 )
-ROUNDED_M = 0.001  # that the last dip of a table, a whole millimetre, stands above the top at most
-LEVELS = 9  # from empty to full, at which inputs are asked whether they move the volume
+ROUNDED_M = 0.001  # the last dip of a table, rounded to a millimetre, may exceed the top by this
+LEVELS = 9  # levels from empty to full in the test whether an input changes the volume
 
 
 @dataclass(frozen=True)
 class ShellPart(Part):
-    """The shell of courses as a part; it has nothing below the bottom of its first course.
+    """Shell of courses as a part; it contains no volume below the bottom of its first course.
 
     Attributes
     ----------
     volume : ShellVolume
-        Inside, at the table's temperature.
+        Inside volume, at the temperature of the table.
     factors : tuple of Factor
-        What the survey leaves uncertain about the shell's features: of the points, of causes that
-        they share, and of the wall between them ("bulge", "ovality", "seams").
+        Uncertainty of the features of the shell after the survey: due to the points, to their
+        common causes, and to the wall between them ("bulge", "ovality", "seams").
     scale : float
-        Of horizontal lengths, by temperature; expansion_per_k its coefficient.
+        Temperature factor on horizontal lengths.
+    expansion_per_k : float
+        Coefficient of linear expansion, 1/K.
     stretch : float
-        Of heights, by temperature; 1 where heights are not corrected.
+        Temperature factor on heights; 1 if heights are not corrected.
     bearing : tuple of str
-        Which of the inputs "plate_thickness", "paint", "shell_temperature" and "expansion" were
-        used.
+        Inputs in use, of "plate_thickness", "paint", "shell_temperature" and "expansion".
     tilt : float
-        Of the axis, m/m.
+        Tilt of the axis, m/m.
     read_with : dict
-        {input: (f,) derivative of the shell's features by it}, of inputs that the readings of the
-        survey depend on: the temperature of a tape that has that of the shell.
+        {input: (f,) derivative of the features of the shell}, for inputs that affect the readings
+        of the survey, such as the temperature of a tape equal to that of the shell.
     unused : tuple of str
-        Names of inputs that have no meaning for the survey.
+        Names of inputs that do not apply to the survey.
     subtracts : bool
-        Whether plate and paint were taken off the surveyed radii.
+        Whether plate and paint were subtracted from the surveyed radii.
     """
 
     volume: ShellVolume
@@ -66,88 +68,99 @@ class ShellPart(Part):
 
     @property
     def breakpoints_m(self):
-        """Bottoms of the courses."""
+        """Levels of the bottoms of the courses."""
         return tuple(course.bottom_m for course in self.volume.courses)
 
     def volume_m3(self, levels_m):
-        """(rows,) volume of the shell below each level."""
+        """Return the volume (rows,) of the shell below each level."""
         return self.volume.volume_m3(np.maximum(levels_m, 0.0))
 
     def area_m2(self, levels_m):
-        """(rows,) inside area at each level; 0 below the bottom."""
+        """Return the inside area (rows,) at each level; 0 below the bottom."""
         return self.volume.area_m2(np.maximum(levels_m, 0.0)) * (np.asarray(levels_m) >= 0)
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} m3 per SI unit; of "course_heights" (rows, courses), each its own.
+        """Return {input: (rows,)}, m3 per SI unit; (rows, courses) for "course_heights".
 
-        "barrel" and "taper", where they were declared, are the same in all courses, for in a real
-        tank they had one sign. "scale" multiplies the surveyed lengths square to the axis, "offset"
-        adds to every surveyed radius, "datum" lifts the table's zero. "tilt" leans the shell as
-        surveyed: the horizontal cut is sqrt(1 + m^2) times the one square to the axis.
+        Declared "barrel" and "taper" are equal in all courses, since they had one sign in real
+        tanks. "scale" multiplies the surveyed lengths perpendicular to the axis, "offset" is added
+        to every surveyed radius, "datum" raises the zero of the table. "tilt" is the lean of the
+        surveyed shell: the horizontal cut is sqrt(1 + m^2) times the perpendicular section.
         """
         wet = np.maximum(levels_m, 0.0)
         features = self.volume.features, self.volume.girth_features, self.volume.scale_features
         departures = {name: self.volume.missed_features(name) for name in self.volume.departures}
         columns = np.column_stack([*features, *departures.values(), *self.read_with.values()])
+        # One integration for all feature columns: volume loss by thickness, scale, departures,
+        # readings.
         volume, loss, by_scale, *others = self.volume.integrated(wet, columns).T
         area = self.area_m2(levels_m)
         by_length = 2 * volume / self.scale
+        # Stretched heights: V(h) = s V0(h / s), so dV/ds = (V - A h) / s.
         if self.stretch != 1.0:
             by_length = by_length + (volume - area * wet) / self.stretch
-        of_corrections = {
+        by_corrections = {
             "plate_thickness": -loss * self.subtracts,
             "paint": -loss * self.subtracts,
             "shell_temperature": -self.expansion_per_k * by_length,
             "expansion": (self.scale - 1) / self.expansion_per_k * by_length,
         }
-        found = {
+        derivatives = {
             "scale": by_scale,
             "datum": area,
             "offset": loss,
             **dict(zip(departures, others, strict=False)),
             "course_heights": self.volume.by_course_heights_m2(wet),
             "tilt": volume * self.tilt / (1 + self.tilt**2),
-            **{name: of_corrections[name] for name in self.bearing},
+            **{name: by_corrections[name] for name in self.bearing},
         }
-        found = {name: one for name, one in found.items() if name not in self.unused}
+        derivatives = {
+            name: derivative for name, derivative in derivatives.items() if name not in self.unused
+        }
         for name, by_readings in zip(self.read_with, others[len(departures) :], strict=True):
-            found[name] = found.get(name, 0.0) + by_readings
-        return found
+            derivatives[name] = derivatives.get(name, 0.0) + by_readings
+        return derivatives
 
     def sources(self, levels_m):
-        """What the survey itself leaves uncertain: the points, and the form between them."""
+        """Return the sources of the survey: the points, and the form between them."""
         if not self.factors:
             return ()
         wet = np.maximum(levels_m, 0.0)
-        columns = self.volume.integrated(wet, np.hstack([one.columns for one in self.factors]))
-        ends = np.cumsum([one.columns.shape[1] for one in self.factors])[:-1]
+        columns = self.volume.integrated(
+            wet, np.hstack([factor.columns for factor in self.factors])
+        )
+        ends = np.cumsum([factor.columns.shape[1] for factor in self.factors])[:-1]
         parts = np.split(columns, ends, axis=1)
-        return tuple(one.source(part) for one, part in zip(self.factors, parts, strict=True))
+        return tuple(factor.source(part) for factor, part in zip(self.factors, parts, strict=True))
 
 
 @dataclass(frozen=True)
 class SolidPart(Part):
-    """A tank of one solid (lying cylinder, sphere, mesh) at the table's temperature.
+    """Tank that is a single solid (lying cylinder, sphere, mesh) at the temperature of the table.
 
     Attributes
     ----------
     solid : Part
-        A part whose lengths are at that temperature already.
+        Solid whose lengths refer to that temperature.
     scale : float
-        Of its lengths by temperature; expansion_per_k its coefficient; warmed whether a temperature
-        was given.
+        Temperature factor on lengths.
+    expansion_per_k : float
+        Coefficient of linear expansion, 1/K.
+    warmed : bool
+        Whether a temperature was given.
     surveyed : tuple of str
-        Names of the inputs of the solid that a survey of its wall gave; () without one.
+        Inputs of the solid determined by a survey of its wall; () without a survey.
     factors : tuple of Factor
-        What that survey leaves uncertain about them, where no form says it of the volumes.
+        Uncertainty of these inputs after the survey, if no form contains the uncertainty of
+        volumes.
     form : SurveyedForm or None
-        How that wall departs from the solid, with what the survey leaves uncertain of its volumes.
+        Departure of the wall from the solid, with the uncertainty of its volumes.
     unused : tuple of str
-        Names of the solid's inputs that have no meaning in this job.
+        Inputs of the solid that do not apply to the job.
     read_with : dict
-        {input: (f,) derivative by it of what the survey gave: the surveyed inputs, or the volumes
-        at the form's nodes}, of inputs that the readings of the survey depend on: the temperature
-        of a tape that has that of the shell.
+        {input: (f,) derivative of the surveyed inputs, or of the volumes at the nodes of the form},
+        for inputs that affect the readings of the survey, such as the temperature of a tape equal
+        to that of the shell.
     """
 
     solid: Part
@@ -162,24 +175,24 @@ class SolidPart(Part):
 
     @property
     def top_m(self):
-        """The highest dip."""
+        """Highest dip, m."""
         return self.solid.top_m * self._stretch
 
     @property
     def capacity_m3(self):
-        """Volume of the full tank."""
+        """Volume of the full tank, m3."""
         full = self.solid.capacity_m3
         return full if self.form is None else full * (1 + self.form.share)
 
     def volume_m3(self, levels_m):
-        """(rows,) volume below each level."""
+        """Return the volume (rows,) below each level."""
         volume = self.solid.volume_m3(self._of_solid(levels_m))
         if self.form is None:
             return volume
         return volume * self.form.factor(self._shares(levels_m))
 
     def area_m2(self, levels_m):
-        """(rows,) derivative of the volume by the level."""
+        """Return the derivative (rows,) of the volume by the level."""
         area = self.solid.area_m2(self._of_solid(levels_m))
         if self.form is None:
             return area
@@ -187,39 +200,45 @@ class SolidPart(Part):
         return self._formed_area(levels_m, volume, area)
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} m3 per SI unit: those of the solid as measured, and its temperature."""
-        found = self._formed(levels_m, self.solid.derivatives(self._of_solid(levels_m)))
-        found |= {name: self.scale * found[name] for name in MEASURED if name in found}
+        """Return {input: (rows,)}, m3 per SI unit, by measured inputs and temperature."""
+        derivatives = self._formed(levels_m, self.solid.derivatives(self._of_solid(levels_m)))
+        # Measured lengths are multiplied by the temperature factor.
+        derivatives |= {
+            name: self.scale * derivatives[name] for name in MEASURED if name in derivatives
+        }
         if self.warmed:
-            by_length = found["scale"] / self.scale
-            found["shell_temperature"] = -self.expansion_per_k * by_length
-            found["expansion"] = (self.scale - 1) / self.expansion_per_k * by_length
+            by_length = derivatives["scale"] / self.scale
+            derivatives["shell_temperature"] = -self.expansion_per_k * by_length
+            derivatives["expansion"] = (self.scale - 1) / self.expansion_per_k * by_length
         if "diameter" in self.surveyed:
-            found["offset"] = 2 * found["diameter"]
+            derivatives["offset"] = 2 * derivatives["diameter"]
         if self.read_with:
-            by_survey = self._by_survey(levels_m, found)
+            by_survey = self._by_survey(levels_m, derivatives)
             for name, column in self.read_with.items():
-                found[name] = found.get(name, 0.0) + by_survey @ column
-        without = {*self.unused, *self.surveyed}
-        return {name: one for name, one in found.items() if name not in without}
+                derivatives[name] = derivatives.get(name, 0.0) + by_survey @ column
+        excluded = {*self.unused, *self.surveyed}
+        return {
+            name: derivative for name, derivative in derivatives.items() if name not in excluded
+        }
 
     def sources(self, levels_m):
-        """What the survey of the wall leaves uncertain, beside the solid's own sources."""
-        own = tuple(self.solid.sources(self._of_solid(levels_m)))
+        """Return the sources of uncertainty of the survey of the wall, then those of the solid."""
+        solid_sources = tuple(self.solid.sources(self._of_solid(levels_m)))
         if not self.surveyed:
-            return own
-        of_solid = self.solid.derivatives(levels_m) if self.form is None else {}
-        by_survey = self._by_survey(levels_m, of_solid)
+            return solid_sources
+        by_solid = self.solid.derivatives(levels_m) if self.form is None else {}
+        by_survey = self._by_survey(levels_m, by_solid)
         factors = self.factors if self.form is None else self.form.factors
-        return (*(one.source(by_survey @ one.columns) for one in factors), *own)
+        return (*(factor.source(by_survey @ factor.columns) for factor in factors), *solid_sources)
 
-    def _by_survey(self, levels_m, found):
-        """(rows, f) derivatives by what the survey gave: the nodes of its form, or the surveyed of
-        those by all inputs.
+    def _by_survey(self, levels_m, derivatives):
+        """Return derivatives (rows, f) by the results of the survey.
+
+        The results are the volumes at the nodes of the form, or the surveyed inputs of the solid.
         """
         if self.form is not None:
             return self.form.at(self._shares(levels_m))
-        return np.column_stack([found[name] for name in self.surveyed])
+        return np.column_stack([derivatives[name] for name in self.surveyed])
 
     @property
     def _stretch(self):
@@ -233,42 +252,45 @@ class SolidPart(Part):
         return share
 
     def _formed_area(self, levels_m, volume, area):
-        """Of the wall, from volume and area of the solid at its own levels."""
+        """Return the area of the wall, from volume and area of the solid."""
         shares, by_level = self.solid.height_share(self._of_solid(levels_m))
+        # Product rule: V = W(L / s) f(share), with s the stretch of the dips.
         slope = self.form.factor_slope(shares) * by_level / self._stretch
         return area * self.form.factor(shares) / self._stretch + volume * slope
 
-    def _formed(self, levels_m, found):
-        """Derivatives of the wall from those of the solid at its own levels.
+    def _formed(self, levels_m, derivatives):
+        """Return derivatives of the wall from those of the solid at the corresponding levels.
 
-        All lengths times t make the volume t^3 W(d / t): by the scale it is 3 W - d dW/dd.
+        All lengths times t give the volume t^3 W(d / t): its derivative by the scale is 3 W - d
+        dW/dd.
         """
         if self.form is None:
-            return found
+            return derivatives
         levels, factor = self._of_solid(levels_m), self.form.factor(self._shares(levels_m))
         volume = self.solid.volume_m3(levels)
-        area = self._formed_area(levels_m, volume, found["datum"])
-        formed = {name: factor * one for name, one in found.items()}
+        area = self._formed_area(levels_m, volume, derivatives["datum"])
+        formed = {name: factor * derivative for name, derivative in derivatives.items()}
         by_scale = 3 * factor * volume - np.asarray(levels_m) * area
         return formed | {"datum": area, "scale": by_scale}
 
 
 @dataclass(frozen=True)
 class Body:
-    """The parts of a tank together.
-
-    lowest_m, highest_m levels between which there is a tank, in the frame of the parts
+    """Parts of a tank together.
 
     Attributes
     ----------
+    parts : tuple of Part
     declared : tuple
         Inputs with name, u (SI), u_as_read, unit, type, distribution, dof, note, is_default.
+    lowest_m, highest_m : float
+        Levels of the empty and the full tank in the frame of the parts, m.
     correlations : tuple
         (name, name, r) of declared inputs.
     estimates : dict
-        {name of an input: its value, in the unit it is declared in}.
+        {name of an input: its value, in the declared unit}.
     shell : ShellPart or None
-        The shell of courses that is among the parts; None for a tank without.
+        Shell of courses among the parts; None for a tank without courses.
     """
 
     parts: tuple[Part, ...]
@@ -283,112 +305,132 @@ class Body:
 
     @property
     def breakpoints_m(self):
-        """Levels at which the free surface jumps: joints, edges of what stands or floats inside."""
-        every = {edge for part in self.parts for edge in part.breakpoints_m}
-        return tuple(sorted(edge for edge in every if np.isfinite(edge)))
+        """Levels at which the free surface jumps: joints, and limits of fittings or a roof."""
+        edges = {edge for part in self.parts for edge in part.breakpoints_m}
+        return tuple(sorted(edge for edge in edges if np.isfinite(edge)))
 
     def volume_m3(self, levels_m):
-        """(rows,) volume below each level.
+        """Return the volume (rows,) below each level.
 
-        Above its top, where the last whole millimetre of a dip may stand, the tank goes on as wide
-        as it is there: a closed one not at all. Raises HeightError for levels farther off.
+        The last dip, a whole millimetre, may exceed the top. There the tank continues with the area
+        at the top, which is zero for a closed tank. Raises HeightError for levels farther outside.
         """
         inside = self._inside(levels_m)
         volume = sum(part.volume_m3(inside) for part in self.parts)
-        over = np.asarray(levels_m, dtype=float) - inside
-        if not np.any(over):
+        excess = np.asarray(levels_m, dtype=float) - inside
+        if not np.any(excess):
             return volume
         top = np.array([self.highest_m])
-        return volume + over * sum(part.area_m2(top) for part in self.parts)
+        # Above the top: a prism over the area at the top.
+        return volume + excess * sum(part.area_m2(top) for part in self.parts)
 
     def area_m2(self, levels_m):
-        """(rows,) derivative of the volume by the level: the free surface."""
+        """Return the free surface (rows,), the derivative of the volume by the level."""
         levels_m = self._inside(levels_m)
         return sum(part.area_m2(levels_m) for part in self.parts)
 
     def derivatives(self, levels_m):
-        """{input: (rows,) or (rows, c)} of all parts together, m3 per SI unit."""
+        """Return {input: (rows,) or (rows, c)} of all parts together, m3 per SI unit."""
         levels_m = self._inside(levels_m)
         return sum_derivatives(part.derivatives(levels_m) for part in self.parts)
 
     def _inside(self, levels_m):
-        """The levels; the top for those less than a millimetre above it."""
+        """Return the levels; levels less than a millimetre above the top become the top."""
         levels = np.asarray(levels_m, dtype=float)
-        over = (levels > self.highest_m) & (levels < self.highest_m + ROUNDED_M)
-        return np.where(over, self.highest_m, levels)
+        slightly_above = (levels > self.highest_m) & (levels < self.highest_m + ROUNDED_M)
+        return np.where(slightly_above, self.highest_m, levels)
 
     def moved_m3(self, levels_m, step_m):
-        """(rows,) volumes when the table's zero stands step_m higher, a number or (rows,).
+        """Return volumes (rows,) for a zero of the table raised by step_m, a number or (rows,).
 
-        What is declared by dips (deadwood, a roof, volumes measured by liquid) goes with the zero.
-        Never below empty; above the top the tank goes on as wide as it is there.
+        Parts declared by dips (deadwood, a roof, volumes measured with liquid) move with the zero.
+        Volumes are never below empty; above the top, the tank continues with the area at the top.
         """
         levels = np.asarray(levels_m, dtype=float)
         ends = self.lowest_m, self.highest_m
         return sum(part.moved_m3(levels, step_m, *ends) for part in self.parts)
 
     def only_shell(self):
-        """The body of the shell of courses alone."""
+        """Return the body of the shell of courses alone."""
         return replace(self, parts=(self.shell,), highest_m=self.shell.volume.height_m)
 
     def undeclared(self):
-        """Names of the inputs that move some volume of the tank and have no declared u.
+        """Return the names of the inputs that change a volume but have no declared u.
 
-        The scale of an instrument that was adjusted along stands for the scale of the survey, what
-        the heights of a bottom share for its height.
+        The estimated scale of an instrument replaces the scale of the survey. The common error of
+        the heights of a bottom replaces its height.
         """
         levels = np.linspace(self.lowest_m, self.highest_m, LEVELS)
-        moved = self.derivatives(levels)
-        known = {one.name for one in self.declared}
+        derivatives = self.derivatives(levels)
+        known_names = {item.name for item in self.declared}
         if self.shell is not None:
-            known.update(self.shell.unused)
-        if any(one.kind == OWN_SCALE for part in self.parts for one in part.sources(levels)):
-            known.add("scale")
+            known_names.update(self.shell.unused)
+        if any(item.kind == OWN_SCALE for part in self.parts for item in part.sources(levels)):
+            known_names.add("scale")
         if any(part.has_own_height for part in self.parts):
-            known.add("bottom")
-        return tuple(name for name, by in moved.items() if name not in known and _bears(by))
+            known_names.add("bottom")
+        return tuple(
+            name
+            for name, derivative in derivatives.items()
+            if name not in known_names and _changes_volume(derivative)
+        )
 
     def sources(self, levels_m):
-        """One `Source` for each cause of uncertainty: the parts' own, then what was declared."""
+        """Return one `Source` for each cause of uncertainty, of the parts and then declared."""
         return self._sources(self._inside(levels_m), self.derivatives(levels_m))
 
     def sources_by(self, levels_m, inputs, without=()):
-        """`sources` in which every declared input of `inputs` has its line, zeros where it does not
-        move this body, or is one of `without`.
+        """Return `sources` with a line for each declared input of `inputs`.
 
-        Two bodies of one tank (loaded by two liquids) then give the same sources in the same order.
+        Two bodies of one tank (loaded by two liquids) then have equal sources in equal order.
+
+        Parameters
+        ----------
+        levels_m : array_like, shape (rows,)
+            Levels, m.
+        inputs : iterable of str
+            Names of inputs. The line of an input that does not affect the body is zero.
+        without : sequence of str, optional
+            Names of inputs whose line is zero in any case.
+
+        Returns
+        -------
+        tuple of Source
         """
         derivatives = self.derivatives(levels_m)
         for name in inputs:
-            by = derivatives.get(name, np.zeros(len(levels_m)))
-            derivatives[name] = np.zeros_like(by) if name in without else by
+            derivative = derivatives.get(name, np.zeros(len(levels_m)))
+            derivatives[name] = np.zeros_like(derivative) if name in without else derivative
         return self._sources(self._inside(levels_m), derivatives)
 
     def rows(self, levels_m):
-        """(volumes, areas, sources) of a table, each as its own method gives it, at one go.
+        """Return (volumes, areas, sources) of a table in a single pass.
 
-        The derivative by "datum" is that by the level, so it serves as the area, too.
+        The derivative by "datum" is the derivative by the level, so it also gives the area.
         """
         inside = self._inside(levels_m)
         derivatives = [part.derivatives(inside) for part in self.parts]
         area = sum(
-            part.area_by(found, inside) for part, found in zip(self.parts, derivatives, strict=True)
+            part.area_by(part_derivatives, inside)
+            for part, part_derivatives in zip(self.parts, derivatives, strict=True)
         )
         return self.volume_m3(levels_m), area, self._sources(inside, sum_derivatives(derivatives))
 
     def _sources(self, levels_m, derivatives):
-        own = join_shared([part.sources(levels_m) for part in self.parts])
-        alone = {
-            one.name: declared_source(one, derivatives[one.name], self.estimates.get(one.name))
-            for one in self.declared
-            if one.name in derivatives
+        part_sources = join_shared([part.sources(levels_m) for part in self.parts])
+        declared_sources = {
+            item.name: declared_source(item, derivatives[item.name], self.estimates.get(item.name))
+            for item in self.declared
+            if item.name in derivatives
         }
-        return (*own, *group_correlated(alone, self.correlations))
+        return (*part_sources, *group_correlated(declared_sources, self.correlations))
 
 
-def _bears(by):
-    """Whether an input moves volumes, by its derivatives (rows,) or (rows, courses).
+def _changes_volume(derivatives):
+    """Whether an input changes volumes, by its derivatives (rows,) or (rows, courses).
 
-    The heights of several courses do, even where a nominal tank has equal ones: no real tank has.
+    Heights of several courses do, even if the derivatives vanish in a nominal tank of equal
+    courses, since the courses of a real tank differ.
     """
-    return (by.ndim == 2 and by.shape[1] > 1) or bool(np.any(by != 0))
+    # Derivatives by several course heights may vanish for equal courses, see above.
+    return (derivatives.ndim == 2 and derivatives.shape[1] > 1) or bool(np.any(derivatives != 0))

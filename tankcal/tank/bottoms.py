@@ -1,13 +1,13 @@
-"""What lies between the bottom of a vertical tank and the plane of the bottom of its first course.
+"""Volume between the bottom of a vertical tank and the plane of the bottom of its first course.
 
-Every part here gives the volume that stands on the bottom below a level, less the area times level
-that the shell counts above that plane (level 0),
+Each part gives the volume on the bottom below a level, less the area times level that the shell
+counts above that plane (level 0),
 
     V(L) = integral over the plan of (L - z)+ - L+,
 
-so it is positive below the plane and negative where the bottom rises above it. A level L = z counts
-as wet. Where the wall differs from the plan's outline between the plane and the bottom's edge is
-left out: it is the product of two small heights.
+so it is positive below the plane, and negative where the bottom is above the plane. A level L = z
+counts as wet. Between the plane and the edge of the bottom, the wall may differ from the outline of
+the plan. This difference is neglected, as the product of two small heights.
 """
 
 from dataclasses import dataclass
@@ -24,19 +24,20 @@ from tankcal.tank.tips import Tip, tip_of
 from tankcal.uncertainty import Source
 
 FORMS = ("flat", *TIPS)
-LEAN_AZIMUTHS = 720  # of the triangles of a leaning plate
+LEAN_AZIMUTHS = 720  # number of triangles of a leaning plate
 
 
 @dataclass(frozen=True)
 class ShapedBottom(Part):
-    """A level plate, or a head with a level edge at level 0, dished down or up; `shaped_bottom`.
+    """Level plate, or head with a level edge at level 0, dished down or up; see `shaped_bottom`.
 
     Attributes
     ----------
     form : str
         One of FORMS.
     centre_m : float
-        Level of the centre: above 0 the bottom bulges up, below 0 down.
+        Level of the centre: positive for a bottom that bulges up, negative for one that bulges
+        down.
     plan_m2 : float
         Inside area of the first course at its bottom.
     tip : Tip or None
@@ -51,50 +52,55 @@ class ShapedBottom(Part):
 
     @property
     def lowest_m(self):
-        """Level at which the tank is empty."""
+        """Level of the empty tank."""
         return min(self.centre_m, 0.0)
 
     @property
     def breakpoints_m(self):
-        """Where the tank is empty."""
+        """Level of the empty tank."""
         return (self.lowest_m,)
 
     def volume_m3(self, levels_m):
-        """(rows,) of the head below the edge, less what one that bulges up takes above it."""
+        """Return the volume (rows,) of the head below its edge, or minus that above it."""
         levels = as_levels(levels_m)
         return self._of_tip(levels, self.tip.beyond_m3) if self.tip else 0.0 * levels
 
     def area_m2(self, levels_m):
-        """(rows,) derivative of `volume_m3` by the level."""
+        """Return the derivative (rows,) of `volume_m3` by the level."""
         return self._wet_m2(levels_m) - self.plan_m2 * (as_levels(levels_m) >= 0)
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} by "datum" (level), "bottom", "scale" and sizes, m3 per SI unit.
+        """Return {input: (rows,)} by "datum" (level), "bottom", "scale" and sizes, m3 per SI unit.
 
-        bottom lifts the whole bottom: minus its wetted plan area. scale stretches the plan.
-        bottom_depth moves the centre away from the edge, dish_radius and knuckle_radius are those
-        of a torispherical head that was given by them.
+        "bottom" raises the whole bottom: minus its wet plan area. "scale" stretches the plan.
+        "bottom_depth" moves the centre away from the edge. "dish_radius" and "knuckle_radius" are
+        the dimensions of a torispherical head, if given.
         """
         levels = as_levels(levels_m)
-        found = {
+        derivatives = {
             "datum": self.area_m2(levels),
             "bottom": -self._wet_m2(levels),
             "scale": 0.0 * levels,
         }
         if self.tip is None:
-            return found
+            return derivatives
         for name in self.tip.derivatives(0.0):
-            said = "bottom_depth" if name == "depth" else name
-            found[said] = self._of_tip(levels, lambda x, name=name: self.tip.derivatives(x)[name])
-        return found
+            input_name = "bottom_depth" if name == "depth" else name
+            derivatives[input_name] = self._of_tip(
+                levels, lambda x, name=name: self.tip.derivatives(x)[name]
+            )
+        return derivatives
 
-    def _of_tip(self, levels, beyond):
-        """What the head adds at levels, by what it has beyond a plane."""
+    def _of_tip(self, levels, content_beyond):
+        """Return the contribution of the head at levels, from its content beyond a plane."""
+        # Bulging down: content beyond the level. Bulging up: minus the volume that the head
+        # occupies.
         if self.centre_m <= 0:
-            return beyond(np.clip(-levels, 0, self.tip.depth_m))
-        return beyond(np.clip(levels, 0, self.tip.depth_m)) - beyond(0.0)
+            return content_beyond(np.clip(-levels, 0, self.tip.depth_m))
+        return content_beyond(np.clip(levels, 0, self.tip.depth_m)) - content_beyond(0.0)
 
     def _wet_m2(self, levels_m):
+        """Return the wet plan area (rows,) of the bottom."""
         levels = as_levels(levels_m)
         if self.tip is None:
             return self.plan_m2 * (levels >= 0)
@@ -105,7 +111,7 @@ class ShapedBottom(Part):
 
 
 def shaped_bottom(form, plan_m2, centre_m=0.0, dish_radius_m=None, knuckle_radius_m=None):
-    """A flat bottom, or a head; a centre at level 0 makes it flat.
+    """Return a flat bottom, or a head; a centre at level 0 makes it flat.
 
     Parameters
     ----------
@@ -114,10 +120,10 @@ def shaped_bottom(form, plan_m2, centre_m=0.0, dish_radius_m=None, knuckle_radiu
     plan_m2 : float
         Inside area of the first course at its bottom.
     centre_m : float, optional
-        Level of the centre: above 0 the bottom bulges up, below 0 down. 0 for a torispherical one
-        of given radii, which bulges down.
+        Level of the centre: positive for a bottom that bulges up, negative for one that bulges
+        down. 0 for a torispherical bottom of given radii, which bulges down.
     dish_radius_m, knuckle_radius_m : float, optional
-        Of a torispherical bottom: one beside the centre, or both.
+        Radii of a torispherical bottom: one of them in addition to the centre, or both.
 
     Returns
     -------
@@ -126,12 +132,12 @@ def shaped_bottom(form, plan_m2, centre_m=0.0, dish_radius_m=None, knuckle_radiu
     Raises
     ------
     SolutionError
-        For an unknown form, an area that cannot be, a flat bottom with a centre off the plane, and
-        sizes that make no such head (a dish deeper than half a sphere).
+        For an unknown form, an impossible area, a flat bottom with a centre off the plane, and
+        dimensions that are impossible for such a head (a dish deeper than a hemisphere).
 
     Examples
     --------
-    A cone of 0.3 m below a floor of 100 m2 holds a third of its prism:
+    A cone of 0.3 m below an area of 100 m2 contains a third of its prism:
 
     >>> round(float(shaped_bottom("cone", 100.0, -0.3).volume_m3([0.0])[0]), 9)
     10.0
@@ -166,18 +172,18 @@ def shaped_bottom(form, plan_m2, centre_m=0.0, dish_radius_m=None, knuckle_radiu
 
 @dataclass(frozen=True)
 class SurfaceBottom(Part):
-    """A bottom given as a surface of triangles: a leaning plate, or surveyed points.
+    """Bottom given as a surface of triangles: a leaning plate, or surveyed points.
 
     Attributes
     ----------
     surface : Surface
-        Over the plan (`terrain.Surface`).
+        Surface over the plan (`terrain.Surface`).
     survey : SurveyedSurface or None
-        `soundings.SurveyedSurface`, or None for a plate of a given slope.
+        `soundings.SurveyedSurface`; None for a plate of a given slope.
     shared : tuple of factors.Factor
-        What the heights of the points have in common: columns (n, c), m.
+        Common errors of the heights of the points: columns (n, c), m.
     has_own_height : bool
-        Whether this is all that is uncertain about its height.
+        Whether `shared` contains the complete uncertainty of the height of the bottom.
     """
 
     surface: Surface
@@ -188,32 +194,33 @@ class SurfaceBottom(Part):
 
     @property
     def lowest_m(self):
-        """Level at which the tank is empty."""
+        """Level of the empty tank."""
         return self.surface.lowest_m
 
     @property
     def breakpoints_m(self):
-        """Where the tank is empty."""
+        """Level of the empty tank."""
         return (self.lowest_m,)
 
     def volume_m3(self, levels_m):
-        """(rows,) exact for the surface."""
+        """Return the volume (rows,), exact for the surface of triangles."""
         volume, _ = self.surface.volume_and_area(as_levels(levels_m))
         return volume - self._plan_m2 * np.maximum(as_levels(levels_m), 0)
 
     def area_m2(self, levels_m):
-        """(rows,) derivative of `volume_m3` by the level."""
+        """Return the derivative (rows,) of `volume_m3` by the level."""
         _, wet = self.surface.volume_and_area(as_levels(levels_m))
         return wet - self._plan_m2 * (as_levels(levels_m) >= 0)
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} by "datum" (level), "bottom" and "scale", m3 per SI unit.
+        """Return {input: (rows,)} by "datum" (level), "bottom" and "scale", m3 per SI unit.
 
-        bottom lifts the whole bottom: minus its wetted plan area. scale stretches the plan; a
-        leaning plate keeps its slope, surveyed points their heights.
+        "bottom" raises the whole bottom: minus its wet plan area. "scale" stretches the plan; a
+        leaning plate keeps its slope, surveyed points keep their heights.
         """
         levels = as_levels(levels_m)
         volume, wet = self.surface.volume_and_area(levels)
+        # The plan area grows with the square of the scale; the heights are constant.
         by_scale = 2 * (volume - self._plan_m2 * np.maximum(levels, 0))
         if self.survey is None:
             by_scale += volume - levels * wet  # minus the integral of z over the wet plan
@@ -224,10 +231,10 @@ class SurfaceBottom(Part):
         }
 
     def sources(self, levels_m):
-        """Noise of the surveyed points and form between them; none for a leaning plate.
+        """Return sources for the noise of the points and the form between them; none for a plate.
 
-        The covariance is exact at the edges of 24 bands of wet area; within a band it grows with
-        the wet area.
+        The covariance is exact at the limits of 24 bands of wet area. Within a band, it grows in
+        proportion to the wet area.
         """
         if self.survey is None:
             return ()
@@ -235,12 +242,14 @@ class SurfaceBottom(Part):
         _, at_edges = self.surface.volume_and_area(edges)
         at_edges[0] = 0.0
         _, wet = self.surface.volume_and_area(as_levels(levels_m))
+        # Interpolation weights of the bands: the column of a band grows from 0 to 1 over its wet
+        # area.
         share = np.column_stack([np.interp(wet, at_edges, unit) for unit in np.eye(len(edges))[1:]])
         by_points = share @ self.survey.by_points_m2
         return (
             Source("bottom_points", share @ self.survey.noise_m3, self.survey.noise_dof),
             Source("bottom_form", share @ self.survey.form_m3, self.survey.form_dof),
-            *(one.source(by_points @ one.columns) for one in self.shared),
+            *(factor.source(by_points @ factor.columns) for factor in self.shared),
         )
 
     @property
@@ -249,10 +258,10 @@ class SurfaceBottom(Part):
 
 
 def leaning_bottom(footprint, slope):
-    """A plate square to the shell's axis, through level 0 at the axis.
+    """Return a plate perpendicular to the axis of the shell, through level 0 at the axis.
 
-    Slid along the axis to the plane of level 0, its point at the distance x down the lean lies at z
-    = - m x / (1 + m^2).
+    The plate is shifted along the axis to the plane of level 0. Its point at the distance x down
+    the lean has the height z = - m x / (1 + m^2).
 
     Parameters
     ----------
@@ -271,20 +280,20 @@ def leaning_bottom(footprint, slope):
 
 
 def surveyed_bottom(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0), shared=None):
-    """The bottom through surveyed points, smoothed by what they can tell.
+    """Return the bottom through surveyed points, smoothed according to their noise.
 
     Parameters
     ----------
     footprint : Footprint
         Outline of the first course at its bottom.
     xyz_m : ndarray, shape (n, 3)
-        x, y in the survey's frame, z above the bottom of the first course.
+        x, y in the frame of the survey, z above the bottom of the first course.
     sd_m : ndarray, shape (n,), or float, optional
-        Standard deviations of z; None: noise and waves are estimated as one.
+        Standard deviations of z; None: noise and waves are estimated jointly.
     slope : array_like, shape (2,), optional
-        (dx/dz, dy/dz) of the shell's axis.
+        (dx/dz, dy/dz) of the axis of the shell.
     shared : sequence of factors.Factor, optional
-        What the heights have in common, over the points; None: nothing says it.
+        Common errors of the heights, for each point; None: unknown.
 
     Returns
     -------
@@ -293,7 +302,7 @@ def surveyed_bottom(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0), shared=None):
     Raises
     ------
     SolutionError
-        As `soundings.surveyed_surface`.
+        As for `soundings.surveyed_surface`.
     """
     survey = surveyed_surface(footprint, xyz_m, sd_m, slope)
     return SurfaceBottom(survey.surface, survey, tuple(shared or ()), shared is not None)

@@ -1,9 +1,9 @@
-"""The budget of a volume that is read from the table: at a dip, or between two dips.
+"""Uncertainty budget of a volume read from the table: at a dip, or between two dips.
 
-One line for each input, correlated ones each by itself, then what the reading adds: the rows are
-written to litres and joined by straight lines. These errors are of each reading by itself, so they
-are no part of the covariance of the rows; of a delivery they count twice.
-Source: JCGM 100:2008 5.1.3, 5.2.2, 7.2.7.
+The budget has one line for each input, with correlated inputs listed separately, then the
+contributions of the reading: rows are rounded to litres and joined by straight lines. These errors
+are independent for each reading, so they are not part of the covariance of the rows; for a delivery
+they count twice. Source: JCGM 100:2008 5.1.3, 5.2.2, 7.2.7.
 """
 
 from dataclasses import dataclass
@@ -22,28 +22,29 @@ from tankcal.uncertainty import (
     scale_source,
 )
 
-HALF_A_LITRE_M3 = 5e-4
+HALF_A_LITRE_M3 = 5e-4  # half-width of the rounding of a row to whole litres
 
 
 @dataclass(frozen=True, repr=False)
 class Budget:
-    """A volume read from the table and what its uncertainty is made of.
+    """Volume read from the table, with the components of its uncertainty.
 
     Attributes
     ----------
     low_m, high_m : float
         Dips, m; low_m None: the volume below high_m.
     volume_m3 : float
-        Volume below, or between, m3.
+        Volume below the dip, or between the dips, m3.
     table_u_m3 : float
-        Standard uncertainty by the table alone, m3; what reading adds alone is `reading_U_m3`.
+        Standard uncertainty of the table alone, m3; the expanded contribution of the reading is
+        `reading_U_m3`.
     u_m3, dof, k, U_m3 : float
-        With what the reading adds: standard uncertainty, m3, degrees of freedom, coverage factor,
+        Including the reading: standard uncertainty, m3, degrees of freedom, coverage factor,
         expanded uncertainty, m3.
     for_use : bool
-        False where a dip stands in a zone in which the table must not be used.
+        False if a dip is in a zone in which the table must not be used.
     lines : tuple of BudgetRow
-        In the order of the table's sources, then the reading's; their shares add up to 1.
+        In the order of the sources of the table, then of the reading; their shares sum to 1.
     """
 
     low_m: float | None
@@ -59,7 +60,7 @@ class Budget:
 
     @property
     def reading_U_m3(self):
-        """k times what reading adds: the standard uncertainties of its lines, by squares."""
+        """k times the root sum of squares of the standard uncertainties of the reading, m3."""
         return self.k * max(self.u_m3**2 - self.table_u_m3**2, 0.0) ** 0.5
 
     def __str__(self) -> str:
@@ -72,34 +73,34 @@ class Budget:
         return f"<Budget of {self}>"
 
     def _repr_html_(self) -> str:
-        ordered = sorted(self.lines, key=lambda one: -abs(one.share))
+        ordered = sorted(self.lines, key=lambda line: -abs(line.share))
         rows = [
             [
-                one.name + (" (default)" if one.is_default else ""),
-                None if isnan(one.u) else one.u,
-                one.unit,
-                one.contribution,
-                100 * one.share,
+                line.name + (" (default)" if line.is_default else ""),
+                None if isnan(line.u) else line.u,
+                line.unit,
+                line.contribution,
+                100 * line.share,
             ]
-            for one in ordered
+            for line in ordered
         ]
         return table_html(str(self), ["input", "u", "unit", "contribution, m3", "share, %"], rows)
 
 
 def reading_sources(declared, largest_interpolation_m3):
-    """The two uncertainties that reading a table adds: interpolation and rounding.
+    """Return the two uncertainties of reading a table: interpolation and rounding.
 
     Parameters
     ----------
     declared : sequence of Input
-        Inputs of the job; "interpolation" and "rounding" there replace the defaults.
+        Inputs of the job; "interpolation" and "rounding" replace the defaults.
     largest_interpolation_m3 : float
         Largest error of a straight line between two rows, m3.
 
     Returns
     -------
     tuple of Source
-        Of one dip, one row each. The defaults are rectangular, with half a litre and the largest
+        Sources of a single dip. The defaults are rectangular, with half a litre and the largest
         error of interpolation as half-widths.
 
     Examples
@@ -107,10 +108,12 @@ def reading_sources(declared, largest_interpolation_m3):
     >>> [f"{source.kind} {source.u:.6f} m3" for source in reading_sources((), 0.003)]
     ['interpolation 0.001732 m3', 'rounding 0.000289 m3']
     """
-    given = {one.name: one for one in declared}
+    by_name = {item.name: item for item in declared}
     defaults = {"interpolation": largest_interpolation_m3, "rounding": HALF_A_LITRE_M3}
     return tuple(
-        declared_source(given[name], np.ones(1)) if name in given else _default(name, half_width)
+        declared_source(by_name[name], np.ones(1))
+        if name in by_name
+        else _default(name, half_width)
         for name, half_width in defaults.items()
     )
 
@@ -129,7 +132,7 @@ def _default(name, half_width):
 
 
 def budget(table, high_m, low_m=None, reading=(), factors=None):
-    """Uncertainty budget of the volume below a dip, or between two dips.
+    """Return the uncertainty budget of the volume below a dip, or between two dips.
 
     Parameters
     ----------
@@ -139,9 +142,9 @@ def budget(table, high_m, low_m=None, reading=(), factors=None):
     low_m : float, optional
         Lower dip of a delivery, m.
     reading : sequence of Source, optional
-        Of `reading_sources`; none for the table alone.
+        Result of `reading_sources`; empty for the table alone.
     factors : sequence of float, optional
-        What if the u of each line of this budget were so many times what it is; None: as it is.
+        Factors on the u of each line of the budget, to study their effect; None: no change.
 
     Returns
     -------
@@ -152,7 +155,7 @@ def budget(table, high_m, low_m=None, reading=(), factors=None):
     HeightError
         For a dip outside the table.
     ValueError
-        For another number of factors than lines, or one below 0.
+        If the number of factors differs from the number of lines, or a factor is negative.
 
     References
     ----------
@@ -174,64 +177,69 @@ def budget(table, high_m, low_m=None, reading=(), factors=None):
     >>> print(budget(table, 0.5, factors=[0.5]))
     0.5 m: 50.000 m3, U = 0.098 m3 (k = 1.96)
     """
-    found = table.at(high_m) if low_m is None else table.delivery(low_m, high_m)
+    quantity = table.at(high_m) if low_m is None else table.delivery(low_m, high_m)
     dips = [high_m] if low_m is None else [low_m, high_m]
     weights = table.weights(dips[-1:]) - (0 if low_m is None else table.weights(dips[:1]))
+    # A delivery is the difference of two interpolated rows: common errors cancel in the weights.
     sources = [source.weighted(weights) for source in table.sources]
-    table_u_m3 = found.u_m3
-    sources += [_read(source, table, dips) for source in reading]
+    table_u_m3 = quantity.u_m3
+    sources += [_scale_reading(source, table, dips) for source in reading]
     if factors is not None:
-        sources = _scaled(sources, factors)
+        sources = _scale_lines(sources, factors)
+        # The changed u of the lines also changes the standard uncertainty of the table.
         table_u_m3 = float(combine(sources[: len(table.sources)], 1).u[0])
     total = Shares(sources, table.probability)
     return Budget(
         low_m=low_m,
         high_m=high_m,
-        volume_m3=found.value_m3,
+        volume_m3=quantity.value_m3,
         table_u_m3=table_u_m3,
         u_m3=total.u,
         dof=total.dof,
         k=total.k,
         U_m3=total.U,
-        for_use=found.for_use,
-        lines=tuple(line for index in range(len(sources)) for line in _lines(total, index)),
+        for_use=quantity.for_use,
+        lines=tuple(line for index in range(len(sources)) for line in _budget_rows(total, index)),
     )
 
 
-def _scaled(sources, factors):
-    """The sources with u of each line times its factor."""
-    factors = [float(one) for one in factors]
-    ends = np.cumsum([0, *(max(len(one.parts), 1) for one in sources)])
-    if len(factors) != ends[-1] or not all(0 <= one < np.inf for one in factors):
+def _scale_lines(sources, factors):
+    """Return the sources with the u of each line multiplied by its factor."""
+    factors = [float(item) for item in factors]
+    ends = np.cumsum([0, *(max(len(item.parts), 1) for item in sources)])
+    if len(factors) != ends[-1] or not all(0 <= item < np.inf for item in factors):
         raise ValueError(f"found {factors}; expected {ends[-1]} factors, 0 or more")
-    own = zip(sources, ends, ends[1:], strict=False)
-    return [scale_source(one, factors[start:stop]) for one, start, stop in own]
+    slices = zip(sources, ends, ends[1:], strict=False)
+    return [scale_source(item, factors[start:stop]) for item, start, stop in slices]
 
 
-def _read(source, table, dips):
-    """What reading adds for these dips: rounding at each, interpolation where it is no row."""
-    between = sum(len(table.rows_of(dip)) > 1 for dip in dips)
-    times = between if source.kind == "interpolation" else len(dips)
+def _scale_reading(source, table, dips):
+    """Return a reading source for dips: rounding at each, interpolation between rows."""
+    interpolated = sum(len(table.rows_of(dip)) > 1 for dip in dips)
+    times = interpolated if source.kind == "interpolation" else len(dips)
+    # Independent errors of equal size: the standard uncertainty grows with the root of their
+    # number.
     return source.mapped(lambda columns: columns * np.sqrt(times))
 
 
-def _lines(total, index):
-    """The `BudgetRow`s of a source: one, or one for each of its correlated parts."""
+def _budget_rows(total, index):
+    """Return the `BudgetRow`s of a source: one, or one for each of its correlated parts."""
     source = total.sources[index]
     if not source.parts:
-        return [_line(source, total.of_line({index: None}))]
-    found = []
+        return [_budget_row(source, total.of_line({index: None}))]
+    rows = []
     for i, part in enumerate(source.parts):
         others = zip(source.parts, source.correlation[i], strict=True)
-        pairs = tuple((one.kind, float(r)) for one, r in others if one is not part and r)
-        found.append(_line(part, total.of_line({index: [i]}), pairs))
-    return found
+        pairs = tuple((other.kind, float(r)) for other, r in others if other is not part and r)
+        rows.append(_budget_row(part, total.of_line({index: [i]}), pairs))
+    return rows
 
 
-def _line(source, shares, correlations=()):
-    known = source.u is not None
+def _budget_row(source, shares, correlations=()):
+    """Return the `BudgetRow` of a source."""
+    has_u = source.u is not None
     column = float(source.columns_m3[0, 0]) if source.columns_m3.shape[1] == 1 else None
-    is_slope = known and source.u > 0 and column is not None
+    is_slope = has_u and source.u > 0 and column is not None
     return BudgetRow(
         name=source.kind,
         unit=source.unit or "",
@@ -241,7 +249,7 @@ def _line(source, shares, correlations=()):
         note=source.note,
         is_default=source.is_default,
         estimate=np.nan if source.estimate is None else source.estimate,
-        u=source.u if known else np.nan,
+        u=source.u if has_u else np.nan,
         sensitivity=column / source.u if is_slope else np.nan,
         correlations=correlations,
         **shares,

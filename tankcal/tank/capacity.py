@@ -1,8 +1,8 @@
-"""The capacity table: volumes at dip heights with a factor of their covariance, and what follows.
+"""Capacity table: volumes at dip heights, with a factor of their covariance.
 
-The covariance of all rows is factor @ factor.T with one column for each uncertain input, so rows,
-differences of rows (deliveries) and the budget all come from the same few columns.
-Source: JCGM 100:2008 5.2, JCGM 102:2011 6.2; u, degrees of freedom and k by `uncertainty.Combined`.
+The covariance of all rows is factor @ factor.T, with one column for each uncertain input. Rows,
+differences of rows (deliveries) and the budget thus follow from a few common columns. Source: JCGM
+100:2008 5.2, JCGM 102:2011 6.2; u, degrees of freedom and k by `uncertainty.Combined`.
 """
 
 from dataclasses import dataclass
@@ -16,25 +16,25 @@ from tankcal.messages import message
 from tankcal.text.display import volume_text
 from tankcal.uncertainty import Source, combine
 
-SAME_ROW = 1e-9  # of a weight: a dip this near to a row is that row
-SAME_M = 1e-9  # dips nearer than this are the same
+SAME_ROW = 1e-9  # a smaller weight is rounding: the dip coincides with the other row
+SAME_M = 1e-9  # dips with a smaller difference are equal
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A volume with its uncertainty: value, standard u, effective dof, factor k, expanded U.
+    """Volume with its uncertainty: value, standard u, effective dof, factor k, expanded U.
 
     Attributes
     ----------
     k : float or None
-        None where U is not k u but Monte Carlo's.
+        None if U is the result of Monte Carlo instead of k u.
     for_use : bool
-        False where a dip stands in a zone in which the table must not be used.
+        False if a dip is in a zone in which the table must not be used.
     interval : str
-        Whose U is: "gum", "monte_carlo"; "gum_not_simulated" of a delivery that Monte Carlo did not
-        look at, though it looked at the table.
+        Method of U: "gum", "monte_carlo", or "gum_not_simulated" for a delivery that Monte Carlo
+        did not include, although it simulated the table.
     ends_m3 : tuple[float, float] or None
-        (low, high) of Monte Carlo's interval; None: value - U and value + U.
+        (low, high) of the Monte Carlo interval; None: value - U and value + U.
     """
 
     value_m3: float
@@ -65,13 +65,19 @@ class Quantity:
 
 @dataclass(frozen=True, repr=False)
 class Capacity:
-    """The table: (rows,) dip heights from the table's zero, volumes, and areas of the cut.
+    """Capacity table: dip heights from the zero of the table, volumes, and areas.
 
     Attributes
     ----------
+    height_m, volume_m3, area_m2 : ndarray, shape (rows,)
+        Dips, m, volumes, m3, and free surfaces, m2.
+    sources : tuple of Source
+        Sources of uncertainty of the volumes.
+    probability : float
+        Coverage probability.
     critical_m : tuple[float, float] or None
-        (low, high) dips between which the table is not for use, or None: a floating roof that is
-        partly afloat.
+        (low, high) dips between which the table must not be used, because a floating roof is partly
+        afloat; None: no such zone.
     """
 
     height_m: np.ndarray
@@ -87,27 +93,27 @@ class Capacity:
 
     @cached_property
     def factor_m3(self):
-        """(rows, inputs) factor of the covariance of all rows."""
+        """Factor (rows, inputs) of the covariance of all rows."""
         return np.hstack([np.empty((len(self.height_m), 0)), *(s.columns_m3 for s in self.sources)])
 
     @cached_property
     def u_m3(self):
-        """(rows,) standard uncertainty of each volume."""
+        """Standard uncertainty (rows,) of each volume."""
         return self._combined_rows.u
 
     @cached_property
     def dof(self):
-        """(rows,) effective degrees of freedom, inf where only such inputs contribute."""
+        """Effective degrees of freedom (rows,); inf if only such inputs contribute."""
         return self._combined_rows.effective_dof
 
     @cached_property
     def k(self):
-        """(rows,) coverage factor."""
+        """Coverage factor (rows,)."""
         return self._combined_rows.k(self.probability)
 
     @cached_property
     def U_m3(self):
-        """(rows,) expanded uncertainty k u."""
+        """Expanded uncertainty (rows,), k u."""
         return self.k * self.u_m3
 
     @cached_property
@@ -116,7 +122,7 @@ class Capacity:
         return combine(self.sources, len(self.height_m))
 
     def at(self, height_m):
-        """The volume at a dip, interpolated linearly between rows as a gauge does.
+        """Return the volume at a dip, interpolated linearly between rows as in a gauge.
 
         Parameters
         ----------
@@ -130,7 +136,7 @@ class Capacity:
         Raises
         ------
         HeightError
-            Outside the table.
+            For a dip outside the table.
 
         Examples
         --------
@@ -142,7 +148,7 @@ class Capacity:
         return self._combined([(height_m, 1.0)])
 
     def delivery(self, low_m, high_m):
-        """The volume between two dips; what both have in common cancels.
+        """Return the volume between two dips; their common errors cancel.
 
         Parameters
         ----------
@@ -156,12 +162,12 @@ class Capacity:
         Raises
         ------
         HeightError
-            Outside the table.
+            For a dip outside the table.
         """
         return self._combined([(high_m, 1.0), (low_m, -1.0)])
 
     def for_use(self, height_m):
-        """Whether the table may be used at each height: not inside the critical zone of a roof."""
+        """Return whether the table may be used at each height."""
         height_m = np.asarray(height_m, dtype=float)
         if self.critical_m is None:
             return np.full(height_m.shape, True)
@@ -169,21 +175,24 @@ class Capacity:
         return (height_m <= low) | (height_m >= high)
 
     def _combined(self, terms):
+        """Return the `Quantity` of a sum of (height, sign) terms."""
+        # A linear combination of rows: the covariance of the rows includes common errors exactly.
         weights = sum(sign * self.weights([height])[0] for height, sign in terms)
-        found = combine([source.weighted(weights[None, :]) for source in self.sources], 1)
-        u, dof = float(found.u[0]), float(found.effective_dof[0])
-        k = float(found.k(self.probability)[0])
+        combined = combine([source.weighted(weights[None, :]) for source in self.sources], 1)
+        u, dof = float(combined.u[0]), float(combined.effective_dof[0])
+        k = float(combined.k(self.probability)[0])
         for_use = bool(np.all(self.for_use([height for height, _ in terms])))
         return Quantity(float(weights @ self.volume_m3), u, dof, k, k * u, for_use)
 
     def inside(self, heights_m):
-        """(n,) dips of the table: its ends for those that are beyond them by rounding.
+        """Return the dips (n,), with dips beyond the ends of the table by rounding set to the ends.
 
-        The top of the shell rounded to a millimetre counts as the top. Raises HeightError for
-        others outside.
+        The top of the shell rounded to a millimetre counts as the top. Raises HeightError for other
+        dips outside the table.
         """
         dips = np.atleast_1d(np.asarray(heights_m, dtype=float))
         first, last = self.height_m[0], self.height_m[-1]
+        # The negated form also refuses nan.
         outside = ~((dips >= first - SAME_M) & (dips <= max(round(last, 3), last + SAME_M)))
         if np.any(outside):
             raise HeightError(
@@ -198,12 +207,13 @@ class Capacity:
         return np.clip(dips, first, last)
 
     def weights(self, heights_m):
-        """(n, rows) by which the rows give the volumes at n dips: linear between two rows.
+        """Return the weights (n, rows) of the rows in the volumes at n dips.
 
-        The top of the shell rounded to a millimetre counts as the top. Raises HeightError outside
-        the table.
+        The interpolation is linear between two rows. The top of the shell rounded to a millimetre
+        counts as the top. Raises HeightError outside the table.
         """
         dips = self.inside(heights_m)
+        # Linear interpolation in the interval below the row, as in a gauge.
         upper = np.clip(np.searchsorted(self.height_m, dips), 1, len(self.height_m) - 1)
         below, above = self.height_m[upper - 1], self.height_m[upper]
         part = (dips - below) / (above - below)
@@ -213,5 +223,5 @@ class Capacity:
         return weights
 
     def rows_of(self, height_m):
-        """Numbers of the rows that a dip is read from: its own, or the two that it lies between."""
+        """Return the numbers of the rows from which a dip is read, one or two."""
         return np.flatnonzero(self.weights([height_m])[0] > SAME_ROW)

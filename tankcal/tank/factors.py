@@ -1,4 +1,4 @@
-"""What a survey leaves uncertain, cause by cause, and causes that several parts of a tank share."""
+"""Uncertainty after a survey by cause, and causes shared by several parts of a tank."""
 
 from dataclasses import dataclass, replace
 
@@ -6,19 +6,19 @@ import numpy as np
 
 from tankcal.uncertainty import Source, factor_of
 
-LEAST_SHARE = 1e-6  # rounding of the share that a named cause has in the covariance
+LEAST_SHARE = 1e-6  # tolerance for rounding of the share of a named cause in the covariance
 
 
 @dataclass(frozen=True)
 class Factor:
-    """One cause of what a survey leaves uncertain, over what the survey gave.
+    """Cause of uncertainty after a survey, in terms of the results of the survey.
 
     Attributes
     ----------
     kind : str
-        "points", "bulge", "ovality", "seams", or what a named cause is ("instrument_scale").
+        "points", "bulge", "ovality", "seams", or the kind of a named cause ("instrument_scale").
     columns : ndarray, shape (f, c)
-        Factor of the covariance of a shell's features or of a solid's inputs.
+        Factor of the covariance of the features of a shell or of the inputs of a solid.
     dof, u, unit, type, note, is_default
         As in `uncertainty.Source`.
     """
@@ -33,11 +33,11 @@ class Factor:
     is_default: bool = False
 
     def mapped(self, function):
-        """The same cause over something else: function(columns) -> columns."""
+        """Return the cause in terms of other quantities: function(columns) -> columns."""
         return replace(self, columns=function(self.columns))
 
     def source(self, columns_m3):
-        """The `Source` of (rows, c) columns that its own columns make in a table."""
+        """Return the `Source` with the columns (rows, c) of the cause in a table."""
         return Source(
             self.kind,
             columns_m3,
@@ -51,69 +51,79 @@ class Factor:
 
 
 def survey_factors(covariance, dof=np.inf, causes=(), effects=()):
-    """`Factor`s of what a survey leaves uncertain: the points, then every named cause.
+    """Return the `Factor`s of a survey: the points, then every named cause.
 
-    With F F' the covariance and e = F a the rest is F (I - A A') F', which is never negative.
+    With F F' the covariance and e = F a, the remainder is F (I - A A') F', which is positive
+    semidefinite.
 
     Parameters
     ----------
     covariance : ndarray, shape (f, f)
-        Of all causes together: the rest L L' + sum of e e' over the effects.
-    dof : optional
+        Covariance due to all causes: the remainder L L' + sum of e e' over the effects.
+    dof : float, optional
         Degrees of freedom of the covariance.
-    causes : optional
-        With name, what, u, unit, is_assumed (`surveys.Cause`); effects: (f,) of one u of each.
-        Those of one name and kind make one `Factor`.
+    causes : sequence, optional
+        Objects with name, what, u, unit, is_assumed (`surveys.Cause`). Causes of equal name and
+        kind form a single `Factor`.
+    effects : sequence of ndarray, shape (f,), optional
+        Effect of one standard uncertainty of each cause.
+
+    Returns
+    -------
+    tuple of Factor
 
     Raises
     ------
     ValueError
-        For effects that are larger than the covariance.
+        For effects larger than the covariance.
     """
-    whole = factor_of(covariance)
+    factor = factor_of(covariance)
     if len(causes) == 0:
-        return (Factor("points", whole, dof),)
-    shares = whole.T @ np.column_stack(effects) / np.sum(whole**2, axis=0)[:, None]
-    turn, size, _ = np.linalg.svd(shares)
+        return (Factor("points", factor, dof),)
+    shares = factor.T @ np.column_stack(effects) / np.sum(factor**2, axis=0)[:, None]
+    # Coordinates of the effects in the factor; singular values above 1 would leave a negative
+    # remainder.
+    basis, size, _ = np.linalg.svd(shares)
     if size.max(initial=0.0) > 1 + LEAST_SHARE:
         raise ValueError("a named cause is larger than the covariance that contains it")
-    left = np.ones(len(turn))
-    left[: len(size)] = np.sqrt(np.maximum(1 - size**2, 0.0))
-    rest = whole @ (turn * left)
+    # I - A A' has the eigenvalues 1 - size^2 in the basis of the left singular vectors.
+    remaining = np.ones(len(basis))
+    remaining[: len(size)] = np.sqrt(np.maximum(1 - size**2, 0.0))
+    remainder = factor @ (basis * remaining)
     return (
-        Factor("points", rest[:, left > 0], dof),
+        Factor("points", remainder[:, remaining > 0], dof),
         *cause_factors(causes, effects),
     )
 
 
 def cause_factors(causes, effects):
-    """`Factor` tuple of named causes; arguments as of `survey_factors`."""
+    """Return a tuple with the `Factor` of each named cause; arguments as for `survey_factors`."""
     return tuple(
         Factor(
-            one.what,
+            cause.what,
             np.column_stack(columns),
-            u=one.u,
-            unit=one.unit,
+            u=cause.u,
+            unit=cause.unit,
             type="B",
-            note=one.name,
-            is_default=one.is_assumed,
+            note=cause.name,
+            is_default=cause.is_assumed,
         )
-        for one, columns in _by_name(causes, effects)
+        for cause, columns in _group_by_name(causes, effects)
     )
 
 
-def _by_name(causes, effects):
-    """The first cause of each name and kind, with the effects of all of that name and kind."""
-    found = {}
+def _group_by_name(causes, effects):
+    """Return the first cause of each name and kind, with the effects of all such causes."""
+    groups = {}
     for cause, effect in zip(causes, effects, strict=True):
-        found.setdefault((cause.what, cause.name), (cause, []))[1].append(effect)
-    return tuple(found.values())
+        groups.setdefault((cause.what, cause.name), (cause, []))[1].append(effect)
+    return tuple(groups.values())
 
 
 def join_shared(of_parts):
-    """Sources of parts, those of one named cause that several parts feel as one.
+    """Return sources of parts, with a named cause of several parts joined to a single source.
 
-    Its columns stand for the same unit variables in all of them, so they add.
+    The columns of a named cause refer to the same unit variables in all parts, so they add.
 
     Parameters
     ----------
@@ -127,19 +137,20 @@ def join_shared(of_parts):
     --------
     >>> lifted = Source("registration", np.array([[3.0]]), note="A")
     >>> widened = Source("registration", np.array([[4.0]]), note="A")
-    >>> [one.columns_m3.tolist() for one in join_shared([[lifted], [widened]])]
+    >>> [source.columns_m3.tolist() for source in join_shared([[lifted], [widened]])]
     [[[7.0]]]
     """
-    found, place = [], {}
+    joined, place = [], {}
     for sources in of_parts:
-        before = dict(place)
-        for one in sources:
-            cause = one.kind, one.note, one.columns_m3.shape[1]
-            if one.note and cause in before:
-                known = found[before[cause]]
-                columns = known.columns_m3 + one.columns_m3
-                found[before[cause]] = replace(known, columns_m3=columns)
+        earlier_place = dict(place)
+        for source in sources:
+            cause = source.kind, source.note, source.columns_m3.shape[1]
+            # Only sources of earlier parts are joined: equal causes within a part remain separate.
+            if source.note and cause in earlier_place:
+                earlier = joined[earlier_place[cause]]
+                columns = earlier.columns_m3 + source.columns_m3
+                joined[earlier_place[cause]] = replace(earlier, columns_m3=columns)
                 continue
-            place[cause] = len(found)
-            found.append(one)
-    return found
+            place[cause] = len(joined)
+            joined.append(source)
+    return joined

@@ -1,11 +1,11 @@
-"""No capacity falls: of a table that does, what takes more than the tank holds there."""
+"""Check for a falling capacity: identify the part that takes more than the tank holds there."""
 
 import numpy as np
 
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 
-ROUNDING = 1e-9  # of the capacity: a table that falls by less does not
+ROUNDING = 1e-9  # relative to the capacity: a smaller fall is rounding
 
 
 def refuse_falling(job, body, zero_m, heights_m, volumes_m3):
@@ -15,26 +15,27 @@ def refuse_falling(job, body, zero_m, heights_m, volumes_m3):
     ----------
     job : Job
     body : Body
-        The tank as the sum of its parts.
+        Tank as the sum of its parts.
     zero_m : float
-        Level of the table's zero in the frame of the parts, m.
+        Level of the zero of the table in the frame of the parts, m.
     heights_m, volumes_m3 : ndarray, shape (n,)
         Ascending dips, m, and the volumes there, m3.
 
     Raises
     ------
     InputError
-        When deadwood, the floating roof or the bottom takes more than the tank holds there.
+        If deadwood, the floating roof or the bottom takes more than the tank holds there.
     SolutionError
-        When the wall itself does.
+        If the volume of the wall itself falls.
     """
+    # Report the largest fall; rounding of large volumes is no fall.
     rise = np.diff(volumes_m3)
     falls = np.flatnonzero(rise < -ROUNDING * np.abs(volumes_m3).max())
     if len(falls) == 0:
         return
     worst = int(falls[np.argmin(rise[falls])])
-    between = np.array(heights_m)[[worst, worst + 1]]
-    file, column, what = _cause(job, body, between, zero_m)
+    interval = np.array(heights_m)[[worst, worst + 1]]
+    file, column, what = _find_cause(job, body, interval, zero_m)
     text = message(
         "table_falls",
         "the capacity falls from {from_m3:.6g} to {to_m3:.6g} m3 between the dips of "
@@ -42,8 +43,8 @@ def refuse_falling(job, body, zero_m, heights_m, volumes_m3):
         "which takes up more than the tank holds there",
         from_m3=float(volumes_m3[worst]),
         to_m3=float(volumes_m3[worst + 1]),
-        low_m=float(between[0]),
-        high_m=float(between[1]),
+        low_m=float(interval[0]),
+        high_m=float(interval[1]),
         count=len(falls),
         what=what,
     )
@@ -52,16 +53,20 @@ def refuse_falling(job, body, zero_m, heights_m, volumes_m3):
     raise InputError(Problem(file, text, None, column))
 
 
-def _cause(job, body, dips_m, zero_m):
-    """(file, column, words) of what takes most between two dips; no file: the wall itself."""
-    takes = []
+def _find_cause(job, body, dips_m, zero_m):
+    """Return (file, column, words) of the part with the largest loss between two dips.
+
+    The file is None if the wall is the cause.
+    """
+    gains = []
     for part in body.parts:
         low, high = part.volume_m3(dips_m + zero_m)
-        takes.append((float(high - low), part.kind))
-    _, kind = min(takes)
+        gains.append((float(high - low), part.kind))
+    # The part with the most negative change of volume is the likely cause.
+    _, kind = min(gains)
     if kind == "deadwood":
         low, high = dips_m
-        deepest = min(job.deadwood, key=lambda one: _between(one, low, high))
+        deepest = min(job.deadwood, key=lambda item: _volume_between(item, low, high))
         named = message("deadwood_named", "deadwood {name}", name=deepest.name)
         return "deadwood.csv", "volume_m3", named
     if kind == "roof":
@@ -71,8 +76,11 @@ def _cause(job, body, dips_m, zero_m):
     return "job.toml", "bottom", message("its_bottom", "the bottom")
 
 
-def _between(item, low_m, high_m):
-    """Volume of deadwood between two dips, linear in height; at one height: all of it."""
+def _volume_between(item, low_m, high_m):
+    """Return the volume of deadwood between two dips, linear in height.
+
+    Deadwood without height counts completely at its level.
+    """
     height = item.top_m - item.bottom_m
     if height <= 0:
         return item.volume_m3 if low_m < item.bottom_m <= high_m else 0.0

@@ -1,4 +1,4 @@
-"""What stands or floats in a tank: deadwood, and a floating roof.
+"""Fittings inside a tank: deadwood, and a floating roof.
 
 Levels and heights count from the bottom of the first course, in metres.
 """
@@ -12,21 +12,21 @@ from tankcal.messages import message
 from tankcal.tank.parts import Part, as_levels
 from tankcal.uncertainty import Source
 
-AIR_KG_M3, WEIGHTS_KG_M3 = 1.2, 8000.0  # of conventional weighing (OIML D 28)
+AIR_KG_M3, WEIGHTS_KG_M3 = 1.2, 8000.0  # densities of air and weights (OIML D 28)
 
 
 @dataclass(frozen=True)
 class Deadwood(Part):
     """Items inside (negative volume) or beside a tank (positive), each linear in height.
 
-        V(h) = sum v_i (h - b_i) / (t_i - b_i), kept between 0 and v_i
+        V(h) = sum v_i (h - b_i) / (t_i - b_i), limited to the range from 0 to v_i
 
-    An item without height counts from its level on. Items may overlap.
+    An item without height counts completely from its level on. Items may overlap.
 
     names                (n,) as in the job
-    bottoms_m, tops_m    (n,)
-    volumes_m3, u_m3     (n,) signed volumes and their standard uncertainties; nan where unknown:
-                         the relative uncertainty that these items share is the input "deadwood"
+    bottoms_m, tops_m    (n,) levels
+    volumes_m3, u_m3     (n,) signed volumes and their standard uncertainties; nan if unknown: the
+                         input "deadwood" is then the common relative uncertainty of these items
     """
 
     names: tuple[str, ...]
@@ -38,30 +38,31 @@ class Deadwood(Part):
 
     @property
     def lowest_m(self):
-        """Lowest level of an item that adds to the capacity; inf when none does."""
+        """Lowest level of an item that adds to the capacity; inf if no item does."""
         return float(np.min(self.bottoms_m[self.volumes_m3 > 0], initial=np.inf))
 
     @property
     def breakpoints_m(self):
-        """Bottoms and tops of the items."""
+        """Levels of the bottoms and tops of the items."""
         return (*self.bottoms_m.tolist(), *self.tops_m.tolist())
 
     def volume_m3(self, levels_m):
-        """(rows,) sum of what each item has below each level."""
+        """Return the sum (rows,) of the volumes of all items below each level."""
         return self._parts(levels_m) @ self.volumes_m3
 
     def area_m2(self, levels_m):
-        """(rows,) derivative of `volume_m3` by the level; the upper side where an item begins."""
+        """Return the derivative (rows,) of `volume_m3` by the level, upwards at a bottom or top."""
         levels = as_levels(levels_m)
+        # Items without height are jumps of the volume: they do not contribute to the area.
         tall = self.tops_m > self.bottoms_m
-        low, high = self.bottoms_m[tall], self.tops_m[tall]
-        here = (levels >= low[:, None]) & (levels < high[:, None])
-        return (self.volumes_m3[tall] / (high - low)) @ here
+        bottom, top = self.bottoms_m[tall], self.tops_m[tall]
+        is_within = (levels >= bottom[:, None]) & (levels < top[:, None])
+        return (self.volumes_m3[tall] / (top - bottom)) @ is_within
 
     def derivatives(self, levels_m):
-        """{"deadwood": (rows,)} m3 by a relative error of all items without an uncertainty.
+        """Return {"deadwood": (rows,)}, m3 per relative error of all items without an uncertainty.
 
-        Bottoms and tops are dips, they move with the table's zero.
+        Bottoms and tops are dips and move with the zero of the table.
         """
         shared = np.isnan(self.u_m3)
         if not np.any(shared):
@@ -69,7 +70,7 @@ class Deadwood(Part):
         return {"deadwood": self._parts(levels_m)[:, shared] @ self.volumes_m3[shared]}
 
     def sources(self, levels_m):
-        """One `Source` for each item that has an uncertainty: the part of it below each level."""
+        """Return one `Source` for each item with an uncertainty, for its part below each level."""
         parts = self._parts(levels_m)
         return tuple(
             Source(
@@ -85,25 +86,26 @@ class Deadwood(Part):
         )
 
     def _parts(self, levels_m):
-        """(rows, n) which part of each item lies below each level."""
+        """Return the fraction (rows, n) of each item below each level."""
         above = as_levels(levels_m) - self.bottoms_m[:, None]
         heights = (self.tops_m - self.bottoms_m)[:, None]
         step = heights == 0
+        # Heights of zero are replaced before the division, which numpy evaluates for all items.
         linear = np.clip(above / np.where(step, 1.0, heights), 0.0, 1.0)
         return np.where(step, above >= 0, linear).T
 
 
 def deadwood(names, bottoms_m, tops_m, volumes_m3, u_m3=None):
-    """Deadwood of items that stand in a tank, or beside it.
+    """Return the deadwood of items inside a tank, or beside it.
 
     Parameters
     ----------
     names : sequence of str
-        n items.
+        Names of n items.
     bottoms_m, tops_m : array_like, shape (n,)
-        Levels, m; equal ones for an item that counts whole from its level on.
+        Levels, m; equal levels for an item that counts completely from its level on.
     volumes_m3 : array_like, shape (n,)
-        Signed: below 0 for what takes capacity away, m3.
+        Signed volumes, m3: negative for items that reduce the capacity.
     u_m3 : array_like, shape (n,), optional
         Standard uncertainties, m3; None: exact; None for an item: unknown.
 
@@ -114,8 +116,8 @@ def deadwood(names, bottoms_m, tops_m, volumes_m3, u_m3=None):
     Raises
     ------
     SolutionError
-        Naming the item, for a top below its bottom, a negative uncertainty or a number that is not
-        finite.
+        With the name of the item, for a top below its bottom, a negative uncertainty or a number
+        that is not finite.
 
     Examples
     --------
@@ -157,15 +159,15 @@ def deadwood(names, bottoms_m, tops_m, volumes_m3, u_m3=None):
 
 @dataclass(frozen=True)
 class FloatingRoof(Part):
-    """What a floating roof displaces: nothing below its critical zone, all of it above.
+    """Displacement of a floating roof: 0 below its critical zone, complete above it.
 
-    Between the critical levels the roof rests partly on its legs: what is given there, linear in
-    height, is not for use.
+    Between the critical levels, the roof rests partly on its legs. The volumes there, linear in
+    height, are not for use.
 
-    mass_kg                  as weighed
+    mass_kg                  mass as weighed
     critical_bottom_m        level at which the liquid first touches the roof
-    critical_top_m           level from which it floats freely
-    reference_density_kg_m3  of the liquid that the table is for
+    critical_top_m           level from which the roof floats freely
+    reference_density_kg_m3  density of the liquid of the table
     weighing                 "air" (conventional, with weights of 8000 kg/m3) or "vacuum" (mass)
     """
 
@@ -182,33 +184,34 @@ class FloatingRoof(Part):
         return (self.critical_bottom_m, self.critical_top_m)
 
     def displacement_m3(self, density_kg_m3=None):
-        """Volume of liquid that the floating roof displaces; None: at the reference density.
+        """Return the volume of liquid displaced by the roof; None: at the reference density.
 
             "vacuum"  M / rho
             "air"     M (1 - 1.2 / 8000) / (rho - 1.2)
 
-        Weighed in air, a reading M of conventional weights stands for the true mass m less the air
-        that the roof displaces: m - 1.2 V = M (1 - 1.2 / 8000). Afloat, liquid and air carry it:
-        rho D + 1.2 (V - D) = m, hence D without knowing V. Raises SolutionError for a density not
-        above the air's.
+        For weighing in air, a reading M of conventional weights is the true mass m less the air
+        displaced by the roof: m - 1.2 V = M (1 - 1.2 / 8000). Afloat, the roof is supported by
+        liquid and air: rho D + 1.2 (V - D) = m, which gives D without V. Raises SolutionError for a
+        density not above that of air.
         """
         density = self.reference_density_kg_m3 if density_kg_m3 is None else density_kg_m3
         return self.mass_kg * self._per_kg(density)
 
     def density_correction_m3(self, observed_kg_m3):
-        """To be added to a volume read from the table: - M (1 / rho_observed - 1 / rho_reference).
+        """Return the correction of a volume read from the table for the observed density.
 
-        In air with the densities and mass of `displacement_m3`. Negative in a lighter liquid, in
-        which the roof sinks deeper. Only for dips above the critical zone.
+        The correction is - M (1 / rho_observed - 1 / rho_reference); in air, with the densities and
+        mass of `displacement_m3`. It is negative for a lighter liquid, in which the roof sinks
+        deeper. It applies only to dips above the critical zone.
         """
         return self.displacement_m3() - self.displacement_m3(observed_kg_m3)
 
     def volume_m3(self, levels_m):
-        """(rows,) minus what is displaced at each level, at the reference density."""
+        """Return minus the displacement (rows,) at each level, at the reference density."""
         return -self.displacement_m3() * self._afloat(levels_m)
 
     def area_m2(self, levels_m):
-        """(rows,) derivative of `volume_m3` by the level; 0 outside the critical zone."""
+        """Return the derivative (rows,) of `volume_m3`; 0 outside the critical zone."""
         low, high = self.breakpoints_m
         levels = as_levels(levels_m)
         return np.where(
@@ -216,16 +219,19 @@ class FloatingRoof(Part):
         )
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} by "roof_mass", kg; its heights are dips and move with the zero."""
+        """Return {"roof_mass": (rows,)}, m3 per kg; the heights are dips and move with the zero."""
         by_mass = -self._per_kg(self.reference_density_kg_m3) * self._afloat(levels_m)
         return {"roof_mass": by_mass}
 
     def _afloat(self, levels_m):
+        """Return the floating fraction (rows,) of the roof at each level."""
         low, high = self.breakpoints_m
         levels = as_levels(levels_m)
         return np.clip((levels - low) / (high - low), 0.0, 1.0)
 
     def _per_kg(self, density):
+        """Return the displaced volume per kg of the weighed mass."""
+        # Without air buoyancy the formula reduces to M / rho.
         air = AIR_KG_M3 if self.weighing == "air" else 0.0
         if not np.all(np.asarray(density) > AIR_KG_M3):
             raise SolutionError(f"liquid of {density} kg/m3; expected it denser than air")
@@ -233,17 +239,17 @@ class FloatingRoof(Part):
 
 
 def floating_roof(mass_kg, critical_bottom_m, critical_top_m, reference_density_kg_m3, weighing):
-    """A floating roof, from its mass and its critical zone.
+    """Return a floating roof, from its mass and its critical zone.
 
     Parameters
     ----------
     mass_kg : float
     critical_bottom_m, critical_top_m : float
-        Levels of the critical zone, m: below it the roof displaces nothing, above it all.
+        Levels of the critical zone, m: the displacement is 0 below it and complete above it.
     reference_density_kg_m3 : float
-        Density of the liquid that the table is for, kg/m3.
+        Density of the liquid of the table, kg/m3.
     weighing : {"air", "vacuum"}
-        How the mass is to be understood: see `FloatingRoof.displacement_m3`.
+        Definition of the mass: see `FloatingRoof.displacement_m3`.
 
     Returns
     -------
@@ -252,7 +258,7 @@ def floating_roof(mass_kg, critical_bottom_m, critical_top_m, reference_density_
     Raises
     ------
     SolutionError
-        For a mass, zone, density or weighing that cannot be.
+        For an impossible mass, zone, density or weighing.
 
     Examples
     --------
@@ -286,5 +292,6 @@ def floating_roof(mass_kg, critical_bottom_m, critical_top_m, reference_density_
         float(reference_density_kg_m3),
         weighing,
     )
+    # Evaluate once, to refuse an impossible density here.
     roof.displacement_m3()
     return roof

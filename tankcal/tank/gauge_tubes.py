@@ -1,13 +1,14 @@
-"""A gauge tube in the round section of a lying tank: the depth of the liquid by the dip along it.
+"""Gauge tube in the round section of a lying tank: depth of the liquid from the dip along the tube.
 
-A tank that was rolled about its axis on its saddles carries its tube off the plumb, and a tube may
-pass the axis at a distance. Seen from end A, x to the right, z up, the tube that leans to the right
-by the angle a and passes e to the right of the axis has at the distance t from its middle
+The tube is not plumb if the tank was rolled about its axis on its saddles, and it may pass the axis
+at a distance. Seen from end A, with x to the right and z up, the tube leans to the right by the
+angle a and passes e to the right of the axis. At the distance t from its middle, the tube has the
+position
 
     (x, z) = e (cos a, -sin a) + t (sin a, cos a),
 
-and touches the wall of radius R at t = -w, w = sqrt(R^2 - e^2). With the dip d = t + w, the liquid
-stands above the lowest point of the section, where a plumb dip would find it, by
+and touches the wall of radius R at t = -w, w = sqrt(R^2 - e^2). With the dip d = t + w, the height
+of the liquid above the lowest point of the section, equal to a plumb dip, is
 
     depth(d) = R + (d - w) cos a - e sin a.
 """
@@ -19,26 +20,26 @@ import numpy as np
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
-STEEPEST = np.radians(80)
+STEEPEST = np.radians(80)  # largest angle off the plumb
 
 
 @dataclass(frozen=True)
 class GaugeTube:
-    """A straight tube across a round section.
+    """Straight tube across a round section.
 
     Attributes
     ----------
     radius_m : float
-        Of the section.
+        Radius of the section.
     angle_rad : float
-        Off the plumb, in the plane of the section; its top leans to the right as seen from A.
+        Angle off the plumb, in the plane of the section; the top leans to the right as seen from A.
     offset_m : float
-        Distance at which it passes the axis, to the right of it as seen from A when plumb.
+        Distance from the axis, to the right of it as seen from A if the tube is plumb.
 
     Raises
     ------
     SolutionError
-        For a tube that does not cross the section, or lies.
+        For a tube that does not cross the section, or that is nearly horizontal.
 
     Examples
     --------
@@ -68,12 +69,13 @@ class GaugeTube:
 
     @property
     def foot_m(self):
-        """From the wall, where the tube ends, to its middle: w."""
+        """Distance w from the end of the tube at the wall to its middle."""
         return np.sqrt(self.radius_m**2 - self.offset_m**2) if self.offset_m else self.radius_m
 
     @property
     def full_m(self):
-        """Dip of the full section; above the wall the tube goes on in its nozzle."""
+        """Dip of the full section; above the wall, the tube continues in its nozzle."""
+        # Solve depth(d) = 2 R for the dip d.
         rise = self.offset_m * np.sin(self.angle_rad)
         return self.foot_m + (self.radius_m + rise) / np.cos(self.angle_rad)
 
@@ -83,18 +85,23 @@ class GaugeTube:
         return np.cos(self.angle_rad)
 
     def depth_m(self, dips_m):
-        """(rows,) depths above the lowest point of the section."""
+        """Return depths (rows,) above the lowest point of the section."""
         return self.radius_m + self._over_axis(dips_m)
 
     def derivatives(self, dips_m):
-        """{input: of the depth at a fixed dip} by "radius", "tube_angle" and "tube_offset"."""
+        """Return {input: derivative of the depth at a fixed dip}.
+
+        The inputs are "radius", "tube_angle" and "tube_offset".
+        """
         sin, cos = np.sin(self.angle_rad), np.cos(self.angle_rad)
         return {
+            # w = sqrt(R^2 - e^2) has the derivatives R / w by the radius and -e / w by the offset.
             "radius": 1 - self.radius_m / self.foot_m * cos,
             "tube_angle": -(dips_m - self.foot_m) * sin - self.offset_m * cos,
             "tube_offset": self.offset_m / self.foot_m * cos - sin,
         }
 
     def _over_axis(self, dips_m):
+        """Return heights (rows,) of the liquid above the axis."""
         sin, cos = np.sin(self.angle_rad), np.cos(self.angle_rad)
         return (dips_m - self.foot_m) * cos - self.offset_m * sin

@@ -1,4 +1,4 @@
-"""Ends of lying tanks and heads of upright ones: their meridians, by the sizes that are given."""
+"""Meridians of the ends of lying tanks and the heads of upright tanks, from their dimensions."""
 
 from dataclasses import dataclass, replace
 
@@ -9,8 +9,8 @@ from tankcal.messages import message
 from tankcal.tank.arcs import EllipseArc, Line
 
 KINDS = ("flat", "conical", "ellipsoidal", "torispherical", "spherical", "guppy")
-RADII = ("dish", "knuckle")  # inputs that a torispherical end may be given by
-STANDARDS = {  # torispherical: radii of dish and knuckle over the diameter
+RADII = ("dish", "knuckle")  # possible dimensions of a torispherical end, beside the depth
+STANDARDS = {  # torispherical: radii of dish and knuckle over the diameter of the cylinder
     "asme": (1.0, 0.06),
     "din_28011": (1.0, 0.1),
     "din_28013": (0.8, 0.154),
@@ -19,21 +19,21 @@ STANDARDS = {  # torispherical: radii of dish and knuckle over the diameter
 
 @dataclass(frozen=True)
 class End:
-    """An end of a lying tank, as seen from its own tangent line (the edge of the cylinder).
+    """End of a lying tank, relative to its tangent line (the edge of the cylinder).
 
-    Two of the three sizes of a torispherical end are given, the third follows.
+    Two of the three dimensions of a torispherical end are given, the third is computed.
 
     Attributes
     ----------
     kind : str
         "flat", "conical", "ellipsoidal", "torispherical", "spherical" or "guppy".
     depth_m : float
-        From the tangent line to the tip, inside; 0 for a torispherical end of given radii, and for
-        a flat end, which has none.
+        Inside depth from the tangent line to the tip; 0 for a torispherical end of given radii, and
+        for a flat end.
     dish_radius_m, knuckle_radius_m : float or None
-        Of a torispherical end, inside.
+        Inside radii of a torispherical end.
     inward : bool
-        The end bulges into the tank (bulkheads of road tankers).
+        Whether the end bulges into the tank (bulkheads of road tankers).
     """
 
     kind: str = "flat"
@@ -44,14 +44,16 @@ class End:
 
 
 def standard_end(end, standard, diameter_m):
-    """A torispherical end with the radii of a standard form; of a given depth with its knuckle.
+    """Return a torispherical end with the radii of a standard form.
+
+    An end of given depth gets only the knuckle radius of the standard.
 
     Parameters
     ----------
     end : End
-        Without radii, with a measured depth or without one.
+        End without radii, with or without a measured depth.
     standard : str
-        A name of STANDARDS.
+        Key of STANDARDS.
     diameter_m : float
 
     Returns
@@ -69,22 +71,33 @@ def standard_end(end, standard, diameter_m):
 
 
 def meridian(end, radius_m, upward=1.0):
-    """Arcs of an end, x from its tangent line to its tip; radius_m of the cylinder.
+    """Return the arcs of an end, with x from its tangent line to its tip.
 
-    Conical r = R (1 - x/h); ellipsoidal r = R sqrt(1 - (x/h)^2); spherical: the sphere of radius
-    (R^2 + h^2) / (2 h) through the edge; torispherical: a knuckle of radius k, tangent to the
-    cylinder, and a dish of radius f, tangent to the knuckle, of depth
-    h = f - sqrt((f - k)^2 - (R - k)^2); guppy: a cone whose tip lies on the line of the crown, so
-    that the centres of its sections rise by R x / h, times `upward` (the cosine of a roll).
+    Conical: r = R (1 - x/h). Ellipsoidal: r = R sqrt(1 - (x/h)^2). Spherical: the sphere of radius
+    (R^2 + h^2) / (2 h) through the edge. Torispherical: a knuckle of radius k, tangent to the
+    cylinder, and a dish of radius f, tangent to the knuckle, of depth h = f - sqrt((f - k)^2 - (R -
+    k)^2). Guppy: a cone whose tip is on the line of the crown, so that the centres of its sections
+    rise by R x / h, times `upward` (the cosine of a roll).
 
-    Each arc knows its derivatives by "radius" and "end_depth" (all other given sizes stay; of a
-    torispherical end of given radii "end_depth" stretches it along the axis), by the RADII that
-    were given, and by "end_plate" (h, f and k, whichever were given, are less by it; R stays).
+    Each arc contains its derivatives by "radius" and "end_depth" (with all other given dimensions
+    fixed; for a torispherical end of given radii, "end_depth" stretches it along the axis), by the
+    given RADII, and by "end_plate" (which reduces the given dimensions of h, f and k; R is fixed).
+
+    Parameters
+    ----------
+    end : End
+    radius_m : float
+        Radius R of the cylinder.
+    upward : float, optional
+
+    Returns
+    -------
+    tuple of Line or EllipseArc
 
     Raises
     ------
     SolutionError
-        With the numbers, for sizes that make no such end.
+        With the numbers, for dimensions that are impossible for such an end.
     """
     if end.kind not in KINDS:
         raise SolutionError(f"no end is called {end.kind!r}: expected one of {', '.join(KINDS)}")
@@ -117,18 +130,18 @@ def meridian(end, radius_m, upward=1.0):
 
 
 def depth_of(end, radius_m):
-    """Depth of an end from its tangent line to its tip.
+    """Return the depth of an end from its tangent line to its tip.
 
     Parameters
     ----------
     end : End
     radius_m : float
-        Of the cylinder.
+        Radius of the cylinder.
 
     Returns
     -------
     float
-        In m, never negative.
+        Depth, m, never negative.
 
     Examples
     --------
@@ -139,10 +152,12 @@ def depth_of(end, radius_m):
 
 
 def _inputs(by_radius, by_depth):
+    """Return {input: derivative of the parameters of an arc}."""
     return {"radius": by_radius, "end_depth": by_depth, "end_plate": -by_depth}
 
 
 def _spherical(h, radius_m):
+    """Return the arc of a spherical end of depth h."""
     if h > radius_m * (1 + 1e-12):
         raise SolutionError(
             message(
@@ -156,36 +171,37 @@ def _spherical(h, radius_m):
     ball = (radius_m**2 + h**2) / (2 * h)
     by_radius = radius_m / h * np.array([-1.0, 0, 1, 1])
     by_depth = np.array([ball / h, 0, 1 - ball / h, 1 - ball / h])
-    edge = np.pi / 2 - 2 * np.arctan2(h, radius_m)  # of the ball, above its greatest radius
+    # Parameter of the edge; the half-angle form is accurate for shallow ends.
+    edge = np.pi / 2 - 2 * np.arctan2(h, radius_m)
     return (EllipseArc(edge, np.pi / 2, h - ball, 0.0, ball, ball, _inputs(by_radius, by_depth)),)
 
 
 def torispherical_radii(radius_m, depth_m=0.0, dish_radius_m=None, knuckle_radius_m=None):
-    """Radii of dish and knuckle of a torispherical end, one of which may follow from the depth.
+    """Return the radii of dish and knuckle of a torispherical end, from two of three dimensions.
 
         k = (2 f h - R^2 - h^2) / (2 (f - R)),    f = (R^2 + h^2 - 2 R k) / (2 (h - k))
 
     Parameters
     ----------
     radius_m : float
-        Of the cylinder.
+        Radius of the cylinder.
     depth_m : float, optional
-        0: not given.
+        Depth; 0: not given.
     dish_radius_m, knuckle_radius_m : float, optional
 
     Returns
     -------
     tuple of two float
-        Dish, knuckle, m; of radii that make no end, too.
+        Dish, knuckle, m; the radii are not checked for consistency if both are given.
 
     Raises
     ------
     SolutionError
-        Where other than two of the three sizes are given, or no third one goes with them.
+        If the number of given dimensions is not two, or no third dimension fits.
 
     Notes
     -----
-    Both are h = f - sqrt((f - k)^2 - (R - k)^2), solved for k and for f.
+    Both formulas are h = f - sqrt((f - k)^2 - (R - k)^2), solved for k and for f.
 
     Examples
     --------
@@ -204,8 +220,9 @@ def torispherical_radii(radius_m, depth_m=0.0, dish_radius_m=None, knuckle_radiu
         )
     if not h:
         return f, k
-    low = (f - np.sqrt(max(f**2 - r**2, 0.0))) if k is None else k
-    if not low < h < r or (f is not None and not r < f < np.inf) or (k is not None and not k > 0):
+    # Least depth: a dish without knuckle, or the depth of the knuckle alone.
+    least = (f - np.sqrt(max(f**2 - r**2, 0.0))) if k is None else k
+    if not least < h < r or (f is not None and not r < f < np.inf) or (k is not None and not k > 0):
         raise SolutionError(
             message(
                 "torispherical_depth_impossible",
@@ -215,7 +232,7 @@ def torispherical_radii(radius_m, depth_m=0.0, dish_radius_m=None, knuckle_radiu
                 depth_m=h,
                 radius_m=r,
                 given_m=f if k is None else k,
-                low_m=low,
+                low_m=least,
             )
         )
     if k is None:
@@ -224,6 +241,7 @@ def torispherical_radii(radius_m, depth_m=0.0, dish_radius_m=None, knuckle_radiu
 
 
 def _torispherical(end, radius_m):
+    """Return the arcs of a torispherical end: knuckle and dish."""
     dish, knuckle = torispherical_radii(
         radius_m, end.depth_m, end.dish_radius_m, end.knuckle_radius_m
     )
@@ -239,6 +257,8 @@ def _torispherical(end, radius_m):
                 radius_m=radius_m,
             )
         )
+    # The knuckle centre is `inner` from the axis, the dish centre `reach` behind the tangent line;
+    # both arcs meet on the line through their centres.
     inner = radius_m - knuckle
     reach = np.sqrt((dish - radius_m) * (dish + radius_m - 2 * knuckle))
     joint = np.arctan2(reach, inner)
@@ -250,32 +270,34 @@ def _torispherical(end, radius_m):
 
 
 def _torispherical_inputs(end, radius_m, dish, knuckle):
-    """Derivatives of both arcs, (of the knuckle, of the dish), by what was given."""
+    """Return {input: derivatives} of the knuckle and of the dish, by the given dimensions."""
     inner = radius_m - knuckle
     reach = np.sqrt((dish - radius_m) * (dish + radius_m - 2 * knuckle))
     h = dish - reach
-    free = {  # by each of R, f, k, the two others held
+    partial_derivatives = {  # derivatives by R, f and k, with the other two fixed
         "radius": np.array([[0.0, 1, 0, 0], [inner / reach, 0, 0, 0]]),
         "dish": np.array([[0.0, 0, 0, 0], [(knuckle - dish) / reach, 0, 1, 1]]),
         "knuckle": np.array([[0.0, -1, 1, 1], [(dish - radius_m) / reach, 0, 0, 0]]),
     }
     if not end.depth_m:
         stretch = np.array([[0.0, 0, knuckle / h, 0], [-reach / h, 0, dish / h, 0]])
-        found, given = free | {"end_depth": stretch}, RADII
+        derivatives, given_names = partial_derivatives | {"end_depth": stretch}, RADII
     else:
-        of_depth = {  # dh by each of them
+        by_depth = {  # derivatives of h by R, f and k
             "radius": inner / reach,
             "dish": 1 - (dish - knuckle) / reach,
             "knuckle": (dish - radius_m) / reach,
         }
-        follows = RADII[end.dish_radius_m is not None]
-        slope = of_depth[follows]
-        found = {  # what follows gives way, so that the depth stays
-            name: by - of_depth[name] / slope * free[follows]
-            for name, by in free.items()
-            if name != follows
+        computed = RADII[end.dish_radius_m is not None]
+        slope = by_depth[computed]
+        derivatives = {  # the computed radius changes so that the depth is constant
+            name: derivative - by_depth[name] / slope * partial_derivatives[computed]
+            for name, derivative in partial_derivatives.items()
+            if name != computed
         }
-        found["end_depth"] = free[follows] / slope
-        given = [name for name in found if name != "radius"]
-    found["end_plate"] = -sum(found[name] for name in given)
-    return tuple({name: by[arc] for name, by in found.items()} for arc in (0, 1))
+        derivatives["end_depth"] = partial_derivatives[computed] / slope
+        given_names = [name for name in derivatives if name != "radius"]
+    derivatives["end_plate"] = -sum(derivatives[name] for name in given_names)
+    return tuple(
+        {name: derivative[arc] for name, derivative in derivatives.items()} for arc in (0, 1)
+    )

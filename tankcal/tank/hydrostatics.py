@@ -1,20 +1,22 @@
-"""Liquid head: how the shell gives way to the liquid in it, by thin hoops.
+"""Liquid head: deformation of the shell by the liquid, with thin hoops.
 
-A liquid of density rho up to the level h widens the unloaded radius r0 of a course of plate t by
+A liquid of density rho up to the level h widens the unloaded radius r0 of a course of plate
+thickness t by
 
     dr(z) = K rho (h - z),  z < h,      K = g r0^2 / (E t).
 
-The survey saw the shell with the liquid of its day. That load is taken off and the table's is put
-on, so with the table's liquid up to h the surveyed radius at the height z changes by
+During the survey, the shell was loaded by the liquid of that day. That load is removed and the load
+of the table is applied. With the liquid of the table up to h, the surveyed radius at the height z
+thus changes by
 
     d(z; h) = K [rho_t (h - z)+ - rho_s (h_s - z)+]
 
-and the volume below h by the integral of girth(z) d + pi d^2 over z < h: the whole of
-1/2 integral (r + d)^2 da less 1/2 integral r^2 da of an irregular outline r(a). The integral is
-exact: girths are of degree six in z, d is linear below and above h_s.
+and the volume below h changes by the integral of girth(z) d + pi d^2 over z < h. This is the exact
+difference of 1/2 integral (r + d)^2 da and 1/2 integral r^2 da for an irregular outline r(a). The
+integral is exact: girths are of degree six in z, d is linear below and above h_s.
 
-K belongs to a course; r0 is its mean inside radius over azimuth and height, unloaded.
-Sources: ISO 7507-1 and API MPMS 2.2A (liquid head); thin hoop: Timoshenko, Strength of Materials.
+K is constant in a course; r0 is its mean unloaded inside radius over azimuth and height. Sources:
+ISO 7507-1 and API MPMS 2.2A (liquid head); thin hoop: Timoshenko, Strength of Materials.
 """
 
 from dataclasses import dataclass, replace
@@ -45,12 +47,13 @@ INPUTS = (
 
 @dataclass(frozen=True)
 class Hoop:
-    """One course as a stack of thin hoops.
+    """Course as a stack of thin hoops.
 
-    girth_m        (q,) coefficients of the inside girth by powers of the part of the height
-    radius_m       mean inside radius r0, unloaded
-    compliance     K, widening by the mass of liquid above a square metre, m per kg/m2
-    compliance_by  its derivatives: {input: m per kg/m2 per SI unit of the input}
+    course         shape of the course
+    girth_m        (q,) coefficients of the inside girth by powers of the relative height
+    radius_m       mean unloaded inside radius r0
+    compliance     K, widening per mass of liquid above a square metre, m per kg/m2
+    compliance_by  {input: derivative of K, m per kg/m2 per SI unit of the input}
     """
 
     course: CourseShape
@@ -62,14 +65,14 @@ class Hoop:
 
 @dataclass(frozen=True)
 class LiquidHead(Part):
-    """The part of a tank that the head of the liquid adds to the shell as it was surveyed.
+    """Part of a tank: volume added by the liquid head to the shell as surveyed.
 
-    volume   the shell as surveyed
-    hoops    its courses, from the bottom up
-    density_kg_m3  of the liquid that the table is for; 0: the empty shell
-    headroom_m  how far above the shell, in a head on top, its liquid may stand
+    volume   shell as surveyed
+    hoops    courses, from the bottom up
+    density_kg_m3  density of the liquid of the table; 0: the empty shell
+    headroom_m  possible height of the liquid above the shell, in a head on top
     survey_density_kg_m3, survey_level_m  liquid during the survey; level above the bottom of the
-             first course
+                                          first course
     """
 
     volume: ShellVolume
@@ -81,49 +84,51 @@ class LiquidHead(Part):
 
     @property
     def breakpoints_m(self):
-        """Bottoms of the courses."""
+        """Levels of the bottoms of the courses."""
         return tuple(hoop.course.bottom_m for hoop in self.hoops)
 
     def with_density(self, density_kg_m3):
-        """The same shell and survey, for a table of another density of the liquid."""
+        """Return the liquid head for a table of another density of the liquid."""
         return replace(self, density_kg_m3=float(density_kg_m3))
 
     def volume_m3(self, levels_m):
-        """(rows,) change of the volume below each level; 0 below the bottom.
+        """Return the change (rows,) of the volume below each level; 0 below the bottom.
 
-        Raises HeightError for a level above the shell and the head on it.
+        Raises HeightError for a level above the shell and the head on top of it.
         """
         return self._sums(levels_m)[0]
 
     def area_m2(self, levels_m):
-        """(rows,) derivative of `volume_m3` by the level; the upper course at a joint.
+        """Return the derivative (rows,) of `volume_m3`; at a joint that of the upper course.
 
-        Not only the wider free surface: a rising level also widens the wall below it.
+        It contains the wider free surface, and the widening of the wall below a rising level.
         """
         return self._sums(levels_m)[1]
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} derivative of `volume_m3` by each of INPUTS, m3 per SI unit.
+        """Return {input: derivative (rows,) of `volume_m3`} for INPUTS, m3 per SI unit.
 
-        plate_thickness is that through the stiffness of all plates; what a thicker plate takes off
-        the radius is the shell's. scale multiplies the inside radii.
+        plate_thickness acts through the stiffness of all plates; its effect on the inside radius is
+        part of the shell. scale multiplies the inside radii.
         """
         return dict(zip(INPUTS, self._sums(levels_m)[1:], strict=True))
 
     def widening_m(self, heights_m, level_m):
-        """(len(heights),) change of the surveyed radius with the table's liquid up to level_m.
+        """Return the change (len(heights),) of the surveyed radius with liquid up to level_m.
 
-        At a joint that of the upper course.
+        At a joint, the change is that of the upper course.
         """
         heights = np.atleast_1d(np.asarray(heights_m, dtype=float))
         joints = [hoop.course.bottom_m for hoop in self.hoops[1:]]
         compliance = np.array([hoop.compliance for hoop in self.hoops])
-        put_on = self.density_kg_m3 * np.maximum(level_m - heights, 0)
-        taken_off = self.survey_density_kg_m3 * np.maximum(self.survey_level_m - heights, 0)
-        return compliance[np.searchsorted(joints, heights, side="right")] * (put_on - taken_off)
+        table_load = self.density_kg_m3 * np.maximum(level_m - heights, 0)
+        survey_load = self.survey_density_kg_m3 * np.maximum(self.survey_level_m - heights, 0)
+        return compliance[np.searchsorted(joints, heights, side="right")] * (
+            table_load - survey_load
+        )
 
     def _sums(self, levels_m):
-        """(1 + inputs, rows) volume and its derivatives."""
+        """Return the volume and its derivatives, shape (1 + inputs, rows)."""
         levels = as_levels(levels_m)
         shell = self.volume.height_m
         top = shell + self.headroom_m
@@ -139,24 +144,39 @@ class LiquidHead(Part):
             )
         place = np.searchsorted([hoop.course.bottom_m for hoop in self.hoops], levels, "right") - 1
         sums = np.zeros((1 + len(INPUTS), len(levels)))
-        for index, (hoop, below) in enumerate(zip(self.hoops, self._below, strict=True)):
+        for index, (hoop, lower_courses) in enumerate(zip(self.hoops, self._below, strict=True)):
             rows = np.flatnonzero(place == index)
-            own = levels[rows]
-            found = _load(self, hoop, own, np.minimum(own, shell) if self.headroom_m else own)
-            found[1] += _at_surface(self, hoop, own) * ((own < shell) | (self.headroom_m == 0))
-            found += below[:, :1] + (below[:, 1:2] + below[:, 2:] * own) * own
-            sums[:, rows] = found
+            course_levels = levels[rows]
+            values = _integrate_load(
+                self,
+                hoop,
+                course_levels,
+                np.minimum(course_levels, shell) if self.headroom_m else course_levels,
+            )
+            values[1] += _at_surface(self, hoop, course_levels) * (
+                (course_levels < shell) | (self.headroom_m == 0)
+            )
+            # Courses below contribute a quadratic polynomial of the level.
+            values += (
+                lower_courses[:, :1]
+                + (lower_courses[:, 1:2] + lower_courses[:, 2:] * course_levels) * course_levels
+            )
+            sums[:, rows] = values
         return sums
 
     @cached_property
     def _below(self):
-        """[(1 + inputs, 3)] powers of the level in what the courses below each course add.
+        """Coefficients (1 + inputs, 3) of the contribution of the courses below each course.
 
-        It is quadratic in the level: three levels give it.
+        The contribution is quadratic in the level, so three levels determine it.
         """
-        three = self.volume.height_m * np.arange(3.0)
-        to_powers = np.linalg.inv(np.vander(three, increasing=True).T)
-        full = [_load(self, h, three, np.full(3, h.course.top_m)) @ to_powers for h in self.hoops]
+        levels = self.volume.height_m * np.arange(3.0)
+        # Coefficients of the parabola through three levels.
+        to_powers = np.linalg.inv(np.vander(levels, increasing=True).T)
+        full = [
+            _integrate_load(self, h, levels, np.full(3, h.course.top_m)) @ to_powers
+            for h in self.hoops
+        ]
         return [sum(full[:index], np.zeros((1 + len(INPUTS), 3))) for index in range(len(full))]
 
 
@@ -172,26 +192,27 @@ def liquid_head(
     scale=1.0,
     headroom_m=0.0,
 ):
-    """What the head of the liquid adds to a shell, course by course as thin hoops.
+    """Return the volume added to a shell by the liquid head, with each course as thin hoops.
 
         dr(z) = K rho (h - z),  z < h,      K = g r0^2 / (E t)
 
     Parameters
     ----------
     volume : ShellVolume
-        The shell as surveyed, inside.
+        Shell as surveyed, inside.
     thicknesses_m : array_like, shape (courses,)
-        Plate of each course from the bottom up, m.
+        Plate thickness of each course from the bottom up, m.
     youngs_modulus_pa : float
     density_kg_m3 : float
-        Of the liquid that the table is for, kg/m3; 0: the empty shell.
+        Density of the liquid of the table, kg/m3; 0: the empty shell.
     survey_density_kg_m3, survey_level_m : float, default 0
-        Liquid in the tank during the survey; its level above the bottom of the first course, m.
+        Density of the liquid during the survey, and its level above the bottom of the first course,
+        m.
     gravity_m_s2 : float
     scale : float, default 1
-        Of horizontal lengths, as `course_shape` was given it.
+        Temperature factor on horizontal lengths, as for `course_shape`.
     headroom_m : float, default 0
-        How far above the shell the table's liquid may stand, in a head on top of it.
+        Possible height of the liquid above the shell, in a head on top of it.
 
     Returns
     -------
@@ -200,8 +221,8 @@ def liquid_head(
     Raises
     ------
     SolutionError
-        For a modulus, density, level or gravity that cannot be, or a course that carries liquid
-        and has no plate.
+        For an impossible modulus, density, level or gravity, or a loaded course without plate
+        thickness.
 
     References
     ----------
@@ -243,13 +264,14 @@ def liquid_head(
             )
     survey = (float(survey_density_kg_m3), float(survey_level_m))
     hoops = [
-        _hoop(course, plate, youngs_modulus_pa, gravity_m_s2, scale, *survey)
+        _build_hoop(course, plate, youngs_modulus_pa, gravity_m_s2, scale, *survey)
         for course, plate in zip(volume.courses, thicknesses, strict=True)
     ]
     return LiquidHead(volume, tuple(hoops), float(density_kg_m3), *survey, headroom_m)
 
 
 def _refuse_numbers(modulus, gravity, *others):
+    """Raise SolutionError for an impossible modulus, gravity, density or level."""
     for value in (modulus, gravity):
         if not (np.isfinite(value) and value > 0):
             raise SolutionError(
@@ -270,80 +292,96 @@ def _refuse_numbers(modulus, gravity, *others):
             )
 
 
-def _hoop(course, plate, modulus, gravity, scale, density, level):
-    """The hoop of a course; r0 + B r0^2 is the surveyed radius, B of the survey's liquid."""
+def _build_hoop(course, plate, modulus, gravity, scale, density, level):
+    """Return the hoop of a course from its surveyed radius.
+
+    The surveyed radius is r0 + B r0^2, with B due to the liquid during the survey.
+    """
     girths = height_polynomials(gauss_levels(), LEVELS - 1) @ course.girths_m / scale
     height = course.height_m
     girth = _integrals(course, girths, np.array([course.top_m]))[0]
     surveyed = girth[0] / (2 * np.pi * height)
     wet = np.clip(level - course.bottom_m, 0, height)
     depth = wet * (level - course.bottom_m - wet / 2) / height  # mean of (h_s - z)+
-    soft = gravity / (modulus * plate) if plate > 0 else 0.0  # refused where it is loaded
+    soft = gravity / (modulus * plate) if plate > 0 else 0.0  # no plate: the course is unloaded
     bulge = soft * density * depth
+    # Positive root of B r0^2 + r0 - r = 0, in the form without cancellation for small B.
     radius = 2 * surveyed / (1 + np.sqrt(1 + 4 * bulge * surveyed))
+    # Implicit derivative: dr0 (1 + 2 B r0) = dr - r0^2 dB, for K = soft r0^2.
     stiffening = 1 + 2 * bulge * radius
     by_soft = radius**2 / stiffening
     by_bulge = -2 * soft * radius**3 / stiffening
-    by = {
+    derivatives = {
         "youngs_modulus": -by_soft * soft / modulus,
         "plate_thickness": -by_soft * soft / plate if plate > 0 else 0.0,
         "survey_density": by_bulge * soft * depth,
         "survey_level": by_bulge * soft * density * wet / height,
         "scale": 2 * soft * radius * surveyed / stiffening,
     }
-    return Hoop(course, girths, float(radius), float(soft * radius**2), by)
+    return Hoop(course, girths, float(radius), float(soft * radius**2), derivatives)
 
 
-def _load(head, hoop, levels, ends):
-    """(1 + inputs, rows) what a course adds below `ends`, with liquid up to the levels.
+def _integrate_load(head, hoop, levels, ends):
+    """Return the contribution (1 + inputs, rows) of a course below `ends`, for liquid up to levels.
 
-    With d = K u, u = rho_t (h - z) - rho_s (h_s - z)+, the integral of girth d + pi d^2 and its
-    derivatives, at a fixed end of the integral.
+    With d = K u, u = rho_t (h - z) - rho_s (h_s - z)+, these are the integral of girth d + pi d^2
+    and its derivatives, at a fixed end of the integral.
     """
-    stiff = hoop.compliance
-    density, survey, seen = head.density_kg_m3, head.survey_density_kg_m3, head.survey_level_m
+    compliance_k = hoop.compliance
+    density, survey, survey_level = (
+        head.density_kg_m3,
+        head.survey_density_kg_m3,
+        head.survey_level_m,
+    )
+    # Integrals of girth, girth z, 1, z and z^2: all terms of u and u^2 are combinations of these.
     girth, lever, length, first, second = _integrals(hoop.course, hoop.girth_m, ends)
-    below = np.zeros((5, len(ends)))  # to level and h_s
-    if seen > hoop.course.bottom_m:
-        below = _integrals(hoop.course, hoop.girth_m, np.minimum(ends, seen))
-    depth = [seen * below[i] - below[j] for i, j in ((0, 1), (2, 3), (3, 4))]  # of (h_s - z)+
+    survey_integrals = np.zeros((5, len(ends)))  # integrals up to the lower of end and h_s
+    if survey_level > hoop.course.bottom_m:
+        survey_integrals = _integrals(hoop.course, hoop.girth_m, np.minimum(ends, survey_level))
+    depth = [
+        survey_level * survey_integrals[i] - survey_integrals[j]
+        for i, j in ((0, 1), (2, 3), (3, 4))
+    ]  # of (h_s - z)+
     mass = density * levels
     hoops = mass * girth - density * lever - survey * depth[0]  # integral of girth u
     moments = [  # integrals of u times 1, z and (h_s - z)+
         mass * length - density * first - survey * depth[1],
         mass * first - density * second - survey * depth[2],
-        mass * depth[1] - density * depth[2] - survey * (seen * depth[1] - depth[2]),
+        mass * depth[1] - density * depth[2] - survey * (survey_level * depth[1] - depth[2]),
     ]
     square = mass * moments[0] - density * moments[1] - survey * moments[2]
-    both = mass * below[2] - density * below[3] - survey * depth[1]
+    survey_moment = mass * survey_integrals[2] - density * survey_integrals[3] - survey * depth[1]
     by_one, by_height, by_depth = (  # derivatives by the coefficients of 1, z, (h_s - z)+ in u
-        stiff * (linear + 2 * np.pi * stiff * moment)
+        compliance_k * (linear + 2 * np.pi * compliance_k * moment)
         for linear, moment in zip((girth, lever, depth[0]), moments, strict=True)
     )
-    by_level = stiff * (below[0] + 2 * np.pi * stiff * both)
-    by_compliance = hoops + 2 * np.pi * stiff * square
-    through = {name: by * by_compliance for name, by in hoop.compliance_by.items()}
-    through["liquid_density"] = levels * by_one - by_height
-    through["survey_density"] = through["survey_density"] - by_depth
-    through["survey_level"] = through["survey_level"] - survey * by_level
-    through["scale"] = through["scale"] + stiff * hoops
-    through["datum"] = density * by_one
-    volume = stiff * (hoops + np.pi * stiff * square)
-    return np.array([volume, *(through[name] for name in INPUTS)])
+    by_level = compliance_k * (survey_integrals[0] + 2 * np.pi * compliance_k * survey_moment)
+    by_compliance = hoops + 2 * np.pi * compliance_k * square
+    derivatives_by = {
+        name: derivative * by_compliance for name, derivative in hoop.compliance_by.items()
+    }
+    derivatives_by["liquid_density"] = levels * by_one - by_height
+    derivatives_by["survey_density"] = derivatives_by["survey_density"] - by_depth
+    derivatives_by["survey_level"] = derivatives_by["survey_level"] - survey * by_level
+    derivatives_by["scale"] = derivatives_by["scale"] + compliance_k * hoops
+    derivatives_by["datum"] = density * by_one
+    volume = compliance_k * (hoops + np.pi * compliance_k * square)
+    return np.array([volume, *(derivatives_by[name] for name in INPUTS)])
 
 
 def _at_surface(head, hoop, levels):
-    """(rows,) girth d + pi d^2 at each level itself, the unloading alone."""
-    above = np.maximum(head.survey_level_m - levels, 0)
-    widening = -hoop.compliance * head.survey_density_kg_m3 * above
+    """Return girth d + pi d^2 (rows,) at each level, where only the unloading acts."""
+    survey_depth = np.maximum(head.survey_level_m - levels, 0)
+    widening = -hoop.compliance * head.survey_density_kg_m3 * survey_depth
     return (_girth_m(hoop.course, hoop.girth_m, levels) + np.pi * widening) * widening
 
 
 def _integrals(course, girth_m, ends):
-    """(5, rows) integrals of girth, girth z, 1, z, z^2 from the course's bottom to each end.
+    """Return integrals (5, rows) of girth, girth z, 1, z, z^2 from the bottom of a course to ends.
 
-    An end below the bottom counts as the bottom.
+    An end below the bottom of the course counts as the bottom.
     """
+    # Gauss-Legendre rule with four nodes on the interval from the bottom to each end.
     half = np.maximum(ends - course.bottom_m, 0.0) / 2
     z = course.bottom_m + half * (1 + NODES[:, None])
     girth = _girth_m(course, girth_m, z)
@@ -352,8 +390,10 @@ def _integrals(course, girth_m, ends):
 
 
 def _girth_m(course, girth_m, z):
+    """Return the inside girth of a course at heights z."""
     t = (z - course.bottom_m) / course.height_m
     girth = girth_m[-1]
+    # Horner's scheme.
     for coefficient in girth_m[-2::-1]:
         girth = girth * t + coefficient
     return girth + 0.0 * t

@@ -1,4 +1,4 @@
-"""A lowest zone of a tank that was measured by liquid, and what the other parts add above it."""
+"""Lowest zone of a tank measured with liquid, and the contribution of other parts above it."""
 
 from dataclasses import dataclass, replace
 
@@ -13,13 +13,13 @@ from tankcal.uncertainty import Source
 
 @dataclass(frozen=True)
 class MeasuredBottom(Part):
-    """The lowest zone of a tank, measured by liquid; it stands for all that is in that zone.
+    """Lowest zone of a tank, measured with liquid; it replaces all parts in that zone.
 
-    All other parts count from `highest_m` up only (`Above`): the measured volumes hold shell,
-    deadwood and head of that zone already, and its uncertainty replaces theirs.
+    All other parts count only above `highest_m` (`Above`). The measured volumes already contain
+    shell, deadwood and head of that zone, and their uncertainty replaces that of these parts.
 
     levels_m    (n,) ascending
-    volumes_m3  (n,) capacity below each
+    volumes_m3  (n,) capacity below each level
     errors_m3   (n, n) factor of their covariance
     curve       (rows,) -> volume, monotone and smooth through the volumes
     """
@@ -32,7 +32,7 @@ class MeasuredBottom(Part):
 
     @property
     def lowest_m(self):
-        """Level below which nothing was measured, or the highest at which the tank is empty."""
+        """Lowest measured level, or the highest level at which the tank is empty."""
         empty = self.levels_m[self.volumes_m3 == 0]
         return float(empty[-1] if len(empty) else self.levels_m[0])
 
@@ -43,34 +43,36 @@ class MeasuredBottom(Part):
 
     @property
     def breakpoints_m(self):
-        """Both ends of the zone."""
+        """Lower and upper limit of the zone."""
         return (self.lowest_m, self.highest_m)
 
     def volume_m3(self, levels_m):
-        """(rows,) the measured capacity, above `highest_m` that of `highest_m`.
+        """Return the measured capacity (rows,), constant above `highest_m`.
 
-        Between dips by monotone cubics (Fritsch & Carlson 1980). Raises HeightError below the
-        lowest dip, unless the tank is empty there.
+        Interpolation between dips is by monotone cubics (Fritsch & Carlson 1980). Raises
+        HeightError below the lowest dip, unless the tank is empty there.
         """
         return self.curve(self._measured(levels_m))
 
     def area_m2(self, levels_m):
-        """(rows,) derivative of `volume_m3` by the level; 0 from `highest_m` up."""
+        """Return the derivative (rows,) of `volume_m3` by the level; 0 from `highest_m` up."""
         inside = (as_levels(levels_m) >= self.levels_m[0]) & (as_levels(levels_m) < self.highest_m)
         return np.where(inside, self.curve(self._measured(levels_m), 1), 0.0)
 
     def derivatives(self, levels_m):
-        """None: volumes were measured by dips, from wherever the table's zero is."""
+        """Return no derivatives: volumes refer to dips, wherever the zero of the table is."""
         return {}
 
     def sources(self, levels_m):
-        """Errors of the measured volumes, linear between dips, and of the curve between them.
+        """Return the errors of the measured volumes, and of the curve between dips.
 
-        The curve's half-width is its distance from straight lines, rectangular. Above `highest_m`
-        all rows have the error of the last volume in common.
+        Errors are linear between dips. The half-width of the curve is its distance from straight
+        lines, with a rectangular distribution. Above `highest_m`, all rows share the error of the
+        last volume.
         """
         levels = self._measured(levels_m)
         errors = [np.interp(levels, self.levels_m, column) for column in self.errors_m3.T]
+        # Distance of the curve from straight lines between the measured volumes.
         bend = self.curve(levels) - np.interp(levels, self.levels_m, self.volumes_m3)
         return (
             Source("bottom_liquid", np.column_stack(errors), type="B"),
@@ -80,6 +82,7 @@ class MeasuredBottom(Part):
         )
 
     def _measured(self, levels_m):
+        """Return the levels limited to the zone."""
         levels, lowest = as_levels(levels_m), self.levels_m[0]
         if self.volumes_m3[0] > 0 and not np.all(levels >= lowest):
             raise HeightError(
@@ -96,20 +99,20 @@ class MeasuredBottom(Part):
 
 
 def measured_bottom(levels_m, volumes_m3, u_m3=None):
-    """A bottom that was measured by liquid.
+    """Return a bottom measured with liquid.
 
-    Where u grows from one dip to the next, its growth is the independent error of what was added
-    between them; where it does not, both dips have one error: a delivery within the zone is as
-    uncertain as what was metered between.
+    Where u increases from one dip to the next, the increase is the independent error of the added
+    volume. Where u does not increase, both dips have a common error. The uncertainty of a delivery
+    within the zone is thus that of the metered volume.
 
     Parameters
     ----------
     levels_m : array_like, shape (n,)
-        Rising dips, two or more, m.
+        Ascending dips, two or more, m.
     volumes_m3 : array_like, shape (n,)
-        Volume below each, cumulative, m3.
+        Cumulative volume below each dip, m3.
     u_m3 : array_like, shape (n,), optional
-        Standard uncertainty of each, m3; None: exact.
+        Standard uncertainty of each volume, m3; None: exact.
 
     Returns
     -------
@@ -118,7 +121,8 @@ def measured_bottom(levels_m, volumes_m3, u_m3=None):
     Raises
     ------
     SolutionError
-        With the number of the row, when levels do not rise or volumes fall, or one is negative.
+        With the number of the row, if levels do not rise, volumes fall, or a volume or uncertainty
+        is negative.
 
     Examples
     --------
@@ -139,8 +143,8 @@ def measured_bottom(levels_m, volumes_m3, u_m3=None):
             )
         )
     finite = np.isfinite(levels) & np.isfinite(volumes) & np.isfinite(u)
-    follows = np.append(True, (np.diff(levels) > 0) & (np.diff(volumes) >= 0))
-    wrong = np.flatnonzero(~(finite & follows & (volumes >= 0) & (u >= 0)))
+    is_ascending = np.append(True, (np.diff(levels) > 0) & (np.diff(volumes) >= 0))
+    wrong = np.flatnonzero(~(finite & is_ascending & (volumes >= 0) & (u >= 0)))
     if len(wrong):
         row = wrong[0]
         raise SolutionError(
@@ -156,10 +160,11 @@ def measured_bottom(levels_m, volumes_m3, u_m3=None):
         )
     errors = np.zeros((len(u), len(u)))
     for row in range(len(u)):
-        before = u[row - 1] if row else 0.0
-        common = min(1.0, u[row] / before) if before > 0 else 0.0
+        previous_u = u[row - 1] if row else 0.0
+        common = min(1.0, u[row] / previous_u) if previous_u > 0 else 0.0
+        # Row of the Cholesky factor: the common part of the previous row, plus an independent part.
         errors[row] = common * errors[row - 1]
-        errors[row, row] = np.sqrt(max(u[row] ** 2 - (common * before) ** 2, 0.0))
+        errors[row, row] = np.sqrt(max(u[row] ** 2 - (common * previous_u) ** 2, 0.0))
     return MeasuredBottom(
         levels, volumes, errors, scipy.interpolate.PchipInterpolator(levels, volumes)
     )
@@ -167,16 +172,16 @@ def measured_bottom(levels_m, volumes_m3, u_m3=None):
 
 @dataclass(frozen=True)
 class Above(Part):
-    """Another part of the tank, counted from a level up: P(L) - P(level) for L above it, else 0.
+    """Another part of the tank above a level: P(L) - P(level) for L above the level, else 0.
 
-    Its derivatives and sources likewise, so that what a measured zone replaced cancels.
+    Its derivatives and sources are reduced likewise, so that errors of the replaced zone cancel.
 
     Attributes
     ----------
     part : Part
-        The part that is counted.
+        Original part.
     level_m : float
-        The level from which it counts, m.
+        Level above which the part counts, m.
     """
 
     part: Part
@@ -184,51 +189,63 @@ class Above(Part):
 
     @property
     def kind(self):
-        """That of the part."""
+        """Kind of the part."""
         return self.part.kind
 
     @property
     def moves_with_zero(self):
-        """That of the part."""
+        """As for the part."""
         return self.part.moves_with_zero
 
     @property
     def breakpoints_m(self):
-        """Those of the part."""
+        """Breakpoints of the part."""
         return self.part.breakpoints_m
 
     def volume_m3(self, levels_m):
-        """(rows,) contribution above the level."""
+        """Return the contribution (rows,) above the level."""
         volume = self.part.volume_m3(self._and_own(levels_m))
+        # The last element is the volume at `level_m`, appended by `_and_own`.
         return volume[:-1] - volume[-1]
 
     def area_m2(self, levels_m):
-        """(rows,) derivative of `volume_m3` by the level."""
+        """Return the derivative (rows,) of `volume_m3` by the level."""
         levels = as_levels(levels_m)
         area = self.part.area_m2(np.maximum(levels, self.level_m))
         return np.where(levels >= self.level_m, area, 0.0)
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} those of the part, less the same at `level_m`."""
+        """Return {input: (rows,)} of the part, less the derivative at `level_m`."""
         levels = self._and_own(levels_m)
-        found = self.part.derivatives(levels)
-        return {name: column[:-1] - column[-1] for name, column in found.items()}
+        derivatives_of_part = self.part.derivatives(levels)
+        return {name: column[:-1] - column[-1] for name, column in derivatives_of_part.items()}
 
     def sources(self, levels_m):
-        """Those of the part, less the same at `level_m`."""
+        """Return the sources of the part, less their columns at `level_m`."""
         return tuple(
             replace(source, columns_m3=source.columns_m3[:-1] - source.columns_m3[-1])
             for source in self.part.sources(self._and_own(levels_m))
         )
 
     def area_by(self, derivatives, levels_m):
-        """`area_m2`: the derivative by "datum" is not it, for the level goes with the zero."""
+        """Return `area_m2`, which differs from "datum", since the level moves with the zero."""
         return self.area_m2(levels_m)
 
     def moved_m3(self, levels_m, step_m, lowest_m, highest_m):
-        """Those of the part, less the same at `level_m`, which goes with the zero."""
+        """Return the volume of the part, less that at `level_m`, which moves with the zero.
+
+        Parameters
+        ----------
+        levels_m, step_m, lowest_m, highest_m
+            As for `Part.moved_m3`.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+        """
         if self.moves_with_zero:
             return self.volume_m3(levels_m)
+        # The lower limit moves with the zero as well, so both ends are moved.
         upper = np.maximum(levels_m, self.level_m)
         lower = np.full(len(levels_m), self.level_m)
         above, below = (
@@ -237,4 +254,5 @@ class Above(Part):
         return above - below
 
     def _and_own(self, levels_m):
+        """Return the levels, at least `level_m`, followed by `level_m`."""
         return np.append(np.maximum(as_levels(levels_m), self.level_m), self.level_m)

@@ -1,10 +1,11 @@
-"""What lying tanks have in common: pieces along an axis, and a liquid whose surface cuts them.
+"""Common base of lying tanks: pieces along an axis, and a liquid whose surface cuts them.
 
-Volumes and free surfaces of `arcs`, each at its place along the axis s, below a surface at
+The volumes and free surfaces of `arcs`, at the position s along the axis, are below a surface at
 
     c(s) = c_p - tilt (s - p),   c_p = -r + d stretch,   d the dip, r the radius at its zero p,
 
-above the axis. Lengths are those of a round tank; one that is not round is squeezed into it.
+above the axis. Lengths are those of a round tank; a tank of other section is scaled to it in
+height.
 """
 
 from dataclasses import dataclass
@@ -18,23 +19,23 @@ from tankcal.tank.arcs import Cut, EllipseArc, Line, integrate
 from tankcal.tank.heads import depth_of, meridian
 from tankcal.tank.parts import Solid
 
-ROUNDING = 1e-9  # of the highest dip: a dip so little outside is the top or the bottom itself
+ROUNDING = 1e-9  # relative to the highest dip: a smaller excess is rounding
 
 
 @dataclass(frozen=True)
 class Piece:
-    """An arc of the meridian at its place along the axis, s = origin + way x.
+    """Arc of the meridian at its position along the axis, s = origin + way x.
 
     Attributes
     ----------
     arc : Line or EllipseArc
     origin_m : float
     way, sign : int
-        Direction of x along the axis; -1 for room that an end takes from the tank.
+        Direction of x along the axis; sign -1 for a volume that an end takes from the tank.
     end : str
-        "a" or "b"; "" of the cylinder.
+        "a" or "b"; "" for the cylinder.
     ring : int
-        Of the cylinder, from A on; of an end that on which it sits.
+        Ring of the cylinder, from A on; for an end, the ring that carries it.
     """
 
     arc: Line | EllipseArc
@@ -46,37 +47,41 @@ class Piece:
 
 
 class LyingSolid(Solid):
-    """A lying tank as the sum of `Piece`s.
+    """Lying tank as the sum of `Piece`s.
 
-    A subclass has `tilt`, `dip_from_a_m`, `dip_direction`, `top_m`, `_pieces`, and `_radius_m`, the
-    radius at the zero of its dips.
+    Subclasses define `tilt`, `dip_from_a_m`, `dip_direction`, `top_m`, `_pieces`, and `_radius_m`,
+    the radius at the zero of the dips.
     """
 
-    _squeeze = 1.0  # heights of the round tank to heights of this one
-    _has_twins = False  # whether both ends hold the same at any dip
+    _squeeze = 1.0  # ratio of heights of the round tank to heights of this tank
+    _has_twins = False  # whether both ends have equal volumes at any dip
 
     @cached_property
     def capacity_m3(self):
-        """Volume of the full tank."""
+        """Volume of the full tank, m3."""
         full = np.array([2 * max(piece.arc.at(piece.arc.start)[1] for piece in self._pieces)])
-        whole = (piece.sign * integrate(piece.arc, full, 0.0, [Cut.segment])[0, 0]
+        volumes = (piece.sign * integrate(piece.arc, full, 0.0, [Cut.segment])[0, 0]
                  for piece in self._pieces)  # fmt: skip
-        return float(sum(whole))
+        return float(sum(volumes))
 
     def volume_m3(self, levels_m):
-        """(rows,) volume below each dip."""
+        """Return the volume (rows,) below each dip."""
         return self._sum(levels_m, Cut.segment)
 
     def area_m2(self, levels_m):
-        """(rows,) derivative of the volume by the dip; the free surface, when the dip is plumb."""
+        """Return the derivative (rows,) of the volume by the dip; plumb: the free surface."""
+        # Chain rule: dip to depth, depth to the height in the round tank, height to volume.
         return self._squeeze * self._depth_slope * self._sum(levels_m, Cut.chord)
 
     def depth_m(self, levels_m):
-        """(rows,) depths square to the axis above the bottom of the section of each dip."""
+        """Return depths (rows,), perpendicular to the axis, in the section of the dip."""
         return self._stretch * np.asarray(levels_m, dtype=float)
 
     def _sum(self, levels_m, integrand):
-        """(rows,) integral over the whole tank; equal ends of a level one are integrated once."""
+        """Return the integral (rows,) over the whole tank.
+
+        Equal ends of a level tank are integrated once.
+        """
         pieces, twins = self._pieces, self._has_twins
         if twins:
             pieces = [piece for piece in pieces if piece.end != "b"]
@@ -87,29 +92,30 @@ class LyingSolid(Solid):
         )
 
     def _integrals(self, piece, levels_m, integrands):
-        """(integrands, rows) over one piece, of the round tank."""
+        """Return integrals (integrands, rows) over a piece of the round tank."""
         level = self._liquid_m(levels_m, piece.origin_m)
         slope = piece.way * self._squeeze * self.tilt
         return piece.sign * integrate(piece.arc, level, slope, integrands)
 
     def _moment(self, piece, surface, surface_moment):
-        """Moment of a piece's free surface about the place of the dip."""
+        """Return the moment of the free surface of a piece about the position of the dip."""
         return (piece.origin_m - self.dip_from_a_m) * surface + piece.way * surface_moment
 
     def _section_m2(self, levels_m, s, ring=0):
-        """(rows,) wet part of the section of a ring of the cylinder at s."""
+        """Return the wet area (rows,) of the section of a ring of the cylinder at s."""
         arc = self._pieces[ring].arc
         return Cut(arc, s, s, arc.radius_m, self._liquid_m(levels_m, s)).segment()
 
     def _liquid_m(self, levels_m, s):
-        """(rows,) height of the liquid above the axis at s, in the round tank of equal area."""
+        """Return the height (rows,) of the liquid above the axis at s, in the round tank."""
         levels = levels_inside(levels_m, self._highest_m)
+        # The surface is level, so relative to the tilted axis it falls by the tilt per metre.
         above_dip_zero = self.depth_m(levels) - self.tilt * (s - self.dip_from_a_m)
         return self._squeeze * above_dip_zero - self._radius_m
 
     @property
     def _highest_m(self):
-        """The highest dip that is answered."""
+        """Highest valid dip."""
         return self.top_m
 
     @property
@@ -119,26 +125,34 @@ class LyingSolid(Solid):
 
     @property
     def _stretch(self):
-        """Heights square to the axis to dips."""
+        """Ratio of heights perpendicular to the axis to dips."""
         return np.hypot(1.0, self.tilt) if self.dip_direction == "plumb" else 1.0
 
 
 def pieces_of_ends(ends, length_m, last_ring=0, upward=1.0):
-    """`Piece`s of the ends.
+    """Yield the `Piece`s of the ends.
 
-    ends    (End, radius of the cylinder there) of A and of B
-    upward  as of `heads.meridian`
+    Parameters
+    ----------
+    ends : pair of (End, float)
+        End, and radius of the cylinder there, of A and of B.
+    length_m : float
+        Length of the cylinder.
+    last_ring : int, optional
+        Ring that carries end B.
+    upward : float, optional
+        As for `heads.meridian`.
     """
     places = ("a", 0.0, -1, 0), ("b", length_m, 1, last_ring)
-    for (end, radius), (name, origin, out, ring) in zip(ends, places, strict=True):
+    for (end, radius), (name, origin, outwards, ring) in zip(ends, places, strict=True):
         sign = -1 if end.inward else 1
         for arc in meridian(end, radius, upward):
-            yield Piece(arc, origin, sign * out, sign, name, ring)
+            yield Piece(arc, origin, sign * outwards, sign, name, ring)
 
 
 def refuse_meeting_ends(ends, length_m):
-    """SolutionError for ends that bulge inwards and meet; arguments as of `pieces_of_ends`."""
-    depths = [(depth_of(*one), one[0]) for one in ends]
+    """Raise SolutionError for inward ends that meet; arguments as for `pieces_of_ends`."""
+    depths = [(depth_of(*item), item[0]) for item in ends]
     inward = sum(depth for depth, end in depths if end.inward)
     if inward > length_m:
         raise SolutionError(
@@ -152,7 +166,16 @@ def refuse_meeting_ends(ends, length_m):
 
 
 def check_directions(dip_direction, tilt, roll_rad=0.0):
-    """SolutionError for a direction of the dip that is none, and for angles that are none."""
+    """Raise SolutionError for an unknown direction of the dip, or angles that are not finite.
+
+    Parameters
+    ----------
+    dip_direction : str
+        "plumb" or "square".
+    tilt : float
+        Tangent of the tilt.
+    roll_rad : float, optional
+    """
     if dip_direction not in ("plumb", "square"):
         raise SolutionError(f"dip direction {dip_direction!r}: expected plumb or square")
     if not np.isfinite(tilt) or not np.isfinite(roll_rad):
@@ -160,14 +183,24 @@ def check_directions(dip_direction, tilt, roll_rad=0.0):
 
 
 def check_dip(dip_from_a_m, dip_direction, shift_m, length_m):
-    """SolutionError for a dip that does not stand in the cylinder.
+    """Raise SolutionError for a dip outside the cylinder.
 
-    shift_m  how much farther from A a plumb dip is at the top
+    Parameters
+    ----------
+    dip_from_a_m : float
+        Position of the zero of the dip along the cylinder.
+    dip_direction : str
+        "plumb" or "square".
+    shift_m : float
+        Additional distance from A of a plumb dip at the top.
+    length_m : float
+        Length of the cylinder.
     """
     low, high = dip_from_a_m, dip_from_a_m
     if dip_direction == "plumb":
         high += shift_m
     slack = ROUNDING * length_m
+    # The tolerance permits a dip exactly at an end of the cylinder.
     if min(low, high) < -slack or max(low, high) > length_m + slack:
         raise SolutionError(
             message(
@@ -182,7 +215,7 @@ def check_dip(dip_from_a_m, dip_direction, shift_m, length_m):
 
 
 def levels_inside(levels_m, top_m):
-    """The levels as an array; HeightError for one outside."""
+    """Return the levels as an array; raise HeightError for a level outside the tank."""
     levels = np.asarray(levels_m, dtype=float)
     slack = ROUNDING * top_m
     outside = ~((levels >= -slack) & (levels <= top_m + slack))
@@ -199,6 +232,6 @@ def levels_inside(levels_m, top_m):
 
 
 def require_length(name, length_m):
-    """SolutionError for a length that is not above zero."""
+    """Raise SolutionError for a length that is not above zero."""
     if not 0 < length_m < np.inf:
         raise SolutionError(f"{name} {length_m:g} m: expected a length above zero")

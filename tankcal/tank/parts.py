@@ -1,7 +1,8 @@
-"""What a part of a tank is: the contract that shells, heads, bottoms, solids and fittings fulfil.
+"""Part of a tank: the interface of shells, heads, bottoms, solids and fittings.
 
-A tank is the sum of its parts (`body.Body`), so a part has to give, below any level, its volume,
-the free surface, the derivatives by every input that moves it, and its own causes of uncertainty.
+A tank is the sum of its parts (`body.Body`). A part therefore provides, below any level, its
+volume, the free surface, the derivatives by every input that changes it, and its own causes of
+uncertainty.
 """
 
 from abc import abstractmethod
@@ -13,21 +14,21 @@ from tankcal.uncertainty import Source
 
 
 class Part(Protocol):
-    """A part of a tank; classes fulfil it by naming it as their base.
+    """Part of a tank; classes implement it as their base class.
 
-    Levels count from the bottom of a vertical tank's first course, of another tank from its lowest
-    inside point, in metres. A part may take away: deadwood has a negative volume.
+    Levels count from the bottom of the first course of a vertical tank, or from the lowest inside
+    point of another tank, in metres. A part may have a negative volume: deadwood.
 
     Attributes
     ----------
     kind : str
-        What it is to who measured the tank: "wall", "bottom", "deadwood" or "roof".
+        Category for the user: "wall", "bottom", "deadwood" or "roof".
     moves_with_zero : bool
-        Whether it was declared by dips. It then has no derivative by "datum": wherever the table's
-        zero is, the same dips have the same volume.
+        Whether the part was declared by dips. It then has no derivative by "datum": equal dips have
+        equal volumes wherever the zero of the table is.
     has_own_height : bool
-        Of a bottom: whether its sources say how well its height is known, as those of one in scans
-        do; the input "bottom" is not missed then.
+        For a bottom: whether its sources contain the uncertainty of its height, as for a bottom
+        from scans; the input "bottom" is then not required.
     """
 
     kind: str = "wall"
@@ -36,7 +37,7 @@ class Part(Protocol):
 
     @abstractmethod
     def volume_m3(self, levels_m) -> np.ndarray:
-        """Volume below each level.
+        """Return the volume below each level.
 
         Parameters
         ----------
@@ -56,66 +57,82 @@ class Part(Protocol):
 
     @abstractmethod
     def area_m2(self, levels_m) -> np.ndarray:
-        """Derivative of the volume by the level, (rows,) m2; above the level where it jumps."""
+        """Return the derivative of the volume by the level, (rows,) m2; at a jump, that above."""
 
     @abstractmethod
     def derivatives(self, levels_m) -> dict[str, np.ndarray]:
-        """Derivatives of the volume by the inputs that move it, others held.
+        """Return the derivatives of the volume by each input, with other inputs fixed.
 
         Returns
         -------
         dict of str to (rows,) or (rows, c) array
-            By the name of the input, m3 per SI unit; c columns where each course has its own.
+            By the name of the input, m3 per SI unit; c columns if each course has its own input.
         """
 
     def sources(self, levels_m) -> tuple[Source, ...]:
-        """Causes of uncertainty that belong to this part alone, `Source`s of (rows, c) columns."""
+        """Return causes of uncertainty of this part alone, `Source`s of (rows, c) columns."""
         return ()
 
     @property
     def lowest_m(self) -> float:
-        """Level at which a tank with this part is empty; inf for one that never holds liquid."""
+        """Level of an empty tank with this part; inf for a part that never contains liquid."""
         return 0.0
 
     @property
     def breakpoints_m(self) -> tuple[float, ...]:
-        """Levels at which the area jumps or, as that of a bottom, ends."""
+        """Levels at which the area jumps or, for a bottom, ends."""
         return ()
 
     def area_by(self, derivatives, levels_m):
-        """`area_m2` of levels whose derivatives are known: that by "datum", where there is one."""
+        """Return `area_m2` from known derivatives: that by "datum", if there is one."""
         return derivatives["datum"] if "datum" in derivatives else self.area_m2(levels_m)
 
     def moved_m3(self, levels_m, step_m, lowest_m, highest_m):
-        """Volumes when the table's zero stands step_m higher in a tank between two levels.
+        """Return volumes with the zero of the table raised, in a tank between two levels.
 
-        Never below empty; above the top the part goes on as wide as it is there.
+        Volumes are never below empty; above the top, the part continues with the area at the top.
+
+        Parameters
+        ----------
+        levels_m : ndarray, shape (rows,)
+            Levels of the dips before the change, m.
+        step_m : float or ndarray, shape (rows,)
+            Rise of the zero, m.
+        lowest_m, highest_m : float
+            Levels of the empty and of the full tank, m.
+
+        Returns
+        -------
+        ndarray, shape (rows,)
+            m3.
         """
+        # The volume belongs to the dip, not to the level in the tank.
         if self.moves_with_zero:
             return self.volume_m3(levels_m)
-        moved = levels_m + step_m
-        volume = self.volume_m3(np.clip(moved, lowest_m, highest_m))
-        over = np.maximum(moved - highest_m, 0.0)
-        if not np.any(over):
+        # A higher zero adds step_m to the level of each dip.
+        moved_levels = levels_m + step_m
+        volume = self.volume_m3(np.clip(moved_levels, lowest_m, highest_m))
+        excess = np.maximum(moved_levels - highest_m, 0.0)
+        if not np.any(excess):
             return volume
-        return volume + over * self.area_m2(np.array([highest_m]))[0]
+        return volume + excess * self.area_m2(np.array([highest_m]))[0]
 
 
 class Solid(Part):
-    """A part that is a whole tank; its highest dip is `top_m`."""
+    """Part that is a whole tank; its highest dip is `top_m`."""
 
     def height_share(self, levels_m):
-        """(rows,) levels as a share of the highest one, and its slope."""
+        """Return levels (rows,) as fractions of the highest level, and the derivative."""
         return np.asarray(levels_m, dtype=float) / self.top_m, 1 / self.top_m
 
 
 def as_levels(levels_m):
-    """(rows,) levels as floats, of an array or of one number."""
+    """Return levels (rows,) as floats, from an array or a single number."""
     return np.atleast_1d(np.asarray(levels_m, dtype=float))
 
 
 def sum_derivatives(derivatives):
-    """Sum what several parts give by each input.
+    """Sum the derivatives of several parts by each input.
 
     Parameters
     ----------
@@ -133,7 +150,7 @@ def sum_derivatives(derivatives):
     {'datum': 5.0, 'scale': 1.0}
     """
     total = {}
-    for found in derivatives:
-        for name, by in found.items():
-            total[name] = total[name] + by if name in total else by
+    for part_derivatives in derivatives:
+        for name, derivative in part_derivatives.items():
+            total[name] = total[name] + derivative if name in total else derivative
     return total

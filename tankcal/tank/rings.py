@@ -1,12 +1,13 @@
-"""A lying cylinder of rings, each of its own radius: exact.
+"""Lying cylinder of rings, each with its own radius: exact.
 
-The rings are coaxial. With tilt m (B higher: above zero), a plumb dip h that touches the bottom of
-the ring at s = p, of radius R_p, and cos the cosine of the tilt, the liquid stands
+The rings are coaxial. The tilt m is above zero if B is higher. For a plumb dip h that touches the
+bottom of the ring at s = p, of radius R_p, with cos the cosine of the tilt, the liquid has the
+depth
 
     depth(s) = (p - s) m + h / cos + R_i - R_p,   0 <= depth <= 2 R_i,
 
-square to the axis in ring i. The quadrature breaks at joints and where the surface meets the bottom
-or the top of a ring (`arcs.integrate`).
+perpendicular to the axis in ring i. The quadrature has breaks at joints and where the surface meets
+the bottom or the top of a ring (`arcs.integrate`).
 """
 
 from dataclasses import dataclass
@@ -28,34 +29,34 @@ from tankcal.tank.lying import (
 )
 
 FLAT = End("flat")
-WAVES = tuple(range(2, 13))  # orders of departures from a circle that move rows one by one
+WAVES = tuple(range(2, 13))  # orders of departures from a circle in the derivatives of rows
 
 
 @dataclass(frozen=True)
 class RingedTank(LyingSolid):
-    """A lying cylinder of coaxial rings between two ends, tilted.
+    """Lying, tilted cylinder of coaxial rings between two ends.
 
-    The zero is the bottom of the ring at dip_from_a_m, where the plumb line touches it. Liquid may
-    lie lower, in a tilted tank or in a wider ring, so the volume at dip 0 may be above zero; and
-    there may be room above the highest dip, where the plumb line meets the top.
+    The zero is the bottom of the ring at dip_from_a_m, where the plumb line touches it. In a tilted
+    tank or a wider ring, liquid may be below the zero, so the volume at dip 0 may be above zero.
+    There may also be room above the highest dip, where the plumb line meets the top.
 
     Attributes
     ----------
     radii_m, lengths_m : tuple of float
-        Inside, of each ring from end A to end B.
+        Inside radius and length of each ring from end A to end B.
     end_a, end_b : End
-        On the first and on the last ring.
+        Ends on the first and on the last ring.
     tilt : float
-        Tan of the angle by which the axis rises from A to B (negative: falls).
+        Tangent of the angle by which the axis rises from A to B (negative: falls).
     dip_from_a_m : float
-        Place of the dip's zero, along the axis from the start of the cylinder at A.
+        Position of the zero of the dip, along the axis from the start of the cylinder at A.
     dip_direction : str
-        "plumb": the dip is read along the vertical; "square": square to the axis.
+        "plumb": the dip is read along the vertical; "square": perpendicular to the axis.
 
     Raises
     ------
     SolutionError
-        For sizes that make no tank.
+        For impossible dimensions.
 
     References
     ----------
@@ -92,12 +93,12 @@ class RingedTank(LyingSolid):
 
     @cached_property
     def joints_m(self):
-        """(rings + 1,) places of the joints along the axis."""
+        """Positions (rings + 1,) of the joints along the axis."""
         return np.concatenate([[0.0], np.cumsum(self.lengths_m)])
 
     @property
     def length_m(self):
-        """Of the cylinder."""
+        """Length of the cylinder."""
         return float(self.joints_m[-1])
 
     @property
@@ -107,70 +108,73 @@ class RingedTank(LyingSolid):
 
     @property
     def height_m(self):
-        """The same: each ring is round."""
+        """Mean inside diameter: each ring is round."""
         return self.width_m
 
     @property
     def top_m(self):
-        """The highest dip: where its line meets the top."""
+        """Highest dip, where its line meets the top."""
         return (self._radius_m + self._radius_at_top_m) * self._stretch
 
     @property
     def zero_ring(self):
-        """Index of the ring that the dip touches."""
+        """Index of the ring at the zero of the dip."""
         return self._ring_at(self.dip_from_a_m)
 
     @property
     def left_m3(self):
-        """Room that is left when the liquid reaches the highest dip."""
+        """Remaining room when the liquid reaches the highest dip."""
         return self.capacity_m3 - float(self.volume_m3([self.top_m])[0])
 
     def derivatives(self, levels_m):
-        """{input: (rows,) or (rows, k)} derivative of the volume at a fixed dip, all else fixed.
+        """Return {input: derivative (rows,) or (rows, k) of the volume at a fixed dip}.
 
-        ring_radii       (rows, rings) each its own; the ring of the dip takes the zero along
-        dip_radius       of the wall where the dip touches it alone
+        ring_radii       (rows, rings) each ring separately; the ring of the dip also moves the zero
+        dip_radius       radius of the wall only where the dip touches it
         ring_waves       (rows, rings x WAVES) wave cos(k a) of a ring, a from its bottom, the waves
-                         of a ring together; the ring of the dip takes the zero along
-        ring_lengths     (rows, rings) each its own; what lies beyond moves away, A and the dip stay
-        ring_axes        (rows, rings) how far the axis of each stands above the common one
+                         of a ring together; the ring of the dip also moves the zero
+        ring_lengths     (rows, rings) each ring separately; the rings beyond move, A and the dip do
+                         not
+        ring_axes        (rows, rings) height of the axis of each ring above the common axis
         end_depth, dish, knuckle, tilt, dip_position, datum, scale
-                         as of `solids.LyingTank`
-        plate_thickness  of plates that were taken off outside measures: all radii are less by it,
-                         each end less deep; the lengths stay
-        paint            the same of the radii alone
+                         as for `solids.LyingTank`
+        plate_thickness  thickness subtracted from outside measurements: reduces all radii and the
+                         depths of the ends, but not the lengths
+        paint            thickness subtracted from the radii alone
         """
         integrands = [Cut.segment, Cut.chord, Cut.chord_moment]
         inputs = ("radius", "end_depth", "end_plate", *RADII)
         integrands += [partial(Cut.by, name=name) for name in inputs]
         cylinder = [*integrands, *(partial(Cut.by_wave, order=order) for order in WAVES)]
-        found = [
+        integrals = [
             (piece, self._integrals(piece, levels_m, integrands if piece.end else cylinder))
             for piece in self._pieces
         ]
         rings = len(self.radii_m)
         volume, surface, by_depth, by_dish, by_knuckle = (
-            sum(one[i] for _, one in found) for i in (0, 1, 4, 6, 7)
+            sum(values[i] for _, values in integrals) for i in (0, 1, 4, 6, 7)
         )
-        by_plate = sum(piece.sign * one[5] for piece, one in found)
-        moment = sum(self._moment(piece, one[1], one[2]) for piece, one in found)
-        of_ring = np.zeros((2, len(surface), rings))  # surface, and by the radius
-        for piece, one in found:
-            of_ring[:, :, piece.ring] += one[[1, 3]]
-        waves = np.stack([one[8:].T for piece, one in found if not piece.end], axis=1)
-        own = np.eye(rings)[self.zero_ring]
-        zero = -surface[:, None] * own  # of what moves the bottom of the dip's ring
-        by_radii = of_ring[1] + zero
+        by_plate = sum(piece.sign * values[5] for piece, values in integrals)
+        moment = sum(self._moment(piece, values[1], values[2]) for piece, values in integrals)
+        by_ring = np.zeros((2, len(surface), rings))  # surface, and by the radius
+        for piece, values in integrals:
+            by_ring[:, :, piece.ring] += values[[1, 3]]
+        # The waves exist only in the cylinder, not in the ends.
+        waves = np.stack([values[8:].T for piece, values in integrals if not piece.end], axis=1)
+        is_dip_ring = np.eye(rings)[self.zero_ring]
+        zero = -surface[:, None] * is_dip_ring  # of what moves the bottom of the dip's ring
+        by_radii = by_ring[1] + zero
+        # A rise of the ring of the dip lowers the liquid everywhere: the zero moves with it.
         datum = self._stretch * surface
         by_stretch = self.tilt / self._stretch if self.dip_direction == "plumb" else 0.0
         levels = np.asarray(levels_m, dtype=float)
-        of_end_b = sum(one[1] * (piece.end == "b") for piece, one in found)
+        surface_of_b = sum(values[1] * (piece.end == "b") for piece, values in integrals)
         return {
             "ring_radii": by_radii,
             "dip_radius": -surface,
             "ring_waves": (waves + zero[:, :, None]).reshape(len(surface), -1),
-            "ring_lengths": self._by_lengths(levels, of_ring[0], of_end_b),
-            "ring_axes": -of_ring[0] - zero,
+            "ring_lengths": self._by_lengths(levels, by_ring[0], surface_of_b),
+            "ring_axes": -by_ring[0] - zero,
             "end_depth": by_depth,
             "dish": by_dish,
             "knuckle": by_knuckle,
@@ -183,21 +187,21 @@ class RingedTank(LyingSolid):
         }
 
     def _by_lengths(self, levels, surface, of_end_b):
-        """(rows, rings) by the length of each ring.
+        """Return derivatives (rows, rings) by the length of each ring.
 
-        surface (rows, rings) with the ends; of_end_b (rows,) that of end B alone
+        surface (rows, rings) includes the ends; of_end_b (rows,) is the surface of end B alone
         """
         rings = surface.shape[1]
-        beyond = np.cumsum(surface[:, ::-1], axis=1)[:, ::-1] - surface  # of the rings after each
-        beyond[:, -1] = of_end_b
+        later_surface = np.cumsum(surface[:, ::-1], axis=1)[:, ::-1] - surface  # sum of later rings
+        later_surface[:, -1] = of_end_b
         sections = [self._section_m2(levels, self.joints_m[i + 1], i) for i in range(rings)]
-        return np.column_stack(sections) - self.tilt * beyond
+        return np.column_stack(sections) - self.tilt * later_surface
 
     @cached_property
     def _pieces(self):
-        by = {"radius": (1.0, 0.0)}
+        by_input = {"radius": (1.0, 0.0)}
         cylinder = (
-            Piece(Line(start, stop, radius, 0.0, by), 0.0, 1, 1, "", ring)
+            Piece(Line(start, stop, radius, 0.0, by_input), 0.0, 1, 1, "", ring)
             for ring, (start, stop, radius) in enumerate(
                 zip(self.joints_m[:-1], self.joints_m[1:], self.radii_m, strict=True)
             )
@@ -214,18 +218,24 @@ class RingedTank(LyingSolid):
 
     @property
     def _radius_at_top_m(self):
-        """Of the ring whose top the line of the dip meets."""
+        """Radius of the ring whose top the line of the dip meets."""
+        # A plumb line in a tilted tank is farther from A at the top than at the bottom.
         shift = 2 * self._radius_m * self.tilt if self.dip_direction == "plumb" else 0.0
         return self.radii_m[self._ring_at(self.dip_from_a_m + shift)]
 
     @property
     def _highest_m(self):
-        """A dip at which nothing is left, or the highest one: a pipe above the top may read it."""
-        depths = [depth_of(*one) for one in self._ends]
+        """Highest valid dip: that of the full tank, or the top if higher.
+
+        A pipe above the top may read dips above the top.
+        """
+        depths = [depth_of(*item) for item in self._ends]
         low, high = -depths[0] - self.dip_from_a_m, self.length_m + depths[1] - self.dip_from_a_m
-        over = max(self.radii_m) + abs(self.tilt) * max(-low, high)
-        return max(self.top_m, (over + self._radius_m) / self._stretch)
+        # Highest point of the inside above the axis at the dip: a full tank reaches it.
+        highest_point = max(self.radii_m) + abs(self.tilt) * max(-low, high)
+        return max(self.top_m, (highest_point + self._radius_m) / self._stretch)
 
     def _ring_at(self, s):
+        """Return the index of the ring at the position s."""
         ring = int(np.searchsorted(self.joints_m, s, side="right")) - 1
         return min(max(ring, 0), len(self.radii_m) - 1)

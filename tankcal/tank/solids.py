@@ -1,7 +1,7 @@
-"""Tanks that are one solid: the lying cylinder with its ends, and the sphere.
+"""Tanks that are a single solid: the lying cylinder with its ends, and the sphere.
 
-Both are parts of a capacity: volumes, free surfaces and derivatives at any dips. The dips of this
-room count from the inside bottom, in metres; dips outside the tank raise HeightError.
+Both are parts of a capacity table, with volumes, free surfaces and derivatives at any dips. Dips
+count from the inside bottom, in metres; dips outside the tank raise HeightError.
 """
 
 from dataclasses import dataclass
@@ -32,47 +32,48 @@ TUBE = ("tube_angle", "tube_offset")  # inputs of a gauge tube
 
 @dataclass(frozen=True)
 class LyingTank(LyingSolid):
-    """A lying cylinder, round or elliptical, between two ends, tilted and rolled: exact.
+    """Lying cylinder, round or elliptical, between two ends, tilted and rolled: exact.
 
     The zero is the lowest point of the section at dip_from_a_m, where the plumb line touches the
-    bottom; in a tilted tank liquid may lie lower, so the volume at dip 0 may be above zero. With
-    level c_p above the axis in that section, B the half height of the rolled section and a dip d,
+    bottom. In a tilted tank, liquid may be below the zero, so the volume at dip 0 may be above
+    zero. With the level c_p above the axis in that section, B the half height of the rolled section
+    and a dip d,
 
         c_p = -B + d (square),   c_p = -B + d sqrt(1 + tilt^2) (plumb),   c(s) = c_p - tilt (s - p).
 
-    The highest dip is where its line meets the top of the cylinder: 2 B, plumb 2 B sqrt(1+tilt^2).
-    With a gauge tube off the axis or off the plumb, of a round tank only, c_p = depth(d) - B, its
-    d times sqrt(1 + tilt^2) where it is read plumb (`GaugeTube`).
-    Sections of an end are similar to that of the cylinder. An elliptical tank is computed as the
-    round one of equal section area, with heights times sqrt(width height) / (2 B), which is exact;
-    the radii and the spherical form of an end are those of that round tank.
+    At the highest dip, its line meets the top of the cylinder: 2 B, plumb 2 B sqrt(1+tilt^2). For a
+    gauge tube off the axis or off the plumb (round tanks only), c_p = depth(d) - B, with d times
+    sqrt(1 + tilt^2) for a plumb reading (`GaugeTube`). The sections of an end are similar to that
+    of the cylinder. An elliptical tank is computed as the round tank of equal section area, with
+    heights times sqrt(width height) / (2 B), which is exact; the radii and the spherical form of an
+    end refer to that round tank.
 
     Attributes
     ----------
     width_m, height_m : float
-        Inside axes of the section, square to the axis; equal when it is round.
+        Inside axes of the section, perpendicular to the axis; equal for a round tank.
     length_m : float
         Inside length of the cylinder, without its ends.
     end_a, end_b : End
-        Each of its own kind and size.
+        Ends, of independent kind and size.
     tilt : float
-        Tan of the angle by which the axis rises from A to B (negative: falls).
+        Tangent of the angle by which the axis rises from A to B (negative: falls).
     roll_rad : float
-        Turn of the section about the axis; of no effect when it is round.
+        Rotation of the section about the axis; without effect for a round tank.
     dip_from_a_m : float
-        Place of the dip's zero, along the axis from the start of the cylinder at A.
+        Position of the zero of the dip, along the axis from the start of the cylinder at A.
     dip_direction : str
-        "plumb": the dip is read along the vertical; "square": square to the axis.
+        "plumb": the dip is read along the vertical; "square": perpendicular to the axis.
     tube_angle_rad : float
-        Of the gauge tube off the plumb, in the plane of the section; its top leans to the right as
-        seen from A. 0: plumb.
+        Angle of the gauge tube off the plumb, in the plane of the section; its top leans to the
+        right as seen from A. 0: plumb.
     tube_offset_m : float
-        Distance at which the tube passes the axis, to the right of it as seen from A, when plumb.
+        Distance of the tube from the axis, to the right of it as seen from A if the tube is plumb.
 
     Raises
     ------
     SolutionError
-        For sizes that make no tank.
+        For impossible dimensions.
 
     References
     ----------
@@ -102,7 +103,10 @@ class LyingTank(LyingSolid):
         check_dip(self.dip_from_a_m, self.dip_direction, shift, self.length_m)
 
     def _check_round(self):
-        """What only a round section has: a tube off its axis, and a rolled guppy end."""
+        """Raise SolutionError for features that require a round section.
+
+        They are a gauge tube off the axis or the plumb, and a rolled guppy end.
+        """
         ends = {self.end_a.kind, self.end_b.kind}
         if self._is_round:
             GaugeTube(self._radius_m, self.tube_angle_rad, self.tube_offset_m)
@@ -119,48 +123,52 @@ class LyingTank(LyingSolid):
 
     @property
     def top_m(self):
-        """The highest dip."""
+        """Highest dip, m."""
         if self._has_tube:
             return self._tube.full_m * self._stretch
         return 2 * self._half_height_m * self._stretch
 
     def depth_m(self, levels_m):
-        """(rows,) depths square to the axis above the lowest point of the section of each dip."""
-        along = super().depth_m(levels_m)
-        return self._tube.depth_m(along) if self._has_tube else along
+        """Return depths (rows,) perpendicular to the axis above the lowest point of the section."""
+        dips_square = super().depth_m(levels_m)
+        return self._tube.depth_m(dips_square) if self._has_tube else dips_square
 
     def height_share(self, levels_m):
-        """(rows,) the plumb dip of each depth as a share of the highest one, and its slope."""
-        high = 2 * self._half_height_m * self._stretch**2  # of the depth at that dip
+        """Return the plumb dip (rows,) of each depth over the highest dip, and its derivative."""
+        high = 2 * self._half_height_m * self._stretch**2  # scale from depths to fractions
         return self.depth_m(levels_m) / high, self._depth_slope / high
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} derivative of the volume at a fixed dip by each input, all else fixed.
+        """Return {input: derivative (rows,) of the volume at a fixed dip}, with all else fixed.
 
-        diameter         width and height both; ends keep their depths (torispherical: their radii)
-        length           of the cylinder; B moves away, A and the place of the dip stay
-        end_depth        of both ends, each the way it bulges; flat ends have none, torispherical
-                         ones of given radii are stretched along the axis
-        dish, knuckle    radii of both ends, where torispherical ones were given by them
-        tube_angle, tube_offset  of the gauge tube, of a round tank only
-        tilt             the tangent; the dip's zero stays where it is
+        diameter         width and height together; ends keep their depths (torispherical: their
+                         radii)
+        length           length of the cylinder; B moves, A and the position of the dip do not
+        end_depth        depth of both ends in the direction of their bulge; flat ends have none,
+                         torispherical ends of given radii are stretched along the axis
+        dish, knuckle    radii of both ends, for torispherical ends of given radii
+        tube_angle, tube_offset  position of the gauge tube, of a round tank only
+        tilt             tangent of the tilt; the zero of the dip is fixed
         dip_position     dip_from_a_m
-        plate_thickness  of plates that were taken off outside measures: the diameter is less by
-                         twice, each end less deep (or of less radii) by once, more if inward;
-                         the length stays
+        plate_thickness  thickness subtracted from outside measurements: reduces the diameter by
+                         twice the thickness, and the depth (or the radii) of each end by the
+                         thickness; the depth of an inward end increases; the length is fixed
         datum            height of the liquid at a given dip
-        scale            of all lengths of the tank and the place of the dip, but not of the dips
+        scale            scale of all lengths of the tank and of the position of the dip, but not of
+                         the dips
         """
         integrands = [Cut.segment, Cut.chord, Cut.chord_moment]
         inputs = ("radius", "end_depth", "end_plate", *RADII)
         integrands += [partial(Cut.by, name=name) for name in inputs]
-        found = [(piece, self._integrals(piece, levels_m, integrands)) for piece in self._pieces]
+        integrals = [
+            (piece, self._integrals(piece, levels_m, integrands)) for piece in self._pieces
+        ]
         volume, surface, _, by_radius, by_depth, _, by_dish, by_knuckle = sum(
-            one for _, one in found
+            values for _, values in integrals
         )
-        moment = sum(self._moment(piece, one[1], one[2]) for piece, one in found)
-        surface_of_b = sum(one[1] for piece, one in found if piece.end == "b")
-        by_plate = sum(piece.sign * one[5] for piece, one in found)
+        moment = sum(self._moment(piece, values[1], values[2]) for piece, values in integrals)
+        surface_of_b = sum(values[1] for piece, values in integrals if piece.end == "b")
+        by_plate = sum(piece.sign * values[5] for piece, values in integrals)
         levels = np.asarray(levels_m, dtype=float)
         squeeze, tilt, stretch, slope = self._squeeze, self.tilt, self._stretch, self._tube.slope
         by_stretch = tilt / stretch * slope if self.dip_direction == "plumb" else 0.0
@@ -168,10 +176,13 @@ class LyingTank(LyingSolid):
         by_squeeze = stretch * levels * surface - tilt * moment
         by_tube = self._tube.derivatives(stretch * levels)
         radius_by, squeeze_by = self._by_diameter
+        # A larger radius lowers the bottom, where dips begin: the surface falls relative to the
+        # axis.
         by_radius = by_radius - (1 - by_tube["radius"]) * surface
         diameter = radius_by * by_radius + squeeze_by * by_squeeze
-        of_tube = {name: by_tube[name] * surface for name in TUBE if self._is_round}
-        return of_tube | {
+        # Chain rule: the volume changes by the free surface times the change of the depth.
+        by_tube_inputs = {name: by_tube[name] * surface for name in TUBE if self._is_round}
+        return by_tube_inputs | {
             "diameter": diameter,
             "length": self._section_m2(levels, self.length_m) - squeeze * tilt * surface_of_b,
             "end_depth": by_depth,
@@ -200,7 +211,7 @@ class LyingTank(LyingSolid):
 
     @property
     def _has_tube(self):
-        """Whether the dip is not that of the lowest point of the section."""
+        """Whether the gauge tube is off the axis or off the plumb."""
         return bool(self.tube_angle_rad or self.tube_offset_m)
 
     @property
@@ -223,18 +234,20 @@ class LyingTank(LyingSolid):
     @cached_property
     def _half_height_m(self):
         """Half height B of the rolled section: B^2 = (w/2)^2 sin^2 roll + (h/2)^2 cos^2 roll."""
+        # Support function of the ellipse in the vertical direction.
         sin, cos = np.sin(self.roll_rad), np.cos(self.roll_rad)
         return np.hypot(self.width_m * sin, self.height_m * cos) / 2
 
     @property
     def _squeeze(self):
-        """Heights of the round tank to heights of this one."""
+        """Ratio of heights of the round tank to heights of this tank."""
         return self._radius_m / self._half_height_m
 
     @property
     def _by_diameter(self):
-        """Derivatives of the round tank's radius and of the squeeze by width and height both."""
+        """Derivatives of the radius of the round tank and of the squeeze by width and height."""
         sin2, cos2 = np.sin(self.roll_rad) ** 2, np.cos(self.roll_rad) ** 2
+        # Derivative of sqrt(w h) / 2 for equal changes of w and h.
         radius = (self.width_m + self.height_m) / (8 * self._radius_m)
         half = (self.width_m * sin2 + self.height_m * cos2) / (4 * self._half_height_m)
         return radius, (radius - self._squeeze * half) / self._half_height_m
@@ -242,12 +255,12 @@ class LyingTank(LyingSolid):
 
 @dataclass(frozen=True)
 class Sphere(Solid):
-    """A spherical tank; dips count from its lowest inside point: V = pi d^2 (3 R - d) / 3.
+    """Spherical tank; dips count from its lowest inside point: V = pi d^2 (3 R - d) / 3.
 
     Attributes
     ----------
     diameter_m : float
-        Inside.
+        Inside diameter.
 
     Raises
     ------
@@ -271,7 +284,7 @@ class Sphere(Solid):
 
     @property
     def top_m(self):
-        """The highest dip."""
+        """Highest dip, m."""
         return self.diameter_m
 
     @property
@@ -280,22 +293,22 @@ class Sphere(Solid):
         return np.pi * self.diameter_m**3 / 6
 
     def volume_m3(self, levels_m):
-        """(rows,) volume below each dip."""
+        """Return the volume (rows,) below each dip."""
         d = levels_inside(levels_m, self.top_m)
         return np.pi * d**2 * (1.5 * self.diameter_m - d) / 3
 
     def area_m2(self, levels_m):
-        """(rows,) free surface, pi d (D - d)."""
+        """Return the free surface (rows,), pi d (D - d)."""
         d = levels_inside(levels_m, self.top_m)
         return np.pi * d * (self.diameter_m - d)
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} derivative of the volume at a fixed dip by each input.
+        """Return {input: derivative (rows,) of the volume at a fixed dip}.
 
-        diameter         the lowest point, from which dips count, goes with it
-        plate_thickness  of a plate that was taken off an outside diameter: twice
+        diameter         inside diameter; the lowest point, the zero of the dips, moves with it
+        plate_thickness  thickness subtracted twice from an outside diameter
         datum            height of the liquid at a given dip
-        scale            of the diameter, but not of the dips
+        scale            scale of the diameter, but not of the dips
         """
         d = levels_inside(levels_m, self.top_m)
         by_diameter = np.pi * d**2 / 2

@@ -1,11 +1,11 @@
-"""A bottom's surface through surveyed points, by kriging, and what is uncertain about it.
+"""Surface of a bottom through surveyed points, by kriging, and its uncertainty.
 
-Heights are a trend 1, x, y, rho, rho^2 (a plate that leans, a cone, a dish), plus a form whose
-covariance falls linearly with the distance, - b |p - q|, plus waves finer than the points; b and
-the waves by restricted maximum likelihood. Triangles between the points, the other way, cut off a
-cone (compared in tests/tank/test_soundings.py).
-Sources: Matheron 1973 (intrinsic random functions); Cressie 1993, Statistics for Spatial Data, 3.4;
-Patterson & Thompson 1971.
+Heights are a trend 1, x, y, rho, rho^2 (a leaning plate, a cone, a dish), plus a form whose
+covariance decreases linearly with the distance, - b |p - q|, plus waves finer than the points. b
+and the waves are estimated by restricted maximum likelihood. The alternative, triangles between the
+points, cuts off a part of a cone (compared in tests/tank/test_soundings.py). Sources: Matheron 1973
+(intrinsic random functions); Cressie 1993, Statistics for Spatial Data, 3.4; Patterson & Thompson
+1971.
 """
 
 from dataclasses import dataclass
@@ -19,27 +19,28 @@ from tankcal.messages import message
 from tankcal.tank.terrain import Surface, surface
 from tankcal.uncertainty import factor_of
 
-MESH, COVARIANCE_MESH = (48, 144), (16, 48)  # rings, azimuths
-FEWEST_POINTS, MOST_POINTS = 12, 500
-BEYOND_WALL = 0.01  # of the radius: a point further out is not of this bottom
-BANDS = 24  # of wet area, at whose edges the covariance is computed
-TREND = 5  # functions
-WORST_CONDITION = 1e3  # of the trend in units of the mean radius
-LEAST_WAVES_M2 = 1e-8  # a tenth of a millimetre
+MESH, COVARIANCE_MESH = (48, 144), (16, 48)  # rings and azimuths of the meshes
+FEWEST_POINTS, MOST_POINTS = 12, 500  # least and largest number of surveyed points
+BEYOND_WALL = 0.01  # points beyond the wall by more than 1 % of the radius are refused
+BANDS = 24  # bands of wet area, at whose limits the covariance is computed
+TREND = 5  # number of functions of the trend
+WORST_CONDITION = 1e3  # largest condition number of the trend, in units of the mean radius
+LEAST_WAVES_M2 = 1e-8  # lower bound of the variance of waves: a tenth of a millimetre
 
 
 @dataclass(frozen=True)
 class SurveyedSurface:
-    """A bottom predicted from surveyed points.
+    """Bottom predicted from surveyed points.
 
-    surface          at the vertices of a polar mesh
-    edges_m          (e,) ascending levels, the last above all of the surface
-    noise_m3         (e, c) factor of the covariance of the volumes below the edges, by the points'
-                     noise; form_m3 by the form between them, and what it hides below a level
-    noise_dof, form_dof  their degrees of freedom
+    surface          surface over a polar mesh
+    edges_m          (e,) ascending levels, the last above the whole surface
+    noise_m3         (e, c) factor of the covariance of the volumes below the edges due to the noise
+    form_m3          factor due to the form between the points, and to the volume it hides
+    noise_dof, form_dof  degrees of freedom of the noise and of the form
     form_m2_per_m    b: variance of a height difference is 2 b distance
-    waves_sd_m       of waves finer than the points; with the noise when this is not given
-    w                (n,) of each point: how far it lies off what the others predict, over its sd
+    waves_sd_m       standard deviation of waves finer than the points; including the noise if no
+                     standard deviation is given
+    w                (n,) difference of each point from the prediction by all others, over its sd
     by_points_m2     (e, n) derivative of the volumes below the edges by the heights of the points
     """
 
@@ -56,13 +57,28 @@ class SurveyedSurface:
 
 
 def surveyed_surface(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
-    """The bottom through surveyed points, smoothed by what they can tell.
+    """Return the bottom through surveyed points, smoothed according to their noise.
 
-    xyz_m  (n, 3) x, y in the survey's frame, z above the bottom of the first course
-    sd_m   (n,) or a number: standard deviations of z; None: noise and waves are estimated as one
-    slope  (dx/dz, dy/dz) of the shell's axis
-    Raises SolutionError for under 12 or over 500 points, a point outside the wall, and points that
-    do not spread over the plan.
+    Parameters
+    ----------
+    footprint : Footprint
+        Outline of the first course at its bottom.
+    xyz_m : ndarray, shape (n, 3)
+        x, y in the frame of the survey, z above the bottom of the first course.
+    sd_m : ndarray, shape (n,), or float, optional
+        Standard deviations of z; None: noise and waves are estimated jointly.
+    slope : array_like, shape (2,), optional
+        (dx/dz, dy/dz) of the axis of the shell.
+
+    Returns
+    -------
+    SurveyedSurface
+
+    Raises
+    ------
+    SolutionError
+        For fewer than 12 or more than 500 points, a point outside the wall, and points that are not
+        spread over the plan.
     """
     xyz = np.asarray(xyz_m, dtype=float)
     n = len(xyz)
@@ -81,71 +97,83 @@ def surveyed_surface(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
             message("bottom_point_not_finite", "a surveyed point of the bottom is not finite")
         )
     size = np.sqrt(footprint.area_m2 / np.pi)
+    # Shift the points along the axis to the plane of the plan.
     plan = xyz[:, :2] - (footprint.x_m, footprint.y_m) - np.outer(xyz[:, 2], slope)
     _refuse_outside(footprint, plan)
     noise = np.zeros(n) if sd_m is None else np.broadcast_to(np.square(sd_m), (n,))
-    kriging = _kriging(plan / size, xyz[:, 2], noise)
-    found, predictor = _predicted(footprint, MESH, kriging, size, xyz[:, 2])
-    edges = _edges(found)
-    shown = found.wet_weights(edges) @ predictor
-    waves = kriging.waves_m2 * shown @ shown.T
+    kriging = _fit_kriging(plan / size, xyz[:, 2], noise)
+    predicted, predictor = _predict_surface(footprint, MESH, kriging, size, xyz[:, 2])
+    edges = _edges(predicted)
+    # The volumes are linear in the heights of the mesh, which are linear in the points.
+    by_points = predicted.wet_weights(edges) @ predictor
+    waves = kriging.waves_m2 * by_points @ by_points.T
     form, hidden = _form(footprint, kriging, size, xyz[:, 2], edges)
-    given = sd_m is not None
+    has_sd = sd_m is not None
     return SurveyedSurface(
-        surface=found,
+        surface=predicted,
         edges_m=edges,
-        noise_m3=factor_of((shown * noise) @ shown.T if given else waves),
-        form_m3=np.column_stack([factor_of(form + waves if given else form), hidden]),
-        noise_dof=np.inf if given else float(n - TREND),
+        noise_m3=factor_of((by_points * noise) @ by_points.T if has_sd else waves),
+        form_m3=np.column_stack([factor_of(form + waves if has_sd else form), hidden]),
+        noise_dof=np.inf if has_sd else float(n - TREND),
         form_dof=float(n - TREND),
         form_m2_per_m=float(kriging.form_m2 / size),
         waves_sd_m=float(np.sqrt(kriging.waves_m2)),
         w=kriging.left_out(xyz[:, 2]),
-        by_points_m2=-shown,
+        by_points_m2=-by_points,
     )
 
 
-def _predicted(footprint, mesh, kriging, size, heights):
-    """The surface over a mesh, and (v, n) the weights of the points' heights in it."""
+def _predict_surface(footprint, mesh, kriging, size, heights):
+    """Return the surface over a mesh, and the weights (v, n) of the heights of the points."""
     plan, faces = footprint.mesh(*mesh)
     predictor = kriging.predictor(plan / size)
     return surface(plan, faces, predictor @ heights), predictor
 
 
 def _form(footprint, kriging, size, heights, edges):
-    """(e, e) covariance of the volumes below the edges by the form, and (e,) what it hides.
+    """Return the covariance (e, e) of the volumes below edges due to the form, and its bias (e,).
 
-    The covariance is that of wet @ (predicted - true). Both reproduce a constant, so the
-    generalised covariance - distance can stand for one. Below a level there is more room on a
-    rough surface than on the smooth one: E(L - z)+ > (L - E z)+; above the whole surface there is
-    none.
+    The covariance is that of wet @ (predicted - true). Both surfaces reproduce a constant, so the
+    generalised covariance - distance may replace a covariance. Below a level, a rough surface
+    leaves more room than a smooth surface: E(L - z)+ > (L - E z)+. Above the whole surface, the
+    difference is zero.
     """
-    found, predictor = _predicted(footprint, COVARIANCE_MESH, kriging, size, heights)
+    predicted, predictor = _predict_surface(footprint, COVARIANCE_MESH, kriging, size, heights)
     grid, points = footprint.mesh(*COVARIANCE_MESH)[0] / size, kriging.points
-    wet, to_points, between = (
-        found.wet_weights(edges),
+    wet, to_points, among_points = (
+        predicted.wet_weights(edges),
         _distances(grid, points),
         _distances(points, points),
     )
-    shown = wet @ predictor
-    crossed = wet @ to_points @ shown.T
-    true = wet @ _distances(grid, grid) @ wet.T
-    both = crossed + crossed.T - true - shown @ between @ shown.T
-    own = 2 * np.sum(predictor * to_points, axis=1)
-    own -= np.sum(predictor @ between * predictor, axis=1)
-    sd = np.sqrt(np.maximum(kriging.form_m2 * own, 0) + kriging.waves_m2)
-    off = np.abs(edges[:, None] - found.heights_m) / sd
-    more = sd * (np.exp(-(off**2) / 2) / np.sqrt(2 * np.pi) - off * ndtr(-off))
-    hidden = more @ found.wet_weights(found.highest_m)[0]
+    by_points = wet @ predictor
+    cross_covariance = wet @ to_points @ by_points.T
+    true_covariance = wet @ _distances(grid, grid) @ wet.T
+    combined = (
+        cross_covariance
+        + cross_covariance.T
+        - true_covariance
+        - by_points @ among_points @ by_points.T
+    )
+    variance = 2 * np.sum(predictor * to_points, axis=1)
+    variance -= np.sum(predictor @ among_points * predictor, axis=1)
+    # Prediction error of the height at each vertex.
+    sd = np.sqrt(np.maximum(kriging.form_m2 * variance, 0) + kriging.waves_m2)
+    difference = np.abs(edges[:, None] - predicted.heights_m) / sd
+    # E(L - z)+ - (L - E z)+ for a normal z: sd (phi(d) - d Phi(-d)).
+    excess = sd * (
+        np.exp(-(difference**2) / 2) / np.sqrt(2 * np.pi) - difference * ndtr(-difference)
+    )
+    hidden = excess @ predicted.wet_weights(predicted.highest_m)[0]
     hidden[-1] = 0.0
-    return kriging.form_m2 * (both + both.T) / 2, hidden
+    return kriging.form_m2 * (combined + combined.T) / 2, hidden
 
 
 def _refuse_outside(footprint, plan):
+    """Raise SolutionError for a point outside the wall."""
     azimuth, distance = np.arctan2(*plan.T), np.hypot(*plan.T)
-    beyond = distance / footprint.radius_at(azimuth) - 1
-    worst = int(np.argmax(beyond))
-    if not beyond[worst] <= BEYOND_WALL:
+    excess = distance / footprint.radius_at(azimuth) - 1
+    worst = int(np.argmax(excess))
+    if not excess[worst] <= BEYOND_WALL:
         raise SolutionError(
             message(
                 "bottom_point_off_wall",
@@ -158,21 +186,23 @@ def _refuse_outside(footprint, plan):
         )
 
 
-def _edges(found):
-    """Levels, closer where the tank begins to fill, that have (k / BANDS)^2 of the plan below."""
-    order = np.argsort(found.heights_m[found.faces].mean(axis=1))
-    filled = np.cumsum(found.areas_m2[order])
-    wanted = filled[-1] * (np.arange(1, BANDS) / BANDS) ** 2
-    middle = found.heights_m[found.faces].mean(axis=1)[order]
-    return np.unique(np.append(np.interp(wanted, filled, middle), found.highest_m))
+def _edges(surface_of_points):
+    """Return levels with (k / BANDS)^2 of the plan below them, closer near the bottom."""
+    order = np.argsort(surface_of_points.heights_m[surface_of_points.faces].mean(axis=1))
+    filled = np.cumsum(surface_of_points.areas_m2[order])
+    target_areas = filled[-1] * (np.arange(1, BANDS) / BANDS) ** 2
+    middle = surface_of_points.heights_m[surface_of_points.faces].mean(axis=1)[order]
+    return np.unique(
+        np.append(np.interp(target_areas, filled, middle), surface_of_points.highest_m)
+    )
 
 
 @dataclass(frozen=True)
 class _Kriging:
-    """Heights at points (n, 2) with form variance form_m2 and waves, in units of the mean radius.
+    """Heights at points (n, 2) with variances of form and waves, in units of the mean radius.
 
-    covariance  (n, n) of the heights, but for the trend
-    contrasts   (n, n - TREND) combinations of heights that the trend does not touch
+    covariance  (n, n) of the heights, without the trend
+    contrasts   (n, n - TREND) combinations of heights independent of the trend
     """
 
     points: np.ndarray
@@ -182,21 +212,22 @@ class _Kriging:
     contrasts: np.ndarray
 
     def predictor(self, grid):
-        """(v, n) weights of the points' heights in the height at each vertex."""
+        """Return weights (v, n) of the heights of the points in the height at each vertex."""
         trend = _trend(self.points)
+        # Universal kriging: Lagrange multipliers enforce unbiasedness for the trend.
         system = np.block([[self.covariance, trend], [trend.T, np.zeros((TREND, TREND))]])
-        right = np.hstack([-self.form_m2 * _distances(grid, self.points), _trend(grid)])
-        return np.linalg.solve(system, right.T)[: len(trend)].T
+        right_side = np.hstack([-self.form_m2 * _distances(grid, self.points), _trend(grid)])
+        return np.linalg.solve(system, right_side.T)[: len(trend)].T
 
     def left_out(self, heights):
-        """(n,) each height less its prediction from all others, over its standard deviation."""
+        """Return differences (n,) of heights from predictions by all others, over their sds."""
         inner = self.contrasts.T @ self.covariance @ self.contrasts
         weights = self.contrasts @ np.linalg.solve(inner, self.contrasts.T)
         return weights @ heights / np.sqrt(np.diag(weights))
 
 
-def _kriging(points, heights, noise):
-    """Form and waves by restricted maximum likelihood; raises SolutionError for a poor spread."""
+def _fit_kriging(points, heights, noise):
+    """Fit form and waves by REML; raise SolutionError for a poor spread of the points."""
     trend = _trend(points)
     if np.linalg.cond(trend) > WORST_CONDITION:
         raise SolutionError(
@@ -207,45 +238,48 @@ def _kriging(points, heights, noise):
             )
         )
     contrasts = np.linalg.qr(trend, mode="complete")[0][:, TREND:]
+    # Contrasts eliminate the trend: the generalised covariance becomes positive definite.
     form = -contrasts.T @ _distances(points, points) @ contrasts
     measured = contrasts.T @ (noise[:, None] * contrasts)
-    seen = contrasts.T @ heights
+    observed = contrasts.T @ heights
 
     def misfit(logs):
-        """Doubled negative log-likelihood, but for a constant, and its gradient."""
+        """Return minus twice the log-likelihood, up to a constant, and its gradient."""
         amplitude, waves = np.exp(logs)
-        inner = amplitude * form + measured + (LEAST_WAVES_M2 + waves) * np.eye(len(seen))
+        inner = amplitude * form + measured + (LEAST_WAVES_M2 + waves) * np.eye(len(observed))
         inverse = np.linalg.inv(inner)
-        solved = inverse @ seen
+        solved = inverse @ observed
         by_amplitude = np.sum(inverse * form) - solved @ form @ solved
         by_waves = np.trace(inverse) - solved @ solved
-        value = np.linalg.slogdet(inner)[1] + seen @ solved
+        value = np.linalg.slogdet(inner)[1] + observed @ solved
         return value, np.array([amplitude * by_amplitude, waves * by_waves])
 
-    size = np.log(np.mean(seen**2) + LEAST_WAVES_M2)
+    size = np.log(np.mean(observed**2) + LEAST_WAVES_M2)
     bounds = [(size - 20, size + 10), (np.log(LEAST_WAVES_M2) - 5, size + 5)]
-    found = [
+    # Two starts guard against a local maximum.
+    results = [
         scipy.optimize.minimize(
             misfit,
-            [size, size + start],
+            [size, size + log_ratio],
             jac=True,
             method="L-BFGS-B",
             bounds=bounds,
             options={"ftol": 1e-14, "gtol": 1e-8},
         )
-        for start in (-5, -1)
+        for log_ratio in (-5, -1)
     ]
-    amplitude, waves = np.exp(min(found, key=lambda one: one.fun).x)
+    amplitude, waves = np.exp(min(results, key=lambda result: result.fun).x)
     waves += LEAST_WAVES_M2
     covariance = np.diag(noise + waves) - amplitude * _distances(points, points)
     return _Kriging(points, float(amplitude), float(waves), covariance, contrasts)
 
 
-def _distances(some, others):
-    """Between each of some points and each of others; rows are the first."""
-    return scipy.spatial.distance.cdist(some, others)
+def _distances(points, other_points):
+    """Return the distances between points (rows) and other points (columns)."""
+    return scipy.spatial.distance.cdist(points, other_points)
 
 
 def _trend(points):
+    """Return the functions (n, TREND) of the trend at points."""
     rho = np.hypot(*points.T)
     return np.column_stack([np.ones(len(points)), points, rho, rho**2])

@@ -1,11 +1,13 @@
-"""What the form of a surveyed wall adds to a solid: its height, and its volume at every level.
+"""Form of a surveyed wall about a solid: its height, and its volume at every level.
 
-A wall is no true cylinder or sphere. With T the height of the solid, H that of the surveyed wall
-from the bottom at the dip to the top, and V the volumes of the solid, those of the wall are
+A wall is not exactly a cylinder or sphere. T is the height of the solid, and V are its volumes. H
+is the height of the surveyed wall, from the bottom at the dip to the top. The volumes of the wall
+are
 
     W(d) = V(d T / H) (1 + share + g(t) (1 + cos t)^1.5),   d = H (1 - cos t) / 2,
 
-which fills up where the wall does, and as smoothly; g is a spline through levels even in t.
+where g is a spline through levels equally spaced in t. W is full where the wall is full, and
+equally smooth.
 """
 
 from dataclasses import dataclass
@@ -14,35 +16,35 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-NODES = 49  # levels from empty to full
-MOST_BEND = 0.14  # of g: at the bottom (1 + cos t)^1.5 is 2.8, and a narrow groove no small change
-LEAST_TURN = 1e-4  # next to the ends, where the derivative is taken beside them
+NODES = 49  # number of levels from empty to full
+MOST_BEND = 0.14  # bound of |g|: at the bottom (1 + cos t)^1.5 is 2.8, and a groove may be large
+LEAST_TURN = 1e-4  # distance in t from the ends, where the derivative is indeterminate
 
 
 def node_turns():
-    """(NODES,) t of the levels that a form is stated at."""
+    """Return t (NODES,) of the levels of a form."""
     return np.linspace(0.0, np.pi, NODES)
 
 
 def node_levels(height_m):
-    """(NODES,) these levels of a solid of some height."""
+    """Return the levels (NODES,) of a solid of a given height."""
     return height_m * (1 - np.cos(node_turns())) / 2
 
 
 @dataclass(frozen=True)
 class SurveyedForm:
-    """The form of a wall about the solid that was fitted to it.
+    """Form of a wall about the solid fitted to it.
 
     Attributes
     ----------
     stretch : float
-        Height of the wall over that of the solid.
+        Ratio of the height of the wall to that of the solid.
     share : float
-        Of the solid's volume that the full wall holds more.
+        Relative excess of the volume of the full wall over that of the solid.
     bend : ndarray, shape (NODES,)
         g at the nodes.
     factors : tuple of body.Factor
-        What the survey leaves uncertain about the volumes at the nodes, m3.
+        Uncertainty of the volumes at the nodes after the survey, m3.
     """
 
     stretch: float
@@ -52,45 +54,49 @@ class SurveyedForm:
 
     @classmethod
     def of_volumes(cls, volume_m3, area_m2, height_m, added_m3, added_height_m, factors):
-        """The form of a wall that adds volumes at the nodes of a solid, and a height.
+        """Return the form of a wall with given additional volumes and additional height.
 
         Parameters
         ----------
         volume_m3, area_m2 : ndarray, shape (NODES,)
-            Of the solid at its nodes.
+            Volumes and areas of the solid at its nodes.
         height_m : float
-            Of the solid.
+            Height of the solid.
         added_m3 : ndarray, shape (NODES,)
-            By the departures of the wall, at the same dips.
+            Additional volumes due to the departures of the wall, at equal dips.
         added_height_m : float
-            By them.
+            Additional height due to the departures.
         factors : tuple of body.Factor
         """
         stretch = 1 + added_height_m / height_m
-        risen = node_levels(height_m) * (stretch - 1)
-        rest = added_m3 + area_m2 * risen
-        share = rest[-1] / volume_m3[-1]
+        rise_m = node_levels(height_m) * (stretch - 1)
+        # The nodes of the wall are higher by `risen`: add the volume between to compare at equal
+        # shares.
+        additional_m3 = added_m3 + area_m2 * rise_m
+        share = additional_m3[-1] / volume_m3[-1]
         size = volume_m3 * (1 + np.cos(node_turns())) ** 1.5
         bend = np.zeros(NODES)
-        bend[1:-1] = (rest - share * volume_m3)[1:-1] / size[1:-1]
+        bend[1:-1] = (additional_m3 - share * volume_m3)[1:-1] / size[1:-1]
         bend = np.clip(bend, -MOST_BEND, MOST_BEND)
+        # g is 0 / 0 at the ends: continue with the neighbouring values.
         bend[0], bend[-1] = bend[1], bend[-2]
         return cls(float(stretch), float(share), bend, factors)
 
     def factor(self, level_share):
-        """(rows,) W over V at levels that are these shares of the height."""
+        """Return W over V (rows,) at levels given as fractions of the height."""
         turn = _turn(level_share)
         return 1 + self.share + self._bend(turn) * (1 + np.cos(turn)) ** 1.5
 
     def factor_slope(self, level_share):
-        """(rows,) derivative of `factor` by the share of the height."""
+        """Return the derivative (rows,) of `factor` by the fraction of the height."""
         turn = np.clip(_turn(level_share), LEAST_TURN, np.pi - LEAST_TURN)
         fall, rise = (1 + np.cos(turn)) ** 0.5, np.sin(turn)
         by_turn = self._bend(turn, 1) * fall**3 - 1.5 * self._bend(turn) * fall * rise
+        # share = (1 - cos t) / 2, so dt/dshare = 2 / sin t.
         return 2 * by_turn / rise
 
     def at(self, level_share):
-        """(rows, NODES) weights by which values at the nodes make those at levels."""
+        """Return the weights (rows, NODES) of values at the nodes for values at levels."""
         return _through_nodes()(_turn(level_share))
 
     @cached_property
@@ -101,8 +107,10 @@ class SurveyedForm:
 
 
 def _through_nodes():
+    """Return the spline with unit values at each node."""
     return scipy.interpolate.CubicSpline(node_turns(), np.eye(NODES))
 
 
 def _turn(level_share):
+    """Return t of fractions of the height."""
     return np.arccos(1 - 2 * np.clip(level_share, 0.0, 1.0))

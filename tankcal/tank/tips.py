@@ -1,13 +1,13 @@
 """Heads of upright tanks beyond their edge: cones, dishes, ellipsoids and torispheres.
 
 A head is a solid of revolution about a plumb axis; x counts from the plane of its edge to its tip,
-at x = h. What lies beyond a level plane at x and its derivatives by a size s, x held, are
+at x = h. The volume beyond a level plane at x, and its derivative by a dimension s at fixed x, are
 
     V(x) = pi integral from x to h of r^2 dx,    dV/ds = pi integral of d(r^2)/ds dx,
 
-in closed form, or by Gauss along the arcs of the meridian, which is exact to rounding there.
-Over an outline that is no circle the head is that over a circle of the same area, drawn out to the
-outline along each radius: areas and volumes depend on the plan's area alone.
+in closed form, or by Gaussian quadrature along the arcs of the meridian, which is exact to
+rounding. For an outline that is not a circle, the head over a circle of equal area is stretched to
+the outline along each radius: areas and volumes depend only on the area of the plan.
 """
 
 from dataclasses import dataclass
@@ -30,18 +30,18 @@ FORMS = {
 
 @dataclass(frozen=True)
 class Tip:
-    """A head over a plan; make one with `tip_of`.
+    """Head over a plan; see `tip_of`.
 
     Attributes
     ----------
     form : str
         One of FORMS.
     end : End
-        Its sizes.
+        Dimensions of the head.
     plan_m2 : float
-        Area of its edge.
+        Area of the edge.
     depth_m : float
-        From the edge to the tip, above 0.
+        Depth from the edge to the tip, above 0.
     """
 
     form: str
@@ -50,7 +50,10 @@ class Tip:
     depth_m: float
 
     def beyond_m3(self, x_m):
-        """(rows,) volume beyond each x, 0 to depth_m: a cone holds A s^3 / (3 h^2), s = h - x."""
+        """Return the volume (rows,) beyond each x, 0 to depth_m.
+
+        A cone contains A s^3 / (3 h^2), s = h - x.
+        """
         s, h, plan = self.depth_m - x_m, self.depth_m, self.plan_m2
         if self.form == "cone":
             return plan * s**3 / (3 * h**2)
@@ -61,7 +64,7 @@ class Tip:
         return self._revolved(x_m, _square)
 
     def area_m2(self, x_m):
-        """(rows,) area of the cut at each x."""
+        """Return the area (rows,) of the cut at each x."""
         s, h = self.depth_m - x_m, self.depth_m
         if self.form == "cone":
             return self.plan_m2 * (s / h) ** 2
@@ -72,44 +75,50 @@ class Tip:
         return self._cut_m2(x_m)
 
     def derivatives(self, x_m):
-        """{input: (rows,)} of `beyond_m3` at fixed x, m3 per SI unit, other given sizes held.
+        """Return {input: derivative (rows,) of `beyond_m3` at fixed x}, m3 per SI unit.
 
-        "scale" stretches the plan; "depth" moves the tip away from the edge, and stretches a
-        torispherical head of given radii; "dish", "knuckle" where they were given.
+        Other given dimensions are fixed. "scale" stretches the plan. "depth" moves the tip away
+        from the edge, and stretches a torispherical head of given radii. "dish" and "knuckle" are
+        present if given.
         """
         s, h, plan = self.depth_m - x_m, self.depth_m, self.plan_m2
         if self.form == "cone":
+            # At a fixed x, s = h - x grows with h: both terms of the derivative appear.
             by_depth = plan * (s**2 / h**2 - 2 * s**3 / (3 * h**3))
             return {"scale": 2 * self.beyond_m3(x_m), "depth": by_depth}
         if self.form == "dish":
             sphere = self._sphere_m
+            # The radius of the sphere, (R^2 / h + h) / 2, changes by 1 - sphere / h.
             by_depth = np.pi * s * (2 * sphere - s) + np.pi * s**2 * (1 - sphere / h)
             return {"scale": plan / h * s**2, "depth": by_depth}
         if self.form == "ellipsoidal":
             by_depth = plan * s * (2 / h - s / h**2 - s / h**2 + 2 * s**2 / (3 * h**3))
             return {"scale": 2 * self.beyond_m3(x_m), "depth": by_depth}
+        # The arcs are differentiated by the radius; the scale multiplies the radius.
         names = {"radius": "scale", "end_depth": "depth"} | dict(zip(RADII, RADII, strict=True))
-        known = {name for arc in self._arcs for name in arc.by_input}
-        found = {
-            said: self._revolved(x_m, partial(_square_by, name=name))
-            for name, said in names.items()
-            if name in known
+        available = {name for arc in self._arcs for name in arc.by_input}
+        derivatives = {
+            input_name: self._revolved(x_m, partial(_square_by, name=name))
+            for name, input_name in names.items()
+            if name in available
         }
-        return found | {"scale": self._radius_m * found["scale"]}
+        return derivatives | {"scale": self._radius_m * derivatives["scale"]}
 
     @property
     def sizes_m(self):
-        """{input: size} of those that it is given by, but for the plan."""
+        """{input: dimension} of the given dimensions, without the plan."""
         end = self.end
-        given = dict(zip(RADII, (end.dish_radius_m, end.knuckle_radius_m), strict=True))
-        return {"depth": end.depth_m, **{name: one for name, one in given.items() if one}}
+        radii = dict(zip(RADII, (end.dish_radius_m, end.knuckle_radius_m), strict=True))
+        return {"depth": end.depth_m, **{name: size for name, size in radii.items() if size}}
 
     @property
     def _radius_m(self):
+        """Radius of the circle of equal area."""
         return np.sqrt(self.plan_m2 / np.pi)
 
     @property
     def _sphere_m(self):
+        """Radius of the sphere of a dish."""
         return (self.plan_m2 / np.pi / self.depth_m + self.depth_m) / 2
 
     @cached_property
@@ -117,27 +126,32 @@ class Tip:
         return meridian(self.end, self._radius_m)
 
     def _revolved(self, x_m, integrand):
+        """Return integrals over the head beyond x, shape of x_m."""
         rows = np.atleast_1d(np.asarray(x_m, dtype=float))
         parts = [revolved(arc, _parameter(arc, rows), [integrand])[0] for arc in self._arcs]
         return sum(parts).reshape(np.shape(x_m))
 
     def _cut_m2(self, x_m):
-        of_arcs = [np.pi * arc.at(_parameter(arc, x_m))[1] ** 2 for arc in self._arcs]
+        """Return the area of the cut at each x, of the knuckle or of the dish."""
+        areas = [np.pi * arc.at(_parameter(arc, x_m))[1] ** 2 for arc in self._arcs]
         joint = self._arcs[0].at(self._arcs[0].stop)[0]
-        return np.where(x_m < joint, *of_arcs)
+        # The knuckle extends from the edge to the joint, the dish from there to the tip.
+        return np.where(x_m < joint, *areas)
 
 
 def tip_of(form, plan_m2, depth_m=0.0, dish_radius_m=None, knuckle_radius_m=None):
-    """A head of an upright tank, by its depth; a torispherical one by two of its three sizes.
+    """Return a head of an upright tank from its depth.
+
+    A torispherical head requires two of its three dimensions.
 
     Parameters
     ----------
     form : str
         "cone", "dish", "ellipsoidal" or "torispherical".
     plan_m2 : float
-        Area of its edge.
+        Area of the edge.
     depth_m : float, optional
-        From the edge to the tip, m; 0 where radii give it.
+        Depth from the edge to the tip, m; 0 if radii determine it.
     dish_radius_m, knuckle_radius_m : float, optional
 
     Returns
@@ -147,7 +161,7 @@ def tip_of(form, plan_m2, depth_m=0.0, dish_radius_m=None, knuckle_radius_m=None
     Raises
     ------
     SolutionError
-        For sizes that make no such head.
+        For impossible dimensions of such a head.
 
     Examples
     --------
@@ -165,19 +179,21 @@ def tip_of(form, plan_m2, depth_m=0.0, dish_radius_m=None, knuckle_radius_m=None
             )
         )
     end = End(FORMS[form], float(depth_m), dish_radius_m, knuckle_radius_m)
-    follows = depth_of(end, np.sqrt(plan_m2 / np.pi))
-    return Tip(form, end, float(plan_m2), float(depth_m) or follows)
+    computed_depth = depth_of(end, np.sqrt(plan_m2 / np.pi))
+    return Tip(form, end, float(plan_m2), float(depth_m) or computed_depth)
 
 
 def _square(arc, u):
+    """Return pi r^2 of an arc."""
     return np.pi * arc.at(u)[1] ** 2
 
 
 def _square_by(arc, u, name):
+    """Return the derivative of pi r^2 of an arc by an input."""
     return np.pi * arc.square_by(name, u)
 
 
 def _parameter(arc: EllipseArc, x_m):
-    """Angle of an arc at x, within the arc."""
+    """Return the angle of an arc at x, limited to the arc."""
     sin = np.clip((x_m - arc.centre_m) / arc.along_m, -1.0, 1.0)
     return np.clip(np.arcsin(sin), arc.start, arc.stop)

@@ -1,8 +1,8 @@
-"""A shell of courses with a head on top of it: a dome or a cone that liquid may rise into.
+"""Shell of courses with a head on top: a dome or a cone that liquid may enter.
 
-The edge of the head is the top of the last course, and its plan the area there, so what is
-uncertain about that area moves the head, too: all of it is one linear function of the features of
-the shell. Liquid above the shell leaves the shell's own volume as it is.
+The edge of the head is the top of the last course, and its plan is the area there. The uncertainty
+of that area thus also affects the head: the volume of the head is a linear function of the features
+of the shell. Liquid above the shell does not change the volume of the shell.
 """
 
 from dataclasses import dataclass
@@ -15,19 +15,19 @@ from tankcal.tank.body import ShellPart
 from tankcal.tank.parts import Part, as_levels
 from tankcal.tank.tips import Tip
 
-ROUNDING = 1e-12  # of the height, by which a level may stand above the tip
-MOVED_BY_HEIGHT = ("shell_temperature", "expansion")
+ROUNDING = 1e-12  # relative excess of a level above the tip due to rounding
+MOVED_BY_HEIGHT = ("shell_temperature", "expansion")  # inputs that stretch heights
 
 
 @dataclass(frozen=True)
 class HeadedShell(Part):
-    """The shell of courses and the head on it as one part; both at the table's temperature.
+    """Shell of courses and its head as a single part, both at the temperature of the table.
 
     Attributes
     ----------
     shell : ShellPart
     tip : Tip
-        Over the area of the last course at its top, its sizes stretched as heights are.
+        Head over the area of the last course at its top, with dimensions stretched like heights.
     """
 
     shell: ShellPart
@@ -35,12 +35,12 @@ class HeadedShell(Part):
 
     @property
     def base_m(self):
-        """Level of the head's edge."""
+        """Level of the edge of the head."""
         return self.shell.volume.height_m
 
     @property
     def highest_m(self):
-        """Level of the head's tip."""
+        """Level of the tip of the head."""
         return self.base_m + self.tip.depth_m
 
     @property
@@ -49,59 +49,67 @@ class HeadedShell(Part):
         return (*self.shell.breakpoints_m, self.base_m)
 
     def volume_m3(self, levels_m):
-        """(rows,) volume of shell and head below each level."""
-        below, x = self._split(levels_m)
-        return self.shell.volume_m3(below) + self.tip.beyond_m3(0.0) - self.tip.beyond_m3(x)
+        """Return the volume (rows,) of shell and head below each level."""
+        shell_levels, x = self._split(levels_m)
+        return self.shell.volume_m3(shell_levels) + self.tip.beyond_m3(0.0) - self.tip.beyond_m3(x)
 
     def area_m2(self, levels_m):
-        """(rows,) inside area at each level; that of the head at its edge."""
-        below, x = self._split(levels_m)
-        over = as_levels(levels_m) >= self.base_m
-        return np.where(over, self.tip.area_m2(x), self.shell.area_m2(below))
+        """Return the inside area (rows,) at each level; at the edge, the area of the head."""
+        shell_levels, x = self._split(levels_m)
+        in_head = as_levels(levels_m) >= self.base_m
+        return np.where(in_head, self.tip.area_m2(x), self.shell.area_m2(shell_levels))
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} those of the shell, of the plan of the head, and of its sizes.
+        """Return {input: (rows,)} of the shell, of the plan of the head, and of its dimensions.
 
-        "top_depth" lifts the tip over its edge; "dish" and "knuckle" are those of a
-        torispherical head that was given by them. A higher course lifts the whole head.
+        "top_depth" raises the tip over its edge. "dish" and "knuckle" are the radii of a
+        torispherical head, if given. A higher course raises the whole head.
         """
-        below, x = self._split(levels_m)
-        over, cut = as_levels(levels_m) >= self.base_m, self.tip.area_m2(x)
-        found = self.shell.derivatives(below)
-        plan, of_tip = self.tip.plan_m2, self._of_tip(x)
-        by_plan = of_tip.pop("scale") / (2 * plan)
+        shell_levels, x = self._split(levels_m)
+        in_head, cut_m2 = as_levels(levels_m) >= self.base_m, self.tip.area_m2(x)
+        derivatives = self.shell.derivatives(shell_levels)
+        plan, by_tip = self.tip.plan_m2, self._of_tip(x)
+        # The plan grows with the square of its scale.
+        by_plan = by_tip.pop("scale") / (2 * plan)
         for name, by_input in self._plan_by().items():
-            if name in found:
-                found[name] = found[name] + by_plan * by_input
-        lifted = np.where(over, plan - cut, 0.0)
-        if "datum" in found:
-            found["datum"] = np.where(over, cut, found["datum"])
-        if "course_heights" in found:
-            found["course_heights"] = found["course_heights"] + lifted[:, None]
+            if name in derivatives:
+                derivatives[name] = derivatives[name] + by_plan * by_input
+        # Raising the head adds a cylinder over the plan, and removes the cut at the level.
+        by_lift = np.where(in_head, plan - cut_m2, 0.0)
+        if "datum" in derivatives:
+            derivatives["datum"] = np.where(in_head, cut_m2, derivatives["datum"])
+        if "course_heights" in derivatives:
+            derivatives["course_heights"] = derivatives["course_heights"] + by_lift[:, None]
         if self.shell.stretch != 1.0:
-            by_heights = sum(self.tip.sizes_m[name] * by for name, by in of_tip.items())
-            by_stretch = (by_heights + lifted * self.base_m) / self.shell.stretch
+            # A stretch of heights changes the dimensions of the head, and the level of its edge.
+            by_heights = sum(
+                self.tip.sizes_m[name] * derivative for name, derivative in by_tip.items()
+            )
+            by_stretch = (by_heights + by_lift * self.base_m) / self.shell.stretch
             for name in MOVED_BY_HEIGHT:
-                if name in found:
-                    found[name] = found[name] + self._warmed_by(name) * by_stretch
-        found |= {"top_depth" if name == "depth" else name: by for name, by in of_tip.items()}
-        return found
+                if name in derivatives:
+                    derivatives[name] = derivatives[name] + self._warmed_by(name) * by_stretch
+        derivatives |= {
+            "top_depth" if name == "depth" else name: derivative
+            for name, derivative in by_tip.items()
+        }
+        return derivatives
 
     def sources(self, levels_m):
-        """What the survey leaves uncertain: of the shell, and of the plan of the head with it."""
+        """Return the sources of the survey, for the shell and the plan of the head."""
         factors = self.shell.factors
         if not factors:
             return ()
-        below, x = self._split(levels_m)
+        shell_levels, x = self._split(levels_m)
         by_plan = self._of_tip(x)["scale"] / (2 * self.tip.plan_m2)
         weights = self.shell.volume.top_weights
         return tuple(
-            one.source(source.columns_m3 + by_plan[:, None] * (weights @ one.columns))
-            for one, source in zip(factors, self.shell.sources(below), strict=True)
+            factor.source(source.columns_m3 + by_plan[:, None] * (weights @ factor.columns))
+            for factor, source in zip(factors, self.shell.sources(shell_levels), strict=True)
         )
 
     def _split(self, levels_m):
-        """(levels in the shell, x in the head); raises HeightError above the tip."""
+        """Return (levels in the shell, x in the head); raise HeightError above the tip."""
         levels = as_levels(levels_m)
         above = levels > self.highest_m * (1 + ROUNDING)
         if np.any(above):
@@ -117,25 +125,29 @@ class HeadedShell(Part):
         return np.minimum(levels, self.base_m), x
 
     def _of_tip(self, x):
-        """{input of the tip: (rows,)} of the head's volume below x."""
-        whole, beyond = self.tip.derivatives(np.zeros(1)), self.tip.derivatives(x)
-        return {name: whole[name] - beyond[name] for name in whole}
+        """Return {input of the tip: derivative (rows,) of the volume of the head below x}."""
+        complete, remaining = self.tip.derivatives(np.zeros(1)), self.tip.derivatives(x)
+        return {name: complete[name] - remaining[name] for name in complete}
 
     def _plan_by(self):
-        """{input: derivative of the plan of the head by it, m2 per SI unit}."""
+        """Return {input: derivative of the plan of the head, m2 per SI unit}."""
         shell, volume = self.shell, self.shell.volume
         courses = volume.courses
         weights, scale = volume.top_weights, 2 * self.tip.plan_m2 / shell.scale
         girth = float(weights @ volume.girth_features)
-        of_readings = {name: float(weights @ by) for name, by in shell.read_with.items()}
+        by_readings = {
+            name: float(weights @ derivative) for name, derivative in shell.read_with.items()
+        }
         departures = {
             name: sum(
-                float(own @ (one.girths_m * one.missed[name]))
-                for own, one in zip(np.split(weights, len(courses)), courses, strict=True)
+                float(course_weights @ (course.girths_m * course.missed[name]))
+                for course_weights, course in zip(
+                    np.split(weights, len(courses)), courses, strict=True
+                )
             )
             for name in volume.departures
         }
-        found = {
+        derivatives = {
             "scale": float(weights @ volume.scale_features),
             "offset": girth,
             "tilt": self.tip.plan_m2 * shell.tilt / (1 + shell.tilt**2),
@@ -144,17 +156,17 @@ class HeadedShell(Part):
             **{name: self._warmed_by(name) * scale for name in MOVED_BY_HEIGHT},
             **departures,
         }
-        found = {
-            name: by
-            for name, by in found.items()
+        derivatives = {
+            name: derivative
+            for name, derivative in derivatives.items()
             if name in ("scale", "offset", "tilt", *shell.bearing, *departures)
         }
-        for name, by in of_readings.items():
-            found[name] = found.get(name, 0.0) + by
-        return found
+        for name, derivative in by_readings.items():
+            derivatives[name] = derivatives.get(name, 0.0) + derivative
+        return derivatives
 
     def _warmed_by(self, name):
-        """Growth of lengths by the temperature of the shell, or by its coefficient."""
+        """Return the growth of lengths by the temperature of the shell, or by its coefficient."""
         shell = self.shell
         if name == "shell_temperature":
             return -shell.expansion_per_k

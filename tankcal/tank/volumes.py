@@ -1,11 +1,11 @@
-"""The volume of a shell of courses, from its outlines, with the covariance kept to every row.
+"""Volume of a shell of courses from its outlines, with the full covariance of the rows.
 
-What a course is integrated through are its outlines at its Gauss levels. With their areas A_i,
+The volume of a course is integrated from its outlines at its Gauss levels. With their areas A_i,
 
     A(t) = sum l_i(t) A_i,      V(h) = sum over courses of A_i integral l_i dz,
 
-so every row is a weighted sum of a few areas: that is the whole propagation. Nothing is
-interpolated across a joint. Heights in this room count from the bottom of the first course, m.
+so each row is a weighted sum of a few areas, which also propagates their covariance. No
+interpolation crosses a joint. Heights count from the bottom of the first course, m.
 """
 
 from dataclasses import dataclass
@@ -23,74 +23,75 @@ from tankcal.tank.courses import CourseShape, gauss_levels
 
 @dataclass(frozen=True)
 class ShellVolume:
-    """The courses of a shell, and what can be integrated over them.
+    """Courses of a shell, and integrals over them.
 
-    The features of a shell are the areas at the Gauss levels of all its courses, one after another.
+    The features of a shell are the areas at the Gauss levels of all its courses, in order.
 
     Attributes
     ----------
     courses : tuple of CourseShape
-        From the bottom up.
+        Courses from the bottom up.
     """
 
     courses: tuple[CourseShape, ...]
 
     @property
     def height_m(self):
-        """Height of the shell, along the vertical."""
+        """Height of the shell along the vertical."""
         return self.courses[-1].top_m
 
     @property
     def joints_m(self):
-        """(courses - 1,) bottoms of all courses but the first."""
+        """Bottoms (courses - 1,) of all courses except the first."""
         return np.array([course.bottom_m for course in self.courses[1:]])
 
     @property
     def joint_steps_m2(self):
-        """(courses - 1,) area just below each joint less the area just above it."""
+        """Area just below each joint less the area just above it, shape (courses - 1,)."""
         polynomials = self._by_height(self.features)
         return np.array([below.sum() - above[0] for below, above in pairwise(polynomials)])
 
     @property
     def departures(self):
-        """Names of the departures of its courses that were declared: "barrel", "taper"."""
+        """Names of the declared departures of the courses: "barrel", "taper"."""
         return tuple(self.courses[0].missed)
 
     @cached_property
     def features(self):
-        """(f,) the areas that every volume is a sum of, m2."""
+        """Areas (f,) of which every volume is a weighted sum, m2."""
         return np.concatenate([course.areas_m2 for course in self.courses])
 
     @property
     def top_weights(self):
-        """(f,) derivative of the area at the top by the features."""
+        """Derivative (f,) of the area at the top by the features."""
         weights = np.zeros(len(self.features))
+        # At t = 1 all powers are one: the weight of a level is the sum of its coefficients.
         weights[-LEVELS:] = _height_polynomials().sum(axis=0)
         return weights
 
     @cached_property
     def girth_features(self):
-        """(f,) what the features lose by metre of inset, m."""
+        """Loss (f,) of the features per metre of inset, m."""
         return np.concatenate([course.girths_m for course in self.courses])
 
     @cached_property
     def scale_features(self):
-        """(f,) derivative of the features by a scale of the surveyed lengths, m2."""
+        """Derivative (f,) of the features by a scale of the surveyed lengths, m2."""
         return np.concatenate([course.by_scale_m2 for course in self.courses])
 
     def integrated(self, heights_m, features):
-        """Sums over the features of the volume below each height.
+        """Return weighted sums of features for the volume below each height.
 
         Parameters
         ----------
         heights_m : array_like, shape (rows,)
         features : array_like, shape (f,) or (f, c)
-            Each column stands for the areas of all courses.
+            Each column replaces the areas of all courses.
 
         Returns
         -------
         ndarray, shape (rows,) or (rows, c)
-            m times the unit of the features; the rows of a column are next to each other.
+            m times the unit of the features; the rows of a column are contiguous.
 
         Raises
         ------
@@ -99,7 +100,8 @@ class ShellVolume:
 
         Notes
         -----
-        Rows cost only what they see: the polynomial of their own course, and a sum of those below.
+        A row requires only the polynomial of its own course, and a running sum of the courses
+        below.
         """
         heights = self._inside(heights_m)
         columns = np.asarray(features, dtype=float).reshape(len(features), -1)
@@ -107,6 +109,8 @@ class ShellVolume:
         below = np.zeros(columns.shape[1])
         divisors = np.arange(1.0, LEVELS + 1)[:, None]
         for course, rows, polynomial in self._by_course(heights, columns):
+            # Primitive of sum a_k t^k: height times a_k / (k + 1), above the sum of the courses
+            # below.
             primitive = np.concatenate([below[None], course.height_m * polynomial / divisors])
             t = (heights[rows] - course.bottom_m) / course.height_m
             result[:, rows] = primitive.T @ _powers(t)
@@ -114,18 +118,18 @@ class ShellVolume:
         return result.T if np.ndim(features) == 2 else result[0]
 
     def weights_m(self, heights_m):
-        """(rows, f) derivative of the volume below each height by the features, m.
+        """Return derivatives (rows, f) of the volume below each height by the features, m.
 
         Raises HeightError for a height outside the shell.
         """
         return self.integrated(heights_m, np.eye(len(self.features)))
 
     def volume_m3(self, heights_m):
-        """(rows,) volume between the bottom and each height."""
+        """Return the volume (rows,) between the bottom and each height."""
         return self.integrated(heights_m, self.features)
 
     def area_m2(self, heights_m):
-        """(rows,) inside area of the horizontal cut at each height; the upper course at a joint."""
+        """Return the inside area (rows,) at each height; at a joint, of the upper course."""
         heights = self._inside(heights_m)
         area = np.empty(len(heights))
         for course, rows, polynomial in self._by_course(heights, self.features):
@@ -134,56 +138,67 @@ class ShellVolume:
         return area
 
     def inset_m2(self, heights_m):
-        """(rows,) loss of volume below each height by metre of plate or paint: the wetted wall."""
+        """Return the loss (rows,) of volume per metre of plate or paint: the wetted wall."""
         return self.integrated(heights_m, self.girth_features)
 
     def by_missed_m2(self, heights_m, name, *, each=False):
-        """Derivative of the volume below each height by a departure that was not declared.
+        """Return the derivative of the volume below each height by an undeclared departure.
 
-        name  "barrel" or "taper": the estimate lacks `CourseShape.missed` of it
-        each  False: (rows,) by one departure of all courses; True: (rows, courses) by that of each
+        Parameters
+        ----------
+        heights_m : array_like, shape (rows,)
+        name : str
+            "barrel" or "taper"; the estimate lacks `CourseShape.missed` of it.
+        each : bool, optional
+            False: (rows,) by a common departure of all courses; True: (rows, courses) by that of
+            each course.
 
-        After one ring in the middle of each course nobody knows of a barrel: b zeta^2 is lacking,
-        and -1/3 of b in the volume of a course.
+        Notes
+        -----
+        A single ring in the middle of each course does not determine a barrel: b zeta^2 is missing
+        in the radius, and -1/3 of b in the volume of a course.
         """
         missed = self.missed_features(name)
         if not each:
             return self.integrated(heights_m, missed)
-        own = np.kron(np.eye(len(self.courses)), np.ones((LEVELS, 1)))
-        return self.integrated(heights_m, own * missed[:, None])
+        by_course = np.kron(np.eye(len(self.courses)), np.ones((LEVELS, 1)))
+        return self.integrated(heights_m, by_course * missed[:, None])
 
     def missed_features(self, name):
-        """(f,) derivative of the features by a departure that was not declared, of all courses."""
-        return np.concatenate([one.girths_m * one.missed[name] for one in self.courses])
+        """Return derivatives (f,) of the features by an undeclared departure of all courses."""
+        return np.concatenate([course.girths_m * course.missed[name] for course in self.courses])
 
     def by_course_heights_m2(self, heights_m):
-        """(rows, courses) derivative of the volume below each height by the height of each course.
+        """Return derivatives (rows, courses) of the volume below each height by the course heights.
 
-        A higher course lifts every joint above it, which gives the area below the joint in place of
-        the one above. The outlines stay where they were surveyed.
+        A higher course raises every joint above it, which replaces the area above the joint by the
+        area below it. The outlines stay at their surveyed heights.
         """
-        passed = np.searchsorted(self.joints_m, self._inside(heights_m))
+        joints_below = np.searchsorted(self.joints_m, self._inside(heights_m))
+        # A course raises all joints above it that are below the height.
         steps = np.concatenate([[0.0], np.cumsum(self.joint_steps_m2)])
-        return np.take(np.tril(steps[:, None] - steps).T, passed, axis=1).T
+        return np.take(np.tril(steps[:, None] - steps).T, joints_below, axis=1).T
 
     @property
     def barrels_m(self):
-        """(courses,) barrel of the mean radius: that of its parabola of least squares in height."""
+        """Barrel (courses,) of the mean radius: that of its least-squares parabola in height."""
         zeta, weights = panels([-1.0, 1.0], LEVELS)
         parabola = 1.5 * zeta**2 - 0.5
         radii = [np.sqrt(course.areas_m2 / np.pi) for course in self.courses]
-        return np.array([-1.5 * 2.5 * np.sum(weights * parabola * one) for one in radii])
+        return np.array([-1.5 * 2.5 * np.sum(weights * parabola * radius) for radius in radii])
 
     def _by_height(self, features):
-        """For each course the coefficients of sum l_i(t) features_i by the powers of t."""
+        """Return, for each course, coefficients of sum l_i(t) features_i by powers of t."""
         return [
             _height_polynomials() @ features[start : start + LEVELS]
             for start in range(0, len(features), LEVELS)
         ]
 
     def _by_course(self, heights, features):
-        """(course, its rows, polynomial) of each course: the rows that end in it, the upper one at
-        a joint, as a slice where all heights ascend.
+        """Return (course, its rows, polynomial) for each course.
+
+        The rows are those whose height is in the course, at a joint in the upper course; a slice if
+        all heights ascend.
         """
         if np.all(heights[1:] >= heights[:-1]):
             ends = [0, *np.searchsorted(heights, self.joints_m), len(heights)]
@@ -194,6 +209,7 @@ class ShellVolume:
         return zip(self.courses, rows, self._by_height(features), strict=True)
 
     def _inside(self, heights_m):
+        """Return heights (rows,) as an array; raise HeightError outside the shell."""
         heights = np.atleast_1d(np.asarray(heights_m, dtype=float))
         outside = ~((heights >= 0) & (heights <= self.height_m * (1 + 1e-12)))
         if np.any(outside):
@@ -209,7 +225,7 @@ class ShellVolume:
 
 
 def _powers(t):
-    """(LEVELS + 1, rows) powers of t from the 0th on."""
+    """Return powers (LEVELS + 1, rows) of t from the 0th on."""
     powers = np.empty((LEVELS + 1, len(t)))
     powers[0], powers[1] = 1.0, t
     for power in range(2, LEVELS + 1):
@@ -219,5 +235,5 @@ def _powers(t):
 
 @cache
 def _height_polynomials():
-    """(LEVELS, LEVELS) coefficients of l_i(t) of the Gauss levels, by the powers of t."""
+    """Return coefficients (LEVELS, LEVELS) of l_i(t) of the Gauss levels, by powers of t."""
     return height_polynomials(gauss_levels(), LEVELS - 1)

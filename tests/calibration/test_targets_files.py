@@ -221,3 +221,32 @@ def test_without_opencv_one_clear_line(photos, tmp_path, monkeypatch):
     assert '-m pip install "opencv-python-headless>=' in line
     with pytest.raises(InputError):
         read_coded(np.zeros((50, 50), dtype=np.uint8), ARUCO)
+
+
+def with_another_byte(path, place):
+    data = bytearray(path.read_bytes())
+    data[place] ^= 0xFF
+    path.write_bytes(bytes(data))
+
+
+@pytest.mark.parametrize("ending", ["png", "tiff"])
+def test_a_picture_that_its_decoder_reports_as_damaged(tmp_path, capfd, ending):
+    """The decoder may return pixels nevertheless; what it prints itself reaches nobody."""
+    noise = np.random.default_rng(1).integers(0, 255, (400, 600)).astype(np.uint8)
+    path = tmp_path / f"left.{ending}"
+    cv2.imwrite(str(path), noise)
+    with_another_byte(path, path.stat().st_size // 2)
+    assert told([path], tmp_path / "image_points.csv") == [
+        f"left.{ending}: damaged: the picture cannot be decoded as its header describes it"
+    ]
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_jpeg_that_its_decoder_doubts_is_named(tmp_path, capfd):
+    path = tmp_path / "left.jpg"
+    noise = np.random.default_rng(1).integers(0, 255, (400, 600)).astype(np.uint8)
+    cv2.imwrite(str(path), noise)
+    with_another_byte(path, path.stat().st_size // 2)
+    reading = read_photographs([path], tmp_path / "image_points.csv")
+    assert "perhaps damaged: the JPEG decoder reports 'Corrupt" in str(reading.warnings[0])
+    assert capfd.readouterr() == ("", "")

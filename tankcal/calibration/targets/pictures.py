@@ -1,8 +1,12 @@
 """Photographs from files: grey values as stored, never turned, never of a size that bursts."""
 
+import os
 import struct
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -152,8 +156,8 @@ def read_picture(path, log, encoding="by_file"):
             least=LEAST_SIDE_PX,
         )
         return log.problem(path.name, expected)
-    image = _decoded(data)
-    if image is None or image.shape != (lines, columns):
+    image, report = _decode(data)
+    if image is None or image.shape != (lines, columns) or "error" in report.lower():
         return log.problem(
             path.name,
             message(
@@ -161,18 +165,45 @@ def read_picture(path, log, encoding="by_file"):
                 "damaged: the picture cannot be decoded as its header describes it",
             ),
         )
+    if "Corrupt JPEG data" in report:
+        template = "perhaps damaged: the JPEG decoder reports {report!r}; open it and look at it"
+        log.warning(path.name, message("targets_doubtful_jpeg", template, report=report.strip()))
     if encoding == "by_file":
         encoding = "srgb" if data.startswith(JPEG_START) else "linear"
     return Picture(_light(image, encoding), encoding, header.orientation)
 
 
-def _decoded(data):
+def _decode(data):
+    """Decode a picture: (grey values or None, the lines that the decoder printed).
+
+    A decoder may return a picture although the file is damaged, and then only prints an error.
+    """
     cv2 = opencv()
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
-    try:
-        return cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
-    except cv2.error:
-        return None
+    image = None
+    with _captured_error_stream() as printed, suppress(cv2.error):
+        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
+    return image, printed.text
+
+
+@contextmanager
+def _captured_error_stream():
+    """Collect in `text` what C libraries print to the standard error stream of the process."""
+    printed = SimpleNamespace(text="")
+    with TemporaryFile() as file:
+        try:
+            stream = os.dup(2)
+        except OSError:  # a process without this stream
+            yield printed
+            return
+        try:
+            os.dup2(file.fileno(), 2)
+            yield printed
+        finally:
+            os.dup2(stream, 2)
+            os.close(stream)
+            file.seek(0)
+            printed.text = file.read().decode("utf-8", "replace")
 
 
 def _light(image, encoding):

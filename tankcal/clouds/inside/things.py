@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse
 
+from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.clouds.inside.bottom import level_everywhere
 from tankcal.clouds.inside.floor_cells import STACK_M
 from tankcal.clouds.wall.passes import Passes
@@ -226,7 +227,7 @@ def _column(xyz, level, grid):
         return None
     x, y, radius, rms = np.array(fits).T
     r = float(np.median(radius))
-    scatter = float(1.4826 * np.median(np.abs(radius - r)))
+    scatter = float(SD_OVER_MEDIAN * np.median(np.abs(radius - r)))
     if scatter > max(BAND_M / 2, SAME * r):
         return None
     u = max(scatter, float(np.median(rms)) / 2, LEAST_U_M)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.clouds.wall.cells import FINE_BITS, PLACE, CellGrid
 from tankcal.clouds.wall.features import (
     Joint,
@@ -267,5 +268,5 @@ def _scatter(radius, course, row_m, column_m):
                 e = e - np.nanmedian(e, axis=1, keepdims=True)
                 found.setdefault((way, lag), []).append(e[np.isfinite(e)])
     told = [np.concatenate(one) for one in found.values()]
-    told = [1.4826 * np.median(np.abs(e)) for e in told if len(e) >= FEWEST_TOLD]
+    told = [SD_OVER_MEDIAN * np.median(np.abs(e)) for e in told if len(e) >= FEWEST_TOLD]
     return float(max(told, default=0.0) / np.sqrt(1.5))

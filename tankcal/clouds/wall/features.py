@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.clouds.wall.cells import FAR_BINS, FAR_M
 from tankcal.clouds.wall.growing import EMPTY, WALL, spread_between
 from tankcal.geometry.outlines import FULL_TURN
@@ -128,7 +129,8 @@ def find_welds(radius_m, course, column_m):
         beside = radius_m[mine] - _medians(radius_m[mine])[:, None]
         depth = _depths(beside, reach)
         thirds = [_depths(part, reach) for part in np.array_split(beside, 3) if len(part)]
-        noise = max(1.4826 * np.nanmedian(np.abs(depth)), 1e-4) if np.isfinite(depth).any() else 1.0
+        is_empty = not np.isfinite(depth).any()
+        noise = 1.0 if is_empty else max(SD_OVER_MEDIAN * np.nanmedian(np.abs(depth)), 1e-4)
         apart = max(1, round(WELD_M / width))
         left = np.nan_to_num(np.abs(depth))
         while left.max() > max(LEAST_WELD_M, SURE_WELD * noise):

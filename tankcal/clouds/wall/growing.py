@@ -12,6 +12,8 @@ import scipy
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from tankcal.adjust import SD_OVER_MEDIAN
+
 WALL, EMPTY, FEW, OBSTRUCTED, STEEP, OFF_TREND = range(6)
 FEWEST = 6  # points of a cell that says anything
 OCCUPIED = 0.15  # of the fullest bin of a cell
@@ -129,7 +131,7 @@ _LINES = tuple((sign * k, sign * 2 * k, 2) for sign in (-1, 1) for k in (1, 2))
 def spread_between(second_differences):
     """Sd of a value, from its departures from the middle of two neighbours, by their median."""
     known = np.abs(second_differences[np.isfinite(second_differences)])
-    return 1.4826 * float(np.median(known)) / np.sqrt(1.5) if len(known) else 0.0
+    return SD_OVER_MEDIAN * float(np.median(known)) / np.sqrt(1.5) if len(known) else 0.0
 
 
 def _shifted(values, step, axis):

@@ -1,15 +1,17 @@
-"""Blunders among the readings of a wall: each tested against the wall as all others have it.
+"""Blunders among the readings of a wall: each reading is tested against all other readings.
 
-With V the covariance of readings (field and noise) and X what no prior binds,
+With V the covariance of the readings (field and noise) and X the design of the parameters without
+prior,
 
     P = V^-1 - V^-1 X (X' V^-1 X)^-1 X' V^-1,  e = P y:
 
-a reading without which the others predict y_i - e_i / P_ii, with the variance 1 / P_ii of the
-difference, is w_i = e_i / sqrt(P_ii) of its standard deviations off. Readings S that were set aside
-are predicted by the rest: P_SS^-1 e_S, of covariance P_SS^-1. Where the rest does not tell what no
-prior binds (all points of a course, or of a ring, were set aside) P_SS is singular; its pseudo-
-inverse compares them with each other, that much free. What agrees with its neighbours along the
-wall is wall, however far both depart.
+All other readings predict the reading y_i as y_i - e_i / P_ii. The difference has the variance 1 /
+P_ii, so the test statistic is w_i = e_i / sqrt(P_ii). The accepted readings predict the rejected
+readings S with the differences P_SS^-1 e_S, of covariance P_SS^-1. P_SS is singular if the accepted
+readings do not determine the parameters without prior (all points of a course, or of a ring, are
+rejected). Its pseudo-inverse then compares the rejected readings with each other, up to these
+parameters. A reading that agrees with its neighbours along the wall belongs to the wall, however
+large their common departure.
 
 Source: Cook & Weisberg 1982 (deletion residuals); Baarda 1968.
 """
@@ -28,29 +30,29 @@ from tankcal.geometry.field.precision import Precision
 from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.outlines import FULL_TURN
 
-MOST_ROUNDS = 4  # of amplitudes from the accepted readings, and tests of all with these
-FEW = 0.005  # of the readings: when no more of them change sides, the amplitudes stay
-AT_ONCE = 0.9
-PIECE = 200  # readings that are tested together, about, where all are more than a field takes
-MOST_SD = 30  # of its own before: a reading that the others predict no better is not controlled
-NOTHING_LEFT = 1e-9  # of the largest eigenvalue of P_SS: what is smaller is zero but for rounding
+MOST_ROUNDS = 4  # rounds: amplitudes from the accepted readings, then tests of all readings
+FEW = 0.005  # share of readings that change between accepted and rejected, at convergence
+AT_ONCE = 0.9  # a pass rejects all readings whose statistic reaches this part of the largest
+PIECE = 200  # approximate number of readings in a test, if all are too many for a field
+MOST_SD = 30  # ratio of predicted to prior sd above which a reading counts as uncontrolled
+NOTHING_LEFT = 1e-9  # relative to the largest eigenvalue of P_SS: smaller ones are rounding
 
 
 @dataclass(frozen=True)
 class Tested:
-    """Readings accepted or set aside, and how far each is from what the accepted others predict.
+    """Accepted and rejected readings, and their departures from the prediction.
 
     Attributes
     ----------
     accepted : ndarray of bool, shape (n,)
     departure_m : ndarray, shape (n,)
-        Outwards, from the wall as the others have it, m.
+        Outward departure from the wall that the other accepted readings determine, m.
     w : ndarray, shape (n,)
         Departure over its standard deviation.
     sd_m : ndarray, shape (n,)
-        That; vast of a reading that no other one controls.
+        Standard deviation of the departure, m; very large for a reading without control.
     sizes_m2 : ndarray, shape (components + 1,), optional
-        Variances of the components by which they were tested, and factor of that of the readings.
+        Variances of the components in the test, and factor on the variance of the readings.
     """
 
     accepted: np.ndarray
@@ -61,31 +63,31 @@ class Tested:
 
 
 def nothing_tested(accepted):
-    """`Tested` to be filled."""
-    nothing = np.zeros((3, len(accepted)))
-    return Tested(accepted.copy(), *nothing)
+    """Return a `Tested` with zeros, to be filled."""
+    zero_rows = np.zeros((3, len(accepted)))
+    return Tested(accepted.copy(), *zero_rows)
 
 
 def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None, may_go=True):
-    """Test every reading of a wall by all others, with amplitudes that the accepted ones tell.
+    """Test each reading of a wall by all others, with amplitudes from the accepted readings.
 
     Parameters
     ----------
     sites : Sites
-        Of n readings.
+        n readings.
     radius_m : ndarray, shape (n,)
         Distances from the axis, m.
     variance_m2 : ndarray, shape (n,)
-        Of the readings, believed in relation to each other.
+        Variances of the readings, known up to a common factor, m2.
     nominal_m : float
         Radius of the tank, m.
     accepted : ndarray of bool, shape (n,)
-        What is believed at first.
+        Readings accepted at the start.
     barred : ndarray of bool, shape (n,), optional
-        Readings that stay aside, whatever the others say; None: none.
+        Readings that remain rejected, whatever their statistic; None: no reading.
     may_go : ndarray of bool, shape (n,), optional
-        Readings that may be set aside; the others stay, and the amplitudes are learned from them,
-        too: a wall that is as rough as they say is less known between the readings.
+        Readings that may be rejected. All other readings remain accepted and also determine the
+        amplitudes: a rough wall is less certain between the readings.
 
     Returns
     -------
@@ -94,106 +96,157 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None
     barred = np.zeros(len(sites), dtype=bool) if barred is None else barred
     may_go = np.broadcast_to(may_go, len(sites))
     accepted = (accepted | ~may_go) & ~barred
-    pieces = [Piece(sites, members, nominal_m) for members in _pieces(sites)]
-    left, found, sizes = radius_m - radius_m.mean(), nothing_tested(accepted), None
+    pieces = [Piece(sites, members, nominal_m) for members in _split_readings(sites)]
+    centred, results, sizes = radius_m - radius_m.mean(), nothing_tested(accepted), None
     for _ in range(MOST_ROUNDS):
-        known = sites.take(accepted)
-        some = radius_m[accepted], variance_m2[accepted]
-        sizes = likely_variances(known, *some, nominal_m, sizes)
+        accepted_sites = sites.take(accepted)
+        accepted_readings = radius_m[accepted], variance_m2[accepted]
+        # Amplitudes of the last round are the start values of the next round.
+        sizes = likely_variances(accepted_sites, *accepted_readings, nominal_m, sizes)
         variances, noise = sizes[:-1], sizes[-1]
         for piece in pieces:
-            own = piece.members
-            own_noise = noise * variance_m2[own] + LEAST_NOISE_M**2
-            precision, before_m = piece.precision(variances, own_noise)
-            pull, most = precision @ left[own], MOST_SD * before_m
-            tested = snoop_wall(precision, pull, accepted[own], may_go[own], most, barred[own])
+            chosen = piece.members
+            piece_noise = noise * variance_m2[chosen] + LEAST_NOISE_M**2
+            # A reading that the others hardly predict cannot be tested: the limit is relative to
+            # its prior sd.
+            precision, before_m = piece.precision(variances, piece_noise)
+            pull, most_sd = precision @ centred[chosen], MOST_SD * before_m
+            tested = snoop_wall(
+                precision, pull, accepted[chosen], may_go[chosen], most_sd, barred[chosen]
+            )
             for name in ("accepted", "departure_m", "w", "sd_m"):
-                getattr(found, name)[own] = getattr(tested, name)
-        changed, accepted = np.mean(found.accepted != accepted), found.accepted.copy()
+                getattr(results, name)[chosen] = getattr(tested, name)
+        changed, accepted = np.mean(results.accepted != accepted), results.accepted.copy()
         if changed <= FEW:
             break
-    return replace(found, sizes_m2=sizes)
+    return replace(results, sizes_m2=sizes)
 
 
-def _pieces(sites):
-    """Lists of readings that are tested together: all, or of many those of sectors of courses.
+def _split_readings(sites):
+    """Return lists of readings that are tested together.
 
-    A piece is about as many courses high as there are pieces around them.
+    Up to MOST_SITES readings form a single list. More readings are divided into sectors of belts of
+    courses. The number of courses in a belt is about the number of pieces around it.
     """
     count = 1 if len(sites) <= MOST_SITES else len(sites) / PIECE
-    every = np.argsort(sites.course, kind="stable")
-    found = []
-    for belt in np.array_split(np.arange(sites.course.max() + 1), _belts(count, sites)):
-        members = every[np.isin(sites.course[every], belt)]
+    by_course = np.argsort(sites.course, kind="stable")
+    pieces = []
+    for belt in np.array_split(np.arange(sites.course.max() + 1), _count_belts(count, sites)):
+        members = by_course[np.isin(sites.course[by_course], belt)]
         order = members[np.argsort(sites.azimuth_rad[members] % FULL_TURN, kind="stable")]
-        found += np.array_split(order, max(round(count * len(order) / len(sites)), 1))
-    return found
+        pieces += np.array_split(order, max(round(count * len(order) / len(sites)), 1))
+    return pieces
 
 
-def _belts(count, sites):
-    """Number of belts of courses for that many pieces."""
+def _count_belts(count, sites):
+    """Return the number of belts of courses for a number of pieces."""
     return int(np.clip(round(np.sqrt(count)), 1, sites.course.max() + 1))
 
 
 class Piece:
-    """Some of the readings, and their covariance by the wall."""
+    """Some of the readings, and their covariance as a part of the wall.
+
+    Parameters
+    ----------
+    sites : Sites
+    members : ndarray of int, shape (k,)
+        Indices of the readings.
+    nominal_m : float
+        Radius of the tank, m.
+    """
 
     def __init__(self, sites, members, nominal_m):
-        self.members, chosen = members, sites.take(members)
-        self._covariances = Covariances(chosen, nominal_m)
-        self._design = free_design(chosen)[0]
+        self.members, member_sites = members, sites.take(members)
+        self._covariances = Covariances(member_sites, nominal_m)
+        self._design = free_design(member_sites)[0]
 
     def precision(self, variances_m2, noise_m2):
-        """`Precision` with variances (n,) of the noise, and (n,) sds of the readings before, m."""
-        whole = self._covariances.total(variances_m2)
-        whole.flat[:: len(whole) + 1] += noise_m2
-        before = np.sqrt(np.diag(whole))
-        return Precision(whole, self._design), before
+        """Return the `Precision` of the readings, and their prior standard deviations (k,), m.
+
+        The arguments are the variances of the components and of the noise (k,), m2.
+        """
+        covariance = self._covariances.total(variances_m2)
+        covariance.flat[:: len(covariance) + 1] += noise_m2
+        prior_sd = np.sqrt(np.diag(covariance))
+        return Precision(covariance, self._design), prior_sd
 
 
 def restricted_precision(covariance, design):
-    """P of the module's heading, written out."""
+    """Return P of the module docstring as an array (n, n); the design has the shape (n, p)."""
+    # `invert` allocates a new array, which is overwritten by P.
     inverse = invert(covariance)[1]
     by_design = inverse @ design
-    normal = scipy.linalg.pinvh(design.T @ by_design)  # some points may hardly bear on anything
+    normal = scipy.linalg.pinvh(design.T @ by_design)  # the points may not determine a parameter
     inverse -= (by_design @ normal) @ by_design.T
     return inverse
 
 
 def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf, barred=False):
-    """`Tested` after setting aside one reading after another, of those that may go.
+    """Reject one reading after another and return the result of the last test.
 
-    most_sd_m  of a departure, beyond which no other reading controls it: then it stays
-    barred     of readings that stay aside
+    Parameters
+    ----------
+    precision : Precision or ndarray, shape (n, n)
+        P of the module docstring.
+    pull : ndarray, shape (n,)
+        P y.
+    accepted : ndarray of bool, shape (n,)
+        Readings accepted at the start.
+    may_go : ndarray of bool, shape (n,), optional
+        Readings that may be rejected.
+    most_sd_m : ndarray, shape (n,), optional
+        Readings whose departures have a larger standard deviation are not rejected, m.
+    barred : ndarray of bool, shape (n,), optional
+        Readings that remain rejected.
+
+    Returns
+    -------
+    Tested
     """
 
-    def tests(found):
-        statistic = np.abs(found.w) * may_go * (found.sd_m < most_sd_m)
-        return found.accepted, np.where(barred, np.nan, statistic), CRITICAL
+    def tests(result):
+        statistic = np.abs(result.w) * may_go * (result.sd_m < most_sd_m)
+        return result.accepted, np.where(barred, np.nan, statistic), CRITICAL
 
-    def again(before, goes, comes):
-        return against_others(precision, pull, before.accepted & ~goes | comes)
+    def again(previous, goes, comes):
+        return against_others(precision, pull, previous.accepted & ~goes | comes)
 
     start = against_others(precision, pull, accepted)
     return snoop(start, tests, again, at_once=AT_ONCE, returns=1).adjustment
 
 
 def carried_over(precision, aside):
-    """(P_SS^-1, P_.S P_SS^-1) of readings S that are set aside: what takes them out of P."""
-    among = scipy.linalg.pinvh(precision[np.ix_(aside, aside)], rtol=NOTHING_LEFT)
-    return among, precision[:, aside] @ among
+    """Return P_SS^-1 and P_.S P_SS^-1 of rejected readings S, the terms that eliminate S from P."""
+    inverse_block = scipy.linalg.pinvh(precision[np.ix_(aside, aside)], rtol=NOTHING_LEFT)
+    return inverse_block, precision[:, aside] @ inverse_block
 
 
 def against_others(precision, pull, accepted):
-    """`Tested` with P and P y of the module's heading."""
-    aside = np.flatnonzero(~accepted)
+    """Return `Tested` from P and P y of the module docstring.
+
+    Parameters
+    ----------
+    precision : Precision or ndarray, shape (n, n)
+        P.
+    pull : ndarray, shape (n,)
+        P y.
+    accepted : ndarray of bool, shape (n,)
+
+    Returns
+    -------
+    Tested
+    """
+    rejected = np.flatnonzero(~accepted)
     departure, weight = pull.copy(), precision.diagonal().copy()
-    if len(aside):
-        among, to = carried_over(precision, aside)
-        departure -= to @ pull[aside]
-        weight -= np.sum(to * precision[:, aside], axis=1)
-        departure[aside], weight[aside] = among @ pull[aside], 1.0
-        weight[aside] = 1 / np.diag(among)
-        departure[aside] *= weight[aside]
+    if len(rejected):
+        inverse_block, eliminator = carried_over(precision, rejected)
+        # Eliminate S: the accepted rows of P and P y refer to the accepted readings alone.
+        departure -= eliminator @ pull[rejected]
+        weight -= np.sum(eliminator * precision[:, rejected], axis=1)
+        # Rejected readings: difference P_SS^-1 e_S with the variances diag(P_SS^-1).
+        departure[rejected], weight[rejected] = inverse_block @ pull[rejected], 1.0
+        weight[rejected] = 1 / np.diag(inverse_block)
+        departure[rejected] *= weight[rejected]
+    # departure holds e_i and weight P_ii: their quotient is the difference in metres.
     weight = np.maximum(weight, 1e-300)
     return Tested(accepted, departure / weight, departure / np.sqrt(weight), weight**-0.5)

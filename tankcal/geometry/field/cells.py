@@ -1,4 +1,4 @@
-"""Many points of a wall as fewer sites: means of the points in cells of its surface."""
+"""Reduction of many points of a wall to fewer sites: means of the points in cells."""
 
 import numpy as np
 import scipy.sparse
@@ -6,32 +6,33 @@ import scipy.sparse
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.outlines import FULL_TURN
 
-MOST_SITES = 1600  # of a field: its covariance is written out
-CELL_M, CELL_ZETA, WIDER = 0.1, 0.1, 1.3  # first width and height of a cell, and its growth
-TALLEST = 0.2  # of half a course: a mean over w of a bulge b (1 - zeta^2) is b w^2 / 12 too low
+MOST_SITES = 1600  # largest number of sites of a field, whose covariance is a dense matrix
+CELL_M, CELL_ZETA, WIDER = 0.1, 0.1, 1.3  # first width and height of a cell, and growth factor
+# Height limit in halves of a course: a mean over w of a bulge b (1 - zeta^2) is b w^2 / 12 too low.
+TALLEST = 0.2
 
 
 def cells_of(sites, variance_m2, nominal_m, most=MOST_SITES):
-    """Weights of the means of points in cells, no more than so many.
+    """Return the weights of the means of points in at most `most` cells.
 
-    A cell is a piece of one ring of points. The mean over a width d shows a wave of k around the
-    turn times 1 - (k d / R)^2 / 24.
+    A cell is a section of a ring of points. The mean over a width d attenuates a wave of k periods
+    around the turn by 1 - (k d / R)^2 / 24.
 
     Parameters
     ----------
     sites : Sites
-        Of n points.
+        n points.
     variance_m2 : ndarray, shape (n,)
-        Of their radii, m2: a point counts as its inverse.
+        Variances of the radii, m2; the weight of a point is the inverse.
     nominal_m : float
         Radius of the tank, m.
     most : int
-        Cells.
+        Largest number of cells.
 
     Returns
     -------
     sparse array, shape (m, n)
-        Rows add up to one.
+        The elements of each row sum to one.
 
     Examples
     --------
@@ -41,37 +42,45 @@ def cells_of(sites, variance_m2, nominal_m, most=MOST_SITES):
     >>> cells_of(sites, np.ones(4), 5.0, most=3).toarray()[0]
     array([0.5, 0.5, 0. , 0. ])
     """
-    wide, tall = CELL_M / nominal_m, CELL_ZETA
+    width, height_step = CELL_M / nominal_m, CELL_ZETA
     turn, ring = sites.azimuth_rad % FULL_TURN, np.unique(sites.ring, return_inverse=True)[1]
     while True:
-        columns, rows = int(FULL_TURN / wide) + 1, int(2 / tall) + 2
-        height = np.clip(((sites.zeta + 1) / tall).astype(int), 0, rows - 1)
-        cell = (ring * rows + height) * columns + (turn / wide).astype(int)
+        columns, rows = int(FULL_TURN / width) + 1, int(2 / height_step) + 2
+        height = np.clip(((sites.zeta + 1) / height_step).astype(int), 0, rows - 1)
+        cell = (ring * rows + height) * columns + (turn / width).astype(int)
         place = np.unique(cell, return_inverse=True)[1]
-        around = wide > FULL_TURN
-        if place.max() < most or (around and tall > 2):  # there may be more rings than that
+        full_turn = width > FULL_TURN
+        if place.max() < most or (
+            full_turn and height_step > 2
+        ):  # no further reduction: one cell a ring
             break
-        wide, tall = WIDER * wide, WIDER * tall if around else min(WIDER * tall, TALLEST)
+        # First widen the cells to a full turn; only then may they exceed the height limit.
+        width, height_step = (
+            WIDER * width,
+            WIDER * height_step if full_turn else min(WIDER * height_step, TALLEST),
+        )
     weight = 1 / variance_m2
     weight = weight / np.bincount(place, weight)[place]
     return scipy.sparse.csr_array((weight, (place, np.arange(len(place)))))
 
 
 def sites_of_cells(sites, weights):
-    """The `Sites` of means of points.
+    """Return the `Sites` of means of points.
 
     Parameters
     ----------
     sites : Sites
-        Of n points.
+        n points.
     weights : sparse array, shape (m, n)
-        Of `cells_of`.
+        Result of `cells_of`.
 
     Returns
     -------
     Sites
+        m sites.
     """
     turn = weights @ np.exp(1j * sites.azimuth_rad)
+    # All points of a cell have one course and ring: those of its first point.
     first = weights.indices[weights.indptr[:-1]]
     return Sites(
         course=sites.course[first],

@@ -1,18 +1,19 @@
-"""What is known of a wall before it is measured: its components, and how large each may be.
+"""Prior knowledge of walls: components of the departure from a cylinder, and their amplitudes.
 
 The radius of a wall at azimuth a and height zeta of a course (-1 at its bottom, +1 at its top) is
 
     r = rho + x sin a + y cos a + sum over components of f(a, zeta),
 
-rho free for each course, x and y for each ring of points. A component is a random field of
-covariance
+with rho free for each course, and x and y free for each ring of points. A component is a random
+field of covariance
 
     variance * c(a - a') * h(zeta, zeta'),  c(0) = 1,  the mean of h(zeta, zeta) over a course = 1,
 
-so that its amplitude, the root of its variance, is the rms departure that it makes. It is the same
-in all courses, or each course has its own. How large it is a survey tells in part; before it, the
-logarithm of the variance is normal: about that of `median_m`, with `log_sd`, and a shell that is
-large in one is more likely large in another (`log_covariance`).
+so that its amplitude, the root of its variance, is its rms departure. A component is either common
+to all courses or independent in each course. The survey determines the amplitudes in part. Their
+prior is a normal distribution of the logarithm of the variance, with the median from `median_m` and
+the standard deviation `log_sd`. The logarithms of the components are correlated: a shell that is
+rough in one component is more likely rough in another (`log_covariance`).
 
 Settlement is the exception: its h depends on the height t above the foot of the whole shell (0 to
 1). A foundation that settles unevenly by u cos k a bends an open shell without stretching it. The
@@ -21,8 +22,8 @@ radius then changes by
     k^2 z / R * u cos k a,
 
 which grows in proportion to the height z, so h(t, t') = 3 t t', of mean 1 over the shell. The
-amplitudes u of a foundation fall with k and the factor k^2 grows, so modes 2 to 6 have equal
-variances. That the shell is not stretched follows from w_k = k v_k and v_k' = k u_k / R of the
+amplitudes u of a foundation decrease with k and the factor k^2 increases, so modes 2 to 6 have
+equal variances. The absence of stretching follows from w_k = k v_k and v_k' = k u_k / R of the
 radial, circumferential and vertical displacements w, v, u of mode k.
 """
 
@@ -36,22 +37,22 @@ from tankcal.geometry.outlines import FULL_TURN
 
 OVALITY_MODES = np.arange(2.0, 37.0)
 OVALITY_WEIGHTS = OVALITY_MODES**-3 / np.sum(OVALITY_MODES**-3)
-SEAM_LENGTH_M = 0.4  # along the arc, of a seam's flank
-WELD_LENGTH_M = 0.2  # the same of a peak at a weld, which is 0.8 m wide in all
+SEAM_LENGTH_M = 0.4  # length of the flank of a seam along the arc
+WELD_LENGTH_M = 0.2  # length of the flank of a peak at a weld, whose total width is 0.8 m
 SETTLEMENT_MODES = np.arange(2.0, 7.0)
 SETTLEMENT_WEIGHTS = np.full(len(SETTLEMENT_MODES), 1 / len(SETTLEMENT_MODES))
-JOINT_LENGTHS = (0.1, 0.25)  # of half a course: how far a joint draws the plate in
-LOCAL_LENGTH = 0.5  # of half a course: height over which a dent is lost
-BELL, BELL_SD = 1.0, 0.4  # of the way from a parabola to a plate whose joints do not turn
-WORKMANSHIP = 0.05  # correlation of the sizes of any two components of a shell
-SHRINKAGE = 0.09  # the same, besides, of two that its welds make: joints and seams
+JOINT_LENGTHS = (0.1, 0.25)  # decay lengths of drawn-in joints, in halves of a course
+LOCAL_LENGTH = 0.5  # correlation length of dents in height, in halves of a course
+BELL, BELL_SD = 1.0, 0.4  # profile of a plate: 0 for a parabola, 1 for clamped joints; and its sd
+WORKMANSHIP = 0.05  # correlation of the log variances of any two components of a shell
+SHRINKAGE = 0.09  # additional correlation of two components due to welds: joints and seams
 
 _LEVEL = (1,)
 KINDS = ("bulge", "ovality", "seams")
-ROUND_SHAPES = ("oval", "settled", "seam")  # waves round the wall, random at every azimuth
-LARGEST_QUOTIENT = 110.0  # b of which exp(2 pi b) is still a number
-PIECE = 1 << 14  # correlations at once
-NOT_AROUND = 15.0  # exp(-15 pi) is rounding: of a seam that short nothing is left half a turn away
+ROUND_SHAPES = ("oval", "settled", "seam")  # shapes with waves along the perimeter
+LARGEST_QUOTIENT = 110.0  # largest b for which exp(2 pi b) does not overflow
+PIECE = 1 << 14  # correlations in one array operation
+NOT_AROUND = 15.0  # b above which the correlation over half a turn is rounding, exp(-15 pi)
 
 
 @dataclass(frozen=True)
@@ -61,9 +62,9 @@ class Heights:
     Attributes
     ----------
     zeta : ndarray, shape (n,)
-        Within the course, -1 at its bottom to +1 at its top.
+        Height within the course, -1 at its bottom to +1 at its top.
     up : ndarray, shape (n,)
-        Above the foot of the shell, as a part of its height, 0 to 1.
+        Height above the foot of the shell, as a fraction of the height of the shell, 0 to 1.
     """
 
     zeta: np.ndarray
@@ -74,36 +75,36 @@ class Heights:
 
     @classmethod
     def within(cls, span, zeta):
-        """Heights zeta (n,) of courses between bottoms and tops (2,) or (n, 2) of the shell."""
-        low, high = np.transpose(span)
-        return cls(zeta, low + (np.asarray(zeta) + 1) / 2 * (high - low))
+        """Return `Heights` for zeta (n,) in courses with bottoms and tops (2,) or (n, 2)."""
+        bottom, top = np.transpose(span)
+        return cls(zeta, bottom + (np.asarray(zeta) + 1) / 2 * (top - bottom))
 
 
 @dataclass(frozen=True)
 class Component:
-    """One way in which a wall departs from a cylinder.
+    """Component of the departure of a wall from a cylinder.
 
     Attributes
     ----------
     name : str
     kind : str
-        Its name in a budget.
+        Name in an uncertainty budget.
     shape : str
-        Along the azimuth: "mean" (none: the mean radius), "oval" (mode k of variance k^-3, from 2
-        on), "settled" (modes 2 to 6 of equal variance), "seam" (the spectrum (1 + (k SEAM_LENGTH_M
-        / R)^2)^-2 from mode 2 on, cusps) or "weld" (a narrow seam at each vertical weld whose
-        azimuth is known; its amplitude is the peak's).
+        Form along the azimuth: "mean" (constant: the mean radius), "oval" (mode k of variance k^-3,
+        from 2 on), "settled" (modes 2 to 6 of equal variance), "seam" (the spectrum (1 + (k
+        SEAM_LENGTH_M / R)^2)^-2 from mode 2 on, cusps) or "weld" (a narrow seam at each vertical
+        weld of known azimuth; its amplitude is that of the peak).
     common : bool
-        The same in all courses.
+        Whether the component is common to all courses.
     orders : tuple of float, str
-        Variances of the Legendre polynomials 0, 1, ... in the height, up to a factor; "plate": of
-        the profiles of `plate_profiles`; "joints": of those of `joint_profiles`; "local": the
-        covariance exp(-|zeta - zeta'| / LOCAL_LENGTH); "growing": in proportion to the height above
-        the foot of the shell.
+        Form over the height. A tuple contains variances of the Legendre polynomials 0, 1, ..., up
+        to a factor. "plate": the profiles of `plate_profiles`; "joints": the profiles of
+        `joint_profiles`; "local": the covariance exp(-|zeta - zeta'| / LOCAL_LENGTH); "growing":
+        proportional to the height above the foot of the shell.
     median_m, log_sd : float
-        Median of its amplitude, m, and standard deviation of the logarithm of its variance.
+        Median of the amplitude, m, and standard deviation of the logarithm of the variance.
     declared_as : str
-        Input of an uncertainty budget that stands for it, where somebody declares that.
+        Input of an uncertainty budget that replaces the component, if declared.
     """
 
     name: str
@@ -116,49 +117,51 @@ class Component:
     declared_as: str = ""
 
     def height_columns(self, heights):
-        """(n, r) columns whose products are h at `Heights`; not of a component that is local."""
+        """Return columns (n, r) A with A A' = h at `Heights`; undefined for local components."""
         if self.orders == "growing":
             return np.sqrt(3.0) * heights.up[:, None]
         if self.orders == "joints":
             return joint_profiles(heights.zeta)
         if self.orders == "plate":
             return plate_profiles(heights.zeta)
-        used, scale = self._scales
-        return legendre(heights.zeta, used[-1])[:, used] * scale
+        orders_used, scale = self._scales
+        return legendre(heights.zeta, orders_used[-1])[:, orders_used] * scale
 
     @cached_property
     def _scales(self):
-        """Orders that have a variance, and its roots, so that the mean of h is one."""
+        """Return the orders with non-zero variance and the roots of their variances."""
         weights = np.array(self.orders, dtype=float)
+        # The mean square of the Legendre polynomial n over a course is 1 / (2 n + 1).
         weights = weights / np.sum(weights / (2 * np.arange(len(weights)) + 1))
-        used = np.flatnonzero(weights)
-        return used, np.sqrt(weights[used])
+        nonzero = np.flatnonzero(weights)
+        return nonzero, np.sqrt(weights[nonzero])
 
     def columns(self, waves, heights):
-        """(n, k) columns whose products are the covariance, of a mean, an oval or a settlement.
+        """Return columns (n, k) A with A A' = covariance, for the shapes mean, oval and settled.
 
         waves  {shape: (n, 2 modes)} of `wave_columns`
         """
-        up = self.height_columns(heights)
+        profiles = self.height_columns(heights)
         if self.shape == "mean":
-            return up
-        return (waves[self.shape][:, :, None] * up[:, None]).reshape(len(up), -1)
+            return profiles
+        # A product of covariances has the products of all pairs of columns.
+        return (waves[self.shape][:, :, None] * profiles[:, None]).reshape(len(profiles), -1)
 
     @property
     def is_level(self):
-        """The same at all heights of a course."""
+        """Whether the component is constant over the height of a course."""
         return self.orders == _LEVEL
 
     def height_covariance(self, heights, other):
-        """(n, m) h between `Heights` (n,) and (m,)."""
+        """Return h (n, m) between `Heights` (n,) and (m,)."""
         if self.orders == "local":
-            return _fading(np.subtract.outer(heights.zeta, other.zeta))
+            return _dent_covariance(np.subtract.outer(heights.zeta, other.zeta))
         return self.height_columns(heights) @ self.height_columns(other).T
 
     def height_between(self, heights, other):
-        """(n,) h between each of the `Heights` (n,) and its partner in the other (n,)."""
+        """Return h (n,) between each of the `Heights` (n,) and its partner in `other` (n,)."""
         if self.orders == "local":
-            return _fading(heights.zeta - other.zeta)
+            return _dent_covariance(heights.zeta - other.zeta)
         return np.sum(self.height_columns(heights) * self.height_columns(other), axis=1)
 
 
@@ -183,153 +186,203 @@ COMPONENTS = (
 
 
 def log_covariance(smoothed=False):
-    """(components, components) of the logarithms of the variances, before the survey.
+    """Return the prior covariance (components, components) of the logarithms of the variances.
 
-    Plates that are badly rolled and fitted leave a shell that is rough in every way; what welds
-    draw in when they shrink is peaking at the vertical and banding at the girth ones. Settlement is
-    due to the foundation, and is independent of the plates. But limbs,
-    which pass over its valleys, and set-ups that nothing but the wall ties show every wall smoother
-    than it is: of those (smoothed True) no size tells of another.
+    Poor rolling and fitting of plates makes a shell rough in all components. Weld shrinkage causes
+    both peaking at vertical welds and banding at girth welds. Settlement is due to the foundation
+    and independent of the plates.
+
+    With `smoothed`, the logarithms are independent. Limb measurements, which bridge the valleys of
+    a wall, and set-ups tied only by the wall show every wall smoother than it is. In such surveys,
+    the size of a component carries no information on another component.
     """
-    log_sd = np.array([one.log_sd for one in COMPONENTS])
+    log_sd = np.array([component.log_sd for component in COMPONENTS])
     if smoothed:
         return np.diag(log_sd**2)
-    welded = np.array([one.kind == "seams" or one.orders == "joints" for one in COMPONENTS])
-    of_plates = np.array([one.shape != "settled" for one in COMPONENTS])
-    alike = np.outer(of_plates, of_plates) * (WORKMANSHIP + SHRINKAGE * np.outer(welded, welded))
-    np.fill_diagonal(alike, 1.0)
-    return alike * np.outer(log_sd, log_sd)
+    welded = np.array(
+        [component.kind == "seams" or component.orders == "joints" for component in COMPONENTS]
+    )
+    plate_related = np.array([component.shape != "settled" for component in COMPONENTS])
+    correlation = np.outer(plate_related, plate_related) * (
+        WORKMANSHIP + SHRINKAGE * np.outer(welded, welded)
+    )
+    np.fill_diagonal(correlation, 1.0)
+    return correlation * np.outer(log_sd, log_sd)
 
 
-def _fading(apart):
-    """h of a dent between heights so far apart."""
-    return np.exp(-np.abs(apart) / LOCAL_LENGTH)
+def _dent_covariance(difference):
+    """Return h of a dent for a difference of heights."""
+    return np.exp(-np.abs(difference) / LOCAL_LENGTH)
 
 
 def legendre(zeta, highest):
-    """(n, highest + 1) Legendre polynomials of order 0 to the highest."""
+    """Return Legendre polynomials (n, highest + 1) of orders 0 to highest."""
     zeta = np.asarray(zeta, dtype=float)
-    found = np.ones((len(zeta), highest + 1))
-    found[:, 1:2] = zeta[:, None]
+    polynomials = np.ones((len(zeta), highest + 1))
+    polynomials[:, 1:2] = zeta[:, None]
     for n in range(2, highest + 1):
-        found[:, n] = (2 - 1 / n) * zeta * found[:, n - 1] - (1 - 1 / n) * found[:, n - 2]
-    return found
+        # Bonnet's recursion: n P_n = (2 n - 1) x P_(n-1) - (n - 1) P_(n-2).
+        polynomials[:, n] = (2 - 1 / n) * zeta * polynomials[:, n - 1] - (1 - 1 / n) * polynomials[
+            :, n - 2
+        ]
+    return polynomials
 
 
 def plate_profiles(zeta):
-    """(n, 2) columns whose products are h of a plate that bulges between its joints.
+    """Return columns (n, 2) A with A A' = h of a plate that bulges between its joints.
 
-    A plate whose joints turn freely is nearly a parabola, p = 1 - zeta^2; one whose joints do not,
-    b = (1 - zeta^2)^2. What bulges is p + t (b - p), t about BELL with the standard deviation
-    BELL_SD. Less the mean over the course, p = -2/3 P2 and b = -16/21 P2 + 8/35 P4.
+    A plate with freely rotating joints is nearly a parabola, p = 1 - zeta^2; a plate with clamped
+    joints is b = (1 - zeta^2)^2. The bulge is p + t (b - p), with t distributed about BELL with the
+    standard deviation BELL_SD. Without their means over the course, p = -2/3 P2 and b = -16/21 P2 +
+    8/35 P4.
     """
-    free, held = np.array([-2 / 3, 0.0]), np.array([-16 / 21, 8 / 35])  # of P2 and P4
-    shapes = np.array([free + BELL * (held - free), BELL_SD * (held - free)])
+    hinged, clamped = np.array([-2 / 3, 0.0]), np.array([-16 / 21, 8 / 35])  # of P2 and P4
+    shapes = np.array([hinged + BELL * (clamped - hinged), BELL_SD * (clamped - hinged)])
+    # Scale to a mean h of one: the mean squares of P2 and P4 are 1/5 and 1/9.
     shapes /= np.sqrt(np.sum(shapes**2 @ [1 / 5, 1 / 9]))
     return legendre(zeta, 4)[:, [2, 4]] @ shapes.T
 
 
 def joint_profiles(zeta):
-    """(n, 2) columns whose products are h of a plate that its joints draw in, near them.
+    """Return columns (n, 2) A with A A' = h of a plate that is drawn in near its joints.
 
-    Each is exp(-(1 - |zeta|) / w) less its mean, of mean square a half; w of JOINT_LENGTHS, for
-    what a girth weld draws in is lost over about sqrt(R t) / 1.3 of a plate t thick (the edge
-    effect of a cylinder): 0.1 m of a small tank, 0.3 m of a large one.
+    Each column is exp(-(1 - |zeta|) / w) less its mean, scaled to a mean square of one half, with w
+    from JOINT_LENGTHS. The deformation due to a girth weld decays over about sqrt(R t) / 1.3 for a
+    plate of thickness t (the edge effect of a cylinder): 0.1 m for a small tank, 0.3 m for a large
+    tank.
 
     Source: Timoshenko & Woinowsky-Krieger 1959, section 114.
     """
     w = np.array(JOINT_LENGTHS)
+    # Mean and variance over the course of exp(-s / w), s from 0 to 1.
     mean = w * (1 - np.exp(-1 / w))
     square = w / 2 * (1 - np.exp(-2 / w)) - mean**2
-    below = (1 - np.abs(np.asarray(zeta, dtype=float)))[:, None]
-    return (np.exp(-below / w) - mean) / np.sqrt(len(w) * square)
+    from_joint = (1 - np.abs(np.asarray(zeta, dtype=float)))[:, None]
+    return (np.exp(-from_joint / w) - mean) / np.sqrt(len(w) * square)
 
 
 def wave_columns(azimuth_rad):
-    """{"oval", "settled": (n, 2 modes) columns whose products are c}.
+    """Return {"oval", "settled": columns (n, 2 modes) A with A A' = c}.
 
-    Mode k has the variance k^-3, k = 2..36; modes 2 to 6 have equal ones. nan: the mean of a whole
-    turn, which has none of them.
+    Mode k has the variance k^-3 for k = 2..36 ("oval"); modes 2 to 6 have equal variances
+    ("settled"). The azimuth nan denotes the mean of a full turn, to which no mode contributes.
     """
     cosines, sines = multiples(azimuth_rad, int(OVALITY_MODES[-1]))
-    found = {}
+    columns = {}
     for shape, weights in (("oval", OVALITY_WEIGHTS), ("settled", SETTLEMENT_WEIGHTS)):
         modes = slice(1, 1 + len(weights))  # from k = 2 on
         waves = np.hstack([cosines[:, modes], sines[:, modes]]) * np.tile(np.sqrt(weights), 2)
         waves[~np.isfinite(azimuth_rad)] = 0.0
-        found[shape] = waves
-    return found
+        columns[shape] = waves
+    return columns
 
 
 def seam_correlation(difference_rad, radius_m, length_m=SEAM_LENGTH_M):
-    """c of an azimuth difference on a wall of that radius: sum over k >= 2 of (1 + (k/k0)^2)^-2.
+    """Return c for azimuth differences: sum over k >= 2 of (1 + (k/k0)^2)^-2, over its value at 0.
 
-    k0 = R / length_m; all modes are summed in closed form,
+    k0 = R / length_m. All modes are summed in closed form,
 
         sum over all k of exp(i k x) / (k^2 + b^2)^2
             = pi / (2 b^2) (C / b - (pi - x) S + pi C coth(pi b)),  0 <= x <= pi,
         C = cosh(b (pi - x)) / sinh(pi b),  S = sinh(b (pi - x)) / sinh(pi b),
 
-    and modes 0 and 1 are taken off.
+    and modes 0 and 1 are subtracted.
+
+    Parameters
+    ----------
+    difference_rad : array_like
+        Azimuth differences, rad.
+    radius_m : float
+        Radius of the wall, m.
+    length_m : float
+        Length of the flank of a seam along the arc, m.
+
+    Returns
+    -------
+    ndarray
+        Same shape as `difference_rad`.
     """
     b = radius_m / length_m
     x = np.asarray(difference_rad, dtype=float)
-    found = _all_modes(x, b) - b**-4 - 2 * np.cos(x) / (1 + b**2) ** 2
-    return found / _seam_sum(b)
+    # Mode 0 contributes b^-4, modes +1 and -1 together 2 cos x / (1 + b^2)^2.
+    total = _all_modes(x, b) - b**-4 - 2 * np.cos(x) / (1 + b**2) ** 2
+    return total / _seam_sum(b)
 
 
-def _seams_between(azimuth_rad, other_rad, radius_m):
-    """(n, m) `seam_correlation` between azimuths, in pieces of rows that a processor keeps at hand.
+def _correlate_seams(azimuth_rad, other_rad, radius_m):
+    """Return `seam_correlation` (n, m) between azimuths, in blocks that fit the processor cache.
 
-    exp(-b x) is a quotient of exp(b a), so that there are no more exponentials than azimuths. Of
-    azimuths with themselves one half is computed, and mirrored.
+    exp(-b x) is a quotient of exp(b a), so only one exponential for each azimuth is required. For
+    azimuths with themselves, half of the matrix is computed and mirrored.
     """
     b = radius_m / SEAM_LENGTH_M
     first, second = azimuth_rad % FULL_TURN - np.pi, other_rad % FULL_TURN - np.pi
     if b > LARGEST_QUOTIENT:
         return seam_correlation(np.subtract.outer(first, second), radius_m)
     turn, at_once = np.exp(-b * FULL_TURN), max(1, PIECE // max(len(second), 1))
-    scale, near_by, far_by = _of_modes(b, turn)
+    scale, near_by, far_by = _mode_terms(b, turn)
     scale /= _seam_sum(b)
     grows, falls = np.exp(b * second), np.exp(-b * second)
-    low = [np.stack([np.ones(len(a)), np.cos(a), np.sin(a)], axis=1) for a in (first, second)]
-    low[0] *= np.array([b**-4, *2 * [2 / (1 + b**2) ** 2]]) / _seam_sum(b)
-    found, mirrored = np.empty((len(first), len(second))), azimuth_rad is other_rad
+    # Modes 0 and 1 as products of columns: cos(a - a') = cos a cos a' + sin a sin a'.
+    low_modes = [np.stack([np.ones(len(a)), np.cos(a), np.sin(a)], axis=1) for a in (first, second)]
+    low_modes[0] *= np.array([b**-4, *2 * [2 / (1 + b**2) ** 2]]) / _seam_sum(b)
+    correlations, mirrored = np.empty((len(first), len(second))), azimuth_rad is other_rad
     for start in range(0, len(first), at_once):
-        rows, to = slice(start, start + at_once), slice(start if mirrored else 0, None)
-        here = first[rows]
-        x = np.abs(np.subtract.outer(here, second[to]))
+        rows, columns = slice(start, start + at_once), slice(start if mirrored else 0, None)
+        azimuths = first[rows]
+        x = np.abs(np.subtract.outer(azimuths, second[columns]))
         np.minimum(x, FULL_TURN - x, out=x)
-        one = np.multiply.outer(np.exp(b * here), falls[to])
-        other = np.multiply.outer(np.exp(-b * here), grows[to])
-        near, around = np.minimum(one, other), np.maximum(one, other, out=one)
-        around *= turn  # the same along the other way
-        np.maximum(near, around, out=near)
+        quotient = np.multiply.outer(np.exp(b * azimuths), falls[columns])
+        inverse_quotient = np.multiply.outer(np.exp(-b * azimuths), grows[columns])
+        # The smaller of exp(+-b (a - a')) is the direct way; the other way round has the factor
+        # exp(-2 pi b).
+        direct, indirect = (
+            np.minimum(quotient, inverse_quotient),
+            np.maximum(quotient, inverse_quotient, out=quotient),
+        )
+        indirect *= turn
+        np.maximum(direct, indirect, out=direct)
         if b < NOT_AROUND:
-            far = turn / near
-            far *= far_by - x
+            far_term = turn / direct
+            far_term *= far_by - x
         else:
-            far = 0.0
+            far_term = 0.0
         x += near_by
-        near *= x
-        near += far
-        near *= scale
-        np.subtract(near, low[0][rows] @ low[1][to].T, out=found[rows, to])
+        direct *= x
+        direct += far_term
+        direct *= scale
+        np.subtract(
+            direct, low_modes[0][rows] @ low_modes[1][columns].T, out=correlations[rows, columns]
+        )
         if mirrored:
-            found[to, rows] = found[rows, to].T
-    return found
+            correlations[columns, rows] = correlations[rows, columns].T
+    return correlations
 
 
 def weld_columns(azimuth_rad, welds_rad, radius_m):
-    """(n, w) a seam of WELD_LENGTH_M at each weld, of peak one: c(a - weld); 0 of a whole turn."""
-    away = np.subtract.outer(azimuth_rad, welds_rad)
-    return np.nan_to_num(seam_correlation(away, radius_m, WELD_LENGTH_M))
+    """Return peaks (n, w) of height one and flank length WELD_LENGTH_M at the welds.
+
+    Parameters
+    ----------
+    azimuth_rad : ndarray, shape (n,)
+        nan, the mean of a full turn, gives 0.
+    welds_rad : ndarray, shape (w,)
+    radius_m : float
+        Radius of the wall, m.
+
+    Returns
+    -------
+    ndarray, shape (n, w)
+        c(a - weld).
+    """
+    differences = np.subtract.outer(azimuth_rad, welds_rad)
+    return np.nan_to_num(seam_correlation(differences, radius_m, WELD_LENGTH_M))
 
 
 def mode_shares(modes, radius_m):
-    """{"oval", "settled", "seam": (k,) variance of cosine and sine of each mode, from 2 on}.
+    """Return {"oval", "settled", "seam": variances (k,) of cosine and sine of each mode}.
 
-    All modes of a shape add up to one.
+    The variances of all modes of a shape sum to one.
     """
     b = radius_m / SEAM_LENGTH_M
     return {
@@ -340,35 +393,48 @@ def mode_shares(modes, radius_m):
 
 
 def _seam_sum(b):
-    """Sum over |k| >= 2 of (k^2 + b^2)^-2."""
+    """Return the sum over |k| >= 2 of (k^2 + b^2)^-2."""
     return _all_modes(np.zeros(1), b)[0] - b**-4 - 2 / (1 + b**2) ** 2
 
 
 def _all_modes(x, b):
+    """Return the sum over all k of exp(i k x) / (k^2 + b^2)^2 (see `seam_correlation`)."""
     x = np.abs(x)
     if np.max(x, initial=0.0) > FULL_TURN:
         x = x % FULL_TURN
     x = np.minimum(x, FULL_TURN - x)
     turn = np.exp(-b * FULL_TURN)
-    scale, near_by, far_by = _of_modes(b, turn)
-    near = np.exp(-b * x)
-    found = near * (near_by + x)
-    if b < NOT_AROUND:  # else nothing comes from the other way around
-        far = turn / near
-        found += far * (far_by - x)
-    return scale * found
+    scale, near_by, far_by = _mode_terms(b, turn)
+    near_term = np.exp(-b * x)
+    total = near_term * (near_by + x)
+    if b < NOT_AROUND:  # otherwise the term of the other way round is rounding
+        far_term = turn / near_term
+        total += far_term * (far_by - x)
+    return scale * total
 
 
-def _of_modes(b, turn):
-    """Factor of the sum of all modes, and what stands beside x along the near and the far way."""
+def _mode_terms(b, turn):
+    """Return the factor of the sum of all modes, and the constants added to +x and -x."""
     coth = np.pi * (1 + turn) / (1 - turn)
     return np.pi / (2 * b**2 * (1 - turn)), 1 / b + coth - np.pi, 1 / b + coth + np.pi
 
 
 def azimuth_correlations(azimuth_rad, other_rad, radius_m):
-    """{shape: (n, m) c} between azimuths (n,) and (m,); nan: a whole turn.
+    """Return {shape: c (n, m)} between azimuths (n,) and (m,).
 
-    The mean of a whole turn has none of the waves around it.
+    The azimuth nan denotes the mean of a full turn, to which no wave contributes.
+
+    Parameters
+    ----------
+    azimuth_rad : ndarray, shape (n,)
+    other_rad : ndarray, shape (m,)
+    radius_m : float
+        Radius of the wall, m.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n, m)
+        Keys "mean", "oval", "settled" and "seam".
     """
     seams = seam_correlations(azimuth_rad, other_rad, radius_m)
     waves, others = wave_columns(azimuth_rad), wave_columns(other_rad)
@@ -377,10 +443,22 @@ def azimuth_correlations(azimuth_rad, other_rad, radius_m):
 
 
 def seam_correlations(azimuth_rad, other_rad, radius_m):
-    """(n, m) c of "seam", as `azimuth_correlations` gives it."""
-    known = np.nan_to_num(azimuth_rad)
-    other = known if other_rad is azimuth_rad else np.nan_to_num(other_rad)
-    found = _seams_between(known, other, radius_m)
-    found[~np.isfinite(azimuth_rad)] = 0.0
-    found[:, ~np.isfinite(other_rad)] = 0.0
-    return found
+    """Return c (n, m) of "seam" between azimuths, as in `azimuth_correlations`.
+
+    Parameters
+    ----------
+    azimuth_rad : ndarray, shape (n,)
+    other_rad : ndarray, shape (m,)
+    radius_m : float
+        Radius of the wall, m.
+
+    Returns
+    -------
+    ndarray, shape (n, m)
+    """
+    first = np.nan_to_num(azimuth_rad)
+    second = first if other_rad is azimuth_rad else np.nan_to_num(other_rad)
+    correlations = _correlate_seams(first, second, radius_m)
+    correlations[~np.isfinite(azimuth_rad)] = 0.0
+    correlations[:, ~np.isfinite(other_rad)] = 0.0
+    return correlations

@@ -1,13 +1,14 @@
-"""The wall of a tank as one random field: its best estimate from what was measured, and its doubt.
+"""Wall of a tank as a random field: best estimate from measurements, and its uncertainty.
 
-With the components of `components` and their amplitudes the wall is a Gaussian field with a free
-radius in each course and a free centre of each ring. What was measured, y = X beta + f + noise,
-gives every linear functional of the wall g = X_g beta + f_g by the best linear unbiased estimate
+With the components of `components` and their amplitudes, the wall is a Gaussian field with a free
+radius in each course and a free centre of each ring. The measurements y = X beta + f + noise give
+the best linear unbiased estimate of every linear functional of the wall, g = X_g beta + f_g,
 
     g = A y,   A = (K_g - (K_g V^-1 X - X_g) (X' V^-1 X)^-1 X') V^-1,   V = K + C,
 
-K the covariance of the field at the sites, K_g between functionals and sites, C that of the noise.
-The error A y - g consists of A (noise), and of what each component has that the survey did not see,
+with K the covariance of the field at the sites, K_g the covariance between functionals and sites,
+and C the covariance of the noise. The error A y - g consists of A (noise) and, for each component,
+of the part that the survey does not determine,
 
     variance * (K_gg - A K_g' - K_g A' + A K A').
 
@@ -34,24 +35,26 @@ from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import panels
 
-LEVELS = 7  # of a course, at which its outlines are stated: Gauss levels
+LEVELS = 7  # number of Gauss levels of a course, at which its outlines are estimated
 SHAPES = ("mean", *ROUND_SHAPES, "weld")
-GRID_M, FEWEST_OF_GRID = 0.1, 720  # along the arc, and azimuths, of outlines that are integrated
+# Grid of the integrals along outlines: largest step along the arc, and least number of azimuths.
+GRID_M, FEWEST_OF_GRID = 0.1, 720
 
 
 @cache
 def gauss_heights():
-    """(LEVELS,) heights within a course, -1 to 1, at which outlines are stated."""
+    """Return the heights (LEVELS,) of the outlines within a course, -1 to 1."""
     return 2 * panels([0.0, 1.0], LEVELS)[0] - 1
 
 
 @dataclass(frozen=True)
 class WallField:
-    """A wall known from radii at sites.
+    """Wall estimated from radii at sites.
 
     Attributes
     ----------
     sites : Sites
+        n sites.
     radius_m : ndarray, shape (n,)
         Distances from the centre of the ring, m.
     noise_m2 : ndarray, shape (n, n)
@@ -60,12 +63,12 @@ class WallField:
     nominal_m : float
         Radius of the tank, m.
     stated : tuple of str
-        Shapes of components that the estimate states; the others are in the doubt alone. Without
-        any each course is a cylinder of its mean radius, as standards of strapping have it; with
-        "mean" alone a surface of revolution.
+        Shapes of the components in the estimate; other components contribute only to the
+        uncertainty. Without shapes, each course is a cylinder of its mean radius, as in strapping
+        standards; with "mean" alone, the wall is a surface of revolution.
     plumbed : int, optional
-        Rings from this number on do not stand off the axis, but off a plumb line, or off set-ups
-        that may move: where they are is no part of an outline.
+        Rings from this number on do not refer to the axis but to a plumb line, or to set-ups that
+        may move: their centres are not part of an outline.
     """
 
     sites: Sites
@@ -78,41 +81,45 @@ class WallField:
 
     @property
     def grid_rad(self):
-        """(g,) azimuths of the outlines, even."""
+        """Evenly spaced azimuths (g,) of the outlines."""
         count = max(FEWEST_OF_GRID, int(np.ceil(FULL_TURN * self.nominal_m / GRID_M)))
         return np.arange(count) * FULL_TURN / count
 
     @cached_property
     def outlines_m(self):
-        """(courses, LEVELS, g) the estimated radius at each Gauss level of each course."""
+        """Estimated radius (courses, LEVELS, g) at each Gauss level of each course, m."""
         return self.outlines_at(gauss_heights())
 
     def outlines_at(self, zeta):
-        """(courses, k, g) the estimated radius at heights (k,) of each course."""
+        """Return the estimated radius (courses, k, g) at heights (k,) of each course, m."""
         zeta = np.asarray(zeta, dtype=float)
-        found = np.empty((len(self._members), len(zeta), len(self.grid_rad)))
-        found[:] = self._mean_m[:, None, None] + self._circles[:, None]
+        outlines = np.empty((len(self._members), len(zeta), len(self.grid_rad)))
+        # Parameters without prior first, then the conditional mean K_g V^-1 (y - X beta) of each
+        # shape.
+        outlines[:] = self._mean_m[:, None, None] + self._circles[:, None]
         for shape in self._to_grid:
             if shape not in self.stated:
                 continue
             for course, members in enumerate(self._covariances.runs):
                 heights = self.sites.heights_at(course, zeta)
-                if shape == "settled" or course == 0:  # the others are alike in all courses
-                    alike = self._drawn(shape, heights, slice(None), common=True)
-                found[course] += alike + self._drawn(shape, heights, members, common=False)
+                if (
+                    shape == "settled" or course == 0
+                ):  # other common shapes are equal in all courses
+                    common_part = self._drawn(shape, heights, slice(None), common=True)
+                outlines[course] += common_part + self._drawn(shape, heights, members, common=False)
         if "weld" in self.stated:
             for i, at_grid in self.peaks_at_grid.items():
                 peaks = self._explained @ self._covariances.peaks[i]
-                found += self.amplitudes.variances_m2[i] * (at_grid @ peaks)[:, None]
-        return found
+                outlines += self.amplitudes.variances_m2[i] * (at_grid @ peaks)[:, None]
+        return outlines
 
     def _drawn(self, shape, heights, members, *, common):
-        """(k, g or 1) what some sites show of the components of one shape at `Heights` (k,)."""
-        of_sites = self.sites.heights[members]
+        """Return the conditional mean (k, g or 1) of the components of a shape at `Heights`."""
+        site_heights = self.sites.heights[members]
         parts = [
-            size * one.height_covariance(heights, of_sites)
-            for one, size in zip(COMPONENTS, self.amplitudes.variances_m2, strict=True)
-            if (one.shape, one.common) == (shape, common)
+            size * component.height_covariance(heights, site_heights)
+            for component, size in zip(COMPONENTS, self.amplitudes.variances_m2, strict=True)
+            if (component.shape, component.common) == (shape, common)
         ]
         if not parts:
             return 0.0
@@ -122,12 +129,12 @@ class WallField:
         return pull @ self._covariances.at_sites(self._to_grid[shape], members).T
 
     def functionals(self, gradients_m):
-        """`Functionals` of the wall: each the integral of a gradient times its radius.
+        """Return `Functionals` of the wall: integrals of gradients times the radius.
 
         Parameters
         ----------
         gradients_m : ndarray, shape (courses, LEVELS, g)
-            One functional for each course and level, of the outline there.
+            One functional for each course and level, as a function of the outline there.
 
         Returns
         -------
@@ -137,28 +144,29 @@ class WallField:
 
     @cached_property
     def means(self):
-        """`Functionals`: the mean radius of each course at each Gauss level."""
+        """`Functionals` for the mean radius of each course at each Gauss level."""
         return self.functionals(np.full(self.outlines_m.shape, 1 / FULL_TURN))
 
     def seen(self, departures_m):
-        """(courses, LEVELS) mean radii that the estimate makes of departures (n,) of the radii."""
+        """Return mean radii (courses, LEVELS) estimated from departures (n,) of the readings, m."""
         return (self.means.weights @ departures_m).reshape(len(self._members), LEVELS)
 
     @property
     def centres_m(self):
-        """{ring: (x, y) of its centre}, of rings that are level."""
+        """{ring: (x, y) of its centre}, for level rings, m."""
         free, starts = self._solved[0], self._columns[1]
-        found = {}
+        centres = {}
         for start, members in zip(starts, self._members, strict=True):
             rings = np.unique(self.sites.ring[members])
             for place, ring in enumerate(rings[rings >= 0]):
-                at = start + 1 + 2 * place
-                found[int(ring)] = free[at : at + 2]
-        return found
+                # The columns of a course are its radius, then x and y of the centre of each ring.
+                column = start + 1 + 2 * place
+                centres[int(ring)] = free[column : column + 2]
+        return centres
 
     @property
     def shared(self):
-        """(s,) what courses share without a prior, and (s, s) its covariance."""
+        """Estimates (s,) of the unknowns shared by courses, and their covariance (s, s)."""
         free, normal = self._solved[0], self._factored[2]
         count = self.sites.shared.shape[1]
         covariance = scipy.linalg.cho_solve(normal, np.eye(len(free))[:, -count:])
@@ -166,11 +174,11 @@ class WallField:
 
     @property
     def shared_by_readings(self):
-        """(s, n) derivative of what courses share without a prior by the readings."""
+        """Derivatives (s, n) of the unknowns shared by courses by the readings."""
         _, by_columns, normal = self._factored
         return scipy.linalg.cho_solve(normal, by_columns.T)[-self.sites.shared.shape[1] :]
 
-    # what follows is computed once
+    # The following quantities are computed once and cached.
 
     @cached_property
     def _members(self):
@@ -178,7 +186,7 @@ class WallField:
 
     @cached_property
     def _mean_m(self):
-        """(courses,) mean radius of the readings: what is taken off before anything."""
+        """Mean radii (courses,) of the readings, which are subtracted to avoid cancellation."""
         return np.array([self.radius_m[members].mean() for members in self._members])
 
     @cached_property
@@ -187,83 +195,92 @@ class WallField:
 
     @cached_property
     def _to_grid(self):
-        found = azimuth_correlations(self.grid_rad, self._covariances.azimuths_rad, self.nominal_m)
-        for shape in ROUND_SHAPES:  # no mode 0, nor one that the grid takes for it
-            found[shape] -= found[shape].mean(axis=0)
-        return found
+        """{shape: covariance c (g, azimuths) between the grid and the distinct azimuths}."""
+        correlations = azimuth_correlations(
+            self.grid_rad, self._covariances.azimuths_rad, self.nominal_m
+        )
+        for shape in ROUND_SHAPES:  # remove mode 0, and modes that the grid aliases to it
+            correlations[shape] -= correlations[shape].mean(axis=0)
+        return correlations
 
     @cached_property
     def peaks_at_grid(self):
-        """{component: (courses, g, k) derivative of the outlines by the peaks of welds}."""
+        """{component: derivative (courses, g, k) of the outlines by the peaks of welds}."""
         welds = [self.sites.welds_of(course) for course in range(len(self._members))]
-        ends = np.cumsum([0, *(len(one) for one in welds)])
-        alone = np.zeros((len(welds), len(self.grid_rad), ends[-1]))
+        ends = np.cumsum([0, *(len(item) for item in welds)])
+        by_weld = np.zeros((len(welds), len(self.grid_rad), ends[-1]))
         for course, azimuths in enumerate(welds):
             columns = weld_columns(self.grid_rad, azimuths, self.nominal_m)
-            alone[course, :, ends[course] : ends[course + 1]] = columns - columns.mean(axis=0)
+            by_weld[course, :, ends[course] : ends[course + 1]] = columns - columns.mean(axis=0)
         return {
-            index: alone.sum(axis=2, keepdims=True) if one.common else alone
-            for index, one in enumerate(COMPONENTS)
-            if one.shape == "weld"
+            index: by_weld.sum(axis=2, keepdims=True) if item.common else by_weld
+            for index, item in enumerate(COMPONENTS)
+            if item.shape == "weld"
         }
 
     @cached_property
     def _columns(self):
-        """(n, p) X, and (courses,) which of its columns are the radii."""
+        """Design X (n, p), and the columns (courses,) of the radii."""
         return free_design(self.sites)
 
     @property
     def covariance_m2(self):
-        """(n, n) V: of the readings, by the wall and by their noise."""
-        whole = self._covariances.total(self.amplitudes.variances_m2)
-        whole += self.noise_m2
-        whole.flat[:: len(whole) + 1] += LEAST_NOISE_M**2
-        return whole
+        """Covariance V (n, n) of the readings due to the wall and the noise."""
+        covariance = self._covariances.total(self.amplitudes.variances_m2)
+        covariance += self.noise_m2
+        covariance.flat[:: len(covariance) + 1] += LEAST_NOISE_M**2
+        return covariance
 
     @cached_property
     def _factored(self):
-        """Cholesky factor of V, V^-1 X, and that of X' V^-1 X."""
-        whole = self.covariance_m2.T  # the same, in columns, as LAPACK has it
-        factor = scipy.linalg.cho_factor(whole, lower=True, overwrite_a=True, check_finite=False)
+        """Cholesky factor of V, V^-1 X, and Cholesky factor of X' V^-1 X."""
+        covariance = (
+            self.covariance_m2.T
+        )  # symmetric: the transpose is in the column order of LAPACK
+        factor = scipy.linalg.cho_factor(
+            covariance, lower=True, overwrite_a=True, check_finite=False
+        )
         columns = self._columns[0]
         by_columns = scipy.linalg.cho_solve(factor, columns, check_finite=False)
         return factor, by_columns, scipy.linalg.cho_factor(columns.T @ by_columns)
 
     @cached_property
     def _solved(self):
-        """(p,) beta less the mean radii, and (n,) V^-1 (y - X beta)."""
+        """beta (p,) less the mean radii, and V^-1 (y - X beta) (n,)."""
         factor, by_columns, normal = self._factored
-        left = self.radius_m - self._mean_m[self.sites.course]
-        free = scipy.linalg.cho_solve(normal, by_columns.T @ left)
-        left = left - self._columns[0] @ free
-        return free, scipy.linalg.cho_solve(factor, left, check_finite=False)
+        residuals = self.radius_m - self._mean_m[self.sites.course]
+        beta = scipy.linalg.cho_solve(normal, by_columns.T @ residuals)
+        residuals = residuals - self._columns[0] @ beta
+        return beta, scipy.linalg.cho_solve(factor, residuals, check_finite=False)
 
     @property
     def _explained(self):
+        """V^-1 (y - X beta), shape (n,)."""
         return self._solved[1]
 
     @cached_property
     def _circles(self):
-        """(courses, g) the free radius less the mean, about the mean centre of its rings."""
+        """Free radius less the mean (courses, g), about the mean centre of the rings."""
         free, radii = self._solved[0], self._columns[1]
         turn = np.stack([np.sin(self.grid_rad), np.cos(self.grid_rad)])
-        found, most = [], np.inf if self.plumbed is None else self.plumbed
+        circles, first_plumbed = [], np.inf if self.plumbed is None else self.plumbed
         for start, members in zip(radii, self._members, strict=True):
             ring = self.sites.ring[members]
-            members = members[(ring >= 0) & (ring < most)]
+            members = members[(ring >= 0) & (ring < first_plumbed)]
             if not len(members) or "oval" not in self.stated:
-                found.append(np.full(len(self.grid_rad), free[start]))
+                circles.append(np.full(len(self.grid_rad), free[start]))
                 continue
+            # A leaning ring has four columns (centre and lean), a level ring two.
             _, leaning = np.unique(self.sites.ring[members], return_index=True)
             widths = np.where(self.sites.leans[members][leaning], 4, 2)
-            at = start + 1 + np.cumsum([0, *widths[:-1]])
-            centre = np.mean([free[i : i + 2] for i in at], axis=0)
-            found.append(free[start] + centre @ turn)
-        return np.array(found)
+            columns = start + 1 + np.cumsum([0, *widths[:-1]])
+            centre = np.mean([free[i : i + 2] for i in columns], axis=0)
+            circles.append(free[start] + centre @ turn)
+        return np.array(circles)
 
 
 class Functionals:
-    """Linear functionals of a wall, one for each course and Gauss level, estimated.
+    """Estimated linear functionals of a wall, one for each course and Gauss level.
 
     Attributes
     ----------
@@ -284,84 +301,92 @@ class Functionals:
         }
         self._along["mean"] = self._totals[:, :, None] * np.ones(len(field.sites))
         self._across = [self._with_component(index) for index in range(len(COMPONENTS))]
-        across = np.zeros((len(field._members) * LEVELS, len(field.sites)))
-        for one, part in zip(COMPONENTS, self._across, strict=True):
-            if one.shape in field.stated:
-                across += part
+        # K_g: components outside the estimate do not enter the weights, only the uncertainty.
+        covariance = np.zeros((len(field._members) * LEVELS, len(field.sites)))
+        for component, part in zip(COMPONENTS, self._across, strict=True):
+            if component.shape in field.stated:
+                covariance += part
         columns, radii = field._columns
-        free = np.zeros((len(across), columns.shape[1]))
+        free = np.zeros((len(covariance), columns.shape[1]))
         courses = np.repeat(np.arange(len(radii)), LEVELS)
         free[np.arange(len(free)), radii[courses]] = self._totals.ravel()
-        short = free - across @ by_columns
-        self.with_free = scipy.linalg.cho_solve(normal, short.T).T
-        across = across + self.with_free @ columns.T
-        self.weights = scipy.linalg.cho_solve(factor, across.T, check_finite=False).T
+        remainder = free - covariance @ by_columns
+        self.with_free = scipy.linalg.cho_solve(normal, remainder.T).T
+        covariance = covariance + self.with_free @ columns.T
+        # A = (K_g + (X_g - K_g V^-1 X) (X' V^-1 X)^-1 X') V^-1.
+        self.weights = scipy.linalg.cho_solve(factor, covariance.T, check_finite=False).T
 
     def _along_sites(self, to_grid):
-        """(courses, LEVELS, n) integrals of the gradients times a covariance (g, azimuths)."""
-        flat = self._gradients.reshape(-1, len(to_grid)) @ to_grid  # in one product
+        """Return integrals (courses, LEVELS, n) of gradients times a covariance (g, azimuths)."""
+        flat = self._gradients.reshape(-1, len(to_grid)) @ to_grid  # a single matrix product
         flat = self._field._covariances.at_sites(flat)
         return flat.reshape(*self._totals.shape, -1)
 
     def unseen(self, index):
-        """(f, f) covariance of the functionals by what was not seen of one component."""
-        seen = self.weights @ self._across[index].T
+        """Return the covariance (f, f) due to the undetermined part of a component.
+
+        variance * (K_gg - A K_g' - K_g A' + A K A') of the module docstring.
+        """
+        cross_term = self.weights @ self._across[index].T
         size = self._field.amplitudes.variances_m2[index]
         spread = size * self._field._covariances.spread(self.weights, index)
-        return without_rounding(self._within(index) - seen - seen.T + spread)
+        return without_rounding(self._within(index) - cross_term - cross_term.T + spread)
 
     def hidden_seams(self):
-        """(f, f) covariance by seams between the columns of points of each course."""
+        """Return the covariance (f, f) due to seams between the columns of points."""
         sites = self._field.sites
         covariance = hidden_covariance_m2(*sites.seen, self._field.nominal_m)
-        here = np.isfinite(sites.azimuth_rad)
-        of_courses = np.zeros((len(self.weights), len(covariance)))
-        np.add.at(of_courses, (slice(None), sites.course[here]), self.weights[:, here])
-        return of_courses @ covariance @ of_courses.T
+        has_azimuth = np.isfinite(sites.azimuth_rad)
+        # Sum of the weights of each course: a hidden seam changes all readings of a course alike.
+        by_course = np.zeros((len(self.weights), len(covariance)))
+        np.add.at(by_course, (slice(None), sites.course[has_azimuth]), self.weights[:, has_azimuth])
+        return by_course @ covariance @ by_course.T
 
     def _with_component(self, index):
-        """(f, n) covariance of the functionals with one component at the sites."""
-        field, one = self._field, COMPONENTS[index]
+        """Return the covariance (f, n) of the functionals with a component at the sites."""
+        field, component = self._field, COMPONENTS[index]
         count, sites = len(field._members), field.sites
-        if one.shape == "weld":
+        if component.shape == "weld":
             size = field.amplitudes.variances_m2[index]
             return size * self._by_peaks(index) @ field._covariances.peaks[index].T
-        found = np.zeros((count, LEVELS, len(sites)))
-        along = self._along[one.shape]
+        covariance = np.zeros((count, LEVELS, len(sites)))
+        integrals = self._along[component.shape]
         for course, members in enumerate(field._members):
-            chosen = slice(None) if one.common else members
+            chosen = slice(None) if component.common else members
             levels = sites.heights_at(course, gauss_heights())
-            height = one.height_covariance(levels, sites.heights[chosen])
-            found[course][:, chosen] = along[course][:, chosen] * height
-        return field.amplitudes.variances_m2[index] * found.reshape(-1, len(sites))
+            height = component.height_covariance(levels, sites.heights[chosen])
+            covariance[course][:, chosen] = integrals[course][:, chosen] * height
+        return field.amplitudes.variances_m2[index] * covariance.reshape(-1, len(sites))
 
     def _by_peaks(self, index):
-        """(f, k) derivative of the functionals by the peaks of welds of one component."""
+        """Return the derivative (f, k) of the functionals by the peaks of welds of a component."""
         return (self._gradients @ self._field.peaks_at_grid[index]).reshape(self._totals.size, -1)
 
     def _within(self, index):
-        """(f, f) covariance of the functionals by one component itself."""
-        field, one = self._field, COMPONENTS[index]
-        if one.shape == "weld":
+        """Return the covariance (f, f) of the functionals due to a component, without readings."""
+        field, component = self._field, COMPONENTS[index]
+        if component.shape == "weld":
             peaks = self._by_peaks(index)
             return field.amplitudes.variances_m2[index] * peaks @ peaks.T
         count = len(field._members)
-        along = self._along_each_other[one.shape]
+        integrals = self._along_each_other[component.shape]
         courses = np.repeat(np.arange(count), LEVELS)
         levels = field.sites.heights_at(courses, np.tile(gauss_heights(), count))
-        height = one.height_covariance(levels, levels)
-        if not one.common:
+        height = component.height_covariance(levels, levels)
+        if not component.common:
             height = height * np.equal.outer(courses, courses)
-        return field.amplitudes.variances_m2[index] * along * height
+        return field.amplitudes.variances_m2[index] * integrals * height
 
     @cached_property
     def _along_each_other(self):
-        """{shape: (f, f) covariance of the functionals by the shape, of all heights the same}."""
+        """{shape: covariance (f, f) of the functionals for h = 1}."""
         field, gradients = self._field, self._gradients.reshape(self._totals.size, -1)
         kernels = azimuth_correlations(field.grid_rad, np.zeros(1), field.nominal_m)
-        waves, found = np.fft.rfft(gradients), {"mean": np.outer(self._totals, self._totals)}
+        waves, covariances = np.fft.rfft(gradients), {"mean": np.outer(self._totals, self._totals)}
         for shape in ROUND_SHAPES:
+            # The covariance is a circular convolution: a product of spectra, without a (g, g)
+            # matrix.
             kernel = kernels[shape][:, 0] - kernels[shape][:, 0].mean()
             spectrum = np.fft.rfft(kernel).real
-            found[shape] = np.fft.irfft(waves * spectrum, gradients.shape[1]) @ gradients.T
-        return found
+            covariances[shape] = np.fft.irfft(waves * spectrum, gradients.shape[1]) @ gradients.T
+        return covariances

@@ -1,8 +1,9 @@
-"""The wall of a tank of which the mean radius of each course is known, and nothing else.
+"""Wall of a tank for which only the mean radius of each course is known.
 
-What a course does besides (bulge, taper) has the mean 0 over its height, for it is in the radius
-already: f - M f, M the mean over the course. So it moves no volume at a joint; between joints it is
-in the doubt, as large as walls are (`components`).
+All other departures of a course (bulge, taper) have the mean 0 over its height, since the measured
+radius includes their mean: f - M f, with M the mean over the course. They do not change the volume
+at a joint. Between joints they contribute to the uncertainty, with the prior amplitudes of walls
+(`components`).
 """
 
 from dataclasses import dataclass
@@ -20,11 +21,12 @@ from tankcal.quadrature import panels
 
 @dataclass(frozen=True)
 class MeanField:
-    """A wall of courses with known mean radii, with what a `WallField` has of it.
+    """Wall of courses with known mean radii, with the interface of `WallField`.
 
     Attributes
     ----------
     mean_radius_m : ndarray, shape (courses,)
+        m.
     """
 
     mean_radius_m: np.ndarray
@@ -32,12 +34,12 @@ class MeanField:
 
     @cached_property
     def amplitudes(self):
-        """`Amplitudes` of the wall between the joints: assumed."""
+        """Assumed `Amplitudes` of the wall between the joints."""
         return assumed_amplitudes()
 
     @cached_property
     def sites(self):
-        """`Sites` of the Gauss levels of each course, of whole turns."""
+        """`Sites` of full turns at the Gauss levels of each course."""
         courses = len(self.mean_radius_m)
         n = courses * LEVELS
         return Sites(
@@ -50,29 +52,29 @@ class MeanField:
 
     @cached_property
     def outlines_m(self):
-        """(courses, LEVELS, g) the radius at each Gauss level of each course."""
+        """Radius (courses, LEVELS, g) at each Gauss level of each course, m."""
         return self.outlines_at(gauss_heights())
 
     def outlines_at(self, zeta):
-        """(courses, k, g) the radius at heights (k,) of each course."""
+        """Return the radius (courses, k, g) at heights (k,) of each course, m."""
         shape = (len(self.mean_radius_m), len(np.atleast_1d(zeta)), FEWEST_OF_GRID)
         return np.broadcast_to(self.mean_radius_m[:, None, None], shape)
 
     def functionals(self, gradients_m):
-        """`MeanFunctionals` of the wall: each the integral of a gradient times its radius.
+        """Return `MeanFunctionals` of the wall: integrals of gradients times the radius.
 
-        gradients_m  (courses, LEVELS, g), as of `WallField.functionals`
+        gradients_m  (courses, LEVELS, g), as for `WallField.functionals`
         """
         return MeanFunctionals(self, 2 * np.pi * np.mean(gradients_m, axis=2))
 
     def seen(self, departures_m):
-        """(courses, LEVELS) mean of departures (n,) at the sites over each course."""
-        means = departures_m.reshape(-1, LEVELS) @ _shares()
+        """Return the mean (courses, LEVELS) of departures (n,) at the sites over each course."""
+        means = departures_m.reshape(-1, LEVELS) @ _level_weights()
         return np.repeat(means[:, None], LEVELS, axis=1)
 
 
 class MeanFunctionals:
-    """Linear functionals of such a wall, one for each course and Gauss level.
+    """Linear functionals of a `MeanField`, one for each course and Gauss level.
 
     Attributes
     ----------
@@ -82,22 +84,24 @@ class MeanFunctionals:
 
     def __init__(self, field, totals):
         self._field, self._totals = field, totals
-        own = np.eye(len(totals))[:, None] * totals[:, :, None]
-        self.weights = own.reshape(-1, len(totals))
+        # A functional depends on the mean radius of its own course only.
+        by_course = np.eye(len(totals))[:, None] * totals[:, :, None]
+        self.weights = by_course.reshape(-1, len(totals))
 
     def unseen(self, index):
-        """(f, f) covariance of the functionals by what the mean does not say of one component."""
-        one, size = COMPONENTS[index], self._field.amplitudes.variances_m2[index]
-        if one.shape != "mean":  # round the wall: it has no part in areas
+        """Return the covariance (f, f) due to the part of a component outside the mean."""
+        component, size = COMPONENTS[index], self._field.amplitudes.variances_m2[index]
+        if component.shape != "mean":  # waves along the perimeter do not change areas
             return np.zeros((self._totals.size, self._totals.size))
-        about_mean = np.eye(LEVELS) - _shares()
+        # h of f - M f: (I - M) h (I - M)'.
+        about_mean = np.eye(LEVELS) - _level_weights()
         levels = self._field.sites.heights_at(0, gauss_heights())
-        height = about_mean @ one.height_covariance(levels, levels) @ about_mean.T
+        height = about_mean @ component.height_covariance(levels, levels) @ about_mean.T
         count, flat = len(self._totals), self._totals.ravel()
-        same = np.ones((count, count)) if one.common else np.eye(count)
-        return without_rounding(size * np.outer(flat, flat) * np.kron(same, height))
+        course_correlation = np.ones((count, count)) if component.common else np.eye(count)
+        return without_rounding(size * np.outer(flat, flat) * np.kron(course_correlation, height))
 
 
-def _shares():
-    """(LEVELS,) of a course's height that each Gauss level stands for."""
+def _level_weights():
+    """Return the Gauss weights (LEVELS,), fractions of the height of a course."""
     return panels([0.0, 1.0], LEVELS)[1]

@@ -1,9 +1,9 @@
-"""Places on a lying cylinder or a sphere, how its wall departs there, and functionals of it.
+"""Places on a lying cylinder or a sphere, and departures of its wall there.
 
-Each departure is a Gaussian field of a known shape whose size, its rms, is unsure: the logarithm of
-its variance is normal, about that of `median_m` with `log_sd`. On a cylinder a departure has a
-covariance c(turn) h(distance along the axis); on a sphere one of the great-circle angle, the sum of
-v_l P_l(cos angle) over the degrees l from 2 on.
+A departure is a Gaussian field of a known shape. The logarithm of its variance has a normal prior,
+with the median from `median_m` and the standard deviation `log_sd`. On a cylinder, a departure has
+a covariance c(turn) h(distance along the axis). On a sphere, the covariance is a function of the
+great-circle angle, the sum of v_l P_l(cos angle) over the degrees l from 2 on.
 """
 
 from dataclasses import dataclass
@@ -15,35 +15,36 @@ import scipy.sparse
 from tankcal.geometry.field.components import wave_columns
 from tankcal.geometry.outlines import FULL_TURN
 
-WRAPS = np.arange(-2, 3)  # turns of a circumference that a short covariance is summed over
-CELL_M, LARGEST_CELL_M = 0.15, 120  # along the axis; cells of it at most
-AROUND = 144  # cells around a cylinder
-DEGREES = np.arange(2, 161)  # of the Legendre polynomials of a sphere's departures
-ZONAL = np.sqrt(5.0)  # P_2 over its rms on a sphere
+WRAPS = np.arange(-2, 3)  # turns over which a short covariance is summed to make it periodic
+CELL_M, LARGEST_CELL_M = 0.15, 120  # length of a cell along the axis; largest number of cells
+AROUND = 144  # number of cells around a cylinder
+DEGREES = np.arange(2, 161)  # degrees of the Legendre polynomials of a sphere's departures
+ZONAL = np.sqrt(5.0)  # ratio of P_2 to its rms on a sphere
 AT_EQUATOR = np.polynomial.legendre.legvander(np.zeros(1), DEGREES[-1])[0, 2:]  # P_l(0)
-MOST_SITES, CELL_GROWTH = 600, 1.15  # of more points the means of neighbours count
+# Larger numbers of points are replaced by means of neighbours, in cubes that grow by this factor.
+MOST_SITES, CELL_GROWTH = 600, 1.15
 
 
 @dataclass(frozen=True)
 class Departure:
-    """One way in which a wall departs from its cylinder or sphere.
+    """Component of the departure of a wall from its cylinder or sphere.
 
     Attributes
     ----------
     kind : str
-        Its name in a budget: "bulge", "ovality", "oblateness", "legs" or "seams".
+        Name in an uncertainty budget: "bulge", "ovality", "oblateness", "legs" or "seams".
     shape : str
-        Around a cylinder "mean" (the mean radius), "first" (the axis moves), "oval" (mode k of
-        variance k^-3, from 2 on) or "local" (lost over `width_m` of the arc). On a sphere "oval"
-        (degree l of variance l^-3, from 2 on), "local", or "zonal" (P_2 about the vertical: what
-        its own weight makes of it); of its great circles "band", about the equator, where legs
-        press a sphere in.
+        Around a cylinder: "mean" (the mean radius), "first" (the axis is displaced), "oval" (mode k
+        of variance k^-3, from 2 on), "local" (correlation length `width_m` along the arc) or
+        "bottom" (only near the bottom). On a sphere: "oval" (degree l of variance l^-3, from 2 on),
+        "local", or "zonal" (P_2 about the vertical: deformation by the weight of the sphere). On
+        great circles: also "band", about the equator, where legs press a sphere in.
     width_m : float
-        Of a local one, along the arc; of a band the latitude, rad.
+        Correlation length of a local departure along the arc, m; latitude of a band, rad.
     length_m : float
-        Along the axis of a cylinder, over which it is lost; inf: it runs along the whole tank.
+        Correlation length along the axis of a cylinder, m; inf: constant along the whole tank.
     median_m, log_sd : float
-        Median of its rms, m, and standard deviation of the logarithm of its variance.
+        Median of the rms, m, and standard deviation of the logarithm of the variance.
     """
 
     kind: str
@@ -71,7 +72,7 @@ OF_SPHERES = (
     Departure("seams", "local", 1.2, 0.0, 3e-3, 1.5),
     Departure("oblateness", "zonal", 0.0, 0.0, 3e-3, 2.0),
 )
-OF_GREAT_CIRCLES = (  # whose size no strap tells
+OF_GREAT_CIRCLES = (  # strapping does not determine these amplitudes: log_sd is 0
     Departure("ovality", "oval", 0.0, 0.0, 2e-3, 0.0),
     Departure("seams", "local", 0.4, 0.0, 2e-3, 0.0),
     Departure("seams", "local", 1.2, 0.0, 2e-3, 0.0),
@@ -87,9 +88,9 @@ class OnCylinder:
     ----------
     radius_m : float
     turn_rad : ndarray, shape (n,)
-        About the axis, 0 at the bottom.
+        Angle about the axis, 0 at the bottom.
     along_m : ndarray, shape (n,)
-        Along the axis.
+        Position along the axis.
     """
 
     radius_m: float
@@ -97,68 +98,74 @@ class OnCylinder:
     along_m: np.ndarray
     departures = OF_CYLINDERS
 
-    def covariance(self, one):
-        """(n, n) of one departure of unit variance between the places."""
-        return self._around(one, self.turn_rad, self.turn_rad) * _fading(
-            np.subtract.outer(self.along_m, self.along_m), one.length_m
+    def covariance(self, departure):
+        """Return the covariance (n, n) of a departure of unit variance between the places."""
+        return self._around(departure, self.turn_rad, self.turn_rad) * _fading(
+            np.subtract.outer(self.along_m, self.along_m), departure.length_m
         )
 
-    def across(self, one, functionals):
-        """(f, n) covariance of `CylinderFunctionals` with one departure at the places."""
-        around = self._around(one, functionals.turn_rad, self.turn_rad)
-        along = _fading(np.subtract.outer(functionals.along_m, self.along_m), one.length_m)
-        found = np.einsum("ftn,tn->fn", functionals.weights @ along, around, optimize=True)
-        at_point = self._around(one, np.zeros(1), self.turn_rad)[0]
-        at_point = at_point * _fading(functionals.point_m - self.along_m, one.length_m)
-        return found + np.outer(functionals.at_point, at_point)
+    def across(self, departure, functionals):
+        """Return the covariance (f, n) of `CylinderFunctionals` with a departure at the places."""
+        circumferential = self._around(departure, functionals.turn_rad, self.turn_rad)
+        axial = _fading(np.subtract.outer(functionals.along_m, self.along_m), departure.length_m)
+        covariance = np.einsum(
+            "ftn,tn->fn", functionals.weights @ axial, circumferential, optimize=True
+        )
+        # The reference point at the bottom is separate from the grid of cells.
+        at_point = self._around(departure, np.zeros(1), self.turn_rad)[0]
+        at_point = at_point * _fading(functionals.point_m - self.along_m, departure.length_m)
+        return covariance + np.outer(functionals.at_point, at_point)
 
-    def within(self, one, functionals):
-        """(f, f) covariance of `CylinderFunctionals` by one departure itself."""
+    def within(self, departure, functionals):
+        """Return the covariance (f, f) of `CylinderFunctionals` due to a departure."""
         count = len(functionals.weights)
-        around = self._around(one, functionals.turn_rad, functionals.turn_rad)
-        along = np.subtract.outer(functionals.along_m, functionals.along_m)
-        spread = around @ (functionals.weights @ _fading(along, one.length_m))
+        circumferential = self._around(departure, functionals.turn_rad, functionals.turn_rad)
+        axial = np.subtract.outer(functionals.along_m, functionals.along_m)
+        spread = circumferential @ (functionals.weights @ _fading(axial, departure.length_m))
         flat = functionals.weights.reshape(count, -1)
         at_point = OnCylinder(self.radius_m, np.zeros(1), np.array([functionals.point_m]))
-        point = at_point.across(one, functionals)  # its own share of the point is in it
+        # Covariance of the functionals with the point; it includes the weight of the point itself.
+        point = at_point.across(departure, functionals)
         over_grid = point - functionals.at_point[:, None]
-        whole = spread.reshape(count, -1) @ flat.T + over_grid @ functionals.at_point[None, :]
-        return whole + np.outer(functionals.at_point, point[:, 0])
+        covariance = spread.reshape(count, -1) @ flat.T + over_grid @ functionals.at_point[None, :]
+        return covariance + np.outer(functionals.at_point, point[:, 0])
 
-    def _around(self, one, turn, other):
-        """(n, m) c between turns (n,) and (m,)."""
-        if one.shape == "oval":
+    def _around(self, departure, turn, other):
+        """Return c (n, m) between turns (n,) and (m,)."""
+        if departure.shape == "oval":
             return wave_columns(turn)["oval"] @ wave_columns(other)["oval"].T
-        away = np.subtract.outer(turn, other)
-        if one.shape == "first":
-            return np.cos(away)
-        if one.shape == "mean":
-            return np.ones(away.shape)
-        if one.shape == "bottom":
-            return np.outer(*(self._of_bottom(one, places) for places in (turn, other)))
-        arcs = self.radius_m * (away[..., None] + FULL_TURN * WRAPS)
-        at_once = _smooth(self.radius_m * FULL_TURN * WRAPS / one.width_m).sum()
-        return _smooth(arcs / one.width_m).sum(axis=-1) / at_once
+        difference = np.subtract.outer(turn, other)
+        if departure.shape == "first":
+            return np.cos(difference)
+        if departure.shape == "mean":
+            return np.ones(difference.shape)
+        if departure.shape == "bottom":
+            return np.outer(*(self._of_bottom(departure, places) for places in (turn, other)))
+        # Sum over several turns: the covariance becomes periodic and remains positive definite.
+        arcs = self.radius_m * (difference[..., None] + FULL_TURN * WRAPS)
+        variance = _smooth(self.radius_m * FULL_TURN * WRAPS / departure.width_m).sum()
+        return _smooth(arcs / departure.width_m).sum(axis=-1) / variance
 
-    def _of_bottom(self, one, turn):
-        """(n,) how much a place has of what departs at the bottom alone."""
+    def _of_bottom(self, departure, turn):
+        """Return the amplitude (n,) at turns of a departure limited to the bottom."""
         arc = self.radius_m * (turn - FULL_TURN * np.round(turn / FULL_TURN))
-        return np.exp(-((arc / one.width_m) ** 2))
+        return np.exp(-((arc / departure.width_m) ** 2))
 
 
 @dataclass(frozen=True)
 class CylinderFunctionals:
-    """Linear functionals of a wall: weights of the cells of a grid, and of one point at the bottom.
+    """Linear functionals of a wall: weights of grid cells and of a point at the bottom.
 
     Attributes
     ----------
     turn_rad, along_m : ndarray, shapes (t,) and (s,)
-        Middles of the cells.
+        Centres of the cells.
     weights : ndarray, shape (f, t, s)
+        Weights of the cells.
     point_m : float
-        Place of the point along the axis.
+        Position of the point along the axis.
     at_point : ndarray, shape (f,)
-        Its weights.
+        Weights of the point.
     """
 
     turn_rad: np.ndarray
@@ -169,25 +176,28 @@ class CylinderFunctionals:
 
 
 def cells_around():
-    """(t,) middles of the cells around a cylinder; the first at the bottom, one at the top."""
+    """Return centres (t,) of the cells around a cylinder, rad, the first at the bottom."""
     return FULL_TURN * np.arange(AROUND) / AROUND
 
 
 def cells_along(begin_m, length_m):
-    """(s,) middles of even cells along an axis."""
+    """Return centres (s,) of equal cells along an axis, from begin_m over length_m, m."""
     count = int(np.clip(np.ceil(length_m / CELL_M), 24, LARGEST_CELL_M))
     return begin_m + length_m * (np.arange(count) + 0.5) / count
 
 
 def wet_cells(level_m, radius_m):
-    """(..., t) share of each cell around a cylinder that is below levels (...) above its axis."""
-    half = np.arccos(np.clip(-np.asarray(level_m) / radius_m, -1.0, 1.0))[..., None]
-    away = np.abs((cells_around() + np.pi) % FULL_TURN - np.pi)
+    """Return the wet share (..., t) of each cell around a cylinder, for levels (...)."""
+    wet_angle = np.arccos(np.clip(-np.asarray(level_m) / radius_m, -1.0, 1.0))[..., None]
+    turn = np.abs((cells_around() + np.pi) % FULL_TURN - np.pi)
     width = FULL_TURN / AROUND
-    left = np.clip((half - away) / width + 0.5, 0.0, 1.0)
-    other_side = np.clip((half - (FULL_TURN - away)) / width + 0.5, 0.0, 1.0)  # of the cell on top
-    at_bottom = np.clip((half + away) / width + 0.5, 0.0, 1.0) - 1.0  # of that at the bottom
-    return np.clip(left + other_side + at_bottom, 0.0, 1.0)
+    # The wet arc is |turn| < half; a cell at its end is wet in part.
+    share = np.clip((wet_angle - turn) / width + 0.5, 0.0, 1.0)
+    other_side = np.clip(
+        (wet_angle - (FULL_TURN - turn)) / width + 0.5, 0.0, 1.0
+    )  # of the cell on top
+    at_bottom = np.clip((wet_angle + turn) / width + 0.5, 0.0, 1.0) - 1.0  # of that at the bottom
+    return np.clip(share + other_side + at_bottom, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -198,136 +208,156 @@ class OnSphere:
     direction: np.ndarray
     departures = OF_SPHERES
 
-    def covariance(self, one):
-        """(n, n) of one departure of unit variance between the places."""
-        if one.shape == "zonal":
+    def covariance(self, departure):
+        """Return the covariance (n, n) of a departure of unit variance between the places."""
+        if departure.shape == "zonal":
             return np.outer(*(self._flattened() for _ in "ab"))
         cosine = np.clip(self.direction @ self.direction.T, -1.0, 1.0)
-        return _zonal(cosine, degree_shares(one, self.radius_m))
+        return _zonal(cosine, degree_shares(departure, self.radius_m))
 
-    def across(self, one, functionals):
-        """(f, n) covariance of functionals with one departure at the places.
+    def across(self, departure, functionals):
+        """Return the covariance (f, n) of functionals with a departure at the places.
 
-        functionals  (f, degrees) what each makes of P_l of the angle from the bottom
+        functionals  (f, degrees) values of the functionals for P_l of the angle from the bottom
         """
-        if one.shape == "zonal":
+        if departure.shape == "zonal":
             return np.outer(ZONAL * functionals[:, 0], self._flattened())
-        shares = degree_shares(one, self.radius_m)
+        shares = degree_shares(departure, self.radius_m)
+        # Addition theorem: the covariance of two places, expanded at the bottom, is a product in l.
         return (functionals * shares) @ _nadir_waves(self.direction).T
 
-    def within(self, one, functionals):
-        """(f, f) covariance of functionals by one departure itself."""
-        if one.shape == "zonal":
+    def within(self, departure, functionals):
+        """Return the covariance (f, f) of functionals due to a departure."""
+        if departure.shape == "zonal":
             return ZONAL**2 * np.outer(functionals[:, 0], functionals[:, 0])
-        return (functionals * degree_shares(one, self.radius_m)) @ functionals.T
+        return (functionals * degree_shares(departure, self.radius_m)) @ functionals.T
 
     def _flattened(self):
-        """(n,) of the places, of a sphere that is flattened by an rms of one."""
+        """Return the departure (n,) of a sphere flattened by an rms of 1, at the places."""
         return ZONAL * (1.5 * self.direction[:, 2] ** 2 - 0.5)
 
 
 @dataclass(frozen=True)
 class OnGreatCircles:
-    """Mean radii of great circles of a sphere, known by the normals (n, 3) of their planes.
+    """Mean radii of great circles of a sphere, given by the normals (n, 3) of their planes.
 
-    The mean of P_l of the angle from a place, over a great circle, is P_l(0) times that of the
-    angle from the place to the normal. What an ellipsoid has, the degree 2, is no departure.
+    The mean over a great circle of P_l of the angle from a place is P_l(0) times P_l of the angle
+    from the place to the normal. The degree 2 belongs to the ellipsoid and is no departure.
     """
 
     radius_m: float
     normal: np.ndarray
     departures = OF_GREAT_CIRCLES
 
-    def covariance(self, one):
-        """(n, n) of one departure of unit variance between the means."""
-        if one.shape == "band":
-            return np.outer(*(self._of_band(one) for _ in "ab"))
-        shares = self._shares(one) * AT_EQUATOR**2
+    def covariance(self, departure):
+        """Return the covariance (n, n) of a departure of unit variance between the means."""
+        if departure.shape == "band":
+            return np.outer(*(self._of_band(departure) for _ in "ab"))
+        shares = self._shares(departure) * AT_EQUATOR**2
         return _zonal(np.clip(self.normal @ self.normal.T, -1.0, 1.0), shares)
 
-    def across(self, one, functionals):
-        """(f, n) covariance of functionals with the means, as `OnSphere.across`."""
-        if one.shape == "band":
-            return np.outer(functionals @ _band(one), self._of_band(one))
-        of_means = functionals * self._shares(one) * AT_EQUATOR
+    def across(self, departure, functionals):
+        """Return the covariance (f, n) of functionals with the means, as `OnSphere.across`."""
+        if departure.shape == "band":
+            return np.outer(functionals @ _band(departure), self._of_band(departure))
+        of_means = functionals * self._shares(departure) * AT_EQUATOR
         return of_means @ _nadir_waves(self.normal).T
 
-    def within(self, one, functionals):
-        """(f, f) covariance of functionals by one departure itself."""
-        if one.shape == "band":
-            return np.outer(*(functionals @ _band(one) for _ in "ab"))
-        return (functionals * self._shares(one)) @ functionals.T
+    def within(self, departure, functionals):
+        """Return the covariance (f, f) of functionals due to a departure."""
+        if departure.shape == "band":
+            return np.outer(*(functionals @ _band(departure) for _ in "ab"))
+        return (functionals * self._shares(departure)) @ functionals.T
 
-    def _of_band(self, one):
-        """(n,) means of a band over the circles."""
-        return _nadir_waves(self.normal) @ (_band(one) * AT_EQUATOR)
+    def _of_band(self, departure):
+        """Return the means (n,) of a band over the circles."""
+        return _nadir_waves(self.normal) @ (_band(departure) * AT_EQUATOR)
 
-    def _shares(self, one):
-        return np.where(DEGREES == 2, 0.0, degree_shares(one, self.radius_m))
+    def _shares(self, departure):
+        return np.where(DEGREES == 2, 0.0, degree_shares(departure, self.radius_m))
 
 
 @cache
-def _band(one):
-    """(degrees,) what a band about the equator has of P_l, but for the degree 2."""
-    up, weights = np.polynomial.legendre.leggauss(2 * DEGREES[-1])
-    profile = np.exp(-((np.arcsin(up) / one.width_m) ** 2))
-    waves = np.polynomial.legendre.legvander(up, DEGREES[-1])[:, 2:]
-    found = (2 * DEGREES + 1) / 2 * ((weights * profile) @ waves)
-    return np.where(DEGREES == 2, 0.0, found)
+def _band(departure):
+    """Return coefficients (degrees,) of a band about the equator in P_l, without degree 2."""
+    sine, weights = np.polynomial.legendre.leggauss(2 * DEGREES[-1])
+    profile = np.exp(-((np.arcsin(sine) / departure.width_m) ** 2))
+    waves = np.polynomial.legendre.legvander(sine, DEGREES[-1])[:, 2:]
+    # Projection on P_l, whose square has the integral 2 / (2 l + 1) over -1..1.
+    coefficients = (2 * DEGREES + 1) / 2 * ((weights * profile) @ waves)
+    return np.where(DEGREES == 2, 0.0, coefficients)
 
 
 def _nadir_waves(direction):
-    """(n, degrees) P_l of the angles of directions from below."""
+    """Return P_l (n, degrees) of the angles between directions and the nadir."""
     return np.polynomial.legendre.legvander(-direction[:, 2], DEGREES[-1])[:, 2:]
 
 
-def degree_shares(one, radius_m):
-    """(degrees,) v_l of a departure of unit variance."""
-    if one.shape == "oval":
-        found = np.where(DEGREES <= 36, DEGREES**-3.0, 0.0)
+def degree_shares(departure, radius_m):
+    """Return the variances v_l (degrees,) of a departure of unit variance."""
+    if departure.shape == "oval":
+        variances = np.where(DEGREES <= 36, DEGREES**-3.0, 0.0)
     else:
-        found = (2 * DEGREES + 1) * (DEGREES**2 + (radius_m / one.width_m) ** 2) ** -2.5
-    return found / found.sum()
+        variances = (2 * DEGREES + 1) * (DEGREES**2 + (radius_m / departure.width_m) ** 2) ** -2.5
+    return variances / variances.sum()
 
 
 def cap_volumes(levels_m, area_m2, radius_m):
-    """(k, degrees) what P_l of the angle from the bottom adds to volumes below levels of a sphere.
+    """Return changes (k, degrees) of the volumes below levels of a sphere for a departure P_l.
 
-    Dips count from the wall itself: it takes the free surface along.
+    Dips refer to the wall at the bottom, so a shift of the bottom also moves the free surface.
+
+    Parameters
+    ----------
+    levels_m : ndarray, shape (k,)
+        Levels above the bottom, m.
+    area_m2 : ndarray, shape (k,)
+        Areas of the free surface, m2.
+    radius_m : float
+
+    Returns
+    -------
+    ndarray, shape (k, degrees)
+        m3 per metre of departure at the bottom.
     """
     return radius_m**2 * cap_integrals(1 - levels_m / radius_m) - area_m2[:, None]
 
 
 def cap_integrals(cosine):
-    """(k, degrees) integral of P_l over caps about the bottom, out to angles of these cosines.
+    """Return integrals (k, degrees) of P_l over caps about the bottom.
 
-    2 pi times the integral of P_l(t) from cosine to 1, (P_{l-1} - P_{l+1}) / (2 l + 1).
+    The caps extend to angles with the given cosines (k,). The integral is 2 pi times the integral
+    of P_l(t) from cosine to 1, (P_{l-1} - P_{l+1}) / (2 l + 1).
     """
-    every = np.polynomial.legendre.legvander(cosine, DEGREES[-1] + 1)
-    return FULL_TURN * (every[:, 1:-2] - every[:, 3:]) / (2 * DEGREES + 1)
+    polynomials = np.polynomial.legendre.legvander(cosine, DEGREES[-1] + 1)
+    return FULL_TURN * (polynomials[:, 1:-2] - polynomials[:, 3:]) / (2 * DEGREES + 1)
 
 
 def _zonal(cosine, shares):
-    """Sum of shares times P_l of many cosines, by interpolation in the angle."""
+    """Return the sum of shares times P_l of many cosines, by interpolation in the angle."""
     angle = np.linspace(0.0, np.pi, 4001)
     table = np.polynomial.legendre.legval(np.cos(angle), np.concatenate([np.zeros(2), shares]))
     return np.interp(np.arccos(cosine), angle, table)
 
 
 def _smooth(part):
-    """(1 + d) exp(-d): once differentiable."""
-    away = np.abs(part)
-    return (1 + away) * np.exp(-away)
+    """Return (1 + d) exp(-d) with d = |part|, a once differentiable covariance."""
+    distance = np.abs(part)
+    return (1 + distance) * np.exp(-distance)
 
 
 def _fading(distance_m, length_m):
+    """Return h of distances along the axis."""
     if np.isinf(length_m):
         return np.ones(np.shape(distance_m))
     return _smooth(distance_m / length_m)
 
 
 def means_of_neighbours(xyz_m, most=MOST_SITES):
-    """(sites, n) weights of the points in each site: one, or the mean of those in a small cube."""
+    """Return weights (sites, n) of the points in each site: a point, or the mean of a small cube.
+
+    xyz_m (n, 3) are the points, m; most is the largest number of sites.
+    """
     place = _cubes(xyz_m, most)
     counts = np.bincount(place)
     entries = (1 / counts[place], (place, np.arange(len(place))))
@@ -335,13 +365,13 @@ def means_of_neighbours(xyz_m, most=MOST_SITES):
 
 
 def _cubes(xyz_m, most):
-    """(n,) number of the cube that each point is in, as small cubes as give at most so many."""
+    """Return the number (n,) of the cube of each point, with the smallest cubes that suffice."""
     if len(xyz_m) <= most:
         return np.arange(len(xyz_m))
     size = np.ptp(xyz_m, axis=0).max() / most
     while True:
         cubes = np.floor((xyz_m - xyz_m.min(axis=0)) / size).astype(int)
-        found, place = np.unique(cubes, axis=0, return_inverse=True)
-        if len(found) <= most:
+        occupied, place = np.unique(cubes, axis=0, return_inverse=True)
+        if len(occupied) <= most:
             return place.ravel()
         size *= CELL_GROWTH

@@ -1,4 +1,4 @@
-"""Where a wall was measured, and what of its readings no prior binds."""
+"""Sites of the measurements of a wall, and the design of the parameters without prior."""
 
 from dataclasses import dataclass
 
@@ -7,39 +7,40 @@ import numpy as np
 from tankcal.geometry.field.components import Heights, weld_columns
 from tankcal.geometry.outlines import FULL_TURN
 
-SAME_AZIMUTH_RAD = 1e-12
+SAME_AZIMUTH_RAD = 1e-12  # azimuths with a smaller difference are equal up to rounding
 
 
 @dataclass(frozen=True)
 class Sites:
-    """Where a wall was measured.
+    """Sites of the measurements of a wall.
 
     Attributes
     ----------
     course : ndarray of int, shape (n,)
-        From 0 on, each of them with sites.
+        Course, from 0 on; each course has sites.
     ring : ndarray of int, shape (n,)
-        Sites that have a centre of their own, all of one course; below 0: they have none.
+        Number of the ring. Sites of a ring belong to one course and share a centre; below 0: no
+        centre.
     zeta : ndarray, shape (n,)
         Height within the course, -1 at its bottom to +1 at its top.
     azimuth_rad : ndarray, shape (n,)
-        nan: the mean of a whole turn, as a tape measures it; it has no ring, either.
+        Azimuth; nan for the mean of a full turn (tape measurement), which has no ring.
     leans : ndarray of bool, shape (n,)
-        Whether the ring is not level, and its centre moves with the height.
+        Whether the ring is not level, so that its centre moves with the height.
     welds_rad : tuple of ndarray
-        Azimuths of the vertical welds of each course; (): not known.
+        Azimuths of the vertical welds of each course; (): unknown.
     shared : ndarray, shape (n, s), optional
-        Derivative of the radii by unknowns that courses share: the constant of a plumb line.
+        Derivative of the radii by unknowns shared by courses, such as the constant of a plumb line.
     points : tuple of ndarray, shape (p,), optional
-        Course and azimuth of the points that the sites are means of.
+        Course and azimuth of the original points if the sites are means of points.
     spans : ndarray, shape (courses, 2), optional
-        Bottom and top of each course, as parts of the height of the shell; None: all courses are of
-        one height.
+        Bottom and top of each course, as fractions of the height of the shell; None: courses of
+        equal height.
     smoothed : bool
         Whether the readings show the wall smoother than it is; see `components.log_covariance`.
     bulge_scale : float
-        Sizes of bulges and tapers of this wall before the survey, over those of
-        `components.COMPONENTS`. Joints are not scaled: a weld shrinks by the plate, not by R.
+        Prior amplitudes of bulges and tapers of this wall, relative to `components.COMPONENTS`.
+        Joints are not scaled: the shrinkage of a weld depends on the plate, not on R.
     """
 
     course: np.ndarray
@@ -58,25 +59,27 @@ class Sites:
         return len(self.course)
 
     def take(self, chosen):
-        """Those of the sites that are chosen; courses that lose all of theirs are left out."""
-        seen, course = np.unique(self.course[chosen], return_inverse=True)
+        """Return the chosen sites; courses without chosen sites are omitted."""
+        remaining, course = np.unique(self.course[chosen], return_inverse=True)
         return Sites(
             course=course,
             ring=self.ring[chosen],
             zeta=self.zeta[chosen],
             azimuth_rad=self.azimuth_rad[chosen],
             leans=self.leans[chosen],
-            welds_rad=tuple(self.welds_of(one) for one in seen) if self.welds_rad else (),
+            welds_rad=tuple(self.welds_of(number) for number in remaining)
+            if self.welds_rad
+            else (),
             shared=None if self.shared is None else self.shared[chosen],
-            points=None if self.points is None else _of_courses(*self.points, seen),
-            spans=self.course_spans[seen],
+            points=None if self.points is None else _select_courses(*self.points, remaining),
+            spans=self.course_spans[remaining],
             smoothed=self.smoothed,
             bulge_scale=self.bulge_scale,
         )
 
     @property
     def course_spans(self):
-        """(courses, 2) bottom and top of each course, as parts of the height of the shell."""
+        """Bottom and top (courses, 2) of each course, as fractions of the height of the shell."""
         if self.spans is not None:
             return self.spans
         return spans_of(np.arange(self.course.max() + 2.0))
@@ -87,20 +90,20 @@ class Sites:
         return self.heights_at(self.course, self.zeta)
 
     def heights_at(self, course, zeta):
-        """`Heights` at places of courses: a number or (n,) of each."""
+        """Return `Heights` at zeta (n,) in courses: a number, or (n,) of each place."""
         return Heights.within(self.course_spans[course], zeta)
 
     @property
     def seen(self):
-        """Course and azimuth of the points themselves, where the sites are means of some."""
+        """Course and azimuth of the original points, or of the sites if they are no means."""
         return self.points or (self.course, self.azimuth_rad)
 
     def welds_of(self, course):
-        """Azimuths of the vertical welds of a course."""
+        """Return the azimuths of the vertical welds of a course."""
         return self.welds_rad[course] if self.welds_rad else np.zeros(0)
 
     def welds_at(self, nominal_m):
-        """For each course (k, w) what a peak of one at each of its welds makes of its radii."""
+        """Return, for each course, derivatives (k, w) of its radii by the peaks of its welds."""
         return [
             weld_columns(self.azimuth_rad[members], self.welds_of(course), nominal_m)
             for course, members in enumerate(self.members)
@@ -108,27 +111,31 @@ class Sites:
 
     @property
     def members(self):
-        """For each course the indices of its sites."""
+        """Indices of the sites of each course."""
         return [np.flatnonzero(self.course == c) for c in range(self.course.max() + 1)]
 
     def free_columns(self, members):
-        """(k, p) derivative of the radii of some sites of a course by what no prior binds.
+        """Return derivatives (k, p) of radii of a course by its parameters without prior.
 
-        Its radius first, then x and y of the centre of each ring, and of its lean.
+        The order is: radius, then for each ring x and y of its centre, and of its lean.
         """
         azimuth, ring = self.azimuth_rad[members], self.ring[members]
+        # The mean of a full turn (nan) does not depend on the centre of the section.
         turn = np.nan_to_num(np.column_stack([np.sin(azimuth), np.cos(azimuth)]))
         columns = [np.ones((len(members), 1))]
-        for one in np.unique(ring[ring >= 0]):
-            there = turn * (ring == one)[:, None]
-            columns.append(there)
-            if np.any(self.leans[members] & (ring == one)):
-                columns.append(there * self.zeta[members, None])
+        for number in np.unique(ring[ring >= 0]):
+            in_ring = turn * (ring == number)[:, None]
+            # The centre of the ring; a leaning ring also has a shift of the centre per half course.
+            columns.append(in_ring)
+            if np.any(self.leans[members] & (ring == number)):
+                columns.append(in_ring * self.zeta[members, None])
         return np.hstack(columns)
 
 
 def spans_of(joints_m):
-    """(courses, 2) bottom and top of courses between joints, as parts of the height of the shell.
+    """Return bottom and top (courses, 2) of courses as fractions of the height of the shell.
+
+    joints_m (courses + 1,) are the heights of the joints, m.
 
     Examples
     --------
@@ -140,14 +147,16 @@ def spans_of(joints_m):
 
 
 def free_design(sites):
-    """(n, p) derivative of the radii by what no prior binds, and the columns of the radii.
+    """Return the design (n, p) of the parameters without prior, and the columns of the radii.
 
-    Course by course as in `Sites.free_columns`, then what they share.
+    The parameters are in the order of the courses, as in `Sites.free_columns`; then follow the
+    shared unknowns.
     """
     blocks = [(members, sites.free_columns(members)) for members in sites.members]
     starts = np.cumsum([0, *(block.shape[1] for _, block in blocks)])
     design = np.zeros((len(sites), starts[-1]))
     for start, (members, block) in zip(starts, blocks, strict=False):
+        # The parameters of a course affect only its own readings: the design is block diagonal.
         design[members, start : start + block.shape[1]] = block
     if sites.shared is not None:
         design = np.hstack([design, sites.shared])
@@ -155,13 +164,13 @@ def free_design(sites):
 
 
 def distinct_azimuths(azimuth_rad):
-    """(n,) place of each azimuth among the distinct ones, and these."""
+    """Return the index (n,) of each azimuth among the distinct azimuths, and these azimuths."""
     turns = np.round((np.asarray(azimuth_rad) % FULL_TURN) / SAME_AZIMUTH_RAD)
-    found, place = np.unique(turns, return_inverse=True)
-    return place, found * SAME_AZIMUTH_RAD
+    distinct, place = np.unique(turns, return_inverse=True)
+    return place, distinct * SAME_AZIMUTH_RAD
 
 
-def _of_courses(course, azimuth_rad, seen):
-    """Course, by its place among those that are seen, and azimuth of the points in these."""
-    here = np.isin(course, seen)
-    return np.searchsorted(seen, course[here]), azimuth_rad[here]
+def _select_courses(course, azimuth_rad, remaining):
+    """Return course, renumbered among the remaining courses, and azimuth of their points."""
+    in_courses = np.isin(course, remaining)
+    return np.searchsorted(remaining, course[in_courses]), azimuth_rad[in_courses]

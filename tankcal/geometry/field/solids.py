@@ -1,14 +1,14 @@
-"""The wall of a lying cylinder or of a sphere as one random field, known from points of it.
+"""Wall of a lying cylinder or of a sphere as a random field, estimated from points.
 
 The distance of a wall from its cylinder or sphere is
 
     f = X beta + sum of departures,
 
-X what moves the shape itself (`cylinders.cylinder_distances`, `primitives.sphere_distances`), the
-departures those of `places`; their variances are learned as those of a standing wall's components
-(`likelihood`).
-What was measured, y = X beta + f + noise, gives every linear functional of the wall by the best
-linear unbiased estimate, with the formulas of `estimate`.
+with X the derivative by the parameters of the shape (`cylinders.cylinder_distances`,
+`primitives.sphere_distances`) and the departures of `places`. Their variances are estimated like
+those of the components of a standing wall (`likelihood`). The measurements y = X beta + f + noise
+give the best linear unbiased estimate of every linear functional of the wall, with the formulas of
+`estimate`.
 
 Source: Robinson 1991 (best linear unbiased prediction).
 """
@@ -26,48 +26,53 @@ from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, p
 
 
 def estimate_sizes(places, design, distance_m, noise_m2, *, estimate_noise=False):
-    """`Amplitudes` of the departures of a wall from distances to its cylinder or sphere.
+    """Estimate the `Amplitudes` of the departures of a wall from its cylinder or sphere.
 
     Parameters
     ----------
     places : OnCylinder or OnSphere
-        Of n points.
+        n points.
     design : ndarray, shape (n, p)
-        Derivative of the distances by what moves the shape.
+        Derivative of the distances by the parameters of the shape.
     distance_m : ndarray, shape (n,)
-        Outwards positive, m.
+        Distances from the shape, outwards positive, m.
     noise_m2 : ndarray, shape (n, n)
-        Covariance of the distances.
+        Covariance of the distances, m2.
     estimate_noise : bool
-        Whether `noise_m2` is known up to a factor only.
+        Whether `noise_m2` is known only up to a factor.
 
     Returns
     -------
     Amplitudes
     """
-    left = scipy.linalg.qr(design)[0][:, np.linalg.matrix_rank(design) :]
-    own = [left.T @ places.covariance(one) @ left for one in places.departures]
-    fixed, noise = LEAST_NOISE_M**2 * np.eye(left.shape[1]), left.T @ noise_m2 @ left
+    # Restricted likelihood: the complement of the design contains no shape parameters.
+    basis = scipy.linalg.qr(design)[0][:, np.linalg.matrix_rank(design) :]
+    own_covariances = [
+        basis.T @ places.covariance(departure) @ basis for departure in places.departures
+    ]
+    fixed, noise = LEAST_NOISE_M**2 * np.eye(basis.shape[1]), basis.T @ noise_m2 @ basis
     if estimate_noise:
-        own.append(noise)
+        own_covariances.append(noise)
     else:
         fixed = fixed + noise
-    part = Part(left.T @ distance_m, np.array(own), fixed, np.zeros((len(fixed), 0)))
-    none, no_values = np.zeros(0, dtype=int), np.zeros((0, 0, 0))
+    part = Part(basis.T @ distance_m, np.array(own_covariances), fixed, np.zeros((len(fixed), 0)))
+    no_indices, no_values = np.zeros(0, dtype=int), np.zeros((0, 0, 0))
     prior = prior_of(places.departures, noise_m2=np.diag(noise_m2) if estimate_noise else None)
-    likelihood = Likelihood((part,), np.arange(len(own)), none, no_values, np.zeros(0), *prior)
+    likelihood = Likelihood(
+        (part,), np.arange(len(own_covariances)), no_indices, no_values, np.zeros(0), *prior
+    )
     return most_likely(likelihood, len(places.departures))
 
 
 @dataclass(frozen=True)
 class SolidField:
-    """The wall of a solid, known from distances to its cylinder or sphere.
+    """Wall of a solid, estimated from distances to its cylinder or sphere.
 
     Attributes
     ----------
     places : OnCylinder or OnSphere
     design, distance_m, noise_m2
-        As `estimate_sizes` takes them.
+        As for `estimate_sizes`.
     amplitudes : Amplitudes
     """
 
@@ -79,7 +84,7 @@ class SolidField:
 
     @cached_property
     def _solved(self):
-        """Cholesky factor of V, V^-1 X, that of X' V^-1 X, beta, and V^-1 (y - X beta)."""
+        """Cholesky factors of V and X' V^-1 X with V^-1 X between, beta, and V^-1 (y - X beta)."""
         factor = scipy.linalg.cho_factor(self._covariance, lower=True)
         by_columns = scipy.linalg.cho_solve(factor, self.design)
         normal = scipy.linalg.cho_factor(self.design.T @ by_columns)
@@ -89,76 +94,96 @@ class SolidField:
 
     @cached_property
     def _parts(self):
-        """(departures, n, n) their covariances."""
-        each = zip(self.amplitudes.variances_m2, self.places.departures, strict=True)
-        return np.array([size * self.places.covariance(one) for size, one in each])
+        """Covariances (departures, n, n) of the departures."""
+        sized_departures = zip(self.amplitudes.variances_m2, self.places.departures, strict=True)
+        return np.array(
+            [size * self.places.covariance(departure) for size, departure in sized_departures]
+        )
 
     @property
     def _covariance(self):
-        """(n, n) V: of the departures and the noise."""
-        whole = self.amplitudes.noise * self.noise_m2 + self._parts.sum(axis=0)
-        whole.flat[:: len(whole) + 1] += LEAST_NOISE_M**2
-        return whole
+        """Covariance V (n, n) of the departures and the noise."""
+        covariance = self.amplitudes.noise * self.noise_m2 + self._parts.sum(axis=0)
+        covariance.flat[:: len(covariance) + 1] += LEAST_NOISE_M**2
+        return covariance
 
     def far_off(self, limit, least_m):
-        """(k,) indices of readings that differ from what all others show by over limit sds.
+        """Return indices (k,) of readings that differ from the prediction by all others.
 
-        The worst is left out first, and the rest is asked again. A difference up to least_m may be
-        a dent that one point alone shows.
+        The worst reading is rejected first, and the test is repeated without it. A difference up to
+        least_m may be a dent at a single point.
+
+        Parameters
+        ----------
+        limit : float
+            Largest accepted difference, in standard deviations.
+        least_m : float
+            Smallest difference of a rejected reading, m.
         """
         precision = restricted_precision(self._covariance, self.design)
         pull = precision @ self.distance_m
-        kept, off = np.ones(len(pull), dtype=bool), []
-        while np.count_nonzero(kept) > self.design.shape[1] + 1:
-            found = against_others(precision, pull, kept)
-            deep = kept & (np.abs(found.departure_m) > least_m)
-            away = np.where(deep, np.abs(found.w), 0.0)
-            worst = int(np.argmax(away))
-            if not away[worst] > limit:
+        accepted, rejected = np.ones(len(pull), dtype=bool), []
+        while np.count_nonzero(accepted) > self.design.shape[1] + 1:
+            tested = against_others(precision, pull, accepted)
+            deep = accepted & (np.abs(tested.departure_m) > least_m)
+            statistics = np.where(deep, np.abs(tested.w), 0.0)
+            worst = int(np.argmax(statistics))
+            if not statistics[worst] > limit:
                 break
-            off.append(worst)
-            kept[worst] = False
-        return np.array(off, dtype=int)
+            rejected.append(worst)
+            accepted[worst] = False
+        return np.array(rejected, dtype=int)
 
     def estimated(self, functionals, by_shape):
-        """`Estimated` of functionals of the wall.
+        """Return `Estimated` of functionals of the wall.
 
         Parameters
         ----------
         functionals
-            As `places.across` takes them.
+            As for `places.across`.
         by_shape : ndarray, shape (f, p)
-            Their derivatives by what moves the shape, in the order of the design.
+            Derivatives by the parameters of the shape, in the order of the design.
         """
         factor, by_columns, normal, beta, pull = self._solved
-        each = list(zip(self.amplitudes.variances_m2, self.places.departures, strict=True))
-        across = [size * self.places.across(one, functionals) for size, one in each]
-        together = sum(across)
-        short = by_shape - together @ by_columns
-        with_shape = together + scipy.linalg.cho_solve(normal, short.T).T @ self.design.T
+        sized_departures = list(
+            zip(self.amplitudes.variances_m2, self.places.departures, strict=True)
+        )
+        covariances = [
+            size * self.places.across(departure, functionals)
+            for size, departure in sized_departures
+        ]
+        total = sum(covariances)
+        # A = (K_g + (X_g - K_g V^-1 X) (X' V^-1 X)^-1 X') V^-1, as in `estimate`.
+        remainder = by_shape - total @ by_columns
+        with_shape = total + scipy.linalg.cho_solve(normal, remainder.T).T @ self.design.T
         weights = scipy.linalg.cho_solve(factor, with_shape.T).T
         unseen = []
-        for (size, one), part, here in zip(each, self._parts, across, strict=True):
-            seen = weights @ here.T
-            whole = size * self.places.within(one, functionals) - seen - seen.T
-            unseen.append(without_rounding(whole + weights @ part @ weights.T))
-        return Estimated(beta, together @ pull, weights, unseen)
+        for (size, departure), part, covariance in zip(
+            sized_departures, self._parts, covariances, strict=True
+        ):
+            # K_gg - A K_g' - K_g A' + A K A' for each departure.
+            cross_term = weights @ covariance.T
+            difference = (
+                size * self.places.within(departure, functionals) - cross_term - cross_term.T
+            )
+            unseen.append(without_rounding(difference + weights @ part @ weights.T))
+        return Estimated(beta, total @ pull, weights, unseen)
 
 
 @dataclass(frozen=True)
 class Estimated:
-    """Functionals of a wall, estimated.
+    """Estimated functionals of a wall.
 
     Attributes
     ----------
     moved : ndarray, shape (p,)
-        By how much the shape moves.
+        Changes of the parameters of the shape.
     departing : ndarray, shape (f,)
-        What the departures alone make of each functional.
+        Contribution of the departures to each functional.
     weights : ndarray, shape (f, n)
         Derivatives by the distances.
     unseen : list of ndarray, shape (f, f)
-        Covariance by what was not seen of each departure.
+        Covariance due to the undetermined part of each departure.
     """
 
     moved: np.ndarray

@@ -1,13 +1,13 @@
-"""A wall at single places: its radius about the own centre of a level, and where that centre is.
+"""Wall at single places: its radius about the centre of the level, and that centre.
 
-The linear functionals of `estimate`, g = A y, for a radius at a course, height and azimuth, and for
-the coordinates of the centre of a ring, which no prior binds: all with one another, so that what
-two places share drops out of their difference.
+The linear functionals of `estimate`, g = A y, are radii at a course, height and azimuth, and the
+coordinates of the centre of a ring, which have no prior. They are estimated jointly, so that common
+errors cancel in the difference of two places.
 
-Where there is a reading, the best estimate draws it towards its neighbours, which is right on the
-average and wrong at a dent: the larger a departure is among small ones, the more of it is lost. So
-a place may be asked for as it was read, y_i less the centre of its ring: unbiased whatever the wall
-does there, and hardly less certain.
+At a site, the best estimate is drawn towards the neighbouring readings. The estimate is correct on
+average but biased at a dent: the larger a departure among small ones, the larger its loss. A place
+may therefore request the reading itself, y_i less the centre of its ring. The reading is unbiased
+whatever the form of the wall, and hardly less certain.
 """
 
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Spots:
         Height within the course, -1 at its bottom to +1 at its top.
     azimuth_rad : ndarray, shape (p,)
     site : ndarray of int, shape (p,), optional
-        Reading of the field at that very place that is to count as it was read; -1: the estimate.
+        Reading of the field at the place that replaces the estimate; -1: the estimate.
     """
 
     course: np.ndarray
@@ -49,20 +49,21 @@ class Spots:
 
 
 class FieldValues:
-    """Radii at p places, then x and y of the centres of c rings, estimated together; f = p + 2 c.
+    """Radii at p places, then x and y of the centres of c rings, estimated jointly; f = p + 2 c.
 
     Parameters
     ----------
     field : WallField
     spots : Spots
     centres : sequence of (int, float)
-        Ring and height within its course, -1 to 1: the centre of a ring that leans moves with it.
+        Ring and height within its course, -1 to 1; the centre of a leaning ring depends on the
+        height.
 
     Attributes
     ----------
     value_m : ndarray, shape (f,)
-        Radii about the own centre of their level, so without first harmonic; centres from the point
-        that the radii of their ring were taken about.
+        Radii about the centre of their level, thus without first harmonic; centres relative to the
+        origin of the radii of their ring, m.
     weights : ndarray, shape (f, n)
         Derivative by the readings of the field.
     """
@@ -75,37 +76,40 @@ class FieldValues:
         design = self._design(centres)
         self._across = [self._with_sites(index) for index in range(len(COMPONENTS))]
         stated = [one.shape in field.stated for one in COMPONENTS]
-        across = np.zeros((len(design), len(field.sites)))
-        for part, counts in zip(self._across, stated, strict=True):
-            if counts:
-                across[: len(spots)] += part
-        self.value_m = design @ free + across @ explained
+        covariance = np.zeros((len(design), len(field.sites)))
+        for part, included in zip(self._across, stated, strict=True):
+            if included:
+                covariance[: len(spots)] += part
+        # g = X_g beta + K_g V^-1 (y - X beta), plus the subtracted mean radius of the course.
+        self.value_m = design @ free + covariance @ explained
         self.value_m[: len(spots)] += field._mean_m[spots.course]
-        with_free = scipy.linalg.cho_solve(normal, (design - across @ by_columns).T).T
-        across += with_free @ field._columns[0].T
-        self.weights = scipy.linalg.cho_solve(factor, across.T, check_finite=False).T
+        with_free = scipy.linalg.cho_solve(normal, (design - covariance @ by_columns).T).T
+        covariance += with_free @ field._columns[0].T
+        self.weights = scipy.linalg.cho_solve(factor, covariance.T, check_finite=False).T
         if spots.site is not None and np.any(spots.site >= 0):
             self._take_as_read(np.flatnonzero(spots.site >= 0))
 
     def _take_as_read(self, rows):
-        """Put readings in place of estimates: each less all but the radius of what is free."""
+        """Replace estimates by readings, less all parameters without prior except the radius."""
         field, sites = self._field, self._spots.site[rows]
         factor, _, normal = field._factored
         design, radii = field._columns
+        # Keep only centre and shared unknowns: the reading less these is the radius at the place.
         others = design[sites].copy()
         others[np.arange(len(rows)), radii[field.sites.course[sites]]] = 0.0
-        free = scipy.linalg.cho_solve(normal, others.T).T @ design.T
+        by_parameters = scipy.linalg.cho_solve(normal, others.T).T @ design.T
         self.value_m[rows] = field.radius_m[sites] - others @ field._solved[0]
-        self.weights[rows] = -scipy.linalg.cho_solve(factor, free.T, check_finite=False).T
+        self.weights[rows] = -scipy.linalg.cho_solve(factor, by_parameters.T, check_finite=False).T
         self.weights[rows, sites] += 1.0
 
     def unseen_of(self, rows):
-        """What was not seen of each component, in sums of the values.
+        """Return variances of sums of the values due to the undetermined part of each component.
 
         Parameters
         ----------
         rows : scipy.sparse.csr_array, shape (r, f)
-            Each of few places: only these are asked for with one another.
+            Coefficients of the sums, each with few places: only covariances between these are
+            computed.
 
         Returns
         -------
@@ -113,68 +117,78 @@ class FieldValues:
             Variances of the errors, m2.
         """
         weights, of_places = rows @ self.weights, rows[:, : len(self._spots)]
-        row, first, second, product = _pairs(of_places)
-        around = self._around(first, second)
-        found = np.empty((len(COMPONENTS), len(weights)))
+        row, first, second, product = _enumerate_pairs(of_places)
+        correlations = self._around(first, second)
+        variances = np.empty((len(COMPONENTS), len(weights)))
         sizes = self._field.amplitudes.variances_m2
-        for index, (size, across) in enumerate(zip(sizes, self._across, strict=True)):
-            found[index] = size * self._covariances.spread_alone(weights, index)
-            found[index] -= 2 * np.einsum("rn,rn->r", weights, of_places @ across)
-            own = size * product * self._between(index, first, second, around)
-            found[index] += np.bincount(row, own, len(weights))
-        return found
+        for index, (size, covariance) in enumerate(zip(sizes, self._across, strict=True)):
+            # Diagonal of A K A' - 2 K_g A' + K_gg, term by term.
+            variances[index] = size * self._covariances.spread_alone(weights, index)
+            variances[index] -= 2 * np.einsum("rn,rn->r", weights, of_places @ covariance)
+            prior_variance = size * product * self._between(index, first, second, correlations)
+            variances[index] += np.bincount(row, prior_variance, len(weights))
+        return variances
 
     def _design(self, centres):
-        """(f, p) derivative by what no prior binds."""
+        """Return the derivative (f, p) by the parameters without prior."""
         sites = self._field.sites
         design, radii = self._field._columns
-        found = np.zeros((len(self._spots) + 2 * len(centres), design.shape[1]))
-        found[np.arange(len(self._spots)), radii[self._spots.course]] = 1.0
+        derivative = np.zeros((len(self._spots) + 2 * len(centres), design.shape[1]))
+        derivative[np.arange(len(self._spots)), radii[self._spots.course]] = 1.0
         for row, (ring, zeta) in enumerate(centres):
             course = sites.course[sites.ring == ring][0]
-            own = sites.ring[sites.course == course]
-            at = radii[course] + 1
-            for one in np.unique(own[own >= 0]):
-                leans = bool(np.any(sites.leans[sites.ring == one]))
-                if one == ring:
+            rings_of_course = sites.ring[sites.course == course]
+            column = radii[course] + 1
+            for number in np.unique(rings_of_course[rings_of_course >= 0]):
+                leans = bool(np.any(sites.leans[sites.ring == number]))
+                if number == ring:
                     rows = len(self._spots) + 2 * row + np.arange(2)
-                    found[rows, at + np.arange(2)] = 1.0
+                    derivative[rows, column + np.arange(2)] = 1.0
                     if leans:
-                        found[rows, at + 2 + np.arange(2)] = zeta
-                at += 4 if leans else 2
-        return found
+                        derivative[rows, column + 2 + np.arange(2)] = zeta
+                # Columns of a ring: x and y of the centre, and of its lean if the ring is not
+                # level.
+                column += 4 if leans else 2
+        return derivative
 
     def _with_sites(self, index):
-        """(p, n) covariance of the places with one component at the sites, m2."""
-        one, spots, sites = COMPONENTS[index], self._spots, self._field.sites
+        """Return the covariance (p, n) of the places with a component at the sites, m2."""
+        component, spots, sites = COMPONENTS[index], self._spots, self._field.sites
         size = self._field.amplitudes.variances_m2[index]
-        if one.shape == "weld":
+        if component.shape == "weld":
             return size * self._peaks[index] @ self._covariances.peaks[index].T
-        found = self._along[one.shape] * one.height_covariance(self._heights, sites.heights)
-        if not one.common:
-            found = found * (spots.course[:, None] == sites.course)
-        return size * found
+        covariance = self._along[component.shape] * component.height_covariance(
+            self._heights, sites.heights
+        )
+        if not component.common:
+            covariance = covariance * (spots.course[:, None] == sites.course)
+        return size * covariance
 
     def _around(self, first, second):
-        """{shape: (k,) c between places (k,) and others}."""
+        """Return {shape: c (k,) between places (k,) and others}."""
         azimuth = self._spots.azimuth_rad
-        found = {
+        correlations = {
             shape: np.sum(waves[first] * waves[second], axis=1)
             for shape, waves in wave_columns(azimuth).items()
         }
-        apart = azimuth[first] - azimuth[second]
-        return found | {"mean": 1.0, "seam": seam_correlation(apart, self._field.nominal_m)}
+        difference = azimuth[first] - azimuth[second]
+        return correlations | {
+            "mean": 1.0,
+            "seam": seam_correlation(difference, self._field.nominal_m),
+        }
 
     def _between(self, index, first, second, around):
-        """(k,) covariance between places (k,) and others by one component of unit variance."""
-        one, spots = COMPONENTS[index], self._spots
-        if one.shape == "weld":
+        """Return the covariance (k,) between pairs of places due to a unit component."""
+        component, spots = COMPONENTS[index], self._spots
+        if component.shape == "weld":
             return np.sum(self._peaks[index][first] * self._peaks[index][second], axis=1)
         heights = self._heights
-        found = around[one.shape] * one.height_between(heights[first], heights[second])
-        if not one.common:
-            found = found * (spots.course[first] == spots.course[second])
-        return found
+        covariance = around[component.shape] * component.height_between(
+            heights[first], heights[second]
+        )
+        if not component.common:
+            covariance = covariance * (spots.course[first] == spots.course[second])
+        return covariance
 
     @cached_property
     def _heights(self):
@@ -182,34 +196,41 @@ class FieldValues:
 
     @cached_property
     def _along(self):
-        """{shape: (p, n) c between the places and the sites}."""
-        found = azimuth_correlations(
+        """{shape: c (p, n) between the places and the sites}."""
+        correlations = azimuth_correlations(
             self._spots.azimuth_rad, self._covariances.azimuths_rad, self._field.nominal_m
         )
-        return {shape: self._covariances.at_sites(one) for shape, one in found.items()}
+        return {
+            shape: self._covariances.at_sites(columns) for shape, columns in correlations.items()
+        }
 
     @cached_property
     def _peaks(self):
-        """{component: (p, k) derivative of the places by the peaks of welds}."""
+        """{component: derivative (p, k) of the places by the peaks of welds}."""
         spots, sites, columns = self._spots, self._field.sites, []
         for course in range(len(self._field._members)):
-            own = weld_columns(spots.azimuth_rad, sites.welds_of(course), self._field.nominal_m)
-            columns.append(own * (spots.course == course)[:, None])
-        alone = np.hstack(columns)
+            by_peaks = weld_columns(
+                spots.azimuth_rad, sites.welds_of(course), self._field.nominal_m
+            )
+            columns.append(by_peaks * (spots.course == course)[:, None])
+        by_weld = np.hstack(columns)
         return {
-            index: alone.sum(axis=1, keepdims=True) if one.common else alone
-            for index, one in enumerate(COMPONENTS)
-            if one.shape == "weld"
+            index: by_weld.sum(axis=1, keepdims=True) if component.common else by_weld
+            for index, component in enumerate(COMPONENTS)
+            if component.shape == "weld"
         }
 
 
-def _pairs(rows):
-    """Each two places of a row of rows (r, p), in both orders and with itself: the row's number,
+def _enumerate_pairs(rows):
+    """Return all pairs of places in each row of a sparse array (r, p).
+
+    The pairs include both orders, and each place with itself. Returned are the number of the row,
     both places, and the product of their coefficients.
     """
     rows = rows.tocsr()
     count = np.diff(rows.indptr)
     row = np.repeat(np.arange(len(count)), count**2)
-    within = np.arange(len(row)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
-    first, second = (rows.indptr[row] + part for part in np.divmod(within, count[row]))
+    # Number of the pair within its row; its quotient and remainder are the two places.
+    pair_number = np.arange(len(row)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
+    first, second = (rows.indptr[row] + part for part in np.divmod(pair_number, count[row]))
     return row, rows.indices[first], rows.indices[second], rows.data[first] * rows.data[second]

@@ -1,7 +1,7 @@
-"""Does the job make sense as a whole? Checks that need more than one value of it.
+"""Checks of the job as a whole, which need more than one of its values.
 
-Each check tells `log` its problems and warnings and returns nothing. A check whose values are
-missing or bad stays silent: what is wrong with them has been told already.
+Each check reports problems and warnings to `log` and returns nothing. A check is skipped if its
+values are missing or invalid, because these faults have already been reported.
 """
 
 from tankcal.job.checking import has_rows, loads_sphere
@@ -52,12 +52,22 @@ __all__ = ["check_all", "check_tank"]
 
 
 def check_all(values, tables, registers, raw, is_whole, log):
-    """All checks that the readable parts allow.
+    """Run all checks that the readable parts allow.
 
-    values     of the settings, or None: unreadable
-    tables     {name: ColumnValues, or None: not there}
-    registers  {"cameras", "instruments", "clouds" or "meters": {name: {key: value}}}
-    is_whole   False: the survey alone is asked for, whatever there is of the tank
+    Parameters
+    ----------
+    values : dict or None
+        {section: {key: value}} of the settings; None: unreadable.
+    tables : dict
+        {name: ColumnValues; None: missing}.
+    registers : dict
+        {"cameras", "instruments", "clouds" or "meters": {name: {key: value}}}.
+    raw : RawJob
+        Job as read.
+    is_whole : bool
+        False: check only the survey.
+    log : Log
+        Receives problems and warnings.
     """
     if is_whole:
         check_tank(values, tables, raw, log)
@@ -82,7 +92,7 @@ def check_all(values, tables, registers, raw, is_whole, log):
 
 
 def check_tank(values, tables, raw, log):
-    """The checks of everything but the survey; arguments as in `check_all`."""
+    """Run all checks except those of the survey; parameters as for `check_all`."""
     kind = kind_of(raw)
     points, extent = tables["points"], Extent()
     if values is not None:
@@ -90,9 +100,10 @@ def check_tank(values, tables, raw, log):
         check_steps(values["table"], extent, raw, log)
         check_settings(values, tables, extent, kind, raw, log)
         check_plausible(values, tables, extent, kind, raw, log)
-    elsewhere = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
-    told = elsewhere or is_metered(tables) or has_radii(tables)
-    needs_points = kind == "vertical" and not told
+    has_readings = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
+    has_shape = has_readings or is_metered(tables) or has_radii(tables)
+    # Any measurement of the shape of the wall replaces the points.
+    needs_points = kind == "vertical" and not has_shape
     if points is not None and (needs_points or has_rows(points)):
         check_points(points, log)
     if values is not None:
@@ -103,8 +114,8 @@ def check_tank(values, tables, raw, log):
 def _check_uncertainty(values, tables, extent, kind, raw, log):
     inputs, correlations, stated = (tables[t] for t in ("uncertainty", "correlations", "stated"))
     if inputs is not None:
-        known = values is not None and kind is not None
-        check_inputs(inputs, useless_inputs(values, tables, kind) if known else {}, log)
+        is_readable = values is not None and kind is not None
+        check_inputs(inputs, useless_inputs(values, tables, kind) if is_readable else {}, log)
     if correlations is not None:
         check_correlations(correlations, inputs, raw, log)
     if stated is not None:

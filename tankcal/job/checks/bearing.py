@@ -1,4 +1,4 @@
-"""Which inputs of uncertainty.csv have an effect on a job, and why the others have none."""
+"""Inputs of uncertainty.csv without an effect on the job, with the reasons."""
 
 from tankcal.job.checking import has_rows, loads_sphere
 from tankcal.job.checks.extent import (
@@ -33,9 +33,21 @@ NO_SURVEY_LIQUID = message("no_survey_liquid", "expected only with survey.liquid
 
 
 def useless_inputs(values, tables, kind):
-    """{name of an input without any effect on this job: why}.
+    """Inputs of uncertainty without an effect on this job.
 
-    values, tables  of the job; what is blank or bad there counts as not given
+    Parameters
+    ----------
+    values : dict
+        {section: {key: value}} of the settings; blank and invalid values count as not given.
+    tables : dict of {str: ColumnValues or None}
+        Tables by name.
+    kind : str
+        Kind of tank.
+
+    Returns
+    -------
+    dict of {str: Message}
+        Reason for each input.
     """
     others = {
         name: message("no_bearing", "it has no effect on a tank of kind {of_kind}", of_kind=kind)
@@ -61,7 +73,10 @@ def _switched_off(correction):
 
 
 def _of_temperature(values, tables):
-    """{input: "" or why it has no effect}; so do all below."""
+    """{input: reason}, with "" for an input that has an effect.
+
+    All functions below return this form.
+    """
     given = values["survey"]["shell_temperature_c"] is not None
     if has_radii_alone(tables):
         given = values["radii"]["reference_temperature_c"] is not None
@@ -115,7 +130,7 @@ def _of_vertical(values, tables):
 
 
 def _of_radii():
-    """What a survey has, and radii that were declared have not."""
+    """Reasons for inputs of a survey, beside declared radii."""
     why = message(
         "radii_are_inside",
         "expected only with a survey: the radii are those of the empty shell, inside, with their"
@@ -126,7 +141,7 @@ def _of_radii():
 
 
 def _has_own_offset(tables):
-    """Is what the wall was measured by free of an offset that all radii share?"""
+    """Return True if no offset common to all radii affects the measurements of the wall."""
     return (
         has_hits(tables)
         or has_clouds(tables)
@@ -149,35 +164,36 @@ def _of_bottom(values, bottom):
 
 
 def _of_heads(values, bottom):
-    """Sizes of a shaped bottom and of a head on top, where they are on."""
+    """Reasons for the dimensions of a shaped bottom and of a head on top."""
     form, top = bottom_form(values, bottom), values["top"]["form"]
-    off = {part: values["corrections"][part] is False for part in ("bottom", "top")}
+    is_off = {part: values["corrections"][part] is False for part in ("bottom", "top")}
     heads = [
         {**values[part], "form": shape, "depth_m": values[part][key]}
         for part, shape, key in (("bottom", form, "centre_z_m"), ("top", top, "depth_m"))
-        if shape == "torispherical" and not off[part]
+        if shape == "torispherical" and not is_off[part]
     ]
-    shaped = form in SHAPED and not off["bottom"]
-    headed = top is not None and not off["top"]
+    has_shaped_bottom = form in SHAPED and not is_off["bottom"]
+    has_head = top is not None and not is_off["top"]
     return {
         **_of_radii_of(heads),
         "bottom_depth": ""
-        if shaped
+        if has_shaped_bottom
         else message("no_shaped_bottom", "expected only with a bottom that is a cone or a head"),
         "top_depth": ""
-        if headed
+        if has_head
         else message("no_top", "expected only with a head on the shell: [top]"),
     }
 
 
-def _of_plates(values, tables, is_loaded, of="courses"):
-    """Plates count where they are subtracted or loaded, paint where it is subtracted.
+def _of_plates(values, tables, is_loaded, table_name="courses"):
+    """Reasons for the thickness of plates and paint.
 
-    A tape sees both, also where the points are inside, and so do hits from outside beside them.
+    Plates have an effect if they are subtracted or loaded; paint, if it is subtracted. A tape lies
+    on both even if the points are inside, and so do hits from outside.
     """
-    switches, courses = values["corrections"], tables[of]
-    seen = is_strapped(tables) or may_be_hit_from_both_sides(tables)
-    inside = (values["survey"]["side"] == "inside" and not seen) or has_radii_alone(tables)
+    switches, courses = values["corrections"], tables[table_name]
+    outside_seen = is_strapped(tables) or may_be_hit_from_both_sides(tables)
+    inside = (values["survey"]["side"] == "inside" and not outside_seen) or has_radii_alone(tables)
     why = {"plate_thickness": "", "paint": ""}
     if (inside or switches["plate"] is False) and not is_loaded:
         why["plate_thickness"] = NOT_SUBTRACTED
@@ -190,15 +206,15 @@ def _of_plates(values, tables, is_loaded, of="courses"):
                     "no_such_thickness",
                     "expected only with {column} above 0 in {table}.csv",
                     column=column,
-                    table=of,
+                    table=table_name,
                 )
     return why
 
 
 def _of_heights(courses, values):
-    headed = values["top"]["form"] is not None and values["corrections"]["top"] is not False
-    is_one = not headed and courses is not None and len(courses.rows) + courses.skipped == 1
-    return message("only_one_course", "expected only with two courses or more") if is_one else ""
+    has_head = values["top"]["form"] is not None and values["corrections"]["top"] is not False
+    single = not has_head and courses is not None and len(courses.rows) + courses.skipped == 1
+    return message("only_one_course", "expected only with two courses or more") if single else ""
 
 
 def _of_horizontal(values, tables):
@@ -227,15 +243,15 @@ def _of_horizontal(values, tables):
 
 
 def _of_one_cylinder():
-    """What only rings have."""
+    """Reasons for inputs of strapped rings, for a tank without rings."""
     no_rings = message("no_rings", "expected only with the rings of rings.csv")
     return dict.fromkeys(("paint", "ring_lengths", "ring_axes"), no_rings)
 
 
 def _of_rings(values, tables):
-    """What a cylinder has whose rings a tape was put round."""
+    """Reasons for the inputs of a cylinder with strapped rings."""
     by_tape = message("by_tape", "its uncertainty comes from the readings of the tape")
-    one = "rings" in tables and has_rows(tables["rings"]) and len(tables["rings"].rows) == 1
+    is_single = "rings" in tables and has_rows(tables["rings"]) and len(tables["rings"].rows) == 1
     why = _of_plates(values, tables, False, "rings")
     return why | {
         "diameter": by_tape,
@@ -243,13 +259,13 @@ def _of_rings(values, tables):
         "length": message("of_each_ring", "expected ring_lengths instead: each ring has its own"),
         "ring_lengths": "",
         "ring_axes": message("only_one_ring", "expected only with two rings or more")
-        if one
+        if is_single
         else "",
     }
 
 
 def _of_ship(values):
-    """What a tank has that is sounded along a pipe on a ship."""
+    """Reasons for the inputs of a tank of a ship, sounded through a pipe."""
     no_pipe = message("no_ship", "expected only with [ship]")
     no_contraction = message("no_contraction", "expected only with ship.contraction_percent")
     contracts = values["ship"]["contraction_percent"] is not None
@@ -260,21 +276,21 @@ def _of_ship(values):
 
 
 def _of_radii_of_ends(given):
-    """Radii that the job gives, or a standard."""
+    """Reasons for the radii of the two ends."""
     ends = [{key: given[f"end_{end}_{key}"] for key in SIZES_OF_END} for end in "ab"]
     return _of_radii_of(ends)
 
 
 def _of_radii_of(heads):
     return {
-        name: "" if any(_gives(name, one) for one in heads) else NO_SUCH_RADIUS for name in GIVEN
+        name: "" if any(_gives(name, head) for head in heads) else NO_SUCH_RADIUS for name in GIVEN
     }
 
 
-def _gives(name, end):
-    """Is a radius, "dish" or "knuckle", among the sizes that an end or a head is given by?"""
-    by_standard = end["standard"] and (name == "knuckle" or not end["depth_m"])
-    return bool(end[f"{name}_radius_m"] or by_standard)
+def _gives(name, head):
+    """Return True if a radius, "dish" or "knuckle", is among the given dimensions of a head."""
+    by_standard = head["standard"] and (name == "knuckle" or not head["depth_m"])
+    return bool(head[f"{name}_radius_m"] or by_standard)
 
 
 def _of_tube(given, wall):
@@ -286,10 +302,10 @@ def _of_tube(given, wall):
 
 
 def _of_wall(given, values, has_points):
-    """What horizontal cylinders and spheres share."""
+    """Reasons for inputs of horizontal cylinders and spheres."""
     switched_off = values["corrections"]["plate"] is False
-    outside = values["survey"]["side"] == "outside" and not switched_off
-    nothing = message(
+    is_subtracted = values["survey"]["side"] == "outside" and not switched_off
+    not_subtracted = message(
         "no_plates",
         "expected only with side = outside and a thickness_mm: without them nothing is subtracted",
     )
@@ -298,34 +314,38 @@ def _of_wall(given, values, has_points):
         "offset": ""
         if has_points
         else message("no_points", "expected only with points; without points, declare diameter"),
-        "plate_thickness": "" if outside and given["thickness_mm"] else nothing,
+        "plate_thickness": "" if is_subtracted and given["thickness_mm"] else not_subtracted,
     }
 
 
 def _of_sphere(values, tables):
-    """What great circles tell, and what widens a sphere."""
+    """Reasons for inputs of great circles and of the expansion of a sphere under load."""
     table, survey = values["table"], values["survey"]
-    off = values["corrections"]["head"] is False
+    is_off = values["corrections"]["head"] is False
     liquid = (survey["liquid_density_kg_m3"] or 0) * (survey["liquid_level_m"] or 0)
     rules = {
         "youngs_modulus": loads_sphere(values)
         or message("no_load_of_sphere", "expected only with a pressure or a liquid that loads it"),
-        "liquid_density": (table["liquid_density_kg_m3"] and not off) or NO_HEAD,
-        "pressure": (table["pressure_bar"] and not off)
+        "liquid_density": (table["liquid_density_kg_m3"] and not is_off) or NO_HEAD,
+        "pressure": (table["pressure_bar"] and not is_off)
         or message("no_table_pressure", "expected only with table.pressure_bar above 0"),
-        "survey_pressure": (survey["pressure_bar"] and not off)
+        "survey_pressure": (survey["pressure_bar"] and not is_off)
         or message("no_survey_pressure", "expected only with survey.pressure_bar above 0"),
         **dict.fromkeys(
-            ("survey_level", "survey_density"), (liquid and not off) or NO_SURVEY_LIQUID
+            ("survey_level", "survey_density"), (liquid and not is_off) or NO_SURVEY_LIQUID
         ),
     }
-    found = {name: why for name, why in rules.items() if isinstance(why, str)}
+    reasons = {name: why for name, why in rules.items() if isinstance(why, str)}
     if has_great_circles(tables):
-        found["diameter"] = message("from_circles", "its uncertainty comes from the great circles")
-    plate = (values["survey"]["side"] == "outside") and values["corrections"]["plate"] is not False
-    if loads_sphere(values) and values["sphere"]["thickness_mm"] and not plate:
-        found["plate_thickness"] = ""  # it gives way to what loads it
-    return found
+        reasons["diameter"] = message(
+            "from_circles", "its uncertainty comes from the great circles"
+        )
+    is_subtracted = (values["survey"]["side"] == "outside") and values["corrections"][
+        "plate"
+    ] is not False
+    if loads_sphere(values) and values["sphere"]["thickness_mm"] and not is_subtracted:
+        reasons["plate_thickness"] = ""  # the plate determines the expansion under load
+    return reasons
 
 
 def _from_points(has_points):

@@ -1,4 +1,4 @@
-"""Do point clouds make sense as a whole? Files, poses, scanners, targets, what else is given."""
+"""Checks of point clouds as a whole: files, poses, scanners, targets, other measurements."""
 
 import numpy as np
 
@@ -19,13 +19,13 @@ from tankcal.job.entries import kind_of
 from tankcal.job.tables import unreadable_file
 from tankcal.messages import message
 
-FEWEST_TARGETS = 3  # of a scan: they tell its pose
-RIGID = 1e-4  # a pose may be so far from a rotation: rounding of a few digits
-PLACE = 3  # coordinates
+FEWEST_TARGETS = 3  # smallest number of targets that determine the pose of a scan
+RIGID = 1e-4  # largest deviation of a pose from a rotation, due to rounding
+PLACE = 3  # number of coordinates
 
 
 def check_clouds(values, tables, registers, raw, log):
-    """Files that are there and sound, poses that move and do not bend, and errors declared."""
+    """Check files, rigid poses, targets and declared errors; parameters as for `check_all`."""
     given, targets = registers.get("clouds", {}), tables["scan_targets"]
     if values is not None and kind_of(raw) == "vertical":
         _check_bottom(values, given, tables, raw, log)
@@ -37,29 +37,29 @@ def check_clouds(values, tables, registers, raw, log):
     _refuse_beside(tables, log)
     size = ("tank", "nominal_diameter_m")
     if values is not None and kind_of(raw) != "vertical" and is_not_given(raw, *size):
-        tell(log.problem, raw, *size, missing_beside(file))  # of an upright one it always is
-    headers = {name: _header(raw, name, one, log) for name, one in given.items()}
+        tell(log.problem, raw, *size, missing_beside(file))  # always required for a vertical tank
+    headers = {name: _header(raw, name, keys, log) for name, keys in given.items()}
     names = {name: scans_of(name, headers[name]) for name in given if headers[name] is not None}
     counts = _count_targets(targets, names, len(names) == len(given), log)
-    for name, one in given.items():
+    for name, keys in given.items():
         tell_of = _teller(raw, file, name, log)
         if headers[name] is not None:
-            _check_poses(one, headers[name], tell_of)
+            _check_poses(keys, headers[name], tell_of)
             for scan in headers[name].scans:
-                if scan.warning is not None and one["pose"] is None:
+                if scan.warning is not None and keys["pose"] is None:
                     tell_of("pose", scan.warning, log.warning)
-        _check_places(one, tell_of)
-        _check_errors(one, [counts.get(scan, 0) for scan in names.get(name, ())], tables, tell_of)
+        _check_places(keys, tell_of)
+        _check_errors(keys, [counts.get(scan, 0) for scan in names.get(name, ())], tables, tell_of)
     _refuse_unlike(raw, file, given, log)
     if has_rows(targets):
         _warn_lonely(tables, targets, log)
 
 
 def _check_bottom(values, given, tables, raw, log):
-    """A bottom that scans are to show needs one from inside."""
+    """Refuse a bottom measured by scans without a scan from inside."""
     if values["bottom"]["form"] != OF_CLOUD:
         return
-    sides = {one["side"] or values["survey"]["side"] or "inside" for one in given.values()}
+    sides = {keys["side"] or values["survey"]["side"] or "inside" for keys in given.values()}
     if not has_clouds(tables) or "inside" not in sides:
         text = message(
             "bottom_without_cloud",
@@ -70,19 +70,19 @@ def _check_bottom(values, given, tables, raw, log):
 
 
 def scans_of(name, header):
-    """Names of the scans of a file: that of its section, with a number where there are more."""
+    """Names of the scans of a file: the name of its section, numbered if there are several."""
     count = len(header.scans)
     return (name,) if count == 1 else tuple(f"{name} {i + 1}" for i in range(count))
 
 
 def _teller(raw, file, name, log):
-    """Tell a problem of one key of a cloud, with its row."""
+    """Function that reports on one key of a cloud, with its row."""
     register = raw.registers["clouds"]
 
-    def tell(key, expected, to=log.problem):
+    def tell(key, expected, report=log.problem):
         value = register.entries[name].get(key)
         row = register.rows[name] if value is None or value.row is None else value.row
-        to(file, expected, row, f"{name}.{key}")
+        report(file, expected, row, f"{name}.{key}")
 
     return tell
 
@@ -101,7 +101,7 @@ def _refuse_beside(tables, log):
 
 
 def _header(raw, name, given, log):
-    """CloudHeader of a file; None after telling all that is wrong with it."""
+    """`CloudHeader` of a file; None, with the problems in `log`, if unreadable."""
     if given["file"] is None:
         return None
     path = raw.folder / given["file"]
@@ -131,22 +131,22 @@ def _header(raw, name, given, log):
 
 
 def poses_of(given, header, unit_m):
-    """Of each scan its pose (4, 4), lengths in m, or None: not given, or the file has none."""
+    """Pose (4, 4) of each scan, lengths in m; None if not given or not in the file."""
     if given["pose"] is None:
         return [None] * len(header.scans)
     if given["pose"] == OF_FILE:
-        found = [one.pose for one in header.scans]
+        poses = [pose.pose for pose in header.scans]
     else:
-        found = [*np.reshape(given["pose"], (-1, 4, 4))]
+        poses = [*np.reshape(given["pose"], (-1, 4, 4))]
     scale = np.ones((4, 4))
     scale[:3, 3] = unit_m
-    return [None if one is None else np.asarray(one, dtype=float) * scale for one in found]
+    return [None if pose is None else np.asarray(pose, dtype=float) * scale for pose in poses]
 
 
 def _check_poses(given, header, tell):
     pose, count = given["pose"], len(header.scans)
     if pose is None:
-        if count > 1 and any(one.pose is not None for one in header.scans):
+        if count > 1 and any(scan.pose is not None for scan in header.scans):
             text = message(
                 "pose_of_scans_missing",
                 'blank, but the file has {count} scans with a pose each; expected "file", or four'
@@ -154,7 +154,7 @@ def _check_poses(given, header, tell):
                 count=count,
             )
             tell("pose", text)
-        elif count > 1 and any(one.is_placed for one in header.scans):
+        elif count > 1 and any(scan.is_placed for scan in header.scans):
             text = message(
                 "pose_without_rotation",
                 "blank, but the {count} scans of the file have positions without a rotation (a"
@@ -164,13 +164,13 @@ def _check_poses(given, header, tell):
             tell("pose", text)
         return
     if pose == OF_FILE:
-        without = [i + 1 for i, one in enumerate(header.scans) if one.pose is None]
-        if without:
+        unplaced = [i + 1 for i, scan in enumerate(header.scans) if scan.pose is None]
+        if unplaced:
             text = message(
                 "file_without_pose",
                 "found file, but scans {scans} of the file have no pose; expected four rows of four"
                 " numbers for each scan, or blank",
-                scans=without[:5],
+                scans=unplaced[:5],
             )
             tell("pose", text)
             return
@@ -184,8 +184,8 @@ def _check_poses(given, header, tell):
         )
         tell("pose", text)
         return
-    for i, one in enumerate(poses_of(given, header, 1.0)):
-        if not _is_rigid(one):
+    for i, scan in enumerate(poses_of(given, header, 1.0)):
+        if not _is_rigid(scan):
             text = message(
                 "pose_not_rigid",
                 "the pose of scan {scan} is no rotation and shift; expected rows that turn a"
@@ -206,9 +206,11 @@ def _is_rigid(pose):
 
 
 def _check_places(given, tell):
-    stood = given["scanner_xyz"]
-    if stood is not None and len(stood) != PLACE:
-        text = message("three_numbers", "{count} numbers; expected x, y and z", count=len(stood))
+    scanner_xyz = given["scanner_xyz"]
+    if scanner_xyz is not None and len(scanner_xyz) != PLACE:
+        text = message(
+            "three_numbers", "{count} numbers; expected x, y and z", count=len(scanner_xyz)
+        )
         tell("scanner_xyz", text)
     for i, box in enumerate(given["leave_out"] or ()):
         if not all(low < high for low, high in zip(box[:3], box[3:], strict=True)):
@@ -222,15 +224,26 @@ def _check_places(given, tell):
 
 
 def _check_errors(given, targets, tables, tell):
-    """What all points of a scan share is declared, or is to be assumed.
+    """Require the common errors of the points of a scan, declared or assumed.
 
-    targets  their number on each scan of the file; empty: the file cannot be read
+    Parameters
+    ----------
+    given : dict
+        {key: value} of the cloud.
+    targets : sequence of int
+        Number of targets in each scan of the file; empty: unreadable.
+    tables : dict
+        Tables by name.
+    tell : callable
+        Reports on a key.
     """
     if given["assume"] == DOCUMENTED:
         return
     missing = [key for key in RANGING if given[key] is None]
-    known = bool(targets) or not has_rows(tables["scan_targets"])  # else who knows whose they are
-    if known and min(targets, default=0) < FEWEST_TARGETS:
+    is_certain = bool(targets) or not has_rows(
+        tables["scan_targets"]
+    )  # else the targets may belong to these scans
+    if is_certain and min(targets, default=0) < FEWEST_TARGETS:
         missing += [key for key in REGISTRATION if given[key] is None]
     for key in missing:
         text = message(
@@ -244,7 +257,7 @@ def _check_errors(given, targets, tables, tell):
 
 
 def offset_untold():
-    """What is said of a free offset that no tape tells."""
+    """Message about a free offset that no tape determines."""
     return message(
         "offset_of_cloud_untold",
         "found free; expected its standard uncertainty, or a circumference by tape: nothing in the"
@@ -253,12 +266,12 @@ def offset_untold():
 
 
 def _refuse_unlike(raw, file, given, log):
-    """Problems of files of one scanner that declare different errors of it."""
+    """Report files of one scanner with different declared errors."""
     first = {}
-    for name, one in given.items():
-        other = first.setdefault(one["scanner"], name)
+    for name, keys in given.items():
+        other = first.setdefault(keys["scanner"], name)
         for key in OF_SCANNER:
-            if one[key] != given[other][key] and not log.has(file, None, f"{name}.{key}"):
+            if keys[key] != given[other][key] and not log.has(file, None, f"{name}.{key}"):
                 text = message(
                     "unlike_scanner",
                     "not what {other!r} has, but both are of one scanner; expected the same, or"
@@ -269,11 +282,11 @@ def _refuse_unlike(raw, file, given, log):
 
 
 def _count_targets(targets, names, are_all_read, log):
-    """{scan: how many targets it has}; what is wrong with their rows is told."""
+    """{scan: number of its targets}; invalid rows are reported."""
     if not has_rows(targets):
         return {}
     known = [scan for scans in names.values() for scan in scans]
-    counts, seen = {}, {}
+    counts, first_rows = {}, {}
     columns = zip(targets.rows, targets.of("scan"), targets.of("target"), strict=True)
     for row, scan, target in columns:
         if scan is None or target is None:
@@ -288,16 +301,16 @@ def _count_targets(targets, names, are_all_read, log):
                 )
                 log.problem(targets.file, text, row, "scan")
             continue
-        if (scan, target) in seen:
-            log.problem(targets.file, name_twice(target, seen[scan, target]), row, "target")
+        if (scan, target) in first_rows:
+            log.problem(targets.file, name_twice(target, first_rows[scan, target]), row, "target")
             continue
-        seen[scan, target] = row
+        first_rows[scan, target] = row
         counts[scan] = counts.get(scan, 0) + 1
     return counts
 
 
 def _warn_lonely(tables, targets, log):
-    """A warning for each target that one scan alone has, and nothing else."""
+    """Warn about each target that occurs in a single scan and nowhere else."""
     known = set()
     for name, columns in (
         ("control", ("point",)),
@@ -311,7 +324,7 @@ def _warn_lonely(tables, targets, log):
     ):
         table = tables[name]
         if has_rows(table):
-            known.update(one for column in columns for one in table.of(column))
+            known.update(name_of_point for column in columns for name_of_point in table.of(column))
     listed = targets.of("target")
     for row, target in zip(targets.rows, listed, strict=True):
         if target is not None and target not in known and listed.count(target) == 1:
@@ -325,10 +338,10 @@ def _warn_lonely(tables, targets, log):
 
 
 def has_network(tables):
-    """Is there a survey to be adjusted whose points may be targets of scans?"""
+    """Return True if a survey to be adjusted may contain the targets of scans."""
     return has_survey(tables)
 
 
 def unit_of(given):
-    """Metres of one unit of a file."""
+    """Length of one unit of a file, m."""
     return UNITS_M[given["unit"]]

@@ -1,4 +1,4 @@
-"""How large a tank is before anything is computed, and where its wall comes from."""
+"""Size of a tank before the calculation, and origin of its wall."""
 
 from dataclasses import dataclass
 
@@ -11,105 +11,111 @@ from tankcal.job.contract.top import depth_of_top
 
 
 def has_survey(tables):
-    """Are there observations to be adjusted, readable or not?"""
+    """Return True if there are observations to be adjusted, readable or not."""
     return any(has_rows(tables[name]) for name in ("image_points", "stadia", *READINGS))
 
 
 def is_strapped(tables):
-    """Was a tape put round the tank?"""
+    """Return True if circumferences of the tank were taped."""
     return has_rows(tables["circumferences"])
 
 
 def tells_by_tape(tables):
-    """Does a tape tell something of the wall, other than to be compared with it?"""
+    """Return True if circumferences determine the wall, not only as a check."""
     return is_strapped(tables) and any(use != "check" for use in tables["circumferences"].of("use"))
 
 
 def has_hits(tables):
-    """Was the bare wall hit by a total station?"""
+    """Return True if a total station measured the bare wall."""
     return has_rows(tables["wall_hits"])
 
 
 def has_tangents(tables):
-    """Were the limbs of the tank sighted from a traverse round it?"""
+    """Return True if the limbs of the tank were sighted from a traverse around it."""
     return has_rows(tables["tangents"])
 
 
 def has_clouds(tables):
-    """Was the wall scanned?"""
+    """Return True if the wall was scanned."""
     return has_rows(tables.get("clouds"))
 
 
 def is_metered(tables):
-    """Was metered liquid filled in, or drawn off, between dips?"""
+    """Return True if metered liquid was filled or drawn off between dips."""
     return has_rows(tables.get("liquid"))
 
 
 def has_great_circles(tables):
-    """Was a tape put round a sphere?"""
+    """Return True if great circles of a sphere were taped."""
     return has_rows(tables.get("great_circles"))
 
 
 def has_radii(tables):
-    """Are there radii of a former table, a record or a declaration?"""
+    """Return True if radii of a former table, a record or a declaration are given."""
     return has_rows(tables.get("radii"))
 
 
 def is_surveyed(tables):
-    """Did somebody measure the wall of an upright tank, or some courses of it?"""
+    """Return True if the wall of a vertical tank, or some of its courses, was measured."""
     return has_wall_points(tables) or is_strapped(tables)
 
 
 def has_radii_alone(tables):
-    """Is nothing but declared radii known of the wall?"""
+    """Return True if declared radii are the only data of the wall."""
     return has_radii(tables) and not is_surveyed(tables)
 
 
 def is_metered_alone(tables):
-    """Is liquid all that tells the tank, beside the sizes of its drawing?"""
+    """Return True if only metered liquid and nominal dimensions determine the tank."""
     return is_metered(tables) and not is_surveyed(tables)
 
 
 def is_sighted(tables):
-    """Does the wall come from sights that name no target, or from scans?"""
+    """Return True if sights without targets, or scans, determine the wall."""
     return has_hits(tables) or has_tangents(tables) or has_clouds(tables)
 
 
 def may_be_hit_from_both_sides(tables):
-    """Are there hits from more set-ups than one, which may stand in and round the tank?"""
+    """Return True if hits from several set-ups may be on both sides of the wall."""
     return has_hits(tables) and len(set(tables["wall_hits"].of("setup"))) > 1
 
 
 def has_wall_points(tables):
-    """Does the wall come from points, handed in, sighted or to be adjusted?"""
+    """Return True if points, given, sighted or to be adjusted, determine the wall."""
     return has_rows(tables["points"]) or has_survey(tables) or is_sighted(tables)
 
 
 def wall_of(tables):
-    """What the wall of a lying tank comes from: "points", "straps", or None: its sizes alone."""
+    """Origin of the wall of a lying tank: "points", "straps", or None for its dimensions."""
     if has_wall_points(tables):
         return "points"
     return "straps" if is_strapped(tables) or has_rows(tables.get("rings")) else None
 
 
 def height_of_rings(tables):
-    """About the inside diameter of strapped rings, m; None: nothing tells it."""
+    """Approximate inside diameter of strapped rings, m; None if unknown."""
     if not is_strapped(tables) or not has_rows(tables.get("rings")):
         return None
-    readings = [one for one in tables["circumferences"].of("reading_m") if one is not None]
-    plates = [one for one in tables["rings"].of("thickness_mm") if one is not None]
+    readings = [value for value in tables["circumferences"].of("reading_m") if value is not None]
+    plates = [value for value in tables["rings"].of("thickness_mm") if value is not None]
     if not readings:
         return None
+    # Subtract two plates from the outside diameter, mm to m.
     return float(np.median(readings) / np.pi - 2e-3 * (np.median(plates) if plates else 0.0))
 
 
 @dataclass(frozen=True)
 class Extent:
-    """What is known of a tank's size before anything is computed; None: not known.
+    """Size of a tank known before the calculation; None: not known.
 
-    height_m          from its lowest to its highest inside point at the dip point
-    lowest_m, top_m   dips of its lowest and highest inside points, from the table's zero
-    area_m2           the largest free surface
+    Attributes
+    ----------
+    height_m : float or None
+        Height from its lowest to its highest inside point at the dip point.
+    lowest_m, top_m : float or None
+        Dips of its lowest and highest inside points, from the zero of the table.
+    area_m2 : float or None
+        Largest free surface.
     """
 
     height_m: float | None = None
@@ -119,7 +125,7 @@ class Extent:
 
 
 def extent_of(values, tables, kind):
-    """The Extent of a tank of the kind; nothing is known of a mesh, or of an unknown kind."""
+    """Extent of a tank of this kind; unknown for a mesh and for an unknown kind."""
     if kind == "vertical":
         return _of_vertical(values, tables["bottom"])
     if kind == "horizontal":
@@ -148,9 +154,11 @@ def _of_vertical(values, bottom):
     if values["bottom"]["form"] == OF_CLOUD and diameter is not None:
         from tankcal.clouds.inside.floor_cells import reach_of_floor
 
-        lowest.append(shell_z - zero - reach_of_floor(diameter / 2))  # how deep it is looked for
-    over = depth_of_top(values)
-    top = None if None in (height, over) else shell_z + height + over - zero
+        lowest.append(
+            shell_z - zero - reach_of_floor(diameter / 2)
+        )  # depth to which scans are searched for the bottom
+    depth = depth_of_top(values)
+    top = None if None in (height, depth) else shell_z + height + depth - zero
     return Extent(height, min(lowest), top, area)
 
 
@@ -160,13 +168,14 @@ def _of_horizontal(given, values, has_points):
     length = given["length_m"]
     if None in (height, width, length):
         return Extent(height)
+    # An end without a depth is taken as half a sphere.
     length += sum(given[f"end_{end}_depth_m"] or height / 2 for end in "ab")
     tilt = abs(given["tilt_mm_per_m"] or 0.0) / 1000
     return _lying(height, tilt * length, width * length, values, has_points)
 
 
 def _lying(height, reach, area, values, has_points):
-    """reach: how much the ends may lie above or below the place of the dip point, m."""
+    """Extent of a lying tank or a sphere; reach: height of the ends above the dip point, m."""
     if height is None or has_points:
         return Extent(height, area_m2=area)
     zero = values["datum"]["dip_plate_z_m"] or 0.0

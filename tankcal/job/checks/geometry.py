@@ -1,4 +1,4 @@
-"""Points, drawing and courses: in the same unit and frame, and enough points everywhere?"""
+"""Checks of points, drawing and courses: common unit and frame, sufficient points."""
 
 import numpy as np
 
@@ -7,16 +7,18 @@ from tankcal.job.checks.extent import has_radii
 from tankcal.messages import message
 from tankcal.survey.reference_line import courses_told
 
-MIN_POINTS_PER_COURSE = 5
-FEW_POINTS_PER_COURSE = 10
+MIN_POINTS_PER_COURSE = 5  # fewer points are a problem
+FEW_POINTS_PER_COURSE = 10  # fewer points cause a warning
+# Smallest number of points on the wall of a lying tank.
 MIN_POINTS_OF_SCAN = {"horizontal": 20, "sphere": 12}
-DOUBTFUL_EXTENT = 1.5  # points wider than the tank by more: feet, or many points off the tank
-LARGEST_SPHERE_M = 100
+DOUBTFUL_EXTENT = 1.5  # width of the points over that of the tank: feet, or clutter
+LARGEST_SPHERE_M = 100  # largest diameter of a sphere without a nominal diameter
 
 
 def check_cylinder(points, tables, values, raw, log):
-    """Points, drawing and courses of a vertical tank, and enough points in each course that
-    neither straps nor lines tell.
+    """Check points, drawing and courses of a vertical tank.
+
+    Each course needs enough points, unless circumferences or reference lines determine its radius.
     """
     courses = tables["courses"]
     xyz = places_of(points)
@@ -25,22 +27,23 @@ def check_cylinder(points, tables, values, raw, log):
     if not len(xyz):
         return
     diameter, height = tank["nominal_diameter_m"], tank["nominal_height_m"]
+    # Percentiles exclude clutter from the size of the points.
     low, high = np.percentile(xyz, [5, 95], axis=0)
     width, rise = float(np.max(high[:2] - low[:2])), float(high[2] - low[2])
-    same_unit = True
+    is_same_unit = True
     if diameter is not None and len(xyz) >= MIN_POINTS_PER_COURSE:
-        same_unit = check_extent(points, "x_m", width, "tank.nominal_diameter_m", diameter, log)
+        is_same_unit = check_extent(points, "x_m", width, "tank.nominal_diameter_m", diameter, log)
     if height is not None and rise > UNIT_FACTOR * height:
-        same_unit = check_extent(points, "z_m", rise, "tank.nominal_height_m", height, log)
+        is_same_unit = check_extent(points, "z_m", rise, "tank.nominal_height_m", height, log)
     heights = course_heights(courses)
-    if not same_unit or bottom is None or heights is None:
+    if not is_same_unit or bottom is None or heights is None:
         return
     edges = bottom + np.concatenate([[0.0], np.cumsum(heights)])
     _check_points_in_courses(xyz[:, 2], unplaced, edges, tables, raw, log)
 
 
 def check_scan(points, values, kind, raw, log):
-    """Points of a horizontal cylinder or a sphere: enough, in metres, in the datum's frame?"""
+    """Check the points of a lying tank or a sphere: number, unit and frame of the datum."""
     xyz = places_of(points)
     unplaced = points.skipped + len(points.rows) - len(xyz)
     if len(xyz) + unplaced < MIN_POINTS_OF_SCAN.get(kind, 0):
@@ -86,9 +89,28 @@ def check_scan(points, values, kind, raw, log):
 
 
 def check_extent(points, column, extent, key, nominal, log):
-    """Is the points' extent of the size of the drawing's? Returns False after telling a problem."""
+    """Compare the size of the points with the drawing.
+
+    Parameters
+    ----------
+    points : ColumnValues
+        Table of points.
+    column : str
+        Column of the message.
+    extent, nominal : float
+        Size of the points and nominal dimension, m.
+    key : str
+        Key of the nominal dimension.
+    log : Log
+        Receives problem or warning.
+
+    Returns
+    -------
+    bool
+        False after a problem.
+    """
     ratio = extent / nominal
-    found = message(
+    comparison = message(
         "extent_beside_nominal",
         "the points are {extent:.4g} m apart (most of them), {key} is {nominal:g} m",
         extent=extent,
@@ -119,14 +141,17 @@ def check_extent(points, column, extent, key, nominal, log):
             "large_beside_small", "{large} too large or {small} too small", large=large, small=small
         )
     expected = message(
-        "other_size", "{found}; expected the same size in metres: {guess}", found=found, guess=guess
+        "other_size",
+        "{found}; expected the same size in metres: {guess}",
+        found=comparison,
+        guess=guess,
     )
     log.problem(points.file, expected, None, column)
     return False
 
 
 def _check_points_in_courses(z, unplaced, edges, tables, raw, log):
-    """Enough points in each course, even if all points that could not be read lie there?"""
+    """Require enough points in each course, counting unreadable points in every course."""
     courses = tables["courses"]
     if not np.any((z >= edges[0]) & (z <= edges[-1])):
         expected = message(
@@ -142,11 +167,13 @@ def _check_points_in_courses(z, unplaced, edges, tables, raw, log):
         return
     counts, _ = np.histogram(z, bins=edges)
     names = np.array(courses.of("course"))
-    seen = set(names[counts + unplaced >= MIN_POINTS_PER_COURSE].tolist())
-    told = courses_told(seen, _courses_of(tables["circumferences"]), _courses_of(tables["offsets"]))
-    known = has_radii(tables)  # of those that were not measured again
+    with_points = set(names[counts + unplaced >= MIN_POINTS_PER_COURSE].tolist())
+    determined = courses_told(
+        with_points, _courses_of(tables["circumferences"]), _courses_of(tables["offsets"])
+    )
+    known = has_radii(tables)  # radii of courses that were not measured again
     for row, name, count in zip(courses.rows, courses.of("course"), counts, strict=True):
-        if (name in told - seen or known) and not count:
+        if (name in determined - with_points or known) and not count:
             continue
         if count + unplaced < MIN_POINTS_PER_COURSE:
             expected = message(
@@ -169,7 +196,7 @@ def _check_points_in_courses(z, unplaced, edges, tables, raw, log):
 
 
 def _courses_of(table):
-    """Names of the courses in the rows of a table that count."""
+    """Names of the courses in the rows of a table that are not checks."""
     if table is None:
         return set()
     pairs = zip(table.of("course"), table.of("use"), strict=True)

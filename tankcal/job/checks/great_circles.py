@@ -1,4 +1,4 @@
-"""Does a strapping of a sphere make sense as a whole: circles, tapes, obstructions, settings?"""
+"""Checks of a strapped sphere as a whole: circles, tapes, obstructions, settings."""
 
 from dataclasses import replace
 
@@ -16,11 +16,11 @@ from tankcal.job.checks.strapping import (
 )
 from tankcal.messages import message
 
-MOST_APART = 0.05  # great circles of one sphere, of their size
+MOST_APART = 0.05  # largest relative difference of great circles of one sphere
 
 
 def check_great_circles(values, tables, registers, raw, log):
-    """Great circles with a tape, each in one place; obstructions and tape checks that fit."""
+    """Check circles, obstructions and tape comparisons; parameters as for `check_all`."""
     table = tables["great_circles"]
     if not has_great_circles(tables):
         tell_without_effect(tables, log)
@@ -57,13 +57,13 @@ def check_great_circles(values, tables, registers, raw, log):
 
 
 def _as_straps(table):
-    """The readings with the names that circumferences have; a great circle is pulled in one."""
-    named = {"circumference": table.columns["circle"], "pulls": None}
-    return replace(table, columns=table.columns | named)
+    """Readings with the column names of circumferences; a great circle is taped in one pull."""
+    columns = {"circumference": table.columns["circle"], "pulls": None}
+    return replace(table, columns=table.columns | columns)
 
 
 def _check_circles(table, log):
-    """The equator has no azimuth, a meridian has one, and repeats are of one circle."""
+    """Require an azimuth for meridians only, and repeats of the same circle."""
     places = {}
     columns = map(table.of, ("circle", "kind", "azimuth_deg"))
     for row, name, kind, azimuth in zip(table.rows, *columns, strict=True):
@@ -95,7 +95,7 @@ def _check_circles(table, log):
 
 
 def _refuse_settings(values, raw, log):
-    """Settings of strapped spheres beside a sphere that was not strapped."""
+    """Refuse settings of strapped spheres if the sphere was not strapped."""
     for key in ("ovality_mm", "form_mm"):
         if values["sphere"][key] is not None:
             expected = message(

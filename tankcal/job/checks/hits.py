@@ -1,4 +1,4 @@
-"""Do bare wall hits make sense as a whole? Set-ups, instruments, angles, and what else is given."""
+"""Checks of bare wall hits as a whole: set-ups, instruments, angles, other measurements."""
 
 import numpy as np
 
@@ -11,14 +11,14 @@ from tankcal.job.checks.survey.readings import check_angle, warn_copies
 from tankcal.job.contract.registers import FREE
 from tankcal.messages import message
 
-RANGE_NOTHING = ("plummet", "stadia", "level")  # kinds of instruments
-MOST_HITS = 2500  # whose full covariance is kept
-FEWEST_HITS = 5  # of a section of the wall
-RANGES = ("slope_distances", "distances")  # tables by which a network tells an offset
+RANGE_NOTHING = ("plummet", "stadia", "level")  # kinds of instruments without a distance
+MOST_HITS = 2500  # largest number of hits with a full covariance matrix
+FEWEST_HITS = 5  # smallest number of hits of a section of the wall
+RANGES = ("slope_distances", "distances")  # tables by which a network determines an offset
 
 
 def too_many_hits(count):
-    """What is said of more hits than can be used."""
+    """Message about more hits than can be used."""
     return message(
         "too_many_hits",
         "{count} hits; expected at most {most}, for the covariance of each with each is kept, four"
@@ -29,7 +29,7 @@ def too_many_hits(count):
 
 
 def check_hits(values, tables, registers, raw, log):
-    """Hits from set-ups that are there, by instruments that say how well they range."""
+    """Check hits, their set-ups and the accuracy of the instruments; as for `check_all`."""
     hits, control = tables["wall_hits"], tables["control_readings"]
     if not has_hits(tables):
         if has_rows(control):
@@ -62,8 +62,8 @@ def check_hits(values, tables, registers, raw, log):
             " directions and distances to them (directions.csv, slope_distances.csv)",
         )
         log.problem(tables["targets"].file, expected)
-    told = frozenset((problem.file, problem.row) for problem in log.problems)
-    files = SurveyFiles(values, tables, registers, raw, log, told)
+    reported = frozenset((problem.file, problem.row) for problem in log.problems)
+    files = SurveyFiles(values, tables, registers, raw, log, reported)
     for table in (hits, control):
         if has_rows(table):
             _check_readings(files, table, is_needed=table is hits)
@@ -88,7 +88,7 @@ def _check_readings(files, table, *, is_needed):
 
 
 def ranging_of(registers):
-    """{name: {key: value}} of the instruments that may range: no tape, plummet, stadia or level."""
+    """{name: {key: value}} of the instruments that measure distances, except tapes."""
     instruments, tapes = registers["instruments"], tapes_of(registers)
     return {
         name: given
@@ -98,10 +98,10 @@ def ranging_of(registers):
 
 
 def instruments_used(setups, ranging):
-    """{set-up: name of its instrument}: the only one where it is blank; None: there are more."""
-    usual = next(iter(ranging)) if len(ranging) == 1 else None
+    """{set-up: name of its instrument}; a blank means the only instrument, None if several."""
+    only = next(iter(ranging)) if len(ranging) == 1 else None
     pairs = zip(setups.of("setup"), setups.of("instrument"), strict=True)
-    return {setup: name or usual for setup, name in pairs}
+    return {setup: name or only for setup, name in pairs}
 
 
 def _check_instruments(files, hits):
@@ -113,11 +113,11 @@ def _check_instruments(files, hits):
         tell_missing(log, raw.file_of("instruments"), setups.file, "instrument")
         return
     used = instruments_used(setups, ranging)
-    file, told = raw.file_of("instruments"), set()
+    file, reported = raw.file_of("instruments"), set()
     rows = dict(zip(setups.of("setup"), setups.rows, strict=True))
     for name in dict.fromkeys(hits.of("setup")):
-        if name in used and used[name] not in ranging and name not in told:
-            told.add(name)
+        if name in used and used[name] not in ranging and name not in reported:
+            reported.add(name)
             expected = message(
                 "setup_of_no_instrument",
                 "found {name!r}; expected the instrument of {file} that took the hits: a total"
@@ -130,15 +130,15 @@ def _check_instruments(files, hits):
     for place, name in enumerate(hits.of("setup")):
         if used.get(name) in ranging:
             places.setdefault(used[name], []).append(place)
-    for name, mine in places.items():
-        _check_instrument(files, hits, name, ranging[name], np.array(mine))
-        if not has_survey(tables):  # else all instruments are asked
+    for name, hits_of_instrument in places.items():
+        _check_instrument(files, hits, name, ranging[name], np.array(hits_of_instrument))
+        if not has_survey(tables):  # otherwise the check of the survey includes all instruments
             check_correction(files, name, ranging[name])
 
 
-def _check_instrument(files, hits, name, given, mine):
+def _check_instrument(files, hits, name, given, places):
     for key in ("s_mm", "s_arcsec"):
-        blank = np.isnan(hits.numbers(key)[mine])
+        blank = np.isnan(hits.numbers(key)[places])
         if given[key] is None and blank.any():
             expected = message(
                 "sd_of_hits_missing",
@@ -153,14 +153,16 @@ def _check_instrument(files, hits, name, given, mine):
         files.tell_key(files.log.problem, "instruments", name, "u_scale_ppm", expected)
     offset = given["u_offset_mm"]
     is_known = offset is not None and (offset != FREE or _told_by_network(files, name))
-    told = tells_by_tape(files.tables) or len(set(hits.of("setup"))) > 1  # from both sides, perhaps
-    told = told or files.is_unreadable("circumferences")
-    if not is_known and not told:
+    is_determined = (
+        tells_by_tape(files.tables) or len(set(hits.of("setup"))) > 1
+    )  # perhaps from both sides
+    is_determined = is_determined or files.is_unreadable("circumferences")
+    if not is_known and not is_determined:
         files.tell_key(files.log.problem, "instruments", name, "u_offset_mm", offset_unknown())
 
 
 def offset_unknown():
-    """What is said of an offset that nobody gave, and that nothing tells."""
+    """Message about an offset that is neither given nor determined by the job."""
     return message(
         "offset_of_hits_unknown",
         "not given; expected the standard uncertainty of the offset without reflector, a"
@@ -170,9 +172,9 @@ def offset_unknown():
 
 
 def _told_by_network(files, name):
-    """Does a network range with the instrument, so that its free scale or offset is an unknown?"""
+    """Return True if distances of a network determine scale and offset of the instrument."""
     setups, distances = files.tables["setups"], files.tables["distances"]
     slopes = files.tables["slope_distances"]
     used = instruments_used(setups, ranging_of(files.registers))
-    by_setup = has_rows(slopes) and any(used.get(one) == name for one in slopes.of("setup"))
+    by_setup = has_rows(slopes) and any(used.get(setup) == name for setup in slopes.of("setup"))
     return by_setup or (has_rows(distances) and name in distances.of("instrument"))

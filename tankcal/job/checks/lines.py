@@ -1,4 +1,4 @@
-"""Do reference lines make sense as a whole? Lines, their offsets, plummets, and the strap below."""
+"""Checks of reference lines as a whole: lines, offsets, plummets, and the strap."""
 
 import numpy as np
 
@@ -17,18 +17,18 @@ from tankcal.job.tables import nearest
 from tankcal.messages import message
 from tankcal.survey.reference_line import FEWEST_LINES, SAME_LEVEL_M
 
-NAMELESS = ""  # plummet that no list describes
-MOST_OFFSETS = 2000  # readings of one tank
-CLOSE_DEG = 0.01  # lines that are nearer are one
+NAMELESS = ""  # name of a plummet that is not described
+MOST_OFFSETS = 2000  # largest number of readings of one tank
+CLOSE_DEG = 0.01  # smallest difference of azimuth of two lines
 
 
 def has_lines(tables):
-    """Were offsets from reference lines read?"""
+    """Return True if offsets from reference lines were read."""
     return has_rows(tables["lines"]) or has_rows(tables["offsets"])
 
 
 def too_many_offsets(count):
-    """What is said of more offsets than can be used."""
+    """Message about more offsets than can be used."""
     return message(
         "too_many_offsets",
         "{count} offsets; expected at most {most}",
@@ -38,7 +38,7 @@ def too_many_offsets(count):
 
 
 def check_lines(values, tables, registers, raw, log):
-    """Lines with offsets, on a tank that is strapped, by plummets whose collimation is known."""
+    """Check lines, offsets, plummets and circumferences; parameters as for `check_all`."""
     if not has_lines(tables):
         return
     lines, offsets, straps = (tables[name] for name in ("lines", "offsets", "circumferences"))
@@ -48,7 +48,7 @@ def check_lines(values, tables, registers, raw, log):
             "lines_incomplete",
             "no rows; expected them: reference lines need lines.csv and offsets.csv",
         )
-        if raw.tables.get(missing, ()) is not None:  # else it is told already
+        if raw.tables.get(missing, ()) is not None:  # else reported already
             log.problem(raw.file_of(missing), expected)
         return
     if not is_strapped(tables) and not has_wall_points(tables):
@@ -58,7 +58,7 @@ def check_lines(values, tables, registers, raw, log):
             " offsets give differences of radii only",
             file=raw.file_of("circumferences"),
         )
-        if raw.tables.get("circumferences", ()) is not None:  # else it is told already
+        if raw.tables.get("circumferences", ()) is not None:  # else reported already
             log.problem(offsets.file, expected)
         return
     if len(offsets.rows) > MOST_OFFSETS:
@@ -77,49 +77,51 @@ def check_lines(values, tables, registers, raw, log):
             log.problem(offsets.file, expected, row, "face")
     if values is not None:
         check_levels(offsets, courses, values, log)
-    sound = not (offsets.skipped or lines.skipped)
+    is_complete = not (offsets.skipped or lines.skipped)
     needed = (offsets.of(name) for name in ("line", "course", "level_m"))
-    if sound and not any(None in column for column in needed):
+    if is_complete and not any(None in column for column in needed):
         _check_coverage(lines, offsets, log)
         if not has_wall_points(tables):
             _check_strapped(offsets, straps, log)
 
 
 def plummets_of(registers):
-    """{name: {key: value}} of the instruments that may make upright lines: no tape, no stadia.
+    """{name: {key: value}} of the instruments that may define vertical lines.
 
-    Without any there is one that nobody describes, of a blank name.
+    Tapes and stadia bars are excluded. Without such an instrument, one plummet with a blank name
+    and without data is returned.
     """
     instruments, tapes = registers["instruments"], tapes_of(registers)
-    found = {
+    plummets = {
         name: given
         for name, given in instruments.items()
         if name not in tapes and not is_bar(given["kind"])
     }
-    return found or {NAMELESS: {field.name: None for field in REGISTER_KEYS["instruments"]}}
+    return plummets or {NAMELESS: {field.name: None for field in REGISTER_KEYS["instruments"]}}
 
 
 def plummets_used(lines, plummets):
-    """(n,) name of the plummet of each line; blank: the only instrument, or that of this kind."""
-    named = [name for name, one in plummets.items() if (one["kind"] or "").lower() == "plummet"]
-    alone = named if len(plummets) > 1 else [*plummets]
-    usual = alone[0] if len(alone) == 1 else None
-    return [usual if name is None else name for name in lines.of("instrument")]
+    """Name of the plummet of each line, shape (n,); blank: the only candidate."""
+    named = [name for name, keys in plummets.items() if (keys["kind"] or "").lower() == "plummet"]
+    candidates = named if len(plummets) > 1 else [*plummets]
+    only = candidates[0] if len(candidates) == 1 else None
+    return [only if name is None else name for name in lines.of("instrument")]
 
 
 def at_reference(offsets):
-    """(n,) bool: read at the reference level; None where no level is read on every line."""
+    """True for readings at the reference level, shape (n,); None if no level has all lines."""
     marked = [bool(flag) for flag in offsets.of("reference")]
     if any(marked):
         return np.array(marked)
     level = offsets.numbers("level_m")
     line = np.array(offsets.of("line"))
     counts = np.array([use != "check" for use in offsets.of("use")], dtype=bool)
-    every = set(line)
-    for low in np.unique(level[counts]):
-        here = np.abs(level - low) <= SAME_LEVEL_M
-        if set(line[here & counts]) == every:
-            return here
+    all_lines = set(line)
+    # Without marks, the lowest level that was read on every line is the reference level.
+    for height in np.unique(level[counts]):
+        is_at_level = np.abs(level - height) <= SAME_LEVEL_M
+        if set(line[is_at_level & counts]) == all_lines:
+            return is_at_level
     return None
 
 
@@ -133,14 +135,14 @@ def _check_lines(lines, log):
         )
         log.problem(lines.file, expected, lines.rows[int(np.argmin(given))], "azimuth_deg")
     for place in np.flatnonzero(given):
-        before = azimuth[:place]
-        near = np.abs((before - azimuth[place] + 180) % 360 - 180) < CLOSE_DEG
-        if np.any(near):
+        previous = azimuth[:place]
+        is_near = np.abs((previous - azimuth[place] + 180) % 360 - 180) < CLOSE_DEG
+        if np.any(is_near):
             expected = message(
                 "line_at_same_place",
                 "{azimuth:g} degrees, as in row {row}; expected each line at a place of its own",
                 azimuth=azimuth[place],
-                row=lines.rows[int(np.argmax(near))],
+                row=lines.rows[int(np.argmax(is_near))],
             )
             log.problem(lines.file, expected, lines.rows[place], "azimuth_deg")
 
@@ -148,7 +150,7 @@ def _check_lines(lines, log):
 def _check_plummets(lines, offsets, plummets, raw, log):
     file, used = raw.file_of("instruments"), plummets_used(lines, plummets)
     register = raw.registers.get("instruments", ())
-    if register is None:  # unreadable, which is told
+    if register is None:  # unreadable, reported already
         return
     if not (register and register.entries) and any(lines.of("instrument")):
         tell_missing(log, file, lines.file, "instrument")
@@ -182,7 +184,7 @@ def _check_plummets(lines, offsets, plummets, raw, log):
 
 
 def _turned(lines, offsets, used):
-    """Plummets with a place, not all at one level, that was read on both faces."""
+    """Plummets with positions, not all at one level, that were read on both faces."""
     of_line = dict(zip(lines.of("line"), used, strict=True))
     columns = (offsets.of(name) for name in ("line", "level_m", "face", "use"))
     faces, heights = {}, {}
@@ -191,13 +193,13 @@ def _turned(lines, offsets, used):
             place = line, round(level / SAME_LEVEL_M)
             faces.setdefault(place, set()).add(int(face or 1))
             heights.setdefault(of_line.get(line), []).append(level)
-    both = {}
-    for (line, level), seen in faces.items():
-        if len(seen) == 2:
-            both.setdefault(of_line.get(line), set()).add(level)
+    levels_of_plummet = {}
+    for (line, level), faces_read in faces.items():
+        if len(faces_read) == 2:
+            levels_of_plummet.setdefault(of_line.get(line), set()).add(level)
     return {
         name
-        for name, levels in both.items()
+        for name, levels in levels_of_plummet.items()
         if len(levels) > 1 or np.ptp(heights[name]) > SAME_LEVEL_M
     }
 
@@ -226,22 +228,24 @@ def _check_coverage(lines, offsets, log):
         )
         log.problem(offsets.file, expected, rows[place], "reference")
         return
-    seen = set(line[reference & counts])
+    lines_at_reference = set(line[reference & counts])
     for row, name in zip(lines.rows, lines.of("line"), strict=True):
-        if name is not None and name not in seen:
+        if name is not None and name not in lines_at_reference:
             expected = message(
                 "line_without_reference",
                 "line {line!r} has no reading at the reference level; expected one",
                 line=name,
             )
             log.problem(lines.file, expected, row, "line")
-    told = set()
+    reported = set()
     for place in np.flatnonzero(counts):
-        here = counts & (course == course[place]) & (np.abs(level - level[place]) <= SAME_LEVEL_M)
-        first = int(np.argmax(here))
-        count = len(set(line[here]))
-        if count < FEWEST_LINES and first not in told:
-            told.add(first)
+        is_at_level = (
+            counts & (course == course[place]) & (np.abs(level - level[place]) <= SAME_LEVEL_M)
+        )
+        first = int(np.argmax(is_at_level))
+        count = len(set(line[is_at_level]))
+        if count < FEWEST_LINES and first not in reported:
+            reported.add(first)
             expected = message(
                 "level_of_few_lines",
                 "lines that read {level:g} m of course {course!r}: {count}; expected {fewest} at"
@@ -255,9 +259,9 @@ def _check_coverage(lines, offsets, log):
 
 
 def _check_strapped(offsets, straps, log):
-    """Without points of the wall a strap tells the radius that the lines carry on."""
+    """Require a circumference that determines the radii, if the wall has no points."""
     counts = [use != "check" for use in offsets.of("use")]
-    read = {one for one, used in zip(offsets.of("course"), counts, strict=True) if used}
+    read = {course for course, is_used in zip(offsets.of("course"), counts, strict=True) if is_used}
     reference = at_reference(offsets)
     if reference is None:
         return

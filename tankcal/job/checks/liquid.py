@@ -1,4 +1,4 @@
-"""Does a calibration by liquid make sense as a whole? Meters, settings, what stands beside it."""
+"""Checks of a calibration with liquid as a whole: meters, settings, other measurements."""
 
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, settings_place, tell
 from tankcal.job.checks.extent import (
@@ -15,11 +15,11 @@ from tankcal.job.entries import kind_of
 from tankcal.job.tables import nearest
 from tankcal.messages import message
 
-MOST_ROWS = 3000
+MOST_ROWS = 3000  # largest number of rows of liquid.csv
 
 
 def check_liquid(values, tables, registers, raw, log):
-    """Meters that are described, settings that are complete, rows that follow one another."""
+    """Check meters, settings and the order of rows; parameters as for `check_all`."""
     if not is_metered(tables):
         _tell_without_rows(tables, registers, raw, log)
         return
@@ -44,13 +44,13 @@ def check_liquid(values, tables, registers, raw, log):
 
 
 def meters_read(table, meters):
-    """Name of the meter of each row, None where it is not known.
+    """Name of the meter of each row; None where it is not known.
 
-    A blank is the only meter there is; at the start of a run, where nothing was metered, that of
-    the row after it.
+    A blank means the only meter. At the start of a run, where nothing was metered, the meter of the
+    next row applies.
     """
-    usual = next(iter(meters)) if len(meters) == 1 else None
-    names = [name or usual for name in table.of("meter")]
+    only = next(iter(meters)) if len(meters) == 1 else None
+    names = [name or only for name in table.of("meter")]
     for rows in place_runs(table).values():
         if len(rows) > 1 and names[rows[0]] is None:
             names[rows[0]] = names[rows[1]]
@@ -58,12 +58,12 @@ def meters_read(table, meters):
 
 
 def _tell_without_rows(tables, registers, raw, log):
-    """What is said of meters, settings and an empty table without a single row of readings."""
+    """Report meters, settings or an empty table without any readings."""
     if "liquid" in raw.tables:
         table = raw.tables["liquid"]
-        elsewhere = has_wall_points(tables) or is_strapped(tables)
-        is_for_it = registers["meters"] or _given_settings(raw)
-        if table is not None and (elsewhere or kind_of(raw) != "vertical") and is_for_it:
+        has_wall = has_wall_points(tables) or is_strapped(tables)
+        is_begun = registers["meters"] or _given_settings(raw)
+        if table is not None and (has_wall or kind_of(raw) != "vertical") and is_begun:
             expected = message(
                 "meters_without_rows",
                 "no rows, but a meter or [liquid] is filled in; expected the batches and dips",
@@ -90,7 +90,7 @@ def _given_settings(raw):
 def _check_meters(table, meters, raw, log):
     file = raw.file_of("meters")
     if raw.registers.get("meters", ()) is None:
-        return  # unreadable: it is told already
+        return  # unreadable, reported already
     if not meters:
         expected = message(
             "no_meter",
@@ -99,8 +99,8 @@ def _check_meters(table, meters, raw, log):
         )
         log.problem(file, expected)
         return
-    read = meters_read(table, meters)
-    for row, given, name in zip(table.rows, table.of("meter"), read, strict=True):
+    used_meters = meters_read(table, meters)
+    for row, given, name in zip(table.rows, table.of("meter"), used_meters, strict=True):
         if name is None and not log.has(table.file, row, "meter"):
             expected = message("meter_not_named", "blank; expected a meter of {file}", file=file)
             log.problem(table.file, expected, row, "meter")
@@ -114,8 +114,8 @@ def _check_meters(table, meters, raw, log):
             )
             log.problem(table.file, expected, row, "meter")
     register = raw.registers["meters"]
-    for name, one in meters.items():
-        low, high = one["flow_min_m3_h"], one["flow_max_m3_h"]
+    for name, keys in meters.items():
+        low, high = keys["flow_min_m3_h"], keys["flow_max_m3_h"]
         if None not in (low, high) and low >= high:
             expected = message(
                 "flows_upside_down",
@@ -124,20 +124,20 @@ def _check_meters(table, meters, raw, log):
                 high=high,
             )
             _tell_of_meter(log.problem, register, name, "flow_min_m3_h", expected)
-        if name not in read:
+        if name not in used_meters:
             expected = message("meter_not_read", "without effect: no row of {of} names it",
                                of=table.file)  # fmt: skip
             log.warning(file, expected, register.rows.get(name), name)
 
 
-def _tell_of_meter(to, register, name, key, expected):
+def _tell_of_meter(report, register, name, key, expected):
     value = register.entries[name].get(key)
     row = register.rows.get(name) if value is None or value.row is None else value.row
-    to(register.file, expected, row, f"{name}.{key}")
+    report(register.file, expected, row, f"{name}.{key}")
 
 
 def _check_settings(values, tables, raw, log):
-    """What liquid needs is given, and the rest has an effect."""
+    """Require the settings of a calibration with liquid; refuse settings without effect."""
     table, given = tables["liquid"], values["liquid"]
     for key in NEEDED:
         if is_not_given(raw, "liquid", key):
@@ -182,7 +182,7 @@ def _has_unreadable_survey(raw):
 
 
 def _check_beside(values, tables, kind, raw, log):
-    """Of a bottom measured by liquid there is one form; a roof does not lie in the liquid."""
+    """Refuse a second determination of the bottom, and a roof that touches the liquid."""
     lowest, table = values["roof"]["critical_bottom_m"], tables["liquid"]
     if kind == "vertical" and lowest is not None:
         _refuse_roof(table, lowest, log)

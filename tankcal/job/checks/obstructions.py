@@ -1,16 +1,24 @@
-"""What was in the way of a tape: its lengths are there, and what such a thing has."""
+"""Checks of the obstructions of a tape: required lengths, plausible dimensions."""
 
 from tankcal.job.contract.strapping import NEEDED
 from tankcal.messages import message
 
-THICK_WELD_MM = 5.0
-ONE_A_PLATE, LEAST_PLATE_M = ("butt_strap", "weld", "lap"), 1.2  # at upright seams of plates
+THICK_WELD_MM = 5.0  # highest weld reinforcement
+# Obstructions at the vertical seams of plates, and the shortest plate.
+ONE_A_PLATE, LEAST_PLATE_M = ("butt_strap", "weld", "lap"), 1.2
 
 
 def check_obstructions(table, straps, log):
-    """The lengths that obstructions of each kind need, and whether they can be meant.
+    """Check the obstructions of a tape.
 
-    straps  readings of the circumferences that they are on
+    Parameters
+    ----------
+    table : ColumnValues
+        obstructions.
+    straps : ColumnValues
+        Readings of the circumferences.
+    log : Log
+        Receives problems and warnings.
     """
     for place, (row, kind) in enumerate(zip(table.rows, table.of("kind"), strict=True)):
         for column in NEEDED.get(kind, ()):
@@ -38,35 +46,32 @@ def check_obstructions(table, straps, log):
 
 
 def _check_sizes(table, place, log):
-    """Warn of a strip that stands higher than it is wide, and of a weld that no welder leaves."""
+    """Warn about a strip that is thicker than wide, and about an implausibly high weld."""
     kind, row = table.of("kind")[place], table.rows[place]
-    high, wide = table.of("thickness_mm")[place], table.of("width_mm")[place]
-    if kind not in ("weld", "butt_strap") or None in (high, wide):
+    thickness, width = table.of("thickness_mm")[place], table.of("width_mm")[place]
+    if kind not in ("weld", "butt_strap") or None in (thickness, width):
         return
-    if high > wide:
+    if thickness > width:
         expected = message(
             "strip_upright",
             "{high:g} mm thick and {wide:g} mm wide: are the two columns exchanged?",
-            high=high,
-            wide=wide,
+            high=thickness,
+            wide=width,
         )
         log.warning(table.file, expected, row, "thickness_mm")
-    elif kind == "weld" and high > THICK_WELD_MM:
+    elif kind == "weld" and thickness > THICK_WELD_MM:
         expected = message(
             "weld_thick",
             "found {high:g} mm; the cap of a weld stands off by {most:g} mm at most: is it that of"
             " the plate?",
-            high=high,
+            high=thickness,
             most=THICK_WELD_MM,
         )
         log.warning(table.file, expected, row, "thickness_mm")
 
 
 def _check_counts(table, reading_m, log):
-    """Warn of seams that follow each other as no plates are cut.
-
-    reading_m  {circumference: length of it}
-    """
+    """Warn about seams too close for plates; reading_m: {circumference: its length}."""
     columns = (table.of(name) for name in ("circumference", "kind", "count"))
     for row, name, kind, count in zip(table.rows, *columns, strict=True):
         length = reading_m.get(name)

@@ -1,4 +1,4 @@
-"""Do declared radii make sense as a whole? Courses, sizes, and what a new survey needs beside."""
+"""Checks of declared radii as a whole: courses, dimensions, requirements of a new survey."""
 
 from tankcal.job.checking import is_not_given, missing_beside, refuse_repeated, tell
 from tankcal.job.checks.extent import has_radii, is_metered, is_surveyed
@@ -7,11 +7,11 @@ from tankcal.job.contract.radii import KEYS, NEEDED, NEEDED_OF_CHANGE
 from tankcal.job.plausibility import DIAMETER_MISS, DIAMETER_MISS_M, IMPOSSIBLE_MISS
 from tankcal.messages import message
 
-DIAMETER = (1.8, 2.2)  # of the nominal radius: what was given is a diameter
+DIAMETER = (1.8, 2.2)  # ratio to the nominal radius that indicates a diameter
 
 
 def check_radii(values, tables, raw, log):
-    """Each course once, radii of the drawing's size, and the settings that are needed."""
+    """Check courses, radii and required settings; parameters as for `check_all`."""
     if not has_radii(tables):
         _tell_without_rows(raw, log)
         return
@@ -35,7 +35,7 @@ def check_radii(values, tables, raw, log):
 
 def _tell_without_rows(raw, log):
     if raw.tables.get("radii", ()) is None:
-        return  # unreadable: it is told already
+        return  # unreadable, reported already
     for section in KEYS:
         for key in _given(raw, section)[:1]:
             expected = message(
@@ -56,7 +56,7 @@ def _has_unreadable_survey(raw):
 
 
 def _refuse_gaps(table, courses, log):
-    """Where nothing was measured again every course needs its radius."""
+    """Require the radius of every course if no survey measures the wall."""
     blank = message(
         "radius_missing", "blank; expected the radius of the course: no survey measures it"
     )
@@ -76,7 +76,7 @@ def _refuse_gaps(table, courses, log):
 
 
 def _check_sizes(table, diameter_m, log):
-    """Radii against half of the drawing's diameter."""
+    """Compare the radii with half the nominal diameter."""
     if diameter_m is None:
         return
     nominal = diameter_m / 2

@@ -1,4 +1,4 @@
-"""Do the rings of a lying cylinder and the tape round them make sense together?"""
+"""Checks of the rings of a lying cylinder together with their circumferences."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from tankcal.messages import message
 
 
 def check_rings(values, tables, registers, raw, log):
-    """Rings with circumferences and the other way round, nothing beside them, readings that fit."""
+    """Check rings, circumferences and other measurements; parameters as for `check_all`."""
     rings, straps = tables["rings"], tables["circumferences"]
     if not is_strapped(tables) and not has_rows(rings):
         tell_without_effect(tables, log)
@@ -32,8 +32,8 @@ def check_rings(values, tables, registers, raw, log):
     if len(straps.rows) > MOST_STRAPS:
         log.problem(straps.file, too_many_straps(len(straps.rows)))
         return
-    read = tables["thickness"].of("ring") if has_rows(tables["thickness"]) else ()
-    check_rings_alone(rings, set(read), values, log)
+    gauged_rings = tables["thickness"].of("ring") if has_rows(tables["thickness"]) else ()
+    check_rings_alone(rings, set(gauged_rings), values, log)
     known = tuple(rings.of("ring"))
     refuse_others(straps, "ring", known, log)
     if has_rows(tables["thickness"]):
@@ -48,11 +48,11 @@ def check_rings(values, tables, registers, raw, log):
 
 
 def _are_both_there(tables, raw, log):
-    """Whether rings and circumferences are there; what is missing is told, once."""
+    """Return True if rings and circumferences exist; a missing table is reported once."""
     for name, other in (("rings", "circumferences"), ("circumferences", "rings")):
         if has_rows(tables[name]):
             continue
-        if raw.tables.get(name, ()) is None:  # it cannot be read: that is told already
+        if raw.tables.get(name, ()) is None:  # unreadable, reported already
             return False
         expected = message(
             "rings_without_tape",
@@ -97,7 +97,7 @@ def _tell_rings_not_strapped(rings, straps, log):
 
 
 def _check_places(rings, straps, log):
-    """A problem for each place of the tape that is not on the ring that its row names."""
+    """Report each position of the tape that is not on the ring named in its row."""
     lengths, names = rings.of("length_m"), rings.of("ring")
     if None in lengths or rings.skipped:
         return

@@ -1,4 +1,4 @@
-"""Do the rows of liquid.csv follow one another? Starts, signs, dips, temperatures, units."""
+"""Checks of the sequence of rows in liquid.csv: starts, signs, dips, temperatures, units."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,12 +11,12 @@ from tankcal.job.checks.survey.files import tell_rows
 from tankcal.job.contract.liquid import TEMPERATURES
 from tankcal.messages import message
 
-ABOVE_TOP_M, ABOVE_TOP = 0.05, 0.03  # sizes of a drawing are not the tank's
-BELOW_BOTTOM_M = 0.3
+ABOVE_TOP_M, ABOVE_TOP = 0.05, 0.03  # a dip above the nominal top: length, share of the height
+BELOW_BOTTOM_M = 0.3  # a dip below the nominal bottom
 CHECK, REST = "check", "rest"
-TELLING = 20.0  # a step whose level changes by so many sds of a dip may be told by sizes
-UNLIKE = (0.7, 1.4)  # volume of a batch over that by sizes
-GUESSES = (  # (least and most ratio, code of the unit)
+TELLING = 20.0  # smallest change of level, in sds of a dip, for a comparison with sizes
+UNLIKE = (0.7, 1.4)  # plausible volume of a batch over that from nominal sizes
+GUESSES = (  # (smallest and largest ratio of volumes, hint at the unit)
     (700.0, 1400.0, message("in_litres", ": is it in litres?")),
     (190.0, 360.0, message("in_gallons", ": is it in US gallons?")),
     (5.0, 8.0, message("in_barrels", ": is it in barrels?")),
@@ -26,7 +26,17 @@ GUESSES = (  # (least and most ratio, code of the unit)
 
 @dataclass(frozen=True)
 class Step:
-    """What went in between two dips that are used: place of the second row, and both dips."""
+    """Liquid filled between two dips that are used.
+
+    Attributes
+    ----------
+    place : int
+        Index of the row of the second dip.
+    volume_m3 : float
+        Metered volume.
+    before_m, after_m : float
+        Dips.
+    """
 
     place: int
     volume_m3: float
@@ -35,7 +45,7 @@ class Step:
 
 
 def place_runs(table):
-    """{run: places of its rows} of liquid.csv, in the order of its rows."""
+    """{run: indices of its rows} of liquid.csv, in the order of the rows."""
     places = {}
     for place, run in enumerate(table.of("run")):
         if run is not None:
@@ -44,26 +54,38 @@ def place_runs(table):
 
 
 def steps_of(table):
-    """Steps of all runs, those without both dips left out; volumes to dips not used are added."""
+    """Steps of all runs, without steps that lack a dip.
+
+    The volume of a row whose dip is not used is added to the next step.
+    """
     volumes, dips, uses = (table.of(name) for name in ("volume_m3", "dip_m", "use"))
-    found = []
+    steps = []
     for places in place_runs(table).values():
-        before, volume = None, 0.0
+        previous, volume = None, 0.0
         for k, place in enumerate(places):
             if k and volume is not None:
                 volume = None if volumes[place] is None else volume + volumes[place]
             if uses[place] == CHECK:
                 continue
-            if None not in (before, dips[place], volume):
-                found.append(Step(place, volume, before, dips[place]))
-            before, volume = dips[place], 0.0
-    return found
+            if None not in (previous, dips[place], volume):
+                steps.append(Step(place, volume, previous, dips[place]))
+            previous, volume = dips[place], 0.0
+    return steps
 
 
 def check_runs(table, values, extent, raw, log):
-    """Problems of rows one by one, of each run, and of the dips against the tank's sizes.
+    """Check single rows, runs, and dips against the size of the tank.
 
-    values, extent  None: the settings cannot be read
+    Parameters
+    ----------
+    table : ColumnValues
+        liquid.
+    values, extent : dict, Extent
+        Settings and size of the tank; None: the settings are unreadable.
+    raw : RawJob
+        Job as read.
+    log : Log
+        Receives problems and warnings.
     """
     runs = place_runs(table)
     if not table.skipped:
@@ -80,20 +102,20 @@ def check_runs(table, values, extent, raw, log):
 
 
 def _check_order(table, log):
-    """Problems of runs that are taken up again; the names of these."""
-    last, seen, broken = None, {}, []
+    """Report runs whose rows are not consecutive; returns the names of these runs."""
+    last, last_rows, broken = None, {}, []
     for row, run in zip(table.rows, table.of("run"), strict=True):
-        if run is not None and run != last and run in seen:
+        if run is not None and run != last and run in last_rows:
             expected = message(
                 "run_apart",
                 "run {run!r} ended in row {last}; expected its rows one after the other, or another"
                 " name",
                 run=run,
-                last=seen[run],
+                last=last_rows[run],
             )
             log.problem(table.file, expected, row, "run")
             broken.append(run)
-        last, seen[run] = run, row
+        last, last_rows[run] = run, row
     return broken
 
 
@@ -126,7 +148,7 @@ def _check_start(table, run, places, log):
 
 
 def _check_batches(table, run, places, log):
-    """Problems of batches of 0, and of dips at rest that have a batch or no times."""
+    """Report batches of 0, and dips at rest with a batch or without times."""
     volumes, uses, times = (table.of(name) for name in ("volume_m3", "use", "time"))
     for before, place in pairwise(places):
         if uses[place] == REST:
@@ -164,7 +186,7 @@ def _check_rest(table, step, times, log):
 
 
 def _check_dips(table, runs, log):
-    """Problems of rows without a dip, but for the first of each run."""
+    """Report rows without a dip, except for the first row of each run."""
     dips = table.of("dip_m")
     needed = {place for places in runs.values() for place in places[1:]}
     is_blank = [
@@ -195,26 +217,26 @@ def _check_times(table, places, log):
 
 
 def _check_signs(table, broken, log):
-    """Problems of dips that do not follow the sign of the batch; runs in pieces are told."""
+    """Report dips that contradict the sign of the batch, except in interrupted runs."""
     runs = table.of("run")
     for step in steps_of(table):
         if runs[step.place] in broken:
             continue
         rise = step.after_m - step.before_m
-        shown = {"after": step.after_m, "before": step.before_m, "volume": step.volume_m3}
+        figures = {"after": step.after_m, "before": step.before_m, "volume": step.volume_m3}
         if step.volume_m3 > 0 and rise <= 0:
             expected = message(
                 "dip_does_not_rise",
                 "found {after:g} after {before:g} and {volume:g} m3 more; expected a higher dip: is"
                 " one misread, or was the tank drawn off?",
-                **shown,
+                **figures,
             )
         elif step.volume_m3 < 0 and rise >= 0:
             expected = message(
                 "dip_does_not_fall",
                 "found {after:g} after {before:g} and {volume:g} m3; expected a lower dip: is one"
                 " misread, or the sign of the volume?",
-                **shown,
+                **figures,
             )
         else:
             continue
@@ -222,7 +244,7 @@ def _check_signs(table, broken, log):
 
 
 def _check_temperatures(table, runs, log):
-    """Each of them in all rows that need it or in none, and those of the liquid together."""
+    """Require each temperature in all rows that need it or in none; meter and tank together."""
     dips = table.of("dip_m")
     starts = {places[0] for places in runs.values()}
     uses = table.of("use")
@@ -272,11 +294,11 @@ def _check_temperatures(table, runs, log):
 
 
 def _check_levels(table, extent, log):
-    """Problems of dips that are not in the tank; False where one is told."""
+    """Report dips outside the tank; returns False if a problem was found."""
     dips, lowest, top = table.numbers("dip_m"), extent.lowest_m, extent.top_m
     if top is None and extent.height_m is not None:
-        top = 1.2 * extent.height_m  # the table's zero is not known
-    sound = True
+        top = 1.2 * extent.height_m  # the zero of the table is not known
+    is_valid = True
     for row, dip in zip(table.rows, dips, strict=True):
         if top is not None and dip > top + max(ABOVE_TOP_M, ABOVE_TOP * top):
             expected = message(
@@ -296,8 +318,8 @@ def _check_levels(table, extent, log):
         else:
             continue
         log.problem(table.file, expected, row, "dip_m")
-        sound = False
-    return sound
+        is_valid = False
+    return is_valid
 
 
 def _unit_of_dip(dip, top):
@@ -311,22 +333,22 @@ def _unit_of_dip(dip, top):
 
 
 def _check_units(table, volume, extent, values, log):
-    """Batches against what the tank of the drawing holds between their dips.
+    """Compare the batches with the nominal volume between their dips.
 
-    volume  function of a dip, m3, or None: the sizes are not known
+    volume is a function of the dip, m3; None: the nominal dimensions are not known.
     """
     steps = [] if volume is None else steps_of(table)
-    usual = values["liquid"]["s_dip_mm"]
-    sds = [(sd or usual or 0.0) / 1000 for sd in table.of("s_dip_mm")]
-    told = []
+    default_sd = values["liquid"]["s_dip_mm"]
+    sds = [(sd or default_sd or 0.0) / 1000 for sd in table.of("s_dip_mm")]
+    comparable = []
     for step in steps:
-        held = volume(step.after_m) - volume(step.before_m)
+        nominal = volume(step.after_m) - volume(step.before_m)
         is_clear = abs(step.after_m - step.before_m) > TELLING * sds[step.place]
-        if is_clear and held * step.volume_m3 > 0:
-            told.append((step, held, step.volume_m3 / held))
-    if not told:
+        if is_clear and nominal * step.volume_m3 > 0:
+            comparable.append((step, nominal, step.volume_m3 / nominal))
+    if not comparable:
         return
-    ratio = float(np.median([ratio for *_, ratio in told]))
+    ratio = float(np.median([ratio for *_, ratio in comparable]))
     if not 1 / UNIT_FACTOR < ratio < UNIT_FACTOR:
         expected = message(
             "batches_in_other_unit",
@@ -337,9 +359,9 @@ def _check_units(table, volume, extent, values, log):
         )
         log.problem(table.file, expected, None, "volume_m3")
         return
-    for step, held, ratio in told:
-        inside = _is_clear_of_ends(step, extent, values)
-        if inside and not UNLIKE[0] < ratio < UNLIKE[1]:
+    for step, nominal, ratio in comparable:
+        is_inside = _is_clear_of_ends(step, extent, values)
+        if is_inside and not UNLIKE[0] < ratio < UNLIKE[1]:
             expected = message(
                 "batch_unlike_sizes",
                 "{found_m3:g} m3 from a dip of {before_m:g} m to {after_m:g} m, where a tank of"
@@ -348,13 +370,13 @@ def _check_units(table, volume, extent, values, log):
                 found_m3=step.volume_m3,
                 before_m=step.before_m,
                 after_m=step.after_m,
-                held_m3=held,
+                held_m3=nominal,
             )
             log.warning(table.file, expected, table.rows[step.place], "volume_m3")
 
 
 def _is_clear_of_ends(step, extent, values):
-    """Is a step where sizes that are a little wrong tell its volume all the same?"""
+    """Return True if small errors of nominal dimensions do not affect the volume of the step."""
     low, high = sorted((step.before_m, step.after_m))
     if values["tank"]["kind"] == "vertical":
         shell = values["datum"]["bottom_z_m"]

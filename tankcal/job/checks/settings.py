@@ -1,4 +1,4 @@
-"""Settings that hang together: heights of the datum, the survey's liquid, densities, points."""
+"""Checks of related settings: heights of the datum, liquid of the survey, densities, table rows."""
 
 from itertools import pairwise
 
@@ -14,17 +14,26 @@ from tankcal.job.contract.bottom import rise_of_bottom
 from tankcal.job.plausibility import DENSITIES_KG_M3
 from tankcal.messages import message
 
-# The rows of the capacity table: its step, its fine zones, and how many rows they make.
+# Rows of the capacity table: step, fine zones, number of rows.
 
-MAX_TABLE_ROWS = 25_000  # a 20 m tank in millimetres; its certificate has 90 pages
-COARSE_STEP_M = 0.5
+MAX_TABLE_ROWS = 25_000  # a tank of 20 m in millimetres has a certificate of 90 pages
+COARSE_STEP_M = 0.5  # largest plausible step
 INCH_STEPS_M = {"ft-in-8": 0.0254 / 8, "ft-in-16": 0.0254 / 16}
 
 
 def check_steps(table, extent, raw, log):
-    """Is the step given where it must be, credible, and finer in the fine zones?
+    """Check the step of the table and of its fine zones.
 
-    table   the values of the section; extent  as known, `height_m` may be None
+    Parameters
+    ----------
+    table : dict
+        {key: value} of the section.
+    extent : Extent
+        Size of the tank, possibly unknown.
+    raw : RawJob
+        Job as read.
+    log : Log
+        Receives problems and warnings.
     """
     step = INCH_STEPS_M.get(table["height_unit"], table["step_m"])
     _check_presence(table, raw, log)
@@ -55,8 +64,8 @@ def _check_presence(table, raw, log):
     def tell_problem(key, expected):
         tell(log.problem, raw, "table", key, expected)
 
-    inches, step = table["height_unit"] in INCH_STEPS_M, table["step_m"]
-    if inches and step is not None:
+    is_in_inches, step = table["height_unit"] in INCH_STEPS_M, table["step_m"]
+    if is_in_inches and step is not None:
         tell_problem(
             "step_m",
             message(
@@ -66,18 +75,18 @@ def _check_presence(table, raw, log):
                 unit=table["height_unit"],
             ),
         )
-    bound = is_not_given(raw, "table", "max_interpolation_error_l")
-    if not inches and bound and is_not_given(raw, "table", "step_m"):
+    no_error_limit = is_not_given(raw, "table", "max_interpolation_error_l")
+    if not is_in_inches and no_error_limit and is_not_given(raw, "table", "step_m"):
         expected = message(
             "step_missing",
             "missing; expected the step of the capacity table, or max_interpolation_error_l, or "
             "height_unit = ft-in-8 or ft-in-16",
         )
         tell_problem("step_m", expected)
-    for given, lacking in (("fine_step_m", "fine_zones"), ("fine_zones", "fine_step_m")):
-        if table[given] is not None and is_not_given(raw, "table", lacking):
-            tell_problem(lacking, missing_beside(given))
-    if table["fine_step_m"] is not None and (inches or is_not_given(raw, "table", "step_m")):
+    for given, missing in (("fine_step_m", "fine_zones"), ("fine_zones", "fine_step_m")):
+        if table[given] is not None and is_not_given(raw, "table", missing):
+            tell_problem(missing, missing_beside(given))
+    if table["fine_step_m"] is not None and (is_in_inches or is_not_given(raw, "table", "step_m")):
         expected = message(
             "fine_step_without_step",
             "given without step_m; expected fine zones only in a table with step_m",
@@ -151,7 +160,7 @@ def _check_zones(zones, extent, raw, log):
             tell_problem(expected)
 
 
-MAX_DIP_OFFSET_M = 1.0
+MAX_DIP_OFFSET_M = 1.0  # largest distance of dip plate and bottom
 DENSITIES = (
     ("survey", "liquid_density_kg_m3"),
     ("table", "liquid_density_kg_m3"),
@@ -162,12 +171,12 @@ DENSITIES = (
 
 
 def check_settings(values, tables, extent, kind, raw, log):
-    """Heights of the datum and of deliveries, pairs of keys, densities."""
+    """Check datum, deliveries, pairs of keys and densities; parameters as in `check_tank`."""
     datum, table = values["datum"], values["table"]
     _check_dip_plate(values, tables, kind, raw, log)
-    for given, lacking in (("dip_x_m", "dip_y_m"), ("dip_y_m", "dip_x_m")):
-        if datum[given] is not None and is_not_given(raw, "datum", lacking):
-            tell(log.problem, raw, "datum", lacking, missing_beside(given))
+    for given, missing in (("dip_x_m", "dip_y_m"), ("dip_y_m", "dip_x_m")):
+        if datum[given] is not None and is_not_given(raw, "datum", missing):
+            tell(log.problem, raw, "datum", missing, missing_beside(given))
     _check_survey_liquid(values["survey"], extent, raw, log)
     _check_densities(values, raw, log)
     if table["other_densities_kg_m3"] and not loads_the_shell(values):
@@ -189,19 +198,19 @@ def check_settings(values, tables, extent, kind, raw, log):
         tell(log.problem, raw, "certificate", "date_of_issue", expected)
 
 
-def _check_country(found, raw, log):
-    """The country of issue, which the digital certificate must have in two letters."""
-    if found and not (len(found) == 2 and found.isascii() and found.isalpha()):
+def _check_country(country, raw, log):
+    """Require the two-letter code of the country of issue, for the digital certificate."""
+    if country and not (len(country) == 2 and country.isascii() and country.isalpha()):
         expected = message(
             "country_unknown",
             "found {found!r}; expected the two letters of a country by ISO 3166-1, such as: BR",
-            found=found,
+            found=country,
         )
         tell(log.problem, raw, "certificate", "country", expected)
 
 
 def _check_deliveries(heights, extent, raw, log):
-    """Each height of a least delivery once, and no more than the tank has."""
+    """Require different heights of minimum deliveries, within the height of the tank."""
     for place, height in enumerate(heights):
         expected = ""
         if extent.height_m is not None and height > extent.height_m:
@@ -220,7 +229,7 @@ def _check_deliveries(heights, extent, raw, log):
 
 
 def _check_dip_plate(values, tables, kind, raw, log):
-    """The plate lies on the bottom, or nearly so; of a scan the bottom is not known yet."""
+    """Compare the dip plate with the bottom; before a scan is fitted, its bottom is unknown."""
     plate, bottoms = values["datum"]["dip_plate_z_m"], bottoms_z(values, tables, kind)
     if plate is None or not bottoms:
         return
@@ -260,7 +269,7 @@ def _check_dip_plate(values, tables, kind, raw, log):
 
 
 def bottoms_z(values, tables, kind):
-    """Heights at which a bottom is known to lie, m, in the frame of the points."""
+    """Known heights of the bottom, m, in the frame of the points."""
     if kind in ("horizontal", "sphere"):
         return [] if has_wall_points(tables) else [0.0]
     if values["datum"]["bottom_z_m"] is None:
@@ -300,8 +309,8 @@ def _check_survey_liquid(survey, extent, raw, log):
 def _check_densities(values, raw, log):
     lightest, heaviest = DENSITIES_KG_M3
     for section, key in DENSITIES:
-        found = values[section][key]
-        for density in found if isinstance(found, tuple) else (found,):
+        given = values[section][key]
+        for density in given if isinstance(given, tuple) else (given,):
             if not density:
                 continue
             if density < RELATIVE_DENSITY:
@@ -329,13 +338,13 @@ def _check_densities(values, raw, log):
             "densities",
         )
         tell(log.problem, raw, "table", "other_densities_kg_m3", expected)
-    own, of_roof = table["liquid_density_kg_m3"], values["roof"]["reference_density_kg_m3"]
-    if own and of_roof and own != of_roof:
+    of_table, of_roof = table["liquid_density_kg_m3"], values["roof"]["reference_density_kg_m3"]
+    if of_table and of_roof and of_table != of_roof:
         text = message(
             "roof_density",
             "{roof_kg_m3:g} kg/m3 beside {table_kg_m3:g} kg/m3 of the table: roof and liquid "
             "head are computed for different liquids",
             roof_kg_m3=of_roof,
-            table_kg_m3=own,
+            table_kg_m3=of_table,
         )
         tell(log.warning, raw, "roof", "reference_density_kg_m3", text)

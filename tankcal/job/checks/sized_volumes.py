@@ -1,4 +1,4 @@
-"""About how much a tank of the drawing holds below a dip: for slips of unit, not for tables."""
+"""Approximate volume below a dip from nominal dimensions, only for the detection of wrong units."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from tankcal.job.entries import kind_of
 
 
 def volume_by_sizes(values, raw):
-    """Function of a dip (m) that gives m3 by nominal sizes, or None: they are not known."""
+    """Function of a dip (m) that returns m3; None if nominal dimensions are missing."""
     kind = kind_of(raw)
     diameter = values["tank"]["nominal_diameter_m"]
     if kind == "vertical":
@@ -26,7 +26,9 @@ def volume_by_sizes(values, raw):
         if None in (height, width, length):
             return None
         depths = sum(given[f"end_{end}_depth_m"] or 0.0 for end in "ab")
-        section = width * (length + 2 / 3 * depths)  # half of an ellipsoid is 2/3 of its cylinder
+        section = width * (
+            length + 2 / 3 * depths
+        )  # half an ellipsoid has 2/3 of the volume of its cylinder
         return lambda dip: section * height / 4 * _segment((dip + zero) / height)
     return None
 
@@ -36,7 +38,7 @@ def _cap(depth, radius):
     return np.pi * depth**2 * (radius - depth / 3)
 
 
-def _segment(part):
-    """Area of a circle of diameter 2 below a part of its height."""
-    half = np.arccos(1 - 2 * min(max(part, 0.0), 1.0))
+def _segment(fraction):
+    """Area of a circle of diameter 2 below a fraction of its height."""
+    half = np.arccos(1 - 2 * min(max(fraction, 0.0), 1.0))
     return float(half - np.sin(half) * np.cos(half))

@@ -1,44 +1,48 @@
-"""Free spans of a tape: is known what their sag needs, and is the tape nearly straight there?"""
+"""Checks of free spans of a tape: data for the sag, and small sag."""
 
 import numpy as np
 
 from tankcal.messages import message
 
-DEEPEST = 0.5  # weight of a span over the tension: the formula is off by 0.3 % of the sag there
-STEEL_N_PER_M = 0.0770  # of each square millimetre
-FROM, TO = 0.5, 3.0  # of that a tape weighs: holes for the one, a coat for the other
+DEEPEST = 0.5  # largest weight over tension of a span; the formula has an error of 0.3 % of the sag
+STEEL_N_PER_M = 0.0770  # weight of steel per square millimetre of section
+FROM, TO = 0.5, 3.0  # weight of a tape over that of steel: with holes, with a coating
 
 
-def check_spans(table, straps, read, tapes, raw, log):
-    """Weight and pull of each tape that hangs free, and spans that a tape can cross.
+def check_spans(table, straps, tape_names, tapes, raw, log):
+    """Check weight and tension of each free tape, and the length of its spans.
 
     Parameters
     ----------
-    table, straps : Table
+    table, straps : ColumnValues
         Obstructions, circumferences.
     read : list of (str or None)
         Tape of each circumference.
     tapes : dict
         {name: {key: value}}.
-    raw, log
-        Of the job.
+    raw : RawJob
+        Job as read.
+    log : Log
+        Receives problems and warnings.
     """
-    of_tape, of_strap, whole = {}, {}, {}
+    of_tape, of_strap, total = {}, {}, {}
     columns = map(table.of, ("circumference", "kind", "span_m", "count"))
     for row, name, kind, span, count in zip(table.rows, *columns, strict=True):
         if kind != "sag":
             continue
-        whole[name] = whole.get(name, 0.0) + (span or 0.0) * (count or 1)
-        for place in (i for i, one in enumerate(straps.of("circumference")) if one == name):
-            tape = tapes.get(read[place])
+        total[name] = total.get(name, 0.0) + (span or 0.0) * (count or 1)
+        for place in (
+            i for i, circumference in enumerate(straps.of("circumference")) if circumference == name
+        ):
+            tape = tapes.get(tape_names[place])
             if tape is None:
                 continue
-            of_tape.setdefault(read[place], name)
+            of_tape.setdefault(tape_names[place], name)
             least = _least_tension(straps, place, tape, tapes)
             if least is None:
-                of_strap[straps.rows[place]] = read[place]
+                of_strap[straps.rows[place]] = tape_names[place]
             expected = span and (
-                _too_long(straps.of("reading_m")[place], span, whole[name])
+                _too_long(straps.of("reading_m")[place], span, total[name])
                 or _too_deep(span, least, tape["weight_n_per_m"])
             )
             if expected:
@@ -50,30 +54,30 @@ def check_spans(table, straps, read, tapes, raw, log):
 
 
 def _least_tension(straps, place, tape, tapes):
-    """Pull of a reading, or that of the certificate that counts, less friction; None: not said."""
+    """Tension of a reading, or of the valid certificate, less friction; None if not given."""
     pull = straps.of("tension_n")[place]
     if pull is None:
         pull = tapes.get(tape["master"], tape)["tension_n"]
-    lost = np.pi * (tape["friction"] or 0.0) / (straps.of("pulls")[place] or 1)
-    return pull and pull * np.exp(-lost)
+    friction_exponent = np.pi * (tape["friction"] or 0.0) / (straps.of("pulls")[place] or 1)
+    return pull and pull * np.exp(-friction_exponent)
 
 
-def _too_long(reading, span, whole):
-    """What to say of spans that are longer than the way round the tank; None: they are not."""
-    if reading is None or whole < reading:
+def _too_long(reading, span, total):
+    """Message about spans longer than the circumference, or None."""
+    if reading is None or total < reading:
         return None
     return message(
         "span_longer_than_round",
         "found {span:g}; the spans add up to {all:g} m; expected less than the reading of the"
         " tape, {reading:g} m",
         span=span,
-        all=whole,
+        all=total,
         reading=reading,
     )
 
 
 def _too_deep(span, tension, weight):
-    """What to say of a tape that hangs too deep for the formula of its sag; None: it does not."""
+    """Message about a sag too large for the formula, or None."""
     if None in (tension, weight) or span <= DEEPEST * tension / weight:
         return None
     return message(
@@ -99,11 +103,11 @@ def _tell_pulls(file, of_strap, log):
 
 
 def _tell_weights(of_tape, tapes, raw, log):
-    """A problem for each tape without a weight, a warning for one unlike steel of its section."""
+    """Report tapes without a weight; warn if the weight does not fit steel of the section."""
     file, rows = raw.file_of("instruments"), raw.registers["instruments"].rows
     for tape, name in of_tape.items():
         weight, section = (tapes[tape][key] for key in ("weight_n_per_m", "section_mm2"))
-        where = rows.get(tape), f"{tape}.weight_n_per_m"
+        place = rows.get(tape), f"{tape}.weight_n_per_m"
         if weight is None:
             expected = message(
                 "span_weight_missing",
@@ -111,7 +115,7 @@ def _tell_weights(of_tape, tapes, raw, log):
                 " circumference {name!r}",
                 name=name,
             )
-            log.problem(file, expected, *where)
+            log.problem(file, expected, *place)
         elif section and not FROM <= weight / (STEEL_N_PER_M * section) <= TO:
             expected = message(
                 "tape_weight_unlike_steel",
@@ -121,4 +125,4 @@ def _tell_weights(of_tape, tapes, raw, log):
                 section=section,
                 expected=STEEL_N_PER_M * section,
             )
-            log.warning(file, expected, *where)
+            log.warning(file, expected, *place)

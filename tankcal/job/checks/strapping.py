@@ -1,4 +1,4 @@
-"""Does a strapping make sense as a whole? What its tables say of each other, and of the shell."""
+"""Checks of a strapping as a whole: its tables against each other and against the shell."""
 
 import numpy as np
 
@@ -19,12 +19,12 @@ from tankcal.job.plausibility import IMPOSSIBLE_MISS, unit_guess
 from tankcal.job.tables import nearest
 from tankcal.messages import message
 
-MOST_STRAPS = 1000  # readings round one tank
-END_M = 0.02  # so far beyond its course a level may stand
+MOST_STRAPS = 1000  # largest number of readings of one tank
+END_M = 0.02  # largest distance of a level beyond the end of its course
 
 
 def too_many_straps(count):
-    """What is said of more straps than can be used."""
+    """Message about more circumferences than can be used."""
     return message(
         "too_many_straps",
         "{count} readings; expected at most {most}",
@@ -34,7 +34,7 @@ def too_many_straps(count):
 
 
 def check_strapping(values, tables, registers, raw, log):
-    """Circumferences with a tape, on courses that are there; obstructions and checks that fit."""
+    """Check circumferences, courses, obstructions and comparisons; as for `check_all`."""
     straps = tables["circumferences"]
     if not is_strapped(tables):
         tell_without_effect(tables, log)
@@ -44,22 +44,33 @@ def check_strapping(values, tables, registers, raw, log):
         return
     courses = tables["courses"]
     known = () if courses is None else tuple(courses.of("course"))
-    alone = _stands_alone(tables, raw)
-    every = alone and _tell_each_course(tables, raw)
-    _check_courses(straps, tables, courses, known, every, log)
+    is_alone = _stands_alone(tables, raw)
+    needs_each_course = is_alone and _tell_each_course(tables, raw)
+    _check_courses(straps, tables, courses, known, needs_each_course, log)
     check_readings(straps, tables, registers, raw, log)
     if has_rows(tables["thickness"]):
         refuse_others(tables["thickness"], "course", known, log)
     if values is not None:
         check_girths(straps, values["tank"]["nominal_diameter_m"], IMPOSSIBLE_MISS, log)
-        check_strapping_settings(values, tables, registers, alone, raw, log)
+        check_strapping_settings(values, tables, registers, is_alone, raw, log)
         check_levels(straps, courses, values, log)
 
 
 def check_readings(straps, tables, registers, raw, log):
-    """The tapes that were read, what was in their way, and their comparison with a master.
+    """Check the tapes, their obstructions, and their comparison with a master.
 
-    straps  readings, with the names of their circumferences
+    Parameters
+    ----------
+    straps : ColumnValues
+        Readings, with the names of their circumferences.
+    tables : dict
+        Tables by name.
+    registers : dict
+        {"instruments": {name: {key: value}}, ...}.
+    raw : RawJob
+        Job as read.
+    log : Log
+        Receives problems and warnings.
     """
     tapes = tapes_of(registers)
     _check_tapes(straps, registers["instruments"], tapes, raw, log)
@@ -73,23 +84,29 @@ def check_readings(straps, tables, registers, raw, log):
 
 
 def _stands_alone(tables, raw):
-    """Was the wall strapped and nothing else? A table of its points that cannot be read is one, and
-    set-ups of which nothing was sighted are told by themselves.
+    """Return True if circumferences are the only measurements of the wall.
+
+    An unreadable table of points counts as a measurement. Set-ups without sights are reported
+    separately.
     """
     unreadable = (raw.tables.get(name, ()) is None for name in ("points", "wall_hits", *READINGS))
     return not (has_wall_points(tables) or has_rows(tables["setups"]) or any(unreadable))
 
 
 def _tell_each_course(tables, raw):
-    """Is a course without a circumference a problem? Not where lines or radii may tell it, be they
-    incomplete or unreadable, which is told.
+    """Return True if each course needs a circumference.
+
+    Otherwise lines or radii may determine it; if they are incomplete or unreadable, this is
+    reported separately.
     """
     others = ("radii", "lines", "offsets")
-    unreadable = any(raw.tables.get(name, ()) is None for name in others)
-    elsewhere = any(has_rows(tables.get(name)) for name in others)
-    complete = has_rows(tables["lines"]) and has_rows(tables["offsets"])
-    declared = not is_not_given(raw, "radii", "source")
-    return not (unreadable or declared or has_radii(tables)) and (complete or not elsewhere)
+    is_unreadable = any(raw.tables.get(name, ()) is None for name in others)
+    has_others = any(has_rows(tables.get(name)) for name in others)
+    has_complete_lines = has_rows(tables["lines"]) and has_rows(tables["offsets"])
+    has_declared_radii = not is_not_given(raw, "radii", "source")
+    return not (is_unreadable or has_declared_radii or has_radii(tables)) and (
+        has_complete_lines or not has_others
+    )
 
 
 def tapes_of(registers):
@@ -102,15 +119,15 @@ def tapes_of(registers):
 
 
 def tapes_read(straps, tapes):
-    """(n,) name of the tape of each reading: the only one that is no master where it is blank."""
+    """Name of the tape of each reading, shape (n,); blank: the only tape that is not a master."""
     masters = {given["master"] for given in tapes.values()}
-    read = [name for name in tapes if name not in masters]
-    usual = read[0] if len(read) == 1 else None
-    return [name or usual for name in straps.of("instrument")]
+    working = [name for name in tapes if name not in masters]
+    only = working[0] if len(working) == 1 else None
+    return [name or only for name in straps.of("instrument")]
 
 
 def tell_without_effect(tables, log):
-    """Warnings about tables that belong to circumferences, where there are none."""
+    """Warn about tables that require circumferences, in a job without them."""
     for name in ("obstructions", "thickness", "tape_checks"):
         if has_rows(tables.get(name)):
             expected = message(
@@ -120,7 +137,7 @@ def tell_without_effect(tables, log):
 
 
 def _check_courses(straps, tables, courses, known, every, log):
-    """every: whether each course needs a circumference."""
+    """Check the courses of circumferences; every: True if each course needs one."""
     refuse_others(straps, "course", known, log)
     reached = {
         course
@@ -145,9 +162,9 @@ def _check_courses(straps, tables, courses, known, every, log):
 
 
 def refuse_repeats_elsewhere(straps, column, log):
-    """A problem for each reading that is not where others of its name are.
+    """Report each reading whose position differs from other readings with its name.
 
-    column  of its place, as the file has it
+    column is the name of the position in the file.
     """
     places = {}
     names = zip(straps.rows, straps.of("circumference"), straps.of("course"),
@@ -168,12 +185,12 @@ def refuse_repeats_elsewhere(straps, column, log):
 
 
 def names_of(table, column):
-    """The names of a table; none where a row of it was dropped, which is told already."""
+    """Names of a table; () if unreadable rows, which are already reported, were dropped."""
     return () if table.skipped else tuple(table.of(column))
 
 
 def refuse_others(table, column, known, log):
-    """A problem for each name that is not among the known; none where these cannot be read."""
+    """Report each unknown name; without known names, nothing is reported."""
     if not known or None in known:
         return
     for row, name in zip(table.rows, table.of(column), strict=True):
@@ -188,12 +205,12 @@ def refuse_others(table, column, known, log):
 
 
 def _check_tapes(straps, instruments, tapes, raw, log):
-    """A tape for each reading, and of each what its readings need.
+    """Require a tape for each reading, with the data that its readings need.
 
-    straps  readings with instrument; instruments, tapes  {name: {key: value}}
+    instruments and tapes are {name: {key: value}}.
     """
     file = raw.file_of("instruments")
-    if raw.registers.get("instruments", ()) is None:  # unreadable, which is told
+    if raw.registers.get("instruments", ()) is None:  # unreadable, reported already
         return
     if not instruments:
         tell_missing(log, file, straps.file, "instrument")
@@ -222,45 +239,48 @@ def _check_tapes(straps, instruments, tapes, raw, log):
         if given is None:
             continue
         refuse_free_scale(given, file, rows.get(name), name, log)
-        certified = given["master"] if given["master"] in tapes else name  # whose counts
-        found = [(name, *one) for one in _missing_of(given, tapes)]
-        found += [(certified, *one) for one in _missing_of_certificate(given, tapes[certified])]
+        certified = (
+            given["master"] if given["master"] in tapes else name
+        )  # tape whose certificate applies
+        found = [(name, *fault) for fault in _missing_of(given, tapes)]
+        found += [(certified, *fault) for fault in _missing_of_certificate(given, tapes[certified])]
         for owner, key, expected in found:
             where = rows.get(owner), f"{owner}.{key}"
-            if not log.has(file, *where):  # a master of two tapes is told once
+            if not log.has(file, *where):  # report a master of two tapes once
                 log.problem(file, expected, *where)
 
 
 def check_girths(straps, nominal_m, most_apart, log):
-    """Readings whose size is that of the drawing, and of each other.
+    """Compare the readings with the drawing and with each other.
 
     Parameters
     ----------
     straps : ColumnValues
-        With reading_m.
+        Readings with reading_m.
     nominal_m : float or None
-        Diameter by the drawing.
+        Nominal diameter.
     most_apart : float
-        Share by which a reading may differ from the median of all.
+        Largest relative difference of a reading from the median.
     log : Log
+        Receives problems.
     """
     readings = straps.numbers("reading_m")
     if not np.any(np.isfinite(readings)):
         return
-    median = usual = float(np.nanmedian(readings))
-    far = np.abs(readings / median - 1) > most_apart
+    median = expected_m = float(np.nanmedian(readings))
+    is_far = np.abs(readings / median - 1) > most_apart
     if nominal_m is not None:
         ratio = median / (np.pi * nominal_m)
         if not 1 / (1 + IMPOSSIBLE_MISS) <= ratio <= 1 + IMPOSSIBLE_MISS:
-            usual, far[0] = np.pi * nominal_m, True  # one line for all
-    for row, reading in zip(np.array(straps.rows)[far], readings[far], strict=True):
+            expected_m, is_far[0] = np.pi * nominal_m, True  # one message for all readings
+    for row, reading in zip(np.array(straps.rows)[is_far], readings[is_far], strict=True):
         expected = message(
             "circle_of_other_size",
             "found {reading:g}; expected about {usual:.4g} m, as the other circumferences or"
             " tank.nominal_diameter_m have it{guess}",
             reading=reading,
-            usual=usual,
-            guess=unit_guess(float(reading) / usual),
+            usual=expected_m,
+            guess=unit_guess(float(reading) / expected_m),
         )
         log.problem(straps.file, expected, int(row), "reading_m")
 
@@ -275,7 +295,7 @@ def _check_pulls(straps, log):
 
 
 def refuse_free_scale(given, file, row, name, log):
-    """A problem for each of scale and offset of an instrument that is to be an unknown."""
+    """Report a free scale or offset of an instrument, which a strapping does not determine."""
     for key in ("u_scale_ppm", "u_offset_mm"):
         if given[key] == FREE:
             expected = message(
@@ -310,7 +330,7 @@ def _missing_of(given, tapes):
 
 
 def _missing_of_certificate(given, certificate):
-    """What a tape needs of its certificate, which is that of its master where it has one."""
+    """Yield missing data of the certificate of a tape, or of its master if it has one."""
     if given["expansion_per_k"] and certificate["certified_temperature_c"] is None:
         yield "certified_temperature_c", temperature_missing()
     if given["section_mm2"] and certificate["tension_n"] is None:
@@ -324,7 +344,7 @@ def _missing_of_certificate(given, certificate):
 
 
 def _check_comparisons(table, tapes, raw, log):
-    """Comparisons of one working tape, where there is one."""
+    """Check that comparisons belong to exactly one working tape with a master."""
     working = [name for name, given in tapes.items() if given["master"] is not None]
     if has_rows(table) and tapes and len(working) != 1:
         expected = message(
@@ -345,11 +365,11 @@ def _check_comparisons(table, tapes, raw, log):
 
 
 def check_strapping_settings(values, tables, registers, alone, raw, log):
-    """What a strapping needs of the settings; alone: nothing else tells the wall."""
+    """Check the settings of a strapping; alone: True if only circumferences measure the wall."""
     tapes = tapes_of(registers)
-    is_lying = values["tank"]["kind"] == "horizontal"  # an upright shell has a typical shape
-    unknown = values["shell"]["shape_sd_mm"] is None
-    if is_lying and unknown and is_not_given(raw, "shell", "shape_sd_mm"):
+    is_lying = values["tank"]["kind"] == "horizontal"  # a vertical shell has a typical shape
+    is_unknown = values["shell"]["shape_sd_mm"] is None
+    if is_lying and is_unknown and is_not_given(raw, "shell", "shape_sd_mm"):
         expected = message(
             "shape_not_declared",
             "missing; expected how far the wall is from a circle (0: it is one): a tape measures a"
@@ -370,10 +390,10 @@ def check_strapping_settings(values, tables, registers, alone, raw, log):
 
 
 def check_tape_temperature(straps, tapes, raw, log):
-    """The temperature of a tape that expands, or that of the shell that it lies on."""
+    """Require the temperature of a tape with an expansion coefficient, or that of the shell."""
     expands = any(given["expansion_per_k"] for given in tapes.values())
-    read = None not in straps.of("temperature_c")
-    if expands and not read and is_not_given(raw, "survey", "shell_temperature_c"):
+    is_read = None not in straps.of("temperature_c")
+    if expands and not is_read and is_not_given(raw, "survey", "shell_temperature_c"):
         expected = message(
             "tape_of_no_temperature",
             "missing; expected it, or temperature_c of every reading: the tape expands",
@@ -382,7 +402,7 @@ def check_tape_temperature(straps, tapes, raw, log):
 
 
 def refuse_inside(values, raw, log):
-    """A problem where a wall that a tape alone measured is said to be measured inside."""
+    """Refuse an inside survey if only a tape measured the wall."""
     if values["survey"]["side"] == "inside":
         expected = message(
             "strapped_inside", "found inside; expected outside: a tape lies on the outside"
@@ -391,7 +411,7 @@ def refuse_inside(values, raw, log):
 
 
 def check_levels(straps, courses, values, log):
-    """A problem for each level that is not of the course that its row names."""
+    """Report each level outside the course named in its row."""
     heights = course_heights(courses)
     if heights is None:
         return

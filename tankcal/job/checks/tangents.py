@@ -1,4 +1,4 @@
-"""Do tangents make sense as a whole? Set-ups of an adjusted traverse, angles, levels, limbs."""
+"""Checks of tangents as a whole: set-ups of an adjusted traverse, angles, levels, limbs."""
 
 import numpy as np
 
@@ -9,12 +9,12 @@ from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
 from tankcal.job.checks.survey.readings import check_angle, warn_copies
 from tankcal.messages import message
 
-MOST_TANGENTS = 2500  # whose full covariance is kept
-FEWEST_SETUPS = 3  # of a level: two sights from each
+MOST_TANGENTS = 2500  # largest number of tangents with a full covariance matrix
+FEWEST_SETUPS = 3  # smallest number of set-ups of a level, with two sights each
 
 
 def too_many_tangents(count):
-    """What is said of more tangents than can be used."""
+    """Message about more tangents than can be used."""
     return message(
         "too_many_tangents",
         "{count} tangents; expected at most {most}, for the covariance of each with each is kept,"
@@ -25,7 +25,7 @@ def too_many_tangents(count):
 
 
 def check_tangents(values, tables, registers, raw, log):
-    """Sights of both limbs from set-ups that a network ties, outside."""
+    """Check sights to both limbs from a network of set-ups outside; as for `check_all`."""
     table = tables["tangents"]
     if not has_tangents(tables):
         return
@@ -47,8 +47,8 @@ def check_tangents(values, tables, registers, raw, log):
             " distances between their stations (directions.csv, slope_distances.csv)",
         )
         log.problem(table.file, expected)
-    told = frozenset((problem.file, problem.row) for problem in log.problems)
-    files = SurveyFiles(values, tables, registers, raw, log, told)
+    reported = frozenset((problem.file, problem.row) for problem in log.problems)
+    files = SurveyFiles(values, tables, registers, raw, log, reported)
     setups = tables["setups"]
     defined = () if setups is None else dict.fromkeys(setups.of("setup"))
     refuse_undefined(files, table, "setup", defined, "setups")
@@ -72,7 +72,7 @@ def check_tangents(values, tables, registers, raw, log):
 
 
 def _check_limbs(table, courses, log):
-    """Each level of a known course from enough set-ups."""
+    """Require enough set-ups for each level of a known course."""
     columns = (table.of(name) for name in ("course", "level_m", "setup", "side", "use"))
     levels, first = {}, {}
     for row, (course, level, setup, side, use) in zip(

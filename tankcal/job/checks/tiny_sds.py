@@ -1,7 +1,7 @@
-"""Standard deviations of readings of a wall that no reading has: in metres, or in degrees.
+"""Checks of standard deviations of readings that are too small: in metres, or in degrees.
 
-What is merely finer than anybody reads is doubted, for readings may be made up without errors to
-check a formula; what is so only in another unit is refused.
+A value finer than any reading causes a warning, because error-free readings may test a formula. A
+value that is possible only in another unit is a problem.
 """
 
 import numpy as np
@@ -9,18 +9,19 @@ import numpy as np
 from tankcal.job.checking import has_rows
 from tankcal.messages import message
 
-LEAST = {"s_mm": 0.02, "s_arcsec": 0.02}  # smaller than any scale or circle is read
-SURE = {"s_mm": 0.002, "s_arcsec": 0.002}  # millimetres that are metres, seconds that are degrees
+LEAST = {"s_mm": 0.02, "s_arcsec": 0.02}  # smallest sd of a scale or circle
+SURE = {"s_mm": 0.002, "s_arcsec": 0.002}  # smaller values are in metres or degrees
 READ = ("circumferences", "great_circles", "offsets", "wall_hits", "tangents", "tape_checks")
 
 
 def check_tiny_sds(tables, registers, raw, log):
-    """A line for each column of readings, and each instrument, whose standard deviations are
-    smaller than those of any reading, though not all in the file have to be.
+    """Report each column, and each instrument, with standard deviations too small for any reading.
+
+    One small value is sufficient; the other values of the column may be plausible.
     """
 
-    def tell(column, smallest, *told):
-        (log.problem if smallest < SURE[column] else log.warning)(*told)
+    def tell(column, smallest, *details):
+        (log.problem if smallest < SURE[column] else log.warning)(*details)
 
     for name in READ:
         table = tables.get(name)
@@ -30,11 +31,11 @@ def check_tiny_sds(tables, registers, raw, log):
             if table.columns.get(column) is None:
                 continue
             sd = table.numbers(column)
-            tiny = (sd > 0) & (sd < least)
-            if tiny.any():
-                place = int(np.argmax(tiny))
-                expected = _expected(column, sd[place], int(tiny.sum()))
-                tell(column, sd[tiny].min(), table.file, expected, table.rows[place], column)
+            is_tiny = (sd > 0) & (sd < least)
+            if is_tiny.any():
+                place = int(np.argmax(is_tiny))
+                expected = _expected(column, sd[place], int(is_tiny.sum()))
+                tell(column, sd[is_tiny].min(), table.file, expected, table.rows[place], column)
     register = raw.registers.get("instruments")
     for name, given in registers["instruments"].items():
         for key, least in LEAST.items():

@@ -1,4 +1,4 @@
-"""Workbooks (.xlsx) that may come from anywhere: refused or read, in bounded time and memory."""
+"""Safe reading of workbooks (.xlsx) from any source, in bounded time and memory."""
 
 from tankcal.job.excel.archive import MAX_FILE_BYTES, Unreadable
 from tankcal.job.excel.reading import Sheet, read_sheets

@@ -1,7 +1,7 @@
-"""The archive that a workbook is: looked at from the outside before any of it is parsed.
+"""Archive of a workbook: checked before any part is parsed.
 
 Refused are passwords, macros, links to other files, embedded files, entity declarations, and
-archives that unpack to far more than they are or than a job needs.
+archives whose unpacked size is out of proportion.
 """
 
 import io
@@ -10,12 +10,12 @@ import zipfile
 
 from tankcal.messages import message
 
-MAX_FILE_BYTES = 50_000_000
-MAX_UNPACKED_BYTES = 100_000_000
-MAX_MEMBERS = 5000
-MAX_RATIO, RATIO_FROM_BYTES = 300, 10_000_000
-MAX_TAGS = 2_500_000  # start and end tags of all parts: four for a cell with a value
-CHUNK_BYTES = 1_000_000
+MAX_FILE_BYTES = 50_000_000  # largest workbook
+MAX_UNPACKED_BYTES = 100_000_000  # largest sum of all parts
+MAX_MEMBERS = 5000  # largest number of parts
+MAX_RATIO, RATIO_FROM_BYTES = 300, 10_000_000  # largest unpacked over packed size, above a size
+MAX_TAGS = 2_500_000  # most start and end tags of all parts; a cell with a value has four
+CHUNK_BYTES = 1_000_000  # size of the pieces in which a part is read
 
 _BLANK_CELL = re.compile(rb"<c r=[^<>]*(?:/>|></c>)")
 _BLANK_ROW = re.compile(rb"<row r=[^<>]*(?:/>|>\s*</row>)")
@@ -37,7 +37,7 @@ _LINKS = message(
 _CONNECTIONS = message(
     "holds_connections", "holds connections to data elsewhere; remove them and save it again"
 )
-# beginnings of names of parts, in small letters, and what a file with such a part is
+# {beginning of the name of a part, in lower case: reason to refuse the workbook}
 _REFUSED_PARTS = {
     "xl/vbaproject": _MACROS,
     "xl/macrosheets/": _MACROS,
@@ -57,16 +57,16 @@ _REFUSED_PARTS = {
 
 
 class Unreadable(Exception):
-    """The workbook cannot be read; the text says why, and how to mend it."""
+    """The workbook cannot be read; the text states the reason and the remedy."""
 
 
 def damaged():
-    """Unreadable of a workbook that is not whole."""
+    """`Unreadable` for an incomplete workbook."""
     return Unreadable(_DAMAGED)
 
 
 def open_archive(data):
-    """ZipFile of the bytes of a workbook. Raises Unreadable."""
+    """Open the content of a workbook as a ZipFile; raises Unreadable if it is refused."""
     if data.startswith(_OLE):
         raise Unreadable(
             message(
@@ -81,7 +81,7 @@ def open_archive(data):
         _refuse_content(archive)
     except Unreadable:
         raise
-    except Exception:  # zipfile and zlib raise whatever a damaged part happens to trip over
+    except Exception:  # zipfile and zlib raise many types for damaged parts
         raise Unreadable(
             message(
                 "not_a_workbook_or_damaged",
@@ -93,16 +93,16 @@ def open_archive(data):
 
 
 def chunks(archive, member):
-    """The bytes of a part, piece by piece; never more than its directory says."""
+    """Yield the content of a part in pieces, at most the size in its directory entry."""
     with archive.open(member) as stream:
         while chunk := stream.read(CHUNK_BYTES):
             yield chunk
 
 
 def without_blanks(chunk):
-    """The XML without cells that only carry a format, and rows of nothing else.
+    """Remove cells without content, and rows of such cells, from XML.
 
-    A sheet formatted down to its last row holds millions of them.
+    A sheet that is formatted down to its last row contains millions of them.
     """
     return _BLANK_ROW.sub(b"", _BLANK_CELL.sub(b"", chunk))
 
@@ -174,6 +174,7 @@ def _refuse_content(archive):
         for chunk in chunks(archive, member):
             if not before and _is_disguised(chunk):
                 raise _foreign_declarations()
+            # A declaration may begin in one piece and end in the next.
             joined = before[-16:] + chunk
             if b"<!DOCTYPE" in joined or b"<!ENTITY" in joined or b"\0" in chunk:
                 raise _foreign_declarations()
@@ -207,7 +208,7 @@ def _foreign_declarations():
 
 
 def _is_disguised(start):
-    """Is the XML in an encoding in which a DOCTYPE would not be seen?"""
+    """Return True if the XML has an encoding that would hide a DOCTYPE."""
     encoding = re.match(rb"\s*(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*[\"']([^\"']*)", start)
     usual = (b"utf-8", b"us-ascii", b"ascii", b"iso-8859-1", b"windows-1252")
     return encoding is not None and encoding[1].lower() not in usual

@@ -1,21 +1,35 @@
-"""One XML part of a workbook, element by element: nothing of it is kept but what is asked for."""
+"""XML of one part, read element by element; only the requested elements are kept."""
 
 from xml.parsers import expat
 
 from tankcal.job.excel.archive import chunks, damaged, without_blanks
 
-MAX_PIECES = 20  # of the text of one element, each of at most this many characters:
-PIECE_CHARACTERS = 65_536
+MAX_PIECES = 20  # most pieces of the text of one element
+PIECE_CHARACTERS = 65_536  # longest piece of text, characters
 
 
 def parse(archive, member, starts, ends):
-    """Read a part from its beginning to its end.
+    """Read a part from beginning to end.
 
-    starts  {name: function(attributes)} called where such an element begins
-    ends    {name: function(text)} called where it ends, with its text up to its last child
+    Names are without their prefix. Blank cells and rows are skipped.
 
-    Names stand without their prefix; blank cells and rows are passed over. Raises Unreadable for a
-    declaration or a text too long, ExpatError for what is no XML.
+    Parameters
+    ----------
+    archive : ZipFile
+        The workbook.
+    member : str
+        Name of the part.
+    starts : dict of {str: callable}
+        {element: function(attributes)}, called at the start of an element.
+    ends : dict of {str: callable}
+        {element: function(text)}, called at its end with the text after its last child.
+
+    Raises
+    ------
+    Unreadable
+        For a declaration or a text that is too long.
+    ExpatError
+        For invalid XML.
     """
     parser = expat.ParserCreate()
     parser.buffer_text, parser.buffer_size = True, PIECE_CHARACTERS
@@ -33,7 +47,7 @@ def _refuse(*_declaration):
 
 
 class _Part:
-    """The handlers of one part; the prefix of its root element is that of all that count."""
+    """Handlers of one part; the prefix of the root element is removed from all names."""
 
     def __init__(self, starts, ends):
         self.starts, self.ends = starts, ends

@@ -1,4 +1,4 @@
-"""A workbook as plain cells, sheet by sheet."""
+"""Content of a workbook as plain cells, sheet by sheet."""
 
 import posixpath
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ _RELATIONS = "xl/_rels/workbook.xml.rels"
 
 @dataclass(frozen=True)
 class Sheet:
-    """A sheet by its title; is_hidden: its tab does not show."""
+    """A sheet with its title; is_hidden: its tab is hidden."""
 
     title: str
     is_hidden: bool
@@ -22,16 +22,30 @@ class Sheet:
 
 
 def read_sheets(data, is_wanted):
-    """List of Sheet of the bytes of a workbook; is_wanted(title): the others are not parsed.
+    """Read the sheets of a workbook.
 
-    Raises Unreadable, which says why in words.
+    Parameters
+    ----------
+    data : bytes
+        Content of the workbook.
+    is_wanted : callable
+        is_wanted(title) returns False for sheets that are not parsed.
+
+    Returns
+    -------
+    list of Sheet
+
+    Raises
+    ------
+    Unreadable
+        If the workbook cannot be read, with the reason.
     """
     archive = open_archive(data)
     try:
         return _sheets(archive, is_wanted)
     except Unreadable:
         raise
-    except Exception:  # a damaged part may hold anything in place of a number or a name
+    except Exception:  # a damaged part may contain any value
         raise damaged() from None
 
 
@@ -54,7 +68,7 @@ def _sheets(archive, is_wanted):
 
 
 def _read_book(archive):
-    """([(title, is it hidden, its relation)], day that dates count from)."""
+    """([(title, is it hidden, its relation)], first day of the calendar of dates)."""
     from openpyxl.utils.datetime import CALENDAR_MAC_1904, CALENDAR_WINDOWS_1900
 
     listed, epochs = [], [CALENDAR_WINDOWS_1900]

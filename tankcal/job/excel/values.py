@@ -1,4 +1,4 @@
-"""What stands in a cell: its text or number by the cell's type and format."""
+"""Value of a cell, by the type and the format of the cell."""
 
 import datetime
 import re
@@ -10,15 +10,16 @@ from tankcal.job.tables import BadCell, Percent, shown
 from tankcal.messages import message
 
 _ESCAPED = re.compile(r"_x([0-9A-Fa-f]{4})_")
-_NOT_SHOWN = re.compile(r'"[^"]*"|\\.|\[[^\]]*\]')  # within a number format
+# Parts of a number format that are not placeholders.
+_NOT_SHOWN = re.compile(r'"[^"]*"|\\.|\[[^\]]*\]')
 _INTEGER = re.compile(r"-?[0-9]{1,15}")
 DATE, DURATION, PERCENT = "date", "duration", "percent"
 
 
 def uncalculated():
-    """BadCell of a formula whose result the file does not hold.
+    """`BadCell` for a formula without a stored result.
 
-    It looks blank; without this an optional cell would count as not given.
+    Such a cell looks blank; without this mark an optional cell would count as not given.
     """
     return BadCell(
         message(
@@ -30,11 +31,16 @@ def uncalculated():
 
 @dataclass(frozen=True)
 class Values:
-    """What the cells of a workbook share.
+    """Common data of the cells of a workbook.
 
-    strings  texts that cells give by number
-    formats  DATE, DURATION, PERCENT or None of each cell style
-    epoch    day that dates count from
+    Attributes
+    ----------
+    strings : list of str
+        Shared texts, to which cells refer by index.
+    formats : list
+        DATE, DURATION, PERCENT or None for each cell style.
+    epoch : datetime
+        First day of the calendar of dates.
     """
 
     strings: list
@@ -42,7 +48,7 @@ class Values:
     epoch: datetime.datetime
 
     def of(self, attributes, content):
-        """Value of a cell: text, number, bool, date, Percent, BadCell, or None for a blank."""
+        """Value of a cell: text, number, bool, date, Percent, BadCell, or None if blank."""
         kind = attributes.get("t", "n")
         if kind == "n":
             return self._number(attributes, content) if content else None
@@ -89,12 +95,12 @@ def _iso_date(content):
 
 
 def unescaped(text):
-    """A text as Excel shows it: _x000D_ is one character."""
+    """Text as shown by Excel; _x000D_ represents one character."""
     return _ESCAPED.sub(lambda match: chr(int(match[1], 16)), text) if "_x" in text else text
 
 
 def read_strings(archive, member):
-    """The texts that cells share; the readings of Asian texts are left out."""
+    """Shared texts of the cells, without the phonetic readings of Asian texts."""
     strings, pieces, reading = [], [], []
 
     def text(piece):
@@ -115,7 +121,7 @@ def read_strings(archive, member):
 
 
 def read_formats(archive, member):
-    """DATE, DURATION, PERCENT or None of each cell style."""
+    """DATE, DURATION, PERCENT or None for each cell style."""
     from openpyxl.styles.numbers import BUILTIN_FORMATS
 
     codes, numbers, inside = dict(BUILTIN_FORMATS), [], []

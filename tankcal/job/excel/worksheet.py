@@ -1,4 +1,4 @@
-"""The cells of one sheet of a workbook."""
+"""Cells of one sheet of a workbook."""
 
 import re
 from dataclasses import dataclass, field
@@ -10,21 +10,26 @@ from tankcal.job.excel.values import uncalculated
 from tankcal.job.tables import MAX_COLUMNS, shown
 from tankcal.messages import message
 
-MAX_ROWS = 100_000  # that are not blank
-LAST_ROW = 1_048_576  # of Excel itself
+MAX_ROWS = 100_000  # most rows that are not blank
+LAST_ROW = 1_048_576  # last row in Excel
 _RANGE = re.compile(r"([A-Z]{1,3})([0-9]{1,7})(?::([A-Z]{1,3})([0-9]{1,7}))?")
 _TRUE = ("1", "true")
 
 
 @dataclass(frozen=True)
 class Grid:
-    """What a sheet holds.
+    """Content of a sheet.
 
-    rows            (row, values) of each row that is not blank, at most one column more than
-                    MAX_COLUMNS
-    merged          (first row, last row, first column, last column) of each merged range
-    hidden_rows     numbers of the rows that do not show
-    hidden_columns  (first, last) of ranges of columns that do not show
+    Attributes
+    ----------
+    rows : list of (int, list)
+        (row, values) of each row that is not blank; at most MAX_COLUMNS + 1 values.
+    merged : list of tuple of int
+        (first row, last row, first column, last column) of each merged range.
+    hidden_rows : frozenset of int
+        Hidden rows.
+    hidden_columns : list of (int, int)
+        (first, last) of each range of hidden columns.
     """
 
     rows: list
@@ -34,7 +39,28 @@ class Grid:
 
 
 def read_grid(archive, member, values, title):
-    """Grid of a sheet; values: `tankcal.job.excel.values.Values`. Raises Unreadable."""
+    """Read the cells of a sheet.
+
+    Parameters
+    ----------
+    archive : ZipFile
+        The workbook.
+    member : str
+        Name of the part.
+    values : Values
+        Common data of the cells.
+    title : str
+        Title of the sheet, for messages.
+
+    Returns
+    -------
+    Grid
+
+    Raises
+    ------
+    Unreadable
+        If the sheet is damaged or too large.
+    """
     reader = _Cells(values, title)
     starts = {
         "row": reader.row,
@@ -51,7 +77,7 @@ def read_grid(archive, member, values, title):
 
 @dataclass
 class _Cells:
-    """Handlers of the elements of a sheet, and what they have gathered."""
+    """Handlers of the elements of a sheet, which collect its cells."""
 
     values: object
     title: str
@@ -131,7 +157,7 @@ class _Cells:
 
 @cache
 def _column(letters):
-    """Number of a column by its letters: 1 for A."""
+    """Number of a column from its letters: 1 for A."""
     number = 0
     for letter in letters:
         if not "A" <= letter <= "Z":
@@ -143,7 +169,7 @@ def _column(letters):
 
 
 def column_letters(number):
-    """Letters of a column: A for 1."""
+    """Letters of a column from its number: A for 1."""
     letters = ""
     while number:
         number, rest = divmod(number - 1, 26)

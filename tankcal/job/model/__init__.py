@@ -1,4 +1,4 @@
-"""The checked job as frozen dataclasses, all in SI."""
+"""Checked job as frozen dataclasses, in SI."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -76,7 +76,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class InputFile:
-    """Name, size and SHA-256 of one file that the job was read from."""
+    """Name, size and SHA-256 of one input file of the job."""
 
     file: str
     sha256: str
@@ -85,20 +85,20 @@ class InputFile:
 
 @dataclass(frozen=True)
 class Job:
-    """A checked job, all in SI; `load` makes it, `tankcal.run` computes it.
+    """A checked job, in SI; `load` builds it, `tankcal.run` calculates it.
 
     Attributes
     ----------
     tank, survey, datum, table
         None only in a job that is read for its adjustment alone.
     courses : tuple of Course
-        Of vertical tanks, from the bottom up; of others ().
+        Courses of a vertical tank, from the bottom up; () for other tanks.
     points : Points or None
-        As handed in; None where sizes or a survey stand in their place.
+        Points as supplied; None if sizes or a survey replace them.
     bottom : Bottom
-        Of a vertical tank.
+        Bottom of a vertical tank.
     rings : tuple of Ring
-        Of a lying cylinder that a tape was put round, from end A to end B; of others ().
+        Strapped rings of a lying cylinder, from end A to end B; () for other tanks.
     deadwood : tuple of Deadwood
         In the order of the file.
     roof : Roof or None
@@ -108,49 +108,49 @@ class Job:
     horizontal, sphere, mesh
         None for the other kinds of tank.
     ship : Ship or None
-        Of a mesh: trims, lists and the pipe of a tank that goes to sea.
+        Trims, lists and sounding pipe of a tank of a ship, described by a mesh.
     measurements : Measurements or None
-        The survey that the points are to be adjusted from.
+        Survey to be adjusted, which determines the points.
     inputs : tuple of DeclaredInput
-        Declared ones in the order of the file, then the defaults of those that bear on the job and
+        Declared inputs in the order of the file, then defaults of inputs that affect the job and
         are not declared.
     correlations : tuple of (name, name, r)
-        Between declared inputs.
+        Correlation coefficients between declared inputs.
     certificate : dict
-        Texts that are printed when given, never invented.
+        Texts that are printed if given, never invented.
     warnings : tuple of Problem
-        Rows that do not stop the job.
+        Findings that do not prevent a calculation.
     rule : Rule or None
-        The decision rule that the table is judged by.
+        Decision rule for the table.
     circumference_m : float or None
-        Of the first course by tape, outside; only compared.
+        Outside circumference of the first course by tape; only compared.
     diameter_is : {"inside", "middle", "outside"} or None
-        What the nominal diameter is; only compared.
+        Definition of the nominal diameter; only compared.
     diameter_within_m : float or None
-        By how much the diameter as built may differ from a nominal one that is rounded.
+        Largest difference of the diameter as built from a rounded nominal diameter.
     inspection : Inspection or None
-        What an inspection is to know; None: nothing was said of one.
+        Input of an inspection; None: not given.
     strapping : Strapping or None
-        Circumferences by tape, in place of points.
+        Circumferences by tape, which replace points.
     lines : ReferenceLines or None
-        Offsets from lines of sight, beside them.
+        Offsets from lines of sight, in addition to circumferences.
     hits : WallHits or None
-        Bare hits of the wall, in place of points.
+        Sights to the bare wall, which replace points.
     tangents : Tangents or None
-        Sights to the limbs of the tank, in place of points.
+        Sights to the limbs of the tank, which replace points.
     clouds : Clouds or None
-        Files of scanners, in place of points.
+        Files of scanners, which replace points.
     liquid : Metering or None
-        Runs of metered liquid, beside a survey or alone.
+        Runs of metered liquid, in addition to a survey or alone.
     radii : Radii or None
-        Of the courses, by a former table, a record or a declaration; alone, or beside a survey of
-        some courses.
+        Radii of the courses by a former table, a record or a declaration; alone, or in addition to
+        a survey of some courses.
     change : Change or None
-        How they may have changed since then; beside a survey.
+        Possible change of these radii; in addition to a survey.
     great_circles : GreatCircles or None
-        Equator and meridians of a sphere by tape, in place of points.
+        Equator and meridians of a sphere by tape, which replace points.
     overrulings : tuple of Overruling
-        What was decided by hand against the search for blunders, in the order of the file.
+        Manual decisions against the search for blunders, in the order of the file.
     """
 
     tank: Tank | None
@@ -161,11 +161,13 @@ class Job:
     courses: tuple[Course, ...]
     points: Points | None
     inputs: tuple[DeclaredInput, ...] = ()
-    certificate: dict = field(default_factory=dict)  # text, printed when given, never invented
+    certificate: dict = field(
+        default_factory=dict
+    )  # texts that are printed if given, never invented
     snooping: bool = True
     scale: str = "a_priori"
     files: tuple[InputFile, ...] = ()
-    warnings: tuple = ()  # Problem rows that do not stop the job
+    warnings: tuple = ()  # Problems that do not prevent a calculation
     source: str = ""
     switches: Switches = field(default_factory=Switches)
     bottom: Bottom = field(default_factory=Bottom)

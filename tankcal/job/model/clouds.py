@@ -1,4 +1,4 @@
-"""Point clouds of a job: their files, their scans, and what ties these."""
+"""Point clouds of a job: files, scans, and the data of their registration."""
 
 from dataclasses import dataclass, field
 
@@ -15,18 +15,18 @@ class CloudFile:
     Attributes
     ----------
     name : str
-        Of its section in clouds.toml.
+        Name of its section in clouds.toml.
     file : str
-        As it is written there.
+        File name as given in clouds.toml.
     header : CloudHeader
     unit_m : float
-        Metres of one unit of its coordinates.
+        Length of one unit of its coordinates, m.
     first : int
-        Place of its first scan among those of the job.
+        Index of its first scan among the scans of the job.
     leave_out_m : ndarray, shape (k, 6)
-        Boxes x0, y0, z0, x1, y1, z1 in the frame of the tank.
+        Boxes x0, y0, z0, x1, y1, z1 without points of the tank, in the frame of the tank.
     time_s : float or None
-        Since 2000.
+        Time of the scans, s since 2000.
     """
 
     name: str
@@ -46,14 +46,14 @@ class Clouds:
     ----------
     files : tuple of CloudFile
     scans : tuple of ScanSetup
-        Of all files, in their order.
+        Scans of all files, in the order of the files.
     tools : dict
-        {scanner: (RangingInstrument, whether its offset is assumed, whether its scale is)}.
+        {scanner: (RangingInstrument, is its offset assumed, is its scale assumed)}.
     sides : tuple of str
-        "inside" or "outside": where the scanner stood, of each scan.
+        "inside" or "outside": position of the scanner in each scan.
     targets : tuple of ScanTarget
     control : KnownTargets
-        Of control.csv, where no survey is adjusted.
+        Control points of control.csv, if no survey is adjusted.
     """
 
     files: tuple
@@ -66,9 +66,9 @@ class Clouds:
     @property
     def ranging(self):
         """{scanner: RangingInstrument}."""
-        return {name: given[0] for name, given in self.tools.items()}
+        return {name: tool[0] for name, tool in self.tools.items()}
 
     @property
     def declared(self):
-        """Points that the files say they hold; of those that do not say, none."""
-        return sum(one.declared or 0 for file in self.files for one in file.header.scans)
+        """Number of points declared by the files; files without a declaration count 0."""
+        return sum(scan.declared or 0 for file in self.files for scan in file.header.scans)

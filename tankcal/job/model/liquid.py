@@ -1,4 +1,4 @@
-"""Metered filling of a tank: its meters, and each step of its runs."""
+"""Metered filling of a tank: meters, and the steps of the runs."""
 
 from dataclasses import dataclass, field
 
@@ -7,29 +7,29 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Meter:
-    """One meter, as its certificate says: true volume = factor x indicated volume.
+    """One meter according to its certificate: true volume = factor x indicated volume.
 
     The standard deviation of a batch v is sqrt((repeatability v)^2 + fixed_m3^2).
 
     Attributes
     ----------
     name : str
-        Of its section in meters.toml.
+        Name of its section in meters.toml.
     factor : float
     u_factor : float
-        Standard uncertainty of the factor, relative.
+        Relative standard uncertainty of the factor.
     repeatability : float
         Standard deviation of a batch, relative to its volume.
     fixed_m3 : float
-        Standard deviation of a batch that does not grow with it.
+        Constant part of the standard deviation of a batch.
     certificate, prover : str
-        Printed when given, else "".
+        Printed if given, else "".
     flow_min_m3_h, flow_max_m3_h : float or None
-        Range of flow that it was proved for.
+        Range of flow rates of the proving.
     factor_after : float or None
-        Proved again after the calibration; None: it was not.
+        Factor proved after the calibration; None: not proved again.
     row : int or None
-        Of its section in the input, for messages.
+        Row of its section in the input, for messages.
     """
 
     name: str
@@ -49,8 +49,8 @@ class Meter:
 class Metering:
     """All runs of a job, n rows in the order of liquid.csv, in SI; nan: not given.
 
-    Rows of one run follow one another, but for rows that are not used; the first of a run has
-    volume 0 and is its start.
+    The rows of one run are consecutive, except for rows that are not used. The first row of a run
+    has volume 0 and is its start.
 
     Attributes
     ----------
@@ -58,48 +58,48 @@ class Metering:
         Row of the input, for messages.
     run, meter : tuple of str, length n
     volume_m3 : ndarray, shape (n,)
-        Indicated, since the row above: positive when filled, negative when emptied, 0 at the start
-        of a run.
+        Indicated volume since the row above: positive when filled, negative when emptied, 0 at the
+        start of a run.
     dip_m : ndarray, shape (n,)
-        As read; nan only at the start of a run: the tank was empty and dry.
+        Dip as read; nan only at the start of a run: the tank was empty and dry.
     s_dip_m : ndarray, shape (n,)
-        Standard deviation of the dip, always given; 0 where the tank was empty and dry.
+        Standard deviation of the dip, always given; 0 if the tank was empty and dry.
     s_volume_m3 : ndarray, shape (n,)
-        Of the batch, in place of what the meter says of it; nan: by the meter.
+        Standard deviation of the batch, which replaces that of the meter; nan: by the meter.
     meter_c, tank_c, shell_c : ndarray, shape (n,)
         Temperatures of the liquid at the meter and in the tank and of the shell, degrees Celsius;
         nan: no correction.
     flow_m3_h : ndarray, shape (n,)
     time : tuple, length n
-        ISO texts or None.
+        Times in ISO format, or None.
     used : ndarray of bool, shape (n,)
-        False: the *dip* of the row is not used; its volume still went in.
+        False: the *dip* of the row is not used; its volume still entered the tank.
     note : tuple, length n
     meters : dict
-        {name: Meter}, those of meters.toml that are read.
+        {name: Meter} of the meters in use.
     density_kg_m3 : float
-        Of the calibrating liquid at density_c.
+        Density of the calibrating liquid at density_c.
     density_c : float
     expansion_per_k : float
-        Of the liquid's volume, 1/K.
+        Cubic thermal expansion of the liquid, 1/K.
     u_density_kg_m3 : float
     u_dip_zero_m : float
-        Standard uncertainty of what all dips have in common.
+        Standard uncertainty of the common error of all dips.
     flex_sd_m3_per_m : float
-        Standard deviation of the prior of the bottom's flexing, m3 for each metre of head.
+        Prior standard deviation of the flexing of the bottom, m3 per metre of head.
     run_sd : float or None
         Relative standard deviation of the run effect; None: estimated, from two runs or more.
     certified : {"joint", "liquid", "geometry"}
-        The table that is printed.
+        Table to be printed.
     u_expansion_per_k : float
         Standard uncertainty of expansion_per_k.
     u_temperature_c : float
         Standard deviation of one temperature.
     u_radius_m : float or None
-        Of an upright tank that liquid alone tells: standard deviation of each course's radius from
-        half the nominal diameter; None: without a nominal diameter.
+        Prior standard deviation of the radius of each course about half the nominal diameter, for a
+        vertical tank calibrated with liquid alone; None: without a nominal diameter.
     file : str
-        Of the rows, for messages.
+        File of the rows, for messages.
     meters_file : str
     """
 
@@ -138,7 +138,7 @@ class Metering:
 
     @property
     def runs(self):
-        """{name of the run: places of its rows, in order}."""
+        """{name of the run: indices of its rows, in order}."""
         places = {}
         for place, run in enumerate(self.run):
             places.setdefault(run, []).append(place)

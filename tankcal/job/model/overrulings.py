@@ -1,25 +1,25 @@
-"""What somebody decided against the search for blunders, or before it."""
+"""Manual decisions against the search for blunders, or before it."""
 
 from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
 class Overruling:
-    """A point of the wall, or a reading of the survey, that was decided by hand.
+    """Manual decision on a point of the wall or on a reading of the survey.
 
     Attributes
     ----------
     point : str or None
-        Its name; None: a reading.
+        Name of the point; None: a reading.
     table, reading_row : str, int or None
-        Table of a reading and its row there; None: a point.
+        Table of a reading and row in the table; None: a point.
     decision : {"keep", "leave_out"}
-        It stays whatever the search says, or is taken out before it.
+        "keep": not rejected by the search; "leave_out": removed before the search.
     reason : str
     by, date : str
         "": not given.
     row, file
-        Where it stands, for messages.
+        Row and file of the decision, for messages.
     """
 
     point: str | None
@@ -34,10 +34,10 @@ class Overruling:
 
     @property
     def is_kept(self):
-        """Does it stay?"""
+        """Return True if the point or reading is kept."""
         return self.decision == "keep"
 
     @property
     def what(self):
-        """What was decided, as it is named in papers."""
+        """Name of the point or reading in reports."""
         return self.point if self.table is None else f"{self.table} {self.reading_row}"

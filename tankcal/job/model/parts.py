@@ -1,4 +1,4 @@
-"""The parts of a tank, and the points of its wall, in SI."""
+"""Parts of a tank, in SI."""
 
 from dataclasses import dataclass, field
 
@@ -15,7 +15,7 @@ class Course:
     height_m : float
         From joint to joint, m.
     thickness_m : float
-        Of its plates, m.
+        Thickness of its plates, m.
     paint_m : float
         Thickness of their paint, m.
     welds_rad : tuple of float or None
@@ -45,11 +45,11 @@ class Ring:
     length_m : float
         Along the axis, m.
     thickness_m : float
-        Of its plates, m.
+        Thickness of its plates, m.
     paint_m : float
         Thickness of their paint, m.
     lap : str or None
-        "inner" or "outer" of lap-jointed rings; None: not known.
+        "inner" or "outer" for lap-jointed rings; None: not known.
     """
 
     name: str
@@ -61,34 +61,34 @@ class Ring:
 
 @dataclass(frozen=True)
 class Bottom:
-    """The bottom of a vertical tank, below or above the bottom of its first course.
+    """Bottom of a vertical tank, below or above the lower edge of its first course.
 
     Attributes
     ----------
     form : str
-        "flat", "leaning" (square to the shell's axis), "cone", "dish", "ellipsoidal",
-        "torispherical", "points" (a surveyed surface), "cloud" (the same, found in scans) or
+        "flat", "leaning" (perpendicular to the axis of the shell), "cone", "dish", "ellipsoidal",
+        "torispherical", "points" (a surveyed surface), "cloud" (a surface measured by scans) or
         "liquid" (measured volumes).
     centre_z_m : float or None
-        Cone, dish and so on: z of the centre in the survey's frame; the edge is at bottom_z_m.
+        Cone, dish and so on: z of the centre in the frame of the survey; the edge is at bottom_z_m.
     xyz_m : ndarray, shape (n, 3)
-        Points: surveyed, in the survey's frame; of a cloud None until its scans are read.
+        Points: surveyed, in the frame of the survey; for a cloud None until its scans are read.
     sd_m : ndarray, shape (n,)
         Standard deviations of their z, or None: not given.
     level_m : ndarray, shape (n,)
-        Liquid: dips, from the table's zero, ascending.
+        Liquid: dips, from the zero of the table, ascending.
     volume_m3 : ndarray, shape (n,)
-        Liquid: the capacity below each level, ascending.
+        Liquid: capacity below each level, ascending.
     u_m3 : ndarray, shape (n,)
-        Their standard uncertainties, or None: not given.
+        Standard uncertainties of the capacities, or None: not given.
     rows : tuple
         Row of each point or level in its file, for messages.
     shared : tuple of survey.results.Cause
-        Cloud: what the heights of its points have in common; each has (n,) m.
+        Cloud: common causes of error of the heights; each has (n,) m.
     dish_radius_m, knuckle_radius_m : float or None
-        Torispherical: where given; else None.
+        Torispherical: radii if given; else None.
     standard : str or None
-        Torispherical: what gives the radii by the diameter; else None.
+        Torispherical: standard that defines the radii from the diameter; else None.
     """
 
     form: str = "flat"
@@ -107,18 +107,18 @@ class Bottom:
 
 @dataclass(frozen=True)
 class Top:
-    """A head on the shell of a vertical tank, which liquid may rise into; sizes inside.
+    """Head on the shell of a vertical tank, which can contain liquid; inside dimensions.
 
     Attributes
     ----------
     form : str
         "cone", "dish", "ellipsoidal" or "torispherical".
     depth_m : float or None
-        Rise of its middle over the top of the shell; None: it follows from radii.
+        Height of its centre above the top of the shell; None: determined by the radii.
     dish_radius_m, knuckle_radius_m : float or None
-        Torispherical: where given; else None.
+        Torispherical: radii if given; else None.
     standard : str or None
-        Torispherical: what gives the radii by the diameter; else None.
+        Torispherical: standard that defines the radii from the diameter; else None.
     """
 
     form: str
@@ -130,12 +130,12 @@ class Top:
 
 @dataclass(frozen=True)
 class Deadwood:
-    """A thing in the tank that takes room (negative volume) or gives some (positive).
+    """Object in the tank that reduces (negative volume) or increases (positive) the capacity.
 
     Attributes
     ----------
     bottom_m, top_m : float
-        Dips, from the table's zero; the volume is linear in height between them.
+        Dips, from the zero of the table; the volume is linear in height between them.
     u_m3 : float or None
         Standard uncertainty of the volume, or None: not given.
     """
@@ -155,11 +155,11 @@ class Roof:
     Attributes
     ----------
     critical_bottom_m, critical_top_m : float
-        Dips, from the table's zero: between them it is partly afloat.
+        Dips, from the zero of the table; between them the roof is partly afloat.
     reference_density_kg_m3 : float
-        Of the liquid that the table is for.
+        Density of the liquid of the table.
     weighing : str
-        "air" or "vacuum": what `mass_kg` was weighed in.
+        "air" or "vacuum": condition of the weighing that gave `mass_kg`.
     """
 
     mass_kg: float
@@ -171,21 +171,21 @@ class Roof:
 
 @dataclass(frozen=True)
 class End:
-    """One end of a horizontal cylinder, bulging outwards; sizes as measured.
+    """One end of a horizontal cylinder, curved outwards; dimensions as measured.
 
     Attributes
     ----------
     kind : str
         "flat", "conical", "ellipsoidal", "torispherical", "spherical" or "guppy".
     depth_m : float
-        Along the axis, from the end of the cylinder; flat: 0; torispherical: 0 where it follows
-        from the radii.
+        Along the axis, from the end of the cylinder; flat: 0; torispherical: 0 if determined by the
+        radii.
     dish_radius_m : float or None
-        Torispherical: radius of the dish (crown), where given; else None.
+        Torispherical: radius of the dish (crown) if given; else None.
     knuckle_radius_m : float or None
-        Torispherical: radius of the knuckle, where given; else None.
+        Torispherical: radius of the knuckle if given; else None.
     standard : str or None
-        Torispherical: what gives the radii by the diameter; else None.
+        Torispherical: standard that defines the radii from the diameter; else None.
     """
 
     kind: str
@@ -200,32 +200,32 @@ class End:
 
 @dataclass(frozen=True)
 class Horizontal:
-    """A horizontal cylinder between its ends A and B; sizes as measured, on the side of the survey.
+    """Horizontal cylinder between its ends A and B; dimensions on the side of the survey.
 
     Attributes
     ----------
     length_m : float
-        Of the cylinder, without the ends; the same inside and outside.
+        Length of the cylinder without the ends; equal inside and outside.
     width_m, height_m : float or None
-        Of its cross-section, equal when round; None: they come from the points or the straps.
+        Width and height of its cross-section, equal if round; None: from the points or the straps.
     tilt : float or None
         Rise of end B over end A per metre of axis, tan of the angle; None: from the points.
     roll_rad : float
-        Turn of the cross-section about the axis, clockwise seen from A.
+        Rotation of the cross-section about the axis, clockwise seen from A.
     dip_from_a_m : float
-        Of the dip point, along the axis from the start of the cylinder at A.
+        Position of the dip point along the axis, from the end A of the cylinder.
     dip_direction : str
-        Dips are read "plumb", or "square" to the axis.
+        Direction of the dips: "plumb", or "square" to the axis.
     thickness_m : float
-        Plate and paint, to be subtracted from what was measured outside; of strapped rings those of
-        the ends.
+        Thickness of plate and paint, subtracted from outside dimensions; for strapped rings,
+        thickness of the ends.
     azimuth_rad : float or None
         Direction from A to B, clockwise from +y; None: no points.
     tube_angle_rad : float or None
-        Of the gauge tube off the plumb, square to the axis; its top to the right, seen from A;
-        None: plumb.
+        Inclination of the gauge tube perpendicular to the axis; positive: its top is to the right,
+        seen from A; None: plumb.
     tube_offset_m : float or None
-        Distance at which the tube passes the axis, to the right of it, seen from A; None: 0.
+        Distance of the tube from the axis, positive to the right, seen from A; None: 0.
     """
 
     length_m: float
@@ -256,13 +256,15 @@ class Sphere:
     Attributes
     ----------
     diameter_m : float or None
-        As measured, on the side of the survey; None: it comes from the points.
+        Diameter as measured, on the side of the survey; None: from the points.
     thickness_m : float
-        Plate and paint, to be subtracted from what was measured outside.
+        Thickness of plate and paint, subtracted from outside dimensions.
     ovality_m : float or None
-        Standard deviation of its degree 2 where no strap tells it; None: a share of its radius.
+        Prior standard deviation of its degree 2, for directions without straps; None: a share of
+        its radius.
     form_m : float or None
-        Of its radius beyond that; None: as `geometry.field.places` assumes.
+        Prior standard deviation of its radius in higher degrees; None: as in
+        `geometry.field.places`.
     """
 
     diameter_m: float | None
@@ -273,24 +275,24 @@ class Sphere:
 
 @dataclass(frozen=True)
 class Ship:
-    """What a ship adds to a tank of a mesh: how she lies, and the pipe that is sounded.
+    """Attitudes and sounding pipe of a tank of a ship, in addition to its mesh.
 
     Attributes
     ----------
     trim_m : tuple of float
-        Draught aft less draught forward, of the tables of corrections, ascending.
+        Draught aft less draught forward, for the tables of corrections, ascending.
     length_between_marks_m : float
-        Of the draughts.
+        Distance between the marks of the draughts.
     list_rad : tuple of float
-        To starboard, ascending.
+        List to starboard, ascending.
     bow_azimuth_rad : float
-        Clockwise from +y of the mesh's frame.
+        Azimuth of the bow, clockwise from +y of the frame of the mesh.
     pipe_bottom_m, pipe_top_m : tuple of float
-        Ends of the sounding pipe in the mesh's frame.
+        Ends of the sounding pipe in the frame of the mesh.
     correction_step_m : float or None
-        Of the soundings of corrections; None: chosen.
+        Step of the soundings in tables of corrections; None: automatic.
     contraction : float or None
-        Share by which all lengths are shorter in service than as measured; None: not given.
+        Relative contraction of all lengths from measurement to service; None: not given.
     """
 
     trim_m: tuple[float, ...]
@@ -312,9 +314,9 @@ class Mesh:
     file : str
         Name of its file.
     unit_m : float
-        Length of one unit of it, m.
+        Length of one unit of its coordinates, m.
     data : bytes
-        What the file holds.
+        Content of the file.
     """
 
     file: str

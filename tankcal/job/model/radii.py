@@ -1,4 +1,4 @@
-"""Radii of courses that a former table, a record or a declaration gives, and their change."""
+"""Radii of courses from a former table, a record or a declaration, and their change."""
 
 from dataclasses import dataclass
 
@@ -7,27 +7,27 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Radii:
-    """Radii of the courses of an upright tank, from the bottom up.
+    """Radii of the courses of a vertical tank, from the bottom up.
 
-    Each is that of the circle of the course's mean area, inside, the shell empty.
+    Each radius belongs to the circle with the mean area of the course, inside, with the tank empty.
 
     Attributes
     ----------
     radius_m : ndarray, shape (courses,)
         nan: not known; the course was measured again.
     covariance_m2 : ndarray, shape (courses, courses)
-        Of what they do not have in common, m2; of a radius that is not known 0.
+        Covariance matrix without the common component, m2; 0 for radii not known.
     u_common_m : float
-        Standard uncertainty that all have in common.
+        Standard uncertainty of the common component.
     temperature_c : float
-        Of the shell that they are for.
+        Temperature of the shell at which the radii hold.
     source : {"table", "record", "declared"}
-        Where they come from.
+        Origin of the radii.
     note : str
         Printed.
     file : str
     row : tuple of int or None
-        Of each course in that file.
+        Row of each course in that file.
     """
 
     radius_m: np.ndarray
@@ -41,16 +41,22 @@ class Radii:
 
     @property
     def is_known(self):
-        """(courses,) where a radius was given."""
+        """True for each course with a known radius, shape (courses,)."""
         return np.isfinite(self.radius_m)
 
 
 @dataclass(frozen=True)
 class Change:
-    """How radii may have changed since they were measured: standard uncertainties, m.
+    """Standard uncertainties of the change of radii since their measurement.
 
-    common_m, own_m  of all together, and of each for itself
-    shared_m         what the former radii and the new survey have in common
+    Attributes
+    ----------
+    common_m : float
+        Common change of all radii, m.
+    own_m : float
+        Independent change of each radius, m.
+    shared_m : float
+        Common component of the errors of the former radii and of the new survey, m.
     """
 
     common_m: float

@@ -1,4 +1,4 @@
-"""What job.toml says of tank, survey, datum, table and shell, in SI."""
+"""Settings of tank, survey, datum, table and shell, in SI."""
 
 from dataclasses import dataclass, field
 
@@ -6,21 +6,21 @@ import numpy as np
 
 from tankcal.text.languages import DEFAULT
 
-# What a job declares about uncertainty, in SI.
+# Declared inputs of uncertainty and volumes to be reported.
 
 
 @dataclass(frozen=True)
 class DeclaredInput:
-    """A standard uncertainty that the survey itself does not carry: a row of uncertainty.csv.
+    """A standard uncertainty that is not part of the survey: a row of uncertainty.csv.
 
-    u is SI (dimensionless for "scale", "tilt" and "deadwood", m, K, 1/K, Pa, kg, kg/m3, m3), of a
-    t distribution what `u_is` says, "scale" or "sd"; `u_as_read` is the same in
-    `unit`, as the user wrote it.
+    u is in SI units (dimensionless for "scale", "tilt" and "deadwood", else m, K, 1/K, Pa, kg,
+    kg/m3 or m3). For a t distribution, `u_is` states whether u is its "scale" or its "sd".
+    `u_as_read` is the value in `unit`, as given by the user.
 
     Attributes
     ----------
     is_default : bool
-        True: nobody declared it, tankcal assumes it.
+        True: not declared, but assumed by tankcal.
     """
 
     name: str
@@ -37,16 +37,16 @@ class DeclaredInput:
 
 @dataclass(frozen=True)
 class StatedVolume:
-    """A dip whose volume is reported with its budget; with low_m a delivery (stated.csv).
+    """Dip whose volume is reported with its budget; with low_m, a delivery (stated.csv).
 
     Attributes
     ----------
     high_m, low_m : float
-        Dips, from the table's zero.
+        Dips, from the zero of the table.
     volume_m3 : float or None
-        That another table or a contract states, or None.
+        Volume stated by another table or a contract, or None.
     row, file : int or None
-        Where it stands; a sheet of a workbook is "sheet stated".
+        Row and file; a sheet of a workbook is "sheet stated".
     """
 
     high_m: float
@@ -59,14 +59,14 @@ class StatedVolume:
 
 @dataclass(frozen=True)
 class Tank:
-    """The tank: its kind, nominal sizes (None: not given), and what is printed about it.
+    """The tank: kind, nominal dimensions (None: not given), and texts for the report.
 
     Attributes
     ----------
     kind : str
         "vertical", "horizontal", "sphere" or "mesh".
     details : dict
-        Owner, location, product, ...: text, printed when given.
+        Owner, location, product, ...: texts that are printed if given.
     """
 
     id: str
@@ -79,14 +79,14 @@ class Tank:
 
 @dataclass(frozen=True)
 class Survey:
-    """The survey: `date` ISO text, temperature of the shell degC, liquid that was in the tank.
+    """The survey: `date` in ISO format, shell temperature in degrees C, liquid in the tank.
 
     Attributes
     ----------
     side : str
-        "outside" or "inside": where points and sizes were measured.
+        "outside" or "inside": side of the wall on which points and dimensions were measured.
     liquid_level_m : float or None
-        Dip of the survey day, from the table's zero; None or 0: empty.
+        Dip on the day of the survey, from the zero of the table; None or 0: empty.
     pressure_pa : float or None
         Gauge pressure in a sphere on that day; None: none.
     """
@@ -101,16 +101,16 @@ class Survey:
 
 @dataclass(frozen=True)
 class Datum:
-    """Heights in the survey's frame, m.
+    """Heights in the frame of the survey, m.
 
     Attributes
     ----------
     bottom_z_m : float or None
-        Bottom of the first course of a vertical tank. Horizontal cylinder and sphere without
-        points: 0, for z then counts from the inside bottom beneath the dip point; with points,
-        and for a mesh: None, the tank's own lowest point.
+        Lower edge of the first course of a vertical tank. Horizontal cylinder and sphere without
+        points: 0, because z counts from the inside bottom beneath the dip point. With points, and
+        for a mesh: None; the lowest point of the tank applies.
     dip_plate_z_m : float or None
-        The dip plate, which is the table's zero; None: the zero is the bottom.
+        Dip plate, the zero of the table; None: the bottom is the zero.
     """
 
     bottom_z_m: float | None
@@ -121,23 +121,23 @@ class Datum:
 
     @property
     def plate_level_m(self):
-        """Level of the dip plate above the bottom of the first course, m; 0 where none is given."""
+        """Level of the dip plate above the bottom of the first course, m; 0 if not given."""
         return 0.0 if self.dip_plate_z_m is None else self.dip_plate_z_m - self.bottom_z_m
 
 
 @dataclass(frozen=True)
 class TableSpec:
-    """What the capacity table is to be.
+    """Specification of the capacity table.
 
     Attributes
     ----------
     step_m : float or None
-        None: given by `height_unit`, or chosen so that linear interpolation errs by at most
+        None: given by `height_unit`, or chosen so that the error of linear interpolation is at most
         `max_interpolation_error_m3`.
     reference_temperature_c : float
-        Of the shell.
+        Reference temperature of the shell.
     liquid_density_kg_m3 : float
-        Of the liquid head; 0: no head.
+        Density of the liquid for the head correction; 0: no head.
     height_unit : str
         "m", "ft-in-8" or "ft-in-16" (rows of 1/8 and 1/16 inch).
     volume_unit : str
@@ -147,17 +147,17 @@ class TableSpec:
     fine_step_m, fine_zones : float or None
         Smaller step between the dips of each (low_m, high_m), ascending.
     max_interpolation_error_m3 : float or None
-        Bound of the error of linear interpolation between rows; or None.
+        Limit of the error of linear interpolation between rows; or None.
     height_expansion : bool
-        Whether dips expand with the shell, too.
+        True: dips are corrected for the thermal expansion of the shell.
     rule : str or None
-        Name of the decision rule, as written (`Job.rule` has it); or None.
+        Name of the decision rule, as written (`Job.rule` contains the rule); or None.
     minimum_delivery_m : tuple of float or None
-        Heights of the least deliveries to be reported; None: not given.
+        Heights of the minimum deliveries to be reported; None: not given.
     monte_carlo : bool
-        Whether the model is drawn from, too.
+        True: also simulate the model by the Monte Carlo method.
     pressure_pa : float or None
-        Gauge pressure in a sphere that the table is for; None: none.
+        Gauge pressure in a sphere for the table; None: none.
     """
 
     step_m: float | None
@@ -180,14 +180,14 @@ class TableSpec:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What an inspection of the tank is to know.
+    """Input of an inspection of the tank.
 
     Attributes
     ----------
     rule : str or None
-        Name of the rule that it is judged by, as written; None: the usual one.
+        Name of the rule of the assessment, as written; None: the default.
     yield_pa : float or None
-        Yield stress of the shell's steel, Pa; None: not given.
+        Yield stress of the steel of the shell, Pa; None: not given.
     """
 
     rule: str | None = None
@@ -196,12 +196,12 @@ class Inspection:
 
 @dataclass(frozen=True)
 class Switches:
-    """Which corrections are made; one that is off is named in the report.
+    """Corrections to be applied; the report names those that are switched off.
 
     Attributes
     ----------
     plate, paint, temperature, head, tilt, bottom, deadwood, roof, top : bool
-        False: that correction is not made.
+        False: the correction is not applied.
     """
 
     plate: bool = True
@@ -219,16 +219,16 @@ class Switches:
 
 @dataclass(frozen=True)
 class Material:
-    """The shell's steel.
+    """Material of the shell.
 
     Attributes
     ----------
     e_pa : float
         Young's modulus, Pa.
     expansion_per_k : float
-        Thermal expansion, 1/K.
+        Coefficient of linear thermal expansion, 1/K.
     expansion_given : bool
-        False: the default was taken, and the report says so.
+        False: the default is used, and the report states it.
     poisson : float or None
         Poisson's ratio of the wall of a sphere; None: 0.3.
     """

@@ -1,6 +1,7 @@
-"""The starter job of `tankcal new`: an empty form, as a folder of text files and as a workbook.
+"""Starter job of `tankcal new`: an empty form, as a folder of text files or as a workbook.
 
-Both are written from the lists of `tankcal.job.contract`, so that they name every key and column.
+Both are written from the lists of `tankcal.job.contract`, so that they contain every key and
+column.
 """
 
 from tankcal.job.starter.writing import FilledForm, write_form, write_input_workbook, write_starter

@@ -1,4 +1,4 @@
-"""The input workbook: a cover, a sheet of settings, and a sheet for each table and list."""
+"""Input workbook: a cover, a sheet of settings, and a sheet for each table and list."""
 
 import datetime
 import io
@@ -13,13 +13,25 @@ from tankcal.job.starter.table_sheet import write_table
 from tankcal.job.starter.texts import texts_in
 from tankcal.job.tables import REGISTERS, SETTINGS_SHEET
 
-# The sheets that explain: the cover, and the inputs of uncertainty that may be declared.
+# Sheets with explanations: the cover, and the inputs of uncertainty.
 
-_WIDTHS = (4, 22, 78)
+_WIDTHS = (4, 22, 78)  # columns of the cover, characters
 
 
 def write_cover(sheet, form, texts, look):
-    """Write how the workbook is filled in, what the colours say, and a list of its sheets."""
+    """Write instructions, a legend of the colours, and a list of the sheets.
+
+    Parameters
+    ----------
+    sheet : xlsxwriter worksheet
+        Sheet to be written.
+    form : Form
+        Kind of tank and of survey.
+    texts : Texts
+        Texts of the language.
+    look : Look
+        Formats.
+    """
     for column, width in enumerate(_WIDTHS):
         sheet.set_column(column, column, width)
     sheet.hide_gridlines(2)
@@ -61,38 +73,38 @@ def _write_contents(sheet, row, form, texts, look):
         sheet.write_string(row, column, texts.of("cover", code), look.optional)
     for name in (SETTINGS_SHEET, *form.registers, *form.tables):
         row += 1
-        said = texts.of("titles", name)
+        text = texts.of("titles", name)
         if name != SETTINGS_SHEET:
             group = "registers" if name in REGISTERS else "tables"
-            said = f"{said}: {texts.note(group, name)}"
+            text = f"{text}: {texts.note(group, name)}"
         sheet.write_url(row, 1, f"internal:'{name}'!A1", look.link, name)
-        sheet.write_string(row, 2, said, look.wrapped)
-        sheet.set_row(row, LINE_PT * 1.1 * lines_of(said, _WIDTHS[2] * 0.85) + 3)
+        sheet.write_string(row, 2, text, look.wrapped)
+        sheet.set_row(row, LINE_PT * 1.1 * lines_of(text, _WIDTHS[2] * 0.85) + 3)
 
 
 def write_inputs(sheet, form, texts, look):
-    """Write the list of the inputs of uncertainty of this kind of tank, with their units."""
+    """Write the inputs of uncertainty of this kind of tank; parameters as for `write_cover`."""
     for column, width in enumerate((22, 58, 10, 24)):
         sheet.set_column(column, column, width)
     sheet.write_string(0, 0, texts.of("cover", "inputs"), look.title)
     sheet.write_string(1, 0, texts.of("cover", "inputs_note"), look.plain)
     for column, code in enumerate(("input", "what", "unit", "assumed")):
         sheet.write_string(3, column, texts.of("inputs", code), look.optional)
-    for row, (name, one) in enumerate(form.inputs.items(), 4):
+    for row, (name, declarable) in enumerate(form.inputs.items(), 4):
         code = "deadwood_share" if name == "deadwood" else name
         sheet.write_string(row, 0, name, look.code)
         sheet.write_string(row, 1, texts.words["inputs"][code], look.wrapped)
-        sheet.write_string(row, 2, one.unit, look.unit)
-        sheet.write_string(row, 3, texts.assumption(one), look.plain)
+        sheet.write_string(row, 2, declarable.unit, look.unit)
+        sheet.write_string(row, 3, texts.assumption(declarable), look.plain)
     sheet.freeze_panes(4, 0)
     print_on_a4(sheet, texts)
 
 
-_NO_DAY = datetime.datetime(2000, 1, 1)  # the same form gives the same bytes
+_NO_DAY = datetime.datetime(2000, 1, 1)  # constant, so that equal forms give equal files
 
 
 def book_bytes(form):
-    """The empty workbook of a Form as bytes."""
+    """Empty workbook of a Form, as bytes."""
     texts, data = texts_in(form.language), io.BytesIO()
     with xlsxwriter.Workbook(data) as book:
         book.set_properties({"title": texts.of("cover", "title"), "created": _NO_DAY})
@@ -111,7 +123,7 @@ def book_bytes(form):
 
 
 def _sections(form, texts):
-    """The groups of the sheet job; the marks of CSV files are of no use to a workbook."""
+    """Groups of the sheet job; a workbook needs no marks of CSV files."""
     return [
         Group(
             section,
@@ -133,7 +145,7 @@ def _sections(form, texts):
 
 
 def _entries(register, form, texts):
-    """A group of the sheet cameras or instruments for each of them."""
+    """One group for each entry of a sheet such as cameras."""
     return [
         Group(
             name,

@@ -1,4 +1,4 @@
-"""Examples that an input workbook shows in grey; none of them is ever read."""
+"""Examples shown in grey in an input workbook; they are never read."""
 
 EXAMPLES_OF_KEYS = {
     "tank.id": "T-17",

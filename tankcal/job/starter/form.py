@@ -1,4 +1,4 @@
-"""What a starter job has: its tables, lists and keys by the kind of tank and of survey."""
+"""Content of a starter job: tables, lists and keys, by the kind of tank and of survey."""
 
 from dataclasses import dataclass
 
@@ -19,20 +19,34 @@ from tankcal.job.contract.uncertainty import UNITS
 from tankcal.job.fields import Field
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
-STRAPPED = ("strapping", "reference-line")  # surveys that are not adjusted as points
-METERED = "liquid"  # a survey of every kind of tank
-DECLARED = "radii"  # no survey, but what a former table, a record or somebody says
-OF_SHELLS = (*STRAPPED, "wall-hits", "tangents", DECLARED)  # upright, or SURVEYS_OF_KIND
+STRAPPED = ("strapping", "reference-line")  # surveys without an adjustment of points
+METERED = "liquid"  # survey for every kind of tank
+DECLARED = "radii"  # radii of a former table, a record or a declaration
+# Surveys for vertical tanks; for other kinds see SURVEYS_OF_KIND.
+OF_SHELLS = (*STRAPPED, "wall-hits", "tangents", DECLARED)
 OF_GREAT_CIRCLES = (("sphere", "ovality_mm"), ("sphere", "form_mm"))
-DECIMAL_COMMAS = {"separator": ";", "decimal": ","}  # as spreadsheets in these languages write CSV
-PLACEHOLDER = "NAME"  # of a camera or an instrument
+# Marks of CSV files from spreadsheets in these languages.
+DECIMAL_COMMAS = {"separator": ";", "decimal": ","}
+PLACEHOLDER = "NAME"  # replaces the name of a camera or an instrument
 
 
 @dataclass(frozen=True)
 class Form:
-    """Kind of tank, kind of survey (None: surveyed points), language of the papers.
+    """Kind of tank, kind of survey and language of a starter job.
 
-    Raises ValueError for what there is not.
+    Attributes
+    ----------
+    kind : str
+        Kind of tank.
+    survey : str or None
+        Kind of survey; None: surveyed points.
+    language : str
+        Language of the report.
+
+    Raises
+    ------
+    ValueError
+        For an unknown value, or a survey that the kind of tank does not have.
     """
 
     kind: str
@@ -52,7 +66,7 @@ class Form:
 
     @property
     def tables(self):
-        """Names of its tables; those of a survey stand in place of the points."""
+        """Names of its tables; the tables of a survey replace the points."""
         of_tank = TABLES_OF_KIND[self.kind]
         if self.survey is None:
             return of_tank
@@ -63,12 +77,12 @@ class Form:
 
     @property
     def registers(self):
-        """Names of its lists of cameras and instruments."""
+        """Names of its lists, such as cameras and instruments."""
         return REGISTERS_OF_SURVEY.get(self.survey, ())
 
     @property
     def keys(self):
-        """{section: its fields}; sections without any are left out."""
+        """{section: its fields}, without empty sections."""
         suiting = {
             section: [field for field in fields if self._has(section, field)]
             for section, fields in KEYS.items()
@@ -77,11 +91,13 @@ class Form:
 
     @property
     def inputs(self):
-        """{name: Declarable} of the inputs of uncertainty that bear on this kind of tank."""
-        return {name: one for name, one in INPUTS.items() if self.kind in one.kinds}
+        """{name: Declarable} of the inputs of uncertainty for this kind of tank."""
+        return {
+            name: declarable for name, declarable in INPUTS.items() if self.kind in declarable.kinds
+        }
 
     def start(self, section, field):
-        """What the form has in the place of a key; "" for nothing."""
+        """Initial value of a key; "" if blank."""
         if (section, field.name) == ("tank", "kind"):
             return self.kind
         if (section, field.name) == ("table", "language") and self.language != DEFAULT:
@@ -99,30 +115,30 @@ class Form:
         return field.start
 
     def is_to_fill_in(self, section, field):
-        """Is it a key that must be given, and has nothing yet?"""
+        """Return True if the key is required and has no initial value."""
         return field.is_required(self.kind) and not self.start(section, field)
 
     def entries(self, register):
-        """{name: {key: text}} of what a list of cameras or instruments has beforehand."""
+        """{name: {key: text}} of the initial entries of a list."""
         return {PLACEHOLDER: {}}
 
     def fields(self, register, given):
-        """The fields of an entry: the usual ones, and those that it has under names of its own."""
+        """Fields of an entry: the usual fields, and those named by the user."""
         usual = REGISTER_KEYS[register]
         others = given.keys() - {field.name for field in usual}
         return (*usual, *(Field(name, "numbers", "") for name in given if name in others))
 
     def rows(self, table):
-        """What a table has beforehand: a {column: text} for each row."""
+        """Initial rows of a table: a {column: text} for each row."""
         return ()
 
     def choices(self, table, field):
-        """What may be chosen in a column; of the inputs of uncertainty those of this tank."""
+        """Choices of a column; for inputs of uncertainty, the inputs of this tank."""
         suiting = self.inputs
         if table in ("uncertainty", "correlations") and set(field.choices) <= set(INPUTS):
             return tuple(name for name in field.choices if name in suiting)
         if field.choices == UNITS:
-            return tuple(dict.fromkeys(one.unit for one in suiting.values()))
+            return tuple(dict.fromkeys(declarable.unit for declarable in suiting.values()))
         return field.choices
 
     def _has(self, section, field):

@@ -1,16 +1,17 @@
-"""Formats of the cells of an input workbook, and how its sheets are printed."""
+"""Cell formats of an input workbook, and its page layout."""
 
 DARK, LIGHT, YELLOW, GREY, INK = "#1F4E79", "#DCE6F1", "#FFF2CC", "#7F7F7F", "#404040"
 _FONT = {"font_name": "Arial", "font_size": 10}
 _EXAMPLE = {"italic": True, "font_color": GREY}
-_NUMBERS = {"text": "@", "date": "yyyy-mm-dd"}  # text: 1-2 stays a name, and becomes no date
-A4 = 9
-LETTERS_TO_LINE = 1.45  # letters of a small font in one unit of a column's width
-LINE_PT = 12.0
+# The text format keeps the name 1-2 from becoming a date.
+_NUMBERS = {"text": "@", "date": "yyyy-mm-dd"}
+A4 = 9  # code of the paper size
+LETTERS_TO_LINE = 1.45  # letters of the small font in one unit of column width
+LINE_PT = 12.0  # height of a line
 
 
 class Look:
-    """Formats by their names, each made once."""
+    """Named formats, each created once."""
 
     def __init__(self, book):
         self._book, self._made = book, {}
@@ -36,23 +37,23 @@ class Look:
         )
 
     def cell(self, kind, is_to_fill_in=False):
-        """Of a cell to type in: kind is "number", "text" or "date"."""
+        """Format of an input cell; kind is "number", "text" or "date"."""
         given = {"align": "left", "bg_color": YELLOW} if is_to_fill_in else {"align": "left"}
         return self.row(kind, **given)
 
     def row(self, kind, **more):
-        """Of a cell of one of the first rows of a table, ruled as a form is."""
+        """Format of a ruled cell in the first rows of a table."""
         given = {"border": 1, "border_color": "#BFBFBF", "valign": "vcenter"} | more
         if kind in _NUMBERS:
             given["num_format"] = _NUMBERS[kind]
         return self._format(**given)
 
     def column(self, kind):
-        """Of a column of values."""
+        """Format of a column of values."""
         return self._format(**({"num_format": _NUMBERS[kind]} if kind in _NUMBERS else {}))
 
     def example(self, **more):
-        """Of an example, which is never read."""
+        """Format of an example, which is never read."""
         return self._format(**_EXAMPLE, valign="vcenter", **more)
 
     def _heading(self, fill, ink):
@@ -68,12 +69,12 @@ class Look:
 
 
 def type_of_cell(field):
-    """The format that keeps what will be typed there: "number", "date" or "text"."""
+    """Cell format for the values of a field: "number", "date" or "text"."""
     return {"number": "number", "flag": "number", "date": "date"}.get(field.kind, "text")
 
 
 def print_on_a4(sheet, texts, is_landscape=False):
-    """A4, one page wide, with the sheet's name and the number of the page below."""
+    """Print on A4, one page wide, with the name of the sheet and the page number below."""
     sheet.set_paper(A4)
     if is_landscape:
         sheet.set_landscape()
@@ -83,15 +84,15 @@ def print_on_a4(sheet, texts, is_landscape=False):
 
 
 def opened(text):
-    """A note with a capital letter."""
+    """Note with a capital letter."""
     return text[:1].upper() + text[1:]
 
 
 def lines_of(text, width):
-    """How many lines a text takes in the small font of a note, in a column of this width."""
-    room, lines, length = width * LETTERS_TO_LINE, 1, 0
+    """Number of lines of a text in the small font, in a column of this width."""
+    letters, lines, length = width * LETTERS_TO_LINE, 1, 0
     for word in text.split():
-        if length and length + 1 + len(word) > room:
+        if length and length + 1 + len(word) > letters:
             lines, length = lines + 1, 0
         length += len(word) + (1 if length else 0)
     return lines

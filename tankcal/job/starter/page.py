@@ -1,9 +1,9 @@
-"""docs/job-format.md: what the contract knows of each key and column, filled into its tables.
+"""Update of the tables of keys and columns in docs/job-format.md from the contract.
 
-A table of the page stands beneath a heading that names its owners: `### [datum]`, `### points.csv`.
-Its first column has the names, bold where they must be filled in, its last one the values that they
-take; both come from the contract. What stands between them is prose, and is kept. A key or column
-that the page does not have yet gets a row with its note; one that is gone loses its row.
+The heading above a table names its sections and files: `### [datum]`, `### points.csv`. The
+contract gives the first column (names, bold if required) and the last column (accepted values). The
+text between them is kept. A new key or column gets a row with its note; the row of a key or column
+that no longer exists is removed.
 
     python -m tankcal.job.starter.page docs/job-format.md
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 
 LAST = "values"
-MANY = 6  # choices, which then stand in the prose
+MANY = 6  # a field with more choices lists them in the text of the page
 _OWNER = re.compile(r"\[([a-z.]+)\]|(\w+)\.(?:csv|toml)")
 _NAME = re.compile(r"(?:\*\*)?`([^`]+)`(?:\*\*)?")
 _HEAD = re.compile(r"\| (key|column) \| what it is \|")
@@ -37,17 +37,17 @@ _OF_KIND = {
 
 
 def filled_page(text):
-    """The page with its tables of keys and columns as the contract has them.
+    """Page with updated tables of keys and columns.
 
     Parameters
     ----------
     text : str
-        docs/job-format.md as it is.
+        Content of docs/job-format.md.
 
     Returns
     -------
     str
-        The same text where nothing is stale.
+        Updated content; equal to `text` if the page is up to date.
     """
     lines, owners, table = [], {}, None
     for line in [*text.split("\n"), ""]:
@@ -66,7 +66,7 @@ def filled_page(text):
 
 
 def values_of(field):
-    """What a key or a column takes: its bounds, its words, or its kind."""
+    """Accepted values of a key or a column: bounds, words or kind."""
     if field.kind in ("number", "numbers"):
         words = [_bounds(field), *(f"`{choice}`" for choice in field.choices)]
         return " or ".join(word for word in words if word) or field.kind
@@ -90,7 +90,7 @@ def _bounds(field):
 
 
 def _fields_beneath(heading):
-    """{name: fields} of the sections and files that a heading names, in their order."""
+    """{name: fields} of the sections and files in a heading, in their order."""
     fields = {}
     for section, file in _OWNER.findall(heading):
         known = KEYS.get(section) or COLUMNS.get(file) or REGISTER_KEYS.get(file, ())
@@ -102,25 +102,25 @@ def _fields_beneath(heading):
 def _filled_table(table, fields):
     head = " | ".join(table[0].strip("| ").split(" | ")[:2])
     rows = [cells for line in table[2:] if (cells := _filled_row(line, fields))]
-    there = [set(_NAME.findall(row[0])) for row in rows]
-    before = None
+    names_of_rows = [set(_NAME.findall(row[0])) for row in rows]
+    previous = None
     for name, known in fields.items():
-        if not any(name in names for names in there):
-            at = next((k + 1 for k, names in enumerate(there) if before in names), 0)
+        if not any(name in names for names in names_of_rows):
+            at = next((k + 1 for k, names in enumerate(names_of_rows) if previous in names), 0)
             note = known[0].note
             rows.insert(at, (_shown(name, fields), note, _values_of_all([name], fields)))
-            there.insert(at, {name})
-        before = name
+            names_of_rows.insert(at, {name})
+        previous = name
     return [f"| {head} | {LAST} |", "| --- | --- | --- |", *(f"| {' | '.join(r)} |" for r in rows)]
 
 
 def _filled_row(line, fields):
-    """Three cells; None where no name of the row is one of the contract."""
+    """Three cells of a row; None if the contract has none of its names."""
     first, prose = (cell.strip() for cell in line[1:].split("|")[:2])
     names = [name for name in _NAME.findall(first) if name in fields]
-    for gone in set(_NAME.findall(first)) - set(names):
-        first = re.sub(rf"(?:, )?(?:\*\*)?`{re.escape(gone)}`(?:\*\*)?", "", first).strip(", ")
-    shown = _NAME.sub(lambda found: _shown(found[1], fields), first)
+    for obsolete in set(_NAME.findall(first)) - set(names):
+        first = re.sub(rf"(?:, )?(?:\*\*)?`{re.escape(obsolete)}`(?:\*\*)?", "", first).strip(", ")
+    shown = _NAME.sub(lambda match: _shown(match[1], fields), first)
     return (shown, prose, _values_of_all(names, fields)) if names else None
 
 

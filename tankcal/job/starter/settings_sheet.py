@@ -1,4 +1,4 @@
-"""The sheets of settings: job, cameras and instruments, one row for each key."""
+"""Sheets of settings: job, cameras and instruments, one row for each key."""
 
 import datetime
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _WIDTHS = {_MARK: 3, _NOTE: 52, _VALUE: 28, _UNIT: 8, _EXAMPLE: 16, _OWNER: 17, 
 
 @dataclass(frozen=True)
 class Entry:
-    """One row: a key, its note, what stands there at first, and an example or None."""
+    """One row: a key, its note, its initial value, and an example or None."""
 
     field: Field
     note: str
@@ -30,7 +30,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Group:
-    """Rows of one section, camera or instrument, under a title or None."""
+    """Rows of one section, camera or instrument, below a title or None."""
 
     owner: str
     title: str | None
@@ -40,9 +40,20 @@ class Group:
 def write_settings(sheet, name, owner, groups, texts, look):
     """Write an empty sheet of settings.
 
-    name    of the sheet
-    owner   heading of the column of sections: "section", "camera" or "instrument"
-    groups  Groups, from the top down
+    Parameters
+    ----------
+    sheet : xlsxwriter worksheet
+        Sheet to be written.
+    name : str
+        Name of the sheet.
+    owner : str
+        Heading of the column of sections: "section", "camera" or "instrument".
+    groups : sequence of Group
+        Rows, from the top down.
+    texts : Texts
+        Texts of the language.
+    look : Look
+        Formats.
     """
     for column, width in _WIDTHS.items():
         sheet.set_column(column, column, width)

@@ -1,4 +1,4 @@
-"""The sheet of one table: explanations and examples above and below the row of headings."""
+"""Sheet of one table: explanations and examples above and below the row of headings."""
 
 from xlsxwriter.utility import xl_rowcol_to_cell
 
@@ -8,16 +8,30 @@ from tankcal.job.starter.look import LINE_PT, YELLOW, lines_of, opened, print_on
 from tankcal.job.starter.texts import is_number, parted
 from tankcal.job.starter.validation import rule_of
 
-MARK = "#"  # in the first cell of a row: it is not read
+MARK = "#"  # in the first cell of a row that is not read
 TITLE, NOTE, RULE, NOTES, LABELS, UNITS, CODES, FIRST_EXAMPLE = range(8)
-LAST_ROW = 1_048_575
-_MARK_WIDTH = 6
-_RULED_ROWS = 20
-_PORTRAIT_WIDTH, _LANDSCAPE_WIDTH = 95, 180
+LAST_ROW = 1_048_575  # last row in Excel, counted from 0
+_MARK_WIDTH = 6  # width of the column of marks, characters
+_RULED_ROWS = 20  # number of ruled rows of an empty table
+_PORTRAIT_WIDTH, _LANDSCAPE_WIDTH = 95, 180  # widest sheets of a page, characters
 
 
 def write_table(sheet, table, form, texts, look):
-    """Write the empty sheet of a table of a Form."""
+    """Write the empty sheet of a table.
+
+    Parameters
+    ----------
+    sheet : xlsxwriter worksheet
+        Sheet to be written.
+    table : str
+        Name of the table.
+    form : Form
+        Kind of tank and of survey.
+    texts : Texts
+        Texts of the language.
+    look : Look
+        Formats.
+    """
     fields = columns_of(table, form.kind)
     examples = EXAMPLES_OF_TABLES[table]
     first_row = FIRST_EXAMPLE + len(examples)
@@ -55,11 +69,11 @@ def write_table(sheet, table, form, texts, look):
 
 
 def _widths(fields, notes):
-    """Of the columns, in letters: more for a long note, less where the sheet would be too wide."""
+    """Widths of the columns, characters: larger for a long note, limited by the page."""
     least = [max(12, len(field.name) + 1) for field in fields]
     wished = [min(34, 9 + len(note) / 6) for note in notes]
     share = min(1.0, _LANDSCAPE_WIDTH / sum(map(max, least, wished)))
-    return [max(one, share * wish) for one, wish in zip(least, wished, strict=True)]
+    return [max(minimum, share * wish) for minimum, wish in zip(least, wished, strict=True)]
 
 
 def _write_heading(sheet, column, table, field, texts, look):
@@ -72,7 +86,7 @@ def _write_heading(sheet, column, table, field, texts, look):
 
 
 def _write_row(sheet, row, fields, values, look):
-    """What a row has beforehand; what it must have and has not is coloured."""
+    """Write the initial values of a row; required cells without a value are coloured."""
     for column, field in enumerate(fields, 1):
         text, kind = values.get(field.name, ""), type_of_cell(field)
         if not text:

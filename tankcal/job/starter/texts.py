@@ -1,7 +1,7 @@
-"""The explanations of an input workbook, in one language.
+"""Explanations in an input workbook, in one language.
 
-The notes of keys and columns are written once, in English, beside the contract; the words of each
-other language hold theirs.
+The English notes of keys and columns are in the contract. The word files of the other languages
+contain their translations.
 """
 
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ from tankcal.text.words import load_words, marks_of
 
 
 def is_number(text):
-    """Is it a number, as TOML and a spreadsheet would take it?"""
+    """Return True if TOML and spreadsheets read the text as a number."""
     return NUMBER.fullmatch(text) is not None
 
 
-# What each table, section and list of a starter job is for: the English.
+# Purpose of each section, table and list of a starter job, in English.
 
 SECTION_NOTES = {
     "tank": "the tank, as in the drawing; the texts are printed when given",
@@ -107,7 +107,7 @@ REGISTER_NOTES = {
 
 
 def english_notes():
-    """{group: {name: note}} as `[input.notes]` of another language has them, key by key."""
+    """{group: {name: note}}, with the keys of `[input.notes]` of other languages."""
     return {
         "sections": SECTION_NOTES,
         "tables": TABLE_NOTES,
@@ -126,17 +126,17 @@ def _of_fields(owners):
 
 @dataclass(frozen=True)
 class Texts:
-    """Words of a language, and the notes in it."""
+    """Words and notes of one language."""
 
     words: dict
     notes: dict
 
     def of(self, group, code, **values):
-        """A text of the group input.`group`, its places filled in."""
+        """Text of the group input.`group`, with its values inserted."""
         return self.words["input"][group][code].format(**values)
 
     def note(self, group, owner, field=None):
-        """What a section, table or list is for (field: None), or one of its keys or columns."""
+        """Purpose of a section, table or list (field: None), or note of one of its fields."""
         return self.notes[group][owner if field is None else f"{owner}.{field.name}"]
 
     def heading(self, field):
@@ -145,7 +145,7 @@ class Texts:
         return self.words["input"]["labels"][stem]
 
     def expectation(self, field):
-        """What a cell takes: "a number above 0, at most 50 (m)"."""
+        """Accepted values of a cell: "a number above 0, at most 50 (m)"."""
         most = {"name": MAX_NAME, "tank id": MAX_NAME, "text": MAX_TEXT}.get(field.kind)
         if field.kind != "number":
             code = field.kind.replace(" ", "_")
@@ -156,26 +156,26 @@ class Texts:
         )
 
     def choice(self, word):
-        """One of the choices, "true" or "false" as the form offers it."""
+        """A choice, "true" or "false" in the words of the form."""
         return word_of(self.words["language"]["code"], word)
 
     def value(self, field, given):
-        """What stands in a cell of a field: its choices in the words of the form."""
+        """Initial value of a cell; choices are in the words of the form."""
         return self.choice(given) if field.kind in ("choice", "flag") else given
 
     def example(self, field, given):
-        """An example of a field in the words of the form."""
+        """Example of a field in the words of the form."""
         known = self.words["input"]["examples"]
         return known.get(given, self.value(field, given)) if isinstance(given, str) else given
 
     def input_note(self, name, declarable):
-        """What an input of uncertainty is."""
+        """Meaning of an input of uncertainty."""
         if self.words["language"]["code"] == DEFAULT:
             return declarable.note
         return self.words["inputs"]["deadwood_share" if name == "deadwood" else name]
 
     def assumption(self, declarable):
-        """What is assumed for an input that is not declared; "" for nothing."""
+        """Assumed value of an input that is not declared; "" if none."""
         if declarable.default_share is not None:
             return self.of("inputs", "share", share=self._number(100 * declarable.default_share))
         if declarable.default is None:
@@ -194,7 +194,7 @@ def texts_in(language):
 
 
 def _bounds(field):
-    """Which sentence says the bounds of a number."""
+    """Code of the sentence that states the bounds of a number."""
     if is_wide(field):
         return "number"
     if field.high == float("inf"):
@@ -203,7 +203,7 @@ def _bounds(field):
 
 
 def is_wide(field):
-    """Do the bounds only keep nonsense out?"""
+    """Return True if the bounds only exclude absurd values."""
     return field.low == -field.high and field.high >= 1e5
 
 

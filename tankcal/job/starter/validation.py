@@ -1,4 +1,4 @@
-"""The rule that a spreadsheet holds the cells of one field to, with what it says to a slip."""
+"""Validation rule of the cells of one field in a spreadsheet, with its error message."""
 
 import datetime
 import math
@@ -8,8 +8,8 @@ from tankcal.job.starter.texts import is_wide
 from tankcal.text.form_words import NO, YES
 from tankcal.text.naming import MAX_NAME
 
-LONGEST_LIST = 255  # letters: Excel drops a longer one
-LONGEST_TITLE, LONGEST_MESSAGE = 32, 255
+LONGEST_LIST = 255  # longest list of choices in Excel, characters
+LONGEST_TITLE, LONGEST_MESSAGE = 32, 255  # longest title and message in Excel, characters
 _LENGTHS = {
     "name": MAX_NAME,
     "tank id": MAX_NAME,
@@ -21,10 +21,22 @@ FIRST_DAY, LAST_DAY = datetime.date(1950, 1, 1), datetime.date(2119, 1, 1)
 
 
 def rule_of(field, choices, cell, texts):
-    """Options of XlsxWriter's data_validation, or None where anything may stand.
+    """Options of XlsxWriter's data_validation; None if the field accepts any text.
 
-    choices  what may be chosen, in place of the field's own
-    cell     the first cell of the range, as "C7"
+    Parameters
+    ----------
+    field : Field
+        Description of the cells.
+    choices : sequence of str
+        Choices that replace those of the field.
+    cell : str
+        First cell of the range, such as "C7".
+    texts : Texts
+        Texts of the language.
+
+    Returns
+    -------
+    dict or None
     """
     condition = _condition(field, choices, cell, texts)
     if condition is None:
@@ -41,7 +53,7 @@ def _condition(field, choices, cell, texts):
     if field.kind == "flag":
         return {"validate": "list", "source": [texts.choice(YES), texts.choice(NO)]}
     if field.kind == "choice":
-        listed = [texts.choice(one) for one in choices]
+        listed = [texts.choice(choice) for choice in choices]
         return {"validate": "list", "source": listed} if _fits(listed) else None
     if field.kind == "number":
         return _of_number(field, cell)

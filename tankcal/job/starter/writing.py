@@ -1,4 +1,4 @@
-"""Where a starter job goes: a new folder, or one workbook that did not exist."""
+"""Writing of a starter job to a new folder or a new workbook."""
 
 import dataclasses
 import io
@@ -18,20 +18,27 @@ from tankcal.text.languages import DEFAULT
 from tankcal.text.spreadsheets import write_guarded
 from tankcal.text.words import say
 
-KEPT = ("field-sheets.pdf",)  # may lie in the folder when its form is written again
+KEPT = ("field-sheets.pdf",)  # files that may exist in the folder of a new form
 
-# A starter job that has something in it already: what a plan knows before the survey.
+# Starter job with content: data of a plan, known before the survey.
 
 
 @dataclasses.dataclass(frozen=True)
 class FilledForm(Form):
     """A Form with settings, rows and entries, all as texts.
 
-    settings  {"tank.id": text}
-    given     {table: ({column: text}, ...)}
-    registered  {"cameras" or "instruments": {name: {key: text}}}
-    to_fill   keys such as "survey.date" that have to be filled in, beside those that always have
-    more      tables beside those of the kind of survey
+    Attributes
+    ----------
+    settings : dict
+        {"tank.id": text}.
+    given : dict
+        {table: ({column: text}, ...)}.
+    registered : dict
+        {"cameras" or "instruments": {name: {key: text}}}.
+    to_fill : tuple of str
+        Keys such as "survey.date" that must be filled in, in addition to required keys.
+    more : tuple of str
+        Tables in addition to those of the kind of survey.
     """
 
     settings: dict = dataclasses.field(default_factory=dict)
@@ -48,26 +55,26 @@ class FilledForm(Form):
 
     @property
     def registers(self):
-        """Names of its lists of cameras and instruments."""
+        """Names of its lists, such as cameras and instruments."""
         usual = super().registers
         return (*usual, *(name for name in self.registered if name not in usual))
 
     def start(self, section, field):
-        """What stands in the place of a key; "" for nothing."""
+        """Initial value of a key; "" if blank."""
         return self.settings.get(f"{section}.{field.name}", super().start(section, field))
 
     def is_to_fill_in(self, section, field):
-        """Is it a key that must be given, and has nothing yet?"""
+        """Return True if the key must be filled in and has no value."""
         if self.start(section, field):
             return False
         return f"{section}.{field.name}" in self.to_fill or super().is_to_fill_in(section, field)
 
     def entries(self, register):
-        """{name: {key: text}} of a list; an empty entry where there is none."""
+        """{name: {key: text}} of a list; without entries, one empty entry."""
         return self.registered.get(register) or super().entries(register)
 
     def rows(self, table):
-        """The rows of a table."""
+        """Rows of a table."""
         return self.given.get(table, ())
 
     def _has(self, section, field):
@@ -75,11 +82,11 @@ class FilledForm(Form):
         return is_given or super()._has(section, field)
 
 
-# The starter job as text: job.toml, the CSV files, and the lists of cameras and instruments.
+# Text files of the starter job: job.toml, CSV files, lists of cameras and instruments.
 
 
 def settings_text(form):
-    """job.toml of a Form, every key with its note."""
+    """Text of job.toml for a Form, every key with its note."""
     texts = texts_in(form.language)
     tables = [f"{table}.csv" for table in form.tables]
     tables += [f"{register}.toml" for register in form.registers]
@@ -100,7 +107,7 @@ def settings_text(form):
 
 
 def register_text(register, form):
-    """cameras.toml or instruments.toml of a Form: its entries, or an empty one."""
+    """Text of a list such as cameras.toml for a Form, with its entries or an empty entry."""
     texts = texts_in(form.language)
     lines = [f"# {texts.note('registers', register)}"]
     for name, given in form.entries(register).items():
@@ -121,12 +128,12 @@ def _setting(field, start, note):
 
 
 def _key(name):
-    """A name as a key of TOML."""
+    """Name as a key of TOML."""
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False)
 
 
 def csv_text(table, form):
-    """A CSV file of a Form: comments, and the row of headings."""
+    """Text of a CSV file for a Form: comments, row of headings, and initial rows."""
     texts = texts_in(form.language)
     lines = [f"# {texts.note('tables', table)}; {texts.of('files', 'comments')}"]
     fields = columns_of(table, form.kind)
@@ -134,7 +141,7 @@ def csv_text(table, form):
         blank = "" if field.required else f" [{texts.of('files', 'may_be_blank')}]"
         lines.append(f"# {field.name}: {texts.note('columns', table, field)}{blank}")
     if table == "uncertainty":
-        lines += [_input(texts, name, one) for name, one in form.inputs.items()]
+        lines += [_input(texts, name, declarable) for name, declarable in form.inputs.items()]
     separator, decimal = (form.start("csv", field) for field in CSV)
     rows = [[field.name for field in fields]]
     for row in form.rows(table):
@@ -151,7 +158,7 @@ def csv_text(table, form):
 
 
 def _note(texts, field, text, is_to_fill_in):
-    """A note with, where something must be filled in, that word and what may be chosen."""
+    """Note of a key; for a key to be filled in, with this request and the choices."""
     if not is_to_fill_in:
         return text
     choices = f" ({say(texts.words, field.expectation())})" if field.kind == "choice" else ""
@@ -165,17 +172,29 @@ def _input(texts, name, declarable):
 
 
 def write_starter(directory, kind="vertical", survey=None, language=DEFAULT):
-    """Write the starter job of a kind of tank as text files into `directory`.
+    """Write the starter job of a kind of tank as text files.
 
-    kind      "vertical", "horizontal", "sphere" or "mesh"; only what it can use is written
-    survey    "photos" or "total-station": its files in place of the points; None: points
-    language  of the papers that the job asks for, and of the explanations
+    The directory is created if it does not exist. An unchanged starter workbook in it, as written
+    by `write_input_workbook`, is replaced, because a folder contains one form.
 
-    The directory is made when it does not exist. An untouched starter workbook in it, as
-    `write_input_workbook` makes it, is replaced: a folder holds one form.
+    Parameters
+    ----------
+    directory : str or PathLike
+        New or empty folder.
+    kind : {"vertical", "horizontal", "sphere", "mesh"}, optional
+        Kind of tank; only its keys and tables are written.
+    survey : str, optional
+        Kind of survey, such as "photos" or "total-station", whose files replace the points; None:
+        points.
+    language : str, optional
+        Language of the report and of the explanations.
 
-    Raises InputError when the directory holds something else or cannot be written, ValueError
-    for another kind, another survey, or a survey of a mesh.
+    Raises
+    ------
+    InputError
+        If the directory contains other files or cannot be written.
+    ValueError
+        For an unknown kind of tank or survey, or a survey of a mesh.
     """
     form, directory = Form(kind, survey, language), Path(directory)
     try:
@@ -187,9 +206,21 @@ def write_starter(directory, kind="vertical", survey=None, language=DEFAULT):
 
 
 def write_form(directory, form, workbook=False):
-    """Write the job of a Form into `directory`; InputError as above.
+    """Write the job of a Form into a directory.
 
-    workbook  write it as job.xlsx in place of text files
+    Parameters
+    ----------
+    directory : str or PathLike
+        New or empty folder.
+    form : Form
+        Content of the job.
+    workbook : bool, optional
+        True: write job.xlsx; False: write text files.
+
+    Raises
+    ------
+    InputError
+        If the directory contains other files or cannot be written.
     """
     directory = Path(directory)
     try:
@@ -203,12 +234,25 @@ def write_form(directory, form, workbook=False):
 
 
 def write_input_workbook(path, kind="vertical", survey=None, language=DEFAULT):
-    """Write the starter job as a workbook alone; returns its Path.
+    """Write the starter job as a workbook.
 
-    path  of a workbook (.xlsx) that does not exist yet, or of a folder: job.xlsx in it, in place
-          of untouched text files that `write_starter` made of the same form
+    Parameters
+    ----------
+    path : str or PathLike
+        New workbook (.xlsx), or a folder. In a folder, job.xlsx replaces unchanged text files that
+        `write_starter` wrote for the same form.
+    kind, survey, language : str, optional
+        As for `write_starter`.
 
-    The rest as `write_starter` has it.
+    Returns
+    -------
+    Path
+        The workbook.
+
+    Raises
+    ------
+    InputError, ValueError
+        As for `write_starter`.
     """
     form, path, texts = Form(kind, survey, language), Path(path), []
     try:
@@ -244,17 +288,27 @@ def _write_texts(directory, form):
 
 
 def _make_empty(directory, replaceable=None):
-    """Make a directory, or check that it has no files of the user; returns those to replace.
+    """Create a directory, or check that it contains no files of the user.
 
-    replaceable  makes {name: bytes} of the form whose files may be there, unchanged
+    Parameters
+    ----------
+    directory : Path
+        The directory.
+    replaceable : callable, optional
+        Returns {name: bytes} of the form whose unchanged files may be replaced.
+
+    Returns
+    -------
+    list of Path
+        Files to be replaced.
     """
     if directory.exists() and not directory.is_dir():
         text = message("new_is_file", "is a file; expected the name of a new or empty folder")
         raise InputError(Problem(directory.name, text))
-    found = sorted(directory.iterdir()) if directory.exists() else []
-    of_form = [one for one in found if one.name not in KEPT]
+    paths = sorted(directory.iterdir()) if directory.exists() else []
+    of_form = [path for path in paths if path.name not in KEPT]
     written = replaceable() if of_form and replaceable else {}
-    if (found and not written) or not all(_is_untouched(one, written) for one in of_form):
+    if (paths and not written) or not all(_is_untouched(path, written) for path in of_form):
         text = message(
             "new_not_empty",
             "is not empty, and is left as it is; expected the name of a new or empty folder",

@@ -1,6 +1,7 @@
-"""Monte Carlo of a capacity table: the same inputs, the tank's own answer, a verdict for each row.
+"""Monte Carlo simulation of a capacity table, with a verdict for each row.
 
-Sources: JCGM 101:2008, clause 8 for the verdict; JCGM 102:2011, 7.
+The simulation uses the same inputs as the propagation, and the volumes of the tank itself. Sources:
+JCGM 101:2008, clause 8 for the verdict; JCGM 102:2011, 7.
 """
 
 from tankcal.pipeline.simulation.intervals import Intervals, gum_intervals

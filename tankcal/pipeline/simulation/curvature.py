@@ -2,10 +2,10 @@
 
     H_ab u_a u_b = [J_b(x_a + u_a) - J_b(x_a - u_a)] u_b / 2
 
-The slopes J_b are taken of the tank with the input a moved by its standard uncertainty, or at dips
-moved by that of the datum. A scale s of surveyed lengths gives V = s^2 times a tank whose plates
-are 1/s as thick: second derivatives are those by the other inputs, twice for temperature and level,
-once for lengths that do not grow with it.
+The slopes J_b are those of the tank with input a moved by its standard uncertainty, or at dips
+moved by that of the datum. A scale s of surveyed lengths gives V = s^2 times the volume of a tank
+with plates 1/s as thick. Its second derivatives are the first derivatives by the other inputs:
+twice for temperature and level, once for lengths that do not grow with the scale.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from tankcal.pipeline.tanks import body_of
 from tankcal.tank.heads import RADII
 from tankcal.tank.parts import sum_derivatives
 
-# A job with one of its inputs moved: what the volume does then is its own answer, not a slope.
+# Inputs that can be moved in a job, so that the tank itself gives the change of its volumes.
 
 VARIED = (
     "plate_thickness",
@@ -45,24 +45,26 @@ VARIED = (
 
 
 def vary_input(job, name, change):
-    """The job with `change` (SI) added to the input `name`, one of VARIED; None: it has none."""
+    """Job with `change` (SI) added to the input `name` of VARIED; None without such an input."""
     if name in _OF_VALUES:
         part, key = _OF_VALUES[name]
-        return _with(job, part, key, change)
+        return _vary_value(job, part, key, change)
     if name in ("plate_thickness", "paint") and job.courses:
         key = {"plate_thickness": "thickness_m", "paint": "paint_m"}[name]
-        courses = (replace(one, **{key: getattr(one, key) + change}) for one in job.courses)
+        courses = (
+            replace(course, **{key: getattr(course, key) + change}) for course in job.courses
+        )
         return replace(job, courses=tuple(courses))
     if name in ("plate_thickness", "paint") and job.rings:
         key = {"plate_thickness": "thickness_m", "paint": "paint_m"}[name]
-        rings = tuple(replace(one, **{key: getattr(one, key) + change}) for one in job.rings)
+        rings = tuple(replace(ring, **{key: getattr(ring, key) + change}) for ring in job.rings)
         moved = replace(job, rings=rings)
-        return moved if name == "paint" else _of_solid(moved, name, change)
+        return moved if name == "paint" else _vary_solid(moved, name, change)
     if job.tank.kind == "vertical":
-        return _of_heads(job, name, change)
+        return _vary_head(job, name, change)
     if job.points is not None:
-        return None if name != "plate_thickness" else _of_solid(job, name, change)
-    return _of_solid(job, name, change)
+        return None if name != "plate_thickness" else _vary_solid(job, name, change)
+    return _vary_solid(job, name, change)
 
 
 _OF_VALUES = {
@@ -77,14 +79,14 @@ _OF_VALUES = {
 }
 
 
-def _of_heads(job, name, change):
-    """The job with another size of its bottom, of the head on top, or of both; None: no such."""
+def _vary_head(job, name, change):
+    """Job with a changed size of its bottom, of its top head, or of both, or None."""
     bottom, top = job.bottom, job.top
     if name == "bottom_depth" and bottom.centre_z_m is not None:
-        down = bottom.centre_z_m < job.datum.bottom_z_m
-        return _with(job, "bottom", "centre_z_m", -change if down else change)
+        is_below = bottom.centre_z_m < job.datum.bottom_z_m
+        return _vary_value(job, "bottom", "centre_z_m", -change if is_below else change)
     if name == "top_depth" and top is not None and top.depth_m:
-        return _with(job, "top", "depth_m", change)
+        return _vary_value(job, "top", "depth_m", change)
     if name not in RADII:
         return None
     key = _OF_ENDS[name]
@@ -96,13 +98,14 @@ def _of_heads(job, name, change):
     return replace(job, **sized) if sized else None
 
 
-_ABSENT = ("tube_angle_rad", "tube_offset_m")  # where they were not given they are 0
+_ABSENT = ("tube_angle_rad", "tube_offset_m")  # 0 if not given
 
 
-def _of_solid(job, name, change):
+def _vary_solid(job, name, change):
+    """Job with a changed size of its horizontal cylinder or sphere; None without such a size."""
     if job.sphere is not None:
         key = {"diameter": "diameter_m", "plate_thickness": "thickness_m"}.get(name)
-        return None if key is None else _with(job, "sphere", key, change)
+        return None if key is None else _vary_value(job, "sphere", key, change)
     if job.horizontal is None:
         return None
     lying = job.horizontal
@@ -110,7 +113,7 @@ def _of_solid(job, name, change):
         wider = replace(lying, width_m=lying.width_m + change, height_m=lying.height_m + change)
         return replace(job, horizontal=wider)
     if name in _OF_ENDS:
-        ends = {key: _varied(getattr(lying, key), name, change) for key in ("end_a", "end_b")}
+        ends = {key: _vary_end(getattr(lying, key), name, change) for key in ("end_a", "end_b")}
         return None if None in ends.values() else replace(job, horizontal=replace(lying, **ends))
     keys = {
         "tube_angle": "tube_angle_rad",
@@ -120,7 +123,7 @@ def _of_solid(job, name, change):
         "tilt": "tilt",
         "dip_position": "dip_from_a_m",
     }
-    return _with(job, "horizontal", keys[name], change) if name in keys else None
+    return _vary_value(job, "horizontal", keys[name], change) if name in keys else None
 
 
 _OF_ENDS = {
@@ -130,8 +133,8 @@ _OF_ENDS = {
 }
 
 
-def _varied(end, name, change):
-    """The end with another size; None for the depth of a torispherical one that radii give."""
+def _vary_end(end, name, change):
+    """End with a changed size; None for the depth of a torispherical end that radii define."""
     key = _OF_ENDS[name]
     size = getattr(end, key)
     if size:
@@ -139,16 +142,20 @@ def _varied(end, name, change):
     return None if end.kind == "torispherical" and name == "end_depth" else end
 
 
-def _with(job, part, key, change):
-    whole = getattr(job, part)
-    if getattr(whole, key) is None and key not in _ABSENT:
+def _vary_value(job, part, key, change):
+    """Job with `change` added to one value of a part; None if the value is not given."""
+    part_of_job = getattr(job, part)
+    if getattr(part_of_job, key) is None and key not in _ABSENT:
         return None
-    return replace(job, **{part: replace(whole, **{key: (getattr(whole, key) or 0.0) + change})})
+    return replace(
+        job, **{part: replace(part_of_job, **{key: (getattr(part_of_job, key) or 0.0) + change})}
+    )
 
 
-PICKED, FROM_EMPTY = 400, 40  # rows that curvatures are computed at; of them next to the empty tank
-STEPS = (1.0, 1 / 4, 1 / 16)  # in u, by which an input is moved, until there is such a tank
-SMALLEST = 1e-4  # of u of a row: a smaller second derivative is left out everywhere
+# Number of rows at which curvatures are computed, and of these next to the empty tank.
+PICKED, FROM_EMPTY = 400, 40
+STEPS = (1.0, 1 / 4, 1 / 16)  # steps of an input in u, tried until such a tank exists
+SMALLEST = 1e-4  # second derivative, relative to u of a row, that is neglected
 BY_SCALE = {
     **dict.fromkeys(("scale", "offset", "barrel", "plate_thickness", "paint"), 1.0),
     **dict.fromkeys(("datum", "shell_temperature", "expansion"), 2.0),
@@ -157,7 +164,15 @@ BY_SCALE = {
 
 @dataclass(frozen=True)
 class Curvature:
-    """pairs (k,) of input names; values (rows, k) m3: second derivative times both u."""
+    """Second derivatives of the rows, times both standard uncertainties.
+
+    Attributes
+    ----------
+    pairs : tuple of (str, str), length k
+        Names of the inputs.
+    values : ndarray, shape (rows, k)
+        Values, m3.
+    """
 
     pairs: tuple[tuple[str, str], ...]
     values: np.ndarray
@@ -166,29 +181,44 @@ class Curvature:
 def curvature(job, survey, body, levels_m, declared, least_m3):
     """`Curvature` of the rows by pairs of declared inputs.
 
-    declared  {name: u in SI} of inputs with one column each
-    least_m3  (rows,) u of each row: second derivatives below 1e-4 of it everywhere are left out
+    Parameters
+    ----------
+    job : Job
+    survey : Wall, Scan, mesh or None
+    body : Body
+    levels_m : ndarray, shape (rows,)
+        Levels of the rows, m.
+    declared : dict
+        {name: u in SI units} of inputs with one column each.
+    least_m3 : ndarray, shape (rows,)
+        u of each row, m3. Second derivatives below 1e-4 of it in all rows are neglected.
+
+    Returns
+    -------
+    Curvature
     """
-    picked = _picked(len(levels_m))
-    found = {}
+    chosen_rows = _picked(len(levels_m))
+    columns_by_pair = {}
     for name in declared:
-        columns = _of_input(job, survey, body, levels_m, picked, name, declared)
+        columns = _by_input(job, survey, body, levels_m, chosen_rows, name, declared)
         for other, column in columns.items():
-            found.setdefault(tuple(sorted((name, other))), []).append(column)
-    size = np.where(least_m3 > 0, least_m3, np.inf)
-    means = {pair: sum(columns) / len(columns) for pair, columns in found.items()}
-    kept = [pair for pair, one in means.items() if np.max(np.abs(one) / size) > SMALLEST]
-    values = np.stack([means[pair] for pair in kept], axis=1) if kept else None
+            columns_by_pair.setdefault(tuple(sorted((name, other))), []).append(column)
+    u_of_rows = np.where(least_m3 > 0, least_m3, np.inf)
+    means = {pair: sum(columns) / len(columns) for pair, columns in columns_by_pair.items()}
+    kept_pairs = [
+        pair for pair, mean in means.items() if np.max(np.abs(mean) / u_of_rows) > SMALLEST
+    ]
+    values = np.stack([means[pair] for pair in kept_pairs], axis=1) if kept_pairs else None
     empty = np.empty((len(levels_m), 0))
-    return Curvature(tuple(kept), empty if values is None else values)
+    return Curvature(tuple(kept_pairs), empty if values is None else values)
 
 
-def _of_input(job, survey, body, levels_m, picked, name, declared):
-    """{other: (rows,)} second derivatives by one input and each other, times both u."""
+def _by_input(job, survey, body, levels_m, picked, name, declared):
+    """{other input: second derivatives (rows,), times both u} by one input."""
     if name == "datum":
-        return _of_level(body, levels_m, declared)
+        return _by_datum(body, levels_m, declared)
     if name == "scale":
-        return _of_scale(body, levels_m, declared) if body.shell is not None else {}
+        return _by_scale(body, levels_m, declared) if body.shell is not None else {}
     if name == "tilt" and body.shell is not None:
         in_shell = np.minimum(levels_m, body.shell.volume.height_m)
         return {"tilt": body.shell.volume_m3(in_shell) * declared["tilt"] ** 2}
@@ -196,8 +226,9 @@ def _of_input(job, survey, body, levels_m, picked, name, declared):
         return {}
     for share in STEPS:
         try:
+            # Smaller steps if a tank with the full step does not exist.
             ends = _slopes_of_moved(job, survey, levels_m[picked], name, share * declared[name])
-        except SolutionError:  # no such tank: an error that large cannot have been made
+        except SolutionError:  # no such tank exists, so such an error is impossible
             continue
         break
     else:
@@ -213,7 +244,7 @@ def _of_input(job, survey, body, levels_m, picked, name, declared):
 
 
 def _slopes_of_moved(job, survey, levels_m, name, step):
-    """Derivatives of the tank with the input a step up, and a step down; None: it has no such."""
+    """Derivatives of the tank with the input a step up and a step down; None without the input."""
     jobs = [vary_input(job, name, sign * step) for sign in (1, -1)]
     if None in jobs:
         return None
@@ -221,14 +252,20 @@ def _slopes_of_moved(job, survey, levels_m, name, step):
     return [tank.derivatives(np.minimum(levels_m, tank.highest_m)) for tank in tanks]
 
 
-def _of_level(body, levels_m, declared):
-    """What moves with the dips, such as deadwood, has no second derivative by the datum."""
+def _by_datum(body, levels_m, declared):
+    """Second derivatives by the datum and each other input.
+
+    Parts that move with the dips, such as deadwood, have none by the datum.
+    """
     u = declared["datum"]
-    up = np.minimum(levels_m + u, body.highest_m)
-    down = np.maximum(levels_m - u, body.lowest_m)
+    upper_m = np.minimum(levels_m + u, body.highest_m)
+    lower_m = np.maximum(levels_m - u, body.lowest_m)
     moving = [part for part in body.parts if not part.moves_with_zero]
-    ends = [sum_derivatives(part.derivatives(levels) for part in moving) for levels in (up, down)]
-    span = np.where(up > down, (up - down) / u, 1.0)
+    ends = [
+        sum_derivatives(part.derivatives(levels) for part in moving)
+        for levels in (upper_m, lower_m)
+    ]
+    span = np.where(upper_m > lower_m, (upper_m - lower_m) / u, 1.0)
     return {
         other: (ends[0][other] - ends[1][other]) / span * u_other
         for other, u_other in declared.items()
@@ -236,11 +273,12 @@ def _of_level(body, levels_m, declared):
     }
 
 
-def _of_scale(body, levels_m, declared):
+def _by_scale(body, levels_m, declared):
+    """Second derivatives by the scale and each other input."""
     slopes = body.derivatives(levels_m)
     return {
-        other: times * slopes[other] * declared[other] * declared["scale"]
-        for other, times in BY_SCALE.items()
+        other: multiplier * slopes[other] * declared[other] * declared["scale"]
+        for other, multiplier in BY_SCALE.items()
         if other in declared and other in slopes
     }
 

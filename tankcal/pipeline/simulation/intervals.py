@@ -1,9 +1,8 @@
-"""The interval that each volume is stated with, whichever method found it.
+"""Stated interval of each volume, whichever method determined it.
 
-Whoever states a volume states it with one of these. What holds of every one is checked where it is
-made, not hoped for where it is printed:
+Each interval is checked when it is created, not when it is printed:
 
-    low <= V <= high,  low < high wherever the law of propagation gives a u above 0
+    low <= V <= high,  low < high wherever the law of propagation gives u > 0
 
 Source: JCGM 101:2008 clause 8.
 """
@@ -18,10 +17,17 @@ from tankcal.uncertainty import ROUNDING
 
 @dataclass(frozen=True)
 class Intervals:
-    """The interval of each volume that counts, (rows,), and the U that it is stated with.
+    """Stated interval and U of each volume, shape (rows,).
 
-    by_gum  True: volume +- k u; False: Monte Carlo's, where it does not validate that
-    U_m3    of the law of propagation, or the larger distance of Monte Carlo's ends from the volume
+    Attributes
+    ----------
+    low_m3, high_m3 : ndarray
+        Ends of the interval, m3.
+    by_gum : ndarray of bool
+        True: volume +- k u. False: Monte Carlo interval, where the propagation is not validated.
+    U_m3 : ndarray
+        U of the law of propagation, or the larger distance of the Monte Carlo ends from the volume,
+        m3.
     """
 
     low_m3: np.ndarray
@@ -31,35 +37,49 @@ class Intervals:
 
 
 def gum_intervals(volume_m3, u_m3, U_m3):
-    """`Intervals` V +- U of volumes that were not simulated; each (rows,).
+    """`Intervals` V +- U of volumes that were not simulated, from arrays of shape (rows,), m3.
 
-    Raises ProgramError for an interval that contradicts itself.
+    Raises ProgramError for an inconsistent interval.
     """
-    found = Intervals(volume_m3 - U_m3, volume_m3 + U_m3, np.full(len(U_m3), True), U_m3)
-    return check_intervals(found, volume_m3, u_m3)
+    intervals = Intervals(volume_m3 - U_m3, volume_m3 + U_m3, np.full(len(U_m3), True), U_m3)
+    return check_intervals(intervals, volume_m3, u_m3)
 
 
 def judged_intervals(judged, volume_m3, u_m3, U_m3, least_m3=-np.inf):
-    """`Intervals` of simulated volumes: V +- U where that is validated, else Monte Carlo's.
+    """`Intervals` of simulated volumes: V +- U if validated, otherwise the Monte Carlo interval.
 
-    A strong curvature moves the distribution away from the volume at the estimates. Where Monte
-    Carlo's interval leaves that volume out it is made longer up to it: the volume is what is
-    stated, and a longer interval holds the true one no less often.
+    A strong curvature moves the distribution away from the volume at the estimates. If the Monte
+    Carlo interval excludes that volume, the interval is extended to it. The stated value is then
+    inside, and a longer interval does not reduce the coverage.
 
-    judged    `monte_carlo.Verdict` of them
-    least_m3  what Monte Carlo's interval does not go below: no tank holds less than nothing
-    Raises ProgramError for an interval that contradicts itself.
+    Parameters
+    ----------
+    judged : monte_carlo.Verdict
+        Verdict on the volumes.
+    volume_m3, u_m3, U_m3 : ndarray, shape (rows,)
+        Volumes, standard and expanded uncertainties, m3.
+    least_m3 : float
+        Lower bound of a Monte Carlo interval, m3; the volume of a tank is not negative.
+
+    Returns
+    -------
+    Intervals
+
+    Raises
+    ------
+    ProgramError
+        For an inconsistent interval.
     """
     by_gum = judged.validated
     low = np.where(by_gum, judged.low, np.maximum(judged.low, least_m3))
-    found = Intervals(low, judged.high, by_gum, judged.stated(volume_m3, U_m3))
-    _refuse_without_width(found, volume_m3, u_m3)  # before an end is moved to where it belongs
+    intervals = Intervals(low, judged.high, by_gum, judged.stated(volume_m3, U_m3))
+    _refuse_without_width(intervals, volume_m3, u_m3)  # check before an end is moved
     low, high = np.minimum(low, volume_m3), np.maximum(judged.high, volume_m3)
-    return check_intervals(Intervals(low, high, by_gum, found.U_m3), volume_m3, u_m3)
+    return check_intervals(Intervals(low, high, by_gum, intervals.U_m3), volume_m3, u_m3)
 
 
 def check_intervals(intervals, volume_m3, u_m3):
-    """The same `Intervals`; raises ProgramError for one that does not hold its volume."""
+    """Return the `Intervals`; raise ProgramError for an interval that excludes its volume."""
     low, high = intervals.low_m3, intervals.high_m3
     outside = ~((low <= volume_m3) & (volume_m3 <= high))
     _refuse(outside, intervals, volume_m3, u_m3)
@@ -68,12 +88,14 @@ def check_intervals(intervals, volume_m3, u_m3):
 
 
 def _refuse_without_width(intervals, volume_m3, u_m3):
-    # of the largest volume: the empty tank's is a difference of volumes, and has their rounding
+    # Relative to the largest volume: that of the empty tank is a difference with rounding errors.
+    """Raise ProgramError for intervals of zero width with a significant standard uncertainty."""
     varies = u_m3 > ROUNDING * np.max(np.abs(volume_m3), initial=0.0)
     _refuse(varies & ~(intervals.low_m3 < intervals.high_m3), intervals, volume_m3, u_m3)
 
 
 def _refuse(wrong, intervals, volume_m3, u_m3):
+    """Raise ProgramError for the first wrong interval."""
     if np.any(wrong):
         row = int(np.argmax(wrong))
         low, high = intervals.low_m3[row], intervals.high_m3[row]

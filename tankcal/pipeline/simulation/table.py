@@ -1,4 +1,4 @@
-"""The simulation of all rows of a table, and of deliveries between its dips."""
+"""Simulation of all rows of a table and of deliveries between its dips."""
 
 from dataclasses import dataclass, replace
 
@@ -15,16 +15,26 @@ SIMULATING = message("simulating", "simulating the table")
 
 @dataclass(frozen=True)
 class TableSimulation:
-    """What Monte Carlo says of a table and of deliveries from it.
+    """Monte Carlo simulation of a table and of deliveries.
 
-    found, judged  `monte_carlo.Simulation` and `Verdict` of the rows
-    delivered      the `deliveries.Deliveries` that were simulated, too
-    of_deliveries  (Simulation, Verdict) of them
-    smooth         (deliveries,) whether a parabola by the datum follows their volumes
-    curved         pairs of inputs whose second derivatives were kept
-    bent           (rows,) whether the row was simulated with the tank's own volumes, not a parabola
-    drawn          rows that were drawn for; the others of a long table follow their neighbours
-    seed, digits   of all draws; of u that the verdict counts
+    Attributes
+    ----------
+    found, judged : monte_carlo.Simulation, Verdict
+        Results for the rows.
+    delivered : deliveries.Deliveries
+        Simulated deliveries.
+    of_deliveries : (Simulation, Verdict)
+        Results for the deliveries.
+    smooth : ndarray of bool, shape (deliveries,)
+        Whether a parabola in the datum approximates the volumes.
+    curved : tuple of (str, str)
+        Pairs of inputs with a significant second derivative.
+    bent : ndarray of bool, shape (rows,)
+        Whether the row was simulated with the volumes of the tank instead of a parabola.
+    drawn : int
+        Number of rows with draws; other rows of a long table are interpolated.
+    seed, digits : int
+        Seed of the draws, and significant digits of u for the verdict.
     """
 
     found: Simulation
@@ -39,38 +49,55 @@ class TableSimulation:
     digits: int
 
     def intervals(self, table):
-        """`Intervals` of the rows of the table that was simulated."""
+        """`Intervals` of the rows of the simulated table."""
         return judged_intervals(self.judged, table.volume_m3, table.u_m3, table.U_m3, least_m3=0.0)
 
     @property
     def of_delivered(self):
-        """`Intervals` of the deliveries that were simulated."""
-        one = self.delivered
-        return judged_intervals(self.of_deliveries[1], one.volume_m3, one.u_m3, one.U_m3)
+        """`Intervals` of the simulated deliveries."""
+        delivered = self.delivered
+        return judged_intervals(
+            self.of_deliveries[1], delivered.volume_m3, delivered.u_m3, delivered.U_m3
+        )
 
 
 def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, progress=None):
     """`TableSimulation` of a `Capacity`.
 
-    job, survey, body, zero_m  what the table was made of, as in `result.Result`
-    pairs   of dips whose deliveries are simulated as well
-    goal    `monte_carlo.Goal`; the probability is the table's
-    progress  called as progress(text, done, total)
-    Raises HeightError for a dip outside the table.
+    Parameters
+    ----------
+    job, survey, body, zero_m
+        Origin of the table, as in `result.Result`.
+    table : Capacity
+    pairs : sequence of (float, float)
+        Dips of deliveries to simulate, m.
+    goal : monte_carlo.Goal, optional
+        Its probability is replaced by that of the table.
+    progress : callable, optional
+        Called as progress(text, done, total).
+
+    Returns
+    -------
+    TableSimulation
+
+    Raises
+    ------
+    HeightError
+        For a dip outside the table.
     """
     goal = replace(goal or Goal(), probability=table.probability)
-    shown = progress and (lambda text, done, total: progress(SIMULATING, done, total))
+    report = progress and (lambda text, done, total: progress(SIMULATING, done, total))
     low, high = np.array(pairs, dtype=float).reshape(-1, 2).T
     model = Model(job, survey, body, zero_m, table, table.weights(high) - table.weights(low))
-    found, drawn = model.simulated(goal, shown)
-    rows, others = (_part(found, part) for part in model.parts)
+    simulation, drawn = model.simulated(goal, report)
+    rows, of_deliveries = (_part(simulation, part) for part in model.parts)
     delivered = deliveries(table, low, high)
     of_delivered = delivered.volume_m3, delivered.u_m3, delivered.dof
     return TableSimulation(
         found=rows,
         judged=verdict(rows, table.volume_m3, table.u_m3, table.dof, digits=goal.digits),
         delivered=delivered,
-        of_deliveries=(others, verdict(others, *of_delivered, digits=goal.digits)),
+        of_deliveries=(of_deliveries, verdict(of_deliveries, *of_delivered, digits=goal.digits)),
         smooth=~model.bent[model.parts[1]],
         curved=model.curved.pairs,
         bent=model.bent[model.parts[0]],
@@ -80,5 +107,7 @@ def simulate_table(job, survey, body, zero_m, table, pairs=(), *, goal=None, pro
     )
 
 
-def _part(found, part):
-    return replace(found, **{name: values[part] for name, values in found.by_volume.items()})
+def _part(simulation, part):
+    return replace(
+        simulation, **{name: values[part] for name, values in simulation.by_volume.items()}
+    )

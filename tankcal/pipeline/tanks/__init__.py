@@ -1,4 +1,4 @@
-"""From a checked job to the body of its tank: every part, with the corrections that are on."""
+"""From a checked job to the body of its tank: all parts, with the enabled corrections."""
 
 from tankcal.pipeline.tanks.common import as_declared, thermal_scale
 from tankcal.pipeline.tanks.vertical import (
@@ -22,12 +22,22 @@ __all__ = [
 
 
 def body_of(job, survey, switches=None, uncertain=True):
-    """The tank of a job.
+    """`Body` of the tank of a job.
 
-    survey     what was surveyed: the `wall.Wall` of a vertical tank, the `meshes.Mesh` of one that
-               is given as a mesh, the `scan.Scan` of another that has points, else None
-    switches   which corrections are on; those of the job when None
-    uncertain  whether the points' covariance is propagated, too (sizes of corrections need none)
+    Parameters
+    ----------
+    job : Job
+    survey : wall.Wall, meshes.Mesh, scan.Scan or None
+        Survey: the wall of a vertical tank, the mesh of a tank given as a mesh, the scan of another
+        tank with points, otherwise None.
+    switches : optional
+        Enabled corrections; None: those of the job.
+    uncertain : bool
+        Whether to propagate the covariance of the points; sizes of corrections do not need it.
+
+    Returns
+    -------
+    Body
     """
     switches = job.switches if switches is None else switches
     if job.tank.kind == "vertical":
@@ -38,7 +48,7 @@ def body_of(job, survey, switches=None, uncertain=True):
 
 
 def heeled_body(job, survey, trim, list_):
-    """The tank of a ship at tangents of trim and list; levels are soundings along its pipe."""
+    """`Body` of a ship's tank at tangents of trim and list; levels are soundings along its pipe."""
     from tankcal.pipeline.tanks.solid import solid_body
 
     return solid_body(job, survey, job.switches, (trim, list_))

@@ -1,4 +1,4 @@
-"""What tanks of every kind have: what no reading saw, inputs, deadwood, and a temperature."""
+"""Parts common to all kinds of tank: unseen form, input values, deadwood and temperature."""
 
 from dataclasses import replace
 
@@ -9,37 +9,49 @@ from tankcal.tank.fittings import deadwood
 from tankcal.tank.heads import End, standard_end
 from tankcal.uncertainty import factor_of
 
-LEARNED, HALF_LEARNED = 0.1, 0.5  # share of a variance's logarithm that is assumed, at most
+# Largest assumed share of the logarithm of a variance, to count as estimated or partly estimated.
+LEARNED, HALF_LEARNED = 0.1, 0.5
 
 
 def factor_of_unseen(kind, parts, sizes, assumed):
-    """`Factor` of what no reading saw of some components of one kind.
+    """`Factor` of the form that the readings do not determine, for components of one kind.
 
-    parts    (f, f) covariance by each of them
-    sizes    (k,) how much of the doubt each is
-    assumed  (k,) share of each amplitude that is assumed
+    Parameters
+    ----------
+    kind : str
+        Name of the cause.
+    parts : list of ndarray, shape (f, f)
+        Covariance of the features due to each of k components.
+    sizes : sequence of float, length k
+        Weight of each component in the uncertainty.
+    assumed : sequence of float, length k
+        Share of each amplitude that is assumed.
+
+    Returns
+    -------
+    Factor
     """
     sizes = np.maximum(sizes, 1e-30)
-    known = told_by(float(sizes @ assumed / sizes.sum()))
-    by = "B" if known == "assumed" else "A"
-    return Factor(kind, factor_of(sum(parts)), type=by, note=known)
+    origin = told_by(float(sizes @ assumed / sizes.sum()))
+    type_ = "B" if origin == "assumed" else "A"
+    return Factor(kind, factor_of(sum(parts)), type=type_, note=origin)
 
 
 def told_by(assumed):
-    """Code of how an amplitude is known, by the share of it that is assumed."""
+    """Code of the origin of an amplitude, from the share of it that is assumed."""
     if assumed < LEARNED:
         return "learned"
     return "half_learned" if assumed < HALF_LEARNED else "assumed"
 
 
 def estimates_of(job):
-    """{name of an input: its value as declared}; 0 of a scale, an offset and the like.
+    """{name of an input: its declared value}; 0 for a scale, an offset and similar inputs.
 
-    The temperature is that of the shell, deg C. Without a value: plates or paint that differ from
-    course to course, and what the job does not give.
+    The temperature is that of the shell, in degrees Celsius. Inputs that the job does not give have
+    no value, nor have plates or paint that differ between courses.
     """
     survey, table, material = job.survey, job.table, job.material
-    given = {
+    values_of_inputs = {
         **dict.fromkeys(("scale", "datum", "offset", "bottom", "barrel", "taper", "deadwood"), 0.0),
         "surface": 0.0,
         "plate_thickness": _only([1000 * part.thickness_m for part in job.courses or job.rings]),
@@ -51,21 +63,21 @@ def estimates_of(job):
         "survey_level": _thousand(survey.liquid_level_m),
         "survey_density": survey.liquid_density_kg_m3,
         "roof_mass": job.roof and job.roof.mass_kg,
-        **_of_solid(job),
-        **_of_ship(job),
-        **_of_heads(job),
+        **_sizes_of_solid(job),
+        **_values_of_ship(job),
+        **_sizes_of_heads(job),
     }
-    return {name: value for name, value in given.items() if value is not None}
+    return {name: value for name, value in values_of_inputs.items() if value is not None}
 
 
-def _of_heads(job):
-    """Sizes of the bottom of an upright tank, and of the head on it, as they were given."""
+def _sizes_of_heads(job):
+    """Declared sizes of the bottom of an upright tank and of the head on it."""
     if job.tank.kind != "vertical":
         return {}
     centre, top = job.bottom.centre_z_m, job.top
-    heads = [one for one in (job.bottom, top) if one is not None]
+    heads = [head for head in (job.bottom, top) if head is not None]
     dishes, knuckles = (
-        [1000 * getattr(one, key) for one in heads if getattr(one, key)]
+        [1000 * getattr(head, key) for head in heads if getattr(head, key)]
         for key in ("dish_radius_m", "knuckle_radius_m")
     )
     return {
@@ -76,8 +88,8 @@ def _of_heads(job):
     }
 
 
-def _of_solid(job):
-    """Sizes of a lying cylinder or a sphere."""
+def _sizes_of_solid(job):
+    """Declared sizes of a horizontal cylinder or a sphere."""
     lying, solid = job.horizontal, job.horizontal or job.sphere
     if solid is None:
         return {}
@@ -104,8 +116,8 @@ def _of_solid(job):
     }
 
 
-def _of_ship(job):
-    """Even keel, the pipe's place in the ship's frame as the mesh has it, and a contraction."""
+def _values_of_ship(job):
+    """Even keel, position of the pipe in the ship's frame, and contraction."""
     if job.ship is None:
         return {}
     share = job.ship.contraction
@@ -116,7 +128,7 @@ def _of_ship(job):
 
 
 def _only(values):
-    """The value that all have; None where they differ, or there are none."""
+    """Value common to all entries; None if they differ or if there are none."""
     return values[0] if len(set(values)) == 1 else None
 
 
@@ -125,7 +137,7 @@ def _thousand(value):
 
 
 def deadwood_part(items, zero_m):
-    """The declared deadwood as a part; its heights are dips, zero_m the level of dip 0."""
+    """Declared deadwood as a part; heights are dips, and `zero_m` is the level of dip 0."""
     return deadwood(
         [item.name for item in items],
         [item.bottom_m + zero_m for item in items],
@@ -136,9 +148,10 @@ def deadwood_part(items, zero_m):
 
 
 def as_declared(job):
-    """A job of declared radii as these are: inside, the shell empty, at their temperature.
+    """Job whose survey has the conditions of its declared radii: inside, empty, their temperature.
 
-    Any other job as it is. What was surveyed beside the radii is in them already.
+    A job without radii is returned unchanged. A survey of some courses is already included in the
+    radii.
     """
     if job.radii is None:
         return job
@@ -156,7 +169,7 @@ def as_declared(job):
 
 
 def thermal_scale(job, switches):
-    """Lengths at reference temperature over those of the survey; 1 if not known or not on."""
+    """Lengths at reference temperature over those of the survey; 1 if unknown or disabled."""
     if not is_warmed(job, switches):
         return 1.0
     warmer = job.table.reference_temperature_c - job.survey.shell_temperature_c
@@ -164,11 +177,12 @@ def thermal_scale(job, switches):
 
 
 def is_warmed(job, switches):
+    """Whether lengths are corrected for temperature: enabled, with a known shell temperature."""
     return switches.temperature and job.survey.shell_temperature_c is not None
 
 
 def inside_end(end, diameter_m, plate_m, scale):
-    """The inside of an end, from what was measured; radii of a standard follow the diameter."""
+    """Inside of an end from its measured sizes; radii of a standard follow from the diameter."""
     measured = End(end.kind, end.depth_m, end.dish_radius_m, end.knuckle_radius_m)
     if end.standard is not None:
         measured = standard_end(measured, end.standard, diameter_m)

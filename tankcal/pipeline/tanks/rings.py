@@ -1,4 +1,4 @@
-"""A lying cylinder of strapped rings: their inside radii, and what is uncertain of them."""
+"""Horizontal cylinder of strapped rings: inside radii and their uncertainty."""
 
 from tankcal.pipeline.tanks.common import inside_end, is_warmed, thermal_scale
 from tankcal.tank.body import SolidPart
@@ -11,11 +11,13 @@ def ringed_part(job, wall, switches):
     """`SolidPart` of a `ringed_wall.RingedWall`."""
     scale, lying = thermal_scale(job, switches), job.horizontal
     ends_m = lying.thickness_m * switches.plate
-    insets = [switches.plate * one.thickness_m + switches.paint * one.paint_m for one in job.rings]
+    insets = [
+        switches.plate * ring.thickness_m + switches.paint * ring.paint_m for ring in job.rings
+    ]
     radii = wall.radius_m - insets
     tank = RingedTank(
         tuple(float(scale * radius) for radius in radii),
-        tuple(scale * one.length_m for one in job.rings),
+        tuple(scale * ring.length_m for ring in job.rings),
         end_a=inside_end(lying.end_a, 2 * float(wall.radius_m[0]), ends_m, scale),
         end_b=inside_end(lying.end_b, 2 * float(wall.radius_m[-1]), ends_m, scale),
         tilt=lying.tilt,
@@ -24,9 +26,9 @@ def ringed_part(job, wall, switches):
     )
     features = wall.features_at(lying.dip_from_a_m)
     warmed = is_warmed(job, switches)
-    bears = {
-        "plate_thickness": switches.plate and any(one.thickness_m for one in job.rings),
-        "paint": switches.paint and any(one.paint_m for one in job.rings),
+    is_used = {
+        "plate_thickness": switches.plate and any(ring.thickness_m for ring in job.rings),
+        "paint": switches.paint and any(ring.paint_m for ring in job.rings),
     }
     return SolidPart(
         tank,
@@ -34,7 +36,9 @@ def ringed_part(job, wall, switches):
         job.material.expansion_per_k,
         warmed=warmed,
         surveyed=SURVEYED,
-        factors=tuple(one.mapped(lambda columns: scale * columns) for one in features.factors(job)),
-        unused=tuple(name for name, does in bears.items() if not does),
+        factors=tuple(
+            factor.mapped(lambda columns: scale * columns) for factor in features.factors(job)
+        ),
+        unused=tuple(name for name, is_relevant in is_used.items() if not is_relevant),
         read_with=features.read_with() if warmed else {},
     )

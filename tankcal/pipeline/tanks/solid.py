@@ -1,4 +1,4 @@
-"""A tank of one solid: lying cylinder, sphere or mesh, from its sizes or its points."""
+"""Tank of one solid: horizontal cylinder, sphere or mesh, from its sizes or its points."""
 
 from dataclasses import replace
 from functools import partial
@@ -19,11 +19,11 @@ from tankcal.tank.meshes import mesh_part
 from tankcal.tank.ships import Pipe, in_ship_frame, piped_mesh
 from tankcal.tank.solids import LyingTank, Sphere
 
-POISSON = 0.3  # of steel
+POISSON = 0.3  # default Poisson's ratio, of steel
 
 
 def solid_body(job, survey, switches, heel=(0.0, 0.0)):
-    """The `Body` of a solid; heel: tangents of trim and list of a tank of a ship."""
+    """`Body` of a solid; `heel` contains the tangents of trim and list of a ship's tank."""
     part_of = ringed_part if job.rings else partial(_part, heel=heel)
     parts, zero = [part_of(job, survey, switches)], solid_zero(job)
     if switches.deadwood and job.deadwood:
@@ -39,45 +39,47 @@ def solid_body(job, survey, switches, heel=(0.0, 0.0)):
 
 
 def _part(job, survey, switches, heel):
-    """`SolidPart` of a tank of declared sizes, of points, or of a mesh."""
+    """`SolidPart` of a tank with declared sizes, with points, or with a mesh."""
     scale = thermal_scale(job, switches)
     job = sized_job(job, survey)
-    given = job.horizontal or job.sphere
+    declared = job.horizontal or job.sphere
     plate = 0.0
-    if given and job.survey.side == "outside" and switches.plate:
-        plate = given.thickness_m
-    unused, survey_says = () if plate else ("plate_thickness",), {}
+    if declared and job.survey.side == "outside" and switches.plate:
+        plate = declared.thickness_m
+    unused, survey_results = () if plate else ("plate_thickness",), {}
     if job.great_circles is not None:
         solid = survey.solid(plate, scale)
-        survey_says, unused = _of_circles(survey, plate, scale), (*unused, "offset")
+        survey_results, unused = _arguments_of_circles(survey, plate, scale), (*unused, "offset")
     elif job.sphere is not None:
         solid = Sphere((job.sphere.diameter_m - 2 * plate) * scale)
     elif job.horizontal is not None:
         solid = _lying(job.horizontal, plate, scale)
     else:
-        solid = _of_mesh(job, survey, scale, heel)
+        solid = _part_of_mesh(job, survey, scale, heel)
     if job.points is not None:
-        survey_says = _of_scan(survey, scale)
+        survey_results = _arguments_of_scan(survey, scale)
     pressure = pressure_of(job)
-    if switches.head and pressure.is_there and job.sphere.thickness_m:  # else nobody said how stiff
+    if (
+        switches.head and pressure.is_there and job.sphere.thickness_m
+    ):  # otherwise the stiffness is unknown
         solid = PressedSphere(solid, _membrane(job), pressure)
         unused = tuple(name for name in unused if name != "plate_thickness")
-        given = {"pressure": pressure.gas_pa, "survey_pressure": pressure.survey_gas_pa}
-        unused += tuple(name for name, pascals in given.items() if not pascals)
+        declared = {"pressure": pressure.gas_pa, "survey_pressure": pressure.survey_gas_pa}
+        unused += tuple(name for name, pascals in declared.items() if not pascals)
     return SolidPart(
         solid,
         scale,
         job.material.expansion_per_k,
         warmed=is_warmed(job, switches),
-        **survey_says,
+        **survey_results,
         unused=unused,
     )
 
 
 def solid_zero(job):
-    """Level of the table's zero: of the dip plate where it is given, above the solid's own zero.
+    """Level of the table's zero above the solid's zero: that of the dip plate, if given, m.
 
-    The levels of a mesh count from its dip plate already.
+    Levels of a mesh already count from its dip plate.
     """
     datum = job.datum
     if job.mesh is not None or datum.dip_plate_z_m is None:
@@ -101,13 +103,13 @@ def solid_zero(job):
 
 
 def solid_as_surveyed(job, names, values):
-    """The lying tank or sphere inside the plates, of sizes that points gave, at their warmth.
+    """Horizontal tank or sphere inside the plates, with measured sizes, at the survey temperature.
 
-    Its dips are plumb ones through the axis, whatever tube the table is for.
+    Its dips are vertical through the axis, for any sounding tube of the table.
     """
     sized = _with_sizes(job, names, values)
-    given = sized.horizontal or sized.sphere
-    plate = given.thickness_m if job.survey.side == "outside" and job.switches.plate else 0.0
+    solid = sized.horizontal or sized.sphere
+    plate = solid.thickness_m if job.survey.side == "outside" and job.switches.plate else 0.0
     if sized.sphere is not None:
         return Sphere(sized.sphere.diameter_m - 2 * plate)
     by_depth = replace(sized.horizontal, tube_angle_rad=None, tube_offset_m=None)
@@ -115,29 +117,32 @@ def solid_as_surveyed(job, names, values):
 
 
 def sized_job(job, scan):
-    """The job with the sizes that its points gave."""
+    """Job with the sizes determined by its points."""
     return job if job.points is None else _with_sizes(job, scan.names, scan.values)
 
 
 def _with_sizes(job, names, values):
-    found = dict(zip(names, map(float, values), strict=True))
+    """Job with the given sizes in place of its declared sizes."""
+    sizes = dict(zip(names, map(float, values), strict=True))
     if job.sphere is not None:
-        return replace(job, sphere=replace(job.sphere, diameter_m=found["diameter"]))
-    width = found["diameter"]
-    lying = replace(job.horizontal, width_m=width, height_m=width, tilt=found["tilt"])
+        return replace(job, sphere=replace(job.sphere, diameter_m=sizes["diameter"]))
+    width = sizes["diameter"]
+    lying = replace(job.horizontal, width_m=width, height_m=width, tilt=sizes["tilt"])
     return replace(job, horizontal=lying)
 
 
-def _of_scan(scan, scale):
-    """What the survey gives, as arguments of `SolidPart`; volumes are to scale."""
-    factors = tuple(replace(one, columns=scale**3 * one.columns) for one in scan.form.factors)
+def _arguments_of_scan(scan, scale):
+    """Results of a scan as arguments of `SolidPart`; volumes are scaled."""
+    factors = tuple(
+        replace(factor, columns=scale**3 * factor.columns) for factor in scan.form.factors
+    )
     return {"surveyed": scan.names, "form": replace(scan.form, factors=factors)}
 
 
-def _of_circles(sphere, plate_m, scale):
-    """What great circles give, as arguments of `SolidPart`; volumes are to scale."""
+def _arguments_of_circles(sphere, plate_m, scale):
+    """Results of great circles as arguments of `SolidPart`; volumes are scaled."""
     form, read_with = sphere.part_of_volumes(plate_m)
-    factors = tuple(replace(one, columns=scale**3 * one.columns) for one in form.factors)
+    factors = tuple(replace(factor, columns=scale**3 * factor.columns) for factor in form.factors)
     return {
         "surveyed": ("diameter",),
         "form": replace(form, factors=factors),
@@ -146,7 +151,7 @@ def _of_circles(sphere, plate_m, scale):
 
 
 def pressure_of(job):
-    """`Pressure` of a sphere: of its table and of its survey; of another tank none."""
+    """`Pressure` of the table and of the survey of a sphere; zero for other tanks."""
     if job.sphere is None:
         return Pressure()
     table, survey = job.table, job.survey
@@ -160,14 +165,16 @@ def pressure_of(job):
 
 
 def _membrane(job):
-    given = job.material.poisson
-    ratio = POISSON if given is None else given
+    poisson = job.material.poisson
+    ratio = POISSON if poisson is None else poisson
     return Membrane(job.sphere.thickness_m, job.material.e_pa, ratio)
 
 
-def _of_mesh(job, mesh, scale, heel):
-    """The part that a mesh encloses; levels count from the dip plate or from its lowest point, on
-    a ship along the pipe from its lower end.
+def _part_of_mesh(job, mesh, scale, heel):
+    """Part enclosed by a mesh.
+
+    Levels count from the dip plate or the lowest point; on a ship, along the pipe from its lower
+    end.
     """
     if job.ship is not None:
         return _on_ship(job.ship, mesh, scale, heel)
@@ -179,11 +186,12 @@ def _of_mesh(job, mesh, scale, heel):
 
 
 def ship_pipe(ship):
-    """The `Pipe` of a `Ship` in her own frame."""
+    """`Pipe` of a `Ship` in the ship's frame."""
     return Pipe(*in_ship_frame([ship.pipe_bottom_m, ship.pipe_top_m], ship.bow_azimuth_rad))
 
 
 def _on_ship(ship, mesh, scale, heel):
+    """Part enclosed by the mesh of a ship's tank, with levels along its pipe."""
     contracted = None if ship.contraction is None else 1 - ship.contraction
     return piped_mesh(
         replace(mesh, vertices_m=in_ship_frame(mesh.vertices_m, ship.bow_azimuth_rad)),
@@ -196,6 +204,7 @@ def _on_ship(ship, mesh, scale, heel):
 
 
 def _lying(tank, plate_m, scale):
+    """`LyingTank` inside the plates, with scaled lengths."""
     return LyingTank(
         width_m=scale * (tank.width_m - 2 * plate_m),
         height_m=scale * (tank.height_m - 2 * plate_m),

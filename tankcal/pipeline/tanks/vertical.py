@@ -1,4 +1,4 @@
-"""A vertical tank: the shell of courses, its head, and what is under and in it."""
+"""Vertical tank: shell of courses, head, bottom and internal parts."""
 
 from dataclasses import dataclass
 
@@ -30,15 +30,19 @@ from tankcal.tank.tips import tip_of
 from tankcal.tank.tops import HeadedShell
 from tankcal.tank.volumes import ShellVolume
 
-# A bottom whose plan is the shell's own: what widens the shell widens it, too.
+# The plan of a bottom is that of the shell, so it widens with the shell.
 
 
 @dataclass(frozen=True)
 class Widened(Part):
-    """Another part with derivatives by what widens the shell.
+    """Part with derivatives by inputs that widen the shell.
 
-    part   with a derivative by "scale"
-    rates  {input: relative growth of the shell's lengths by SI unit of the input}
+    Attributes
+    ----------
+    part : Part
+        Part with a derivative by "scale".
+    rates : dict
+        {input: relative growth of the shell's lengths per SI unit of the input}.
     """
 
     part: Part
@@ -47,7 +51,7 @@ class Widened(Part):
 
     @property
     def has_own_height(self):
-        """That of the part."""
+        """Whether the part has a height of its own."""
         return self.part.has_own_height
 
     @property
@@ -57,29 +61,31 @@ class Widened(Part):
 
     @property
     def breakpoints_m(self):
-        """Those of the part."""
+        """Breakpoints of the part, m."""
         return self.part.breakpoints_m
 
     def volume_m3(self, levels_m):
-        """(rows,) that of the part."""
+        """Volumes (rows,) of the part, m3."""
         return self.part.volume_m3(levels_m)
 
     def area_m2(self, levels_m):
-        """(rows,) that of the part."""
+        """Areas (rows,) of the part, m2."""
         return self.part.area_m2(levels_m)
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} those of the part, and by each rate that by its scale."""
-        found = self.part.derivatives(levels_m)
-        return found | {name: rate * found["scale"] for name, rate in self.rates.items()}
+        """{input: derivative (rows,)} of the part, with each rate times its derivative by scale."""
+        derivatives = self.part.derivatives(levels_m)
+        return derivatives | {
+            name: rate * derivatives["scale"] for name, rate in self.rates.items()
+        }
 
     def sources(self, levels_m):
-        """Those of the part."""
+        """Sources of uncertainty of the part."""
         return self.part.sources(levels_m)
 
 
 def widen_bottom(part, shell):
-    """`Widened` bottom of a `body.ShellPart`, by its radius at the bottom."""
+    """`Widened` bottom of a `body.ShellPart`, from its radius at the bottom."""
     radius = np.sqrt(shell.volume.area_m2([0.0])[0] / np.pi) / shell.scale
     rates = {
         "offset": 1 / radius,
@@ -92,11 +98,11 @@ def widen_bottom(part, shell):
     return Widened(part, {name: rate for name, rate in rates.items() if name in bearing})
 
 
-FOOTPRINT = 360  # azimuths of the outline that a bottom is computed over
+FOOTPRINT = 360  # azimuths of the outline of a bottom
 
 
 def insets_of(job, switches):
-    """(courses,) what is taken off the surveyed radii, m: plate and paint of an outside survey."""
+    """Plate and paint of each course to subtract from outside radii, m; 0 for an inside survey."""
     outside = job.survey.side == "outside"
     return [
         outside * (switches.plate * course.thickness_m + switches.paint * course.paint_m)
@@ -105,16 +111,29 @@ def insets_of(job, switches):
 
 
 def nominal_inside_m(job, course):
-    """Inside radius of a course by the drawing, m."""
+    """Nominal inside radius of a course, m."""
     less = PLATES_TO_INSIDE[job.diameter_is or INSIDE]
     return job.tank.nominal_diameter_m / 2 - less * course.thickness_m
 
 
 def shell_volume(wall, insets_m=None, scale=1.0, stretch=1.0, *, departures=()):
-    """The shell of courses as the field of its wall has it.
+    """`ShellVolume` of the courses from the field of the wall.
 
-    insets_m (courses,) off the radii; scale of horizontal lengths, stretch of heights; departures
-    that were declared, of "barrel" and "taper"
+    Parameters
+    ----------
+    wall : Wall
+    insets_m : sequence of float, length courses, optional
+        Lengths to subtract from the radii, m.
+    scale : float
+        Factor of horizontal lengths.
+    stretch : float
+        Factor of heights.
+    departures : sequence of str
+        Declared departures among "barrel" and "taper".
+
+    Returns
+    -------
+    ShellVolume
     """
     outlines, sites, levels = wall.field.outlines_m, wall.field.sites, gauss_heights()
     missed = {
@@ -139,10 +158,10 @@ def shell_volume(wall, insets_m=None, scale=1.0, stretch=1.0, *, departures=()):
 
 
 def shell_zero(job, wall):
-    """Level of the table's zero, in the frame of the parts.
+    """Level of the table's zero in the frame of the parts, m.
 
-    Of a shell: of the dip plate, else of the bottom, above the bottom of the first course; a bottom
-    that leans with the shell lies higher or lower where the dip point is.
+    The zero is the dip plate, or otherwise the bottom, above the bottom of the first course. A
+    bottom that leans with the shell is higher or lower at the dip point.
     """
     datum = job.datum
     if datum.dip_plate_z_m is not None:
@@ -159,21 +178,36 @@ def _axis_at_bottom(job, wall):
 
 
 def critical_zone(job):
-    """(low, high) dips between which a floating roof is partly afloat; None without a roof."""
+    """Dips (low, high) between which a floating roof is partly afloat; None without a roof."""
     if job.roof is None or not job.switches.roof:
         return None
     return job.roof.critical_bottom_m, job.roof.critical_top_m
 
 
 def vertical_body(job, wall, switches, uncertain):
+    """`Body` of a vertical tank.
+
+    Parameters
+    ----------
+    job : Job
+    wall : Wall
+    switches
+        Enabled corrections.
+    uncertain : bool
+        Whether to propagate the uncertainty of the wall.
+
+    Returns
+    -------
+    Body
+    """
     job = as_declared(job)
     shell = _shell(job, wall, switches, uncertain)
     zero = shell_zero(job, wall)
-    whole = shell
+    top_part = shell
     if switches.top and job.top is not None:
-        whole = HeadedShell(shell, _tip(job.top, shell))
-    highest = whole.highest_m if whole is not shell else shell.volume.height_m
-    parts = [whole]
+        top_part = HeadedShell(shell, _tip(job.top, shell))
+    highest = top_part.highest_m if top_part is not shell else shell.volume.height_m
+    parts = [top_part]
     if switches.head and (job.table.liquid_density_kg_m3 or job.survey.liquid_density_kg_m3):
         parts.append(_head(job, shell, zero, highest))
     if switches.deadwood and job.deadwood:
@@ -194,7 +228,7 @@ def vertical_body(job, wall, switches, uncertain):
 
 
 def _on_its_bottom(job, wall, shell, zero, parts):
-    """The parts with the bottom: beside them, or below them where it was measured by liquid."""
+    """Parts with the bottom: beside them, or below them if it was calibrated by liquid."""
     bottom = job.bottom
     if bottom.form == "liquid":
         from tankcal.tank.liquid_zone import Above, measured_bottom
@@ -205,6 +239,7 @@ def _on_its_bottom(job, wall, shell, zero, parts):
 
 
 def _bottom(job, wall, shell):
+    """Part of the bottom, by its form."""
     from tankcal.tank.bottoms import leaning_bottom, shaped_bottom, surveyed_bottom
 
     bottom, low = job.bottom, job.datum.bottom_z_m
@@ -214,7 +249,7 @@ def _bottom(job, wall, shell):
     if bottom.xyz_m is not None:
         xyz = bottom.xyz_m - (0.0, 0.0, low)
         causes = bottom.shared if bottom.form == OF_CLOUD else None
-        shared = causes and cause_factors(causes, [one.column_m for one in causes])
+        shared = causes and cause_factors(causes, [cause.column_m for cause in causes])
         return surveyed_bottom(footprint, xyz, bottom.sd_m, wall.shell.slope, shared)
     rise = 0.0 if bottom.centre_z_m is None else bottom.centre_z_m - low
     depth, *radii = _sizes_of_head(bottom, footprint.area_m2, abs(rise))
@@ -222,16 +257,14 @@ def _bottom(job, wall, shell):
 
 
 def _footprint(wall, shell):
-    """The inside outline of the first course at its bottom: that of its lowest section, to scale.
-
-    As large as the shell is there.
-    """
+    """Inside outline of the first course at its bottom: the lowest section, scaled to its area."""
     x, y, radius = wall.lowest_outline(np.arange(FOOTPRINT) * FULL_TURN / FOOTPRINT)
     larger = shell.volume.area_m2([0.0])[0] / (np.pi * np.mean(radius**2))
     return Footprint(float(x), float(y), radius * np.sqrt(larger))
 
 
 def _head(job, shell, zero, highest_m):
+    """Part of the deformation by the liquid head."""
     survey = job.survey
     return liquid_head(
         shell.volume,
@@ -246,15 +279,15 @@ def _head(job, shell, zero, highest_m):
 
 
 def _tip(top, shell):
-    """The head on the shell, as high as heights are at the table's temperature."""
+    """Head on the shell, at the table's temperature."""
     volume = shell.volume
     plan = float(volume.top_weights @ volume.features)
     sizes = _sizes_of_head(top, plan, top.depth_m)
-    return tip_of(top.form, plan, *(shell.stretch * one if one else one for one in sizes))
+    return tip_of(top.form, plan, *(shell.stretch * size if size else size for size in sizes))
 
 
 def _sizes_of_head(head, plan_m2, depth_m):
-    """(depth, dish, knuckle) of a head; radii of a standard follow the diameter of its edge."""
+    """(Depth, dish, knuckle) of a head; radii of a standard follow from the edge diameter."""
     end = End(TIPS[head.form], depth_m or 0.0, head.dish_radius_m, head.knuckle_radius_m)
     if head.standard is not None:
         end = standard_end(end, head.standard, 2 * np.sqrt(plan_m2 / np.pi))
@@ -262,13 +295,14 @@ def _sizes_of_head(head, plan_m2, depth_m):
 
 
 def _survey_level_m(survey, zero):
-    """Level of the liquid on the survey day; 0 for the empty tank."""
+    """Level of the liquid during the survey, m; 0 for the empty tank."""
     if not survey.liquid_density_kg_m3:
         return 0.0
     return max((survey.liquid_level_m or 0.0) + zero, 0.0)
 
 
 def _roof(job, zero):
+    """Part of the floating roof; its heights are dips, `zero` the level of dip 0."""
     roof = job.roof
     return floating_roof(
         roof.mass_kg,
@@ -280,9 +314,24 @@ def _roof(job, zero):
 
 
 def _shell(job, wall, switches, uncertain):
+    """`ShellPart` of a wall.
+
+    Parameters
+    ----------
+    job : Job
+    wall : Wall
+    switches
+        Enabled corrections.
+    uncertain : bool
+        Whether to propagate the uncertainty of the wall.
+
+    Returns
+    -------
+    ShellPart
+    """
     scale = thermal_scale(job, switches)
     stretch = scale if job.table.height_expansion else 1.0
-    leaning = np.hypot(1.0, wall.shell.tilt)  # horizontal cut over cut square to the axis
+    leaning = np.hypot(1.0, wall.shell.tilt)  # horizontal section over section square to the axis
     volume = shell_volume(
         wall,
         insets_of(job, switches),
@@ -293,7 +342,7 @@ def _shell(job, wall, switches, uncertain):
     features = _functionals(wall, volume) if uncertain else None
     bearing = bearing_inputs(job, switches)
     read_with = wall.read_with(features.weights) if uncertain else {}
-    if job.radii is None:  # else all that a survey beside them depends on is in the radii
+    if job.radii is None:  # otherwise the radii include these inputs
         read_with = {name: column for name, column in read_with.items() if name in bearing}
     return ShellPart(
         volume,
@@ -310,55 +359,56 @@ def _shell(job, wall, switches, uncertain):
 
 
 def _declared(job):
-    return {one.name for one in job.inputs}
+    return {declared_input.name for declared_input in job.inputs}
 
 
 def _factors(job, wall, volume, features):
-    """What the survey leaves uncertain about the features of the shell: its readings, and the wall
-    between them by the kinds of its components.
-    """
+    """`Factor`s of the features of the shell: from readings, and from unseen form by kind."""
     return (
         *wall.factors(job, features.weights),
-        *_of_the_unseen(wall, volume, features, _declared(job), scanned=bool(job.clouds)),
+        *_factors_of_unseen(wall, volume, features, _declared(job), scanned=bool(job.clouds)),
     )
 
 
-def _of_the_unseen(wall, volume, features, declared, *, scanned):
-    """A `Factor` of each kind of component that the survey did not see all of.
+def _factors_of_unseen(wall, volume, features, declared, *, scanned):
+    """`Factor` of each kind of component that the survey does not fully determine.
 
-    What was declared, a barrel or a taper, is not counted again. Seams count as those that points
-    need not meet at least, for their readings cannot say that there are none; those of a scan,
-    which are means of cells that leave nothing out, can.
+    A declared barrel or taper is not counted again. Points may miss seams, and their readings
+    cannot exclude them. Seams therefore have at least the size that points may miss. The cells of a
+    scan leave no gaps, so this lower bound does not apply.
     """
-    assumed, found = wall.field.amplitudes.assumed_share(), []
+    assumed, factors = wall.field.amplitudes.assumed_share(), []
     top = volume.weights_m([volume.height_m])[0]
     for kind in KINDS:
-        chosen = [
+        indices = [
             index
-            for index, one in enumerate(COMPONENTS)
-            if one.kind == kind
-            and one.declared_as not in declared
-            and (one.shape == "mean" or wall.field.stated)
+            for index, component in enumerate(COMPONENTS)
+            if component.kind == kind
+            and component.declared_as not in declared
+            and (component.shape == "mean" or wall.field.stated)
         ]
-        if chosen:
-            parts = [features.unseen(index) for index in chosen]
-            told = assumed[chosen]
+        if indices:
+            parts = [features.unseen(index) for index in indices]
+            assumed_shares = assumed[indices]
             if kind == "seams" and not scanned:
-                parts.append(_of_hidden_seams(features, top, sum(parts)))
-                told = np.append(told, 1.0)
-            found.append(factor_of_unseen(kind, parts, [top @ one @ top for one in parts], told))
-    return tuple(one for one in found if one.columns.shape[1])
+                parts.append(_hidden_seams_m2(features, top, sum(parts)))
+                assumed_shares = np.append(assumed_shares, 1.0)
+            factors.append(
+                factor_of_unseen(kind, parts, [top @ part @ top for part in parts], assumed_shares)
+            )
+    return tuple(factor for factor in factors if factor.columns.shape[1])
 
 
-def _of_hidden_seams(features, top, known):
-    """(f, f) covariance by which what is known of seams is short of those that points may miss."""
+def _hidden_seams_m2(features, top, known_m2):
+    """Covariance (f, f) by which the known seams fall short of those that points may miss, m2."""
     hidden = features.hidden_seams()
     least = max(top @ hidden @ top, 1e-30)
-    return max(1 - top @ known @ top / least, 0.0) * hidden
+    # Only the shortfall at the top of the shell is added, so that known seams count once.
+    return max(1 - top @ known_m2 @ top / least, 0.0) * hidden
 
 
 def _functionals(wall, volume):
-    """`Functionals` of the features of the shell, by the surveyed radii."""
+    """`Functionals` of the features of the shell by the surveyed radii."""
     return wall.field.functionals(np.array([course.gradients_m for course in volume.courses]))
 
 
@@ -369,14 +419,14 @@ def volume_by_points(job, wall, levels_m):
     ----------
     job : Job
     wall : Wall
-        With m accepted points.
+        Wall with m accepted points.
     levels_m : array_like, shape (rows,)
         Levels above the bottom of the first course, m.
 
     Returns
     -------
     ndarray, shape (rows, 3 m)
-        m3 per m.
+        Derivatives, m3 per m.
     """
     volume = _shell(job, wall, job.switches, False).volume
     jacobian = _functionals(wall, volume).weights @ wall.radii_by_points
@@ -385,12 +435,12 @@ def volume_by_points(job, wall, levels_m):
 
 def bearing_inputs(job, switches):
     """Declared inputs that the corrections of the shell use."""
-    seen = job.strapping is not None or (job.points is not None and job.points.by_inputs)
-    outside = job.survey.side == "outside" or bool(seen)
-    bears = {
+    is_seen_through = job.strapping is not None or (job.points is not None and job.points.by_inputs)
+    outside = job.survey.side == "outside" or bool(is_seen_through)
+    is_used = {
         "plate_thickness": outside and switches.plate and any(c.thickness_m for c in job.courses),
         "paint": outside and switches.paint and any(c.paint_m for c in job.courses),
         "shell_temperature": is_warmed(job, switches),
         "expansion": is_warmed(job, switches),
     }
-    return tuple(name for name, does in bears.items() if does)
+    return tuple(name for name, is_relevant in is_used.items() if is_relevant)

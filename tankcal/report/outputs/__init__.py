@@ -1,4 +1,4 @@
-"""Everything that a run leaves behind, written all or nothing."""
+"""All files of a run, written as a whole or not at all."""
 
 import shutil
 from collections.abc import Callable
@@ -37,29 +37,31 @@ def write(
     letterhead: "Letterhead | None" = None,
     papers: bool = True,
 ) -> list[Path]:
-    """Write record, CSV files, workbook, certificate.xml, notebook, PDFs and HTML of a result.
+    """Write all files of a result: record, CSV files, workbook, certificate.xml, and papers.
 
     Parameters
     ----------
     result : Result
-        Of `tankcal.run`.
+        Result of `tankcal.run`.
     directory : path
-        Made when missing; earlier results there are replaced when all is written, and a folder that
-        holds anything else is refused.
+        Folder of the results; it is created if it does not exist. Earlier results are replaced
+        after all files have been written.
     progress : callable, optional
         Called as progress(text, done, total).
     letterhead : report.letterhead.Letterhead, optional
+        Letterhead of the laboratory.
     papers : bool, optional
-        False: record and CSV files only; `rebuild` makes the others from the record.
+        False: write record and CSV files only; `rebuild` writes the other files from the record.
 
     Returns
     -------
     list of Path
+        Written files.
 
     Raises
     ------
     InputError
-        For a folder that is not tankcal's to replace.
+        If the folder contains files that are no results of tankcal.
     """
 
     def prepare(folder):
@@ -73,7 +75,22 @@ def write(
 
 
 def write_adjustment(job, adjustment, directory, progress=None, letterhead=None, papers=True):
-    """The same for a survey that was only adjusted (`survey.Adjustment` of a `Job`)."""
+    """Write all files of an adjusted survey without tank.
+
+    Parameters
+    ----------
+    job : Job
+        Job of the survey.
+    adjustment : survey.Adjustment
+        Result of the adjustment.
+    directory, progress, letterhead, papers
+        As in `write`.
+
+    Returns
+    -------
+    list of Path
+        Written files.
+    """
 
     def prepare(folder):
         record = records.record_of_adjustment(job, adjustment)
@@ -85,22 +102,29 @@ def write_adjustment(job, adjustment, directory, progress=None, letterhead=None,
 
 
 def rebuild(record_path, directory, progress=None, language=None, letterhead=None):
-    """Write the same from a record.json alone; nothing is computed again, the record is copied.
+    """Write all files of a result from its record.json, without computation.
 
-    points_cov.npz, which no record holds, is taken over when it lies beside the record. The other
-    arguments are those of `write`.
+    The record is copied. points_cov.npz, which is not part of the record, is copied if it lies
+    beside the record.
 
     Parameters
     ----------
     record_path : path
-        Of a record.json, or the folder of results that holds one.
+        Path of a record.json, or of the folder of results that contains it.
+    directory, progress, letterhead : optional
+        As in `write`.
     language : str, optional
-        Of workbook and papers, one of LANGUAGES; None: that of the job.
+        Language of workbook and papers, one of LANGUAGES; None: the language of the job.
+
+    Returns
+    -------
+    list of Path
+        Written files.
 
     Raises
     ------
     InputError
-        For what is no record, or a language that is not known.
+        If the file is no valid record, or for an unknown language.
     """
     source = record_file(record_path)
     known_language(language)
@@ -116,24 +140,24 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
     try:
         return _write(prepare, directory, progress, language, letterhead)
     except (VocabularyError, CellError) as error:
-        found = message("record_speaks_otherwise", "does not have the content of a record "
+        problem = message("record_speaks_otherwise", "does not have the content of a record "
                                                    "({what})",
                         what=str(error))  # fmt: skip
-        raise InputError(Problem(source.name, found)) from error
+        raise InputError(Problem(source.name, problem)) from error
     except TankcalError:
         raise
     except (LookupError, TypeError, ValueError, AttributeError) as error:
-        found = message(
+        problem = message(
             "no_record",
             "does not have the content of a record ({name}: {error})",
             name=type(error).__name__,
             error=str(error),
         )
-        raise InputError(Problem(source.name, found)) from error
+        raise InputError(Problem(source.name, problem)) from error
 
 
 def known_language(language):
-    """The language, or None; raises InputError for one that is not among LANGUAGES."""
+    """Return the language or None; raise InputError for a language not in LANGUAGES."""
     if language not in (None, *LANGUAGES):
         expected = message(
             "unknown_language",
@@ -146,12 +170,12 @@ def known_language(language):
 
 
 def record_file(path):
-    """The record that a path names: the file itself, or record.json in a folder of results."""
+    """Return the path of the record: the path itself, or record.json in a folder of results."""
     return Path(path) / RECORD if Path(path).is_dir() else Path(path)
 
 
 def _write(prepare, directory, progress, language=None, letterhead=None, papers=True):
-    """Write everything into `directory`; `prepare` puts the record into a folder and gives it."""
+    """Write all files; prepare(folder) writes the record into a folder and returns it."""
     refuse_foreign(directory)
     progress = progress or (lambda text, done, total: None)
     with folders.replaced(directory, language) as temporary:
@@ -166,14 +190,14 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
 
 
 def _write_papers(record, folder, progress, language, letterhead):
-    """Workbook, digital certificate, notebook, PDFs and HTML beside the record."""
+    """Write workbook, digital certificate, notebook, PDFs and web page beside the record."""
     from tankcal.report import (
-        workbook,  # a second to import, which record and tables need not wait for
+        workbook,  # import takes a second; not needed for record and tables
     )
 
     progress(message("writing_workbook", "writing the workbook"), 0, 1)
-    of_tank, of_survey = WORKBOOKS
-    name = of_tank if record["capacity"] else of_survey
+    tank_file, survey_file = WORKBOOKS
+    name = tank_file if record["capacity"] else survey_file
     digest = sha256((folder / RECORD).read_bytes())
     with without_collection():
         workbook.write(record, folder / name, language, digest)
@@ -190,5 +214,5 @@ def _write_papers(record, folder, progress, language, letterhead):
 
 
 def refuse_foreign(directory):
-    """Raise InputError when `directory` exists and holds anything but results of tankcal."""
+    """Raise InputError if `directory` contains files that are no results of tankcal."""
     folders.refuse_foreign(directory, FILES)

@@ -1,4 +1,4 @@
-"""Tables as CSV files, column by column: a survey may have 200 000 readings."""
+"""Tables as CSV files, formatted by columns, since a survey may have 200 000 readings."""
 
 import csv
 import io
@@ -10,19 +10,26 @@ from tankcal.record.columns import ArrayColumns, Texts, values_of
 from tankcal.report import numbers
 from tankcal.text.spreadsheets import guard_formula
 
-BLOCK = 10_000  # rows whose cells are texts at one time
+BLOCK = 10_000  # number of rows that are formatted at a time
 _YES = {True: "yes", False: "no"}
 
 
 def write_table(table, path, rows):
     """Write a declared Table with its headings.
 
-    rows  dicts, {key: values} or `ArrayColumns`; a column that none of them knows is left out
+    Parameters
+    ----------
+    table : Table
+        Declaration of the table.
+    path : Path
+        Path of the file.
+    rows : list of dict, dict or ArrayColumns
+        Rows, or columns {key: values}. Columns without values are omitted.
     """
     if isinstance(rows, ArrayColumns):
         values_of = rows.arrays
     else:
-        values_of = rows if isinstance(rows, dict) else _by_keys(rows)
+        values_of = rows if isinstance(rows, dict) else _columns_of_rows(rows)
     columns = {}
     for column in table.in_csv():
         if column.key not in values_of:
@@ -32,13 +39,13 @@ def write_table(table, path, rows):
     write_csv(columns, path, table.csv_style)
 
 
-def _by_keys(rows):
+def _columns_of_rows(rows):
     keys = dict.fromkeys(key for row in rows for key in row)
     return {key: [row.get(key) for row in rows] for key in keys}
 
 
 def _plain(values, factor):
-    """The values in another unit; yes and no for True and False."""
+    """Convert values by a factor of unit; True and False become yes and no."""
     if isinstance(values, Texts):
         return values
     if isinstance(values, np.ndarray):
@@ -54,20 +61,20 @@ def _plain(values, factor):
 
 
 def _spread(heading, cells):
-    """A column; lists of one or more as columns of their own: id_1, id_2."""
+    """Return a column; a column of lists becomes several columns, such as id_1 and id_2."""
     if isinstance(cells, Texts) and cells.codes.ndim > 1:
         each = [Texts(codes, cells.texts) for codes in cells.codes.T]
     elif not isinstance(cells, list) or not any(isinstance(cell, list) for cell in cells):
         return {heading: cells}
     else:
         width = max(map(len, cells), default=0)
-        padded = ([*one, *[""] * (width - len(one))] for one in cells)
+        padded = ([*cell, *[""] * (width - len(cell))] for cell in cells)
         each = map(list, zip(*padded, strict=True))
-    return {f"{heading}_{i}": one for i, one in enumerate(each, 1)}
+    return {f"{heading}_{i}": column for i, column in enumerate(each, 1)}
 
 
 def write_rows(rows, path):
-    """Write rows (dicts with the same keys) with twelve digits, lists with blanks between."""
+    """Write rows (list of dict with equal keys) with twelve digits; lists are joined by spaces."""
     columns = {key: [_plain_cell(row[key]) for row in rows] for key in rows[0]}
     write_csv(columns, path, "%.12g")
 
@@ -79,25 +86,35 @@ def _plain_cell(value):
 
 
 def write_csv(columns, path, style):
-    """Write {heading: cells}; `style` ("%.6f") is that of numbers, "" for none."""
+    """Write columns as a CSV file.
+
+    Parameters
+    ----------
+    columns : dict
+        {heading: cells}, all of equal length.
+    path : Path
+        Path of the file.
+    style : str
+        Format of floats, such as "%.6f".
+    """
     columns = {heading: _cells(values) for heading, values in columns.items()}
     count = len(next(iter(columns.values()), ()))
     with open(path, "w", encoding="utf-8", newline="") as file:
         file.write(",".join(map(_quoted, columns)) + "\n")
         for start in range(0, count, BLOCK):
-            cells = [_texts(one[start : start + BLOCK], style) for one in columns.values()]
+            cells = [_texts(column[start : start + BLOCK], style) for column in columns.values()]
             file.write("\n".join(map(",".join, zip(*cells, strict=True))) + "\n")
 
 
 def _cells(values):
-    """A column as numbers, or an array of texts as they are written."""
+    """Return a column as numbers or as quoted texts."""
     if isinstance(values, Texts):
         return values.mapped(_quoted).filled("")
     return values if isinstance(values, np.ndarray) else list(values)
 
 
 def _texts(values, style):
-    """The cells of a column: of floats as `style` says, of nothing empty, of all else its text."""
+    """Return the cells of a column: floats in the format `style`, missing values empty."""
     if isinstance(values, np.ndarray):
         if values.dtype == object:
             return values.tolist()
@@ -119,7 +136,7 @@ def _text(value, style):
 
 
 def _quoted(text):
-    """A text as a cell, in quotation marks where it must, never a formula."""
+    """Return a text as a cell, quoted if necessary and never a formula."""
     if text.isalnum():
         return text
     text = guard_formula(text)

@@ -1,4 +1,4 @@
-"""The CSV files: tables of the record in metres, millimetres and degrees, one row a thing."""
+"""The CSV files: tables of the record in metres, millimetres and degrees."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from tankcal.report.tables import (
 )
 from tankcal.text.digits import PROGRAM, decimals_of_rows, fixed
 
-LEAST_DECIMALS = 6  # micrometres, square millimetres, millilitres
+LEAST_DECIMALS = 6  # smallest number of decimals: volumes to millilitres
 FILES = (
     "points.csv",
     "points_cov.npz",
@@ -37,7 +37,7 @@ FILES = (
 
 
 def write_tables(record, directory):
-    """Write every table of the record that has rows, as CSV."""
+    """Write all tables of the record with rows as CSV files."""
     tables = {
         "points": (survey.POINTS, survey.point_columns(record)),
         "sections": (tank.SECTIONS, None),
@@ -70,10 +70,10 @@ def write_tables(record, directory):
 
 
 def write_covariance(adjustment, directory):
-    """Write points_cov.npz: the full covariance of all points, as a job reads it.
+    """Write points_cov.npz, the full covariance matrix of all points, in the format of a job.
 
-    Of more points than a job may have with a full covariance there is none; the covariance of each
-    point by itself is in the record.
+    The file is omitted if the survey exceeds the limit of a job with a full covariance matrix. The
+    record contains the covariance matrix of each point.
     """
     if len(adjustment.names) <= MAX_POINTS:
         np.savez(
@@ -84,12 +84,12 @@ def write_covariance(adjustment, directory):
 
 
 def _capacity(record):
-    """The columns of the capacity table, volumes to the digits of their U, the same in a row."""
-    found = capacity.capacity_columns(record)
-    digits = decimals_of_rows(found["stated_U_m3"], least=LEAST_DECIMALS)
+    """Return the columns of the capacity table, with volumes rounded to the digits of U."""
+    columns = capacity.capacity_columns(record)
+    digits = decimals_of_rows(columns["stated_U_m3"], least=LEAST_DECIMALS)
     return {
         key: [fixed(value, places, PROGRAM) for value, places in zip(values, digits, strict=True)]
         if "_m3" in key
         else values
-        for key, values in found.items()
+        for key, values in columns.items()
     }

@@ -1,12 +1,12 @@
-"""Tables, declared once: columns with key, unit, digits and headings, for every medium.
+"""Declarations of tables: columns with key, unit, digits and headings, for every medium.
 
-A `Table` says which columns it has, and what of the record its rows are. Who writes it:
+A `Table` defines its columns and the rows that it takes from a record. The writers are:
 
-    paper (notebook, PDF, web page, terminal)  `plain.PlainPaper.show`, which makes a block
+    paper (notebook, PDF, web page, terminal)  `plain.PlainPaper.show`, which returns a block
     workbook                                   `workbook.tables.columns_of`
     CSV                                        `outputs.csv_files.write_table`
 
-A new column is a line in one of the modules here, and its heading in the words of each language.
+A new column requires a line in a module of this package and a heading in each language.
 """
 
 from tankcal.report.tables.table import Column, Table, decimals_of_cells

@@ -1,4 +1,4 @@
-"""The capacity table, and the proportional parts beside it: in the units that a job asks for."""
+"""The capacity table and its proportional parts, in the units of the job."""
 
 from tankcal.record.plain_data import rows_of
 from tankcal.report import numbers
@@ -6,51 +6,52 @@ from tankcal.report.tables.table import Column, Table
 from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, k_of_rows, stated_U_m3
 from tankcal.text.digits import LITRE_DECIMALS, round_u
 
+# Names of the capacity tables in the papers.
 PRINTED = "capacity capacity_marked capacity_k capacity_k_marked capacity_monte_carlo"
-NOT_FOR_USE = "†"
+NOT_FOR_USE = "†"  # mark of rows that must not be used
 
 
 def capacity_columns(record):
-    """The rows of the table as {key: values}: volumes in m3, U as it is stated.
+    """Return the columns of the table, {key: values}: volumes in m3 with the stated U.
 
-    Some are there only where they say something: U_m3 where an input was uncertain,
-    by_monte_carlo where some intervals are the simulation's and others not, dip, in_unit and
-    U_in_unit where the table is in feet and inches, litres or barrels.
+    U_m3 contains None if no input is uncertain. by_monte_carlo is present if only some of the
+    intervals are results of Monte Carlo. dip, in_unit and U_in_unit are present if the table is in
+    feet and inches, litres or barrels.
     """
     capacity, spec = record["capacity"], record["job"]["table"]
     U_m3, simulated = stated_U_m3(capacity), by_monte_carlo(capacity)
-    found = {key: capacity[key] for key in ("height_m", "volume_m3", "u_m3", "area_m2")}
-    found |= {
+    columns = {key: capacity[key] for key in ("height_m", "volume_m3", "u_m3", "area_m2")}
+    columns |= {
         "stated_U_m3": U_m3,
         "U_m3": U_m3 if any(U_m3) else [None] * len(U_m3),
         "k_of_gum": capacity["k"],
         "k": k_of_rows(capacity),
     }
-    if "interval" in capacity:  # none in a record from before
-        found |= {key: capacity[key] for key in ("low_m3", "high_m3", "interval")}
+    if "interval" in capacity:  # absent in records of earlier versions
+        columns |= {key: capacity[key] for key in ("low_m3", "high_m3", "interval")}
     if len(set(simulated)) > 1:
-        found["by_monte_carlo"] = [MARK if one else None for one in simulated]
+        columns["by_monte_carlo"] = [MARK if is_simulated else None for is_simulated in simulated]
     if not all(capacity["for_use"]):
-        found["for_use"] = capacity["for_use"]
+        columns["for_use"] = capacity["for_use"]
     if spec["height_unit"] != "m":
-        found["dip"] = capacity["dip"]
+        columns["dip"] = capacity["dip"]
     if spec["volume_unit"] != "m3":
         factor = numbers.unit(spec["volume_unit"]).factor
-        found["in_unit"] = capacity["volume_m3"]
-        found["exact_in_unit"] = [factor * U for U in U_m3]
-        found["U_in_unit"] = [round_u(U) for U in found["exact_in_unit"]]
-    for other in record["densities"]:
-        found[_at(other)] = other["volume_m3"]
-    return found
+        columns["in_unit"] = capacity["volume_m3"]
+        columns["exact_in_unit"] = [factor * U for U in U_m3]
+        columns["U_in_unit"] = [round_u(U) for U in columns["exact_in_unit"]]
+    for density in record["densities"]:
+        columns[_key_at_density(density)] = density["volume_m3"]
+    return columns
 
 
-def _at(other):
-    """The key of the volumes at a further density of the liquid."""
-    return f"volume_m3_at_{other['density_kg_m3']:g}_kg_m3"
+def _key_at_density(density):
+    """Return the key of the volumes at another density of the liquid."""
+    return f"volume_m3_at_{density['density_kg_m3']:g}_kg_m3"
 
 
 def capacity_rows(record):
-    """The rows of `capacity_columns`, a dict each."""
+    """Return the rows of `capacity_columns` (list of dict)."""
     return rows_of(capacity_columns(record))
 
 
@@ -63,14 +64,14 @@ def _use(paper, row):
 
 
 def capacity_table(record):
-    """The Table of a record's capacity, by the units of height and volume of its job."""
+    """Return the Table of the capacity, in the units of height and volume of the job."""
     spec = record["job"]["table"]
     unit, in_feet = spec["volume_unit"], spec["height_unit"] != "m"
     least, named = numbers.unit(unit).least, {"unit": unit}
     with_volume = f"{PRINTED} capacity_density"
     everywhere = f"{with_volume} field_table uneven"
     cubic = {"unit": "m3", "u": "stated_U_m3", "least": LITRE_DECIMALS, "decimals": None}
-    densities = [_at(other) for other in record["densities"]]
+    densities = [_key_at_density(density) for density in record["densities"]]
     return Table(
         "capacity",
         (
@@ -108,11 +109,11 @@ def capacity_table(record):
     )  # fmt: skip
 
 
-# ---- what millimetres add to a row of a centimetre table
+# ---- proportional parts: volume of additional millimetres in a centimetre table
 
 
 def part_rows(record):
-    """Zones of the table in which millimetres add the same, with what 1 mm to 9 mm add."""
+    """Return the zones of constant proportional parts, with the volumes of 1 mm to 9 mm."""
     return [
         zone | {f"part_{n}": part for n, part in enumerate(zone["part_m3"], 1)}
         for zone in record["proportional_parts"]["zones"]
@@ -120,7 +121,7 @@ def part_rows(record):
 
 
 def parts_table(record):
-    """The Table of the proportional parts of a record."""
+    """Return the Table of the proportional parts of a record."""
     unit = record["job"]["table"]["volume_unit"]
     ends = (("bottom_m", "from_m"), ("top_m", "to_m"))
     return Table(

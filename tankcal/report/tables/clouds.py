@@ -1,4 +1,4 @@
-"""Tables of point clouds: files, scans, scanners, targets, overlaps, and what hides the wall."""
+"""Tables of point clouds: files, scans, scanners, targets, overlaps, obstructions."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from tankcal.text.digits import LITRE_DECIMALS
 
 
 def _column(key, heading, unit="", decimals=None, **more):
-    """A column whose heading in the workbook is that of the paper, with the unit."""
+    """Return a column with equal headings in paper and workbook; the workbook adds the unit."""
     return Column(key, unit, decimals=decimals, heading=f"cloud_{heading}", sheet=True, **more)
 
 
@@ -46,8 +46,8 @@ SCANS = Table(
         _count("targets"),
     ),
     rows=lambda record: [
-        one | {"tie": "assumed" if one["is_assumed"] else one["tie"]}
-        for one in record["clouds"]["scans"]
+        scan | {"tie": "assumed" if scan["is_assumed"] else scan["tie"]}
+        for scan in record["clouds"]["scans"]
     ],
 )  # fmt: skip
 
@@ -64,20 +64,22 @@ POINTS = Table(
 def _scanners(record):
     return [
         {
-            **one,
-            "certificate": one["certificate"] or None,
-            "offset_from": _origin(one, one["u_offset_mm"] is None, one["offset_is_assumed"]),
-            "scale_from": _origin(one, False, one["scale_is_assumed"]),
+            **scanner,
+            "certificate": scanner["certificate"] or None,
+            "offset_from": _origin(
+                scanner, scanner["u_offset_mm"] is None, scanner["offset_is_assumed"]
+            ),
+            "scale_from": _origin(scanner, False, scanner["scale_is_assumed"]),
         }
-        for one in record["clouds"]["scanners"]
+        for scanner in record["clouds"]["scanners"]
     ]
 
 
-def _origin(one, is_free, is_assumed):
-    """Code of where an offset or a scale comes from."""
+def _origin(scanner, is_free, is_assumed):
+    """Return the code of the source of an offset or a scale."""
     if is_free:
         return "free"
-    return "assumed" if is_assumed else "certificate" if one["certificate"] else "declared"
+    return "assumed" if is_assumed else "certificate" if scanner["certificate"] else "declared"
 
 
 SCANNERS = Table(
@@ -103,7 +105,8 @@ SHARED = replace(
     ),
     name="cloud_shared",
     rows=lambda record: [
-        {**one, "certificate": one["certificate"] or None} for one in record["clouds"]["shared"]
+        {**error, "certificate": error["certificate"] or None}
+        for error in record["clouds"]["shared"]
     ],
 )
 
@@ -119,8 +122,8 @@ TARGETS = Table(
         Column("row", decimals=0, heading="hit_row", sheet="hit_row", width=8),
     ),
     rows=lambda record: [
-        one | dict(zip(("dx", "dy", "dz"), one["residual_m"], strict=True))
-        for one in record["clouds"]["targets"]
+        target | dict(zip(("dx", "dy", "dz"), target["residual_m"], strict=True))
+        for target in record["clouds"]["targets"]
     ],
 )
 
@@ -155,10 +158,10 @@ OBSTRUCTIONS = Table(
         _column("far_m", "far", "m", 2),
     ),
     rows=lambda record: [
-        one | {"near_m": one["far_m"], "far_m": one["near_m"]}
-        if one["near_m"] is not None and abs(one["near_m"]) > abs(one["far_m"])
-        else one
-        for one in record["clouds"]["obstructions"]
+        thing | {"near_m": thing["far_m"], "far_m": thing["near_m"]}
+        if thing["near_m"] is not None and abs(thing["near_m"]) > abs(thing["far_m"])
+        else thing
+        for thing in record["clouds"]["obstructions"]
     ],
 )
 

@@ -1,7 +1,8 @@
-"""Facts of a tank and its survey, a name and a value each: on certificate, field table, workbook.
+"""Facts of a tank and its survey, as names and values, for certificate, field table and workbook.
 
-Each set of facts is a `Table` of one row. `Column.key` is the label of the fact, and `on` and
-`sheet` say which papers show it; `plain.PlainPaper.facts_of` and the sheet Certificate write them.
+Each set of facts is a `Table` with a single row. `Column.key` is the label of the fact; `on` and
+`sheet` select the papers that show it. `plain.PlainPaper.facts_of` and the sheet Certificate write
+the facts.
 """
 
 from tankcal.report.dip_point import dip_point_text
@@ -24,7 +25,7 @@ def _method(paper, row):
 
 
 def _scanned(paper, row):
-    """What a cloud is, with its number of points as told: none of them counts as independent."""
+    """Return a sentence on the point clouds with their numbers of points, or None."""
     clouds = paper.record.get("clouds")
     if not clouds:
         return None
@@ -33,14 +34,14 @@ def _scanned(paper, row):
         "texts.cloud_method",
         scans=len(scans),
         files=len(clouds["files"]),
-        wall=sum(one["of_wall"] for one in scans),
-        read=sum(one["delivered"] for one in scans),
-        means=sum(one["readings"] for one in scans),
+        wall=sum(scan["of_wall"] for scan in scans),
+        read=sum(scan["delivered"] for scan in scans),
+        means=sum(scan["readings"] for scan in scans),
     )
 
 
 def _metered(paper, row):
-    """Runs and steps of a calibration by liquid, and the dips that they reach."""
+    """Return a sentence on runs, steps and range of dips of a calibration by liquid, or None."""
     liquid = paper.record.get("liquid")
     if not liquid:
         return None
@@ -55,17 +56,17 @@ def _metered_liquid(paper, row):
 
 
 def _metered_with(paper, row):
-    """The meters with their factors, and what each was proved against."""
+    """Return the meters with their factors and provers in words, or None."""
     liquid = paper.record.get("liquid")
-    return liquid and "; ".join(_meter(paper, one) for one in liquid["meters"])
+    return liquid and "; ".join(_meter(paper, meter) for meter in liquid["meters"])
 
 
-def _meter(paper, one):
-    factor, u = (paper.number(one[key], u=one["u_factor"]) for key in ("factor", "u_factor"))
-    meter = paper.word("texts.liquid_meter", name=one["meter"], factor=factor, u=u)
-    if not one["prover"]:
-        return meter
-    return paper.word("texts.liquid_prover", meter=meter, prover=one["prover"])
+def _meter(paper, meter):
+    factor, u = (paper.number(meter[key], u=meter["u_factor"]) for key in ("factor", "u_factor"))
+    text = paper.word("texts.liquid_meter", name=meter["meter"], factor=factor, u=u)
+    if not meter["prover"]:
+        return text
+    return paper.word("texts.liquid_prover", meter=text, prover=meter["prover"])
 
 
 def _metered_table(paper, row):
@@ -82,7 +83,7 @@ def _expansion(paper, row):
 
 
 def tank_facts(record):
-    """What the tank is: its name, its kind, what the job says of its own, nominal sizes."""
+    """Return the Table of the tank: name, kind, additional details of the job, nominal sizes."""
     tank = record["job"]["tank"]
     details = tank["details"]
     sizes = {f"nominal_{key}": tank[f"nominal_{key}_{unit}"]
@@ -121,7 +122,7 @@ def _references(record):
 
 
 REFERENCES = Table(
-    "references",  # what the table of capacities refers to
+    "references",  # reference conditions of the capacity table
     (
         Column("zero", words="zeros", on=BOTH, sheet=True),
         Column("dip_point", text=lambda paper, row: dip_point_text(paper), on=BOTH),
@@ -141,14 +142,14 @@ REFERENCES = Table(
 
 
 def _radii(paper, row):
-    """Where former radii come from."""
+    """Return the source of former radii, or None."""
     return source_text(paper) if paper.record.get("radii") else None
 
 
 def _survey(record):
     survey = record["job"]["survey"]
     radii = record.get("radii")
-    if radii and not radii["change"]:  # nothing was surveyed: the date is that of the radii
+    if radii and not radii["change"]:  # no survey: the date is the date of the radii
         return [{"survey_date": survey["date"]}]
     return [
         {

@@ -1,4 +1,4 @@
-"""Tables of a strapped sphere: readings and corrections, tapes."""
+"""Tables of a strapped sphere: readings with corrections, and tapes."""
 
 from tankcal.report.tables.strapping import TAPES, in_ppm
 from tankcal.report.tables.table import Column, Table
@@ -35,5 +35,5 @@ CIRCLES = Table(
 TAPES_OF_SPHERE = Table(
     "tapes",
     TAPES.columns,
-    rows=lambda record: [in_ppm(one) for one in record["great_circles"]["tapes"]],
+    rows=lambda record: [in_ppm(tape) for tape in record["great_circles"]["tapes"]],
 )

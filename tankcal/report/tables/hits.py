@@ -1,4 +1,4 @@
-"""Tables of bare wall hits: set-ups, what their hits share, rings, control targets, incidence."""
+"""Tables of wall hits: set-ups, common errors, rings, control targets, incidence."""
 
 from tankcal.report.tables.sights import (
     CHECKS,
@@ -42,7 +42,7 @@ SHARED = Table(
         Column("correlation", decimals=2, heading="hit_correlation", sheet="hit_correlation"),
     ),
     rows=lambda record: [
-        {**one, "certificate": one["certificate"] or None} for one in record["hits"]["shared"]
+        {**error, "certificate": error["certificate"] or None} for error in record["hits"]["shared"]
     ],
 )  # fmt: skip
 

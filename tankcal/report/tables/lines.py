@@ -68,16 +68,16 @@ PLUMMETS = Table(
                sheet="plummet_by_faces_arcsec"),
     ),
     rows=lambda record: [
-        {**one, **{key: one[key] or None for key in ("plummet", "certificate")}}
-        for one in record["lines"]["plummets"]
+        {**plummet, **{key: plummet[key] or None for key in ("plummet", "certificate")}}
+        for plummet in record["lines"]["plummets"]
     ],
 )  # fmt: skip
 
 
 def lean_of_points(paper):
-    """Facts, [(label, text)]: the lean that points beside the lines show, and the test of both."""
+    """Return facts [(label, text)] on the lean by points and its test against the lines."""
     record = paper.record["lines"]
-    if record.get("lean_w") is None:  # nor of records that were saved before it was kept
+    if record.get("lean_w") is None:  # None, or absent in records of earlier versions
         return []
     leans = [
         (key, paper.number(record[key], "mm/m", decimals=2))

@@ -1,16 +1,17 @@
-"""Tables of metered runs: meters, runs, steps, dips, sizes, causes, volumes beside each other."""
+"""Tables of metered runs: meters, runs, steps, dips, sizes, causes, and compared volumes."""
 
 from dataclasses import replace
 
 from tankcal.report import numbers
 from tankcal.report.tables.table import Column, Table
 
-DIP_DECIMALS = 4  # of a dip as it was read, m
+DIP_DECIMALS = 4  # decimals of a dip reading in m
+# Unit of a size in the record and printed unit.
 _SHOWN = {"m": "mm", "m/m": "mm/m", "1": "share ppm", "m3": "L", "m3/h": "L/h", "": ""}
 
 
 def _named(key, heading, unit="", **more):
-    """A column whose heading in the workbook is that of the paper, with the unit."""
+    """Return a column with equal headings in paper and workbook; the workbook adds the unit."""
     return Column(key, unit, heading=f"liquid_{heading}", sheet=True, **more)
 
 
@@ -20,18 +21,18 @@ _METER = _named("meter", "meter", width=10)
 _TO = _named("to_dip_m", "to", "m", decimals=DIP_DECIMALS)
 
 
-def _of_step(paper, row):
-    return _dip(paper, row["from_dip_m"])
+def _dip_before_step(paper, row):
+    return _dip_text(paper, row["from_dip_m"])
 
 
-def _dip(paper, dip_m):
-    """The dip that a run or step began at; the tank may have been empty."""
+def _dip_text(paper, dip_m):
+    """Return the dip at the start of a run or step in words; None is an empty tank."""
     if dip_m is None:
         return paper.word("texts.liquid_dry")
     return paper.number(dip_m, decimals=DIP_DECIMALS)
 
 
-_FROM = _named("from_dip_m", "from", "m", text=_of_step, align="right",
+_FROM = _named("from_dip_m", "from", "m", text=_dip_before_step, align="right",
                in_sheet={"text": None, "decimals": DIP_DECIMALS})  # fmt: skip
 _W = Column("w", decimals=2, heading="liquid_w", sheet=True, width=8)
 _REDUNDANCY = _named("redundancy", "redundancy", decimals=2, width=10)
@@ -53,8 +54,8 @@ METERS = Table(
           for end in ("lowest", "highest", "min", "max")),
     ),
     rows=lambda record: [
-        one | {key: one[key] or None for key in ("certificate", "prover")}
-        for one in record["liquid"]["meters"]
+        meter | {key: meter[key] or None for key in ("certificate", "prover")}
+        for meter in record["liquid"]["meters"]
     ],
 )  # fmt: skip
 
@@ -74,7 +75,7 @@ RUNS = Table(
 
 
 def _tested(key, heading, unit="", **more):
-    """A column of the steps that stands in the CSV file by the name that the record has for it."""
+    """Return a column of the steps whose name in the CSV file is its key in the record."""
     return _named(key, heading, unit, csv=key, **more)
 
 
@@ -119,22 +120,22 @@ DIPS = Table(
 )
 
 
-# ---- numbers of several units: rows as they are shown
+# ---- quantities of several units, converted to their printed units
 
 
-def _in_small_units(rows, keys):
-    """Rows with these keys in the unit that they are shown in, which stands beside them."""
-    found = []
+def _convert_units(rows, keys):
+    """Return the rows with the values of `keys` in printed units, and the key "shown_unit"."""
+    converted = []
     for row in rows:
         unit = numbers.unit(_SHOWN[row["unit"]])
         values = {key: None if row[key] is None else unit.factor * row[key] for key in keys}
-        found.append(row | values | {"shown_unit": unit.symbol})
-    return found
+        converted.append(row | values | {"shown_unit": unit.symbol})
+    return converted
 
 
 def _sizes(record):
     rows = record["liquid"]["sizes"]
-    return _in_small_units(rows, ("change", "u_before", "u_after"))
+    return _convert_units(rows, ("change", "u_before", "u_after"))
 
 
 _UNIT = _named("shown_unit", "unit", width=8)
@@ -153,22 +154,22 @@ SIZES = Table(
 
 
 def _causes(record):
-    """Causes in small units, without the size of one that no tank could show."""
+    """Return the causes in printed units; a cause that is not detectable has no size."""
     rows = [
-        one if one["detectable"] is not None else one | dict.fromkeys(("size", "sd"))
-        for one in record["liquid"]["causes"]
+        cause if cause["detectable"] is not None else cause | dict.fromkeys(("size", "sd"))
+        for cause in record["liquid"]["causes"]
     ]
-    return _in_small_units(rows, ("size", "sd", "detectable"))
+    return _convert_units(rows, ("size", "sd", "detectable"))
 
 
 def _cause(paper, row):
-    """What may be wrong, and where: "dip, row 12"."""
-    found = paper.word(f"liquid_causes.{row['kind']}")
+    """Return a possible cause with its place, such as "dip, row 12"."""
+    name = paper.word(f"liquid_causes.{row['kind']}")
     if row["row"] is not None:
-        return paper.word("texts.liquid_cause_row", cause=found, row=row["row"])
+        return paper.word("texts.liquid_cause_row", cause=name, row=row["row"])
     if row["of"]:
-        return paper.word("texts.liquid_cause_of", cause=found, of=row["of"])
-    return found
+        return paper.word("texts.liquid_cause_of", cause=name, of=row["of"])
+    return name
 
 
 CAUSES = Table(
@@ -193,20 +194,20 @@ _KEYS = {"geometry": "by_geometry", "liquid": "by_liquid", "joint": "joint"}
 
 
 def rows_beside(record):
-    """The rows of the table with volumes and U by geometry, by liquid and by both."""
+    """Return the rows with volumes and U by geometry, by liquid and by both (list of dict)."""
     liquid, capacity = record["liquid"], record["capacity"]
-    found = [{"height_m": height} for height in capacity["height_m"]]
+    rows = [{"height_m": height} for height in capacity["height_m"]]
     for kind in KINDS:
         columns = liquid[_KEYS[kind]] or {}
         for key in ("volume_m3", "U_m3"):
-            values = columns.get(key) or [None] * len(found)
-            for row, value in zip(found, values, strict=True):
+            values = columns.get(key) or [None] * len(rows)
+            for row, value in zip(rows, values, strict=True):
                 row[f"{kind}_{key}"] = value
-    return found
+    return rows
 
 
 def volumes_table(record):
-    """The Table of volumes beside each other, in the unit of the record's table."""
+    """Return the Table that compares the volumes, in the unit of the capacity table."""
     unit = record["job"]["table"]["volume_unit"]
     least = numbers.unit(unit).least
     columns = [_named("height_m", "dip", "m", height=True)]

@@ -1,8 +1,8 @@
-"""Decisions against the search for blunders: as sentences of the certificate, and as a table."""
+"""Decisions against the outlier test: sentences of the certificate, and a table."""
 
 from tankcal.report.tables.table import Column, Table
 
-LITRE = 3  # decimals of a change of volume, m3: most are of litres
+LITRE = 3  # decimals of a change of volume in m3
 NO_SOLUTION, REMOVED = "no_solution", "removed"
 
 
@@ -16,7 +16,7 @@ def _reading(paper, row):
 
 
 def _searched(paper, row):
-    """What the search alone does with it, in words; None: not computed."""
+    """Return the result of the outlier test without the decision; None: not computed."""
     code = row["searched"]
     if code is None:
         return None
@@ -43,31 +43,33 @@ OVERRULINGS = Table(
 
 
 def decisions_of(record):
-    """The decisions of a record; [] where there are none."""
-    found = record.get("overrulings")
-    return found["each"] if found else []
+    """Return the decisions of a record (list of dict)."""
+    overrulings = record.get("overrulings")
+    return overrulings["each"] if overrulings else []
 
 
 def sentences(paper):
-    """What the certificate states of each decision, then what they change together."""
-    found = paper.record.get("overrulings")
-    if not found:
+    """Return a sentence for each decision, and a sentence on their joint effect."""
+    overrulings = paper.record.get("overrulings")
+    if not overrulings:
         return []
-    told = [sentence_of(paper, row) for row in found["each"]]
-    if len(told) > 1 and found["moved_m3"] is not None:
-        told.append(paper.word("overrulings.together", moved=_litres(paper, found["moved_m3"])))
-    if found["others"]:
-        told.append(paper.word("overrulings.others", names=", ".join(found["others"])))
-    return told
+    texts = [sentence_of(paper, row) for row in overrulings["each"]]
+    if len(texts) > 1 and overrulings["moved_m3"] is not None:
+        texts.append(
+            paper.word("overrulings.together", moved=_litres(paper, overrulings["moved_m3"]))
+        )
+    if overrulings["others"]:
+        texts.append(paper.word("overrulings.others", names=", ".join(overrulings["others"])))
+    return texts
 
 
 def sentence_of(paper, row):
-    """One decision: what, why, by whom, what the search said, and what it is worth."""
+    """Return a sentence on a decision: reason, person, result of the test, and effect."""
     parts = [paper.word(f"overrulings.{row['decision']}", what=_what(paper, row))]
     parts.append(paper.word("overrulings.reason", reason=row["reason"].rstrip(". ")))
-    by, day = row["by"], paper.day(row["date"])
-    if by:
-        who = ", ".join(one for one in (by, day) if one)
+    person, day = row["by"], paper.day(row["date"])
+    if person:
+        who = ", ".join(part for part in (person, day) if part)
         parts.append(paper.word("overrulings.by", who=who))
     elif day:
         parts.append(paper.word("overrulings.on", day=day))
@@ -82,14 +84,14 @@ def sentence_of(paper, row):
 
 
 def _numbers(paper, row):
-    """(12.3 mm from the wall; w = 5.1); "" where there are none."""
-    found = []
+    """Return distance and w in brackets, such as " (12.3 mm from the wall; w = 5.1)", or ""."""
+    parts = []
     if row["off_m"] is not None:
         off = paper.number(row["off_m"], "mm", decimals=1)
-        found.append(paper.word("overrulings.off", off=off))
+        parts.append(paper.word("overrulings.off", off=off))
     if row["w"] is not None:
-        found.append(f"w = {paper.number(row['w'], decimals=1)}")
-    return f" ({'; '.join(found)})" if found else ""
+        parts.append(f"w = {paper.number(row['w'], decimals=1)}")
+    return f" ({'; '.join(parts)})" if parts else ""
 
 
 def _litres(paper, moved_m3):

@@ -1,4 +1,4 @@
-"""The table of courses by their radii: former, found, expected, and as they are in the table."""
+"""Table of the radii of the courses: former, measured and adopted radii."""
 
 from tankcal.report.tables.table import Column, Table
 
@@ -26,8 +26,8 @@ RADII = Table(
 
 
 def _rows(radii):
-    """Without what only a new survey has, where there was none."""
+    """Return the rows, without the keys of a new survey if no survey exists."""
     if radii["change"] is not None:
         return radii["courses"]
     kept = ("course", "former_radius_m", "u_former_m", "radius_m", "u_m")
-    return [{key: one[key] for key in kept} for one in radii["courses"]]
+    return [{key: course[key] for key in kept} for course in radii["courses"]]

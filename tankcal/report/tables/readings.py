@@ -1,4 +1,4 @@
-"""Tables of what was observed: groups of observations, and each reading with its residual."""
+"""Tables of observations: groups, and each reading with its residual."""
 
 import numpy as np
 
@@ -8,7 +8,8 @@ from tankcal.report.tables.table import Column, Table
 from tankcal.text.digits import decimals_of, fixed, format_significant
 from tankcal.text.words import factor_text, group_name, observation_name
 
-MOST_IN_SHEET = 5_000  # readings, or points, of a survey in the workbook
+MOST_IN_SHEET = 5_000  # largest number of readings, or of points, in the workbook
+# Verdicts on groups with enough redundancy to estimate the factor.
 _JUDGED = ("as_declared", "better", "worse")
 
 
@@ -16,11 +17,14 @@ _JUDGED = ("as_declared", "better", "worse")
 
 
 def group_rows(record):
-    """Groups with their sds and rms in a small unit; factors of those that can be judged."""
-    found = []
+    """Return the groups with standard deviations and rms in small units (list of dict).
+
+    The factors of groups with too little redundancy are None.
+    """
+    rows = []
     for row in record["adjustment"]["groups"]:
         unit, factor = numbers.small_unit(row["unit"])
-        small = {
+        in_small_unit = {
             key: None if row[key] is None else factor * row[key]
             for key in ("sd_smallest", "sd_largest", "rms")
         }
@@ -29,20 +33,20 @@ def group_rows(record):
             f"judged_{key}": row[key] if judged else None
             for key in ("factor", "factor_low", "factor_high")
         }
-        named = {"small_unit": unit, "unit": numbers.spelled(unit) or row["unit"]}
-        found.append(row | small | factors | named)
-    return found
+        units = {"small_unit": unit, "unit": numbers.spelled(unit) or row["unit"]}
+        rows.append(row | in_small_unit | factors | units)
+    return rows
 
 
-def _with_unit(key):
+def _number_with_unit(key):
     return lambda paper, row: paper.number(row[key], row["small_unit"], digits=2)
 
 
 def _declared_sd(paper, row):
     smallest, largest = row["sd_smallest"], row["sd_largest"]
     if smallest is None or not largest > smallest * (1 + 1e-9):
-        return _with_unit("sd_smallest")(paper, row)
-    return f"{paper.number(smallest, digits=2)}–{_with_unit('sd_largest')(paper, row)}"
+        return _number_with_unit("sd_smallest")(paper, row)
+    return f"{paper.number(smallest, digits=2)}–{_number_with_unit('sd_largest')(paper, row)}"
 
 
 def _symbol(key):
@@ -61,7 +65,7 @@ def _factor(paper, row):
 
 
 def _two_digits(key):
-    """Decimals of what has no sd of its own, row by row."""
+    """Return a function of a row: decimals for two significant digits."""
     return lambda row: decimals_of(row[key]) if row[key] else 1
 
 
@@ -79,7 +83,7 @@ GROUPS = Table(
         Column("declared_sd", text=_declared_sd, align="right"),
         *(Column(key, decimals=_two_digits(key), on="", sheet=key, width=11, csv=key)
           for key in ("sd_smallest", "sd_largest")),
-        Column("rms", text=_with_unit("rms"), align="right",
+        Column("rms", text=_number_with_unit("rms"), align="right",
                sheet="rms", width=11, csv="rms",
                in_sheet={"text": None, "decimals": _two_digits("rms")}),
         Column("small_unit", text=_symbol("small_unit"), on="", sheet="unit", width=8),
@@ -102,22 +106,33 @@ GROUPS = Table(
 # ---- readings
 
 
-def in_their_units(found):
-    """`ArrayColumns` of readings, {key: values}, in the units that they are shown in.
+def in_their_units(readings):
+    """Convert readings to their printed units.
 
-    The units are named beside them.
+    The result contains the names of the units as further columns.
+
+    Parameters
+    ----------
+    readings : ArrayColumns or dict
+        Columns of n readings, {key: values}.
+
+    Returns
+    -------
+    ArrayColumns
     """
-    found = as_columns(found)
-    units = found.arrays["unit"] if found.count else Texts.of([])
+    readings = as_columns(readings)
+    units = readings.arrays["unit"] if readings.count else Texts.of([])
     large, small = (
-        [of(unit) for unit in units.texts] for of in (numbers.large_unit, numbers.small_unit)
+        [unit_of(unit) for unit in units.texts]
+        for unit_of in (numbers.large_unit, numbers.small_unit)
     )
     times_large, times_small = (
-        np.array([factor for _, factor in one], dtype=float)[units.codes] for one in (large, small)
+        np.array([factor for _, factor in shown], dtype=float)[units.codes]
+        for shown in (large, small)
     )
-    return found | {
-        "value": found.arrays["value"] * times_large,
-        **{key: found.arrays[key] * times_small for key in _SMALL if key in found},
+    return readings | {
+        "value": readings.arrays["value"] * times_large,
+        **{key: readings.arrays[key] * times_small for key in _SMALL if key in readings},
         "large_unit": Texts(units.codes, tuple(unit for unit, _ in large)),
         "small_unit": Texts(units.codes, tuple(unit for unit, _ in small)),
         "value_unit": Texts(units.codes, _spelled(large, units.texts)),
@@ -128,17 +143,19 @@ def in_their_units(found):
 _SMALL = ("residual", "sd", "mdb", "change")
 
 
-def _spelled(units, own):
-    return tuple(numbers.spelled(unit) or name for (unit, _), name in zip(units, own, strict=True))
+def _spelled(units, names):
+    return tuple(
+        numbers.spelled(unit) or name for (unit, _), name in zip(units, names, strict=True)
+    )
 
 
 def _decimals(row):
-    """Of residuals in micrometres, millimetres and seconds."""
+    """Decimals of residuals in micrometres, millimetres or arc seconds."""
     return {"um": 1, "image mm": 2, "arcsec": 1}.get(row["small_unit"], 6)
 
 
 def _small(key):
-    """The text of a residual or an sd: it has decimals by its unit."""
+    """Return a function of (paper, row) that formats a residual or standard deviation."""
 
     def text(paper, row):
         if row[key] is None:
@@ -155,8 +172,8 @@ def _observed(paper, row):
     return paper.number(row["value"], row["large_unit"], **rule)
 
 
-def _unit_of(key, own):
-    return lambda paper, row: numbers.unit(row[key]).symbol or row[own]
+def _unit_of(key, other_key):
+    return lambda paper, row: numbers.unit(row[key]).symbol or row[other_key]
 
 
 def _ends(paper, row):
@@ -164,7 +181,7 @@ def _ends(paper, row):
 
 
 def _ends_and_element(paper, row):
-    """What was observed of it, too: an angle, or the scale of an instrument."""
+    """Return the ends of an observation with its element, such as an angle or a scale."""
     words, code = paper.words, row["element"]
     element = words["elements"].get(code) or words["instrument_parts"].get(code, code)
     return f"{_ends(paper, row)}, {element}" if element else _ends(paper, row)

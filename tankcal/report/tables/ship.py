@@ -1,10 +1,10 @@
-"""Tables of a tank of a ship: corrections of soundings, and the ends of what the pipe shows."""
+"""Tables of a tank of a ship: corrections of soundings, and limits of the sounding pipe."""
 
 from math import dist
 
 from tankcal.report.tables.table import Column, Table
 
-ROUNDING_M = 0.0005  # that a sounding is printed to
+ROUNDING_M = 0.0005  # half of the last printed digit of a sounding
 
 
 def _named(key, unit="", **more):
@@ -21,28 +21,29 @@ CELLS = Table(
         _named("largest_m", "mm", decimals=1, width=16),
         _named("largest_U_m", "mm", digits=2, width=16),
     ),
-    rows=lambda record: [_cell(one) for one in record["ship"]["cells"]],
+    rows=lambda record: [_cell(cell) for cell in record["ship"]["cells"]],
 )
 
 
-def _cell(one):
-    kept = {key: one[key] for key in ("trim_m", "list_deg", "dry_m3", "full_m")}
-    known = [place for place, value in enumerate(one["correction_m"]) if value is not None]
-    if not known:
+def _cell(cell):
+    """Return a row: a state of trim and list, with its largest correction and U."""
+    kept = {key: cell[key] for key in ("trim_m", "list_deg", "dry_m3", "full_m")}
+    indices = [index for index, value in enumerate(cell["correction_m"]) if value is not None]
+    if not indices:
         return kept | {"largest_m": None, "largest_U_m": None}
-    worst = max(known, key=lambda place: abs(one["correction_m"][place]))
-    spread = [one["U_correction_m"][place] for place in known]
+    largest = max(indices, key=lambda index: abs(cell["correction_m"][index]))
+    U_values = [cell["U_correction_m"][index] for index in indices]
     return kept | {
-        "largest_m": one["correction_m"][worst],
-        "largest_U_m": max((U for U in spread if U is not None), default=None),
+        "largest_m": cell["correction_m"][largest],
+        "largest_U_m": max((U for U in U_values if U is not None), default=None),
     }
 
 
 def beyond_pipe(record):
-    """(length of the pipe in m, trims and lists at which the tank becomes full beyond its end)."""
+    """Return (length of the pipe, m; number of states in which the tank is full beyond its end)."""
     ship = record["ship"]
     length_m = dist(ship["pipe_bottom_m"], ship["pipe_top_m"])
-    beyond = [one["full_m"] for one in ship["cells"] if one["full_m"] > length_m + ROUNDING_M]
+    beyond = [cell["full_m"] for cell in ship["cells"] if cell["full_m"] > length_m + ROUNDING_M]
     return length_m, len(beyond)
 
 
@@ -77,29 +78,29 @@ _OF_CELL = (
 
 
 def corrections_columns(record):
-    """{key: values} of all corrections, one row for each trim, list and sounding."""
+    """Return the columns {key: values} of all corrections, by list, trim and sounding."""
     ship = record["ship"]
     count = len(ship["sounding_m"])
-    found = {key: [] for key in ("trim_m", "list_deg", "sounding_m", *_OF_CELL)}
-    for one in ship["cells"]:
-        found["trim_m"] += [one["trim_m"]] * count
-        found["list_deg"] += [one["list_deg"]] * count
-        found["sounding_m"] += ship["sounding_m"]
+    columns = {key: [] for key in ("trim_m", "list_deg", "sounding_m", *_OF_CELL)}
+    for cell in ship["cells"]:
+        columns["trim_m"] += [cell["trim_m"]] * count
+        columns["list_deg"] += [cell["list_deg"]] * count
+        columns["sounding_m"] += ship["sounding_m"]
         for key in _OF_CELL:
-            found[key] += one[key]
-    return found
+            columns[key] += cell[key]
+    return columns
 
 
 def by_list(record):
-    """[(list in degrees, its cells by trim)], as the matrices of papers have them."""
+    """Return [(list in degrees, its cells by trim)] for the tables of the papers."""
     cells = record["ship"]["cells"]
     return [
-        (list_deg, [one for one in cells if one["list_deg"] == list_deg])
+        (list_deg, [cell for cell in cells if cell["list_deg"] == list_deg])
         for list_deg in record["ship"]["list_deg"]
     ]
 
 
-def largest_U_m(cells, place):
-    """The largest expanded uncertainty of the corrections of one sounding; None: there is none."""
-    found = [one["U_correction_m"][place] for one in cells]
-    return max((U for U in found if U is not None), default=None)
+def largest_U_m(cells, index):
+    """Largest expanded uncertainty of the corrections of a sounding, m, or None."""
+    values = [cell["U_correction_m"][index] for cell in cells]
+    return max((U for U in values if U is not None), default=None)

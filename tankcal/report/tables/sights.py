@@ -1,4 +1,4 @@
-"""Columns that tables of bare wall hits and of tangents share: set-ups, levels, what was used."""
+"""Columns common to the tables of wall hits and of tangents."""
 
 from tankcal.report.tables.table import Column
 
@@ -23,7 +23,7 @@ DEPARTURE = Column(
 
 
 def counts_of(sights):
-    """The columns of how many sights, under that key of the record, were used and rejected."""
+    """Return the columns of the numbers of used and rejected sights (key of the record)."""
     return (
         Column(sights, decimals=0, heading="hits_used", sheet="hits_used"),
         Column("rejected", decimals=0, heading="hits_rejected", sheet="hits_rejected"),

@@ -37,7 +37,7 @@ STRAPS = Table(
 
 
 def in_ppm(tape):
-    """A tape with its scale in ppm; nothing of a comparison where there was none."""
+    """Return a tape with its scale in ppm; values of a missing comparison are None."""
     shown = {key: 1e6 * tape[key] for key in ("correction", "u_scale", "u_comparison")}
     shown["certificate"] = tape["certificate"] or None
     if not tape["master"]:
@@ -58,7 +58,7 @@ TAPES = Table(
         Column("master", heading="tape_master", sheet="tape_master"),
         Column("comparisons", decimals=0, heading="tape_comparisons", sheet="tape_comparisons"),
     ),
-    rows=lambda record: [in_ppm(one) for one in record["strapping"]["tapes"]],
+    rows=lambda record: [in_ppm(tape) for tape in record["strapping"]["tapes"]],
 )  # fmt: skip
 
 STRAPPED_COURSES = Table(
@@ -81,12 +81,12 @@ STRAPPED_COURSES = Table(
 
 
 def straps_of(record):
-    """`STRAPS` with the headings of the tank: of a lying one rings, and places from A."""
+    """Return `STRAPS` with the headings for the tank; a horizontal tank has rings."""
     return _headed(STRAPS, record)
 
 
 def strapped_courses_of(record):
-    """`STRAPPED_COURSES` with the headings of the tank."""
+    """Return `STRAPPED_COURSES` with the headings for the tank."""
     return _headed(STRAPPED_COURSES, record)
 
 

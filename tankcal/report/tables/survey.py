@@ -10,28 +10,29 @@ from tankcal.report.tables.table import Column, Table
 from tankcal.text.digits import decimals_of, decimals_of_mantissa
 from tankcal.text.words import sentence
 
-ANGLES = (("ω", "omega"), ("φ", "phi"), ("κ", "kappa"))  # their signs, and keys of the record
-_DECIMALS = {  # without an sd, and at most
+ANGLES = (("ω", "omega"), ("φ", "phi"), ("κ", "kappa"))  # symbols, and keys of the record
+_DECIMALS = {  # decimals without a standard deviation, and largest number of decimals
     "m": {"decimals": 4, "most": 6},
     "mm": {"decimals": 2, "most": 3},
     "deg": {"decimals": 4, "most": 7},
     "deg arcsec": {"decimals": 1, "most": 3},
 }
-_DEG = {"decimals": 4, "most": 6}  # in the workbook
+_DEG = {"decimals": 4, "most": 6}  # decimals in the workbook
 _ARCSEC = {"decimals": 2, "most": 3}
 
 
-def _to_its_sd(key, unit, sd, **more):
-    """A column of values, or of sds, to two digits of the sd."""
+def _rounded_column(key, unit, sd, **more):
+    """Return a column of values, or standard deviations, rounded to two digits of the latter."""
     return Column(key, unit, u=sd, **_DECIMALS[unit], **more)
 
 
-def _of_axes(key, unit, sd, **more):
-    """The same of x, y and z: "{axis}" in a key is one of them."""
+def _axis_columns(key, unit, sd, **more):
+    """Return three columns of `_rounded_column`; x, y and z replace "{axis}" in the keys."""
     return [
-        _to_its_sd(
+        _rounded_column(
             key.format(axis=axis), unit, sd.format(axis=axis), named={"axis": axis},
-            **{name: one.format(axis=axis) if name == "csv" else one for name, one in more.items()},
+            **{field: value.format(axis=axis) if field == "csv" else value
+               for field, value in more.items()},
         )
         for axis in "xyz"
     ]  # fmt: skip
@@ -41,9 +42,18 @@ def _of_axes(key, unit, sd, **more):
 
 
 def point_columns(record, points=None):
-    """`ArrayColumns` of points (None: all): sds, what the adjustment and a tank's wall say of them.
+    """Return the columns of points with standard deviations and results of adjustment and wall.
 
-    points  rows of the record
+    Parameters
+    ----------
+    record : dict
+        Record of a job.
+    points : ArrayColumns or list of dict, optional
+        Points of the record; None: all points.
+
+    Returns
+    -------
+    ArrayColumns
     """
     points = as_columns(record["points"] if points is None else points)
     if not points.count:
@@ -54,54 +64,58 @@ def point_columns(record, points=None):
     if len(adjusted):
         columns |= _adjusted(points["point"], as_columns(adjusted))
     if record["capacity"] is not None:
-        columns |= _about_wall(points, record["rejected"])
+        columns |= _wall_columns(points, record["rejected"])
     return ArrayColumns(columns)
 
 
 def point_rows(record, points=None):
-    """The same as a list of dicts."""
+    """Return the rows of `point_columns` (list of dict)."""
     return list(point_columns(record, points).rows())
 
 
 def _sds(covariance):
-    if covariance.ndim < 3:  # none is known
+    """Return the standard deviations of the coordinates, m, from covariances (n, 3, 3)."""
+    if covariance.ndim < 3:  # no covariance is known
         return {f"s{axis}_m": covariance for axis in "xyz"}
     return {f"s{axis}_m": np.sqrt(np.maximum(covariance[:, i, i], 0.0))
             for i, axis in enumerate("xyz")}  # fmt: skip
 
 
 def _adjusted(names, adjusted):
-    """What the adjustment says of points; nothing of those that it does not know."""
+    """Return the results of the adjustment for points; other points have missing values."""
     place = {name: i for i, name in enumerate(adjusted["point"])}
     rows = np.array([place.get(name, -1) for name in names])
-    unknown, found = rows < 0, adjusted.take(rows).arrays
-    floats = {key: found[key] for key in ("spherical_sd_m", "quadratic_sd_m")}
-    floats |= {f"e{i}_m": axis for i, axis in enumerate(found["ellipsoid_m"].T, 1)}
-    floats["azimuth_deg"] = found["ellipsoid_azimuth_deg"]
-    floats["elevation_deg"] = found["ellipsoid_elevation_deg"]
-    held = found["fixed"] @ (1, 2, 4)
+    unknown, results = rows < 0, adjusted.take(rows).arrays
+    floats = {key: results[key] for key in ("spherical_sd_m", "quadratic_sd_m")}
+    floats |= {f"e{i}_m": axis for i, axis in enumerate(results["ellipsoid_m"].T, 1)}
+    floats["azimuth_deg"] = results["ellipsoid_azimuth_deg"]
+    floats["elevation_deg"] = results["ellipsoid_elevation_deg"]
+    # The fixed coordinates x, y, z form a binary number from 0 to 7.
+    held = results["fixed"] @ (1, 2, 4)
     return {
-        "kind": Texts(np.where(unknown, -1, found["kind"].codes), found["kind"].texts),
-        "rays": np.where(unknown, NO_INTEGER, found["rays"]),
-        **{key: np.where(unknown, np.nan, one) for key, one in floats.items()},
+        "kind": Texts(np.where(unknown, -1, results["kind"].codes), results["kind"].texts),
+        "rays": np.where(unknown, NO_INTEGER, results["rays"]),
+        **{key: np.where(unknown, np.nan, values) for key, values in floats.items()},
         "fixed": Texts(np.where(unknown, -1, held), ("", "x", "y", "xy", "z", "xz", "yz", "xyz")),
     }
 
 
-def _about_wall(points, rejected):
-    """What the wall of a tank says of points: where they are on it, or why they are not."""
+def _wall_columns(points, rejected):
+    """Return position and residual at the wall, or the reason of rejection, for points."""
     rejected = {row["point"]: row for row in rejected}
-    about = [rejected.get(name, {}) for name in points["point"]]
-    there = [
-        residual if used else one.get("residual_m")
-        for residual, used, one in zip(points["residual_m"], points["used"], about, strict=True)
+    rejections = [rejected.get(name, {}) for name in points["point"]]
+    residuals = [
+        residual if used else row.get("residual_m")
+        for residual, used, row in zip(
+            points["residual_m"], points["used"], rejections, strict=True
+        )
     ]
     return {
         **{key: points.arrays[key]
            for key in ("course", "section", "generatrix", "residual_m", "used")},
-        "residual_there_m": there,
-        "reason": [one.get("reason", "") for one in about],
-        **{key: [one.get(key) for one in about] for key in ("w", "row")},
+        "residual_there_m": residuals,
+        "reason": [row.get("reason", "") for row in rejections],
+        **{key: [row.get(key) for row in rejections] for key in ("w", "row")},
     }  # fmt: skip
 
 
@@ -122,21 +136,21 @@ POINTS = Table(
         Column("course", sheet="course", width=9, csv="course", **_OF_TANK),
         Column("section", sheet="section", width=10, csv="section", **_OF_TANK),
         Column("generatrix", on="", csv="generatrix"),
-        *_of_axes("{axis}_m", "m", "s{axis}_m", sheet="of_m", width=11, csv="{axis}_m"),
+        *_axis_columns("{axis}_m", "m", "s{axis}_m", sheet="of_m", width=11, csv="{axis}_m"),
         Column("residual_m", on="", csv="residual_mm", csv_unit="mm"),
         Column("residual_there_m", "mm", decimals=1, sheet="residual_mm", width=10, **_OF_TANK),
         Column("used", sheet="used", width=8, csv="used", **_OF_TANK),
         Column("reason", text=_reason, sheet="reason", width=40, csv="reason", **_OF_TANK),
         Column("w", decimals=1, nothing="", sheet="w", width=8, **_OF_TANK),
         Column("row", decimals=0, nothing="", sheet="row_in_file", width=9, **_OF_TANK),
-        *_of_axes("s{axis}_m", "mm", "s{axis}_m", sheet="sd_of_mm", width=9, csv="s{axis}_mm",
+        *_axis_columns("s{axis}_m", "mm", "s{axis}_m", sheet="sd_of_mm", width=9, csv="s{axis}_mm",
                   csv_unit="mm"),
         Column("kind", text=_kind_of_point, on="", sheet="kind", width=15, csv="kind",
                optional=True),
         Column("fixed", on="", csv="fixed"),
         *(Column(f"{key}_sd_m", on="", csv=f"{key}_sd_mm", csv_unit="mm")
           for key in ("spherical", "quadratic")),
-        *(_to_its_sd(f"e{i}_m", "mm", f"e{i}_m", sheet="ellipsoid_mm", named={"axis": axis},
+        *(_rounded_column(f"e{i}_m", "mm", f"e{i}_m", sheet="ellipsoid_mm", named={"axis": axis},
                      width=11, csv=f"ellipsoid95_{axis}_mm", csv_unit="mm", optional=True)
           for i, axis in enumerate("abc", 1)),
         Column("azimuth_deg", on="", csv="ellipsoid95_azimuth_deg"),
@@ -156,15 +170,15 @@ POINTS = Table(
 
 
 def camera_rows(camera):
-    """The parameters of a set, with the correlations of those that are free."""
+    """Return the parameters of a camera, with the correlations of the free parameters."""
     rows = []
     for i, name in enumerate(camera["parameters"]):
         row = {"camera": camera["camera"], "photos": " ".join(camera["photos"] or [])}
-        row |= {one: camera[many][i] for one, many in _OF_PARAMETERS.items()}
+        row |= {key: camera[keys][i] for key, keys in _OF_PARAMETERS.items()}
         row["known_sd"] = row["sd"] or None
         if name in camera["free"]:
-            its = camera["correlation"][camera["free"].index(name)]
-            row |= {f"r_{other}": r for other, r in zip(camera["free"], its, strict=True)}
+            correlations = camera["correlation"][camera["free"].index(name)]
+            row |= {f"r_{other}": r for other, r in zip(camera["free"], correlations, strict=True)}
         rows.append(row)
     return rows
 
@@ -176,7 +190,7 @@ _OF_PARAMETERS = {
 
 
 def _format(key):
-    """The number format of a value or an sd: lengths plain, all else with powers of ten."""
+    """Return a function of a row: number format; only lengths have no power of ten."""
 
     def form(row):
         if row["parameter"].startswith(("c", "x0", "y0")):
@@ -192,9 +206,18 @@ def _sd_of_parameter(paper, row):
 
 
 def camera_table(free, words=None):
-    """The Table of the parameters of cameras, with a column of r for each of these parameters.
+    """Return the Table of camera parameters, with a column of correlations per free parameter.
 
-    words  of the language of the workbook, in which they have names; None: they are codes
+    Parameters
+    ----------
+    free : iterable of str
+        Codes of the free parameters.
+    words : dict, optional
+        Words of the language of the workbook; None: the headings are codes.
+
+    Returns
+    -------
+    Table
     """
     names = words["parameters"] if words else {}
     correlations = tuple(
@@ -202,7 +225,7 @@ def camera_table(free, words=None):
                named={"name": names.get(name, name)}, width=10, csv=f"r_{name}")
         for name in free
     )  # fmt: skip
-    keys = " ".join(one.key for one in correlations)
+    keys = " ".join(column.key for column in correlations)
     last = {"sheet": f"{CAMERA.last['sheet']} {keys}"}
     return replace(CAMERA, columns=CAMERA.columns + correlations, last=last)
 
@@ -238,13 +261,13 @@ PHOTOS = Table(
     (
         Column("photo", sheet="photo", width=16, csv="photo"),
         Column("camera", on="photos", sheet="camera", width=16, csv="camera"),
-        *_of_axes("{axis}_m", "m", "s{axis}_m", on="photos", sheet="of_m", csv="{axis}_m"),
-        *(_to_its_sd(f"{key}_deg", "deg", f"s_{key}_deg", on="photo_angles", sheet="of_deg",
+        *_axis_columns("{axis}_m", "m", "s{axis}_m", on="photos", sheet="of_m", csv="{axis}_m"),
+        *(_rounded_column(f"{key}_deg", "deg", f"s_{key}_deg", on="photo_angles", sheet="of_deg",
                      named={"axis": sign}, in_sheet=_DEG, csv=f"{key}_deg")
           for sign, key in ANGLES),
-        *_of_axes("s{axis}_m", "mm", "s{axis}_m", on="photos", sheet="sd_of_mm", width=10,
+        *_axis_columns("s{axis}_m", "mm", "s{axis}_m", on="photos", sheet="sd_of_mm", width=10,
                   csv="s{axis}_m"),
-        *(_to_its_sd(f"s_{key}_deg", "deg arcsec", f"s_{key}_deg", on="photo_angles",
+        *(_rounded_column(f"s_{key}_deg", "deg arcsec", f"s_{key}_deg", on="photo_angles",
                      sheet="sd_of_arcsec", named={"axis": sign}, width=10, in_sheet=_ARCSEC,
                      csv=f"s_{key}_deg")
           for sign, key in ANGLES),
@@ -260,7 +283,7 @@ PHOTOS = Table(
 
 
 def instrument_rows(record):
-    """Instruments with the name of their kind still to be looked up, and their certificates."""
+    """Return the instruments of the adjustment with their certificates (list of dict)."""
     return [
         row | {"certificate": row["details"].get("certificate", "")}
         for row in record["adjustment"]["instruments"]
@@ -268,7 +291,7 @@ def instrument_rows(record):
 
 
 def estimate_rows(record):
-    """Scales and offsets that were estimated, a row each."""
+    """Return a row for each estimated scale or offset (list of dict)."""
     return [
         {
             **{key: row[key] for key in ("instrument", "kind")},
@@ -286,8 +309,8 @@ def estimate_rows(record):
     ]
 
 
-def _beside_sd(code, key, unit):
-    """A column of values and one of their sds for the workbook, both to two digits of the sd."""
+def _columns_with_sd(code, key, unit):
+    """Return columns of values and standard deviations, to two digits of the latter."""
     rule = {"u": f"{key}_sd_{unit}", "decimals": 2, "most": 3}
     return [
         Column(f"{key}_{unit}", sheet=code, **rule),
@@ -301,10 +324,10 @@ INSTRUMENTS = Table(
         Column("instrument", sheet="instrument", width=34),
         Column("kind", words="instruments", sheet="kind"),
         Column("certificate", sheet="certificate"),
-        *_beside_sd("scale_declared", "declared_scale", "ppm"),
-        *_beside_sd("scale_estimated", "scale", "ppm"),
-        *_beside_sd("offset_declared", "declared_offset", "mm"),
-        *_beside_sd("offset_estimated", "offset", "mm"),
+        *_columns_with_sd("scale_declared", "declared_scale", "ppm"),
+        *_columns_with_sd("scale_estimated", "scale", "ppm"),
+        *_columns_with_sd("offset_declared", "declared_offset", "mm"),
+        *_columns_with_sd("offset_estimated", "offset", "mm"),
     ),
     rows=instrument_rows,
 )
@@ -344,9 +367,9 @@ CHECK_POINTS = Table(
     "check_points",
     (
         Column("point", sheet="check_point", width=34),
-        *_of_axes("d{axis}_m", "mm", "s{axis}_m", sheet="difference_mm"),
+        *_axis_columns("d{axis}_m", "mm", "s{axis}_m", sheet="difference_mm"),
         Column("size_m", "mm", decimals=2, sheet="magnitude_mm"),
-        *_of_axes("s{axis}_m", "mm", "s{axis}_m", sheet="sd_of_mm"),
+        *_axis_columns("s{axis}_m", "mm", "s{axis}_m", sheet="sd_of_mm"),
         Column("largest_w", decimals=1, sheet="largest_w"),
     ),
     rows=lambda record: (record["adjustment"]["check_points"] or {"points": []})["points"],

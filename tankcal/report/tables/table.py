@@ -1,4 +1,4 @@
-"""What a table is declared with: `Column` and `Table`, and the digits of the cells of a column."""
+"""Classes `Column` and `Table` for the declaration of tables, and decimals of cells."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -8,49 +8,59 @@ from tankcal.text.digits import NOTHING, decimals_of_height, decimals_of_rows
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: where its values are, how they are written, and who shows them.
+    """Column of a table: key, format and media.
 
-    Of the rules for numbers (decimals, u, digits, height) one is given; none: text.
+    A column of numbers has one of the rules `decimals`, `u`, `digits` and `height`. A column
+    without rule contains texts.
 
     Parameters
     ----------
     key : str
-        Key of the value in each row; on paper its heading is word `table_headings.<key>`.
+        Key of the value in a row. The heading in papers is the word `table_headings.<key>`.
     unit : str
-        Unit in which it is shown, one of numbers.UNITS; "" for text and bare numbers.
+        Printed unit, a key of numbers.UNITS; "" for texts and numbers without unit.
     decimals : int or callable, optional
-        So many, or what gives them from a row (in the workbook maybe a number format); beside
-        `u`: where no row has an uncertainty.
+        Number of decimals, or a function of the row that returns it (in the workbook possibly a
+        number format). With `u`, it applies if no row has an uncertainty.
     u : str, optional
-        Key of the uncertainty that sets the decimals (two digits of it); whole digits are rounded
-        off in the column of that uncertainty alone, and on paper only.
+        Key of the uncertainty whose two digits determine the decimals. Digits before the decimal
+        mark are rounded only in the column of the uncertainty itself, and only in papers.
     least, most : int, optional
-        Never fewer decimals, nor more, where an uncertainty may be the rounding of what is exact.
+        Smallest and largest number of decimals with `u`.
     digits : int, optional
-        So many significant digits.
+        Number of significant digits.
     height : bool
-        A height, in millimetres or finer where it must be.
+        True: a height, printed to the millimetre or finer if necessary.
     words : str, optional
-        Group of words that a code is looked up in.
+        Group of words with the translations of codes.
     text : callable, optional
-        Gives the text of a cell from (paper, row).
+        text(paper, row) returns the text of a cell.
     heading : str, optional
-        Key of another heading on paper.
-    nothing, align, formulas
-        What is printed for no value; one of blocks.ALIGNMENTS (None: text to the left, numbers by
-        their decimal marks); whether formulas of the record in this text are set as such.
+        Key of another heading in papers.
+    nothing : str
+        Text for a missing value.
+    align : str, optional
+        One of blocks.ALIGNMENTS; None: texts left, numbers at their decimal marks.
+    formulas : bool
+        Whether formulas in the text are typeset as mathematics.
     on : str, optional
-        Names of the papers' tables that show it, with blanks between; None: all, "": none.
+        Names of the tables in papers that contain the column, separated by spaces; None: all
+        tables, "": no table.
     sheet : str or True, optional
-        Its heading in the workbook, a key of [workbook.columns]; True: that of the paper with its
-        unit; None: the workbook does not show it.
-    named, width, in_sheet
-        Values for the places in that heading; least width in letters; fields of this column that
-        are others in the workbook.
-    csv, csv_unit : str, optional
-        Its heading in the CSV file, None: it is not there; its unit there, "": that of the record.
+        Heading in the workbook, a key of [workbook.columns]; True: heading of the papers with the
+        unit; None: not in the workbook.
+    named : Mapping
+        Values for the placeholders of the heading in the workbook.
+    width : float
+        Smallest width in the workbook, in letters.
+    in_sheet : Mapping
+        Fields of the column with other values in the workbook.
+    csv : str, optional
+        Heading in the CSV file; None: not in the file.
+    csv_unit : str
+        Unit in the CSV file; "": unit of the record.
     optional : bool
-        It is left out where no row has the key.
+        True: the column is omitted if no row has the key.
     """
 
     key: str
@@ -78,28 +88,28 @@ class Column:
 
     @property
     def is_text(self):
-        """Whether its cells are texts: no rule says how a number is written."""
+        """Whether the cells are texts, since the column has no rule for numbers."""
         rules = (self.decimals, self.u, self.digits)
         return not self.height and all(rule is None for rule in rules)
 
 
 @dataclass(frozen=True)
 class Table:
-    """Columns in their order, and the rows of the record that they are of.
+    """Table: columns in their order, and the selection of rows from a record.
 
     Parameters
     ----------
     name : str
-        On paper its caption is word `captions.<name>`; name of the table in the workbook and,
-        with ".csv", of the file.
+        Name of the table. The caption in papers is the word `captions.<name>`.
     columns : tuple of Column
+        Columns of the table.
     rows : callable, optional
-        Gives the rows, dicts, from a record.
+        rows(record) returns the rows (list of dict).
     last : Mapping
-        {"sheet", "csv" or the name of a paper's table: keys, with blanks between, of the columns
-        that stand last there}.
+        {medium: keys of its last columns, separated by spaces}. A medium is "sheet", "csv" or the
+        name of a table in papers.
     csv_style : str
-        How the file writes numbers.
+        Format of numbers in the CSV file.
     """
 
     name: str
@@ -109,48 +119,68 @@ class Table:
     csv_style: str = "%.12g"
 
     def on_paper(self, name=None, rows=None):
-        """The columns of the paper's table of that name (None: its own)."""
+        """Return the columns of a table in papers; None: the table with the name of this Table."""
         name = name or self.name
-        shown = [one for one in self.columns if one.on is None or name in one.on.split()]
-        return self._in_order(name, _known(shown, rows))
+        shown = [
+            column for column in self.columns if column.on is None or name in column.on.split()
+        ]
+        return self._order_columns(name, _known(shown, rows))
 
     def in_workbook(self, rows=None):
-        """The columns of its sheet."""
-        shown = [replace(one, **one.in_sheet) for one in self.columns if one.sheet]
-        return self._in_order("sheet", _known(shown, rows))
+        """Return the columns of the sheet in the workbook."""
+        shown = [replace(column, **column.in_sheet) for column in self.columns if column.sheet]
+        return self._order_columns("sheet", _known(shown, rows))
 
     def in_csv(self):
-        """The columns of its file."""
-        return self._in_order("csv", [one for one in self.columns if one.csv])
+        """Return the columns of the CSV file."""
+        return self._order_columns("csv", [column for column in self.columns if column.csv])
 
     def but(self, **changed):
-        """The same table with other fields of some columns: {key: {field: value}}."""
-        columns = [replace(one, **changed.get(one.key, {})) for one in self.columns]
+        """Return the table with changed fields of some columns, {key: {field: value}}."""
+        columns = [replace(column, **changed.get(column.key, {})) for column in self.columns]
         return replace(self, columns=tuple(columns))
 
     def only(self, *keys):
-        """The same table with these columns alone."""
-        return replace(self, columns=tuple(one for one in self.columns if one.key in keys))
+        """Return the table with the columns of some keys only."""
+        return replace(self, columns=tuple(column for column in self.columns if column.key in keys))
 
-    def _in_order(self, medium, columns):
+    def _order_columns(self, medium, columns):
         later = self.last.get(medium, "").split()
-        return sorted(columns, key=lambda one: later.index(one.key) if one.key in later else -1)
+        return sorted(
+            columns, key=lambda column: later.index(column.key) if column.key in later else -1
+        )
 
 
 def _known(columns, rows):
-    """The columns without those that are optional and that no row knows."""
+    """Return the columns without optional columns whose key no row has."""
     if rows is None:
         return columns
-    return [one for one in columns if not one.optional or any(one.key in row for row in rows)]
+    return [
+        column
+        for column in columns
+        if not column.optional or any(column.key in row for row in rows)
+    ]
 
 
 def decimals_of_cells(column, rows, factor=1.0, rounds_whole=True):
-    """Decimals of each cell of a column of numbers, shown as `factor` times its value.
+    """Return the decimals of each cell of a column of numbers.
 
     Parameters
     ----------
-    rounds_whole : optional
-        Whether a column of uncertainties may round whole digits off: 417 L to 420 L.
+    column : Column
+        Declaration of the column.
+    rows : list of dict, length n
+        Rows of the table.
+    factor : float, optional
+        Printed value divided by the value in the row.
+    rounds_whole : bool, optional
+        Whether a column of uncertainties may round digits before the decimal mark, such as 417 L
+        to 420 L.
+
+    Returns
+    -------
+    list of int, length n
+        Decimals, or other results of a callable `column.decimals`.
     """
     if column.u is None:
         if column.height:
@@ -158,9 +188,9 @@ def decimals_of_cells(column, rows, factor=1.0, rounds_whole=True):
         if callable(column.decimals):
             return [column.decimals(row) for row in rows]
         return [column.decimals] * len(rows)
-    of_rows = [(row.get(column.u) or 0.0) * factor for row in rows]
+    uncertainties = [(row.get(column.u) or 0.0) * factor for row in rows]
     rounds_whole = rounds_whole and column.u == column.key
     limits = {"least": None if rounds_whole else column.least, "most": column.most}
     if column.decimals is not None:
         limits["unknown"] = column.decimals
-    return decimals_of_rows(of_rows, **limits)
+    return decimals_of_rows(uncertainties, **limits)

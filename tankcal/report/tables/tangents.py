@@ -1,4 +1,4 @@
-"""Tables of tangents: set-ups, levels with perimeter and area, every sight."""
+"""Tables of tangents: set-ups, levels with perimeter and area, and all sights."""
 
 from tankcal.report.tables.sights import (
     CHECKS,

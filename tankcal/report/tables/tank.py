@@ -1,11 +1,11 @@
-"""Tables of a calibrated tank: courses, sections, corrections, what is inside, where it is from."""
+"""Tables of a calibrated tank: courses, sections, corrections, deadwood, and sources."""
 
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.digits import LITRE_DECIMALS
 from tankcal.text.words import choice_sentence, sentence
 
-TO_ITS_SD = {"decimals": 4}  # in the workbook: where no row has an sd
-SD = {"decimals": 2, "most": 3}  # of an sd in mm, in the workbook
+TO_ITS_SD = {"decimals": 4}  # values in the workbook if no row has a standard deviation
+SD = {"decimals": 2, "most": 3}  # standard deviations in mm in the workbook
 
 COURSES = Table(
     "courses",
@@ -98,7 +98,7 @@ SECTION_NOISE = Table(
 
 
 def modes_table(record):
-    """Amplitudes of the form of each section: mode 2 is the ellipse, mode 3 has three lobes."""
+    """Return the Table of amplitudes per section: mode 2 is an ellipse, mode 3 has three lobes."""
     orders = sorted({mode["k"] for row in record["sections"] for mode in row["modes"]})
     return Table(
         "modes",
@@ -187,11 +187,11 @@ DEADWOOD = Table(
 )  # fmt: skip
 
 
-# ---- where it is from
+# ---- choices, warnings, files and programs
 
 
 def _value_of_choice(paper, row):
-    """A choice's value as text: a list by its items, a number in full."""
+    """Return the value of a choice as text; lists are joined by commas."""
     value = row["value"]
     if isinstance(value, list | tuple):
         return ", ".join(str(item) for item in value)
@@ -199,9 +199,9 @@ def _value_of_choice(paper, row):
 
 
 def _place_of_warning(paper, row):
-    """Row and column of a warning, as far as they are known."""
-    of_row = row["row"] and paper.words["workbook"]["texts"]["row"].format(row=row["row"])
-    return ", ".join(part for part in (of_row, row["column"]) if part)
+    """Return row and column of a warning, if known."""
+    row_text = row["row"] and paper.words["workbook"]["texts"]["row"].format(row=row["row"])
+    return ", ".join(part for part in (row_text, row["column"]) if part)
 
 
 CHOICES = Table(

@@ -1,5 +1,5 @@
-"""Uncertainty on paper: what is stated, budgets, deliveries, Monte Carlo, the decision rule.
+"""Uncertainty in the papers: stated U, budgets, deliveries, Monte Carlo, the decision rule.
 
-Every function takes a Paper and gives rows, texts, blocks or a figure, from the record alone; the
-workbook says the same with them. What a record of an earlier version lacks is left out.
+The functions take a Paper and return rows, texts, blocks or a figure from the record. The workbook
+uses these functions as well. Values that records of earlier versions lack are omitted.
 """

@@ -1,4 +1,4 @@
-"""Budgets: line by line for the top row and a delivery, contributions for the others."""
+"""Budgets: complete for the top row and one delivery, contributions for all others."""
 
 from tankcal.pipeline.plot_style import even_groups
 from tankcal.report import blocks
@@ -7,17 +7,17 @@ from tankcal.report.tables import Column, Table
 from tankcal.text.digits import NOTHING, decimals_of, fixed, shortest
 from tankcal.text.words import name_of_input
 
-ACROSS = 7  # volumes and deliveries beside each other
-USEFUL = 0.995  # of U: an input that would change it less is not worth measuring better
-UNLIMITED = "∞"  # degrees of freedom
-LEAST_WRITTEN_OUT = 1e-4  # of a sensitivity in the workbook
-SMALL = 5e-4  # share of the variance that prints as 0.0 %
-# inputs whose note is a code: how their size is known
+ACROSS = 7  # largest number of volumes and deliveries in a table
+USEFUL = 0.995  # largest ratio of U, after halving the u of an input, that is reported
+UNLIMITED = "∞"  # infinite degrees of freedom
+LEAST_WRITTEN_OUT = 1e-4  # smallest sensitivity without a power of ten in the workbook
+SMALL = 5e-4  # share of the variance that is printed as 0.0 %
+# Inputs whose note is a code for the source of their size.
 OF_WALL = ("bulge", "ovality", "seams", "oblateness", "legs")
 
 
 def top(paper):
-    """The budget of the top row, of the table alone."""
+    """Blocks of the budget of the top row of the table."""
     capacity, lines = paper.record["capacity"], paper.record["budget"]
     values = {key: capacity[key][-1] for key in ("u_m3", "k", "U_m3", "dof")}
     height = paper.height(capacity["height_m"][-1])
@@ -25,25 +25,27 @@ def top(paper):
 
 
 def first_delivery(paper):
-    """The budget of the first delivery; nothing where there is none."""
-    one = _first_delivery(paper)
-    if one is None:
+    """Blocks of the budget of the first delivery; [] without deliveries."""
+    delivery = _first_delivery(paper)
+    if delivery is None:
         return []
     table = _table(
         paper,
         "budget_delivery",
-        [line for line in one["lines"] if abs(line["share"]) >= SMALL],
-        one,
-        high=paper.height(one["high_m"]),
-        low=paper.height(one["low_m"]),
-        volume=paper.number(one["volume_m3"], "m3", u=one["U_m3"]),
+        [line for line in delivery["lines"] if abs(line["share"]) >= SMALL],
+        delivery,
+        high=paper.height(delivery["high_m"]),
+        low=paper.height(delivery["low_m"]),
+        volume=paper.number(delivery["volume_m3"], "m3", u=delivery["U_m3"]),
     )
     return [table]
 
 
 def _first_delivery(paper):
-    found = (one for one in paper.record.get("budgets", []) if one["low_m"] is not None)
-    return next(found, None)
+    deliveries = (
+        budget for budget in paper.record.get("budgets", []) if budget["low_m"] is not None
+    )
+    return next(deliveries, None)
 
 
 def _table(paper, name, lines, values, /, **places):
@@ -63,33 +65,33 @@ def _estimate(paper, line):
 
 
 def _note(paper, line):
-    """What was declared beside an input, and what it is correlated with."""
-    return "; ".join(filter(None, [_beside(paper, line), *correlations(paper, [line])]))
+    """Return the remarks on an input: note of the job, and correlations."""
+    return "; ".join(filter(None, [_note_of_input(paper, line), *correlations(paper, [line])]))
 
 
-def _beside(paper, line):
-    """What was declared beside an input, or how the size of a part of the wall is known."""
-    told = paper.words["told_by"] if line["input"] in OF_WALL else {}
-    return told.get(line["note"], line["note"])
+def _note_of_input(paper, line):
+    """Return the note of an input; codes of deviations of the wall are translated."""
+    sources = paper.words["told_by"] if line["input"] in OF_WALL else {}
+    return sources.get(line["note"], line["note"])
 
 
 def _digits_of_sensitivity(line):
-    """Four digits, or a power of ten where they would stand behind many zeros."""
+    """Return four significant digits, or a format with a power of ten for small values."""
     size = abs(line["sensitivity"] or 0)
     return "0.00E+00" if 0 < size < LEAST_WRITTEN_OUT else decimals_of(size, significant=4)
 
 
 def budget_table(decimals):
-    """The Table of the lines of a budget, its contributions with so many decimals."""
-    of_u, as_number = {"u": "u", "decimals": 4, "digits": None}, {"text": None}
+    """Return the Table of a budget, with `decimals` for its contributions."""
+    by_u, as_number = {"u": "u", "decimals": 4, "digits": None}, {"text": None}
     return Table(
         "budget",
         (
             Column("input", text=lambda paper, line: paper.input_name(line), sheet="input",
                    width=38),
             Column("estimate", text=_estimate, align="right", sheet="estimate",
-                   in_sheet=as_number | of_u),
-            Column("u", digits=2, align="right", sheet="u_of_input", width=10, in_sheet=of_u),
+                   in_sheet=as_number | by_u),
+            Column("u", digits=2, align="right", sheet="u_of_input", width=10, in_sheet=by_u),
             Column("unit", text=lambda paper, line: symbol(line["unit"]), sheet="unit", width=9),
             Column("how", text=lambda paper, line: f"{line['type']}, {_distribution(paper, line)}"),
             Column("type", on="", sheet="type", width=7),
@@ -111,9 +113,11 @@ def budget_table(decimals):
 
 
 def _notes(paper, lines):
-    """What was declared beside the inputs, a sentence each."""
+    """Block of sentences on notes and correlations of the inputs; [] without any."""
     texts = [
-        paper.word("texts.input_note", input=paper.input_name(line), note=_beside(paper, line))
+        paper.word(
+            "texts.input_note", input=paper.input_name(line), note=_note_of_input(paper, line)
+        )
         for line in lines
         if line["note"] and line["note"] not in paper.input_name(line)
     ]
@@ -122,8 +126,8 @@ def _notes(paper, lines):
 
 
 def correlations(paper, lines):
-    """A sentence for each input that is correlated with others."""
-    found = []
+    """Return a sentence for each input with correlations (list of str)."""
+    sentences = []
     for line in lines:
         pairs = [
             f"{name_of_input(paper.words, name)}, r = {shortest(r, paper.marks)}"
@@ -131,45 +135,51 @@ def correlations(paper, lines):
         ]
         if pairs:
             name = paper.input_name(line)
-            found.append(paper.word("texts.correlated", input=name, others="; ".join(pairs)))
-    return found
+            sentences.append(paper.word("texts.correlated", input=name, others="; ".join(pairs)))
+    return sentences
 
 
 def others(paper):
-    """Contributions of each input to each stated volume and delivery, some across a table."""
+    """Tables of the contributions of the inputs to all stated volumes and deliveries."""
     budgets = paper.record.get("budgets", [])
     return [_matrix(paper, group) for group in even_groups(budgets, ACROSS)]
 
 
 def _matrix(paper, budgets):
+    """Return a table: a row per input, a column per volume or delivery."""
     names = [paper.input_name(line) for line in budgets[0]["lines"]]
-    columns = [_contributions(paper, one, names) for one in budgets]
+    columns = [_contributions(paper, budget, names) for budget in budgets]
     totals = [paper.word(f"table_headings.{key}_of_all") for key in ("u", "k", "U")]
     rows = [list(row) for row in zip([*names, *totals], *columns, strict=True)]
-    heads = [paper.word("table_headings.input"), *(_dips(paper, one) for one in budgets)]
+    heads = [paper.word("table_headings.input"), *(_dips(paper, budget) for budget in budgets)]
     align = ["left", *["decimal"] * len(budgets)]
     caption = paper.word("captions.budget_matrix", unit=paper.volume_symbol)
     return blocks.table(heads, rows, caption, align, paper.marks.decimal)
 
 
-def _contributions(paper, one, names):
+def _contributions(paper, budget, names):
+    """Return the column of a volume or delivery: contributions, u, k and U as texts."""
     factor = paper.volume_factor
-    digits = decimals_of(factor * one["u_m3"])
-    known = {paper.input_name(line): factor * line["contribution_m3"] for line in one["lines"]}
+    digits = decimals_of(factor * budget["u_m3"])
+    known = {paper.input_name(line): factor * line["contribution_m3"] for line in budget["lines"]}
     texts = [fixed(known.get(name), digits + 1, paper.marks) for name in names]
-    k = fixed(one["k"], 2, paper.marks)
-    u, U = (fixed(factor * one[key], digits, paper.marks) for key in ("u_m3", "U_m3"))
+    k = fixed(budget["k"], 2, paper.marks)
+    u, U = (fixed(factor * budget[key], digits, paper.marks) for key in ("u_m3", "U_m3"))
     return [*texts, u, k, U]
 
 
-def _dips(paper, one):
-    """The head of a column: a dip, and of a delivery below it the one that is subtracted."""
-    below = "" if one["low_m"] is None else f"{paper.marks.minus} {paper.height(one['low_m'], '')}"
-    return [paper.height(one["high_m"], ""), below]
+def _dips(paper, budget):
+    """Return the heading of a column: the dip, and the lower dip of a delivery below it."""
+    below = (
+        ""
+        if budget["low_m"] is None
+        else f"{paper.marks.minus} {paper.height(budget['low_m'], '')}"
+    )
+    return [paper.height(budget["high_m"], ""), below]
 
 
 def improvements(paper):
-    """What is worth measuring better: U with half the u of an input, the most useful first."""
+    """Table of U after halving the u of each input, largest reduction first; [] if none."""
     budgets = {"halved_top": paper.record["budget"]}
     delivery = _first_delivery(paper)
     if delivery is not None:
@@ -181,7 +191,7 @@ def improvements(paper):
     useful = [
         {"input": name, **row, "least": least}
         for name, row in rows.items()
-        if (least := min((one for one in row.values() if one is not None), default=1)) < USEFUL
+        if (least := min((U for U in row.values() if U is not None), default=1)) < USEFUL
     ]
     if not useful:
         return []

@@ -1,22 +1,22 @@
-"""The capacity table of the certificate, each row with the interval that counts."""
+"""The capacity table of the certificate, with the coverage interval of each row."""
 
 from tankcal.report.tables.capacity import NOT_FOR_USE, capacity_rows, capacity_table
 from tankcal.report.uncertainty.stated import by_monte_carlo, uneven_rows
 
-MOST_ACROSS, MOST_ACROSS_OF_DENSITIES = 4, 5
-LETTERS_OF_A_LINE = 114  # of the small print of the table, gaps between its columns left out
+MOST_ACROSS, MOST_ACROSS_OF_DENSITIES = 4, 5  # largest number of parts side by side
+LETTERS_OF_A_LINE = 114  # letters of a line of the table, without gaps between columns
 
 
 def capacity_blocks(paper):
-    """The rows whose interval is not even about the volume, then the whole table."""
+    """Tables of the rows with asymmetric interval, and of all rows."""
     record = paper.record
     table, rows = capacity_table(record), capacity_rows(record)
-    of_k = next(one for one in table.columns if one.key == "k")
-    k_printed = set(paper.column_texts([row for row in rows if row["k"] is not None], of_k))
-    if len(k_printed) < 2:
+    column_of_k = next(column for column in table.columns if column.key == "k")
+    k_printed = set(paper.column_texts([row for row in rows if row["k"] is not None], column_of_k))
+    if len(k_printed) < 2:  # the caption states a common k
         rows = [{key: value for key, value in row.items() if key != "k"} for row in rows]
     name = _caption(set(by_monte_carlo(record["capacity"])), k_printed)
-    whole = paper.show(
+    block = paper.show(
         table,
         rows,
         on=name,
@@ -24,32 +24,48 @@ def capacity_blocks(paper):
         coverage=paper.coverage(),
         k=min(k_printed, default=None),
     )
-    return [*_uneven(paper, table, rows), *note_on_use(paper, rows), whole]
+    return [*_uneven(paper, table, rows), *note_on_use(paper, rows), block]
 
 
 def note_on_use(paper, rows):
-    """What the mark of rows that are not for use means; nothing where all are."""
+    """Paragraph on the mark of rows that must not be used; [] if all rows may be used."""
     if "for_use" not in rows[0]:
         return []
     return [paper.paragraph("not_for_use_marked", mark=NOT_FOR_USE)]
 
 
 def density_blocks(paper):
-    """The table for each further density of the liquid."""
+    """Table for each additional density of the liquid."""
     blocks, name = [], "capacity_density"
-    table, of_table = capacity_table(paper.record), capacity_rows(paper.record)
-    columns = table.on_paper(name, of_table)
-    for other in paper.record["densities"]:
-        volumes = zip(of_table, other["volume_m3"], strict=True)
+    table, table_rows = capacity_table(paper.record), capacity_rows(paper.record)
+    columns = table.on_paper(name, table_rows)
+    for entry in paper.record["densities"]:
+        volumes = zip(table_rows, entry["volume_m3"], strict=True)
         rows = [row | {"volume_m3": volume} for row, volume in volumes]
-        density = paper.number(other["density_kg_m3"], "kg/m3", digits=4)
+        density = paper.number(entry["density_kg_m3"], "kg/m3", digits=4)
         across = times_across(paper, rows, columns, most=MOST_ACROSS_OF_DENSITIES)
         blocks.append(paper.show(table, rows, on=name, across=across, density=density))
     return blocks
 
 
 def times_across(paper, rows, columns, most=MOST_ACROSS):
-    """How many times the columns stand side by side on a page: as often as they have room."""
+    """Return how often the columns fit side by side on a page, at most `most`.
+
+    Parameters
+    ----------
+    paper : Paper
+        Formatter.
+    rows : list of dict
+        Rows of the table.
+    columns : list of Column
+        Columns of the table.
+    most : int, optional
+        Largest result.
+
+    Returns
+    -------
+    int
+    """
     longest = [max(map(len, paper.column_texts(rows, column))) for column in columns]
     return max(1, min(most, LETTERS_OF_A_LINE // sum(1 + length for length in longest)))
 
@@ -62,8 +78,8 @@ def _caption(simulated, k_printed):
 
 
 def _uneven(paper, table, rows):
-    places = uneven_rows(paper.record["capacity"])
-    if not places:
+    indices = uneven_rows(paper.record["capacity"])
+    if not indices:
         return []
-    shown = [rows[place] for place in places]
+    shown = [rows[index] for index in indices]
     return [paper.show(table, shown, on="uneven", across=3, coverage=paper.coverage())]

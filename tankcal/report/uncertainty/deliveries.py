@@ -1,25 +1,27 @@
-"""The worst deliveries of each minimum height."""
+"""Deliveries with the largest uncertainty, for each minimum height."""
 
 from tankcal.report.tables import Column, Table
 from tankcal.report.uncertainty.budget import UNLIMITED
 from tankcal.report.uncertainty.stated import same
 from tankcal.text.digits import LITRE_DECIMALS
 
+# Keys of the worst deliveries in the record.
 WORST = ("absolute", "relative", "at_minimum")
 
 
 def worst_rows(paper):
-    """One row for each minimum height and way of being the worst, each delivery once."""
+    """Return a row for each minimum height and criterion, each delivery once (list of dict)."""
     return [
-        found | {"minimum_m": one["minimum_m"], "which": paper.word(f"worst.{name}")}
-        for one in paper.record["deliveries"]
+        delivery | {"minimum_m": entry["minimum_m"], "which": paper.word(f"worst.{name}")}
+        for entry in paper.record["deliveries"]
         for name in WORST
-        if (found := one[name]) and not (name == "relative" and same(found, one["at_minimum"]))
+        if (delivery := entry[name])
+        and not (name == "relative" and same(delivery, entry["at_minimum"]))
     ]
 
 
 def worst(paper):
-    """The table of the worst deliveries."""
+    """Table of the worst deliveries."""
     return [paper.show(WORST_DELIVERIES, worst_rows(paper))]
 
 

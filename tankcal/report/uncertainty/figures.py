@@ -1,4 +1,4 @@
-"""Figures: uncertainty of deliveries against their height, GUM beside Monte Carlo."""
+"""Figures: uncertainty of deliveries, and comparison of GUM and Monte Carlo."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -7,15 +7,16 @@ from matplotlib.ticker import NullFormatter, ScalarFormatter
 from tankcal.pipeline.plot_style import FAINT, INK, RED, WIDTH, set_margins, styled
 from tankcal.record.covariance_factor import factor_of
 
-_SHORT_AXIS = 20  # from its lowest number to its highest: beyond, powers of ten are enough
-_MOST = 98  # per cent of the differences that the frame holds at least
+_SHORT_AXIS = 20  # ratio of the ends of an axis up to which minor ticks have numbers
+_MOST = 98  # smallest percentage of the differences within the frame
 
 
 @styled
 def delivery_curve(paper):
-    """Standard uncertainty of volumes and of deliveries from the full tank, against height.
+    """Figure of the standard uncertainty of volumes, and of deliveries from the full tank.
 
-    That of a delivery is the length of the difference of two rows of the record's factor.
+    With the covariance factor F, Cov = F F^T, the standard uncertainty of a delivery is the norm
+    of the difference of two rows of F.
     """
     capacity = paper.record["capacity"]
     height_m, volume_m3, u_m3 = (
@@ -28,23 +29,28 @@ def delivery_curve(paper):
         "u": np.linalg.norm(factor[-1] - factor[:-1], axis=1),
     }
     below = {"height": height_m[1:], "volume": volume_m3[1:], "u": u_m3[1:]}
-    found = [one["at_minimum"] for one in paper.record["deliveries"] if one["at_minimum"]]
+    deliveries = [
+        entry["at_minimum"] for entry in paper.record["deliveries"] if entry["at_minimum"]
+    ]
     worst = {
-        "height": np.array([one["high_m"] - one["low_m"] for one in found]),
-        "volume": np.array([one["volume_m3"] for one in found]),
-        "u": np.array([one["u_m3"] for one in found]),
+        "height": np.array([delivery["high_m"] - delivery["low_m"] for delivery in deliveries]),
+        "volume": np.array([delivery["volume_m3"] for delivery in deliveries]),
+        "u": np.array([delivery["u_m3"] for delivery in deliveries]),
     }
     figure = Figure(figsize=(WIDTH, 2.9))
     left, right = figure.subplots(1, 2)
-    for one, look, name in (
+    for curve, look, name in (
         (below, {"color": FAINT}, "volume_below"),
         (delivered, {"color": INK}, "delivery_from_full"),
         (worst, {"color": RED, "marker": "o", "markersize": 3, "linestyle": ""}, "worst"),
     ):
         left.plot(
-            one["height"], paper.volume_factor * one["u"], label=paper.word(f"axes.{name}"), **look
+            curve["height"],
+            paper.volume_factor * curve["u"],
+            label=paper.word(f"axes.{name}"),
+            **look,
         )
-        right.plot(one["height"], 100 * one["u"] / one["volume"], **look)
+        right.plot(curve["height"], 100 * curve["u"] / curve["volume"], **look)
     left.set_ylabel(paper.word("axes.u_m3").replace("m³", paper.volume_symbol))
     left.set_ylim(bottom=0)
     right.set_ylabel(paper.word("axes.u_percent"))
@@ -61,17 +67,17 @@ def delivery_curve(paper):
 
 
 def _few_decades(ax):
-    """The formatter of the ticks between the powers of ten: numbers, on a short axis only."""
+    """Return the formatter of minor ticks of a logarithmic axis: numbers on a short axis only."""
     low, high = ax.get_ylim()
     return ScalarFormatter() if high / low < _SHORT_AXIS else NullFormatter()
 
 
 @styled
 def interval_differences(paper):
-    """Ends of Monte Carlo's intervals less those of the GUM intervals, in percent of U."""
+    """Figure of the differences between Monte Carlo and GUM intervals, in percent of U."""
     capacity, rows = paper.record["capacity"], paper.record["monte_carlo"]["rows"]
     volume, U, height = (np.array(capacity[key]) for key in ("volume_m3", "U_m3", "height_m"))
-    tolerance = np.array(rows["tolerance"], dtype=float)  # none is nan
+    tolerance = np.array(rows["tolerance"], dtype=float)  # None becomes nan
     known = (U > 0) & np.isfinite(tolerance)
     percent = 100 / U[known]
     ends = {

@@ -1,4 +1,4 @@
-"""How the uncertainty was found, and from which inputs: sentences and lists."""
+"""Method of the uncertainty evaluation and its inputs: sentences and lists."""
 
 from math import inf
 
@@ -7,6 +7,7 @@ from tankcal.report.tables import Column, Table
 from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, k_of_rows, stated_rows
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 
+# Inputs that are estimated from the survey.
 FROM_SURVEY = (
     "instrument_scale",
     "instrument_offset",
@@ -53,36 +54,37 @@ FROM_SURVEY = (
     "radii_change_common",
     "measured_form",
 )
+# Inputs of the reading of a table.
 OF_READING = ("interpolation", "rounding")
 
 
 def sentences(paper, mark=MARK):
-    """What U is, how it was propagated, and what Monte Carlo says of it.
+    """Return sentences on U, its propagation, and its validation by Monte Carlo (list of str).
 
-    mark  what the rows with Monte Carlo's interval are marked with
+    `mark` is the mark of rows with a Monte Carlo interval.
     """
     capacity = paper.record["capacity"]
-    low, high = (paper.number(of(capacity["k"]), decimals=2) for of in (min, max))
-    one_k = paper.word("texts.k_one", k=low)
-    k = one_k if low == high else paper.word("texts.k_range", low=low, high=high)
-    found = [paper.word("texts.uncertainty", coverage=paper.coverage(), k=k), *on_k(paper)]
+    low, high = (paper.number(end(capacity["k"]), decimals=2) for end in (min, max))
+    common_k = paper.word("texts.k_one", k=low)
+    k = common_k if low == high else paper.word("texts.k_range", low=low, high=high)
+    texts = [paper.word("texts.uncertainty", coverage=paper.coverage(), k=k), *on_k(paper)]
     if paper.record.get("monte_carlo"):
-        found.append(_simulated(paper, mark))
+        texts.append(_simulated(paper, mark))
     elif paper.record["job"]["table"].get("monte_carlo") is False:
-        found.append(paper.word("texts.monte_carlo_off"))
-    return found
+        texts.append(paper.word("texts.monte_carlo_off"))
+    return texts
 
 
 def on_k(paper):
-    """The sentence on k of a calibration certificate, as EA-4/02 words it; [] without any k."""
+    """Return the sentence on k in the wording of EA-4/02, in a list; [] without any k."""
     capacity = paper.record["capacity"]
     rows = zip(k_of_rows(capacity), capacity["dof"], capacity["U_m3"], strict=True)
     known = [(k, inf if dof is None else dof) for k, dof, U in rows if k is not None and U]
     if not known:
         return []
     ks, dofs = zip(*known, strict=True)
-    k = _between(paper, [paper.number(of(ks), decimals=2) for of in (min, max)])
-    ends = [numbers.degrees_of_freedom(of(dofs), paper.marks) for of in (min, max)]
+    k = _between(paper, [paper.number(end(ks), decimals=2) for end in (min, max)])
+    ends = [numbers.degrees_of_freedom(end(dofs), paper.marks) for end in (min, max)]
     if ends[0] == numbers.degrees_of_freedom(inf):
         return [paper.word("texts.k_normal", k=k, coverage=paper.coverage())]
     dof = _between(paper, ends)
@@ -107,13 +109,13 @@ def _simulated(paper, mark):
 
 
 def _others(paper, simulation):
-    """What became of the rows that were not drawn for; "" where all were."""
+    """Return a sentence on rows without draws of their own; "" if all rows were drawn."""
     rows = len(paper.record["capacity"]["volume_m3"])
     return paper.word("texts.others_follow") if simulation.get("drawn", rows) < rows else ""
 
 
 def draws(paper):
-    """Draws of a row, from the fewest to the most."""
+    """Return the number of draws per row, or its range, in words."""
     drawn = paper.record["monte_carlo"]["rows"]["draws"]
     low, high = min(drawn), max(drawn)
     if low == high:
@@ -122,7 +124,7 @@ def draws(paper):
 
 
 def verdict(paper, mark):
-    """In how many rows the GUM interval is validated, as a sentence."""
+    """Return a sentence on the number of rows in which the GUM interval is validated."""
     simulated = by_monte_carlo(paper.record["capacity"])
     if not any(simulated):
         return paper.word("texts.validated_all")
@@ -133,22 +135,24 @@ def verdict(paper, mark):
 
 
 def inputs(paper):
-    """Labels and texts: inputs of the survey, declared, by default, of a reading, and missing."""
+    """Return labels and texts of the inputs: estimated, declared, default, reading, missing."""
     lines = budget_lines(paper.record)
     groups = {"survey": [], "declared": [], "default": [], "reading": []}
     for line in lines:
         group = _group(line)
-        said = line | {"is_default": False} if group == "default" else line
-        groups[group].append(_with_u(paper, said))
-    found = [(f"inputs_{name}", "; ".join(texts)) for name, texts in groups.items()]
-    missing = [one for one in paper.record["choices"] if one["code"] == "not_in_budget"]
-    names = [paper.words["inputs"].get(name, name) for one in missing for name in one["value"]]
-    return [*found, ("inputs_missing", "; ".join(names) or paper.word("texts.nothing_missing"))]
+        shown_line = line | {"is_default": False} if group == "default" else line
+        groups[group].append(_format_input(paper, shown_line))
+    facts = [(f"inputs_{name}", "; ".join(texts)) for name, texts in groups.items()]
+    missing = [choice for choice in paper.record["choices"] if choice["code"] == "not_in_budget"]
+    names = [
+        paper.words["inputs"].get(name, name) for choice in missing for name in choice["value"]
+    ]
+    return [*facts, ("inputs_missing", "; ".join(names) or paper.word("texts.nothing_missing"))]
 
 
 def budget_lines(record):
-    """The lines of the first budget with what a reading adds; the table's where there is none."""
-    return next((one["lines"] for one in record.get("budgets", [])), record["budget"])
+    """Return the lines of the first stated budget, or of the table if there is none."""
+    return next((budget["lines"] for budget in record.get("budgets", [])), record["budget"])
 
 
 def _group(line):
@@ -159,20 +163,20 @@ def _group(line):
     return "survey" if line["input"] in FROM_SURVEY else "declared"
 
 
-def _with_u(paper, line):
+def _format_input(paper, line):
     name = paper.input_name(line)
     if line["u"] is None or line["input"] in FROM_SURVEY:
         return name
     return paper.word(
         "texts.input_u",
         input=name,
-        u=_with_unit(paper, line["u"], line["unit"]),
+        u=_format_u(paper, line["u"], line["unit"]),
         distribution=paper.words["distributions"].get(line["distribution"], line["distribution"]),
     )
 
 
-def _with_unit(paper, u, unit):
-    """Two digits of an uncertainty, with its unit as the record writes it, volumes as on paper."""
+def _format_u(paper, u, unit):
+    """Format an uncertainty with two digits and its unit; volumes have the unit of the paper."""
     if unit == "m3":
         return paper.number(u, unit, digits=2)
     text, shown = paper.number(u, digits=2), numbers.symbol(unit)
@@ -180,7 +184,7 @@ def _with_unit(paper, u, unit):
 
 
 def stated_blocks(paper):
-    """The table of the volumes and deliveries that are stated; nothing when there are none."""
+    """Table of the stated volumes and deliveries; [] if there are none."""
     rows = stated_rows(paper.record)
     if not rows:
         return []
@@ -197,7 +201,7 @@ def _interval(paper, row):
 
 
 def stated_table(record):
-    """The Table of the volumes and deliveries that are stated, in the unit of a record's table."""
+    """Return the Table of stated volumes and deliveries, in the unit of the capacity table."""
     unit = record["job"]["table"]["volume_unit"]
     litres = {"u": "U_m3", "least": LITRE_DECIMALS}
     return Table(
@@ -225,27 +229,34 @@ def stated_table(record):
 
 
 def remarks(paper, row):
-    """What is to be said of a stated volume: worst delivery, uneven ends, what was stated, use."""
-    found = []
+    """Return the remarks on a stated volume (list of str).
+
+    The remarks concern the worst delivery, an asymmetric interval, a formerly stated volume, and
+    rows that must not be used.
+    """
+    texts = []
     if row["minimum_m"] is not None:
         height = paper.plain(row["minimum_m"], "m")
-        found.append(paper.word("texts.worst_of", height=height))
+        texts.append(paper.word("texts.worst_of", height=height))
     if row["low_m3"] is not None:
         unit = paper.record["job"]["table"]["volume_unit"]
         low, high = (paper.number(row[key], unit, u=row["U_m3"]) for key in ("low_m3", "high_m3"))
-        found.append(paper.word("texts.interval_of", low=low, high=high))
+        texts.append(paper.word("texts.interval_of", low=low, high=high))
     if row["stated_m3"] is not None:
         unit = paper.record["job"]["table"]["volume_unit"]
-        off = row["volume_m3"] - row["stated_m3"]
-        stated, more = (paper.number(one, unit, u=row["U_m3"]) for one in (row["stated_m3"], off))
-        found.append(paper.word("texts.beside_stated", stated=stated, more=more))
+        difference = row["volume_m3"] - row["stated_m3"]
+        stated, difference_text = (
+            paper.number(volume_m3, unit, u=row["U_m3"])
+            for volume_m3 in (row["stated_m3"], difference)
+        )
+        texts.append(paper.word("texts.beside_stated", stated=stated, more=difference_text))
     if not row["for_use"]:
-        found.append(paper.word("texts.not_for_use"))
-    return [*found, row["note"]] if row["note"] else found
+        texts.append(paper.word("texts.not_for_use"))
+    return [*texts, row["note"]] if row["note"] else texts
 
 
 def blocks_of_method(paper):
-    """The chapter of the certificate."""
+    """Blocks of the chapter on uncertainty in the certificate."""
     return [
         *(blocks.paragraph(text) for text in sentences(paper)),
         paper.facts(inputs(paper)),

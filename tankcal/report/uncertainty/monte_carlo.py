@@ -1,4 +1,4 @@
-"""The simulation: how it was made, and where it validates the GUM interval."""
+"""The Monte Carlo simulation and the validation of the GUM intervals."""
 
 from itertools import groupby
 
@@ -9,11 +9,11 @@ from tankcal.report.uncertainty import method
 from tankcal.text.digits import LITRE_DECIMALS
 from tankcal.text.words import name_of_input
 
-MOST_RANGES = 40
+MOST_RANGES = 40  # largest number of ranges in the papers
 
 
 def facts(paper):
-    """Labels and texts: seed, tolerance, draws, what is curved, how many rows are validated."""
+    """Return labels and texts: seed, tolerance, draws, nonlinear inputs, validated rows."""
     simulation = paper.record["monte_carlo"]
     rows = simulation["rows"]
     every = len(rows["validated"])
@@ -36,39 +36,40 @@ def facts(paper):
 
 def _curved(paper):
     pairs = paper.record["monte_carlo"]["curved"]
-    names = [[name_of_input(paper.words, one) for one in pair] for pair in pairs]
+    names = [[name_of_input(paper.words, name) for name in pair] for pair in pairs]
     return "; ".join(
-        one if one == other else paper.word("texts.with_each_other", one=one, other=other)
-        for one, other in names
+        first if first == second else paper.word("texts.with_each_other", one=first, other=second)
+        for first, second in names
     )
 
 
 def ranges(record):
-    """Rows one after the other with the same verdict: one row each, with its largest difference.
+    """Return a row for each range of successive table rows with equal verdict (list of dict).
 
-    Keys low_m, high_m, count, validated; of the row with the largest difference at_m, d_low,
-    d_high, tolerance (None: U is 0), U_m3 and share, that difference over the GUM's U (None).
+    The keys are low_m, high_m, count and validated. The keys at_m, d_low, d_high, tolerance (None
+    if U is 0), U_m3 and share refer to the table row with the largest difference. share is this
+    difference relative to the U of the GUM (or None).
     """
     capacity, rows = record["capacity"], record["monte_carlo"]["rows"]
-    places = range(len(rows["validated"]))
+    indices = range(len(rows["validated"]))
     return [
         _range(capacity, rows, list(group))
-        for _, group in groupby(places, key=lambda row: rows["validated"][row])
+        for _, group in groupby(indices, key=lambda row: rows["validated"][row])
     ]
 
 
-def _range(capacity, rows, places):
-    at = max(places, key=lambda row: max(rows["d_low"][row], rows["d_high"][row]))
-    U = capacity["U_m3"][at]
+def _range(capacity, rows, indices):
+    largest = max(indices, key=lambda row: max(rows["d_low"][row], rows["d_high"][row]))
+    U = capacity["U_m3"][largest]
     return {
-        "low_m": capacity["height_m"][places[0]],
-        "high_m": capacity["height_m"][places[-1]],
-        "count": len(places),
-        "validated": rows["validated"][at],
-        "at_m": capacity["height_m"][at],
+        "low_m": capacity["height_m"][indices[0]],
+        "high_m": capacity["height_m"][indices[-1]],
+        "count": len(indices),
+        "validated": rows["validated"][largest],
+        "at_m": capacity["height_m"][largest],
         "U_m3": U,
-        "share": max(rows["d_low"][at], rows["d_high"][at]) / U if U else None,
-        **{key: rows[key][at] for key in ("d_low", "d_high", "tolerance")},
+        "share": max(rows["d_low"][largest], rows["d_high"][largest]) / U if U else None,
+        **{key: rows[key][largest] for key in ("d_low", "d_high", "tolerance")},
     }
 
 
@@ -105,20 +106,22 @@ DELIVERIES = Table(
         Column("validated", words="validated", heading="interval_code"),
     ),
     rows=lambda record: [
-        {**one, **one["monte_carlo"]} for one in record["budgets"] if one["monte_carlo"] is not None
+        {**budget, **budget["monte_carlo"]}
+        for budget in record["budgets"]
+        if budget["monte_carlo"] is not None
     ],
 )
 
 
 def simulated_columns(record):
-    """Every row of the table as it was simulated, beside the GUM's interval: {key: values}."""
+    """Return the simulated rows with their GUM intervals, {key: values}."""
     capacity, rows = record["capacity"], record["monte_carlo"]["rows"]
     pairs = list(zip(capacity["volume_m3"], capacity["U_m3"], strict=True))
     return rows | {
         "height_m": capacity["height_m"],
         "stated_U_m3": capacity["stated_U_m3"],
-        "gum_low": [one - expanded for one, expanded in pairs],
-        "gum_high": [one + expanded for one, expanded in pairs],
+        "gum_low": [volume - expanded for volume, expanded in pairs],
+        "gum_high": [volume + expanded for volume, expanded in pairs],
     }
 
 
@@ -148,32 +151,32 @@ SIMULATED = Table(
 
 
 def range_blocks(paper):
-    """The table of the ranges."""
-    found = ranges(paper.record)
-    shown = found[:MOST_RANGES]
+    """Table of the ranges of rows with equal verdict."""
+    rows = ranges(paper.record)
+    shown = rows[:MOST_RANGES]
     table = paper.show(RANGES, shown)
-    if len(shown) == len(found):
+    if len(shown) == len(rows):
         return [table]
-    return [table, paper.paragraph("only_first_ranges", shown=len(shown), all=len(found))]
+    return [table, paper.paragraph("only_first_ranges", shown=len(shown), all=len(rows))]
 
 
 def delivery_blocks(paper):
-    """The table of the deliveries that were simulated; nothing where there are none."""
+    """Table of the simulated deliveries; [] if there are none."""
     rows = DELIVERIES.rows(paper.record)
     return [paper.show(DELIVERIES, rows), *_why(paper, rows)] if rows else []
 
 
 def _why(paper, rows):
-    """What it means that deliveries are not validated; nothing where all are."""
-    failed = [one for one in rows if not one["validated"] and one["U_m3"]]
-    if not failed:
+    """Paragraph on deliveries that are not validated; [] if all are validated."""
+    failed_rows = [row for row in rows if not row["validated"] and row["U_m3"]]
+    if not failed_rows:
         return []
-    off = [max(one["d_low"], one["d_high"]) for one in failed]
-    share = max(d / one["U_m3"] for d, one in zip(off, failed, strict=True))
+    differences = [max(row["d_low"], row["d_high"]) for row in failed_rows]
+    share = max(d / row["U_m3"] for d, row in zip(differences, failed_rows, strict=True))
     sentence = paper.word(
         "texts.why_not_validated",
         digits=paper.record["monte_carlo"]["digits"],
-        difference=paper.number(max(off), "m3", digits=2),
+        difference=paper.number(max(differences), "m3", digits=2),
         share=paper.number(share, "share", digits=2),
     )
     return [blocks.paragraph(sentence)]

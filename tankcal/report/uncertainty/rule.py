@@ -1,17 +1,17 @@
-"""The verdict of the job's decision rule: sentences for a certificate, tables for the papers."""
+"""The statement of conformity by the decision rule of the job: sentences and tables."""
 
 from tankcal.report import blocks, numbers
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import decimals_of
 
-CERTAIN = 1e-4  # a probability nearer to 0 or 1 is not printed in full
+CERTAIN = 1e-4  # probabilities closer to 0 or 1 are printed as a limit
 _LITRES = numbers.unit("m3").least
 _LITRES_OF_U, _LITRES_OF_WORST = ({"u": u, "least": _LITRES} for u in ("U_m3", "worst_U_m3"))
-_ENDS = ("TL_m3", "TU_m3", "AL_m3", "AU_m3")  # of tolerance and of acceptance
+_ENDS = ("TL_m3", "TU_m3", "AL_m3", "AU_m3")  # tolerance limits and acceptance limits
 
 
 def facts(paper):
-    """Labels and texts: the rule, where it comes from, what it says of the tank."""
+    """Return labels and texts: the rule, its source, and the verdict on the tank."""
     verdict = paper.record["rule"]
     rule = verdict["rule"]
     return [
@@ -28,94 +28,100 @@ def facts(paper):
 
 
 def sentences(paper):
-    """What became of every limit, a sentence each."""
+    """Return a sentence on the result for each limit (list of str)."""
     verdict = paper.record["rule"]
-    found = [_of_limit(paper, one) for one in verdict["uncertainty"]]
-    found += [_of_deviation(paper, one) for one in verdict["deviation"]]
-    return [*found, *_by_law(paper)]
+    texts = [_limit_sentence(paper, result) for result in verdict["uncertainty"]]
+    texts += [_deviation_sentence(paper, result) for result in verdict["deviation"]]
+    return [*texts, *_propagation_note(paper)]
 
 
-def _by_law(paper):
-    """How deliveries are judged where Monte Carlo was on, and there is a limit of them."""
+def _propagation_note(paper):
+    """Return a sentence on the evaluation of limits for deliveries if Monte Carlo is used."""
     limits = paper.record["rule"]["uncertainty"]
-    is_bound = any(one["of"] == "deliveries" for one in limits)
+    is_bound = any(limit["of"] == "deliveries" for limit in limits)
     return [paper.word("texts.by_law_only")] if is_bound and paper.record["monte_carlo"] else []
 
 
 def is_read(paper):
-    """Whether every value of the rule was read in the legal text; else it certifies nothing."""
+    """Return whether all values of the rule were checked against the legal text.
+
+    The certificate does not state the verdict of an unchecked rule.
+    """
     return paper.record["rule"]["verified"]
 
 
 def blocks_of_verdict(paper):
-    """The chapter of the certificate; nothing of a rule that nobody has read in the legal text."""
+    """Blocks of the chapter of the certificate; [] for an unchecked rule."""
     return [paper.heading("rule"), *_verdict(paper)] if is_read(paper) else []
 
 
 def blocks_of_unread(paper):
-    """What the working papers say of such a rule, the verdict that the certificate leaves out."""
+    """Blocks of the working papers, with the verdict of an unchecked rule."""
     if is_read(paper):
         return [paper.facts(facts(paper))]
     return [paper.paragraph("rule_unread"), *_verdict(paper)]
 
 
 def _verdict(paper):
-    found = [paper.facts(facts(paper))]
+    shown = [paper.facts(facts(paper))]
     texts = sentences(paper)
-    return [*found, blocks.listing(texts)] if texts else found
+    return [*shown, blocks.listing(texts)] if texts else shown
 
 
 # ---- limits of the expanded uncertainty
 
 
-def limit_text(paper, one):
-    """What a limit of U says: of what, how much, of what."""
-    height = paper.plain(one["minimum_height_m"], "m") if one["minimum_height_m"] else ""
-    of = paper.word(f"limited.{one['of']}", height=height)
-    if one["limit"] is None:
-        return paper.word("texts.rule_no_limit", of=of)
-    relative_to = paper.word(f"relative_to.{one['relative_to']}")
+def limit_text(paper, result):
+    """Return a limit of U in words: quantity, value and reference."""
+    height = paper.plain(result["minimum_height_m"], "m") if result["minimum_height_m"] else ""
+    quantity = paper.word(f"limited.{result['of']}", height=height)
+    if result["limit"] is None:
+        return paper.word("texts.rule_no_limit", of=quantity)
+    relative_to = paper.word(f"relative_to.{result['relative_to']}")
     return paper.word(
-        "texts.rule_limit", of=of, limit=paper.percent(one["limit"]), relative_to=relative_to
+        "texts.rule_limit",
+        of=quantity,
+        limit=paper.percent(result["limit"]),
+        relative_to=relative_to,
     )
 
 
-def _of_limit(paper, one):
+def _limit_sentence(paper, result):
     return paper.word(
-        f"texts.rule_{one['code']}",
-        limit=limit_text(paper, one),
-        place=place_text(paper, one),
-        worst=worst_text(paper, one),
+        f"texts.rule_{result['code']}",
+        limit=limit_text(paper, result),
+        place=place_text(paper, result),
+        worst=worst_text(paper, result),
     )
 
 
-def place_text(paper, one):
-    """From which level and volume, or height of delivery, on a limit is kept; None: nowhere."""
-    if one["from_m"] is None:
+def place_text(paper, result):
+    """Return the level, or height of delivery, above which a limit is met; None: nowhere."""
+    if result["from_m"] is None:
         return None
-    level = paper.height(one["from_m"])
-    if one["from_m3"] is None:
+    level = paper.height(result["from_m"])
+    if result["from_m3"] is None:
         return paper.word("texts.from_height", height=level)
-    volume = _volume(paper, one["from_m3"], _LITRES)
+    volume = _volume(paper, result["from_m3"], _LITRES)
     return paper.word("texts.from_level", level=level, volume=volume)
 
 
-def worst_text(paper, one):
-    """Where U is nearest to the limit or farthest beyond it; None: nothing was judged."""
-    if one["worst_m"] is None:
+def worst_text(paper, result):
+    """Return the place with the largest ratio of U to the limit; None: not evaluated."""
+    if result["worst_m"] is None:
         return None
     ratio = ""
-    if one["worst_ratio"] is not None:
-        relative_to = paper.word(f"relative_to.{one['relative_to']}")
-        ratio = paper.number(one["worst_ratio"], "share", digits=2)
+    if result["worst_ratio"] is not None:
+        relative_to = paper.word(f"relative_to.{result['relative_to']}")
+        ratio = paper.number(result["worst_ratio"], "share", digits=2)
         ratio = paper.word("texts.worst_ratio", ratio=ratio, relative_to=relative_to)
-    name = "row" if one["worst_low_m"] is None else "delivery"
+    name = "row" if result["worst_low_m"] is None else "delivery"
     return paper.word(
         f"texts.worst_{name}",
-        low=paper.height(one["worst_low_m"]),
-        high=paper.height(one["worst_m"]),
-        volume=_volume(paper, one["worst_m3"], _LITRES),
-        U=paper.number(one["worst_U_m3"], "m3", u=one["worst_U_m3"]),
+        low=paper.height(result["worst_low_m"]),
+        high=paper.height(result["worst_m"]),
+        volume=_volume(paper, result["worst_m3"], _LITRES),
+        U=paper.number(result["worst_U_m3"], "m3", u=result["worst_U_m3"]),
         ratio=ratio,
     )
 
@@ -125,7 +131,7 @@ LIMITS = Table(
     (
         Column("limit_of", text=limit_text, sheet="limit", width=40),
         Column("limit", "share", digits=2, on="", sheet="at_most"),
-        Column("verdict", text=lambda paper, one: paper.word(f"limit_codes.{one['code']}"),
+        Column("verdict", text=lambda paper, result: paper.word(f"limit_codes.{result['code']}"),
                sheet="verdict", width=16),
         Column("kept_from", text=place_text, heading="from_m"),
         Column("worst", text=worst_text),
@@ -144,50 +150,52 @@ LIMITS = Table(
 
 
 def limit_blocks(paper):
-    """The limits of U as a table; nothing when there are none."""
+    """Table of the limits of U; [] if there are none."""
     return [paper.show(LIMITS)] if LIMITS.rows(paper.record) else []
 
 
 # ---- deviations from stated volumes
 
 
-def _of_deviation(paper, one):
-    return paper.word("texts.rule_deviation", **deviation_texts(paper, one))
+def _deviation_sentence(paper, result):
+    return paper.word("texts.rule_deviation", **deviation_texts(paper, result))
 
 
-def deviation_texts(paper, one):
-    """The texts of a deviation by name."""
-    u = one["U_m3"]
-    low = paper.height(one["low_m"])
-    name = "row" if one["low_m"] is None else "delivery"
+def deviation_texts(paper, result):
+    """Return the texts of a deviation, {name: text}."""
+    u = result["U_m3"]
+    low = paper.height(result["low_m"])
+    name = "row" if result["low_m"] is None else "delivery"
     return {
-        "place": paper.word(f"texts.place_{name}", high=paper.height(one["high_m"]), low=low),
+        "place": paper.word(f"texts.place_{name}", high=paper.height(result["high_m"]), low=low),
         **{
-            key: paper.number(one[f"{key}_m3"], "m3", u=u)
+            key: paper.number(result[f"{key}_m3"], "m3", u=u)
             for key in ("volume", "stated", "deviation", "U")
         },
-        "dips": _dips(paper, one),
-        "limit": paper.word(f"limit_sides.{one['side']}", limit=_room(paper, one)),
-        "guard": paper.word(f"guards.{one['guard']}"),
-        "verdict": paper.word(f"deviation_codes.{one['code']}"),
-        "probability": probability(paper, one["probability"]),
+        "dips": _dips(paper, result),
+        "limit": paper.word(
+            f"limit_sides.{result['side']}", limit=_permissible_deviation(paper, result)
+        ),
+        "guard": paper.word(f"guards.{result['guard']}"),
+        "verdict": paper.word(f"deviation_codes.{result['code']}"),
+        "probability": probability(paper, result["probability"]),
     }
 
 
-def _dips(paper, one):
-    high = paper.height(one["high_m"])
-    return high if one["low_m"] is None else f"{paper.height(one['low_m'], '')} – {high}"
+def _dips(paper, result):
+    high = paper.height(result["high_m"])
+    return high if result["low_m"] is None else f"{paper.height(result['low_m'], '')} – {high}"
 
 
-def _room(paper, one):
-    """How far a volume may be from the stated one."""
-    if one["limit"] is None:
-        return paper.plain(one["limit_m3"] * paper.volume_factor, paper.volume_symbol)
-    return paper.word("texts.limit_of_stated", limit=paper.percent(one["limit"]))
+def _permissible_deviation(paper, result):
+    """Return the largest permissible deviation of a volume from the stated volume."""
+    if result["limit"] is None:
+        return paper.plain(result["limit_m3"] * paper.volume_factor, paper.volume_symbol)
+    return paper.word("texts.limit_of_stated", limit=paper.percent(result["limit"]))
 
 
 def probability(paper, share):
-    """A probability in percent; one very near to 0 or 1 as below or above what is printed."""
+    """Format a probability in percent; values close to 0 or 1 are printed as a limit."""
     if share > 1 - CERTAIN:
         return paper.word("texts.more_probable", probability=paper.percent(1 - CERTAIN))
     if share < CERTAIN:
@@ -195,22 +203,22 @@ def probability(paper, share):
     return paper.number(share, "share", decimals=2)
 
 
-def deviation_limit_text(paper, one):
-    """What a limit of a deviation says."""
-    of = paper.word(f"limited_deviation.{one['of']}")
-    limit = deviation_texts(paper, one)["limit"]
-    return paper.word("texts.rule_deviation_limit", of=of, limit=limit)
+def deviation_limit_text(paper, result):
+    """Return a limit of a deviation in words."""
+    quantity = paper.word(f"limited_deviation.{result['of']}")
+    limit = deviation_texts(paper, result)["limit"]
+    return paper.word("texts.rule_deviation_limit", of=quantity, limit=limit)
 
 
-def _in_words(name, **more):
-    """A column of the paper with a text of a deviation."""
-    return Column(name, text=lambda paper, one: deviation_texts(paper, one)[name],
+def _text_column(name, **more):
+    """Return a column with a text of `deviation_texts`."""
+    return Column(name, text=lambda paper, result: deviation_texts(paper, result)[name],
                   heading=f"deviation_{name}", **more)  # fmt: skip
 
 
-def _decimals_of_probability(one):
-    """Near to 0 and 1 with as many decimals as tell them from these."""
-    rest = 100 * min(one["probability"], 1 - one["probability"])
+def _decimals_of_probability(result):
+    """Return the decimals that distinguish a probability from 0 and 1."""
+    rest = 100 * min(result["probability"], 1 - result["probability"])
     return min(decimals_of(rest, significant=1, least=2), 6)
 
 
@@ -222,24 +230,24 @@ DEVIATIONS = Table(
         Column("high_m", "m", height=True, on="", sheet="from_dip_m"),
         Column(
             "verdict_there",
-            text=lambda paper, one: paper.word(f"deviation_codes.{one['code']}"),
+            text=lambda paper, result: paper.word(f"deviation_codes.{result['code']}"),
             on="",
             sheet="verdict",
             width=16,
         ),
         Column("low_m", "m", height=True, on="", sheet="down_to_m"),
-        _in_words("volume", align="right"),
-        _in_words("stated", align="right"),
-        _in_words("deviation", align="right"),
+        _text_column("volume", align="right"),
+        _text_column("stated", align="right"),
+        _text_column("deviation", align="right"),
         Column("stated_m3", "m3", on="", sheet="stated_m3", **_LITRES_OF_U),
         Column("volume_m3", "m3", on="", sheet="table_m3", **_LITRES_OF_U),
         Column("deviation_m3", "m3", on="", sheet="deviation_m3", **_LITRES_OF_U),
-        _in_words("U", align="right"),
+        _text_column("U", align="right"),
         Column("U_m3", "m3", u="U_m3", on="", sheet="U_m3"),
-        _in_words("limit"),
-        _in_words("guard", sheet="guard"),
-        _in_words("verdict"),
-        _in_words("probability", align="right"),
+        _text_column("limit"),
+        _text_column("guard", sheet="guard"),
+        _text_column("verdict"),
+        _text_column("probability", align="right"),
         Column(
             "conformity",
             "share",
@@ -261,33 +269,33 @@ ACCEPTANCE = Table(
         *(Column(code, "m3", sheet=code, **_LITRES_OF_U) for code in _ENDS),
     ),
     rows=lambda record: [
-        one | dict(zip(_ENDS, (*one["tolerance_m3"], *one["accepted_m3"]), strict=True))
-        for one in record["rule"]["deviation"]
+        result | dict(zip(_ENDS, (*result["tolerance_m3"], *result["accepted_m3"]), strict=True))
+        for result in record["rule"]["deviation"]
     ],
 )  # fmt: skip
 
 
 def deviation_blocks(paper):
-    """The deviations as a table; nothing when there are none."""
+    """Table of the deviations; [] if there are none."""
     return [paper.show(DEVIATIONS)] if DEVIATIONS.rows(paper.record) else []
 
 
 def clauses(paper):
-    """Where each limit stands, and whether it was read there, a sentence each."""
+    """Block of sentences on the source of each limit and whether it was checked; [] if none."""
     verdict = paper.record["rule"]
-    texts = [(limit_text(paper, one), one) for one in verdict["uncertainty"]]
-    texts += [(deviation_limit_text(paper, one), one) for one in verdict["deviation"]]
-    found = [
+    texts = [(limit_text(paper, result), result) for result in verdict["uncertainty"]]
+    texts += [(deviation_limit_text(paper, result), result) for result in verdict["deviation"]]
+    sentences = [
         paper.word(
-            "texts.rule_clause" if one["clause"] else "texts.rule_without_clause",
+            "texts.rule_clause" if result["clause"] else "texts.rule_without_clause",
             limit=text,
-            clause=one["clause"],
-            verified=paper.word(f"verified.{one['verified']}"),
+            clause=result["clause"],
+            verified=paper.word(f"verified.{result['verified']}"),
         )
-        for text, one in texts
+        for text, result in texts
     ]
-    found = [*dict.fromkeys(found), *_by_law(paper)]
-    return [blocks.listing(found)] if found else []
+    sentences = [*dict.fromkeys(sentences), *_propagation_note(paper)]
+    return [blocks.listing(sentences)] if sentences else []
 
 
 def _volume(paper, value_m3, decimals):

@@ -1,4 +1,4 @@
-"""What uncertain inputs the covariance factor of a record has, and where its table may be used."""
+"""Uncertain inputs of the covariance factor, and the critical zone of a table."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from itertools import groupby
 
 @dataclass(frozen=True)
 class Group:
-    """Columns of the covariance factor that were found together: first, last (from 0), dof."""
+    """Columns `first` to `last` (from 0) of the covariance factor with a common source and dof."""
 
     name: str
     first: int
@@ -16,7 +16,7 @@ class Group:
 
 
 def critical_zone(record):
-    """(low, high) dips between which a floating roof forbids the table, or None."""
+    """Return the dips (low, high), m, of the critical zone of a floating roof, or None."""
     if not record["roof"] or not record["job"]["corrections"]["roof"]:
         return None
     roof = roof_of(record)
@@ -24,32 +24,45 @@ def critical_zone(record):
 
 
 def roof_of(record):
-    """{code: value} of the floating roof."""
+    """Return the values of the floating roof, {code: value}."""
     return {line["code"]: line["value"] for line in record["roof"]}
 
 
 def groups_of(kinds, lines):
-    """`Group`s of columns of these kinds: columns that were found together are one source.
+    """Return the sources of the columns of the covariance factor.
 
-    lines  of the budget, one for each source in the order of the columns; correlated inputs,
-           "a & b", have a line each, and as a group the least degrees of freedom of theirs
-    Several sources of one kind (items of deadwood, instruments) have as many columns as lines.
+    Columns with a common estimate form one source. Several sources of one kind, such as items of
+    deadwood or instruments, have as many columns as lines.
+
+    Parameters
+    ----------
+    kinds : list of str
+        Kind of input of each column.
+    lines : list of dict
+        Lines of the budget, in the order of the columns. Correlated inputs "a & b" have a line
+        each. As a group they have the smallest of their degrees of freedom.
+
+    Returns
+    -------
+    list of Group
     """
-    left, found, column = list(lines), [], 0
+    remaining, groups, column = list(lines), [], 0
     for kind, run in groupby(kinds):
         count, names = len(list(run)), [kind]
-        if not any(line["kind"] == kind for line in left):
+        if not any(line["kind"] == kind for line in remaining):
             names = kind.split(" & ")
-        while left[0]["kind"] not in names:  # a source without columns
-            left.pop(0)
-        own = next((i for i, line in enumerate(left) if line["kind"] not in names), len(left))
-        each = [_dof(left.pop(0)) for _ in range(own if len(names) == 1 else len(names))]
+        while remaining[0]["kind"] not in names:  # a source without columns
+            remaining.pop(0)
+        end = next(
+            (i for i, line in enumerate(remaining) if line["kind"] not in names), len(remaining)
+        )
+        each = [_dof(remaining.pop(0)) for _ in range(end if len(names) == 1 else len(names))]
         if len(names) == 1 and len(each) == count:
-            found += [Group(kind, column + i, column + i, dof) for i, dof in enumerate(each)]
+            groups += [Group(kind, column + i, column + i, dof) for i, dof in enumerate(each)]
         else:
-            found.append(Group(kind, column, column + count - 1, min(each)))
+            groups.append(Group(kind, column, column + count - 1, min(each)))
         column += count
-    return found
+    return groups
 
 
 def _dof(line):

@@ -1,4 +1,4 @@
-"""Blocks as HTML: inside Jupyter, and as one offline page with its own small scripts."""
+"""Conversion of blocks to HTML, for Jupyter and for an offline web page with scripts."""
 
 from tankcal.report.web.elements import block_html
 from tankcal.report.web.offline import page

@@ -1,7 +1,8 @@
-"""What the calculator of the page needs of a record: its rows, and what deliveries are made of.
+"""Data of a record for the dip calculator of the web page.
 
-The script computes as the workbook's calculator and `Capacity.delivery` do. The covariance factor
-of a long table is nearly straight between few of its rows: only those are kept.
+The script computes in the same way as the calculator of the workbook and `Capacity.delivery`. The
+covariance factor of a long table is nearly linear between a few rows. The page contains only these
+rows.
 """
 
 import numpy as np
@@ -15,12 +16,12 @@ from tankcal.report.web.packing import packed
 from tankcal.text.digits import decimals_of_rows
 from tankcal.uncertainty import coverage_factor
 
-BEND = 1e-6  # of the largest u: how far the factor may be from the straight line between kept rows
-_NODES = 32  # at which k is given: the script interpolates log k over 1/dof
+BEND = 1e-6  # largest deviation of the factor from the line between kept rows, in largest u
+_NODES = 32  # intervals of nodes for k; the script interpolates log k over 1/dof
 
 
 def calculator(paper):
-    """The block of the calculator, for the record of a paper: shown on the page only."""
+    """Block of the calculator, which only the web page shows."""
     record = paper.record
     capacity, spec = record["capacity"], record["job"]["table"]
     shown = unit(spec["volume_unit"])
@@ -48,14 +49,14 @@ def calculator(paper):
 
 
 def _deliveries(record, unit_factor):
-    """The factor at its kept rows, its sources, k by degrees of freedom, and what is stated."""
+    """Return the data of deliveries: kept rows of the factor, sources, k, stated deliveries."""
     capacity = record["capacity"]
     factor = factor_of(capacity) * unit_factor
     height_m = np.array(capacity["height_m"])
     largest = np.linalg.norm(factor, axis=1).max(initial=0.0)
     rows = straight_rows(height_m, factor, BEND * largest)
     owner, dof = sources_of(record)
-    least_dof = min((one for one in dof if one is not None), default=None)
+    least_dof = min((nu for nu in dof if nu is not None), default=None)
     return {
         "rows": packed(rows, "<u4"),
         "columns": factor.shape[1],
@@ -64,18 +65,29 @@ def _deliveries(record, unit_factor):
         "dof": dof,
         "k": _k_of_dof(record["job"]["table"]["coverage_probability"], least_dof),
         "stated": [
-            {key: one[key] for key in ("low_m", "high_m", "k")} | {"U": one["U_m3"] * unit_factor}
-            for one in stated_rows(record)
-            if one["low_m"] is not None
+            {key: row[key] for key in ("low_m", "high_m", "k")} | {"U": row["U_m3"] * unit_factor}
+            for row in stated_rows(record)
+            if row["low_m"] is not None
         ],
     }
 
 
 def straight_rows(height_m, factor, bend):
-    """Numbers of the rows to keep: (n,) first and last and each where the factor bends.
+    """Select rows between which the covariance factor is linear.
 
-    height_m  (rows,)
-    factor    (rows, c): its rows between kept ones are within `bend` (norm) of the straight line
+    Parameters
+    ----------
+    height_m : ndarray, shape (n,)
+        Heights of the rows.
+    factor : ndarray, shape (n, c)
+        Covariance factor.
+    bend : float
+        Largest norm of the difference between a row and the line between selected rows.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Indices of the selected rows, including the first and the last.
     """
     kept, open_pieces = {0, len(height_m) - 1}, [(0, len(height_m) - 1)]
     while open_pieces:
@@ -84,26 +96,27 @@ def straight_rows(height_m, factor, bend):
             continue
         part = (height_m[first : last + 1] - height_m[first]) / (height_m[last] - height_m[first])
         line = factor[first] + part[:, None] * (factor[last] - factor[first])
-        departure = np.linalg.norm(factor[first : last + 1] - line, axis=1)
-        if departure.max() > bend:
-            middle = first + int(np.clip(np.argmax(departure), 1, last - first - 1))
+        deviation = np.linalg.norm(factor[first : last + 1] - line, axis=1)
+        if deviation.max() > bend:
+            # Split at the largest deviation, but not at an end of the piece.
+            middle = first + int(np.clip(np.argmax(deviation), 1, last - first - 1))
             kept.add(middle)
             open_pieces += [(first, middle), (middle, last)]
     return np.array(sorted(kept))
 
 
 def sources_of(record):
-    """(number of the source of each column of the factor, degrees of freedom of each source).
+    """Return the source of each column of the factor, and the dof of each source.
 
-    None stands for infinite ones.
+    None denotes infinite degrees of freedom.
     """
     groups = groups_of(record["capacity"]["input_kind"], record["budget"])
-    owner = [i for i, one in enumerate(groups) for _ in range(one.first, one.last + 1)]
-    return owner, [one.dof if np.isfinite(one.dof) else None for one in groups]
+    owner = [i for i, group in enumerate(groups) for _ in range(group.first, group.last + 1)]
+    return owner, [group.dof if np.isfinite(group.dof) else None for group in groups]
 
 
 def _k_of_dof(probability, least_dof):
-    """k at Chebyshev's points of 1/dof from 0 to 1/least_dof; the same k at both ends: normal."""
+    """Return log k at Chebyshev points of 1/dof from 0 (normal) to 1/least_dof."""
     widest = 0.0 if least_dof is None else 1 / least_dof
     nodes = widest * (1 - np.cos(np.pi * np.arange(_NODES + 1) / _NODES)) / 2
     with np.errstate(divide="ignore"):

@@ -1,4 +1,4 @@
-"""The contents of the page: its headings get names that links lead to."""
+"""Table of contents of the web page, with links to the headings."""
 
 from html import escape
 
@@ -8,19 +8,20 @@ _WIDGETS = {
     "cloud_map": ("cloud_map", 2),
     "wall_map": ("wall_map", 2),
 }
-_DEEPEST = 2  # level of a heading that stands in the contents
+_DEEPEST = 2  # deepest level of headings in the table of contents
 
 
 def with_ids(blocks, words):
-    """(blocks whose headings have an id, [(depth, text, id)]): titles of parts are of depth 0."""
+    """Return blocks with ids of headings, and [(depth, text, id)]; titles of parts: depth 0."""
     contents = []
 
     def named(item, depth, text):
+        """Add a heading to the contents and return it with its id."""
         name = f"s{len(contents) + 1}"
         contents.append((depth, text, name))
         return item | {"id": name}
 
-    found = []
+    blocks_with_ids = []
     for block in blocks:
         kind = block["kind"]
         if kind == "masthead":
@@ -38,12 +39,12 @@ def with_ids(blocks, words):
                 for node in block["nodes"]
             ]
             block = block | {"nodes": nodes}
-        found.append(block)
-    return found, contents
+        blocks_with_ids.append(block)
+    return blocks_with_ids, contents
 
 
 def contents_html(contents, words):
-    """The contents as a list of links that can be folded; nothing for a page without headings."""
+    """Return the table of contents as a folding list of links; "" for a page without headings."""
     if len(contents) < 2:
         return ""
     links = "".join(
@@ -57,6 +58,6 @@ def contents_html(contents, words):
 
 
 def _text(node):
-    """The words of a markdown node, formulas as they are written."""
-    own = node.get("s", node.get("latex", ""))
-    return own + "".join(_text(child) for child in node.get("c", []))
+    """Return the text of a markdown node; formulas remain LaTeX."""
+    node_text = node.get("s", node.get("latex", ""))
+    return node_text + "".join(_text(child) for child in node.get("c", []))

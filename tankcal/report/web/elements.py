@@ -1,4 +1,4 @@
-"""Each kind of block as HTML; every text of a block is escaped."""
+"""Conversion of each kind of block to HTML; all texts are escaped."""
 
 import base64
 from html import escape
@@ -8,7 +8,7 @@ from tankcal.report.web.tables import caption_of, table_html
 
 
 def block_html(block):
-    """One block as HTML, as Jupyter shows it."""
+    """Return a block as HTML for Jupyter."""
     return _WRITERS[block["kind"]](block)
 
 
@@ -20,7 +20,7 @@ def _document(block):
 
 
 def _letterhead(letterhead, part):
-    """Logo, name and address of the laboratory; logo and mark are only ever pictures."""
+    """Return logo, name and address of the laboratory; logo and mark are embedded as images."""
     picture = _picture(letterhead["logo"])
     mark = letterhead.get("mark")
     if part == "certificate" and isinstance(mark, dict):
@@ -49,7 +49,7 @@ def _masthead(block):
 
 
 def id_of(block):
-    """The attribute by which the page's contents find a heading."""
+    """Return the id attribute of a heading, to which the table of contents links."""
     return f' id="{block["id"]}"' if "id" in block else ""
 
 
@@ -80,7 +80,7 @@ def _signature(block):
 
 
 def _hash_code(block):
-    """The QR code, and its digits as text: to be copied, and to be found by `tankcal verify`."""
+    """Return the QR code and its digits as text, which `tankcal verify` searches for."""
     picture = (
         f'<img class="svg" alt="{escape(block["alt"])}" src="{_data_url("svg", block["svg"])}">'
     )
@@ -108,7 +108,7 @@ def _figure(block):
 
 
 def _data_url(kind, content):
-    """A picture, the text of an SVG or a PNG in base64, as an address that holds it whole."""
+    """Return an image (text of an SVG, or a PNG in base64) as a data URL."""
     if kind == "svg":
         content = with_fonts(content)
         content = base64.b64encode(content.encode("utf-8")).decode("ascii")
@@ -126,6 +126,7 @@ _SPANS = {"paragraph": "p", "quote": "blockquote", "emph": "em", "strong": "stro
 
 
 def _node(node):
+    """Return a markdown node as HTML."""
     kind = node["t"]
     inner = "".join(_node(child) for child in node.get("c", []))
     if kind in _SPANS:

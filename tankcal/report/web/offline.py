@@ -1,7 +1,7 @@
-"""The page: one file that asks the network for nothing, with its own scripts and no others.
+"""The web page: a single file that needs no network.
 
-A policy in its head lets the browser run only scripts and styles of the given SHA-256, so nothing
-that a user wrote can run, whatever it says.
+A content security policy restricts the browser to scripts and styles with given SHA-256 digests.
+Texts of users can therefore never run as scripts.
 """
 
 import base64
@@ -18,7 +18,7 @@ from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.shipped import shipped_folder
 from tankcal.text.words import load_words
 
-_SCRIPTS = {
+_SCRIPTS = {  # scripts of each kind of block; "": scripts of every page
     "": ("numbers.js", "look.js"),
     "columns_table": ("finder.js",),
     "calculator": ("deliveries.js", "calculator.js"),
@@ -29,9 +29,9 @@ _SCRIPTS = {
 
 
 def page(blocks, has_contents=True):
-    """The blocks as one HTML page, in the words of their document's language.
+    """Return blocks as an HTML page in the language of their document.
 
-    has_contents  False: without the list of its headings, as a notebook frames it
+    Without `has_contents` the page has no table of contents, which suits a frame in a notebook.
     """
     first = blocks[0]
     language = first["language"] if first["language"] in LANGUAGES else DEFAULT
@@ -58,7 +58,7 @@ def page(blocks, has_contents=True):
             '<div class="columns">',
             contents_html(contents, words["web"]) if has_contents else "",
             '<main id="main">',
-            *_written(blocks, words["web"]),
+            *_blocks_as_html(blocks, words["web"]),
             "</main>",
             "</div>",
             f'<script type="application/json" id="words">{script_data(spoken)}</script>',
@@ -71,19 +71,19 @@ def page(blocks, has_contents=True):
 
 
 def _colours(letterhead):
-    """The letterhead's colours as style: on a dark page headings keep the colour of the page."""
+    """Return the colours of the letterhead as CSS; a dark page keeps its colour of headings."""
     colours = letterhead["colours"] if letterhead else {}
-    sound = {name: one for name, one in colours.items() if _COLOUR.fullmatch(one)}
-    ink = f"--ink: light-dark({sound['ink']}, #cfdeec); " if "ink" in sound else ""
-    line = f"--line: {sound['line']}; " if "line" in sound else ""
-    return f":root {{ {ink}{line}}}\n" if sound else ""
+    valid = {name: colour for name, colour in colours.items() if _COLOUR.fullmatch(colour)}
+    ink = f"--ink: light-dark({valid['ink']}, #cfdeec); " if "ink" in valid else ""
+    line = f"--line: {valid['line']}; " if "line" in valid else ""
+    return f":root {{ {ink}{line}}}\n" if valid else ""
 
 
 _COLOUR = re.compile("#[0-9a-fA-F]{6}")
 
 
-def _written(blocks, words):
-    """The blocks as HTML; tables are numbered, for their fields have names."""
+def _blocks_as_html(blocks, words):
+    """Yield the blocks as HTML; the numbers of tables make the ids of their fields unique."""
     for number, block in enumerate(blocks):
         kind = block["kind"]
         if kind == "columns_table" and len(block["rows"]) > PIECE:
@@ -103,7 +103,7 @@ def _written(blocks, words):
 
 
 def _bar(first, blocks, words):
-    """The bar at the top: what the page is about, ways to what is used most, light or dark."""
+    """Return the bar at the top: title, links to calculator and view, print and dark mode."""
     kinds = {block["kind"]: block["id"] for block in blocks if "id" in block}
     links = [
         f'<a href="#{kinds[kind]}">{escape(words[name])}</a>'

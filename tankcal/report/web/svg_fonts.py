@@ -1,4 +1,4 @@
-"""Fonts within pictures: a browser without the font of a chart would set wider labels."""
+"""Embedding of fonts in SVG images, since other fonts would change the width of labels."""
 
 import base64
 import io
@@ -7,14 +7,14 @@ from functools import cache
 from html import unescape
 from pathlib import Path
 
-_FAMILY = "STIXGeneral"  # of tankcal.pipeline.plot_style; matplotlib ships it
+_FAMILY = "STIXGeneral"  # font of tankcal.pipeline.plot_style, part of matplotlib
 _TEXT = re.compile(r"<(?:text|tspan)\b[^>]*>([^<]*)")
 _ROOT = re.compile(r"<svg\b[^>]*>")
 _STYLES = {"": "STIXGeneral", "italic": "STIXGeneralItalic", "bold": "STIXGeneralBol"}
 
 
 def with_fonts(svg):
-    """An SVG whose texts bring the letters of their font with them; others as they are."""
+    """Embed the letters of the font into an SVG; return SVGs with other fonts unchanged."""
     if _FAMILY not in svg:
         return svg
     letters = "".join(sorted(set(unescape("".join(_TEXT.findall(svg))))))
@@ -26,15 +26,15 @@ def with_fonts(svg):
 
 @cache
 def _face(style, letters):
-    """A rule @font-face with the letters of one style of the font."""
-    from fontTools import subset  # matplotlib needs it, too
+    """Return a CSS rule @font-face with the given letters in a style of the font."""
+    from fontTools import subset  # a dependency of matplotlib
     from fontTools.ttLib import TTFont
     from matplotlib import get_data_path
 
     font = TTFont(Path(get_data_path()) / "fonts/ttf" / f"{_STYLES[style]}.ttf",
                   recalcTimestamp=False)  # fmt: skip
     options = subset.Options(notdef_outline=True, hinting=False, name_IDs=[])
-    options.drop_tables += ["FFTM"]  # dates of FontForge
+    options.drop_tables += ["FFTM"]  # contains dates, which would change the bytes
     cut = subset.Subsetter(options)
     cut.populate(text=letters)
     cut.subset(font)

@@ -1,15 +1,15 @@
-"""Tables as HTML; on the page a long one comes in pieces, with a field to find its rows."""
+"""Conversion of tables to HTML; long tables are divided and have a search field."""
 
 from html import escape
 
 from tankcal.report.plain_formulas import formula_nodes
 
-PIECE = 66  # rows: one column of a printed page
-SHORT = 20  # rows of a table that is printed on one page
+PIECE = 66  # rows of a part: a column of a printed page
+SHORT = 20  # largest number of rows of a table that is printed on one page
 
 
 def table_html(block):
-    """A table; a long narrow one in a frame that scrolls."""
+    """Return a table as HTML; a long narrow table is in a scrolling frame."""
     table = _table(block, _rows(block), caption_of(block))
     if block["kind"] == "columns_table":
         return f'<div class="long" tabindex="0">{table}</div>'
@@ -17,15 +17,30 @@ def table_html(block):
 
 
 def framed_table(block):
-    """A table in a frame, so that on a narrow page the table scrolls and not the page."""
+    """Return a table in a frame, so that only the table scrolls on a narrow page."""
     short = " short" if len(block["rows"]) <= SHORT else ""
     return f'<div class="frame{short}">{table_html(block)}</div>'
 
 
 def searchable_table(block, number, words):
-    """A long narrow table in pieces of PIECE rows, which a browser lays out when they are seen.
+    """Return a long narrow table with a search field.
 
-    number  of the table on the page
+    The table is divided into parts of PIECE rows, whose layout the browser computes when they
+    become visible.
+
+    Parameters
+    ----------
+    block : dict
+        Block of the table.
+    number : int
+        Number of the table on the page.
+    words : dict
+        Words of the web page.
+
+    Returns
+    -------
+    str
+        HTML.
     """
     rows = [row.replace('<td class="decimal">', "<td>") for row in _rows(block)]
     pieces = "".join(
@@ -47,12 +62,12 @@ def searchable_table(block, number, words):
 
 
 def caption_of(block):
-    """The caption of a table, where it has one."""
+    """Return the caption element of a table, or ""."""
     return f"<caption>{escape(block['caption'])}</caption>" if block["caption"] else ""
 
 
 def decimal_fills(texts, mark="."):
-    """For each number what is missing behind it, as spaces as wide as a digit and as a mark."""
+    """Return the spaces after each number that align the decimal marks of a column."""
     tails = [len(text) - 1 - text.rfind(mark) if mark in text else -1 for text in texts]
     longest = max(tails, default=-1)
     return [
@@ -76,17 +91,17 @@ def _table(block, rows, caption):
 
 
 def _rows(block):
-    """The rows as HTML, for their numbers line up over the whole table."""
-    formulas, whole = block.get("formulas", ()), block.get("whole", ())
-    links = block.get("links", {})  # {column: the address of each cell, "" for none}
+    """Return the rows as HTML, with decimal marks aligned over the whole table."""
+    formulas, unbroken_columns = block.get("formulas", ()), block.get("whole", ())
+    links = block.get("links", {})  # {column: address of each cell, "" for none}
     columns = [
         _cells(
             column,
             align,
             block["decimal_mark"],
-            _with_formulas if i in formulas else escape,
+            _typeset_formulas if i in formulas else escape,
             links=links.get(i),
-            look=f"{align} whole" if i in whole else align,
+            look=f"{align} whole" if i in unbroken_columns else align,
         )
         for i, (column, align) in enumerate(
             zip(zip(*block["rows"], strict=True), block["align"], strict=False)
@@ -96,9 +111,10 @@ def _rows(block):
 
 
 def _cells(texts, align, mark, shown, *, links, look):
-    """The cells of one column; under "decimal", filled up so that the decimal marks line up.
+    """Return the cells of a column as HTML.
 
-    links  address of each, "" for none; None: none has one
+    Cells of a "decimal" column are padded. shown(text) returns the HTML of a text. `links`
+    contains an address for each cell, or ""; None: no links.
     """
     fills = decimal_fills(texts, mark) if align == "decimal" else [""] * len(texts)
     return [
@@ -109,7 +125,7 @@ def _cells(texts, align, mark, shown, *, links, look):
     ]
 
 
-def _with_formulas(text):
+def _typeset_formulas(text):
     return "".join(
         f'<math display="inline">{node["mathml"]}</math>'
         if node["t"] == "math"
@@ -119,5 +135,5 @@ def _with_formulas(text):
 
 
 def _first_cell(block):
-    """An example of what can be typed: the first cell of the middle row."""
+    """Return the first cell of the middle row as an example of a search."""
     return block["rows"][len(block["rows"]) // 2][0] if block["rows"] else ""

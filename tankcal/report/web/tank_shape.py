@@ -1,7 +1,8 @@
-"""What the three-dimensional view of the page needs of a record: the form of the tank.
+"""Data of a record for the three-dimensional view of the tank in the web page.
 
-A shell of courses is drawn by the outlines of its sections, a lying cylinder or a sphere by its
-dimensions. The record of a mesh has no faces: no view, and the page says so.
+A shell of courses is drawn from the outlines of its sections. A horizontal cylinder or a sphere is
+drawn from its dimensions. The record of a mesh has no faces, so that the page states the reason for
+the missing view.
 """
 
 from math import sqrt
@@ -13,40 +14,40 @@ from tankcal.report.blocks import Block
 from tankcal.report.web.packing import packed
 from tankcal.report.web.wall_map import rejected_in_space
 
-MOST_POINTS = 4000  # that are drawn
-TENTH_MM = 1e4  # per metre: outlines are whole tenths of a millimetre
-_LARGEST = 0.1  # of the radius: how large the largest deviation is drawn at first
-_STEPS = 48  # along a curved end
+MOST_POINTS = 4000  # largest number of drawn points
+TENTH_MM = 1e4  # tenths of a millimetre per metre, the unit of outlines
+_LARGEST = 0.1  # initial size of the largest deviation, relative to the radius
+_STEPS = 48  # intervals along a curved end
 
 
 def tank_view(paper):
-    """The block of the view: of a shell its deviations, else the nominal form or the reason."""
+    """Block of the view: shell with deviations, nominal form, or reason of a missing view."""
     record = paper.record
     kind = record["job"]["tank"]["kind"]
-    found = {"shell": None, "solid": None, "reason": ""}
+    shape = {"shell": None, "solid": None, "reason": ""}
     if record["sections"]:
-        found["shell"] = shell_of(record)
+        shape["shell"] = shell_of(record)
     elif kind in _PROFILES and record["solid"] and not _is_oblique(record["solid"]):
-        found["solid"] = _PROFILES[kind]({one["code"]: one["value"] for one in record["solid"]})
+        shape["solid"] = _PROFILES[kind]({size["code"]: size["value"] for size in record["solid"]})
     else:
         drawing = "no_view_of_drawing" if kind == "vertical" else "no_view"
         code = "no_view_of_straps" if record.get("strapping") else drawing
         code = "no_view_of_guppy" if kind == "horizontal" else code
-        found["reason"] = paper.word(f"web.{code}")
-    return Block({"kind": "tank_view", "text": paper.word("web.view_here"), **found})
+        shape["reason"] = paper.word(f"web.{code}")
+    return Block({"kind": "tank_view", "text": paper.word("web.view_here"), **shape})
 
 
 def _is_oblique(solid):
-    """Whether an end is no solid of revolution, which is all that the view can turn."""
-    return any(one["code"] in ("end_a", "end_b") and one["value"] == "guppy" for one in solid)
+    """Return whether an end is no solid of revolution, which the view cannot draw."""
+    return any(size["code"] in ("end_a", "end_b") and size["value"] == "guppy" for size in solid)
 
 
 def shell_of(record):
-    """A shell: outlines about their circles, rings that make its wall, points, first factor."""
+    """Return the data of a shell: outlines, rings of the wall, points, initial enlargement."""
     sections, shell = record["sections"], record["shell"]
     bottom_z_m = record["job"]["datum"]["bottom_z_m"]
     form_m = [np.array(s["outline"]["radius_m"]) - s["radius_m"] for s in sections]
-    largest = max(float(np.max(np.abs(one))) for one in form_m)
+    largest = max(float(np.max(np.abs(outline))) for outline in form_m)
     radius_m = float(np.mean([s["radius_m"] for s in sections]))
     exaggeration = round_factor(_LARGEST * radius_m / largest) if largest else 1
     return {
@@ -62,31 +63,42 @@ def shell_of(record):
 
 
 def _rings(courses, sections, shell, bottom_z_m, radius_m):
-    """A list a course of [height, section, shift x, y and of the radius from an upright cylinder].
+    """Return for each course the rings [height, section, dx, dy, dr] of its wall.
 
-    Between its sections the wall is straight, below and above them it follows the leaning axis.
+    dx, dy and dr are the differences in position and radius from an upright cylinder, m. The wall
+    is straight between the sections. Below and above the sections it follows the inclined axis.
     """
-    found = []
+    rings = []
     for course in courses:
-        own = [(i, s) for i, s in enumerate(sections) if s["course"] == course["course"]]
-        own.sort(key=lambda one: one[1]["height_m"])
-        if not own:
+        course_sections = [
+            (i, s) for i, s in enumerate(sections) if s["course"] == course["course"]
+        ]
+        course_sections.sort(key=lambda pair: pair[1]["height_m"])
+        if not course_sections:
             continue
-        ends = [(course["bottom_m"], *own[0]), *((s["height_m"], i, s) for i, s in own)]
-        ends.append((course["top_m"], *own[-1]))
-        found.append([_ring(height, i, s, shell, radius_m) for height, i, s in ends])
-    return found
+        ends = [
+            (course["bottom_m"], *course_sections[0]),
+            *((s["height_m"], i, s) for i, s in course_sections),
+        ]
+        ends.append((course["top_m"], *course_sections[-1]))
+        rings.append([_ring(height, i, s, shell, radius_m) for height, i, s in ends])
+    return rings
 
 
 def _ring(height_m, number, section, shell, radius_m):
+    """Return a ring at a height, by shifting a section along the inclined axis."""
     above = height_m - section["height_m"]
     x = section["x_m"] + shell["slope_x"] * above - shell["x_m"]
     y = section["y_m"] + shell["slope_y"] * above - shell["y_m"]
-    return [height_m, number, *(round(one, 6) for one in (x, y, section["radius_m"] - radius_m))]
+    return [
+        height_m,
+        number,
+        *(round(shift, 6) for shift in (x, y, section["radius_m"] - radius_m)),
+    ]
 
 
 def _points(record, bottom_z_m):
-    """Names, azimuths (degrees), heights and deviations from their circles (m), evenly thinned."""
+    """Return names, azimuths (degrees), heights and residuals (m) of at most MOST_POINTS points."""
     z_m = {point["point"]: point["z_m"] for point in record["points"]}
     rows = [
         (str(name), azimuth, z_m[name] - bottom_z_m, residual, number)
@@ -118,7 +130,7 @@ def _sphere(dimensions):
 
 
 def _lying(dimensions):
-    """A lying cylinder and its ends as a curve turned about its axis, from end a to end b."""
+    """Return a horizontal cylinder as a profile of revolution from end a to end b."""
     length = dimensions["cylinder_length"]
     width, height = dimensions["section_width"], dimensions["section_height"]
     depth_a, r_a = _end(dimensions, "a", height / 2)
@@ -134,29 +146,31 @@ def _lying(dimensions):
 
 
 def _end(dimensions, name, radius):
-    """(how far it stands out, radius there) from the cylinder to the middle of an end."""
+    """Return (distances along the axis, radii) of an end, from the cylinder to its centre."""
     kind, depth = dimensions[f"end_{name}"], dimensions.get(f"end_{name}_depth", 0.0)
     r = radius * np.cos(np.linspace(0, np.pi / 2, _STEPS + 1))
     r[-1] = 0.0
     if kind == "conical":
         return depth * (1 - r / radius), r
     if kind == "spherical" and depth:
+        # Radius of a sphere through the edge and the centre of the end.
         dish = (radius**2 + depth**2) / (2 * depth)
         return np.sqrt(dish**2 - r**2) - (dish - depth), r
     if kind == "torispherical":
         return _torispherical(r, radius, dimensions, name), r
-    return depth * np.sqrt(1 - (r / radius) ** 2), r  # ellipsoidal; flat ones have no depth
+    return depth * np.sqrt(1 - (r / radius) ** 2), r  # ellipsoidal; a flat end has depth 0
 
 
 def _torispherical(r, radius, dimensions, name):
-    """How far a dish with a knuckle stands out at the radii r."""
+    """Return the distance along the axis of a torispherical end at the radii r."""
     dish = dimensions[f"end_{name}_dish_radius"]
     knuckle = dimensions[f"end_{name}_knuckle_radius"]
     middle = radius - knuckle
     centre = -sqrt((dish - knuckle) ** 2 - middle**2)
+    # The dish and the knuckle have a common tangent at the radius `meet`.
     meet = dish * middle / (dish - knuckle)
-    of_knuckle = np.sqrt(np.maximum(knuckle**2 - (r - middle) ** 2, 0.0))
-    return np.where(r > meet, of_knuckle, centre + np.sqrt(dish**2 - np.minimum(r, dish) ** 2))
+    on_knuckle = np.sqrt(np.maximum(knuckle**2 - (r - middle) ** 2, 0.0))
+    return np.where(r > meet, on_knuckle, centre + np.sqrt(dish**2 - np.minimum(r, dish) ** 2))
 
 
 def _profile(along, radius):

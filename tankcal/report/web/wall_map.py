@@ -1,7 +1,7 @@
-"""What the unrolled wall of the page needs of a record: its points, and those that were rejected.
+"""Data of a record for the unrolled wall in the web page: used and rejected points.
 
-`looked_at` lists what a person may want to look at one by one: rejected points, those that count by
-half, and those that somebody decided to keep, from the largest distance down.
+`looked_at` lists the points for inspection in the order of their distance from the wall: rejected
+points, points with reduced weight, and points that a person decided to keep.
 """
 
 from dataclasses import dataclass
@@ -11,25 +11,29 @@ import numpy as np
 from tankcal.report.blocks import Block
 from tankcal.report.web.packing import packed
 
-MOST_POINTS = 4000  # that are drawn
-MOST_REJECTED = 2000
-LARGEST = 3.0  # times the largest deviation of the wall: so far off a rejected point is drawn
+MOST_POINTS = 4000  # largest number of drawn points
+MOST_REJECTED = 2000  # largest number of drawn rejected points
+LARGEST = 3.0  # largest drawn distance of a rejected point, in largest deviations of the wall
 
 
 @dataclass(frozen=True)
 class LookedAt:
-    """A point that a search or a person decided about.
+    """A point that the outlier test or a person decided on.
 
     Attributes
     ----------
-    name, reason : str
-        The reason is a code of the words `reasons`; "" of a point that was kept.
+    name : str
+        Name of the point.
+    reason : str
+        Code of the words `reasons`; "" for a kept point.
     azimuth_deg, height_m : float or None
-        About the axis, and above the bottom; None where there is no upright wall.
-    off_m, w : float or None
-        From the wall, outwards, m; normalised residual.
+        Azimuth about the axis, degrees, and height above the bottom, m; None without vertical wall.
+    off_m : float or None
+        Distance from the wall, positive outwards, m.
+    w : float or None
+        Normalised residual.
     is_kept : bool
-        By a decision.
+        Whether a person decided to keep the point.
     """
 
     name: str
@@ -42,26 +46,27 @@ class LookedAt:
 
 
 def looked_at(record):
-    """`LookedAt` of the points of a wall."""
+    """Return the points for inspection (tuple of LookedAt), largest distance first."""
     place = _places(record) if record.get("shell") else _nowhere
-    found = [
-        LookedAt(one["point"], one["reason"], *place(one), one["residual_m"], one["w"])
-        for one in record["rejected"]
+    listed = [
+        LookedAt(row["point"], row["reason"], *place(row), row["residual_m"], row["w"])
+        for row in record["rejected"]
     ]
-    points = {one["point"]: one for one in record["points"]}
-    found += [
-        LookedAt(one["what"], "", *place(points[one["what"]]), one["off_m"], one["w"], True)
-        for one in (record.get("overrulings") or {"each": ()})["each"]
-        if one["decision"] == "keep" and one["kind"] == "point" and one["what"] in points
+    points = {point["point"]: point for point in record["points"]}
+    listed += [
+        LookedAt(row["what"], "", *place(points[row["what"]]), row["off_m"], row["w"], True)
+        for row in (record.get("overrulings") or {"each": ()})["each"]
+        if row["decision"] == "keep" and row["kind"] == "point" and row["what"] in points
     ]
-    return tuple(sorted(found, key=lambda one: -abs(one.off_m or 0.0)))
+    return tuple(sorted(listed, key=lambda point: -abs(point.off_m or 0.0)))
 
 
 def _places(record):
-    """A function from a point to its (azimuth in degrees, height above the bottom)."""
+    """Return a function of a point: (azimuth in degrees, height above the bottom in m)."""
     shell, bottom_m = record["shell"], record["job"]["datum"]["bottom_z_m"]
 
     def place(point):
+        # Position relative to the inclined axis at the height of the point.
         above = point["z_m"] - shell["z_m"]
         x = point["x_m"] - shell["x_m"] - shell["slope_x"] * above
         y = point["y_m"] - shell["y_m"] - shell["slope_y"] * above
@@ -74,15 +79,15 @@ def _nowhere(_point):
     return None, None
 
 
-def why(paper, one):
-    """Why a point is looked at, in words."""
-    if one.is_kept:
+def why(paper, point):
+    """Return the reason for the inspection of a point in words."""
+    if point.is_kept:
         return paper.word("overruling_decisions.keep")
-    return paper.words["reasons"].get(one.reason, one.reason)
+    return paper.words["reasons"].get(point.reason, point.reason)
 
 
 def wall_map_view(paper):
-    """The block of the unrolled wall, for the record of a paper: shown on the page only."""
+    """Block of the unrolled wall, which only the web page shows."""
     record = paper.record
     z_m = {point["point"]: point["z_m"] for point in record["points"]}
     bottom_m = record["job"]["datum"]["bottom_z_m"]
@@ -106,28 +111,31 @@ def wall_map_view(paper):
             "joints_m": [0.0, *(course["top_m"] for course in record["courses"])],
             "rejected": [
                 {
-                    "name": one.name,
-                    "azimuth": round(one.azimuth_deg, 3),
-                    "height": round(one.height_m, 4),
-                    "off_mm": round(1e3 * (one.off_m or 0.0), 2),
-                    "reason": why(paper, one),
-                    "is_kept": one.is_kept,
+                    "name": point.name,
+                    "azimuth": round(point.azimuth_deg, 3),
+                    "height": round(point.height_m, 4),
+                    "off_mm": round(1e3 * (point.off_m or 0.0), 2),
+                    "reason": why(paper, point),
+                    "is_kept": point.is_kept,
                 }
-                for one in looked_at(record)[:MOST_REJECTED]
+                for point in looked_at(record)[:MOST_REJECTED]
             ],
         }
     )
 
 
 def rejected_in_space(record, largest_m):
-    """[{name, azimuth, height, off_m}] for the three-dimensional view, at most so far off."""
+    """Return points for the three-dimensional view, [{name, azimuth, height, off_m}].
+
+    The distance is limited to LARGEST times `largest_m`.
+    """
     most = LARGEST * largest_m
     return [
         {
-            "name": one.name,
-            "azimuth": round(one.azimuth_deg, 3),
-            "height": round(one.height_m, 4),
-            "off_m": round(float(np.clip(one.off_m or 0.0, -most, most)), 5),
+            "name": point.name,
+            "azimuth": round(point.azimuth_deg, 3),
+            "height": round(point.height_m, 4),
+            "off_m": round(float(np.clip(point.off_m or 0.0, -most, most)), 5),
         }
-        for one in looked_at(record)[:MOST_REJECTED]
+        for point in looked_at(record)[:MOST_REJECTED]
     ]

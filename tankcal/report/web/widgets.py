@@ -1,6 +1,6 @@
-"""What works on the page: the dip calculator and the tank in three dimensions.
+"""Interactive elements of the web page: dip calculator, views of the tank and its wall.
 
-The scripts in report_templates/web/ fill them with life; without scripts they stay hidden.
+The scripts in report_templates/web/ operate the elements, which are hidden without scripts.
 """
 
 from html import escape
@@ -9,7 +9,7 @@ from tankcal.report.web.packing import script_data
 
 
 def calculator_html(block, words):
-    """The dip calculator: dip, volume, and the volume between two dips."""
+    """Return the dip calculator: volume of a dip, and volume between two dips."""
     data = {key: block[key] for key in block if key not in ("kind", "text", "id")}
     fields = "".join(
         f'<p><label for="{name}">{escape(words[name])}</label> '
@@ -33,16 +33,16 @@ def calculator_html(block, words):
 
 
 def view_html(block, words):
-    """The tank in three dimensions, or why it is not there."""
+    """Return the three-dimensional view of the tank, or the reason why it is missing."""
     heading = f'<h2 id="{block["id"]}">{escape(words["view"])}</h2>'
     if block["reason"]:
         return f'<section class="widget">{heading}<p>{escape(block["reason"])}</p></section>'
-    of_shell = block["shell"] is not None
+    has_shell = block["shell"] is not None
     data = {key: block[key] for key in ("shell", "solid")}
     return (
         f'<section class="widget" id="view" hidden>{heading}'
-        f"<p>{escape(words['view_shell' if of_shell else 'view_solid'])}</p>"
-        f"{_view_controls(words) if of_shell else ''}"
+        f"<p>{escape(words['view_shell' if has_shell else 'view_solid'])}</p>"
+        f"{_view_controls(words) if has_shell else ''}"
         '<div class="stage"><canvas tabindex="0" role="img" '
         f'aria-label="{escape(words["view_alt"])}"></canvas><div class="marks" aria-hidden="true">'
         f'</div></div><p class="fallback" hidden>{escape(words["no_webgl"])}</p>'
@@ -53,7 +53,7 @@ def view_html(block, words):
 
 
 def map_html(block, words):
-    """The wall unrolled: a map whose cells tell their departure."""
+    """Return the map of the unrolled wall, whose cells show their deviation."""
     data = {key: block[key] for key in block if key not in ("kind", "text", "id")}
     return (
         f'<section class="widget" id="map" hidden><h3 id="{block["id"]}">'
@@ -70,7 +70,7 @@ def map_html(block, words):
 
 
 def wall_html(block, words):
-    """The wall unrolled: its points, those that were rejected, and what is said of the chosen."""
+    """Return the unrolled wall with used and rejected points, and details of a selected point."""
     data = {key: block[key] for key in block if key not in ("kind", "text", "id")}
     return (
         f'<section class="widget" id="wall" hidden><h3 id="{block["id"]}">'
@@ -104,13 +104,13 @@ def _view_controls(words):
 
 def _buttons(words):
     signs = {"left": "◀", "right": "▶", "up": "▲", "down": "▼", "nearer": "+", "farther": "−"}
-    found = [
+    buttons = [
         f'<button type="button" data-move="{move}" aria-label="{escape(words[move])}" '
         f'title="{escape(words[move])}">{sign}</button>'
         for move, sign in signs.items()
     ]
-    found.append(f'<button type="button" data-move="reset">{escape(words["reset"])}</button>')
-    return " ".join(found)
+    buttons.append(f'<button type="button" data-move="reset">{escape(words["reset"])}</button>')
+    return " ".join(buttons)
 
 
 def _data(name, data):

@@ -1,7 +1,7 @@
-"""The output workbook: the record as capacity.xlsx, by XlsxWriter (docs/workbook.md).
+"""The output workbook capacity.xlsx, written from the record by XlsxWriter (docs/workbook.md).
 
-No number is computed here. What stands in a cell is the record's value, at most in another unit
-(mm for m, litres per centimetre for m2), and a formula carries the record's value as its result.
+The package computes no results. The cells contain values of the record, possibly in another unit
+(mm for m, litres per centimetre for m2). The stored results of formulas are values of the record.
 """
 
 from tankcal.report.workbook.book import Book
@@ -43,12 +43,12 @@ from tankcal.report.workbook.uncertainty import (
 )
 from tankcal.text.words import language_of, load_words, translate_record
 
-# Hundreds of pages when the whole workbook is printed, and read by programs: these are hidden.
+# Sheets for other programs, which would print on hundreds of pages: hidden.
 _HIDDEN = (
     *("capacity_mm", "workings", "covariance_factor", "monte_carlo", "points", "adjusted_points"),
     *("observations", "deviations", "liquid_steps"),
 )
-_OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the record
+_SHEETS_OF_SURVEYS = {  # sheets of each survey method, by the key of the record
     "strapping": strapping_sheet,
     "great_circles": great_circles_sheet,
     "lines": lines_sheet,
@@ -62,13 +62,25 @@ _OF_SURVEYS = {  # sheets of what a wall was surveyed with, by the part of the r
 
 
 def write(record, path, language=None, digest=None):
-    """Write the workbook of `record` (record.json as parsed) to `path`; same record, same bytes.
+    """Write the workbook of a record; equal records give equal bytes.
 
-    language  of the words; None: that of the job
-    digest    SHA-256 of the record.json, which the workbook then names
+    Parameters
+    ----------
+    record : dict
+        Loaded record.json.
+    path : str or Path
+        Path of the workbook.
+    language : str, optional
+        Language of the workbook; None: the language of the job.
+    digest : str, optional
+        SHA-256 of the record.json, which becomes a property of the workbook.
 
-    Raises TankcalError when no words are shipped in the language of the job, OSError when the file
-    cannot be written.
+    Raises
+    ------
+    TankcalError
+        If the language of the job is not available.
+    OSError
+        If the file cannot be written.
     """
     words = load_words(language or language_of(record))
     record = translate_record(words, record)
@@ -84,6 +96,7 @@ def write(record, path, language=None, digest=None):
 
 
 def _sheets_of_tank(book, record):
+    """Write the sheets of a calibrated tank, in the order of the workbook."""
     certificate_sheet(book, record)
     rows = capacity_sheet(book, record)
     proportional_parts_sheet(book, record)
@@ -93,7 +106,7 @@ def _sheets_of_tank(book, record):
     factor_sheet(book, record)
     if record["courses"]:
         courses_sheet(book, record)
-    for key, sheet_of in _OF_SURVEYS.items():
+    for key, sheet_of in _SHEETS_OF_SURVEYS.items():
         if record.get(key):
             sheet_of(book, record)
     corrections_sheet(book, record)
@@ -117,7 +130,7 @@ def _sheets_of_tank(book, record):
 
 
 def _sheets_of_survey(book, record):
-    """A survey that was only adjusted: no table, nothing that follows from one."""
+    """Write the sheets of an adjusted survey without tank."""
     adjustment_sheet(book, record)
     points_sheet(book, record)
     observations_sheet(book, record)

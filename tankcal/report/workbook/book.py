@@ -1,4 +1,4 @@
-"""The workbook as a file: its properties, its sheets and their page set-up and protection."""
+"""The workbook file: properties, and sheets with page set-up and protection."""
 
 from datetime import datetime
 from functools import cache, cached_property
@@ -23,24 +23,41 @@ from tankcal.report.workbook.look import (
 from tankcal.report.workbook.sheet import NumberRow, Sheet
 from tankcal.report.workbook.writer import Writer
 
-RECORD_PROPERTY = "record.json SHA-256"  # `tankcal verify` looks for it
-_A4 = 9
-_INDEX_ROW, _INDEX_WIDTH = 2, 34  # of the list of sheets
-_PAGE_PT = (750.0, 480.0)  # of A4 in landscape, within the margins
-_COLUMN_PT, _BESIDE_PT = 5.25, 3.75  # of a unit of width; beside it
+RECORD_PROPERTY = "record.json SHA-256"  # property that `tankcal verify` reads
+_A4 = 9  # Excel's code of the paper size
+_INDEX_ROW, _INDEX_WIDTH = 2, 34  # first row and width of the list of sheets
+_PAGE_PT = (750.0, 480.0)  # width and height, points, of A4 in landscape within the margins
+_COLUMN_PT, _BESIDE_PT = 5.25, 3.75  # points per unit of column width, and per column
+# Colours of the tabs by kind of sheet.
 _TAB = {"result": ACCENT, "input": "#C98A00", "paper": "#8FA3B8", "origin": "#5F7A61"}
+# Actions that remain possible on protected sheets.
 _OPENINGS = {"sort": True, "autofilter": True, "format_columns": True, "format_rows": True}
 
 
 def header_text(text):
-    """User text as it may stand in a page header: & doubled, one line, of bearable length."""
+    """Return user text for a page header: a single line of at most 50 letters, & doubled."""
     return " ".join(str(text).split())[:50].replace("&", "&&")
 
 
 def about_saved(version, *, tank=None, source="", date=None, notice="", laboratory=""):
-    """What a Book asks of a record, for a saved file that is none: whose it is, and the day.
+    """Return the part of a record that a Book requires, for a saved file other than a record.
 
-    version  of tankcal        tank  its id; None: the workbook is about `source`
+    Parameters
+    ----------
+    version : str
+        Version of tankcal.
+    tank : str, optional
+        Id of the tank; None: the subject of the workbook is `source`.
+    source : str, optional
+        Name of the job.
+    date : str, optional
+        Date of the survey (ISO).
+    notice, laboratory : str, optional
+        Entries of the certificate.
+
+    Returns
+    -------
+    dict
     """
     return {
         "tankcal": version,
@@ -55,13 +72,27 @@ def about_saved(version, *, tank=None, source="", date=None, notice="", laborato
 
 
 class Book(Writer):
-    """A workbook being written; as a context manager it is closed, that is saved, at the end.
+    """Workbook; a context manager that saves the file at its end.
 
-    subject  what the workbook is about: the tank, or the survey alone
-    notice   of the certificate, on every sheet; "" for none
-    about    "capacity", "adjustment", "plan" or "comparison", by which the file is called; None: by
-             the record
-    hidden   codes of the sheets that are hidden, and not printed with the whole workbook
+    Parameters
+    ----------
+    path : str or Path
+        Path of the workbook.
+    record : dict
+        Record, or the result of `about_saved`.
+    words : dict
+        Words of the language.
+    about : str, optional
+        "capacity", "adjustment", "plan" or "comparison", the key of the title; None: by the record.
+    hidden : collection of str, optional
+        Codes of hidden sheets, which are not printed with the whole workbook.
+
+    Attributes
+    ----------
+    subject : str
+        Subject of the workbook: the tank, or the survey.
+    notice : str
+        Notice of the certificate, printed on every sheet; "" for none.
     """
 
     def __init__(self, path, record, words, about=None, hidden=()):
@@ -71,7 +102,8 @@ class Book(Writer):
             "strings_to_formulas": False,
             "strings_to_urls": False,
             "strings_to_numbers": False,
-            "tmpdir": str(Path(path).parent),  # where sheets wait: in memory they are held thrice
+            # Sheets are stored in files, since memory would hold them three times.
+            "tmpdir": str(Path(path).parent),
             "default_format_properties": dict(FONT),
         }
         super().__init__(xlsxwriter.Workbook(str(path), options), words)
@@ -85,7 +117,7 @@ class Book(Writer):
         self._set_properties(certificate, name, record, about)
 
     def _set_properties(self, certificate, name, record, about):
-        """What the file says of itself: title, author, company, language, date."""
+        """Set the properties of the file: title, author, company, language, date."""
         kind = about or ("capacity" if record["capacity"] else "adjustment")
         laboratory = str(certificate.get("laboratory") or "")
         self._file.set_properties(
@@ -101,12 +133,12 @@ class Book(Writer):
         self._file.set_custom_property("Language", self.words["language"]["code"], "text")
 
     def name_record(self, digest):
-        """Say by its SHA-256 of which record.json the workbook was made: a property of the file."""
+        """Store the SHA-256 of the record.json as a property of the file."""
         self._file.set_custom_property(RECORD_PROPERTY, digest, "text")
 
     @cached_property
     def paper(self):
-        """The record in the words of the workbook, as papers show it: for declared tables."""
+        """Formatter of the record in the language of the workbook, for declared tables."""
         return Paper(self._record, self.words)
 
     def __enter__(self):
@@ -122,10 +154,23 @@ class Book(Writer):
     # ---- sheets
 
     def sheet(self, code, subtitle="", landscape=False, tab="paper"):
-        """A new protected sheet with its title, page set-up, header and footer.
+        """Add a protected sheet with title, page set-up, header and footer.
 
-        code  of its name in [workbook.sheets] and of its title in [workbook.titles]
-        tab   kind of the sheet, by which its tab is coloured: result, input, paper or origin
+        Parameters
+        ----------
+        code : str
+            Key of the name in [workbook.sheets] and of the title in [workbook.titles].
+        subtitle : str, optional
+            Text in the second row, after subject and notice.
+        landscape : bool, optional
+            True: the sheet is printed in landscape.
+        tab : str, optional
+            Kind of the sheet, which determines the colour of its tab: "result", "input", "paper" or
+            "origin".
+
+        Returns
+        -------
+        Sheet
         """
         sheet = self._page(code, landscape, tab)
         self.set_height(sheet, 0, 24)
@@ -136,7 +181,10 @@ class Book(Writer):
         return sheet
 
     def write_index(self):
-        """Links to all sheets that show, right of what the first sheet prints, and the others."""
+        """Write links to the visible sheets, and the names of hidden sheets, into the first sheet.
+
+        The list lies to the right of the printed area.
+        """
         (_, first), *others = self._sheets
         column = first.dim_colmax + 2
         first.print_area(0, 0, first.dim_rowmax, first.dim_colmax)
@@ -153,9 +201,20 @@ class Book(Writer):
             row += 1
 
     def plain_sheet(self, code, columns, landscape=False, tab="origin"):
-        """A protected sheet of nothing but columns, headings in row 1: for other programs to read.
+        """Add a protected sheet of columns with headings in row 1, for other programs.
 
-        A cell that is None stays blank.
+        A cell with None remains blank.
+
+        Parameters
+        ----------
+        columns : list of Column
+            Columns of the sheet.
+        code, landscape, tab
+            As in `sheet`.
+
+        Returns
+        -------
+        Sheet
         """
         sheet = self._page(code, landscape, tab)
         self.widths(sheet, *(column.width for column in columns))
@@ -165,11 +224,13 @@ class Book(Writer):
         for place, column in enumerate(columns):
             sheet.write_string(0, place, column.heading, self._head(column))
         digits = (
-            one.digits if isinstance(one.digits, list) else repeat(one.digits, len(one.cells))
-            for one in columns
+            column.digits
+            if isinstance(column.digits, list)
+            else repeat(column.digits, len(column.cells))
+            for column in columns
         )
         looks = cache(lambda shown: tuple(map(self._number_look, shown)))
-        cells = zip(*(one.cells for one in columns), strict=True)
+        cells = zip(*(column.cells for column in columns), strict=True)
         rows = zip(cells, map(looks, zip(*digits, strict=True)), strict=True)
         sheet.write_number_rows(1, (NumberRow(*row) for row in rows))
         return sheet
@@ -178,7 +239,7 @@ class Book(Writer):
         return self.format(num_format=number_format(digits))
 
     def _page(self, code, landscape, tab):
-        """A new protected sheet with page set-up, header and footer."""
+        """Add a protected sheet with page set-up, header and footer."""
         name = self.sheet_name(code)
         sheet = self._file.add_worksheet(name, Sheet)
         self._sheets.append((code, sheet))
@@ -205,10 +266,18 @@ class Book(Writer):
         return sheet
 
     def keep_together(self, sheet, starts, last, widths):
-        """Break pages in landscape before blocks of rows that would not fit below the others.
+        """Set page breaks in landscape so that blocks of rows are not divided.
 
-        starts  first row of each block, from the top down; last is the last row of all
-        widths  of the columns, which decide how small the sheet is printed
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet with the blocks.
+        starts : list of int
+            First row of each block, in ascending order.
+        last : int
+            Last row of the sheet.
+        widths : list of float
+            Widths of the columns, which determine the scale of the print.
         """
         wide_pt = sum(_COLUMN_PT * width + _BESIDE_PT for width in widths)
         page_pt = _PAGE_PT[1] * max(wide_pt / _PAGE_PT[0], 1.0)
@@ -222,17 +291,29 @@ class Book(Writer):
         sheet.set_h_pagebreaks(breaks)
 
     def name(self, name, sheet, first_row, last_row, column, last_column=None):
-        """Give a name to the cells of one column, or of several; the same in every language."""
+        """Define a name for the cells of columns; names do not depend on the language.
+
+        Parameters
+        ----------
+        name : str
+            Name to define.
+        sheet : Sheet
+            Sheet of the cells.
+        first_row, last_row, column : int
+            Position of the cells, from 0.
+        last_column : int, optional
+            Last column; None: a single column.
+        """
         cells = xl_range_abs(first_row, column, last_row, last_column or column)
         self._file.define_name(name, f"={quote_sheetname(sheet.get_name())}!{cells}")
 
     def chart(self, subtype="straight"):
-        """A new chart with numbers on both axes, their points joined by straight lines or bare."""
+        """Add a scatter chart; `subtype` None: without lines between the points."""
         options = {"type": "scatter"} | ({"subtype": subtype} if subtype else {})
         return self._file.add_chart(options)
 
 
 def _created(issued, survey):
-    """Date of issue, else of the survey, else a fixed one: the same record, the same bytes."""
-    found = day(issued) or day(survey and survey["date"]) or datetime(2000, 1, 1)
-    return datetime(found.year, found.month, found.day)
+    """Return the date of issue, or of the survey, or a fixed date for reproducible bytes."""
+    date = day(issued) or day(survey and survey["date"]) or datetime(2000, 1, 1)
+    return datetime(date.year, date.month, date.day)

@@ -1,4 +1,4 @@
-"""The sheet Capacity, which is the table itself."""
+"""The sheet Capacity with the capacity table."""
 
 from dataclasses import dataclass, replace
 
@@ -8,6 +8,7 @@ from tankcal.report.workbook.tables import columns_of
 from tankcal.text.digits import decimals_of_height, shortest
 from tankcal.text.words import marks_of
 
+# Key of a column and end of its name in formulas.
 NAMED = {
     "height_m": "height",
     "volume_m3": "volume",
@@ -18,13 +19,13 @@ NAMED = {
     "low_m3": "low",
     "high_m3": "high",
     "interval": "interval",
-}  # key of a column: end of its name in formulas
-_HEAD_ROW = 3
+}
+_HEAD_ROW = 3  # row of the first headings, from 0
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Where the capacity table stands: its first and last row, and its columns by name, from 0."""
+    """Position of the capacity table: first and last row, and columns by name, from 0."""
 
     first: int
     last: int
@@ -32,12 +33,12 @@ class Rows:
 
 
 def digits_of_heights(height_m):
-    """3 decimals (mm), or 4 where a step needs them; the last row, the shell's top, is rounded."""
+    """Return the decimals of heights, 3 or 4; the last row, the top of the shell, is rounded."""
     return min(max(map(decimals_of_height, height_m[:-1]), default=3), 4)
 
 
 def capacity_sheet(book, record):
-    """Write the sheet and its named ranges; returns the `Rows` of the table."""
+    """Write the sheet and its named ranges; return the `Rows` of the table."""
     capacity = record["capacity"]
     spec = record["job"]["table"]
     temperature = shortest(spec["reference_temperature_c"], marks_of(book.words))
@@ -52,12 +53,12 @@ def capacity_sheet(book, record):
         wide = max(width_of_lines(columns[place].cells), 11)
         columns[place] = replace(columns[place], width=wide)
     book.widths(sheet, *map(width_of, columns))
-    muted = [row for row, good in enumerate(capacity["for_use"]) if not good]
+    muted = [row for row, is_for_use in enumerate(capacity["for_use"]) if not is_for_use]
     last = book.table(sheet, _HEAD_ROW, "capacity_table", columns, muted=muted)
     places = {NAMED[key]: place for place, key in enumerate(keys) if key in NAMED}
-    found = Rows(_HEAD_ROW + 1, last, places)
+    position = Rows(_HEAD_ROW + 1, last, places)
     book.freeze(sheet, _HEAD_ROW)
     for name in NAMED.values():
         if name in places:
-            book.name(f"capacity_{name}", sheet, found.first, found.last, places[name])
-    return found
+            book.name(f"capacity_{name}", sheet, position.first, position.last, places[name])
+    return position

@@ -1,4 +1,4 @@
-"""The sheet Certificate: what was calibrated, the main result, and what was assumed."""
+"""The sheet Certificate: tank, main result, and assumptions."""
 
 from tankcal.report.certificate import doubts_of
 from tankcal.report.numbers import unit
@@ -10,13 +10,13 @@ from tankcal.report.workbook.look import ACCENT, DATE, LINE_PT, MUTED, lines_of,
 from tankcal.text.digits import decimals_of, decimals_of_height
 from tankcal.text.words import choice_sentence, sentence
 
-_WIDTHS = (36, 20, 24, 14, 14)
-_LONG = 60  # letters that fit beside a label
-_DATES = ("date", "date_of_issue")  # keys of the job whose values are dates
+_WIDTHS = (36, 20, 24, 14, 14)  # widths of the columns, letters
+_LONG = 60  # largest number of letters beside a label
+_DATES = ("date", "date_of_issue")  # keys of the job with dates
 
 
 def certificate_sheet(book, record):
-    """Write the sheet, the first of the workbook."""
+    """Write the first sheet of the workbook."""
     words = book.words
     sheet = book.sheet("certificate", tab="result")
     book.widths(sheet, *_WIDTHS)
@@ -44,31 +44,31 @@ def certificate_sheet(book, record):
 
 
 def _label(words, key):
-    """The label of a key of the job; one without words is written out: vessel_no as Vessel no."""
+    """Return the label of a key of the job; an unknown key vessel_no becomes "Vessel no"."""
     return words["labels"].get(key, key.replace("_", " ").capitalize())
 
 
 def _certificate(record, words):
-    """(label, value, DATE or None) of what the job says about its certificate, nothing else."""
+    """Return (label, value, DATE or None) for the entries of the certificate in the job."""
     labels = {"number": sentence(words, "page", "number")}
     return [
         (labels.get(key) or _label(words, key), value, DATE if key in _DATES else None)
         for key, value in record["job"]["certificate"].items()
-        if key != "notice"  # that one stands at the top
+        if key != "notice"  # printed at the top
     ]
 
 
 def _declared(book, *tables):
-    """(label, value, number format, DATE or None) of declared facts, without what is not given."""
-    words, found = book.words, []
+    """Return (label, value, format) of declared facts with values; the format may be DATE."""
+    words, lines = book.words, []
     for table in tables:
         (row,) = table.rows(book.paper.record)
-        for one in table.in_workbook([row]):
-            value = one.text(book.paper, row) if one.text else row.get(one.key)
+        for column in table.in_workbook([row]):
+            value = column.text(book.paper, row) if column.text else row.get(column.key)
             if value is not None:
-                value = sentence(words, one.words, value) if one.words else value
-                found.append((_label(words, one.key), value, _format(one)))
-    return found
+                value = sentence(words, column.words, value) if column.words else value
+                lines.append((_label(words, column.key), value, _format(column)))
+    return lines
 
 
 def _format(column):
@@ -78,7 +78,7 @@ def _format(column):
 
 
 def _entries(book, sheet, row, title, lines):
-    """A heading and a line for each (label, value, number format); returns the next row."""
+    """Write a heading and a line for each (label, value, format); return the next row."""
     if not lines:
         return row
     book.heading(sheet, row, title, len(_WIDTHS))
@@ -96,7 +96,7 @@ def _entries(book, sheet, row, title, lines):
 
 
 def _uncertainty(book, sheet, row, paper):
-    """How U was found and from what, and the verdict of a decision rule; returns the next row."""
+    """Write method and inputs of U, and the verdict of a decision rule; return the next row."""
     book.heading(sheet, row, paper.word("headings.uncertainty"), len(_WIDTHS))
     for text in method.sentences(paper, f'"{paper.word("intervals.monte_carlo")}"'):
         row += 1
@@ -113,17 +113,17 @@ def _uncertainty(book, sheet, row, paper):
     return row + 1
 
 
-def _facts(paper, of):
-    """(label, text, None) of what a paper says, without what it has nothing of."""
-    return [(paper.label(key), text, None) for key, text in of(paper) if text]
+def _facts(paper, facts_of):
+    """Return (label, text, None) for the non-empty texts of facts_of(paper)."""
+    return [(paper.label(key), text, None) for key, text in facts_of(paper) if text]
 
 
 def _result(book, sheet, row, record):
-    """The capacity at the top of the table with U and k on its line; returns the next row."""
+    """Write the capacity at the top of the table with U and k; return the next row."""
     capacity, words = record["capacity"], book.words
     U, k = stated_U_m3(capacity)[-1], k_of_rows(capacity)[-1]
     factor, symbol = book.paper.volume_factor, book.paper.volume_symbol
-    of_volume = number_format(decimals_of(factor * U), unit=symbol)
+    volume_format = number_format(decimals_of(factor * U), unit=symbol)
     top = number_format(decimals_of_height(capacity["height_m"][-1]), unit="m")
     book.heading(sheet, row, sentence(words, "headings", "result"), len(_WIDTHS))
     lines = []
@@ -138,8 +138,8 @@ def _result(book, sheet, row, record):
     book.put(sheet, row + 2, 0, book.word("labels.top_of_table"), **line)
     k = words["intervals"]["monte_carlo"] if k is None else k
     for column, value, shown in (
-        (1, factor * capacity["volume_m3"][-1], of_volume),
-        (2, factor * U, f'"± "{of_volume}'),
+        (1, factor * capacity["volume_m3"][-1], volume_format),
+        (2, factor * U, f'"± "{volume_format}'),
         (3, k, '"k = "0.00'),
         (4, capacity["height_m"][-1], top),
     ):
@@ -148,7 +148,7 @@ def _result(book, sheet, row, record):
 
 
 def _doubts(book, sheet, row, record):
-    """What is implausible of the numbers handed in; returns the next row."""
+    """Write the warnings of implausible input; return the next row."""
     lines = doubts_of(record["warnings"])
     if not lines:
         return row
@@ -160,17 +160,17 @@ def _doubts(book, sheet, row, record):
 
 
 def _corrections(book, sheet, row, record):
-    """The corrections that were applied, with their sizes; returns the next row."""
+    """Write the applied corrections with their sizes; return the next row."""
     words = book.words
     book.heading(sheet, row, sentence(words, "headings", "corrections"), len(_WIDTHS))
     applied = [correction for correction in record["corrections"] if correction["applied"]]
     factor, symbol = book.paper.volume_factor, book.paper.volume_symbol
     decimals = decimals_of(factor * stated_U_m3(record["capacity"])[-1]) + 1
-    of_volume = number_format(decimals, unit=symbol)
+    volume_format = number_format(decimals, unit=symbol)
     for correction in applied:
         row += 1
         book.put(sheet, row, 0, sentence(words, "corrections", correction["code"]))
-        book.put(sheet, row, 1, factor * correction["size_m3"], num_format=of_volume)
+        book.put(sheet, row, 1, factor * correction["size_m3"], num_format=volume_format)
         book.put(sheet, row, 2, correction["size_percent"], num_format='0.0000 "%"')
     if not applied:
         row += 1
@@ -179,19 +179,19 @@ def _corrections(book, sheet, row, record):
 
 
 def _overrulings(book, sheet, row):
-    """What was decided against the search for blunders, a sentence each; returns the next row."""
-    told = overrulings.sentences(book.paper)
-    if not told:
+    """Write the decisions against the outlier test; return the next row."""
+    texts = overrulings.sentences(book.paper)
+    if not texts:
         return row
     book.heading(sheet, row, book.paper.word("headings.overrulings"), len(_WIDTHS))
-    for text in told:
+    for text in texts:
         row += 1
         book.paragraph(sheet, row, text, _WIDTHS)
     return row + 2
 
 
 def _choices(book, sheet, row, record):
-    """What was assumed, a sentence each; returns the next row."""
+    """Write the assumptions; return the next row."""
     words = book.words
     book.heading(sheet, row, sentence(words, "headings", "choices"), len(_WIDTHS))
     for choice in record["choices"]:
@@ -202,7 +202,7 @@ def _choices(book, sheet, row, record):
 
 
 def _authorisation(book, sheet, row):
-    """Lines that are left empty, for a person to fill in and sign."""
+    """Write blank lines for name, signature, place and date."""
     words = book.words
     book.heading(sheet, row, sentence(words, "headings", "authorisation"), len(_WIDTHS))
     line = book.format(bottom=1)

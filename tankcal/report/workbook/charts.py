@@ -1,4 +1,4 @@
-"""The sheets Charts, native charts of the table and of the wall, and Deviations, their points."""
+"""The sheet Charts with charts of the table and the wall, and the sheet Deviations."""
 
 from itertools import groupby
 from math import floor, log10
@@ -7,21 +7,31 @@ from tankcal.report.tables.tank import DEVIATIONS
 from tankcal.report.workbook.look import ACCENT
 from tankcal.report.workbook.tables import columns_of, set_widths
 
-_HEAD_ROW = 3
-_MOST_POINTS = 20_000  # of the sheet Deviations
-_WIDE, _HIGH, _LOW = 640, 415, 300  # pixels of a chart: two to a page, or three
-_PT = 0.75  # of a pixel
+_HEAD_ROW = 3  # row of the first headings, from 0
+_MOST_POINTS = 20_000  # largest number of points in the sheet Deviations
+_WIDE, _HIGH, _LOW = 640, 415, 300  # pixels; width, heights of two or three charts per page
+_PT = 0.75  # points per pixel
 _COLOURS = (ACCENT, "#B03A2E", "#2E7D5B", "#8E6C00", "#6A4C93", "#445566")
 _GRID = {"visible": True, "line": {"color": "#E3E8ED", "width": 0.75}}
 
 
 def charts_sheets(book, record, rows):
-    """Charts of the capacity table, whose `rows` they draw, and of the deviations of the wall."""
+    """Write charts of the capacity table (its `Rows`) and of the deviations of the wall.
+
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    record : dict
+        Record of the tank.
+    rows : capacity.Rows
+        Position of the capacity table.
+    """
     sheet = book.sheet("charts", tab="paper")
     row = _HEAD_ROW
     for name, axis in (("litres_per_cm", "litres_per_cm"), ("U", "U_m3")):
         row = _insert(book, sheet, row, _curve(book, rows, name, axis), _HIGH)
-    points = _of_sections(record) or _of_solid(record)
+    points = _points_of_sections(record) or _points_of_solid(record)
     if not points:
         return
     for title, x_axis, series in _deviations_sheet(book, points):
@@ -29,9 +39,9 @@ def charts_sheets(book, record, rows):
         row = _insert(book, sheet, row, (chart, title, x_axis, "residual"), _LOW)
 
 
-def _insert(book, sheet, row, drawn, high):
-    """A chart in one high row, which no page break can part; returns the next row."""
-    chart, title, *axes = drawn
+def _insert(book, sheet, row, chart_parts, high):
+    """Insert a chart into one row, which page breaks cannot divide; return the next row."""
+    chart, title, *axes = chart_parts
     x, y = (book.words["axes"][axis] for axis in axes)
     sheet.set_row(row, _PT * (high + 5))
     chart.set_size({"width": _WIDE, "height": high})
@@ -41,7 +51,7 @@ def _insert(book, sheet, row, drawn, high):
 
 
 def _curve(book, rows, name, axis):
-    """One column of the capacity table against the height: chart, title and axes."""
+    """Return chart, title and axes of a column of the capacity table against the height."""
     title, capacity = book.word(f"charts.{name}"), book.sheet_name("capacity")
     height, column = rows.columns["height"], rows.columns[name]
     chart = book.chart()
@@ -59,7 +69,7 @@ def _curve(book, rows, name, axis):
 
 
 def _dress(book, chart, title, x_axis, y_axis, x=None, y=None):
-    """Title and axes of a chart; x and y are further options of the axes."""
+    """Set title and axes of a chart; x and y are further options of the axes."""
     names = book.words["axes"]
     plain = {"major_gridlines": _GRID, "name_font": {"bold": False}, "label_position": "low"}
     chart.set_title({"name": title, "name_font": {"size": 12, "color": ACCENT}})
@@ -71,7 +81,7 @@ def _dress(book, chart, title, x_axis, y_axis, x=None, y=None):
 
 
 def _deviations_sheet(book, rows):
-    """The points with their deviations; returns (title, x axis, series) of each chart of them."""
+    """Write the points with their deviations; return (title, x axis, series) of each chart."""
     every = -(-len(rows) // _MOST_POINTS)
     shown = rows[::every]
     subtitle = book.word("texts.deviations_subtitle", shown=len(shown), all=len(rows))
@@ -92,8 +102,8 @@ def _deviations_sheet(book, rows):
     ]
 
 
-def _of_sections(record):
-    """One row a used point of a section, section by section, by azimuth."""
+def _points_of_sections(record):
+    """Return a row for each used point of the sections, in the order of azimuth."""
     return [
         {
             "point": point,
@@ -109,8 +119,8 @@ def _of_sections(record):
     ]
 
 
-def _of_solid(record):
-    """One row a used point of a wall without sections, by its height."""
+def _points_of_solid(record):
+    """Return a row for each used point of a wall without sections, in the order of height."""
     used = [row for row in record["points"] or [] if row["used"]]
     return [
         {"point": row["point"], "z_m": row["z_m"], "residual_mm": 1000.0 * row["residual_m"]}
@@ -119,9 +129,11 @@ def _of_solid(record):
 
 
 def _series_of_courses(book, name, rows, last):
-    """(course, [(name, x cells, y cells) of each of its sections]) from the bottom up."""
+    """Return (course, [(name, x cells, y cells) of each section]) from the bottom up."""
     row, courses = _HEAD_ROW, {}
-    for (course, section), group in groupby(rows, key=lambda one: (one["course"], one["section"])):
+    for (course, section), group in groupby(
+        rows, key=lambda point: (point["course"], point["section"])
+    ):
         first, row = row + 1, row + len(list(group))
         cells = [[name, first, column, row, column] for column in (last - 1, last)]
         title = book.words["axes"]["section"].format(section=section)
@@ -130,14 +142,14 @@ def _series_of_courses(book, name, rows, last):
 
 
 def _limit_mm(rows):
-    """The end of the axis of deviations, the same in every chart: 1, 2 or 5 times 10^n mm."""
+    """Return the common end of the axes of deviations: 1, 2 or 5 times 10^n mm."""
     largest = max(abs(row["residual_mm"]) for row in rows) or 1.0
     power = 10.0 ** floor(log10(largest))
     return next(step * power for step in (1, 2, 5, 10) if step * power >= largest)
 
 
 def _scatter(book, title, x_axis, series, limit_mm):
-    """Deviations against the azimuth, joined within each section, or bare points by height."""
+    """Return a chart of deviations: against azimuth, joined per section, or against height."""
     joined = x_axis == "azimuth"
     chart = book.chart("straight_with_markers" if joined else None)
     for place, (name, x, y) in enumerate(series):

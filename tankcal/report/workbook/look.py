@@ -1,4 +1,4 @@
-"""How the sheets look: colours, number formats, columns and how wide and high texts are."""
+"""Appearance of the sheets: colours, number formats, and sizes of columns and texts."""
 
 import re
 from dataclasses import dataclass
@@ -13,26 +13,37 @@ ACCENT = "#1F4E79"
 RULE = "#BFC9D4"
 MUTED = "#595959"
 INPUT = "#FFF7DB"
-FONT = {"font_name": "Arial", "font_size": 10}  # or its equal in measure, on every machine
-DATE = 14  # Excel's built-in short date: in the order and with the marks of the reader's system
-LINE_PT = 15.0  # height of a line of text
-ROW_PT = 15.75  # of a row of one line: the 13.5 that XlsxWriter takes for Arial 10 clip its digits
-_MOST_LINES = 27  # Excel allows a row 409 pt
-_UNIT_PX = 7  # of width of a column: one digit
-_EMPTY_PX = 8  # of a cell, at both sides of its text
-_INDENT_PX = 9  # of a text in a table
-_LONG_WORD_PX = 150  # a longer word is broken, such as the name of a file
-_BOLD = 1.1  # times the width of plain letters
-_BREAKS = re.compile(r"\s+|(?<=\w-)(?=\w)")  # of lines: between words, and after hyphens
+# Metric-compatible substitutes exist on every system.
+FONT = {"font_name": "Arial", "font_size": 10}
+DATE = 14  # Excel's built-in short date in the format of the reader's system
+LINE_PT = 15.0  # height of a line of text, points
+ROW_PT = 15.75  # height of a row with a single line, points; the default of 13.5 clips digits
+_MOST_LINES = 27  # largest number of lines in a row, since Excel limits its height to 409 points
+_UNIT_PX = 7  # pixels per unit of column width, the width of a digit
+_EMPTY_PX = 8  # margins of a cell, both sides together
+_INDENT_PX = 9  # indent of a text in a table
+_LONG_WORD_PX = 150  # width above which a word may be broken, such as the name of a file
+_BOLD = 1.1  # width of bold letters relative to plain letters
+_BREAKS = re.compile(r"\s+|(?<=\w-)(?=\w)")  # line breaks: between words, and after hyphens
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a table: heading with its unit, cells from the top down, and their look.
+    """Column of a table.
 
-    digits  decimals of all cells, or a list with those of each cell, or None: text; in place of a
-            number of decimals a number format of Excel
-    width   the least, in letters; it grows for long words and numbers
+    Attributes
+    ----------
+    heading : str
+        Heading with the unit.
+    cells : list
+        Values of the cells.
+    digits : int, str, list or None
+        Decimals of all cells, or an Excel number format, or a list with these for each cell; None:
+        the cells are texts.
+    width : float
+        Smallest width in letters; the column becomes wider for long words and numbers.
+    percent : bool
+        True: the values are shares, printed in percent.
     """
 
     heading: str
@@ -43,10 +54,25 @@ class Column:
 
 
 def number_format(digits, percent=False, unit="", power=False):
-    """The Excel number format with so many decimals (of the mantissa, with `power`) and a unit.
+    """Return an Excel number format.
 
-    A format stays as it is. A spreadsheet rounds by it as `tankcal.text.digits` does, and shows
-    it with     the marks of its own language.
+    Spreadsheets round with this format in the same way as `tankcal.text.digits`, and print the
+    decimal mark of their own language.
+
+    Parameters
+    ----------
+    digits : int or str
+        Decimals, of the mantissa if `power`; or an Excel number format, which is returned.
+    percent : bool, optional
+        True: print in percent.
+    unit : str, optional
+        Unit after the number.
+    power : bool, optional
+        True: print with a power of ten.
+
+    Returns
+    -------
+    str
     """
     if isinstance(digits, str):
         return digits
@@ -55,12 +81,12 @@ def number_format(digits, percent=False, unit="", power=False):
 
 
 def height_digits(heights_m):
-    """Decimals of heights: millimetres, or finer where they are."""
-    return [3 if one is None else decimals_of_height(one) for one in heights_m]
+    """Return the decimals of heights in m: 3, or more for finer heights."""
+    return [3 if height is None else decimals_of_height(height) for height in heights_m]
 
 
 def day(text):
-    """The date that a text of the record begins with, in ISO form; None when it is none."""
+    """Return the date at the start of an ISO text, or None."""
     try:
         return date.fromisoformat(str(text or "")[:10])
     except ValueError:
@@ -68,7 +94,7 @@ def day(text):
 
 
 def width_of(column):
-    """The width of a column, in digits: its words, if not very long, and its numbers fit in."""
+    """Return the width of a column, in digits, for its numbers and its words of usual length."""
     heading = _BOLD * max(map(_pixels, pieces_of(column.heading)))
     if column.digits is None:
         words = {word for cell in set(column.cells) if cell for word in str(cell).split()}
@@ -79,44 +105,59 @@ def width_of(column):
 
 
 def width_of_lines(texts):
-    """The width of a column, in digits, in which each of these texts stands on one line."""
+    """Return the width of a column, in digits, in which each text fits on a single line."""
     longest = max(map(_pixels, set(texts)), default=0)
     return (longest + _INDENT_PX + 1.5 * _EMPTY_PX) / _UNIT_PX
 
 
 def pieces_of(text):
-    """The parts of a text between which a line may break."""
+    """Return the parts of a text between possible line breaks."""
     return [piece for piece in _BREAKS.split(text) if piece]
 
 
 def lines_in(column, width):
-    """How many lines each cell of a column of texts takes."""
-    room = width - _INDENT_PX / _UNIT_PX
+    """Return the number of lines of each cell of a column of texts."""
+    width_of_text = width - _INDENT_PX / _UNIT_PX
     texts = [cell if cell is None else str(cell) for cell in column.cells]
-    lines = {text: 1 if text is None else lines_of(text, room) for text in set(texts)}
+    lines = {text: 1 if text is None else lines_of(text, width_of_text) for text in set(texts)}
     return [lines[text] for text in texts]
 
 
 def lines_of(text, width, bold=False):
-    """How many lines a text takes, wrapped between its words, in columns of this width."""
-    room = (_UNIT_PX * width - _EMPTY_PX) / (_BOLD if bold else 1.0)
-    return min(sum(_lines_of(part, room) for part in str(text).split("\n")), _MOST_LINES)
+    """Return the number of lines of a text, wrapped between words, for a width in digits.
+
+    Parameters
+    ----------
+    text : str
+        Text, possibly with line breaks.
+    width : float
+        Width of the columns, in digits.
+    bold : bool, optional
+        True: the letters are bold.
+
+    Returns
+    -------
+    int
+    """
+    width_px = (_UNIT_PX * width - _EMPTY_PX) / (_BOLD if bold else 1.0)
+    return min(sum(_count_lines(part, width_px) for part in str(text).split("\n")), _MOST_LINES)
 
 
-def _lines_of(text, room):
+def _count_lines(text, width_px):
     lines, used, space = 1, 0.0, _pixels(" ")
     for word in pieces_of(text):
         length = _pixels(word)
-        if used and used + length > room:
+        # A word that does not fit starts a new line; a word longer than a line is broken.
+        if used and used + length > width_px:
             lines, used = lines + 1, 0.0
-        broken = max(int((length - 1) // room), 0)
-        lines, used = lines + broken, used + length - broken * room + space
+        breaks = max(int((length - 1) // width_px), 0)
+        lines, used = lines + breaks, used + length - breaks * width_px + space
     return lines
 
 
 @lru_cache(maxsize=10_000)
 def _pixels(word):
-    """The width of a word; of Calibri 11, which is 5 % wider than the Arial 10 of the sheets."""
+    """Return the width of a word in Calibri 11, which is 5 % wider than Arial 10 of the sheets."""
     return xl_pixel_width(word)
 
 
@@ -124,15 +165,17 @@ def _longest_number(column):
     if column.digits is None:
         return 0
     each = column.digits if isinstance(column.digits, list) else [column.digits] * len(column.cells)
-    of_digits = {}
+    values_by_digits = {}
     for value, digits in zip(column.cells, each, strict=True):
-        of_digits.setdefault(digits, []).append(value)
-    longest = max((_longest(values, digits) for digits, values in of_digits.items()), default=0)
+        values_by_digits.setdefault(digits, []).append(value)
+    longest = max(
+        (_longest(values, digits) for digits, values in values_by_digits.items()), default=0
+    )
     return longest + (len(" %") if column.percent else 0)
 
 
 def _longest(values, digits):
-    """The letters of the longest of some cells: of numbers that is the least or the greatest."""
+    """Return the letters of the longest cell; the longest number is the least or the greatest."""
     if isinstance(digits, str):
         return len(digits)
     texts = [value for value in values if isinstance(value, str)]

@@ -1,4 +1,4 @@
-"""The working papers: courses, corrections, choices and provenance."""
+"""Sheets of the working papers: courses, surveys, corrections, and provenance."""
 
 from tankcal.report.tables import (
     clouds,
@@ -16,11 +16,11 @@ from tankcal.report.workbook.look import Column, number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
 
-_HEAD_ROW = 3
+_HEAD_ROW = 3  # row of the first headings, from 0
 
 
 def courses_sheet(book, record):
-    """Courses, from the bottom up, and the horizontal sections in them."""
+    """Write the courses from the bottom up and their horizontal sections."""
     sheet = book.sheet("courses", book.word("texts.courses_subtitle"), landscape=True)
     tables = [(book.word("headings.courses"), "courses", columns_of(book, tank.COURSES))]
     if record["sections"]:
@@ -38,7 +38,7 @@ def courses_sheet(book, record):
 
 
 def strapping_sheet(book, record):
-    """Every reading of the tape with its corrections, the tapes, and what they make of courses."""
+    """Write the tape readings with their corrections, the tapes, and the courses."""
     sheet = book.sheet("strapping", book.word("texts.strapping_subtitle"), landscape=True)
     tables = [
         (book.word("headings.straps"), "straps", columns_of(book, strapping.straps_of(record))),
@@ -50,7 +50,7 @@ def strapping_sheet(book, record):
 
 
 def great_circles_sheet(book, record):
-    """Every reading of a tape round a sphere with its corrections, and the tapes."""
+    """Write the tape readings of a sphere with their corrections, and the tapes."""
     sheet = book.sheet("great_circles", book.word("texts.circles_subtitle"), landscape=True)
     tables = [
         (book.word("headings.great_circles"), "great_circles",
@@ -61,7 +61,7 @@ def great_circles_sheet(book, record):
 
 
 def lines_sheet(book, record):
-    """Every offset from a reference line, the lines, the levels and the plummets."""
+    """Write the offsets from reference lines, the lines, the levels and the plummets."""
     sheet = book.sheet("lines", book.word("texts.lines_subtitle"), landscape=True)
     tables = [
         (book.word("headings.levels"), "levels", columns_of(book, lines.LEVELS)),
@@ -73,7 +73,7 @@ def lines_sheet(book, record):
 
 
 def hits_sheet(book, record):
-    """Set-ups of bare hits, what their hits share, the rings, control targets, incidence."""
+    """Write set-ups, common errors, rings, control targets and incidence of wall hits."""
     sheet = book.sheet("hits", book.word("texts.hits_subtitle"), landscape=True)
     chosen = [
         table
@@ -96,7 +96,7 @@ def hits_sheet(book, record):
 
 
 def tangents_sheet(book, record):
-    """Set-ups of tangents, levels with perimeter and area, every sight."""
+    """Write the set-ups of tangents, the levels with perimeter and area, and all sights."""
     sheet = book.sheet("tangents", book.word("texts.tangents_subtitle"), landscape=True)
     tables = [
         (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
@@ -106,7 +106,7 @@ def tangents_sheet(book, record):
 
 
 def clouds_sheet(book, record):
-    """Files and scans of clouds, what their points share, targets, and what hides the wall."""
+    """Write files, scans, common errors, targets and obstructions of point clouds."""
     sheet = book.sheet("clouds", book.word("texts.clouds_subtitle"), landscape=True)
     tables = [
         (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
@@ -117,12 +117,12 @@ def clouds_sheet(book, record):
 
 
 def liquid_sheet(book, record):
-    """Metered runs: meters, runs, causes; each step and dip, and three tables of volumes."""
-    of_sheets = {
+    """Write the metered runs: meters, runs, causes, steps, dips, and compared volumes."""
+    tables_by_sheet = {
         "liquid": (liquid.METERS, liquid.RUNS, liquid.SIZES, liquid.CAUSES),
         "liquid_steps": (liquid.STEPS, liquid.DIPS, liquid.volumes_table(record)),
     }
-    for name, declared in of_sheets.items():
+    for name, declared in tables_by_sheet.items():
         sheet = book.sheet(name, book.word(f"texts.{name}_subtitle"), landscape=True)
         tables = [
             (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
@@ -133,7 +133,7 @@ def liquid_sheet(book, record):
 
 
 def radii_sheet(book, record):
-    """Courses by their radii: former, found, and as they are in the table."""
+    """Write the radii of the courses: former, measured and adopted."""
     sheet = book.sheet("radii", book.word("texts.radii_subtitle"), landscape=True)
     heading = book.word("headings.radii")
     columns = columns_of(book, radii.RADII)
@@ -141,7 +141,7 @@ def radii_sheet(book, record):
 
 
 def ship_sheet(book, record):
-    """Corrections for trim and list: where the pipe ends to tell, and a matrix for each list."""
+    """Write the corrections for trim and list: range of the pipe, and a table for each list."""
     sheet = book.sheet("ship", book.word("texts.ship_subtitle"), landscape=True)
     tables = [(book.word("headings.ship_cells"), "ship_cells", columns_of(book, ship.CELLS))]
     for number, (list_deg, cells) in enumerate(ship.by_list(record), 1):
@@ -151,7 +151,7 @@ def ship_sheet(book, record):
 
 
 def _corrections(book, record, cells):
-    """Soundings, the correction at each trim (or why there is none), the largest U of each row."""
+    """Return the columns soundings, correction (or state) at each trim, and largest U."""
     soundings, words = record["ship"]["sounding_m"], book.words["table_headings"]
     columns = [Column(f"{words['ship_sounding_m']}, m", soundings, 3, 12)]
     for cell in cells:
@@ -161,13 +161,13 @@ def _corrections(book, record, cells):
         ]
         heading = book.paper.word("texts.ship_trim", trim=f"{cell['trim_m']:g}")
         columns.append(Column(f"{heading}, mm", values, 1, 14))
-    spread = [ship.largest_U_m(cells, place) for place in range(len(soundings))]
-    in_mm = [None if U is None else 1000 * U for U in spread]
+    largest_U = [ship.largest_U_m(cells, index) for index in range(len(soundings))]
+    in_mm = [None if U is None else 1000 * U for U in largest_U]
     return [*columns, Column(f"{words['ship_U']}, mm", in_mm, 1, 14)]
 
 
 def corrections_sheet(book, record):
-    """Corrections with their size at the top of the table, from the surveyed shell to the net."""
+    """Write the corrections with their sizes at the top of the table."""
     sheet = book.sheet("corrections", book.word("texts.corrections_subtitle"), landscape=True)
     digits = decimals_of(record["capacity"]["u_m3"][-1]) + 1
     columns = columns_of(book, tank.CORRECTIONS.but(size_m3={"decimals": digits}))
@@ -186,9 +186,9 @@ def corrections_sheet(book, record):
 
 
 def provenance_sheet(book, record):
-    """What was assumed, what was warned of, and from which files by which versions."""
+    """Write choices, warnings, input files and versions of programs."""
     sheet = book.sheet("provenance", tab="origin")
-    found = (
+    declared = (
         ("choices", "choices", tank.CHOICES),
         ("warnings", "warnings", tank.WARNINGS),
         ("files", "input_files", tank.FILES),
@@ -196,6 +196,6 @@ def provenance_sheet(book, record):
     )
     tables = [
         (book.word(f"headings.{title}"), name, columns_of(book, table))
-        for title, name, table in found
+        for title, name, table in declared
     ]
     write_tables(book, sheet, _HEAD_ROW, tables)

@@ -1,4 +1,4 @@
-"""Sheets beside the capacity table: parts, densities, every millimetre, what is in the tank."""
+"""Sheets of proportional parts, other densities, millimetres, and fittings of the tank."""
 
 from bisect import bisect_right
 from math import ceil, floor
@@ -14,13 +14,13 @@ from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import LITRE_DECIMALS, decimals_of_rows, format_significant, shortest
 from tankcal.text.words import marks_of
 
-_HEAD_ROW = 3
-_SAME_MM = 1e-6  # a row this near to a whole millimetre is that millimetre
-_WIDTHS = (50, 16, 16, 16, 16)
+_HEAD_ROW = 3  # row of the first headings, from 0
+_SAME_MM = 1e-6  # tolerance, mm, for a row at a whole millimetre
+_WIDTHS = (50, 16, 16, 16, 16)  # widths of the columns, letters
 
 
 def proportional_parts_sheet(book, record):
-    """What 1 to 9 mm add to the row below a dip, course by course; no sheet for other tables."""
+    """Write the proportional parts of 1 mm to 9 mm by zone; no sheet without zones."""
     parts = record["proportional_parts"]
     if not parts["zones"]:
         return
@@ -34,25 +34,25 @@ def proportional_parts_sheet(book, record):
 
 
 def densities_sheet(book, record):
-    """The table for each further density of the liquid; no sheet where none was asked for."""
-    others = record["densities"]
-    if not others:
+    """Write the table for each additional density of the liquid; no sheet without any."""
+    entries = record["densities"]
+    if not entries:
         return
     capacity = record["capacity"]
-    own = record["job"]["table"]["liquid_density_kg_m3"]
+    table_density = record["job"]["table"]["liquid_density_kg_m3"]
     name = book.sheet_name("capacity")
     subtitle = book.word("texts.densities_subtitle", capacity=name)
     sheet = book.sheet("other_densities", subtitle, tab="result")
     digits = decimals_of_rows(stated_U_m3(capacity), least=LITRE_DECIMALS)
-    tables = [(own, capacity["volume_m3"])]
-    tables += [(other["density_kg_m3"], other["volume_m3"]) for other in others]
-    whole = capacity_table(record).but(height_m={"width": 13})
-    columns = columns_of(book, whole.only("height_m", "for_use"))
+    tables = [(table_density, capacity["volume_m3"])]
+    tables += [(entry["density_kg_m3"], entry["volume_m3"]) for entry in entries]
+    table = capacity_table(record).but(height_m={"width": 13})
+    columns = columns_of(book, table.only("height_m", "for_use"))
     columns[1:1] = [
         Column(f"{shortest(density, marks_of(book.words))} kg/m³", volumes, digits, 16)
         for density, volumes in tables
     ]
-    muted = [row for row, good in enumerate(capacity["for_use"]) if not good]
+    muted = [row for row, is_for_use in enumerate(capacity["for_use"]) if not is_for_use]
     set_widths(book, sheet, columns)
     last = book.table(sheet, _HEAD_ROW, "other_densities", columns, muted=muted)
     book.freeze(sheet, _HEAD_ROW)
@@ -61,12 +61,12 @@ def densities_sheet(book, record):
 
 
 def name_of_density(place):
-    """The named range of the volumes of a density of the sheet, from 2 on: 1 is the table's own."""
+    """Return the name of the range of volumes of density `place`, from 2 (1: the table)."""
     return f"volume_of_density_{place}"
 
 
 def inside_sheet(book, record):
-    """Dimensions of a solid; bottom, deadwood and roof, or that none was declared."""
+    """Write the dimensions of a solid, and bottom, deadwood, top and roof."""
     paper, corrections = book.paper, book.words["corrections"]
     sheet = book.sheet("inside")
     book.widths(sheet, *_WIDTHS)
@@ -74,8 +74,8 @@ def inside_sheet(book, record):
     if record["solid"]:
         row = _described(book, sheet, row, book.words["headings"]["dimensions"], record["solid"])
     for code in ("deadwood", "bottom", "top", "roof"):
-        said, declared = paper.choices(code), record.get(code)
-        if not (said or declared):
+        texts, declared = paper.choices(code), record.get(code)
+        if not (texts or declared):
             continue
         title = corrections[code]
         if declared and code != "deadwood":
@@ -83,7 +83,7 @@ def inside_sheet(book, record):
         else:
             book.heading(sheet, row, title, len(_WIDTHS))
             row += 1
-        for text in said:
+        for text in texts:
             book.paragraph(sheet, row, text, _WIDTHS)
             row += 1
         if declared and code == "deadwood":
@@ -92,7 +92,7 @@ def inside_sheet(book, record):
 
 
 def _described(book, sheet, row, title, lines):
-    """A heading, and a line for each {code, value, unit} of the record; returns the next row."""
+    """Write a heading and a line for each {code, value, unit}; return the next row."""
     words = book.words
     book.heading(sheet, row, title, len(_WIDTHS))
     for line in lines:
@@ -113,7 +113,7 @@ def _described(book, sheet, row, title, lines):
 
 
 def millimetres_sheet(book, record):
-    """Every whole millimetre of the table by its own straight lines; blank in a critical zone."""
+    """Write the table interpolated to whole millimetres; blank in a critical zone."""
     capacity = record["capacity"]
     dips, litres, digits = _millimetres(capacity, critical_zone(record))
     columns = [
@@ -124,19 +124,20 @@ def millimetres_sheet(book, record):
 
 
 def _millimetres(capacity, critical):
-    """(dips mm, volumes L or None, decimals) of the rows.
+    """Return (dips in mm, volumes in L or None, decimals) of the rows.
 
-    The last row of the table, which is the shell's top, stands at its rounded millimetre, as the
-    calculator takes it.
+    The last row of the table, the top of the shell, is listed at its rounded millimetre, as in the
+    calculator.
     """
     heights, volumes = capacity["height_m"], capacity["volume_m3"]
     first = ceil(1000 * heights[0] - _SAME_MM)
     last = max(floor(1000 * heights[-1] + _SAME_MM), round(1000 * heights[-1]))
-    of_rows = decimals_of_rows(stated_U_m3(capacity), least=LITRE_DECIMALS)
+    decimals = decimals_of_rows(stated_U_m3(capacity), least=LITRE_DECIMALS)
     dips = list(range(first, last + 1))
     litres, digits = [], []
     for dip in dips:
         height = min(dip / 1000, heights[-1])
+        # Linear interpolation between the rows around the height.
         row = min(bisect_right(heights, height + _SAME_MM / 1000) - 1, len(heights) - 1)
         after = min(row + 1, len(heights) - 1)
         part = 0.0
@@ -144,10 +145,10 @@ def _millimetres(capacity, critical):
             part = (height - heights[row]) / (heights[after] - heights[row])
         volume = volumes[row] + part * (volumes[after] - volumes[row])
         litres.append(None if _is_critical(height, critical) else 1000 * volume)
-        digits.append(max(of_rows[row] - LITRE_DECIMALS, 0))
+        digits.append(max(decimals[row] - LITRE_DECIMALS, 0))
     return dips, litres, digits
 
 
 def _is_critical(height_m, critical):
-    same = _SAME_MM / 1000
-    return critical is not None and critical[0] + same < height_m < critical[1] - same
+    tolerance_m = _SAME_MM / 1000
+    return critical is not None and critical[0] + tolerance_m < height_m < critical[1] - tolerance_m

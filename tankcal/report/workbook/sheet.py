@@ -1,7 +1,7 @@
-"""A worksheet of XlsxWriter that takes and writes numbers by columns and rows: the same bytes.
+"""Worksheet of XlsxWriter that writes numbers by columns and rows, with unchanged output.
 
-XlsxWriter asks of each cell what kind it is, and escapes each of its attributes. A table has a
-hundred thousand numbers, of which all that differs is the number.
+XlsxWriter determines the type of each cell and escapes each of its attributes. This is slow for
+tables with a hundred thousand numbers.
 """
 
 from math import isfinite
@@ -10,33 +10,49 @@ from typing import NamedTuple
 from xlsxwriter.utility import xl_col_to_name
 from xlsxwriter.worksheet import CellNumberTuple, CellStringTuple, Worksheet
 
-_ROWS_OF_A_SPAN = 16  # XlsxWriter names the columns in use of so many rows at once
+_ROWS_OF_A_SPAN = 16  # XlsxWriter states the used columns for groups of so many rows
 
 
 class NumberRow(NamedTuple):
-    """A row of nothing but numbers: as cells they would take ten times the memory.
+    """Row of numbers, which needs a tenth of the memory of cells.
 
-    values  from the first column on; None leaves a cell blank
-    looks   the format of each
+    Attributes
+    ----------
+    values : list of float or None
+        Values from the first column; None leaves a cell blank.
+    looks : tuple
+        Format of each value.
     """
 
     values: list
     looks: tuple
 
     def columns(self):
-        """Those that are not blank."""
+        """Return the indices of columns that are not blank."""
         if None not in self.values:
             return range(len(self.values))
         return [column for column, value in enumerate(self.values) if value is not None]
 
 
 class Sheet(Worksheet):
-    """A worksheet for many numbers."""
+    """Worksheet for many numbers."""
 
     def write_numbers(self, first_row, column, values, looks):
-        """Write numbers from the first row down, each with its format; None leaves a cell blank.
+        """Write numbers into a column.
 
-        Raises TypeError for a number that is not finite.
+        Parameters
+        ----------
+        first_row, column : int
+            Position of the first number, from 0.
+        values : list of float or None
+            Numbers; None leaves a cell blank.
+        looks : list
+            Format of each number.
+
+        Raises
+        ------
+        TypeError
+            For a number that is not finite.
         """
         rows = [row for row, value in enumerate(values, first_row) if value is not None]
         if not rows:
@@ -50,9 +66,9 @@ class Sheet(Worksheet):
             self.table[row][column] = CellNumberTuple(value, looks[row - first_row])
 
     def write_number_rows(self, first_row, rows):
-        """Write a `NumberRow` into each row from the first one down.
+        """Write each `NumberRow` into a row, from `first_row` (from 0) down.
 
-        Raises TypeError for a number that is not finite.
+        A number that is not finite raises TypeError.
         """
         for row, numbers in enumerate(rows, first_row):
             self._take_place(row, 0)
@@ -66,21 +82,23 @@ class Sheet(Worksheet):
             raise ValueError(f"row {row + 1} is beyond the last of a sheet")
 
     def _calculate_spans(self):
-        """The first and the last column in use of each 16 rows."""
-        found = {}
+        """Determine the first and last used column of each group of 16 rows."""
+        used_columns = {}
         for row, cells in self.table.items():
             columns = cells.columns() if type(cells) is NumberRow else cells
             if columns:
-                found.setdefault(row // _ROWS_OF_A_SPAN, []).extend((min(columns), max(columns)))
+                used_columns.setdefault(row // _ROWS_OF_A_SPAN, []).extend(
+                    (min(columns), max(columns))
+                )
         self.row_spans = {
-            span: f"{min(columns) + 1}:{max(columns) + 1}" for span, columns in found.items()
+            span: f"{min(columns) + 1}:{max(columns) + 1}" for span, columns in used_columns.items()
         }
 
     def _write_rows(self):
-        """Every row that has cells or a height."""
+        """Write all rows with cells or a height."""
         self._calculate_spans()
         names = [xl_col_to_name(column) for column in range(self.dim_colmax + 1)]
-        indices = {}  # of formats
+        indices = {}  # {format: its index in the file}
         for row in range(self.dim_rowmin, self.dim_rowmax + 1):
             cells, info = self.table.get(row), self.row_info.get(row)
             span = self.row_spans.get(row // _ROWS_OF_A_SPAN)
@@ -105,10 +123,10 @@ class Sheet(Worksheet):
             if index is None:
                 index = indices[look] = look._get_xf_index()
             if kind is CellNumberTuple:
-                told = f'"><v>{cell.number:.16G}</v></c>'
+                rest_of_cell = f'"><v>{cell.number:.16G}</v></c>'
             else:
-                told = f'" t="s"><v>{cell.string}</v></c>'
-            self.fh.write(f'<c r="{names[column]}{row + 1}" s="{index}{told}')
+                rest_of_cell = f'" t="s"><v>{cell.string}</v></c>'
+            self.fh.write(f'<c r="{names[column]}{row + 1}" s="{index}{rest_of_cell}')
 
     def _write_number_row(self, row, numbers, names, indices):
         for look in dict.fromkeys(numbers.looks):

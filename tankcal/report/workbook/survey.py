@@ -1,4 +1,4 @@
-"""The sheets of an adjusted survey: Adjustment, Points, Observations, Cameras and photos."""
+"""Sheets of an adjusted survey: Adjustment, Points, Observations, Cameras."""
 
 import numpy as np
 
@@ -26,17 +26,17 @@ from tankcal.text.words import (
     verdict_sentences,
 )
 
-MOST_READINGS = MOST_IN_SHEET  # of the sheet: those with the largest |w|
-MOST_POINTS = MOST_IN_SHEET  # of the sheet: those that were not used, then the weakest
-_LEAST = (34, 12)  # widths of the first columns, where labels and values stand
-_HEAD_ROW = 3
-_MOST_ASIDE = 50  # sentences on points that were rejected
-_MOST_LETTERS = 200  # of the names of photographs in a heading
+MOST_READINGS = MOST_IN_SHEET  # largest number of readings; largest |w| first
+MOST_POINTS = MOST_IN_SHEET  # largest number of points; unused, then least precise points first
+_LEAST = (34, 12)  # smallest widths of the columns of labels and values
+_HEAD_ROW = 3  # row of the first headings, from 0
+_MOST_ASIDE = 50  # largest number of sentences on rejected points
+_MOST_LETTERS = 200  # largest number of letters of a heading with names of photographs
 
 
 def adjustment_sheet(book, record):
-    """Statistics, groups, datum, instruments and check points of the adjustment."""
-    a, words = record["adjustment"], book.words
+    """Write statistics, groups, datum, instruments and check points of the adjustment."""
+    adjustment, words = record["adjustment"], book.words
     tables = [
         ("adjusted_groups", "groups", columns_of(book, GROUPS)),
         ("adjusted_instruments", "instruments", columns_of(book, INSTRUMENTS)),
@@ -45,37 +45,37 @@ def adjustment_sheet(book, record):
     ]
     sheet = book.sheet("adjustment", landscape=True)
     widths = set_widths(book, sheet, *(columns for _, _, columns in tables), least=_LEAST)
-    row = _facts(book, sheet, _HEAD_ROW, _statistics(a, words), widths)
+    row = _facts(book, sheet, _HEAD_ROW, _statistics(adjustment, words), widths)
     book.heading(sheet, row, words["headings"]["adjusted_datum"], len(widths))
-    row = _sentences(book, sheet, row + 1, datum_sentences(words, a), widths)
-    aside = [make_sentence(one) for one in a["aside"][:_MOST_ASIDE]]
-    row = _sentences(book, sheet, row, aside, widths)
+    row = _sentences(book, sheet, row + 1, datum_sentences(words, adjustment), widths)
+    rejections = [make_sentence(entry) for entry in adjustment["aside"][:_MOST_ASIDE]]
+    row = _sentences(book, sheet, row, rejections, widths)
     for title, name, columns in tables:
         if columns[0].cells:
             book.heading(sheet, row, words["headings"][title], len(columns))
             row = book.table(sheet, row + 1, name, columns, widths=widths) + 2
         if name == "groups":
-            row = _sentences(book, sheet, row, verdict_sentences(words, a), widths)
+            row = _sentences(book, sheet, row, verdict_sentences(words, adjustment), widths)
 
 
-def _statistics(a, words):
-    """(label key, value, number format or None)."""
-    p, checks = a["precision"] or {}, a["check_points"] or {}
+def _statistics(adjustment, words):
+    """Return (label key, value, number format or None) of the statistics with values."""
+    precision, checks = adjustment["precision"] or {}, adjustment["check_points"] or {}
     lines = [
-        ("adjusted_points", len(a["points"]), "0"),
-        ("observations", a["observations"], "0"),
-        ("unknowns", a["unknowns"], "0"),
-        ("redundancy", a["redundancy"], "0"),
-        ("iterations", a["iterations"], "0"),
-        ("snooping", snooping_sentence(words, a), None),
-        ("sigma0", a["sigma0"], "0.000"),
-        ("global_test", global_test_sentence(words, a), None),
-        ("cov_scale", scale_sentence(words, a), None),
-        _millimetres("mean_sd", p.get("mean_sd_m")),
-        _millimetres("spherical_sd", p.get("spherical_sd_m")),
-        _millimetres("quadratic_sd", p.get("quadratic_sd_m")),
-        ("extent", p.get("extent_m"), '0.0 "m"'),
-        ("proportional", p.get("proportional"), '"1 : "0'),
+        ("adjusted_points", len(adjustment["points"]), "0"),
+        ("observations", adjustment["observations"], "0"),
+        ("unknowns", adjustment["unknowns"], "0"),
+        ("redundancy", adjustment["redundancy"], "0"),
+        ("iterations", adjustment["iterations"], "0"),
+        ("snooping", snooping_sentence(words, adjustment), None),
+        ("sigma0", adjustment["sigma0"], "0.000"),
+        ("global_test", global_test_sentence(words, adjustment), None),
+        ("cov_scale", scale_sentence(words, adjustment), None),
+        _millimetres("mean_sd", precision.get("mean_sd_m")),
+        _millimetres("spherical_sd", precision.get("spherical_sd_m")),
+        _millimetres("quadratic_sd", precision.get("quadratic_sd_m")),
+        ("extent", precision.get("extent_m"), '0.0 "m"'),
+        ("proportional", precision.get("proportional"), '"1 : "0'),
         _millimetres("r_xyz", checks.get("r_xyz_m")),
         _millimetres("largest_difference", checks.get("largest_m")),
         _millimetres("mean_difference", checks.get("mean_m")),
@@ -84,13 +84,13 @@ def _statistics(a, words):
 
 
 def _millimetres(label, size_m):
-    """A line with a size in mm, with three digits as in the working papers."""
+    """Return the line of a size in mm with three digits, as in the working papers."""
     size = None if size_m is None else 1000.0 * size_m
     return label, size, number_format(decimals_of(size, significant=3), unit="mm")
 
 
 def _facts(book, sheet, row, lines, widths):
-    """A line for each label and value; texts over the columns at the right of the labels."""
+    """Write a line for each (label, value, format); return the next row."""
     for label, value, shown in lines:
         if shown is None:
             book.paragraph_in(sheet, row, 1, value, widths[1:])
@@ -102,7 +102,7 @@ def _facts(book, sheet, row, lines, widths):
 
 
 def _sentences(book, sheet, row, sentences, widths):
-    """A paragraph each; returns the next row, after an empty one where there is any."""
+    """Write a paragraph for each sentence; return the next row, after an empty row."""
     for sentence in sentences:
         book.paragraph(sheet, row, sentence, widths)
         row += 1
@@ -113,14 +113,15 @@ def _sentences(book, sheet, row, sentences, widths):
 
 
 def points_sheet(book, record):
-    """Every surveyed point with its residual, and why it was rejected when it was.
+    """Write the surveyed points with their residuals and reasons of rejection.
 
-    Of an adjusted survey with sds and error ellipsoids; without a tank with nothing else.
+    Points of an adjusted survey have standard deviations and error ellipsoids. Without a tank they
+    have no residuals.
     """
-    of_tank = record["capacity"] is not None
-    code = "points" if of_tank else "adjusted_points"
+    has_tank = record["capacity"] is not None
+    code = "points" if has_tank else "adjusted_points"
     points = as_columns(record["points"])
-    used = sum(points["used"]) if of_tank else 0
+    used = sum(points["used"]) if has_tank else 0
     subtitle = book.word(f"texts.{code}_subtitle", count=points.count, used=used)
     shown = _weakest(points)
     if len(shown) == MOST_POINTS:
@@ -129,17 +130,18 @@ def points_sheet(book, record):
     without_sds = {} if record["adjustment"] else {f"s{axis}_m": {"sheet": None} for axis in "xyz"}
     columns = columns_of(book, POINTS.but(**without_sds), point_rows(record, shown))
     set_widths(book, sheet, columns)
-    muted = [index for index, row in enumerate(shown) if of_tank and not row["used"]]
+    muted = [index for index, row in enumerate(shown) if has_tank and not row["used"]]
     if shown:
         book.table(sheet, _HEAD_ROW, "points", columns, muted=muted, autofilter=True)
     book.freeze(sheet, _HEAD_ROW, 1)
 
 
 def _weakest(points):
-    """Rows, in their order; of very many those not used, then those with the largest sds."""
+    """Return the rows; at most MOST_POINTS: unused points first, then the least precise."""
     if points.count >= MOST_POINTS:
         covariance = points.arrays["cov_m2"]
         is_known = covariance.ndim > 1
+        # Trace of the covariance matrix of each point.
         variance = np.nan_to_num(np.einsum("nii->n", covariance)) if is_known else 0.0
         rank = np.lexsort((np.broadcast_to(-variance, points.count), points.arrays["used"]))
         points = points.take(np.sort(rank[:MOST_POINTS]))
@@ -150,7 +152,7 @@ def _weakest(points):
 
 
 def observations_sheet(book, record):
-    """One row a reading, to be filtered; those rejected stand back and say so."""
+    """Write a row for each reading; rejected readings are grey."""
     readings = as_columns(record["adjustment"]["residuals"])
     count = readings.count
     subtitle = book.word("texts.residuals_subtitle")
@@ -167,7 +169,7 @@ def observations_sheet(book, record):
 
 
 def _worst(readings):
-    """The worst readings, in their order: those rejected first, then by test quantity."""
+    """Select MOST_READINGS readings: rejected readings, then the largest |w|."""
     size = np.abs(np.nan_to_num(readings.arrays["w"]))
     rank = np.lexsort((-size, ~readings.arrays["removed"]))
     return readings.take(np.sort(rank[:MOST_READINGS]))
@@ -177,22 +179,22 @@ def _worst(readings):
 
 
 def cameras_sheet(book, record):
-    """Interior orientation with correlations, and the photographs; no sheet without any."""
-    a = record["adjustment"]
-    if not a["photos"]:
+    """Write interior orientation with correlations, and photographs; no sheet without them."""
+    adjustment = record["adjustment"]
+    if not adjustment["photos"]:
         return
     sheet = book.sheet("cameras", landscape=True)
     photos = columns_of(book, PHOTOS)
     cameras = [
         columns_of(book, camera_table(camera["free"], book.words), camera_rows(camera))
-        for camera in a["cameras"]
+        for camera in adjustment["cameras"]
     ]
     widths = set_widths(book, sheet, photos, *cameras)
     title = book.words["headings"]["adjusted_photos"]
     book.heading(sheet, _HEAD_ROW, title, len(photos))
     row = _HEAD_ROW + 1
     row = book.table(sheet, row, "photos", photos, autofilter=True, widths=widths) + 2
-    for number, (camera, columns) in enumerate(zip(a["cameras"], cameras, strict=True), 1):
+    for number, (camera, columns) in enumerate(zip(adjustment["cameras"], cameras, strict=True), 1):
         book.heading(sheet, row, _name_of_camera(camera), len(photos))
         book.put(sheet, row + 1, 0, _model_of_camera(book, camera))
         row = book.table(sheet, row + 2, f"camera_{number}", columns, widths=widths) + 2
@@ -205,7 +207,7 @@ def _name_of_camera(camera):
 
 
 def _model_of_camera(book, camera):
-    """The convention of its distortion, and the form of its affinity."""
+    """Return the convention of the distortion and the form of the affinity in words."""
     words, form = book.words, camera["affinity"]
     convention = words["conventions"][camera["convention"]]
     affinity = words["camera"]["affinities"].get(form, form)

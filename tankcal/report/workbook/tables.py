@@ -1,4 +1,4 @@
-"""Declared tables on sheets: their columns as cells, the widths they share, tables without rows."""
+"""Declared tables in sheets: columns of cells, common widths, tables without rows."""
 
 from itertools import zip_longest
 
@@ -7,23 +7,37 @@ from tankcal.report.tables import decimals_of_cells
 from tankcal.report.workbook.look import Column, width_of
 from tankcal.text.digits import NOTHING, decimals_of
 
-HEAD_ROW = 3  # of a table that has a sheet of its own
+HEAD_ROW = 3  # row of the headings of a table with a separate sheet
 
 
 def columns_of(book, table, rows=None):
-    """The columns of a declared Table as cells, of these rows (None: its own of the record)."""
+    """Return the columns of a declared table with their cells.
+
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    table : Table
+        Declaration of the table.
+    rows : list of dict, optional
+        Rows; None: the rows of the record.
+
+    Returns
+    -------
+    list of Column
+    """
     rows = table.rows(book.paper.record) if rows is None else rows
-    return [_cells(book, book.paper, one, rows) for one in table.in_workbook(rows)]
+    return [_cells(book, book.paper, column, rows) for column in table.in_workbook(rows)]
 
 
 def _cells(book, paper, column, rows):
-    """One declared column as cells: numbers as numbers in its unit, texts in the words."""
+    """Return a declared column as a Column: numbers in its unit, or translated texts."""
     unit = numbers.unit(column.unit)
     heading = _heading(book, column, unit)
     if column.is_text or column.text:
         return Column(heading, _texts(paper, column, rows), None, column.width)
     nothing = None if column.nothing == NOTHING else column.nothing
-    is_share = column.unit == "share"  # a format of the spreadsheet makes percent of it
+    is_share = column.unit == "share"  # the number format converts shares to percent
     factor = 1.0 if is_share else unit.factor
     values = [row.get(column.key) for row in rows]
     cells = [
@@ -56,20 +70,50 @@ def _digits(column, rows, factor):
 
 
 def set_widths(book, sheet, *tables, least=()):
-    """Make each column as wide as the widest that shares it; returns the widths.
+    """Set the widths of the columns of a sheet to the widest of its tables.
 
-    least  widths that the first columns have at least
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    sheet : Sheet
+        Sheet of the tables.
+    *tables : list of Column
+        Columns of each table.
+    least : sequence of float, optional
+        Smallest widths of the first columns.
+
+    Returns
+    -------
+    list of float
+        Widths of the columns.
     """
-    of_tables = [[width_of(column) for column in columns] for columns in tables]
-    widths = [max(shared) for shared in zip_longest(least, *of_tables, fillvalue=0)]
+    widths_of_tables = [[width_of(column) for column in columns] for columns in tables]
+    widths = [
+        max(column_widths) for column_widths in zip_longest(least, *widths_of_tables, fillvalue=0)
+    ]
     book.widths(sheet, *widths)
     return widths
 
 
 def table_sheet(book, code, table, rows):
-    """A declared table on a sheet of its own, with headings that stay in sight.
+    """Write a declared table into a separate sheet with fixed headings.
 
-    Gives the sheet and the columns.
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    code : str
+        Code of the sheet.
+    table : Table
+        Declaration of the table.
+    rows : list of dict
+        Rows of the table.
+
+    Returns
+    -------
+    Sheet
+    list of Column
     """
     sheet = book.sheet(code, landscape=True, tab="result")
     columns = columns_of(book, table, rows)
@@ -80,7 +124,27 @@ def table_sheet(book, code, table, rows):
 
 
 def write_table(book, sheet, row, name, columns, **more):
-    """A table, or the word None where it has no rows; returns the number of its last row."""
+    """Write a table, or the text for a table without rows; return its last row.
+
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    sheet : Sheet
+        Sheet of the table.
+    row : int
+        First row, from 0.
+    name : str
+        Name of the table.
+    columns : list of Column
+        Columns of the table.
+    **more
+        Further arguments of `Writer.table`.
+
+    Returns
+    -------
+    int
+    """
     if columns[0].cells:
         return book.table(sheet, row, name, columns, **more)
     book.put(sheet, row, 0, book.word("texts.no_rows"))
@@ -88,7 +152,23 @@ def write_table(book, sheet, row, name, columns, **more):
 
 
 def write_tables(book, sheet, row, tables):
-    """(title, name, columns) one below the other; returns the row after the last."""
+    """Write tables (title, name, columns) below each other; return the next row.
+
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    sheet : Sheet
+        Sheet of the tables.
+    row : int
+        First row, from 0.
+    tables : list of (str, str, list of Column)
+        Title, name and columns of each table.
+
+    Returns
+    -------
+    int
+    """
     widths = set_widths(book, sheet, *(columns for _, _, columns in tables))
     for title, name, columns in tables:
         book.heading(sheet, row, title, len(columns))

@@ -1,4 +1,4 @@
-"""Sheets of the uncertainty: budgets, stated volumes, deliveries, simulation, decision rule."""
+"""Sheets of budgets, stated volumes, deliveries, Monte Carlo, and decision rule."""
 
 from tankcal.report.uncertainty import budget, monte_carlo, rule
 from tankcal.report.uncertainty.deliveries import WORST_DELIVERIES, worst_rows
@@ -7,49 +7,50 @@ from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
 
-_HEAD_ROW = 3
-_RULE_FACTS = (40, 16, 16, 16, 16, 16)  # widths of the columns that the facts of a rule go over
-_FACT = 4  # column in which facts of the simulation stand beside their labels
+_HEAD_ROW = 3  # row of the first headings, from 0
+_RULE_FACTS = (40, 16, 16, 16, 16, 16)  # widths of the columns of the facts of a rule
+_FACT = 4  # column of the facts of the simulation, to the right of their labels
 
 
 # ---- budgets
 
 
 def budget_sheet(book, record):
-    """The budget of the top row, of the table alone, and of every stated volume and delivery."""
+    """Write the budgets of the top row and of all stated volumes and deliveries."""
     paper, capacity = book.paper, record["capacity"]
     top = {key: capacity[key][-1] for key in ("u_m3", "k", "U_m3")}
     height = paper.height(capacity["height_m"][-1])
     sheet = book.sheet("budget", book.word("texts.budget_subtitle", height=height), landscape=True)
-    columns = _lines(book, record["budget"], top["u_m3"])
+    columns = _budget_columns(book, record["budget"], top["u_m3"])
     widths = set_widths(book, sheet, columns)
-    row = _budget(book, sheet, _HEAD_ROW, "budget", columns, widths)
+    row = _budget_table(book, sheet, _HEAD_ROW, "budget", columns, widths)
     row = _totals(book, sheet, row, top)
     starts = []
-    for number, one in enumerate(record.get("budgets", []), 2):
+    for number, stated in enumerate(record.get("budgets", []), 2):
         starts.append(row)
-        columns = _lines(book, one["lines"], one["u_m3"])
-        book.heading(sheet, row, _title(book, paper, one), len(columns))
-        row = _budget(book, sheet, row + 1, f"budget_{number}", columns, widths)
-        row = _totals(book, sheet, row, one)
+        columns = _budget_columns(book, stated["lines"], stated["u_m3"])
+        book.heading(sheet, row, _title(book, paper, stated), len(columns))
+        row = _budget_table(book, sheet, row + 1, f"budget_{number}", columns, widths)
+        row = _totals(book, sheet, row, stated)
     book.keep_together(sheet, starts, row, widths)
-    sheet.freeze_panes(_HEAD_ROW + 1, 1)  # not printed again: each budget has its headings
+    sheet.freeze_panes(_HEAD_ROW + 1, 1)  # not repeated in print, since each budget has headings
 
 
-def _title(book, paper, one):
-    high, low = paper.height(one["high_m"]), paper.height(one["low_m"])
+def _title(book, paper, stated):
+    high, low = paper.height(stated["high_m"]), paper.height(stated["low_m"])
     return book.word(f"headings.budget_{'volume' if low is None else 'delivery'}", high=high,
                      low=low)  # fmt: skip
 
 
-def _lines(book, lines, u_m3):
+def _budget_columns(book, lines, u_m3):
     return columns_of(book, budget.budget_table(decimals_of(u_m3) + 1), lines)
 
 
-def _budget(book, sheet, row, name, columns, widths):
+def _budget_table(book, sheet, row, name, columns, widths):
+    """Write a budget with bars of the shares; return its last row."""
     last = write_table(book, sheet, row, name, columns, widths=widths)
     heading = book.word("columns.share")
-    share = next(i for i, one in enumerate(columns) if one.heading == heading)
+    share = next(i for i, column in enumerate(columns) if column.heading == heading)
     bar = {"type": "data_bar", "bar_color": "#B8CCE4", "bar_solid": True}
     bar |= {"min_type": "num", "min_value": 0, "max_type": "num", "max_value": 1}
     sheet.conditional_format(row + 1, share, last, share, bar)
@@ -57,7 +58,7 @@ def _budget(book, sheet, row, name, columns, widths):
 
 
 def _totals(book, sheet, last, values):
-    """u, k and k u under a budget; returns the row of the next heading."""
+    """Write u, k and k u below a budget; return the row of the next heading."""
     cubic = number_format(decimals_of(values["u_m3"]), unit="m³")
     for below, label, key, shown in (
         (2, "u_of_all", "u_m3", cubic),
@@ -73,7 +74,7 @@ def _totals(book, sheet, last, values):
 
 
 def deliveries_sheet(book, record):
-    """Volumes and deliveries as they are stated, and the worst deliveries."""
+    """Write the stated volumes and deliveries, and the worst deliveries."""
     sheet = book.sheet("deliveries", landscape=True, tab="result")
     tables = [(book.word("headings.stated"), "stated", columns_of(book, stated_table(record)))]
     worst = worst_rows(book.paper)
@@ -87,7 +88,7 @@ def deliveries_sheet(book, record):
 
 
 def monte_carlo_sheet(book, record):
-    """Every row: mean and u of the simulation, its interval beside the GUM's, the verdict."""
+    """Write mean, u and interval of the simulation with the GUM interval for all rows."""
     paper, sheet = book.paper, book.sheet("monte_carlo")
     columns = columns_of(book, monte_carlo.SIMULATED)
     widths = set_widths(book, sheet, columns)
@@ -105,7 +106,7 @@ def monte_carlo_sheet(book, record):
 
 
 def rule_sheet(book, record):
-    """The rule, its verdict, and its limits; of U first, then of deviations."""
+    """Write the rule, its verdict, the limits of U, and the limits of deviations."""
     paper = book.paper
     sheet = book.sheet("rule", landscape=True, tab="result")
     row = _HEAD_ROW

@@ -1,4 +1,4 @@
-"""Writing values, texts and tables into the cells of a sheet, in the words of a language."""
+"""Writing of values, texts and tables into the cells of a sheet."""
 
 from tankcal.report.workbook.look import (
     ACCENT,
@@ -14,14 +14,11 @@ from tankcal.report.workbook.look import (
 )
 from tankcal.text.digits import NOTHING
 
-_LONGEST_CELL = 32767  # characters, Excel's limit
+_LONGEST_CELL = 32767  # Excel's limit of the characters of a cell
 
 
 class Writer:
-    """Writes into the sheets of an XlsxWriter workbook.
-
-    words  of the language of every text that is not the record's
-    """
+    """Writer for the sheets of an XlsxWriter workbook, with the words of a language."""
 
     def __init__(self, file, words):
         self._file = file
@@ -32,19 +29,19 @@ class Writer:
     # ---- words and looks
 
     def word(self, name, /, of="workbook", **values):
-        """The text "group.key" of [workbook.*], or of another part of the words, filled in.
+        """Return the text "group.key" of the part `of` of the words, with its values.
 
-        Raises KeyError when the words lack it.
+        A missing text raises KeyError.
         """
         group, key = name.split(".", 1)
         return self.words[of][group][key].format(**values)
 
     def sheet_name(self, code):
-        """The name of the sheet with this code, as formulas of the language must call it."""
+        """Return the name of a sheet in the language, as formulas must refer to it."""
         return self.word(f"sheets.{code}")
 
     def format(self, **properties):
-        """The format with these XlsxWriter properties, made once."""
+        """Return the format with these XlsxWriter properties; equal formats are created once."""
         key = tuple(sorted(properties.items()))
         if key not in self._formats:
             self._formats[key] = self._file.add_format({"valign": "vcenter", **properties})
@@ -53,17 +50,41 @@ class Writer:
     # ---- cells
 
     def heading(self, sheet, row, text, columns):
-        """A heading with a rule under it across so many columns."""
+        """Write a heading, underlined across a number of columns.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row : int
+            Row, from 0.
+        text : str
+            Heading.
+        columns : int
+            Number of underlined columns.
+        """
         rule = {"bottom": 1, "bottom_color": ACCENT}
         look = self.format(bold=True, font_size=12, font_color=ACCENT, **rule)
         self.set_height(sheet, row, 21)
-        self.set_height(sheet, row + 1, 18)  # the rule would touch what stands under it
+        self.set_height(sheet, row + 1, 18)  # otherwise the line touches the text below it
         for column in range(columns):
             sheet.write_blank(row, column, None, look)
         sheet.write_string(row, 0, text, look)
 
     def put(self, sheet, row, column, value, **look):
-        """Write one value of the record: a number as number, all else as text, never a formula."""
+        """Write a value: numbers as numbers, other values as text, never as formula.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row, column : int
+            Position, from 0.
+        value : object
+            Value of the record; a list is joined by commas, None is a dash.
+        **look
+            Properties of the format.
+        """
         if isinstance(value, bool):
             value = self.words["yes_no"]["yes" if value else "no"]
         if isinstance(value, list | tuple):
@@ -78,19 +99,59 @@ class Writer:
         sheet.write_string(row, column, str(value)[:_LONGEST_CELL], self.format(**look))
 
     def put_date(self, sheet, row, column, text, **look):
-        """A date of the record as a date of the spreadsheet; what is no date stays text."""
-        found = day(text)
-        if found is None or len(str(text)) > len(found.isoformat()):
+        """Write an ISO date as a date of the spreadsheet, and any other text as text.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row, column : int
+            Position, from 0.
+        text : str
+            ISO date, or another text.
+        **look
+            Properties of the format.
+        """
+        date = day(text)
+        if date is None or len(str(text)) > len(date.isoformat()):
             self.put(sheet, row, column, text, **look)
         else:
-            sheet.write_datetime(row, column, found, self.format(num_format=DATE, **look))
+            sheet.write_datetime(row, column, date, self.format(num_format=DATE, **look))
 
     def paragraph(self, sheet, row, text, widths, **look):
-        """A wrapped text across the columns of these widths, in a row as high as it needs."""
+        """Write a wrapped text across the columns of given widths and set the height of the row.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row : int
+            Row, from 0.
+        text : str
+            Text to write.
+        widths : sequence of float
+            Widths of the columns, in letters.
+        **look
+            Properties of the format.
+        """
         self.paragraph_in(sheet, row, 0, text, widths, **look)
 
     def paragraph_in(self, sheet, row, column, text, widths, **look):
-        """A wrapped text from one column over those of these widths, at its left."""
+        """Write a wrapped text from `column` across columns of given widths.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row, column : int
+            Position of the first column, from 0.
+        text : str
+            Text to write.
+        widths : sequence of float
+            Widths of the columns, in letters.
+        **look
+            Properties of the format.
+        """
         look = self.format(**{"text_wrap": True, "align": "left", "valign": "top", **look})
         self.set_height(sheet, row, LINE_PT * lines_of(text, sum(widths)))
         if len(widths) > 1:
@@ -98,14 +159,36 @@ class Writer:
         sheet.write_string(row, column, text[:_LONGEST_CELL], look)
 
     def label(self, sheet, row, text, width):
-        """A wrapped label in the first column, of this width, in a row as high as it needs."""
-        needed = LINE_PT * lines_of(text, width)
-        if needed > self._heights.get((sheet.get_name(), row), LINE_PT):
-            self.set_height(sheet, row, needed)
+        """Write a wrapped label into the first column of given width; set the height of the row.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row : int
+            Row, from 0.
+        text : str
+            Label.
+        width : float
+            Width of the first column, in letters.
+        """
+        height = LINE_PT * lines_of(text, width)
+        if height > self._heights.get((sheet.get_name(), row), LINE_PT):
+            self.set_height(sheet, row, height)
         self.put(sheet, row, 0, text, valign="top", text_wrap=True)
 
     def set_height(self, sheet, row, points):
-        """Set the height of a row, which `keep_together` counts with."""
+        """Set the height of a row, in points, and store it for `keep_together`.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        row : int
+            Row, from 0.
+        points : float
+            Height.
+        """
         sheet.set_row(row, points)
         self._heights[sheet.get_name(), row] = points
 
@@ -116,25 +199,55 @@ class Writer:
 
     @staticmethod
     def freeze(sheet, head_row, columns=0):
-        """Keep the headings in sight, with so many columns at the left, and print them again."""
+        """Fix the headings and the first columns, and repeat the headings on printed pages.
+
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the cells.
+        head_row : int
+            Row of the headings, from 0.
+        columns : int, optional
+            Number of fixed columns.
+        """
         sheet.freeze_panes(head_row + 1, columns)
         sheet.repeat_rows(head_row)
 
     # ---- tables
 
     def table(self, sheet, row, name, columns, muted=(), autofilter=False, widths=None):
-        """An Excel table with its headings in `row`; returns the number of its last row.
+        """Write an Excel table.
 
-        name    of the table, the same in every language
-        muted   numbers of the data rows that stand back in grey italics
-        widths  of its columns where tables share them; None: of the columns themselves
+        Parameters
+        ----------
+        sheet : Sheet
+            Sheet of the table.
+        row : int
+            Row of the headings, from 0.
+        name : str
+            Name of the table, which does not depend on the language.
+        columns : list of Column
+            Columns of the table.
+        muted : collection of int, optional
+            Indices of rows in grey italics.
+        autofilter : bool, optional
+            True: the headings have filters.
+        widths : list of float, optional
+            Widths of the columns; None: computed from the columns.
+
+        Returns
+        -------
+        int
+            Last row of the table.
         """
         count = len(columns[0].cells)
         muted = frozenset(muted)
         widths = widths or [width_of(column) for column in columns]
         for place, column in enumerate(columns):
             self._cells(sheet, row + 1, place, column, muted)
-        heads = [{"header": one.heading, "header_format": self._head(one)} for one in columns]
+        heads = [
+            {"header": column.heading, "header_format": self._head(column)} for column in columns
+        ]
         options = {"name": name, "style": None, "autofilter": autofilter, "columns": heads}
         sheet.add_table(row, 0, row + count, len(columns) - 1, options)
         lines = max(
@@ -146,17 +259,17 @@ class Writer:
         return row + count
 
     def _cells(self, sheet, first, place, column, muted):
-        """The cells of a column; a table may have a million: each look is made once."""
+        """Write the cells of a column; each format is created once, since tables may be large."""
         cells, digits = column.cells, column.digits
         each = digits if isinstance(digits, list) else [digits] * len(cells)
-        keys = [(one, index in muted) for index, one in enumerate(each)]
+        keys = [(cell_digits, index in muted) for index, cell_digits in enumerate(each)]
         looks = {key: self._cell_look(*key, column.percent) for key in dict.fromkeys(keys)}
-        made = {key: self.format(**look) for key, look in looks.items()}
+        formats = {key: self.format(**look) for key, look in looks.items()}
         numbers = [value if type(value) is float else None for value in cells]
-        sheet.write_numbers(first, place, numbers, [made[key] for key in keys])
+        sheet.write_numbers(first, place, numbers, [formats[key] for key in keys])
         for row, (value, key) in enumerate(zip(cells, keys, strict=True), first):
             if type(value) is str and key[0] is None:  # a column of texts
-                sheet.write_string(row, place, value[:_LONGEST_CELL], made[key])
+                sheet.write_string(row, place, value[:_LONGEST_CELL], formats[key])
             elif type(value) is not float:
                 self.put(sheet, row, place, value, **looks[key])
 
@@ -170,13 +283,13 @@ class Writer:
         return look | ({"italic": True, "font_color": MUTED} if muted else {})
 
     def _row_heights(self, sheet, first, columns, widths):
-        """Make the rows of a table high enough for their longest text."""
-        of_columns = [
+        """Set the heights of the rows of a table for their longest texts."""
+        lines_of_columns = [
             lines_in(column, width)
             for column, width in zip(columns, widths, strict=False)
             if column.digits is None
         ]
-        for index, lines in enumerate(map(max, zip(*of_columns, strict=True))):
+        for index, lines in enumerate(map(max, zip(*lines_of_columns, strict=True))):
             if lines > 1:
                 self.set_height(sheet, first + index, LINE_PT * lines)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
-from tankcal.adjust import CRITICAL
+from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN
 from tankcal.adjust import snoop as search
 from tankcal.errors import SolutionError
 from tankcal.survey.network.adjustment import adjust
@@ -197,9 +197,8 @@ def _robust(candidates, adjusted, critical, options):
     """
     for turn in range(ROUNDS):
         statistic = candidates.statistic(adjusted)[1]
-        # Robust scale from the median statistic (1.4826 for normal errors); never below the
-        # declared scale, 1.
-        size = max(1.0, 1.4826 * float(np.nanmedian(statistic)) / 1.4)
+        # Robust scale from the median statistic; never below the declared scale, 1.
+        size = max(1.0, SD_OVER_MEDIAN * float(np.nanmedian(statistic)) / 1.4)
         away, share = statistic / size, candidates.shares(adjusted.survey)
         if turn < HUBER_ROUNDS:
             # First rounds: Huber weights limit the influence of outliers.

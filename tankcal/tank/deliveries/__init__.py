@@ -1,9 +1,8 @@
-"""Deliveries: the uncertainty of V(h2) - V(h1), and the worst one of at least a given height.
+"""Deliveries: the uncertainty of V(h2) - V(h1), and the worst delivery of at least a given height.
 
-u(h1, h2) = |f(h2) - f(h1)| with f(h) the row of the factor at a dip, linear between rows; what
-both dips share cancels. U = k u with k from Welch-Satterthwaite for each delivery by itself.
-The worst case is found by ruling out whole blocks of rows at once; no matrix of rows by rows is
-ever made.
+u(h1, h2) = |f(h2) - f(h1)|, with f(h) the row of the factor at a dip, linear between rows; common
+errors of both dips cancel. U = k u, with k from Welch-Satterthwaite for each delivery. The search
+for the worst case excludes whole blocks of rows at once; it never builds a matrix of rows by rows.
 
 Sources: JCGM 100:2008 5.2, G.4; JCGM 102:2011 6.2.
 """

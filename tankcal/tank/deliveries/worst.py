@@ -1,10 +1,10 @@
-"""The worst delivery of at least a given height, over all dips and not only over rows.
+"""Worst delivery of at least a given height, over all dips and not only over rows.
 
-Between four neighbouring rows f and V are linear in the two dips, so u is convex there and u/V
-quasi-convex: their maxima lie at the corners of that cell or, where the line h2 - h1 = minimum
-cuts it, at the ends of the cut. So the worst delivery has both dips at rows, or is exactly of the
-minimum height with one dip at a row. With finite degrees of freedom k changes within a cell; what
-that can do is in the bounds.
+Between four neighbouring rows, f and V are linear in the two dips, so u is convex and u/V
+quasi-convex. Their maxima are at the corners of that cell or, where the line h2 - h1 = minimum cuts
+the cell, at the ends of the cut. The worst delivery thus has both dips at rows, or exactly the
+minimum height with one dip at a row. With finite degrees of freedom, k varies within a cell; the
+bounds include this effect.
 """
 
 from dataclasses import dataclass
@@ -16,23 +16,23 @@ from tankcal.tank.deliveries.blocks import Search, bounds_of, kids_of, levels_of
 from tankcal.tank.deliveries.pairs import CHUNK, Groups, Rows, deliveries_between
 from tankcal.text.display import volume_text
 
-TOLERANCE = 1e-6  # relative: the worst delivery is found to this part of itself
+TOLERANCE = 1e-6  # relative tolerance of the worst delivery
 
 
 @dataclass(frozen=True)
 class Delivery:
-    """One delivery.
+    """Delivery between two dips.
 
     Attributes
     ----------
     low_m, high_m : float
-        The dips, m.
+        Dips, m.
     volume_m3 : float
-        Between them, m3.
+        Volume between the dips, m3.
     u_m3 : float
         Standard uncertainty, m3.
     dof : float
-        Its degrees of freedom.
+        Degrees of freedom of the standard uncertainty.
     k : float
         Coverage factor.
     U_m3 : float
@@ -58,21 +58,21 @@ class Delivery:
 
 @dataclass(frozen=True)
 class WorstDeliveries:
-    """The worst of all deliveries of at least `minimum_m` whose dips are for use.
+    """Worst of all deliveries of at least `minimum_m` whose dips are for use.
 
     Attributes
     ----------
     absolute : Delivery
-        The one with the largest U.
+        Delivery with the largest U.
     relative : Delivery
-        The one with the largest U/volume.
+        Delivery with the largest U/volume.
     at_minimum : Delivery or None
-        The one with the largest U/volume of those of exactly minimum_m; None: only higher ones
-        are for use.
+        Delivery of exactly minimum_m with the largest U/volume; None if only higher deliveries are
+        for use.
     U_bound_m3 : float
-        No delivery between any two dips has a larger U.
+        Upper bound of U over all deliveries.
     relative_bound : float
-        Nor a larger U/volume than this.
+        Upper bound of U/volume over all deliveries.
     """
 
     minimum_m: float
@@ -84,9 +84,9 @@ class WorstDeliveries:
 
 
 def worst_deliveries(table, minimum_m):
-    """WorstDeliveries of a Capacity for a minimum delivery height (m), or None.
+    """Return the `WorstDeliveries` of a table for a minimum delivery height, or None.
 
-    max of U and of U/V over all dips with h2 - h1 >= minimum_m.
+    The result contains the maxima of U and of U/V over all dips with h2 - h1 >= minimum_m.
 
     Parameters
     ----------
@@ -97,8 +97,8 @@ def worst_deliveries(table, minimum_m):
     Returns
     -------
     WorstDeliveries or None
-        None where the table has no such delivery: lower than the minimum, or cut by the critical
-        zone of its roof.
+        None if the table has no such delivery: it is lower than the minimum, or the critical zone
+        of its roof divides it.
 
     Raises
     ------
@@ -107,49 +107,59 @@ def worst_deliveries(table, minimum_m):
     """
     if not minimum_m > 0:
         raise ValueError(f"minimum delivery height {minimum_m}: expected above 0")
-    prepared = _prepared(table)
-    found = [_search(prepared, float(minimum_m), is_relative) for is_relative in (False, True)]
-    if found[0] is None:
+    prepared = _prepare(table)
+    results = [
+        _find_worst(prepared, float(minimum_m), is_relative) for is_relative in (False, True)
+    ]
+    if results[0] is None:
         return None
-    (absolute, U_bound), (relative, relative_bound) = found
+    (absolute, U_bound), (relative, relative_bound) = results
     dips = _best_at_minimum(prepared.searching(float(minimum_m), True))[1]
     return WorstDeliveries(
         minimum_m=float(minimum_m),
         absolute=absolute,
         relative=relative,
-        at_minimum=None if dips is None else _delivery(prepared, dips),
+        at_minimum=None if dips is None else _build_delivery(prepared, dips),
         U_bound_m3=U_bound,
         relative_bound=relative_bound,
     )
 
 
 def least_delivery_m(table, limit, is_relative=True):
-    """Least delivery height (m, whole millimetres) from which on all deliveries keep a limit.
+    """Return the least height from which on all deliveries meet a limit, m, in whole millimetres.
 
-    The worst of all deliveries of at least a height falls with that height, so halving finds it.
-    None where even the largest delivery breaks the limit.
+    The worst of all deliveries of at least a height decreases with that height, so bisection finds
+    it.
 
     Parameters
     ----------
-    limit
-        Of U/V, or of U in m3 when not is_relative.
+    table : Capacity
+    limit : float
+        Limit of U/V, or of U in m3 if not is_relative.
+    is_relative : bool, optional
+
+    Returns
+    -------
+    float or None
+        None if even the largest delivery exceeds the limit.
     """
-    prepared = _prepared(table)
+    prepared = _prepare(table)
     heights = prepared.rows.height_m
     low, high = 0, int((np.ptp(heights) + SAME_M) * 1000) if len(heights) else 0
     while low < high:
         middle = (low + high) // 2
-        found = _search(prepared, max(middle, 1) / 1000, is_relative)
-        if found is None or _size_of(found[0], is_relative) <= limit:
+        worst = _find_worst(prepared, max(middle, 1) / 1000, is_relative)
+        if worst is None or _size_of(worst[0], is_relative) <= limit:
             high = middle
         else:
             low = middle + 1
     height_m = max(high, 1) / 1000
-    found = _search(prepared, height_m, is_relative) if len(heights) else None
-    return height_m if found and _size_of(found[0], is_relative) <= limit else None
+    worst = _find_worst(prepared, height_m, is_relative) if len(heights) else None
+    return height_m if worst and _size_of(worst[0], is_relative) <= limit else None
 
 
 def _size_of(delivery, is_relative):
+    """Return U/volume or U of a delivery."""
     return delivery.relative if is_relative else delivery.U_m3
 
 
@@ -163,48 +173,53 @@ class _Prepared:
     probability: float
 
     def searching(self, minimum_m, is_relative):
+        """Return the `Search` for a minimum height."""
         return Search(self.rows, self.pieces, self.levels, self.probability, minimum_m, is_relative)
 
 
-def _prepared(table):
+def _prepare(table):
+    """Return the `_Prepared` of a table, which does not depend on the minimum height."""
     rows, pieces = _rows_for_use(table)
     levels = levels_of(rows, pieces) if len(rows.height_m) else []
     return _Prepared(rows, pieces, levels, table.probability)
 
 
-def _search(prepared, minimum_m, is_relative):
-    """(Delivery, bound) with the largest U/V, or U, or None where there is no delivery."""
+def _find_worst(prepared, minimum_m, is_relative):
+    """Return (Delivery, bound) with the largest U/V, or U; None if there is no delivery."""
     rows = prepared.rows
     if not len(rows.height_m) or np.ptp(rows.height_m) < minimum_m - SAME_M:
         return None
     search = prepared.searching(minimum_m, is_relative)
-    best, dips, bound = _largest(search, *_best_at_minimum(search))
+    best, dips, bound = _branch_and_bound(search, *_best_at_minimum(search))
     if dips is None:
         return None
-    return _delivery(prepared, dips), float(max(bound, best * (1 + TOLERANCE)))
+    return _build_delivery(prepared, dips), float(max(bound, best * (1 + TOLERANCE)))
 
 
-def _delivery(prepared, dips):
+def _build_delivery(prepared, dips):
+    """Return the `Delivery` between two dips."""
     pair = np.array(dips)[:, None]
-    found = deliveries_between(prepared.rows, prepared.probability, *pair, np.array([True]))
-    values = (found.low_m, found.high_m, found.volume_m3, found.u_m3, found.dof, found.k)
-    return Delivery(*(float(value[0]) for value in (*values, found.U_m3, found.relative)))
+    result = deliveries_between(prepared.rows, prepared.probability, *pair, np.array([True]))
+    values = (result.low_m, result.high_m, result.volume_m3, result.u_m3, result.dof, result.k)
+    return Delivery(*(float(value[0]) for value in (*values, result.U_m3, result.relative)))
 
 
-def _largest(search, best, dips):
-    """(largest size, its dips or None, bound of what could be larger): branch and bound."""
+def _branch_and_bound(search, best, dips):
+    """Return the largest size, its dips or None, and a bound of larger sizes (branch and bound)."""
     bound = 0.0
     top = len(search.levels) - 1
     blocks = np.arange(len(search.levels[top].first))
     stack = [(top, *(side.ravel() for side in np.meshgrid(blocks, blocks, indexing="ij")))]
     while stack:
         level, low, high = stack.pop()
+        # Long lists are processed in chunks, so that good values are found before memory grows.
         if len(low) > CHUNK:
             stack.append((level, low[CHUNK:], high[CHUNK:]))
             low, high = low[:CHUNK], high[:CHUNK]
         bounds, reached, pair = bounds_of(search, search.levels[level], low, high)
         if reached > best:
             best, dips = reached, pair
+        # Only pairs of blocks whose bound exceeds the best size are divided further.
         is_open = (bounds >= 0) & (bounds > best * (1 + TOLERANCE))
         if level == 0:
             bound = max(bound, bounds[is_open].max(initial=0.0))
@@ -214,7 +229,10 @@ def _largest(search, best, dips):
 
 
 def _rows_for_use(table):
-    """(Rows, pieces): rows outside the critical zone with its ends as rows; first row of each."""
+    """Return rows outside the critical zone, and the first row of each piece.
+
+    The limits of the zone are rows.
+    """
     rows = Rows(table.height_m, table.volume_m3, table.factor_m3, Groups(table.sources))
     critical = table.critical_m
     if critical is None or critical[1] - critical[0] <= SAME_M or len(table.height_m) < 2:
@@ -222,6 +240,7 @@ def _rows_for_use(table):
     heights = table.height_m
     ends = np.array(critical, dtype=float)
     inside = (ends > heights[0]) & (ends < heights[-1])
+    # The limits of the critical zone become rows, so that each piece ends exactly there.
     new = [end for end in ends[inside] if np.abs(heights - end).min() > SAME_M]
     heights = np.sort(np.append(heights, new))
     low, high = ends
@@ -233,8 +252,9 @@ def _rows_for_use(table):
 
 
 def _best_at_minimum(search):
-    """(size, dips) of the worst delivery of exactly the minimum height with one dip at a row."""
+    """Return (size, dips) of the worst delivery of the minimum height with a dip at a row."""
     rows, minimum_m = search.rows, search.minimum_m
+    # Each row once as the lower dip, and once as the upper dip.
     low = np.concatenate([rows.height_m, rows.height_m - minimum_m])
     high = np.concatenate([rows.height_m + minimum_m, rows.height_m])
     keep = (low >= rows.height_m[0] - SAME_M) & (high <= rows.height_m[-1] + SAME_M)
@@ -244,7 +264,7 @@ def _best_at_minimum(search):
     if not np.any(keep):
         return -1.0, None
     low, high = np.clip([low[keep], high[keep]], rows.height_m[0], rows.height_m[-1])
-    found = deliveries_between(rows, search.probability, low, high, np.full(len(low), True))
-    sizes = search.size(found.U_m3, found.volume_m3)
+    result = deliveries_between(rows, search.probability, low, high, np.full(len(low), True))
+    sizes = search.size(result.U_m3, result.volume_m3)
     place = int(np.argmax(sizes))
     return sizes[place], (low[place], high[place])

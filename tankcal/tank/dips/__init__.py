@@ -1,9 +1,9 @@
-"""Dips: the rows of a table, their labels and units, what lies between them, and the way back.
+"""Dips: rows of a table, labels and units, interpolation between rows, and the inverse reading.
 
 units         volumes in m3, L and bbl; dips in metres or in feet and inches, as numbers and text
 rows          heights of the rows, rounding
-parts         proportional parts: what the millimetres of a dip add to a row
-straightness  how far straight lines between rows are from the exact volume; the step that this asks
+parts         proportional parts: volumes of the millimetres of a dip between two rows
+straightness  error of straight lines between rows, and the step that meets a bound of it
 reading       ullage, and the dip of a volume
 """
 

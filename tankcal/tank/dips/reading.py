@@ -1,4 +1,4 @@
-"""Reading a table: ullage instead of dip, and the dip of a volume."""
+"""Reading of a table: ullage instead of dip, and the dip of a volume."""
 
 from dataclasses import dataclass
 
@@ -16,32 +16,33 @@ class Dips:
     Attributes
     ----------
     height_m : ndarray, shape (n,)
-        The dips, m.
+        Dips, m.
     u_m : ndarray, shape (n,)
-        Their standard uncertainties, m.
+        Standard uncertainties of the dips, m.
     """
 
     height_m: np.ndarray
     u_m: np.ndarray
 
     def __str__(self):
-        """One line for each dip: "6.4213 m, u = 0.0021 m"."""
+        """Return one line for each dip: "6.4213 m, u = 0.0021 m"."""
         return "\n".join(map(_line_of, self.height_m, self.u_m))
 
     def __repr__(self):
-        """The lines of `str`, as an interpreter shows them."""
+        """Return the lines of `str`, for interactive sessions."""
         return str(self)
 
 
 def _line_of(height_m, u_m):
-    shown = format_with_u(height_m, u_m, PROGRAM, least=3)
-    return f"{shown.value} m, u = {shown.uncertainty} m"
+    """Return a dip and its standard uncertainty as text."""
+    formatted = format_with_u(height_m, u_m, PROGRAM, least=3)
+    return f"{formatted.value} m, u = {formatted.uncertainty} m"
 
 
 def ullage_m(reference_height_m, dip_m):
-    """Height from the liquid up to the reference point: reference height - dip; or back again.
+    """Return the ullage, reference height - dip, or the dip from the ullage.
 
-    Both directions are the same subtraction. Raises HeightError for a dip (ullage) below 0 or
+    Both conversions are the same subtraction. Raises HeightError for a dip (ullage) below 0 or
     above the reference height.
     """
     dips = np.asarray(dip_m, dtype=float)
@@ -59,18 +60,18 @@ def ullage_m(reference_height_m, dip_m):
 
 
 def dips_of(height_m, volume_m3, factor_m3, wanted_m3):
-    """`Dips` at which the table, read linearly between its rows, gives the wanted volumes.
+    """Return the `Dips` at which the table, interpolated linearly, gives the wanted volumes.
 
     h = h_a + (V - V_a) (h_b - h_a) / (V_b - V_a),   u(h) = u(V) / ((V_b - V_a) / (h_b - h_a))
 
-    A row itself is read with the slope of the interval below it, as in the table's own reading.
+    At a row, the slope is that of the interval below, as in the reading of the table.
 
     Parameters
     ----------
     height_m, volume_m3 : array_like, shape (rows,)
         Dips, ascending, m, and volumes, m3.
     factor_m3 : array_like, shape (rows, inputs)
-        Factor of the covariance of the rows: u(V) is that of the table at h.
+        Factor of the covariance of the rows, which gives u(V) of the table at h.
     wanted_m3 : float or array_like, shape (n,)
         Volumes, m3.
 
@@ -81,15 +82,15 @@ def dips_of(height_m, volume_m3, factor_m3, wanted_m3):
     Raises
     ------
     HeightError
-        For a volume outside the table, and for one that stands there at more than one height (rows
-        of equal volume, or a volume that falls).
+        For a volume outside the table, or with more than one height (rows of equal volume, or a
+        volume that falls).
 
     Examples
     --------
-    >>> found = dips_of([0.0, 1.0, 2.0], [0.0, 50.0, 100.0], [[0.1], [0.1], [0.1]], 75.0)
-    >>> found
+    >>> dips = dips_of([0.0, 1.0, 2.0], [0.0, 50.0, 100.0], [[0.1], [0.1], [0.1]], 75.0)
+    >>> dips
     1.5000 m, u = 0.0020 m
-    >>> found.height_m, found.u_m
+    >>> dips.height_m, dips.u_m
     (array([1.5]), array([0.002]))
     """
     heights, volumes = np.asarray(height_m, dtype=float), np.asarray(volume_m3, dtype=float)
@@ -100,20 +101,22 @@ def dips_of(height_m, volume_m3, factor_m3, wanted_m3):
     slope = (volumes[upper] - volumes[lower]) / step
     part = (wanted - volumes[lower]) / (volumes[upper] - volumes[lower])
     factor = np.asarray(factor_m3, dtype=float)
+    # The factor at the dip is interpolated like the volume.
     columns = (1 - part)[:, None] * factor[lower] + part[:, None] * factor[upper]
     from_below, from_above = heights[lower] + part * step, heights[upper] - (1 - part) * step
-    dips = np.where(part < 0.5, from_below, from_above)  # so that a row gives its own height
+    dips = np.where(part < 0.5, from_below, from_above)  # exact at both rows
     return Dips(dips, np.sqrt(np.sum(columns**2, axis=1)) / slope)
 
 
 def _row_above(heights, volumes, wanted):
-    """(n,) first row that is not below each volume (1 for the first row of all).
+    """Return the first row (n,) not below each volume (1 for the first row).
 
-    Raises HeightError where there is none, or more than one place in the table.
+    Raises HeightError if no such row exists, or if the volume occurs at several heights.
     """
+    # Envelopes of the volumes from below and above: they differ where the table is not ascending.
     rising = np.maximum.accumulate(volumes)
-    lasting = np.minimum.accumulate(volumes[::-1])[::-1]
-    outside = ~((wanted >= lasting[0]) & (wanted <= rising[-1]))
+    falling = np.minimum.accumulate(volumes[::-1])[::-1]
+    outside = ~((wanted >= falling[0]) & (wanted <= rising[-1]))
     if np.any(outside):
         raise HeightError(
             message(
@@ -121,15 +124,15 @@ def _row_above(heights, volumes, wanted):
                 "volume {volume_m3:g} m3 is outside the capacity table ({first_m3:g} to "
                 "{last_m3:g} m3)",
                 volume_m3=wanted[outside][0],
-                first_m3=lasting[0],
+                first_m3=falling[0],
                 last_m3=rising[-1],
             )
         )
-    reached = np.searchsorted(rising, wanted, side="left")  # first row not below the volume
-    left = np.searchsorted(lasting, wanted, side="right") - 1  # last row not above it
-    unclear = left > reached
+    first = np.searchsorted(rising, wanted, side="left")  # first row not below the volume
+    last = np.searchsorted(falling, wanted, side="right") - 1  # last row not above it
+    unclear = last > first
     if np.any(unclear):
-        low, high = heights[reached[unclear][0]], heights[left[unclear][0]]
+        low, high = heights[first[unclear][0]], heights[last[unclear][0]]
         raise HeightError(
             message(
                 "volume_without_dip",
@@ -140,4 +143,4 @@ def _row_above(heights, volumes, wanted):
                 high_m=high,
             )
         )
-    return np.clip(reached, 1, len(heights) - 1)
+    return np.clip(first, 1, len(heights) - 1)

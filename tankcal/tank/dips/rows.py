@@ -1,7 +1,7 @@
 """Rows of a table: their heights and their rounding.
 
-Dips are metres above the table's zero. Every row is computed from its own number, n * step, and
-rounded from its own exact volume: nothing is added up row by row.
+Dips are metres above the zero of the table. Each row is computed from its own number, n * step, and
+rounded from its own exact volume, so no rounding errors accumulate.
 """
 
 import numpy as np
@@ -10,29 +10,35 @@ from tankcal.errors import HeightError, InputError, Problem
 from tankcal.messages import message
 from tankcal.tank.dips.units import HEIGHT_STEPS_M
 
-MOST_ROWS = 25_000
+MOST_ROWS = 25_000  # largest number of rows of a table
 _PER_METRE = 1_000_000_000  # steps and rows are whole nanometres, so that rows are exact decimals
-_LAST_STEP_M = 1e-6
-NEAR_MARK_M = 0.0005
+_LAST_STEP_M = 1e-6  # a shorter last step is omitted
+NEAR_MARK_M = 0.0005  # a top within this distance of a mark is at the mark
 
 
 def table_heights(step_m, top_m, fine_step_m=None, fine_zones=()):
-    """(rows,) dips at 0, step, 2 step, ... and the top itself, m; each once, ascending.
+    """Return dips (rows,) at 0, step, 2 step, ... and the top, m, in ascending order.
 
     Parameters
     ----------
-    step_m
+    step_m : float
         Row n is the number nearest to n * step.
-    top_m
-        Last row; a last step under a micron is dropped.
-    fine_step_m : optional
-        Step of the rows from the one at or below `low` to the one at or above `high` of each
-        (low_m, high_m) of `fine_zones`; a whole part of step_m.
+    top_m : float
+        Last row; a last step below a micrometre is omitted.
+    fine_step_m : float, optional
+        Step of the rows in `fine_zones`; a whole part of step_m.
+    fine_zones : sequence of (float, float), optional
+        (low_m, high_m) of each zone: it extends from the row at or below low_m to the row at or
+        above high_m.
+
+    Returns
+    -------
+    ndarray, shape (rows,)
 
     Raises
     ------
     InputError
-        For steps that do not fit, and for more than MOST_ROWS rows.
+        For inconsistent steps, and for more than MOST_ROWS rows.
     HeightError
         For a zone outside the table.
 
@@ -48,6 +54,7 @@ def table_heights(step_m, top_m, fine_step_m=None, fine_zones=()):
         last = int(np.ceil(min(high_m, top_m) / fine_step_m - 1e-9))
         pieces.append(multiples_of(fine_step_m, first, last))
     heights = np.unique(np.concatenate(pieces))
+    # Rows beyond the top by more than rounding do not belong to the table.
     heights = heights[heights <= top_m + 2e-9 * step_m]
     if top_m - heights[-1] > _LAST_STEP_M:
         heights = np.append(heights, top_m)
@@ -57,11 +64,12 @@ def table_heights(step_m, top_m, fine_step_m=None, fine_zones=()):
 
 
 def top_mark(top_m, height_unit="m", *, closed=False):
-    """Dip of the last row of a table, m: a mark of the tape that stands for the top of the tank.
+    """Return the dip of the last row of a table, m: the mark of the tape at the top of the tank.
 
-    An open shell ends at the nearest whole millimetre, for 9.49996 m (9.5 m that lean) is 9.5 m
-    to everybody who measures it; a tank that closes at its top is full from the next one on. In
-    feet and inches the top is a mark when it is within half a millimetre of it, else as it is.
+    An open shell ends at the nearest whole millimetre, since 9.49996 m (a leaning shell of 9.5 m)
+    is measured as 9.5 m. A tank that closes at its top is full from the next millimetre on. In feet
+    and inches, the top is a mark if the mark is within half a millimetre; otherwise it is
+    unchanged.
 
     Parameters
     ----------
@@ -69,7 +77,11 @@ def top_mark(top_m, height_unit="m", *, closed=False):
         Dip of the full tank, m.
     height_unit : {"m", "ft-in-8", "ft-in-16"}
     closed : bool
-        Whether it has no free surface there.
+        Whether the tank has no free surface at the top.
+
+    Returns
+    -------
+    float
 
     Examples
     --------
@@ -78,6 +90,7 @@ def top_mark(top_m, height_unit="m", *, closed=False):
     """
     step = float(HEIGHT_STEPS_M[height_unit])
     if height_unit == "m" and closed:
+        # Round up, except for an excess below a micrometre.
         number = np.ceil(top_m / step - _LAST_STEP_M / step)
     else:
         number = np.round(top_m / step)
@@ -87,15 +100,28 @@ def top_mark(top_m, height_unit="m", *, closed=False):
 
 
 def multiples_of(step_m, first, last):
-    """first * step, ..., last * step, each the nearest number to the exact product."""
+    """Return first * step, ..., last * step, each rounded once from the exact product.
+
+    Parameters
+    ----------
+    step_m : float
+    first, last : int
+
+    Returns
+    -------
+    ndarray, shape (last - first + 1,)
+        m.
+    """
     numbers = np.arange(first, last + 1, dtype=float)
     step = step_m * _PER_METRE
+    # Steps of whole nanometres give exact products; rows of other steps are rounded.
     if abs(step - round(step)) < 1e-3:
-        return numbers * round(step) / _PER_METRE  # exact integer product, one rounding
+        return numbers * round(step) / _PER_METRE  # exact integer product, a single rounding
     return np.round(numbers * step_m, 9)
 
 
 def _check_steps(step_m, top_m, fine_step_m, fine_zones):
+    """Raise an error for steps and zones that do not fit the table."""
     if not step_m > 0 or not top_m > 0:
         raise InputError(
             Problem(
@@ -114,11 +140,11 @@ def _check_steps(step_m, top_m, fine_step_m, fine_zones):
     if fine_zones:
         ratio = step_m / (fine_step_m or np.inf)
         if not ratio > 1.5 or abs(ratio - round(ratio)) > 1e-6:
-            found = "no fine step" if fine_step_m is None else f"{fine_step_m:g} m"
+            given_step = "no fine step" if fine_step_m is None else f"{fine_step_m:g} m"
             raise InputError(
                 Problem(
                     "table",
-                    f"{found}; expected a whole part of the step of {step_m:g} m",
+                    f"{given_step}; expected a whole part of the step of {step_m:g} m",
                     None,
                     "fine_step_m",
                 )
@@ -153,9 +179,10 @@ def _check_steps(step_m, top_m, fine_step_m, fine_zones):
 
 
 def round_each(values, decimals):
-    """(rows,) each value rounded by itself, once, to the nearest decimal (a tie to the even one).
+    """Return values (rows,), each rounded once to the nearest decimal (half to even).
 
-    Correct for the number as stored: 2.675, which is stored a little below, gives 2.67.
+    The rounding is correct for the stored number: 2.675, which is stored as slightly less, gives
+    2.67.
 
     Examples
     --------

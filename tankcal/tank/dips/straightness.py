@@ -1,12 +1,12 @@
-"""How far the straight lines between the rows of a table are from the exact volume.
+"""Error of the straight lines between the rows of a table, relative to the exact volume.
 
-All gauging systems interpolate linearly. In the interval (a, b) the table says
+All gauging systems interpolate linearly. In the interval (a, b), the table gives
 
     T(h) = V(a) + (V(b) - V(a)) (h - a) / (b - a),
 
-and T - V is largest where the area of the cut is the mean area of the interval. The rule of thumb
-step^2/8 |A'| fails where A' has no bound (the ends of a lying cylinder) and at joints; here the
-largest deviation itself is searched for in every interval, on each side of every breakpoint.
+and T - V is largest where the area of the cut equals the mean area of the interval. The rule of
+thumb step^2/8 |A'| fails at joints and where A' is unbounded (the ends of a lying cylinder).
+Therefore the largest deviation is searched for in every interval, on each side of every breakpoint.
 """
 
 from dataclasses import dataclass
@@ -21,22 +21,22 @@ METRIC_STEPS_M = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 INCH_STEPS_M = tuple(float(METRES_PER_INCH / part) for part in (1, 2, 4, 8, 16))
 LADDERS_M = {"m": METRIC_STEPS_M, "ft-in-8": INCH_STEPS_M[:4], "ft-in-16": INCH_STEPS_M}
 
-_ALIKE = 1e-4  # of the largest deviation: each is the small difference of two volumes
-_NODES = (1 - np.cos(np.pi * np.arange(9) / 8)) / 2  # of each piece, denser towards its ends
-_GOLDEN = (np.sqrt(5) - 1) / 2
-_SHRINKINGS = 34  # a bracket shrinks to 1e-7 of itself, the deviation is exact to 1e-14 of itself
+_ALIKE = 1e-4  # deviations with a smaller relative difference are equal up to rounding
+_NODES = (1 - np.cos(np.pi * np.arange(9) / 8)) / 2  # samples of a piece, denser at its ends
+_GOLDEN = (np.sqrt(5) - 1) / 2  # golden ratio: a section requires only one new evaluation
+_SHRINKINGS = 34  # reduces a bracket to 1e-7 of its length: deviation exact to 1e-14
 
 
 @dataclass(frozen=True)
 class Straightness:
-    """The largest deviation of linear interpolation in each interval between rows.
+    """Largest deviation of linear interpolation in each interval between rows.
 
     Attributes
     ----------
     height_m : ndarray, shape (rows - 1,)
-        Dip where it is.
+        Dip of the largest deviation.
     deviation_m3 : ndarray, shape (rows - 1,)
-        Table minus exact volume there, with its sign.
+        Table minus exact volume at that dip.
     """
 
     height_m: np.ndarray
@@ -44,25 +44,29 @@ class Straightness:
 
     @property
     def largest_m3(self):
-        """Size of the largest deviation of the whole table."""
+        """Absolute value of the largest deviation of the whole table."""
         return float(np.abs(self.deviation_m3).max())
 
     @property
     def at_m(self):
-        """The dip where it is."""
+        """Dip of the largest deviation of the whole table."""
         return float(self.height_m[first_of_largest(self.deviation_m3)])
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of a table whose linear interpolation keeps a bound.
+    """Rows of a table whose linear interpolation meets a bound.
 
     Attributes
     ----------
+    step_m, fine_step_m, fine_zones
+        Steps and zones, as for `table_heights`.
     height_m : ndarray, shape (rows,)
-        Dips, as `table_heights` gives them for the step and the zones.
+        Dips, as computed by `table_heights` for the steps and zones.
     largest_m3 : float
-        Size of the largest deviation of linear interpolation, at the dip at_m.
+        Absolute value of the largest deviation of linear interpolation.
+    at_m : float
+        Dip of the largest deviation.
     """
 
     step_m: float
@@ -74,9 +78,9 @@ class Rows:
 
 
 def first_of_largest(deviation_m3):
-    """Place of the first of the largest deviations that differ by no more than rounding.
+    """Return the index of the first of the largest deviations that are equal up to rounding.
 
-    So a wall that is alike all the way up tells the same place on every machine.
+    For a wall that is equal at all heights, the index is therefore the same on every machine.
 
     >>> first_of_largest(np.array([1.0, -3.0, 3.0000001]))
     1
@@ -86,18 +90,24 @@ def first_of_largest(deviation_m3):
 
 
 def interpolation_errors(volume_m3, height_m, breakpoints_m=()):
-    """`Straightness` of a table with rows at height_m.
+    """Return the `Straightness` of a table with rows at height_m.
 
-    Between rows and breakpoints the area is taken to turn at most once in an eighth of an interval.
+    Between rows and breakpoints, the area may have at most one extremum in an eighth of an
+    interval.
 
     Parameters
     ----------
-    volume_m3
+    volume_m3 : callable
         Function of (n,) dips, m, to (n,) exact volumes, m3.
     height_m : ndarray, shape (rows,)
-        Dips, ascending.
-    breakpoints_m : optional
-        Dips where the area jumps (joints, edges of deadwood); others need not be known.
+        Dips, ascending, m.
+    breakpoints_m : array_like, optional
+        Dips at which the area jumps (joints, limits of deadwood); other breakpoints are not
+        required.
+
+    Returns
+    -------
+    Straightness
     """
     rows = np.asarray(height_m, dtype=float)
     breakpoints = np.asarray(breakpoints_m, dtype=float)
@@ -108,20 +118,21 @@ def interpolation_errors(volume_m3, height_m, breakpoints_m=()):
 
     def deviation(heights):
         flat = volume_m3(heights.ravel()).reshape(heights.shape)
-        of = interval if heights.ndim == 1 else interval[:, None]
-        return at_rows[of] + slope[of] * (heights - rows[of]) - flat
+        row = interval if heights.ndim == 1 else interval[:, None]
+        return at_rows[row] + slope[row] * (heights - rows[row]) - flat
 
-    place = _largest(deviation, edges[:-1], edges[1:])
-    found = deviation(place)
+    place = _find_largest(deviation, edges[:-1], edges[1:])
+    deviations = deviation(place)
+    # Largest deviation among the pieces of each interval, and the first piece where it occurs.
     first = np.flatnonzero(np.diff(interval, prepend=-1))
-    size = np.maximum.reduceat(np.abs(found), first)
-    best = np.flatnonzero(np.abs(found) == size[interval])
+    size = np.maximum.reduceat(np.abs(deviations), first)
+    best = np.flatnonzero(np.abs(deviations) == size[interval])
     best = best[np.diff(interval[best], prepend=-1) > 0]
-    return Straightness(place[best], found[best])
+    return Straightness(place[best], deviations[best])
 
 
-def _largest(deviation, low, high):
-    """(pieces,) heights where |deviation| is largest: samples, then golden sections about them."""
+def _find_largest(deviation, low, high):
+    """Return heights (pieces,) of the largest |deviation|: samples, then golden sections."""
     samples = low[:, None] + (high - low)[:, None] * _NODES
     size = np.abs(deviation(samples))
     best, piece = size.argmax(axis=1), np.arange(len(low))
@@ -132,53 +143,64 @@ def _largest(deviation, low, high):
     for _ in range(_SHRINKINGS):
         is_left = at_inner[0] > at_inner[1]
         left, right = np.where(is_left, left, inner[0]), np.where(is_left, inner[1], right)
-        kept, at_kept = np.where(is_left, inner, inner[::-1])[0], at_inner.max(axis=0)
+        retained, at_retained = np.where(is_left, inner, inner[::-1])[0], at_inner.max(axis=0)
         span = _GOLDEN * (right - left)
         new = np.where(is_left, right - span, left + span)
         at_new = np.abs(deviation(new))
-        inner = np.where(is_left, [new, kept], [kept, new])
-        at_inner = np.where(is_left, [at_new, at_kept], [at_kept, at_new])
-    found = inner[at_inner.argmax(axis=0), piece]
-    return np.where(at_inner.max(axis=0) > size[piece, best], found, samples[piece, best])
+        inner = np.where(is_left, [new, retained], [retained, new])
+        at_inner = np.where(is_left, [at_new, at_retained], [at_retained, at_new])
+    interior = inner[at_inner.argmax(axis=0), piece]
+    # Samples at the ends of a piece may exceed the interior maximum.
+    return np.where(at_inner.max(axis=0) > size[piece, best], interior, samples[piece, best])
 
 
 def choose_rows(volume_m3, top_m, bound_m3, breakpoints_m=(), step_m=None, ladder_m=METRIC_STEPS_M):
-    """`Rows` that keep the bound with the fewest rows: one step, or a finer one where needed.
+    """Return the `Rows` that meet the bound with the fewest rows, with a single step or fine zones.
 
     Parameters
     ----------
-    volume_m3
+    volume_m3 : callable
         Function of (n,) dips, m, to (n,) exact volumes, m3.
-    bound_m3
-        Of the deviation of linear interpolation from the exact volume.
-    breakpoints_m : optional
-        Dips where the area jumps.
-    step_m : optional
-        The table's step when it is given; then only finer zones are added. None: chosen.
-    ladder_m : optional
-        Steps to choose from, the coarsest first (`LADDERS_M` has them by unit of heights).
+    top_m : float
+        Last row, m.
+    bound_m3 : float
+        Bound of the deviation of linear interpolation from the exact volume, m3.
+    breakpoints_m : array_like, optional
+        Dips at which the area jumps.
+    step_m : float, optional
+        Given step of the table, to which only finer zones are added. None: the step is chosen.
+    ladder_m : sequence of float, optional
+        Available steps, the coarsest first (`LADDERS_M` contains them by unit of heights).
+
+    Returns
+    -------
+    Rows
 
     Raises
     ------
     InputError
-        With the deviation that is reached, when no step of the ladder is enough.
+        With the smallest deviation, if no step of the ladder meets the bound.
     """
-    best, reached = None, None
+    best, most_accurate = None, None
     for step in ladder_m if step_m is None else (step_m,):
+        # Finer steps only have more rows than the best table.
         if best is not None and top_m / step >= len(best.height_m):
             break
-        for candidate in _candidates(volume_m3, top_m, bound_m3, breakpoints_m, step, ladder_m):
-            if reached is None or candidate.largest_m3 < reached.largest_m3:
-                reached = candidate
+        for candidate in _generate_candidates(
+            volume_m3, top_m, bound_m3, breakpoints_m, step, ladder_m
+        ):
+            if most_accurate is None or candidate.largest_m3 < most_accurate.largest_m3:
+                most_accurate = candidate
             is_good = candidate.largest_m3 <= bound_m3
             if is_good and (best is None or len(candidate.height_m) < len(best.height_m)):
                 best = candidate
     if best is None:
-        raise InputError(Problem("table", _not_met(reached, bound_m3), None, "step_m"))
+        raise InputError(Problem("table", _bound_exceeded(most_accurate, bound_m3), None, "step_m"))
     return best
 
 
-def _not_met(reached, bound_m3):
+def _bound_exceeded(reached, bound_m3):
+    """Return the message of a bound that no step meets."""
     if reached is None:
         return f"no step of the choice gives at most {MOST_ROWS} rows"
     finest = reached.fine_step_m or reached.step_m
@@ -188,8 +210,8 @@ def _not_met(reached, bound_m3):
     )
 
 
-def _candidates(volume_m3, top_m, bound_m3, breakpoints_m, step, ladder_m):
-    """`Rows` with one step; where that breaks the bound, with each finer step in those zones."""
+def _generate_candidates(volume_m3, top_m, bound_m3, breakpoints_m, step, ladder_m):
+    """Yield `Rows` with a single step; if it exceeds the bound, also with finer steps in zones."""
     if top_m / step > MOST_ROWS:
         return
     heights = table_heights(step, top_m)
@@ -202,12 +224,12 @@ def _candidates(volume_m3, top_m, bound_m3, breakpoints_m, step, ladder_m):
         if not zones or not is_part or marks + len(heights) > MOST_ROWS:
             continue
         rows = table_heights(step, top_m, fine, zones)
-        found = interpolation_errors(volume_m3, rows, breakpoints_m)
-        yield Rows(step, fine, zones, rows, found.largest_m3, found.at_m)
+        errors = interpolation_errors(volume_m3, rows, breakpoints_m)
+        yield Rows(step, fine, zones, rows, errors.largest_m3, errors.at_m)
 
 
 def _zones(heights, is_bad):
-    """((low, high), ...) of runs of intervals that are bad."""
+    """Return ((low, high), ...) of consecutive intervals that exceed the bound."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_bad, [False]]).astype(int)))
     return tuple(
         (float(heights[low]), float(heights[high]))

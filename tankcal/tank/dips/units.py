@@ -1,7 +1,7 @@
 """Units of volumes, and dips in metres or in feet and inches, as numbers and as text.
 
-1 in = 0.0254 m and 1 bbl = 42 US gallons = 42 * 231 in3 = 0.158987294928 m3 are exact: the
-international yard and pound agreement of 1959, and NIST Handbook 44, appendix C.
+1 in = 0.0254 m and 1 bbl = 42 US gallons = 42 * 231 in3 = 0.158987294928 m3 are exact
+(international yard and pound agreement of 1959; NIST Handbook 44, appendix C).
 """
 
 import re
@@ -22,16 +22,16 @@ VOLUME_UNITS_M3 = {
     "bbl": 42 * 231 * METRES_PER_INCH**3,
 }
 
-TABLE_DECIMALS = {"m3": LITRE_DECIMALS, "L": 0, "bbl": 2}  # that every row has at least
+TABLE_DECIMALS = {"m3": LITRE_DECIMALS, "L": 0, "bbl": 2}  # least number of decimals of a row
 
-# smallest step of a table in each unit of heights, as a fraction of a metre
+# Smallest step of a table in each unit of heights, as a fraction of a metre.
 HEIGHT_STEPS_M = {
     "m": Fraction(1, 1000),
     "ft-in-8": METRES_PER_INCH / 8,
     "ft-in-16": METRES_PER_INCH / 16,
 }
 
-_ON_THE_MARK_M = 1e-8
+_ON_THE_MARK_M = 1e-8  # a dip within this distance of a mark is at the mark
 _FEET_AND_INCHES = re.compile(
     r"(?:(?P<feet>\d+)\s*(?:'|ft\.?|feet|-))?[\s-]*"
     r"(?:(?P<inches>\d+(?:\.\d+)?)(?:[\s-]+(?P<n>\d+)/(?P<d>\d+))?|(?P<n1>\d+)/(?P<d1>\d+))?"
@@ -42,12 +42,12 @@ _TYPED_MARKS = str.maketrans("′’″”", "''\"\"")
 
 
 def volume_from_m3(volume_m3, unit):
-    """Volumes in m3 as volumes in `unit` ("m3", "L", "bbl"): one multiplication, one rounding.
+    """Return volumes in `unit` ("m3", "L", "bbl") from volumes in m3, with a single rounding.
 
     Parameters
     ----------
     volume_m3 : array_like
-        Of any shape, m3.
+        Volumes of any shape, m3.
     unit : str
 
     Raises
@@ -64,7 +64,7 @@ def volume_from_m3(volume_m3, unit):
 
 
 def volume_to_m3(volume, unit):
-    """Volumes in `unit` as volumes in m3; the inverse of `volume_from_m3`.
+    """Return volumes in m3 from volumes in `unit`, the inverse of `volume_from_m3`.
 
     Examples
     --------
@@ -75,16 +75,20 @@ def volume_to_m3(volume, unit):
 
 
 def dip_label(height_m, height_unit="m"):
-    """A dip as the table prints it: '1.035', or 3' 4 5/8" with the fraction reduced.
+    """Return a dip as printed in the table: '1.035', or 3' 4 5/8" with the fraction reduced.
 
-    A height between the marks of the tape (the top of a shell) shows decimals instead: of a metre
-    as many as it needs, of an inch three.
+    A height between the marks of the tape (the top of a shell) has decimals instead: as many as
+    required for metres, three for inches.
 
     Parameters
     ----------
     height_m : float
-        The dip, m.
+        Dip, m.
     height_unit : {"m", "ft-in-8", "ft-in-16"}
+
+    Returns
+    -------
+    str
 
     Raises
     ------
@@ -110,28 +114,34 @@ def dip_label(height_m, height_unit="m"):
     marks = round(height_m / float(step))
     if abs(height_m - float(marks * step)) <= _ON_THE_MARK_M:
         feet, inches = divmod(marks * step / METRES_PER_INCH, INCHES_PER_FOOT)
-        whole, part = divmod(inches, 1)
+        whole_inches, part = divmod(inches, 1)
         fraction = f" {part.numerator}/{part.denominator}" if part else ""
-        return f"{feet}' {whole}{fraction}\""
+        return f"{feet}' {whole_inches}{fraction}\""
+    # Between marks: round once to thousandths of an inch, so that 12 inches become a foot.
     thousandths = round(height_m / float(METRES_PER_INCH) * 1000)
     feet, inches = divmod(Fraction(thousandths, 1000), INCHES_PER_FOOT)
     return f"{feet}' {float(inches):.3f}\""
 
 
 def parse_dip(text, height_unit="m"):
-    """Metres of a dip as text; for feet and inches 3' 4 5/8", 3-4 5/8, 3-04-5/8, 3 ft 4.625 in.
+    """Return the metres of a dip given as text.
 
-    Exact until the last division: the number nearest to n * 0.0254 / 16 m, as in `table_heights`.
+    Feet and inches may have the forms 3' 4 5/8", 3-4 5/8, 3-04-5/8 and 3 ft 4.625 in. The value is
+    exact up to the last division: the number nearest to n * 0.0254 / 16 m, as in `table_heights`.
 
     Parameters
     ----------
     text : str
     height_unit : {"m", "ft-in-8", "ft-in-16"}
 
+    Returns
+    -------
+    float
+
     Raises
     ------
     HeightError
-        For anything else.
+        For any other text.
 
     Examples
     --------
@@ -149,8 +159,8 @@ def parse_dip(text, height_unit="m"):
                 text=text[:40],
             )
         )
-    found = _FEET_AND_INCHES.fullmatch(text.translate(_TYPED_MARKS))
-    inches = _inches(found) if found else None
+    match = _FEET_AND_INCHES.fullmatch(text.translate(_TYPED_MARKS))
+    inches = _inches(match) if match else None
     if inches is None:
         raise HeightError(
             message(
@@ -162,17 +172,18 @@ def parse_dip(text, height_unit="m"):
     return float(inches * METRES_PER_INCH)
 
 
-def _inches(found):
-    """Inches as a fraction; None where a part is missing or too large for its place."""
-    feet, inches = found["feet"], found["inches"]
-    numerator = found["n"] or found["n1"]
-    denominator = found["d"] or found["d1"]
+def _inches(match):
+    """Return inches as a fraction; None if a part is missing or too large for its place."""
+    feet, inches = match["feet"], match["inches"]
+    numerator = match["n"] or match["n1"]
+    denominator = match["d"] or match["d1"]
     if feet is None and inches is None and numerator is None:
         return None
-    if inches is None and numerator is None and found["mark"]:
+    if inches is None and numerator is None and match["mark"]:
         return None
     fraction = Fraction(0)
     if numerator is not None:
+        # Only binary fractions below one inch are marks of a tape.
         if int(denominator) not in (2, 4, 8, 16, 32, 64) or int(numerator) >= int(denominator):
             return None
         if "." in (inches or ""):

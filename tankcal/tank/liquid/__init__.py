@@ -1,12 +1,12 @@
-"""Liquid observes the wall: metered steps as observations of the volumes of a tank.
+"""Calibration with liquid: metered steps as observations of the volumes of a tank.
 
-    fill = fill_of(metering)                                  steps between the dips that count
-    reduced = reduce_steps(fill, volume_m3, growth)           each against the volumes of a geometry
+    fill = fill_of(metering)                                  steps between valid dips
+    reduced = reduce_steps(fill, volume_m3, growth)           misclosures against a geometry
     found = adjust_steps(reduced.misclosure_m3, noise, effects)
     found.gain, found.test(column), run_effect(found, columns), name_causes(found, alternatives)
 
-Plain arrays throughout: nothing here knows a job. Source: ISO 4269:2001 and API Std 2555 (methods,
-by their catalogue pages); the mathematics is in docs/liquid.md.
+The functions use plain arrays and are independent of a job. Source: ISO 4269:2001 and API Std 2555
+(methods, by their catalogue pages); the mathematics is in docs/liquid.md.
 """
 
 from tankcal.tank.liquid.adjustment import Effect, LiquidAdjustment, adjust_steps

@@ -1,25 +1,25 @@
-"""The adjustment of metered steps: what they say of everything that moves their misclosures.
+"""Adjustment of metered steps: estimates of all causes of their misclosures.
 
-A step's misclosure y (metered less the increment of the geometry) is a sum of causes, each a column
-of m3 by one standard deviation of it:
+The misclosure y of a step (metered volume less the increment of the geometry) is a sum of causes.
+Each cause has a column in m3 for one standard deviation:
 
     y = A z + F b + N e,      z, e ~ N(0, I),   b free
 
-z are causes with a prior (geometry, meters, runs), b such as nothing else knows (what lies below
-the first dip), e the readings' own errors (batches, dips). With R = N N' whitened by W, W R W' = I,
+z are causes with a prior (geometry, meters, runs), b causes without a prior (the volume below the
+first dip), e errors of single readings (batches, dips). With R = N N' whitened by W, W R W' = I,
 least squares of
 
     [W A  W F] [z]   [W y]
     [ I    0 ] [b] = [ 0 ]
 
-give z and b = G y, and with what the orthogonal complement leaves the weights M of all tests: for
-any cause of column c (m3 by its unit)
+gives z and b = G y. The orthogonal complement gives the weights M of all tests: for any cause with
+the column c (m3 per unit of the cause)
 
     size = c' M y / c' M c,   sd = 1 / sqrt(c' M c),   w = size / sd.
 
-It is the best linear prediction: G y = A' S^-1 y with S = A A' + R, without inverting S, so that a
-prior may be as wide as one likes. Source: Koch 1999, Parameter estimation and hypothesis testing,
-3.5; Baarda 1968.
+This is the best linear prediction: G y = A' S^-1 y with S = A A' + R, without inversion of S, so
+that a prior may be arbitrarily wide. Source: Koch 1999, Parameter estimation and hypothesis
+testing, 3.5; Baarda 1968.
 """
 
 from dataclasses import dataclass
@@ -31,21 +31,22 @@ import scipy.linalg
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
-UNTOLD = 1e-10  # of the largest pivot: a free cause below it is not observed
-UNSEEN = 1e-12  # of c' R^-1 c: a cause of which less shows in the misclosures cannot be tested
+UNTOLD = 1e-10  # relative to the largest pivot: a free cause with a smaller pivot is unobserved
+UNSEEN = 1e-12  # relative to c' R^-1 c: a cause with a smaller c' M c cannot be tested
 
 
 @dataclass(frozen=True)
 class Effect:
-    """A cause, or several of one kind, that moves misclosures.
+    """Cause of misclosures, or several causes of one kind.
 
     Attributes
     ----------
     kind : str
     columns : ndarray, shape (n, c)
-        What one standard deviation of each adds to the misclosures, m3; of a free one: one unit.
+        Change of the misclosures for one standard deviation of each cause, m3; for a free cause:
+        for one unit.
     is_free : bool
-        True: without any prior.
+        True: no prior.
     """
 
     kind: str
@@ -55,19 +56,20 @@ class Effect:
 
 @dataclass(frozen=True)
 class LiquidAdjustment:
-    """What n steps say.
+    """Result of the adjustment of n steps.
 
     Attributes
     ----------
     misclosure_m3 : ndarray, shape (n,)
     noise : tuple of Effect
-        Of the readings themselves: batches, dips, temperatures.
+        Errors of the readings: batches, dips, temperatures.
     effects : tuple of Effect
-        All others, those that are free last.
+        All other effects, with free effects last.
     gain : ndarray, shape (c, n)
         Estimates of all effects by the misclosures, 1/m3; rows in the order of the effects.
     sd : ndarray, shape (c,)
-        Of the estimates, in the deviates (a free one: the unit) of their effects.
+        Standard deviations of the estimates, in standard deviations of the effects (for a free
+        effect: in its unit).
     weight : ndarray, shape (n, n)
         M, 1/m6.
     """
@@ -81,71 +83,74 @@ class LiquidAdjustment:
 
     @cached_property
     def estimate(self):
-        """(c,) estimates of all effects, in the order of `gain`."""
+        """Estimates (c,) of all effects, in the order of `gain`."""
         return self.gain @ self.misclosure_m3
 
     @cached_property
     def pulled(self):
-        """(n,) M y."""
+        """M y, shape (n,)."""
         return self.weight @ self.misclosure_m3
 
     @property
     def chi2(self):
-        """y' M y, chi-square of n less the number of free effects."""
+        """y' M y, chi-square with n less the number of free effects as degrees of freedom."""
         return float(self.misclosure_m3 @ self.pulled)
 
     @property
     def dof(self):
         """Degrees of freedom of `chi2`."""
-        free = sum(one.columns.shape[1] for one in self.effects if one.is_free)
+        free = sum(effect.columns.shape[1] for effect in self.effects if effect.is_free)
         return len(self.misclosure_m3) - free
 
     def place(self, kind):
-        """Slice of the rows of `gain` that belong to the effects of a kind; empty: none."""
+        """Return the slice of the rows of `gain` for the effects of a kind; empty if none."""
         start = 0
-        for one in self.effects:
-            end = start + one.columns.shape[1]
-            if one.kind == kind:
+        for effect in self.effects:
+            end = start + effect.columns.shape[1]
+            if effect.kind == kind:
                 return slice(start, end)
             start = end
         return slice(0, 0)
 
     def test(self, columns):
-        """(size, sd, w), each (k,), of causes of columns (n, k), each by itself.
+        """Test causes with columns (n, k), each separately, and return (size, sd, w), each (k,).
 
-        size in the unit of the cause; an infinite sd where the steps cannot show it, w is 0 then.
+        size is in the unit of the cause. If the steps cannot determine it, sd is infinite and w is
+        0.
         """
         columns = np.asarray(columns, dtype=float)
-        seen = np.einsum("nk,nm,mk->k", columns, self.weight, columns)
+        information = np.einsum("nk,nm,mk->k", columns, self.weight, columns)
         largest = np.sum(columns**2, axis=0) * np.max(np.diag(self.weight), initial=0.0)
-        shows = seen > UNSEEN * largest
-        safe = np.where(shows, seen, 1.0)
-        size = np.where(shows, columns.T @ self.pulled / safe, 0.0)
-        sd = np.where(shows, 1 / np.sqrt(safe), np.inf)
-        return size, sd, np.where(shows, size / np.where(shows, sd, 1.0), 0.0)
+        # c' M c relative to its largest possible value: below, the remainder is rounding.
+        is_determined = information > UNSEEN * largest
+        divisor = np.where(is_determined, information, 1.0)
+        size = np.where(is_determined, columns.T @ self.pulled / divisor, 0.0)
+        sd = np.where(is_determined, 1 / np.sqrt(divisor), np.inf)
+        return size, sd, np.where(is_determined, size / np.where(is_determined, sd, 1.0), 0.0)
 
     def residuals(self, effect):
-        """(deviates, redundancy, w), each (c,), of what an effect with a prior was observed as.
+        """Return (deviates, redundancy, w), each (c,), of an effect with a prior.
 
-        A cause is observed as 0 with one standard deviation: what is left of it (in it), which part
-        of an error of it shows, and the test of it.
+        The prior is an observation of 0 with one standard deviation. The deviate is its residual in
+        standard deviations, the redundancy is the fraction of an error that appears in the
+        residual, and w is the test statistic.
         """
         deviates = effect.columns.T @ self.pulled
         columns = effect.columns
         redundancy = np.einsum("nk,nm,mk->k", columns, self.weight, columns)
-        safe = np.sqrt(np.maximum(redundancy, 1e-30))
-        return deviates, redundancy, np.where(redundancy > UNSEEN, deviates / safe, 0.0)
+        divisor = np.sqrt(np.maximum(redundancy, 1e-30))
+        return deviates, redundancy, np.where(redundancy > UNSEEN, deviates / divisor, 0.0)
 
 
 def adjust_steps(misclosure_m3, noise, effects):
-    """Adjust metered steps together with all that moves them.
+    """Adjust metered steps together with all causes of their misclosures.
 
     Parameters
     ----------
     misclosure_m3 : array_like, shape (n,)
-        Metered less what the geometry says, m3.
+        Metered volume less the volume of the geometry, m3.
     noise : sequence of Effect
-        Errors of the readings; together they leave no step without an error of its own.
+        Errors of the readings; each step must have an error of its own.
     effects : sequence of Effect
         All other causes.
 
@@ -156,50 +161,53 @@ def adjust_steps(misclosure_m3, noise, effects):
     Raises
     ------
     SolutionError
-        When steps have no error of their own, or when a free effect is not observed.
+        If steps have no error of their own, or if a free effect is not observed.
 
     Examples
     --------
     A batch of 10 m3 +- 0.003 where the geometry has 9.99 +- 0.004: a misclosure of 0.01.
 
     >>> batch, wall = Effect("batch", np.array([[0.003]])), Effect("wall", np.array([[0.004]]))
-    >>> found = adjust_steps([0.01], [batch], [wall])
-    >>> round(float(9.99 + 0.004 * found.estimate[0]), 4), round(float(0.004 * found.sd[0]), 4)
+    >>> fit = adjust_steps([0.01], [batch], [wall])
+    >>> round(float(9.99 + 0.004 * fit.estimate[0]), 4), round(float(0.004 * fit.sd[0]), 4)
     (9.9964, 0.0024)
     """
     y = np.asarray(misclosure_m3, dtype=float)
-    effects = tuple(sorted(effects, key=lambda one: one.is_free))
-    priors = _stacked([one for one in effects if not one.is_free], len(y))
-    free = _stacked([one for one in effects if one.is_free], len(y))
-    own = _stacked(noise, len(y))
-    whiten = _whitening(own)
-    kept = priors.shape[1]
-    design = np.zeros((len(y) + kept, kept + free.shape[1]))
+    effects = tuple(sorted(effects, key=lambda effect: effect.is_free))
+    priors = _stack_columns([effect for effect in effects if not effect.is_free], len(y))
+    free = _stack_columns([effect for effect in effects if effect.is_free], len(y))
+    reading_columns = _stack_columns(noise, len(y))
+    whiten = _whitening_matrix(reading_columns)
+    prior_count = priors.shape[1]
+    design = np.zeros((len(y) + prior_count, prior_count + free.shape[1]))
     design[: len(y)] = whiten @ np.hstack([priors, free])
-    design[len(y) :, :kept] = np.eye(kept)
-    turn, upper, order = scipy.linalg.qr(design, pivoting=True)
+    design[len(y) :, :prior_count] = np.eye(prior_count)
+    # Full QR decomposition: the first columns give the estimates, the others the weights of tests.
+    rotation, upper, order = scipy.linalg.qr(design, pivoting=True)
     count = design.shape[1]
     upper = upper[:count]
     _refuse_unobserved(upper, free.shape[1])
     inverse = np.empty_like(upper)
     inverse[order] = scipy.linalg.solve_triangular(upper, np.eye(count))
-    left = whiten.T @ turn[: len(y), count:]
+    # M = W' Q2 Q2' W, with Q2 the complement of the design in the rows of the misclosures.
+    complement = whiten.T @ rotation[: len(y), count:]
     return LiquidAdjustment(
         misclosure_m3=y,
         noise=tuple(noise),
         effects=effects,
-        gain=inverse @ turn[: len(y), :count].T @ whiten,
+        gain=inverse @ rotation[: len(y), :count].T @ whiten,
         sd=np.linalg.norm(inverse, axis=1),
-        weight=left @ left.T,
+        weight=complement @ complement.T,
     )
 
 
-def _stacked(effects, rows):
-    return np.hstack([np.zeros((rows, 0)), *(one.columns for one in effects)])
+def _stack_columns(effects, rows):
+    """Return the columns of effects side by side, shape (rows, c)."""
+    return np.hstack([np.zeros((rows, 0)), *(effect.columns for effect in effects)])
 
 
-def _whitening(columns):
-    """(n, n) W with W (N N') W' = I."""
+def _whitening_matrix(columns):
+    """Return W (n, n) with W (N N') W' = I."""
     try:
         lower = np.linalg.cholesky(columns @ columns.T)
     except np.linalg.LinAlgError:
@@ -217,6 +225,7 @@ def _whitening(columns):
 
 
 def _refuse_unobserved(upper, free):
+    """Raise SolutionError if a free effect is not observed."""
     pivots = np.abs(np.diag(upper))
     if free and np.min(pivots) < UNTOLD * min(1.0, np.max(pivots)):
         raise SolutionError(

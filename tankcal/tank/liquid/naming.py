@@ -1,10 +1,11 @@
-"""Which cause misclosures of liquid and geometry have: each is tested, the likeliest named.
+"""Identification of the cause of misclosures between liquid and geometry by tests.
 
-An alternative of free size has w of its column; one of a known size (temperatures in Fahrenheit)
-the square root of what chi-square loses by it. Alternatives that explain the misclosures nearly as
-well as the likeliest, as far as chi-square tells two of them apart, are named with it. Of a kind
-with many members (a dip, a batch) one is large by chance sooner: every kind is as likely as any
-other beforehand, and its members share that, which takes 2 ln(members) off their w^2.
+The statistic of an alternative of free size is w of its column. For an alternative of known size
+(temperatures in Fahrenheit), it is the square root of the reduction of chi-square. Alternatives
+whose chi-square is not significantly larger than that of the most likely alternative are named with
+it. Of a kind with many members (a dip, a batch), one member is more often large by chance. All
+kinds have equal prior probability, shared among their members, which subtracts 2 ln(members) from
+w^2.
 """
 
 from dataclasses import dataclass
@@ -13,28 +14,28 @@ import numpy as np
 
 from tankcal.adjust import noncentrality
 
-ALIKE = 3.84  # of chi-square: two causes that differ by less cannot be told apart, at 5 %
-LEAST = 4.0  # |w| from which a cause is named
+ALIKE = 3.84  # chi-square at 5 %: a smaller difference between two causes is not significant
+LEAST = 4.0  # least |w| of a named cause
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """A cause that misclosures may have.
+    """Possible cause of misclosures.
 
     Attributes
     ----------
     kind : str
         "meter", "radii", "dip", "dip_zero", "batch", "leak", "bottom", "fahrenheit", "swapped".
     column : ndarray, shape (n,)
-        What one unit of it adds to the misclosures, m3.
+        Change of the misclosures for one unit of the cause, m3.
     of : str or int or None
-        Of several of a kind which: a meter, a row.
+        Member of the kind: a meter, a row.
     unit : str
-        Of its size: "1", "m", "m3"; "" of one that is so or not.
+        Unit of the size: "1", "m", "m3"; "" for a cause that either applies or not.
     is_whole : bool
-        True: its size is one, or it is not so.
+        True: the size is either one or zero.
     most : float
-        The largest size that it may have; a test that asks for a larger one does not name it.
+        Largest possible size; a cause with a larger estimate is not named.
     """
 
     kind: str
@@ -47,17 +48,19 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Verdict:
-    """How an alternative fared.
+    """Result of the test of an alternative.
 
     Attributes
     ----------
     cause : Alternative
     size, sd, w : float
-        Estimate, in its unit; sd of it (inf: the steps cannot show it); w signed.
+        Estimate, in its unit; its standard deviation (inf: the steps cannot determine it); signed
+        w.
     detectable : float
-        The smallest size that the test would show, with power 0.8 at 0.1 %.
+        Smallest size detected with a power of 0.8 at 0.1 %.
     is_named : bool
-        The likeliest, where |w| is large enough, and those that cannot be told from it.
+        Whether the cause is the most likely, with a sufficiently large |w|, or is not significantly
+        less likely.
     undetected_U : float or None
         External reliability: largest change of a volume of the table by an error of the size
         `detectable`, over the U of that volume; None: not computed for causes of this kind.
@@ -72,12 +75,12 @@ class Verdict:
     undetected_U: float | None = None
 
 
-def name_causes(found, alternatives):
-    """`Verdict`s of all alternatives, the likeliest first.
+def name_causes(adjusted, alternatives):
+    """Return the `Verdict`s of all alternatives, the most likely first.
 
     Parameters
     ----------
-    found : LiquidAdjustment
+    adjusted : LiquidAdjustment
     alternatives : sequence of Alternative
 
     Returns
@@ -86,17 +89,21 @@ def name_causes(found, alternatives):
     """
     if not alternatives:
         return ()
-    columns = np.stack([one.column for one in alternatives], axis=1)
-    size, sd, w = found.test(columns)
-    for place, one in enumerate(alternatives):
-        if one.is_whole and np.isfinite(sd[place]):
-            lost = (2 * size[place] - 1) / sd[place] ** 2
-            w[place] = np.sqrt(max(lost, 0.0))
-    kinds = [one.kind for one in alternatives]
+    columns = np.stack([alternative.column for alternative in alternatives], axis=1)
+    size, sd, w = adjusted.test(columns)
+    for place, alternative in enumerate(alternatives):
+        if alternative.is_whole and np.isfinite(sd[place]):
+            # Reduction of chi-square for the fixed size one: (size^2 - (size - 1)^2) / sd^2.
+            reduction = (2 * size[place] - 1) / sd[place] ** 2
+            w[place] = np.sqrt(max(reduction, 0.0))
+    kinds = [alternative.kind for alternative in alternatives]
     score = w**2 - 2 * np.log([kinds.count(kind) for kind in kinds])
     order = np.argsort(-score, kind="stable")
-    large = (np.abs(w) > LEAST) & (np.abs(size) <= [one.most for one in alternatives])
+    large = (np.abs(w) > LEAST) & (
+        np.abs(size) <= [alternative.most for alternative in alternatives]
+    )
     best = np.max(score[large], initial=-np.inf)
+    # Score: w^2 less the penalty for the number of members of the kind.
     named = large & (best - score < ALIKE)
     delta = noncentrality()
     return tuple(

@@ -1,8 +1,8 @@
-"""What the readings of a filling leave uncertain: each cause as columns of the misclosures.
+"""Uncertainty of the readings of a filling: each cause as columns of the misclosures.
 
-A cause of one standard deviation adds its column to the misclosures, as the truth less what was
-taken: a factor that is larger than declared makes the true increment larger, and the misclosure
-(metered less geometry) less.
+The column of a cause is the change of the misclosures for one standard deviation, as true value
+less assumed value. If a factor is larger than declared, the true increment is larger, and the
+misclosure (metered less geometry) is smaller.
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ import numpy as np
 from tankcal.tank.liquid.adjustment import Effect
 from tankcal.tank.liquid.reduction import reduce_steps, with_expansion
 
-EXPANSION_STEP = 1e-3  # of the expansion: misclosures are all but linear in it
+EXPANSION_STEP = 1e-3  # relative step of the expansion, in which misclosures are nearly linear
 
 
 @dataclass(frozen=True)
@@ -22,12 +22,13 @@ class ReadingEffects:
     Attributes
     ----------
     noise : tuple of Effect
-        "meter_repeatability" (n columns), "dip_readings" (d), "liquid_temperatures": errors of
-        single readings.
+        Errors of single readings: "meter_repeatability" (n columns), "dip_readings" (d),
+        "liquid_temperatures".
     common : tuple of Effect
-        "meter_factor" (one for each meter), "dip_zero", "liquid_expansion": errors of many.
+        Errors of many readings: "meter_factor" (one for each meter), "dip_zero",
+        "liquid_expansion".
     run_m3 : ndarray, shape (n, runs)
-        By a run effect of one, relative.
+        Change of the misclosures for a relative run effect of one.
     """
 
     noise: tuple[Effect, ...]
@@ -36,21 +37,21 @@ class ReadingEffects:
 
 
 def reading_effects(metering, fill, reduced, volume_m3, area_m2, growth=None):
-    """`ReadingEffects` of metered rows.
+    """Return the `ReadingEffects` of metered rows.
 
     Parameters
     ----------
     metering, fill, reduced
-        As `reduce_steps` was given and gave them.
+        Arguments and result of `reduce_steps`.
     volume_m3, area_m2 : ndarray, shape (d,)
-        Below, and of the free surface at, each dip.
+        Volume below each dip, and free surface at each dip.
     growth : optional
-        As there.
+        As for `reduce_steps`.
 
     Returns
     -------
     ReadingEffects
-        Without those that have no size.
+        Without effects of size zero.
     """
     dips = fill.differences(reduced.carried) * np.asarray(area_m2)
     noise = [
@@ -67,74 +68,77 @@ def reading_effects(metering, fill, reduced, volume_m3, area_m2, growth=None):
         Effect("liquid_expansion", _by_expansion(metering, fill, volume_m3, growth)),
     ]
     run_m3 = -reduced.metered_m3[:, None] * (fill.run[:, None] == np.arange(len(fill.runs)))
-    return ReadingEffects(tuple(_sized(noise)), tuple(_sized(common)), run_m3)
+    return ReadingEffects(tuple(_nonzero_effects(noise)), tuple(_nonzero_effects(common)), run_m3)
 
 
 def batch_sd_m3(metering, fill):
-    """(n,) standard deviation of what was metered in each step, at the table's temperature.
+    """Return the standard deviation (n,) of the metered volume of each step, m3.
 
-    A step at rest has none: the meter was not started.
+    It refers to the temperature of the table. A step at rest has none, since the meter was not
+    started.
     """
     meters = [metering.meters[name] for name in metering.meter]
-    relative = np.array([one.repeatability for one in meters])
-    fixed = np.array([one.fixed_m3 for one in meters])
+    relative = np.array([flow_meter.repeatability for flow_meter in meters])
+    fixed = np.array([flow_meter.fixed_m3 for flow_meter in meters])
     by_meter = np.hypot(relative * metering.volume_m3, fixed)
-    own = np.where(np.isfinite(metering.s_volume_m3), metering.s_volume_m3, by_meter)
+    row_sd = np.where(np.isfinite(metering.s_volume_m3), metering.s_volume_m3, by_meter)
     counted = fill.batches & (metering.volume_m3 != 0)
-    return np.sqrt(np.sum(np.where(counted, own, 0.0) ** 2, axis=1))
+    return np.sqrt(np.sum(np.where(counted, row_sd, 0.0) ** 2, axis=1))
 
 
 def _by_factors(metering, fill, reduced):
-    """(n, meters) metered volume of each meter times the relative u of its factor."""
-    of = np.array(metering.meter)
+    """Return the metered volume (n, meters) of each meter times the relative u of its factor."""
+    meter_names = np.array(metering.meter)
     columns = [
-        reduced.by_row_m3[:, of == name].sum(axis=1) * metering.meters[name].u_factor
+        reduced.by_row_m3[:, meter_names == name].sum(axis=1) * metering.meters[name].u_factor
         for name in fill.meters
     ]
     return np.stack(columns, axis=1)
 
 
 def _by_temperatures(metering, fill, reduced, volume_m3):
-    """(n, temperatures) by one degree of each temperature that was read."""
+    """Return the change (n, temperatures) of the misclosures per degree of each reading."""
     b, volume, end, start = metering.expansion_per_k, volume_m3, fill.end, fill.start
     tank = metering.tank_c[fill.dip_row]
-    known = np.isfinite(metering.meter_c) & np.isfinite(tank[end])[:, None]
-    of_rows = b * np.where(known, reduced.by_row_m3, 0.0)
-    before = np.where(fill.from_empty, 0.0, reduced.carried * volume[start])
-    both = np.isfinite(tank[end]) & np.isfinite(tank[start]) & ~fill.from_empty
-    before = b * np.where(both, before, 0.0)
-    of_dips = np.zeros((len(fill), len(volume)))
+    is_known = np.isfinite(metering.meter_c) & np.isfinite(tank[end])[:, None]
+    by_rows = b * np.where(is_known, reduced.by_row_m3, 0.0)
+    previous = np.where(fill.from_empty, 0.0, reduced.carried * volume[start])
+    both_known = np.isfinite(tank[end]) & np.isfinite(tank[start]) & ~fill.from_empty
+    previous = b * np.where(both_known, previous, 0.0)
+    by_dips = np.zeros((len(fill), len(volume)))
     lines = np.arange(len(fill))
-    of_dips[lines, end] -= of_rows.sum(axis=1) + before
-    of_dips[lines[both], start[both]] += before[both]
-    return np.hstack([of_rows[:, np.any(fill.batches, axis=0)], of_dips])
+    # A warmer tank at the end of a step: less volume arrived, and the previous content expanded.
+    by_dips[lines, end] -= by_rows.sum(axis=1) + previous
+    by_dips[lines[both_known], start[both_known]] += previous[both_known]
+    return np.hstack([by_rows[:, np.any(fill.batches, axis=0)], by_dips])
 
 
 def _by_expansion(metering, fill, volume_m3, growth):
-    """(n, 1) by the standard uncertainty of the liquid's expansion."""
+    """Return the change (n, 1) of the misclosures for the standard uncertainty of the expansion."""
     b, u = metering.expansion_per_k, metering.u_expansion_per_k
     if not u:
         return np.zeros((len(fill), 1))
     step = EXPANSION_STEP * (b or u)
-    moved = [
+    # Central difference; the step is relative, or that of u for an expansion of zero.
+    changed = [
         reduce_steps(with_expansion(metering, b + sign * step), fill, volume_m3, growth)
         for sign in (1, -1)
     ]
-    slope = (moved[1].misclosure_m3 - moved[0].misclosure_m3) / (2 * step)
+    slope = (changed[1].misclosure_m3 - changed[0].misclosure_m3) / (2 * step)
     return u * slope[:, None]
 
 
-def _sized(effects):
-    """Those that move something, without columns that do not; a cause keeps all or none."""
-    return [one for one in effects if np.any(one.columns)]
+def _nonzero_effects(effects):
+    """Return the effects that have any non-zero column."""
+    return [effect for effect in effects if np.any(effect.columns)]
 
 
 def as_fahrenheit(metering):
-    """The rows, had their temperatures been written in degrees Fahrenheit."""
-    read = {name: (getattr(metering, name) - 32) / 1.8 for name in ("meter_c", "tank_c")}
-    return replace(metering, **read)
+    """Return the rows with temperatures interpreted as degrees Fahrenheit."""
+    converted = {name: (getattr(metering, name) - 32) / 1.8 for name in ("meter_c", "tank_c")}
+    return replace(metering, **converted)
 
 
 def swapped(metering):
-    """The rows, had temperatures at the meter and in the tank changed places."""
+    """Return the rows with exchanged temperatures of meter and tank."""
     return replace(metering, meter_c=metering.tank_c, tank_c=metering.meter_c)

@@ -1,4 +1,4 @@
-"""Meshes from files and to files, through trimesh."""
+"""Reading and writing of mesh files, through trimesh."""
 
 import io
 import re
@@ -13,39 +13,42 @@ from tankcal.tank.meshes.checks import closed_mesh, problem
 
 
 def clean_mesh_text(kind, data):
-    """The bytes of an OFF, OBJ or PLY file as the strictest reader takes it: corners and faces.
+    """Return the bytes of an OFF, OBJ or PLY file reduced to corners and faces.
 
-    Blank rows, comments, names in quotation marks, line ends of any system and tabs stand in files
-    that other programs write and read.
+    Files of other programs contain blank rows, comments, quoted names, line ends of any system and
+    tabs, which strict readers refuse.
     """
     if kind == "ply":
-        return _ply(data)
+        return _clean_ply(data)
     if kind not in ("off", "obj") or b"\0" in data:
         return data
-    lines = _lines(data)
-    return _joined(_off(lines) if kind == "off" else _obj(lines))
+    lines = _split_lines(data)
+    return _join_lines(_clean_off(lines) if kind == "off" else _clean_obj(lines))
 
 
-def _lines(data):
+def _split_lines(data):
+    """Return the stripped lines of a file."""
     text = data.decode("utf-8-sig", errors="replace")
     return [line.strip() for line in re.split(r"\r\n|\r|\n", text.replace("\t", " "))]
 
 
-def _joined(lines):
+def _join_lines(lines):
+    """Return lines as the bytes of a file."""
     return ("\n".join(lines) + "\n").encode()
 
 
-def _off(lines):
-    """Rows without comments and blanks; the first word of the file in capitals."""
+def _clean_off(lines):
+    """Return rows without comments and blanks, with the first word of the file in capitals."""
     rows = [row for row in (line.partition("#")[0].strip() for line in lines) if row]
+    # The strict reader accepts the keyword OFF only in capitals.
     if rows and not rows[0][:1].isdigit():
         word, space, rest = rows[0].partition(" ")
         rows[0] = word.upper() + space + rest
     return rows
 
 
-def _obj(lines):
-    """Corners and faces alone; a row that ends in a backslash goes on in the next."""
+def _clean_obj(lines):
+    """Return rows of corners and faces only; a backslash at the end continues a row."""
     text = "\n".join(line.partition("#")[0].rstrip() for line in lines).replace("\\\n", " ")
     rows = []
     for line in text.split("\n"):
@@ -53,24 +56,26 @@ def _obj(lines):
         if word == "v":
             rows.append(" ".join([word, *numbers[:3]]))
         elif word == "f":
-            rows.append(" ".join([word, *(one.partition("/")[0] for one in numbers)]))
+            rows.append(" ".join([word, *(index.partition("/")[0] for index in numbers)]))
     return rows
 
 
-def _ply(data):
-    """Blank rows and comments go from the header, from the rows of a file of text, too."""
+def _clean_ply(data):
+    """Remove blank rows and comments from the header, and from the rows of an ASCII file."""
     start = data.lstrip(b"\xef\xbb\xbf \t\r\n")
-    found = re.search(rb"end_header[ \t]*(\r\n|\r|\n)", start)
-    if not start.startswith(b"ply") or found is None:
+    header_end = re.search(rb"end_header[ \t]*(\r\n|\r|\n)", start)
+    if not start.startswith(b"ply") or header_end is None:
         return data
-    header = _rows_of_ply(_lines(start[: found.end()]))
-    body = start[found.end() :]
+    header = _filter_ply_rows(_split_lines(start[: header_end.end()]))
+    body = start[header_end.end() :]
+    # The body of a binary file must remain unchanged.
     if any(row.startswith("format ascii") for row in header):
-        body = _joined(_rows_of_ply(_lines(body)))
-    return _joined(header) + body
+        body = _join_lines(_filter_ply_rows(_split_lines(body)))
+    return _join_lines(header) + body
 
 
-def _rows_of_ply(lines):
+def _filter_ply_rows(lines):
+    """Return the rows without blanks, comments and obj_info."""
     words = ("comment", "obj_info")
     return [line for line in lines if line and line.split()[0] not in words]
 
@@ -79,7 +84,7 @@ FILE_KINDS = ("stl", "obj", "ply", "off")
 
 
 def read_mesh(path, unit_m=1.0):
-    """The closed mesh of a file, as `parse_mesh` gives it; InputError when it cannot be read."""
+    """Return the closed mesh of a file, as `parse_mesh`; InputError if the file cannot be read."""
     path = Path(path)
     try:
         data = path.read_bytes()
@@ -90,19 +95,24 @@ def read_mesh(path, unit_m=1.0):
 
 
 def parse_mesh(name, data, unit_m=1.0):
-    """The closed mesh in the bytes of an STL, OBJ, PLY or OFF file, checked as `closed_mesh` does.
+    """Return the closed mesh in the bytes of an STL, OBJ, PLY or OFF file, after `closed_mesh`.
 
     Parameters
     ----------
-    name
-        Of the file, its ending says what it is; z is up.
-    unit_m : optional
-        Length of one unit of the file, m (0.001 for millimetres).
+    name : str
+        Name of the file, whose ending determines the format; z is up.
+    data : bytes
+    unit_m : float, optional
+        Length of a unit of the file, m (0.001 for millimetres).
+
+    Returns
+    -------
+    Mesh
 
     Raises
     ------
     InputError
-        For data that cannot be read, or what is no closed mesh.
+        For data that cannot be read, or that are no closed mesh.
     """
     import trimesh
 
@@ -114,15 +124,15 @@ def parse_mesh(name, data, unit_m=1.0):
         )
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what is wrong, our own problems say
-            found = trimesh.load_mesh(
+            warnings.simplefilter("ignore")  # the checks of `closed_mesh` report all defects
+            parsed = trimesh.load_mesh(
                 io.BytesIO(clean_mesh_text(kind, data)),
                 file_type=kind,
                 process=False,
                 skip_materials=True,
             )
-        vertices, faces = np.array(found.vertices), np.array(found.faces)
-    except Exception as error:  # whatever a parser stumbles over
+        vertices, faces = np.array(parsed.vertices), np.array(parsed.faces)
+    except Exception as error:  # parsers raise various exceptions for invalid data
         raise problem(
             name,
             message(
@@ -139,11 +149,14 @@ def write_mesh(mesh, path, origin_m=(0.0, 0.0, 0.0)):
 
     Parameters
     ----------
-    origin_m : optional
-        Of the file's coordinates, (3,): STL and PLY hold seven digits, half a metre in
-        coordinates of UTM size.
+    mesh : Mesh
+    path : str or Path
+    origin_m : array_like, shape (3,), optional
+        Origin of the coordinates in the file. STL and PLY store seven digits, half a metre for
+        coordinates as large as UTM.
     """
     import trimesh
 
+    # A nearby origin preserves the precision of single-precision formats.
     vertices = mesh.vertices_m - np.asarray(origin_m, dtype=float)
     trimesh.Trimesh(vertices, mesh.faces, process=False).export(Path(path))

@@ -1,4 +1,4 @@
-"""A mesh lofted from the outlines of a shell: an independent proof of its volume, and a picture."""
+"""Mesh lofted from the outlines of a shell: an independent check of its volume, and a picture."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,12 +15,12 @@ from tankcal.tank.meshes.checks import closed_mesh
 
 @dataclass(frozen=True)
 class Band:
-    """Rings of the wall from one joint to the next: k heights, q even azimuths from north.
+    """Rings of the wall from a joint to the next: k heights, q evenly spaced azimuths from north.
 
     Attributes
     ----------
     heights_m : ndarray, shape (k,)
-        Ascending, the first and the last at the joints.
+        Ascending heights, the first and the last at the joints.
     radii_m : ndarray, shape (k, q)
         Inside radii about the centre of their ring.
     centre_m : ndarray, shape (k, 2)
@@ -33,15 +33,19 @@ class Band:
 
 
 def shell_bands(volume, *, slices=8, azimuths=720):
-    """The bands of a shell, one a course, from the outlines that its volume is integrated from.
+    """Return the bands of a shell, one for each course, from the outlines of its volume.
 
     Parameters
     ----------
     volume : tankcal.tank.volumes.ShellVolume
-    slices : optional
-        Of a course.
-    azimuths : optional
-        Of a ring.
+    slices : int, optional
+        Slices of a course.
+    azimuths : int, optional
+        Azimuths of a ring.
+
+    Returns
+    -------
+    tuple of Band
     """
     azimuth = np.arange(azimuths) * FULL_TURN / azimuths
     parts = np.linspace(0.0, 1.0, slices + 1)
@@ -49,9 +53,10 @@ def shell_bands(volume, *, slices=8, azimuths=720):
     bands = []
     for course in volume.courses:
         outlines = basis @ course.outlines_m
-        even = np.linspace(0.0, FULL_TURN, outlines.shape[1] + 1)
+        grid = np.linspace(0.0, FULL_TURN, outlines.shape[1] + 1)
         closed = np.column_stack([outlines, outlines[:, 0]])
-        radii = scipy.interpolate.CubicSpline(even, closed, axis=1, bc_type="periodic")(azimuth)
+        # Periodic spline: the outlines have other azimuths than the rings of the mesh.
+        radii = scipy.interpolate.CubicSpline(grid, closed, axis=1, bc_type="periodic")(azimuth)
         heights = course.bottom_m + parts * course.height_m
         heights[-1] = course.top_m
         bands.append(Band(heights, radii, np.zeros((len(parts), 2))))
@@ -59,22 +64,26 @@ def shell_bands(volume, *, slices=8, azimuths=720):
 
 
 def loft(bands):
-    """A closed mesh over bands from the bottom up, with a level bottom and lid.
+    """Return a closed mesh over bands from the bottom up, with a level bottom and lid.
 
-    Neighbouring rings are joined by two triangles an azimuth; a step at a joint is such a strip
-    too, a level one. The mesh falls short of the smooth shape by the square of the spacing.
+    Two triangles for each azimuth connect neighbouring rings. A step at a joint is also such a
+    strip, a level one. The volume of the mesh is too small by the square of the spacing.
 
     Parameters
     ----------
-    bands
-        Of one number of azimuths; each begins at the height where the one below it ends.
+    bands : sequence of Band
+        Bands with equal numbers of azimuths; each starts at the height where the band below ends.
+
+    Returns
+    -------
+    Mesh
 
     Raises
     ------
     ValueError
         For bands that do not fit.
     InputError
-        As `closed_mesh` does.
+        As for `closed_mesh`.
     """
     joints = [(below.heights_m[-1], above.heights_m[0]) for below, above in pairwise(bands)]
     if any(low != high for low, high in joints):
@@ -98,17 +107,18 @@ def loft(bands):
 
 
 def _lofted_faces(vertices, count):
-    """(m, 3) faces of `vertices` in rings of `count`, then the centres of bottom and lid."""
-    here = np.arange(count)
-    following = np.roll(here, -1)
+    """Return faces (m, 3) of `vertices` in rings of `count`, then the centres of bottom and lid."""
+    index = np.arange(count)
+    next_index = np.roll(index, -1)
+    # Index offsets of the rings: each strip connects a ring with the next.
     strips = np.arange(0, vertices - count, count)[:, None, None]
     side = np.concatenate(
         [
-            np.column_stack([here, here + count, following]),
-            np.column_stack([following, here + count, following + count]),
+            np.column_stack([index, index + count, next_index]),
+            np.column_stack([next_index, index + count, next_index + count]),
         ]
     )
     top = vertices - count
-    bottom = np.column_stack([here, following, np.full(count, vertices)])
-    lid = np.column_stack([following + top, here + top, np.full(count, vertices + 1)])
+    bottom = np.column_stack([index, next_index, np.full(count, vertices)])
+    lid = np.column_stack([next_index + top, index + top, np.full(count, vertices + 1)])
     return np.concatenate([(strips + side).reshape(-1, 3), bottom, lid])

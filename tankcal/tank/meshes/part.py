@@ -1,12 +1,12 @@
-"""A closed triangle mesh as a part of a tank: exact volumes, checks, files, and lofts of a shell.
+"""Closed mesh of triangles as a part of a tank, with exact volumes.
 
-With a_T the plan area of triangle T (positive where its outside faces up), the divergence theorem
-gives the volume of the body below height h as a sum over its triangles alone,
+With a_T the plan area of triangle T (positive if its outside faces up), the divergence theorem
+gives the volume of the body below the height h as a sum over its triangles,
 
-    V(h) = - sum a_T mean over T of max(h - z, 0),     A(h) = dV/dh = - sum a_T part of T below h,
+    V(h) = - sum a_T mean over T of max(h - z, 0),     A(h) = dV/dh = - sum a_T part of T below h.
 
-and both means are divided differences of (h - .)+^p over the three corner heights, that is, cubics
-and quadratics in h between them (Hermite-Genocchi; de Boor 2001, A Practical Guide to Splines).
+Both means are divided differences of (h - .)+^p over the three corner heights, that is, cubics and
+quadratics in h between them (Hermite-Genocchi; de Boor 2001, A Practical Guide to Splines).
 """
 
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from tankcal.errors import HeightError
 from tankcal.messages import message
 from tankcal.tank.parts import Part, as_levels
 
-BLOCK = 1 << 16  # faces worked on at a time
+BLOCK = 1 << 16  # faces in an array operation
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """A closed surface of triangles whose corners run anticlockwise seen from outside.
+    """Closed surface of triangles whose corners run anticlockwise seen from outside.
 
     Attributes
     ----------
@@ -32,9 +32,9 @@ class Mesh:
     faces : ndarray, shape (m, 3)
         Indices of the corners.
     bodies : int
-        Number of pieces that share no vertex; a hollow counts as a piece.
+        Number of pieces without common vertices; a hollow counts as a piece.
     notes : tuple of str
-        What was repaired or deserves a look, one line each.
+        Repairs and remarks, one line each.
     """
 
     vertices_m: np.ndarray
@@ -46,18 +46,18 @@ class Mesh:
 
 @dataclass(frozen=True)
 class MeshPart(Part):
-    """A mesh as a part of a tank. Make one with `mesh_part`.
+    """Mesh as a part of a tank; see `mesh_part`.
 
     Attributes
     ----------
     zero_m : float
         Height of level 0 above the lowest vertex, m.
     height_m : float
-        Of the highest vertex above the lowest.
+        Height of the highest vertex above the lowest vertex, m.
     corners_m : ndarray, shape (m, 3)
         Heights of the corners above the lowest vertex, ascending in each row.
     plan_m2 : ndarray, shape (m,)
-        Area of each face seen from above, positive where the outside faces up.
+        Plan area of each face, positive if the outside faces up.
     surface_m2 : ndarray, shape (m,)
         Area of each face.
     """
@@ -75,7 +75,7 @@ class MeshPart(Part):
 
     @property
     def top_m(self):
-        """The highest level."""
+        """Highest level, m."""
         return self.height_m - self.zero_m
 
     @property
@@ -84,12 +84,15 @@ class MeshPart(Part):
         return float(self.volume_m3([self.top_m])[0])
 
     def volume_m3(self, levels_m):
-        """(rows,) volume below each level, zero below the mesh; HeightError above it."""
+        """Return the volume (rows,) below each level, zero below the mesh; HeightError above it."""
         heights = self._heights(levels_m)
         return sums_below(self.corners_m, -self.plan_m2, heights, 3) * (heights > 0)
 
     def area_m2(self, levels_m):
-        """(rows,) free surface at each level: above a level face, but below it at the very top."""
+        """Return the free surface (rows,) at each level.
+
+        It is the surface above a level face; at the very top, the surface below it.
+        """
         heights = self._heights(levels_m)
         area = sums_below(self.corners_m, -self.plan_m2, heights, 2)
         full = heights >= self.height_m
@@ -98,7 +101,7 @@ class MeshPart(Part):
         return area
 
     def wetted_m2(self, levels_m):
-        """(rows,) surface of the mesh in touch with the liquid; the free surface is none of it."""
+        """Return the wetted surface (rows,) of the mesh, without the free surface."""
         heights = self._heights(levels_m)
         lid = self.plan_m2 > 0
         return sums_below(self.corners_m[~lid], self.surface_m2[~lid], heights, 2) + sums_below(
@@ -106,11 +109,11 @@ class MeshPart(Part):
         )
 
     def derivatives(self, levels_m):
-        """{input: (rows,)} derivative of the volumes, m3 per unit of the input.
+        """Return {input: derivative (rows,) of the volumes, m3 per unit of the input}.
 
-        scale    of all coordinates, with level 0 fixed: 3 V - h A
-        surface  an outward offset of the surface along its normal, m: the wetted area
-        datum    lifts level 0, m: the free surface
+        scale    scale of all coordinates, with level 0 fixed: 3 V - h A
+        surface  outward offset of the surface along its normal, m: the wetted area
+        datum    rise of level 0, m: the free surface
         """
         levels = as_levels(levels_m)
         area = self.area_m2(levels)
@@ -121,6 +124,7 @@ class MeshPart(Part):
         }
 
     def _heights(self, levels_m):
+        """Return heights (rows,) above the lowest vertex; raise HeightError above the mesh."""
         heights = as_levels(levels_m) + self.zero_m
         outside = ~(np.isfinite(heights) & (heights <= self.height_m * (1 + 1e-12)))
         if outside.any():
@@ -136,12 +140,17 @@ class MeshPart(Part):
 
 
 def mesh_part(mesh, zero_z_m=None):
-    """The part of a tank that a `Mesh` encloses.
+    """Return the part of a tank enclosed by a `Mesh`.
 
     Parameters
     ----------
-    zero_z_m : optional
-        z of level 0; the lowest vertex when None.
+    mesh : Mesh
+    zero_z_m : float, optional
+        z of level 0; None: the lowest vertex.
+
+    Returns
+    -------
+    MeshPart
     """
     z = mesh.vertices_m[:, 2]
     low = float(z.min())
@@ -156,18 +165,32 @@ def mesh_part(mesh, zero_z_m=None):
 
 
 def normals_of(vertices, faces):
-    """(m, 3) normals, twice the area of their face long."""
+    """Return normals (m, 3) with a length of twice the area of their face."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     return np.cross(b - a, c - a)
 
 
 def sums_below(corners, weights, heights, power, side="left"):
-    """(rows,) sums over faces of weight times mean depth (power 3) or part (2) below each height.
+    """Return sums (rows,) over faces of weight times mean depth or part below each height.
 
-    corners (m, 3) ascending; a level face counts at its own height (side "left") or above it only.
     Each face is a cubic (quadratic) on the heights between its corners. A tree over the ascending
-    heights holds it in the few nodes that cover them, as a polynomial about the node's middle:
-    nothing is evaluated face by height, and nothing cancels.
+    heights stores it in the few nodes that cover these heights, as a polynomial about the middle of
+    the node. This avoids an evaluation for each face and height, and avoids cancellation.
+
+    Parameters
+    ----------
+    corners : ndarray, shape (m, 3)
+        Heights of the corners, ascending.
+    weights : ndarray, shape (m,)
+    heights : array_like, shape (rows,)
+    power : int
+        3: mean depth; 2: part of the face.
+    side : {"left", "right"}
+        A level face counts at its own height ("left") or only above it.
+
+    Returns
+    -------
+    ndarray, shape (rows,)
     """
     rows, inverse = np.unique(heights, return_inverse=True)
     tree = _Tree(rows, power)
@@ -175,12 +198,14 @@ def sums_below(corners, weights, heights, power, side="left"):
     for start in range(0, len(weights), BLOCK):
         z = corners[start : start + BLOCK].T
         weight = weights[start : start + BLOCK]
+        # Three ranges of heights: up to the middle corner, up to the highest corner, and above.
         first, second, third = (np.searchsorted(rows, z[i], side=side) for i in range(3))
         slope += np.bincount(second, weights=weight, minlength=len(slope))
         offset += np.bincount(second, weights=weight * z.sum(axis=0) / 3, minlength=len(slope))
-        tall = np.where(z[2] > z[0], z[2] - z[0], 1.0)
-        share = weight / tall / (3.0 if power == 3 else 1.0)
+        extent = np.where(z[2] > z[0], z[2] - z[0], 1.0)
+        share = weight / extent / (3.0 if power == 3 else 1.0)
         low, high = z[1] - z[0], z[1] - z[2]
+        # Between the two upper corners, the value is that of the whole face less the dry tip.
         tree.add(first, second, z[0], low, {power: share * low ** (power - 1)})
         tree.add(second, third, z[2], high, {power: share * high ** (power - 1)})
     below = slope.cumsum()[:-1]
@@ -190,17 +215,27 @@ def sums_below(corners, weights, heights, power, side="left"):
 
 
 def moments_below(corners, values, weights, heights, side="left"):
-    """(rows, c) sums over faces of weight times the mean, over the part below each height, of
-    functions that are linear on each face; where a face is dry it counts nothing.
+    """Return sums (rows, c) over faces of weight times integral means of linear functions.
 
-    With f0, f1, f2 the values at the ascending corners, T their height, r = z1 - z0 and
-    u = (h - z0) / r, the mean up to the middle corner is
+    The mean is over the part of the face below each height; a dry face contributes zero. With f0,
+    f1, f2 the values at the ascending corners, T their height, r = z1 - z0 and u = (h - z0) / r,
+    the mean up to the middle corner is
 
-        r / T u^2 (f0 + u ((f1 - f0) + r / T (f2 - f0)) / 3),
+        r / T u^2 (f0 + u ((f1 - f0) + r / T (f2 - f0)) / 3).
 
-    the whole less the same of the part above from the other end, beyond it.
+    Beyond the middle corner, it is the mean of the whole face less the corresponding term of the
+    part above, from the other end.
 
-    values  (m, 3, c) at the corners; corners, heights and side as in `sums_below`
+    Parameters
+    ----------
+    corners, weights, heights, side
+        As for `sums_below`.
+    values : ndarray, shape (m, 3, c)
+        Values of the functions at the corners.
+
+    Returns
+    -------
+    ndarray, shape (rows, c)
     """
     rows, inverse = np.unique(heights, return_inverse=True)
     columns = values.shape[2]
@@ -210,17 +245,21 @@ def moments_below(corners, values, weights, heights, side="left"):
         f = np.moveaxis(values[start : start + BLOCK], 0, 2)
         weight = weights[start : start + BLOCK]
         first, second, third = (np.searchsorted(rows, z[i], side=side) for i in range(3))
+        # Above the middle corner: mean of the whole face, less the part cut off at the top.
         for column, mean in enumerate(f.mean(axis=0)):
             whole[:, column] += np.bincount(second, weights=weight * mean, minlength=len(whole))
-        tall = np.where(z[2] > z[0], z[2] - z[0], 1.0)
-        tree.add(first, second, z[0], z[1] - z[0], _cut_corner(f, weight, (z[1] - z[0]) / tall))
-        of_top = _cut_corner(f[::-1], -weight, (z[2] - z[1]) / tall)
+        extent = np.where(z[2] > z[0], z[2] - z[0], 1.0)
+        tree.add(first, second, z[0], z[1] - z[0], _cut_corner(f, weight, (z[1] - z[0]) / extent))
+        of_top = _cut_corner(f[::-1], -weight, (z[2] - z[1]) / extent)
         tree.add(second, third, z[2], z[1] - z[2], of_top)
     return (whole.cumsum(axis=0)[:-1] + tree.values().T)[inverse]
 
 
 def _cut_corner(f, weight, share):
-    """{power of u: (c, m)} of the part cut off corner 0; share: of the height up to corner 1."""
+    """Return {power of u: (c, m)} of the part cut off at corner 0.
+
+    share is the fraction of the height up to corner 1.
+    """
     return {
         2: weight * share * f[0],
         3: weight * share * ((f[1] - f[0]) + share * (f[2] - f[0])) / 3,
@@ -230,7 +269,8 @@ def _cut_corner(f, weight, share):
 class _Tree:
     """Sums of polynomials, each over a range of ascending heights, for all heights at once.
 
-    Node 1 holds all heights, nodes 2 i and 2 i + 1 the halves of node i, the last row one each.
+    Node 1 contains all heights, nodes 2 i and 2 i + 1 the halves of node i, the last row one height
+    each.
     """
 
     def __init__(self, heights, power, columns=1):
@@ -250,39 +290,51 @@ class _Tree:
     def add(self, start, stop, foot, reach, amounts):
         """Add the sum of amounts[p] ((h - foot) / reach)^p to heights[start:stop].
 
-        amounts  {power: (m,) or (columns, m)}
+        Parameters
+        ----------
+        start, stop : ndarray of int, shape (m,)
+            Ranges of heights.
+        foot, reach : ndarray, shape (m,)
+            Origin and scale of each polynomial, m.
+        amounts : dict of int to ndarray, shape (m,) or (columns, m)
+            Coefficients of each power.
         """
-        some = np.flatnonzero(start < stop)
-        left, right = start[some] + self.leaves, stop[some] + self.leaves
+        chosen = np.flatnonzero(start < stop)
+        left, right = start[chosen] + self.leaves, stop[chosen] + self.leaves
+        # Segment tree: a range is the union of at most two nodes in each row.
         while len(left):
             odd = (left & 1).astype(bool)
-            self._store(left[odd], some[odd], foot, reach, amounts)
+            self._store(left[odd], chosen[odd], foot, reach, amounts)
             left = left + odd
             odd = (right & 1).astype(bool)
             right = right - odd
-            self._store(right[odd], some[odd], foot, reach, amounts)
+            self._store(right[odd], chosen[odd], foot, reach, amounts)
             left, right = left >> 1, right >> 1
-            open_ = left < right
-            left, right, some = left[open_], right[open_], some[open_]
+            is_open = left < right
+            left, right, chosen = left[is_open], right[is_open], chosen[is_open]
 
-    def _store(self, nodes, some, foot, reach, amounts):
-        at_middle = (self.middle[nodes] - foot[some]) / reach[some]
-        step = self.half[nodes] / reach[some]
-        of_middle, of_step = [np.ones_like(step)], [np.ones_like(step)]
-        for _ in range(max(amounts)):  # products, for powers of arrays are slow
-            of_middle.append(of_middle[-1] * at_middle)
-            of_step.append(of_step[-1] * step)
+    def _store(self, nodes, chosen, foot, reach, amounts):
+        """Add polynomials to the coefficients of nodes, shifted to the middle of each node."""
+        at_middle = (self.middle[nodes] - foot[chosen]) / reach[chosen]
+        step = self.half[nodes] / reach[chosen]
+        middle_powers, step_powers = [np.ones_like(step)], [np.ones_like(step)]
+        for _ in range(max(amounts)):  # products are faster than powers of arrays
+            middle_powers.append(middle_powers[-1] * at_middle)
+            step_powers.append(step_powers[-1] * step)
         for power, amount in amounts.items():
-            own = np.atleast_2d(amount)[:, some]
+            chosen_amounts = np.atleast_2d(amount)[:, chosen]
             for k in range(power + 1):
-                terms = own * (comb(power, k) * of_middle[power - k] * of_step[k])
+                # Binomial theorem: ((h - foot) / reach)^p in powers of (h - middle) / half.
+                terms = chosen_amounts * (
+                    comb(power, k) * middle_powers[power - k] * step_powers[k]
+                )
                 for column, term in enumerate(terms):
                     self.coefficients[k, column] += np.bincount(
                         nodes, weights=term, minlength=2 * self.leaves
                     )
 
     def values(self):
-        """(columns, len(heights)) sum of all that was added, at each height."""
+        """Return the sum (columns, len(heights)) of all polynomials at each height."""
         total = np.zeros((self.coefficients.shape[1], len(self.heights)))
         leaves = np.arange(len(self.heights)) + self.leaves
         for level in range(self.depth + 1):

@@ -1,4 +1,4 @@
-"""What a decision rule says: limits of the expanded uncertainty, limits of a deviation."""
+"""Data model of a decision rule: limits of the expanded uncertainty, limits of a deviation."""
 
 from dataclasses import dataclass
 
@@ -20,27 +20,27 @@ PERIOD_OF = ("all", "bottom_course")
 
 @dataclass(frozen=True)
 class UncertaintyLimit:
-    """A limit of the expanded uncertainty U.
+    """Limit of the expanded uncertainty U.
 
     Attributes
     ----------
     name : str
-        As the file names it.
+        Name in the file.
     tanks : tuple of str
-        Kinds it is for; (): all.
+        Kinds of tank to which it applies; (): all.
     of : str
-        "volumes": of every row; "capacity": of the highest row; "deliveries": of all of at least
+        "volumes": every row; "capacity": the highest row; "deliveries": all deliveries of at least
         minimum_height_m.
     limit : float or None
-        U over what `relative_to` names; None: U is to be stated, nothing is limited.
+        Limit of U over the quantity in `relative_to`; None: U is to be stated, without limit.
     relative_to : str
         "itself": the row, the capacity, the delivered volume; "capacity".
     minimum_height_m : float or None
-        Of a delivery; None for the others.
+        Least height of a delivery; None for other limits.
     clause : str
-        Where it stands.
+        Reference in the legal text.
     verified : bool
-        Whether it was read there.
+        Whether the value was read in the legal text itself.
     """
 
     name: str
@@ -55,22 +55,22 @@ class UncertaintyLimit:
 
 @dataclass(frozen=True)
 class DeviationLimit:
-    """A limit of the deviation of a volume from a stated one.
+    """Limit of the deviation of a volume from a stated volume.
 
     Attributes
     ----------
     of : str
         "volumes": at any dip; "capacity": of the highest row; "deliveries".
     limit : float or None
-        Part of the stated volume.
+        Fraction of the stated volume.
     limit_m3 : float or None
-        Or an amount; one of them is None.
+        Absolute limit; one of limit and limit_m3 is None.
     side : str
-        "both", "upper": only larger volumes are limited, "lower": only smaller ones.
+        "both"; "upper": only larger volumes are limited; "lower": only smaller volumes.
     guard : str
         "none": accepted up to the limit; "U": up to the limit less U (JCGM 106:2012 8.3.2).
     name, tanks, clause, verified
-        As of an UncertaintyLimit.
+        As for an UncertaintyLimit.
     """
 
     name: str
@@ -86,13 +86,13 @@ class DeviationLimit:
 
 @dataclass(frozen=True)
 class ReferenceHeightLimit:
-    """How far the reference height may be from the former one.
+    """Limit of the change of the reference height since the previous calibration.
 
     Attributes
     ----------
     limit_m : float
     name, tanks, clause, verified
-        As of an UncertaintyLimit.
+        As for an UncertaintyLimit.
     """
 
     name: str
@@ -104,7 +104,7 @@ class ReferenceHeightLimit:
 
 @dataclass(frozen=True)
 class Period:
-    """How old a table may become.
+    """Period of validity of a table.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Period:
         "all": the whole tank; "bottom_course": its lowest course.
     years : float
     name, tanks, clause, verified
-        As of an UncertaintyLimit.
+        As for an UncertaintyLimit.
     """
 
     name: str
@@ -125,22 +125,23 @@ class Period:
 
 @dataclass(frozen=True)
 class Rule:
-    """One jurisdiction's decision rule.
+    """Decision rule of a jurisdiction.
 
     Attributes
     ----------
+    name : str
     source : str
-        Where the values were read.
+        Source of the values.
     verified : bool
-        All of them in the text itself.
+        Whether all values were read in the legal text itself.
     remark : str
-        What is to stand beside it; "": nothing.
+        Remark to be printed with the rule; "": none.
     largest_capacity_m3 : float or None
-        Tanks up to which it is for; None: all.
+        Largest capacity to which the rule applies; None: no limit.
     uncertainty, deviation
-        Its limits of one table.
+        Limits of a table.
     reference_height, periods
-        What it says of a new table beside a former one, besides the deviation.
+        Additional limits of a new table relative to the previous table.
     """
 
     name: str
@@ -155,5 +156,5 @@ class Rule:
 
     @property
     def limits(self):
-        """All of its limits."""
+        """All limits of the rule."""
         return (*self.uncertainty, *self.deviation, *self.reference_height, *self.periods)

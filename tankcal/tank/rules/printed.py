@@ -1,4 +1,4 @@
-"""The expanded uncertainties that are printed, where they are not those of the table."""
+"""Printed expanded uncertainties, where they differ from those of the table."""
 
 from dataclasses import dataclass, field
 
@@ -7,19 +7,19 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Printed:
-    """U of rows and deliveries as papers print them: Monte Carlo's where the GUM's does not hold.
+    """U of rows and deliveries as printed in reports: Monte Carlo where the GUM does not apply.
 
     Attributes
     ----------
     rows_m3 : ndarray, shape (rows,)
         U of the rows.
     by_gum : ndarray, shape (rows,), or None
-        Whether it is the table's own; None: all.
+        Whether U of a row is that of the table; None: all rows.
     pairs_m3 : dict
-        {(low_m, high_m): U} of the deliveries that were simulated.
+        {(low_m, high_m): U} of simulated deliveries.
     factor : float
-        Of U of every other delivery: the largest that a simulated one needed whose volumes are
-        smooth at both dips, at least 1.
+        Factor on U of all other deliveries: the largest ratio among simulated deliveries with
+        smooth volumes at both dips, at least 1.
     """
 
     rows_m3: np.ndarray
@@ -28,9 +28,24 @@ class Printed:
     factor: float = 1.0
 
     def of(self, table, low_m, high_m, U_m3):
-        """U of a volume (low_m None) or of a delivery, whose U by the table is U_m3.
+        """Return the printed U of a volume or of a delivery.
 
-        At a row its own; between two rows, of which one is not the table's, the largest of all.
+        Parameters
+        ----------
+        table : Capacity
+        low_m : float or None
+            Lower dip of a delivery, m; None: the volume below high_m.
+        high_m : float
+            Dip, m.
+        U_m3 : float
+            U of the table.
+
+        Returns
+        -------
+        float
+            For a delivery, the simulated U, otherwise `factor` times U of the table. For a volume
+            at a row, U of the row. Between two rows, of which at least one differs from the table,
+            the largest U of the rows and the table.
         """
         if low_m is not None:
             return self.pairs_m3.get((low_m, high_m), self.factor * U_m3)
@@ -42,5 +57,5 @@ class Printed:
 
 
 def printed_of_table(table):
-    """`Printed` of a table by itself."""
+    """Return the `Printed` with the uncertainties of the table."""
     return Printed(table.U_m3)

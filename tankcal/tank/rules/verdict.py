@@ -1,4 +1,4 @@
-"""All limits of a rule on a table: one verdict for each, and one for the whole."""
+"""All limits of a rule for a table: a verdict for each limit, and a verdict for the rule."""
 
 from dataclasses import dataclass
 
@@ -12,28 +12,27 @@ from tankcal.tank.rules.printed import printed_of_table
 
 @dataclass(frozen=True)
 class RuleVerdict:
-    """What a Rule says of a table.
+    """Verdict of a Rule for a table.
 
     Attributes
     ----------
     rule : Rule
-        The Rule.
     tank : str
-        Kind of tank that it was asked for.
+        Kind of tank.
     code : str
-        "passed": every limit is kept everywhere; "passed_in_part": the uncertainty keeps its limits
-        from some level on; "failed"; "not_accepted": nothing fails, but a deviation lies in a guard
-        band; "stated": nothing is limited; "nothing_to_judge"; "not_all_judged": nothing failed,
-        but `unjudged` limits had nothing to be held against; "not_for_this_tank": no limit for the
-        kind or capacity.
+        "passed": every limit is met everywhere; "passed_in_part": the uncertainty meets its limits
+        from some level on; "failed"; "not_accepted": no limit fails, but a deviation is in a guard
+        band; "stated": the rule has no numerical limit; "nothing_to_judge"; "not_all_judged": no
+        limit failed, but `unjudged` limits could not be applied; "not_for_this_tank": no limit for
+        the kind or capacity.
     verified : bool
-        Whether every value that was used was read in the legal text itself.
+        Whether all values in use were read in the legal text itself.
     capacity_m3 : float
-        Volume of the highest row for use; nan: none is.
+        Volume of the highest row for use; nan: no row is for use.
     uncertainty, deviation
         Verdicts of the limits for this kind of tank.
     unjudged : tuple of str
-        Names of those of its limits that no row, delivery or stated volume is for.
+        Names of the limits without a row, delivery or stated volume.
     """
 
     rule: Rule
@@ -47,18 +46,24 @@ class RuleVerdict:
 
 
 def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
-    """RuleVerdict of a Rule for a Capacity of a kind of tank.
+    """Return the RuleVerdict of a Rule for a Capacity of a kind of tank.
 
     Parameters
     ----------
-    tank
+    rule : Rule
+    table : Capacity
+    tank : str
         One of tankcal.tank.rules.TANKS.
-    lowest_m : optional
-        Dip of the start of the calibrated zone, see `judge_uncertainty`.
-    stated : optional
-        StatedVolumes that the deviations are judged against.
-    printed : optional
-        `Printed` uncertainties, such as Monte Carlo's; None: the table's.
+    lowest_m : float, optional
+        Dip at the start of the calibrated zone, see `judge_uncertainty`.
+    stated : sequence of StatedVolume, optional
+        Stated volumes for the deviations.
+    printed : Printed, optional
+        Printed uncertainties, such as Monte Carlo's; None: those of the table.
+
+    Returns
+    -------
+    RuleVerdict
 
     Raises
     ------
@@ -70,23 +75,25 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
     if tank not in TANKS:
         raise ValueError(f"kind of tank {tank!r}: expected one of {', '.join(TANKS)}")
     printed = printed or printed_of_table(table)
+    # The capacity is the volume of the highest row for use.
     rows = np.flatnonzero(table.for_use(table.height_m))
     capacity = float(table.volume_m3[rows[-1]]) if len(rows) else np.nan
     is_too_large = rule.largest_capacity_m3 is not None and capacity > rule.largest_capacity_m3
-    limits = [] if is_too_large else [one for one in rule.uncertainty if _is_for(one, tank)]
-    others = [] if is_too_large else [one for one in rule.deviation if _is_for(one, tank)]
-    uncertainty = tuple(judge_uncertainty(one, table, lowest_m, printed) for one in limits)
-    pairs = [judge_deviation(limit, table, one, printed) for limit in others for one in stated]
+    limits = [] if is_too_large else [item for item in rule.uncertainty if _applies_to(item, tank)]
+    others = [] if is_too_large else [item for item in rule.deviation if _applies_to(item, tank)]
+    uncertainty = tuple(judge_uncertainty(item, table, lowest_m, printed) for item in limits)
+    pairs = [judge_deviation(limit, table, item, printed) for limit in others for item in stated]
     deviation = tuple(verdict for verdict in pairs if verdict is not None)
     verdicts = (*uncertainty, *deviation)
-    used = [verdict.limit for verdict in verdicts]
-    judged = [v.limit for v in verdicts if v.code not in ("nothing_to_judge", "not_for_use")]
-    unjudged = tuple(one.name for one in (*limits, *others) if one not in judged)
+    applied = [verdict.limit for verdict in verdicts]
+    judged_limits = [v.limit for v in verdicts if v.code not in ("nothing_to_judge", "not_for_use")]
+    # A limit without any verdict must be visible to the user.
+    unjudged = tuple(item.name for item in (*limits, *others) if item not in judged_limits)
     return RuleVerdict(
         rule=rule,
         tank=tank,
         code=_code(verdicts, unjudged) if limits or others else "not_for_this_tank",
-        verified=all(limit.verified for limit in used) if used else rule.verified,
+        verified=all(limit.verified for limit in applied) if applied else rule.verified,
         capacity_m3=capacity,
         uncertainty=uncertainty,
         deviation=deviation,
@@ -95,7 +102,7 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
 
 
 def deliveries_to_check(rule, table, tank):
-    """The deliveries that a rule's limits are decided by, each once.
+    """Return the deliveries that decide the limits of a rule, each once.
 
     Parameters
     ----------
@@ -109,16 +116,22 @@ def deliveries_to_check(rule, table, tank):
     tuple of (float, float)
         Lower and higher dip, m.
     """
-    limits = [one for one in rule.uncertainty if one.of == "deliveries" and _is_for(one, tank)]
+    limits = [
+        candidate
+        for candidate in rule.uncertainty
+        if candidate.of == "deliveries" and _applies_to(candidate, tank)
+    ]
     pairs = [pair for limit in limits for pair in deliveries_to_judge(limit, table)]
     return tuple(dict.fromkeys(pairs))
 
 
-def _is_for(limit, tank):
+def _applies_to(limit, tank):
+    """Whether a limit applies to a kind of tank."""
     return not limit.tanks or tank in limit.tanks
 
 
 def _code(verdicts, unjudged):
+    """Return the code of the rule from the codes of its limits, the most severe first."""
     codes = {verdict.code for verdict in verdicts}
     if "fails" in codes:
         return "failed"

@@ -1,4 +1,4 @@
-"""Tanks of ships and barges: a mesh that is trimmed and listed, sounded along a pipe."""
+"""Tanks of ships and barges: a mesh with trim and list, sounded along a pipe."""
 
 from tankcal.tank.ships.corrections import (
     CellCorrections,

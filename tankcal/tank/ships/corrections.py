@@ -1,13 +1,13 @@
-"""Corrections of soundings for trim and list: what brings a sounding to the table at even keel.
+"""Corrections of soundings for trim and list, relative to the table at even keel.
 
-The correction c of a sounding s at a trim and list is that for which
+The correction c of a sounding s at a trim and list is defined by
 
     V(s + c; even keel) = V(s; trim, list).
 
-What is uncertain of it: with the derivatives D of both volumes by an input, and A = dV/ds of the
-table at even keel, c changes by (D(s; trim, list) - D(s + c; even keel)) / A. What both have in
-common, such as a scale, nearly cancels; trim and list move the first volume alone, for even keel
-is even keel.
+With the derivatives D of both volumes by an input, and A = dV/ds of the table at even keel, the
+input changes c by (D(s; trim, list) - D(s + c; even keel)) / A. Common effects of both volumes,
+such as a scale, nearly cancel. Trim and list change the first volume alone, since even keel is
+exact.
 """
 
 from dataclasses import dataclass
@@ -17,31 +17,31 @@ import numpy as np
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
-GRID = 257  # soundings that bracket a volume first
-CLOSE = 1e-13  # of the capacity: a volume met
-ROUNDS = 60
+GRID = 257  # number of soundings of the first bracket of a volume
+CLOSE = 1e-13  # tolerance of a volume, relative to the capacity
+ROUNDS = 60  # largest number of iterations
 READABLE, BELOW, FULL = "", "below", "full"  # states of a sounding
 
 
 @dataclass(frozen=True)
 class CellCorrections:
-    """Corrections at one trim and list.
+    """Corrections at a trim and list.
 
     Attributes
     ----------
     volume_m3 : ndarray, shape (rows,)
-        At each sounding, no more than the capacity.
+        Volume at each sounding, at most the capacity.
     state : ndarray of str, shape (rows,)
-        "" where the sounding has a correction; "full" where the tank is, or the table at even keel
-        ends with less; "below" where it begins with more.
+        "" for a sounding with a correction; "full" if the tank is full, or the table at even keel
+        ends at a smaller volume; "below" if that table begins at a larger volume.
     even_m : ndarray, shape (rows,)
-        Soundings at even keel of the same volume; nan where there is none.
+        Soundings of equal volume at even keel; nan if there is none.
     dry_m3 : float
         Volume at which the pipe becomes dry.
     full_m : float
         Sounding at which the tank becomes full.
     interpolated_m : float
-        Largest error of a correction that is interpolated half way between two soundings.
+        Largest error of a correction interpolated half way between two soundings.
     """
 
     volume_m3: np.ndarray
@@ -53,35 +53,35 @@ class CellCorrections:
 
 
 def corrections_of(parts, even, soundings_m, top_m=np.inf):
-    """`CellCorrections` of each trim and list, their volumes inverted all at once.
+    """Return the `CellCorrections` of each trim and list.
 
     Parameters
     ----------
     parts : sequence of PipedMesh
         One for each trim and list.
     even : PipedMesh
-        At even keel.
+        Mesh at even keel.
     soundings_m : ndarray, shape (rows,)
-        From the pipe's lower end, 0 first, ascending.
+        Soundings from the lower end of the pipe, ascending from 0.
     top_m : float, optional
-        Sounding that the table at even keel ends at, a whole millimetre: what is above it counts
-        as full.
+        Last sounding of the table at even keel, a whole millimetre: larger soundings count as full.
 
     Returns
     -------
     list of CellCorrections
     """
     soundings = np.asarray(soundings_m, dtype=float)
-    middles = (soundings[:-1] + soundings[1:]) / 2
-    every = np.concatenate([soundings, middles])
-    volumes = np.array([one.volume_m3(np.minimum(every, one.top_m)) for one in parts])
-    full = every >= np.array([one.top_m for one in parts])[:, None]
-    below = ~full & (volumes < even.dry_m3)
+    midpoints = (soundings[:-1] + soundings[1:]) / 2
+    all_soundings = np.concatenate([soundings, midpoints])
+    volumes = np.array([mesh.volume_m3(np.minimum(all_soundings, mesh.top_m)) for mesh in parts])
+    is_full = all_soundings >= np.array([mesh.top_m for mesh in parts])[:, None]
+    is_below = ~is_full & (volumes < even.dry_m3)
     even_m = np.full(volumes.shape, np.nan)
-    even_m[~full & ~below] = soundings_of_volumes(even, volumes[~full & ~below])
-    full |= even_m > top_m
-    even_m[full] = np.nan
-    state = np.where(full, FULL, np.where(below, BELOW, READABLE))
+    # The volumes of all trims and lists are inverted at once.
+    even_m[~is_full & ~is_below] = soundings_of_volumes(even, volumes[~is_full & ~is_below])
+    is_full |= even_m > top_m
+    even_m[is_full] = np.nan
+    state = np.where(is_full, FULL, np.where(is_below, BELOW, READABLE))
     rows = len(soundings)
     return [
         CellCorrections(
@@ -90,26 +90,36 @@ def corrections_of(parts, even, soundings_m, top_m=np.inf):
             even_m[i, :rows],
             float(volumes[i, 0]),
             part.top_m,
-            _interpolated(even_m[i, :rows] - soundings, even_m[i, rows:] - middles),
+            _interpolation_error(even_m[i, :rows] - soundings, even_m[i, rows:] - midpoints),
         )
         for i, part in enumerate(parts)
     ]
 
 
-def _interpolated(correction, exact):
-    between = (correction[:-1] + correction[1:]) / 2
-    return float(np.nanmax(np.abs(between - exact), initial=0.0))
+def _interpolation_error(correction, exact):
+    """Return the largest error of corrections interpolated half way between soundings."""
+    interpolated = (correction[:-1] + correction[1:]) / 2
+    return float(np.nanmax(np.abs(interpolated - exact), initial=0.0))
 
 
 def soundings_of_volumes(part, volumes_m3):
-    """(n,) soundings of a `PipedMesh` at which it holds given volumes: the exact inverse.
+    """Return soundings (n,) of a `PipedMesh` for given volumes: the exact inverse.
 
-    Newton's method, kept in a bracket that each round makes smaller.
+    Newton's method, safeguarded by a bracket that each iteration reduces.
+
+    Parameters
+    ----------
+    part : PipedMesh
+    volumes_m3 : array_like, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
 
     Raises
     ------
     SolutionError
-        For a volume that the tank does not hold between its lowest sounding and the full tank.
+        For a volume that is not between the volumes at the lowest sounding and of the full tank.
     """
     volumes = np.asarray(volumes_m3, dtype=float)
     capacity = part.capacity_m3
@@ -127,24 +137,30 @@ def soundings_of_volumes(part, volumes_m3):
             )
         )
     grid = np.linspace(0.0, part.top_m, GRID)
-    held = np.maximum.accumulate(part.volume_m3(grid))
-    upper = np.clip(np.searchsorted(held, volumes), 1, GRID - 1)
+    # Rounding may make the volumes fall slightly; the bracket requires ascending values.
+    volumes_on_grid = np.maximum.accumulate(part.volume_m3(grid))
+    upper = np.clip(np.searchsorted(volumes_on_grid, volumes), 1, GRID - 1)
     low, high = grid[upper - 1].copy(), grid[upper].copy()
-    share = (volumes - held[upper - 1]) / np.maximum(held[upper] - held[upper - 1], slack)
-    found = low + np.clip(share, 0.0, 1.0) * (high - low)
-    todo = np.arange(len(volumes))
+    share = (volumes - volumes_on_grid[upper - 1]) / np.maximum(
+        volumes_on_grid[upper] - volumes_on_grid[upper - 1], slack
+    )
+    soundings = low + np.clip(share, 0.0, 1.0) * (high - low)
+    open_indices = np.arange(len(volumes))
     for _ in range(ROUNDS):
-        over = part.volume_m3(found[todo]) - volumes[todo]
-        high[todo[over >= 0]] = found[todo[over >= 0]]
-        low[todo[over < 0]] = found[todo[over < 0]]
-        wide = high[todo] - low[todo] > 4 * np.finfo(float).eps * part.top_m
-        left = (np.abs(over) > slack) & wide
-        todo, over = todo[left], over[left]
-        if len(todo) == 0:
+        excess = part.volume_m3(soundings[open_indices]) - volumes[open_indices]
+        high[open_indices[excess >= 0]] = soundings[open_indices[excess >= 0]]
+        low[open_indices[excess < 0]] = soundings[open_indices[excess < 0]]
+        is_wide = high[open_indices] - low[open_indices] > 4 * np.finfo(float).eps * part.top_m
+        unfinished = (np.abs(excess) > slack) & is_wide
+        open_indices, excess = open_indices[unfinished], excess[unfinished]
+        if len(open_indices) == 0:
             break
-        area = part.area_m2(found[todo])
-        step = np.divide(over, area, out=np.full(len(todo), np.inf), where=area > 0)
-        newton = found[todo] - step
-        inside = (newton > low[todo]) & (newton < high[todo])
-        found[todo] = np.where(inside, newton, (low[todo] + high[todo]) / 2)
-    return found
+        area = part.area_m2(soundings[open_indices])
+        step = np.divide(excess, area, out=np.full(len(open_indices), np.inf), where=area > 0)
+        newton = soundings[open_indices] - step
+        # A Newton step outside the bracket is replaced by bisection.
+        inside = (newton > low[open_indices]) & (newton < high[open_indices])
+        soundings[open_indices] = np.where(
+            inside, newton, (low[open_indices] + high[open_indices]) / 2
+        )
+    return soundings

@@ -1,4 +1,4 @@
-"""Is each number plausible? The ranges and cross-checks of `tankcal.job.plausibility`."""
+"""Plausibility of single numbers: ranges and cross-checks of `tankcal.job.plausibility`."""
 
 from tankcal.job.checks.plausible.levels import check_dates, check_levels
 from tankcal.job.checks.plausible.liquid import check_metering
@@ -11,7 +11,7 @@ __all__ = ["check_metering", "check_plausible"]
 
 
 def check_plausible(values, tables, extent, kind, raw, log):
-    """Every check of the readable values; arguments as in `checks.check_tank`."""
+    """Run every plausibility check; parameters as for `checks.check_tank`."""
     check_dates(values, raw, log)
     check_material(values, kind, raw, log)
     check_sizes(values, kind, raw, log)

@@ -1,4 +1,4 @@
-"""Heights of the datum: bottom, dip plate, top of the shell, reference point."""
+"""Plausibility of dates and of the heights of bottom, dip plate, shell top and reference point."""
 
 import datetime
 
@@ -22,13 +22,14 @@ from tankcal.job.plausibility import (
 )
 from tankcal.messages import message
 
-# Days of the survey and of issue, against today's.
+# Dates of survey and issue, compared with today.
 
 
 def check_dates(values, raw, log):
-    """A survey lies in the past, and not before tanks were calibrated; an issue is near.
+    """Check the dates of survey and issue.
 
-    One that is planned may lie ahead.
+    A survey lies in the past, after the first tank calibrations; a planned survey may lie in the
+    future. The date of issue is close to today.
     """
     today = datetime.date.today()
     surveyed = _day(values["survey"]["date"])
@@ -67,11 +68,11 @@ def _day(text):
     return None if text is None else datetime.date.fromisoformat(text)
 
 
-MIN_RIM = 6  # points of the bottom near the wall
+MIN_RIM = 6  # smallest number of bottom points near the wall
 
 
 def check_levels(values, tables, extent, kind, raw, log):
-    """Arguments as in `checks.check_tank`."""
+    """Check the heights of the datum; parameters as for `checks.check_tank`."""
     _check_dip_plate(values, tables, extent, kind, raw, log)
     _check_reference(values, extent, raw, log)
     if kind == "vertical":
@@ -127,23 +128,23 @@ def _check_top(values, raw, log):
 
 
 def _check_slope(values, raw, log):
-    """A cone or a dish that rises where the drawing falls, or more than any does."""
+    """Compare the slope of a bottom with the drawing, or with the steepest usual slope."""
     centre, edge = values["bottom"]["centre_z_m"], values["datum"]["bottom_z_m"]
-    diameter, drawn = values["tank"]["nominal_diameter_m"], values["checks"]["bottom_slopes"]
+    diameter, declared = values["tank"]["nominal_diameter_m"], values["checks"]["bottom_slopes"]
     if None in (centre, edge) or centre == edge:
         return
     found = "up" if centre > edge else "down"
-    if drawn is not None and drawn != found:
+    if declared is not None and declared != found:
         text = message(
             "bottom_slopes_otherwise",
             "{rise_m:+.3g} m from the edge (datum.bottom_z_m), so the bottom slopes {found} "
             "to its centre, but checks.bottom_slopes is {drawn}; expected both to agree",
             rise_m=centre - edge,
             found=found,
-            drawn=drawn,
+            drawn=declared,
         )
         tell(log.problem, raw, "bottom", "centre_z_m", text)
-    elif drawn is None and diameter is not None and centre - edge > SLOPE_UP * diameter / 2:
+    elif declared is None and diameter is not None and centre - edge > SLOPE_UP * diameter / 2:
         text = message(
             "bottom_rises_much",
             "{rise_m:+.3g} m from the edge (datum.bottom_z_m), which is steep for a bottom that "
@@ -152,8 +153,8 @@ def _check_slope(values, raw, log):
         )
         tell(log.warning, raw, "bottom", "centre_z_m", text)
 
-    elif drawn is None and (diameter is None or abs(centre - edge) <= STEEP_FACTOR * diameter):
-        text = message(  # a steeper one is asked about already
+    elif declared is None and (diameter is None or abs(centre - edge) <= STEEP_FACTOR * diameter):
+        text = message(  # a steeper bottom is reported elsewhere
             "bottom_slopes_unsaid",
             "blank; the bottom slopes {found} to its centre by {rise_m:.3g} m, and no other "
             "entry confirms it; expected up or down, as on the drawing",
@@ -164,16 +165,16 @@ def _check_slope(values, raw, log):
 
 
 def _check_rim(values, table, log):
-    """Bottom points near the wall lie at the bottom of the shell."""
+    """Compare bottom points near the wall with the bottom of the shell."""
     edge, diameter = values["datum"]["bottom_z_m"], values["tank"]["nominal_diameter_m"]
     xyz = places_of(table)
     if None in (edge, diameter) or len(xyz) < MIN_RIM or table.columns["x_m"] is None:
         return
     low, high = xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)
-    far = np.hypot(*(xyz[:, :2] - (low + high) / 2).T) > RIM * diameter / 2
-    if far.sum() < MIN_RIM:
+    is_near_wall = np.hypot(*(xyz[:, :2] - (low + high) / 2).T) > RIM * diameter / 2
+    if is_near_wall.sum() < MIN_RIM:
         return
-    miss = float(np.median(xyz[far, 2]) - edge)
+    miss = float(np.median(xyz[is_near_wall, 2]) - edge)
     if abs(miss) > RIM_MISS_M:
         text = message(
             "rim_off",

@@ -1,4 +1,4 @@
-"""Liquid that calibrates a tank: temperatures, expansion, meters, their flow, their batches."""
+"""Plausibility of a calibration with liquid: temperatures, expansion, meters, flows, batches."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ L_MIN_PER_M3_H = 1000 / 60
 
 
 def check_metering(values, tables, registers, raw, log):
-    """Warnings of readings that can be, but hardly are; arguments as in `checks.check_all`."""
+    """Warn about implausible readings; parameters as for `checks.check_all`."""
     if not is_metered(tables) or not tables["liquid"].rows:
         return
     table, meters = tables["liquid"], registers["meters"]
@@ -34,9 +34,9 @@ def check_metering(values, tables, registers, raw, log):
         _check_beside_one_another(table, log)
     _check_drift(meters, raw, log)
     names = meters_read(table, meters)
-    for name, one in meters.items():
-        rows = [k for k, read in enumerate(names) if read == name]
-        _check_flow(table, rows, name, one, log)
+    for name, meter in meters.items():
+        rows = [k for k, meter_name in enumerate(names) if meter_name == name]
+        _check_flow(table, rows, name, meter, log)
     _check_sizes(table, names, meters, log)
 
 
@@ -55,44 +55,44 @@ def _check_expansion(values, raw, log):
 
 
 def _check_ranges(table, values, log):
-    """One warning for each column with a temperature that is no liquid's; True where one is told.
+    """Warn once for each column with an implausible temperature; returns True after a warning.
 
-    A hint at Fahrenheit where most of the column would be plausible in it.
+    A hint at degrees Fahrenheit shows the converted value.
     """
     low, high = LIQUID_C[values["checks"]["service"] or AMBIENT]
-    told = False
+    is_reported = False
     for column in TEMPERATURES:
-        found = table.numbers(column)
-        beyond = (found < low) | (found > high)
-        if not beyond.any():
+        temperature_c = table.numbers(column)
+        is_beyond = (temperature_c < low) | (temperature_c > high)
+        if not is_beyond.any():
             continue
-        first, told = int(np.argmax(beyond)), True
+        first, is_reported = int(np.argmax(is_beyond)), True
         text = message(
             "metered_temperature_strange",
             "{found_c:g} degC, expected {low_c:g} to {high_c:g}, in {count} of {all} rows: in"
             " degrees Fahrenheit, which would be {celsius_c:.1f} degC? For a tank that is hot or"
             " cold by its service, say so in checks.service",
-            found_c=float(found[first]),
+            found_c=float(temperature_c[first]),
             low_c=low,
             high_c=high,
-            count=int(beyond.sum()),
-            all=int(np.isfinite(found).sum()),
-            celsius_c=(float(found[first]) - FAHRENHEIT_ZERO) * FAHRENHEIT_STEP,
+            count=int(is_beyond.sum()),
+            all=int(np.isfinite(temperature_c).sum()),
+            celsius_c=(float(temperature_c[first]) - FAHRENHEIT_ZERO) * FAHRENHEIT_STEP,
         )
         log.warning(table.file, text, table.rows[first], column)
-    return told
+    return is_reported
 
 
 def _check_beside_one_another(table, log):
-    """Meter against tank, shell against tank, and dip against dip: the worst row of each."""
+    """Compare meter and tank, shell and tank, consecutive dips; report the worst row each."""
     meter, tank, shell = (table.numbers(column) for column in TEMPERATURES)
-    for column, found, most in (
+    for column, difference, most in (
         ("meter_temperature_c", meter - tank, METER_OVER_TANK_K),
         ("shell_temperature_c", shell - tank, SHELL_OVER_LIQUID_K),
     ):
-        apart = np.nan_to_num(np.abs(found))
-        if apart.max() > most:
-            worst = int(np.argmax(apart))
+        distance = np.nan_to_num(np.abs(difference))
+        if distance.max() > most:
+            worst = int(np.argmax(distance))
             text = message(
                 "temperatures_far_apart",
                 "{found_c:g} degC, and the liquid in the tank had {tank_c:g}: expected at most"
@@ -101,7 +101,7 @@ def _check_beside_one_another(table, log):
                 found_c=float(table.numbers(column)[worst]),
                 tank_c=float(tank[worst]),
                 most_k=most,
-                count=int((apart > most).sum()),
+                count=int((distance > most).sum()),
             )
             log.warning(table.file, text, table.rows[worst], column)
     for places in place_runs(table).values():
@@ -121,10 +121,10 @@ def _check_beside_one_another(table, log):
 
 def _check_drift(meters, raw, log):
     register = raw.registers.get("meters")
-    for name, one in meters.items():
-        if None in (one["factor"], one["factor_after"]):
+    for name, keys in meters.items():
+        if None in (keys["factor"], keys["factor_after"]):
             continue
-        drift = one["factor_after"] / one["factor"] - 1
+        drift = keys["factor_after"] / keys["factor"] - 1
         row = register.entries[name]["factor_after"].row or register.rows.get(name)
         if abs(drift) > MUCH_METER_DRIFT * (1 + 1e-9):
             text = message(
@@ -148,14 +148,14 @@ def _check_drift(meters, raw, log):
 
 
 def _check_flow(table, rows, name, meter, log):
-    """One warning for a meter that was read out of the range it was proved for."""
+    """Warn about flow rates outside the range of the proving of a meter."""
     flows = table.numbers("flow_m3_h")[rows]
     low = 0.0 if meter["flow_min_m3_h"] is None else meter["flow_min_m3_h"]
     high = np.inf if meter["flow_max_m3_h"] is None else meter["flow_max_m3_h"]
-    beyond = (flows < low) | (flows > high)
-    if not beyond.any():
+    is_beyond = (flows < low) | (flows > high)
+    if not is_beyond.any():
         return
-    first = int(np.argmax(beyond))
+    first = int(np.argmax(is_beyond))
     flow = float(flows[first])
     in_litres = low * L_MIN_PER_M3_H <= flow <= high * L_MIN_PER_M3_H and flow > high
     text = message(
@@ -166,7 +166,7 @@ def _check_flow(table, rows, name, meter, log):
         name=name,
         low_m3_h=low,
         high_m3_h=high,
-        count=int(beyond.sum()),
+        count=int(is_beyond.sum()),
         all=int(np.isfinite(flows).sum()),
         hint=message("flow_in_litres", ": is it in litres per minute?") if in_litres else "",
     )
@@ -174,8 +174,8 @@ def _check_flow(table, rows, name, meter, log):
 
 
 def _check_sizes(table, names, meters, log):
-    """One warning where batches are too small for what the meter repeats to."""
-    own = table.of("s_volume_l")
+    """Warn about batches that are too small for the repeatability of the meter."""
+    row_sds = table.of("s_volume_l")
     small = []
     for step in steps_of(table):
         meter = meters.get(names[step.place])
@@ -183,8 +183,8 @@ def _check_sizes(table, names, meters, log):
             continue
         size = abs(step.volume_m3)
         sd = np.hypot(meter["repeatability_ppm"] / 1e6 * size, (meter["fixed_l"] or 0.0) / 1000)
-        if own[step.place] is not None:
-            sd = own[step.place] / 1000
+        if row_sds[step.place] is not None:
+            sd = row_sds[step.place] / 1000
         if sd > BATCH_SD * size * (1 + 1e-9):
             small.append((size, sd, step.place))
     if small:

@@ -1,4 +1,4 @@
-"""Temperatures, expansion and Young's modulus of the shell."""
+"""Plausibility of temperatures, thermal expansion and Young's modulus of the shell."""
 
 from tankcal.job.checking import is_not_given, loads_the_shell, tell
 from tankcal.job.plausibility import (
@@ -17,7 +17,7 @@ FAHRENHEIT_ZERO, FAHRENHEIT_STEP = 32.0, 5 / 9
 
 
 def check_material(values, kind, raw, log):
-    """Temperatures of the season and the service; constants of the metal that was named."""
+    """Check temperatures for the service, and constants for the metal; as `check_plausible`."""
     _check_temperatures(values, raw, log)
     shell = values["checks"]["shell"] or CARBON_STEEL
     _check_expansion(values, shell, raw, log)
@@ -54,7 +54,7 @@ def _check_temperatures(values, raw, log):
 
 
 def _check_range(found, bounds, section, key, raw, log):
-    """Is a temperature one of the service? Returns False after telling a warning."""
+    """Return False, after a warning, if a temperature is implausible for the service."""
     if not _beyond(found, bounds):
         return True
     text = message(
@@ -92,7 +92,7 @@ def _check_expansion(values, shell, raw, log):
         if corrected and values["corrections"]["temperature"] is not False:
             _check_given("expansion_per_k", shell, raw, log)
     elif bounds is not None and _beyond(found, bounds):
-        others = [one for one in EXPANSION_PER_K if not _beyond(found, EXPANSION_PER_K[one])]
+        others = [metal for metal in EXPANSION_PER_K if not _beyond(found, EXPANSION_PER_K[metal])]
         hint = message("power_of_ten", "is a digit or a power of ten wrong?")
         if others:
             hint = message(

@@ -1,4 +1,4 @@
-"""Plates and paint: against the head that they carry, the diameter, and each other."""
+"""Plausibility of plates and paint: for the liquid head, the diameter, and other plates."""
 
 import numpy as np
 
@@ -22,12 +22,12 @@ WATER_KG_M3 = 1000.0
 
 
 def check_plates(values, tables, kind, raw, log):
-    """Plates of courses, or of a lying cylinder or a sphere."""
+    """Check the plates of courses, or of a lying cylinder or a sphere."""
     courses = tables["courses"]
     if kind == "vertical" and courses is not None:
         _check_courses(values, courses, log)
-        seen = is_strapped(tables) or may_be_hit_from_both_sides(tables)
-        _check_paint(values, courses, seen, log)
+        is_outside_seen = is_strapped(tables) or may_be_hit_from_both_sides(tables)
+        _check_paint(values, courses, is_outside_seen, log)
     elif kind in SOLID_PLATES_MM:
         _check_solid(values, kind, raw, log)
 
@@ -79,7 +79,7 @@ def _of_course(plate, limit, head, diameter):
     return {"found_mm": plate, "limit_mm": limit, "head_m": head, "diameter_m": diameter}
 
 
-def _check_paint(values, courses, seen, log):
+def _check_paint(values, courses, is_outside_seen, log):
     paints = courses.of("paint_mm")
     for row, paint in zip(courses.rows, paints, strict=True):
         if paint is not None and paint > PAINT_MM:
@@ -90,8 +90,8 @@ def _check_paint(values, courses, seen, log):
                 most_mm=PAINT_MM,
             )
             log.warning(courses.file, text, row, "paint_mm")
-    outside = values["survey"]["side"] != "inside" or seen
-    if not outside and any(paints):
+    is_subtracted = values["survey"]["side"] != "inside" or is_outside_seen
+    if not is_subtracted and any(paints):
         text = message(
             "paint_of_inside",
             "paint is given, which is subtracted only from what was measured outside, but "

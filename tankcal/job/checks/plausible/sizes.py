@@ -1,4 +1,4 @@
-"""Sizes of lying cylinders and spheres: against the drawing, and against each other."""
+"""Plausibility of dimensions of lying cylinders, spheres and heads, and of rings of points."""
 
 import numpy as np
 
@@ -26,11 +26,11 @@ from tankcal.job.plausibility import (
 from tankcal.messages import message
 from tankcal.tank.tips import FORMS as HEADS
 
-# Level rings of points against the joints of the courses.
+# Level rings of points, compared with the joints of the courses.
 
 
 def check_rings(values, points, courses, log):
-    """Rings are surveyed on plates: one at a joint speaks of wrong heights, or of their order."""
+    """Warn about a ring of points at a joint, which indicates wrong heights or wrong order."""
     bottom = values["datum"]["bottom_z_m"]
     heights = course_heights(courses)
     if points is None or bottom is None or heights is None or len(heights) < 2:
@@ -39,8 +39,8 @@ def check_rings(values, points, courses, log):
     if not len(rings):
         return
     joints = np.cumsum(heights)[:-1]
-    near, at = _nearest(rings, joints)
-    if near > NEAR_JOINT_M:
+    distance, joint = _nearest(rings, joints)
+    if distance > NEAR_JOINT_M:
         return
     hint = message("heights_right", "are the heights of the courses and datum.bottom_z_m right?")
     if _nearest(rings, np.cumsum(heights[::-1])[:-1])[0] > 2 * NEAR_JOINT_M:
@@ -49,22 +49,22 @@ def check_rings(values, points, courses, log):
         "ring_on_joint",
         "a ring of points lies {near_mm:.0f} mm from the joint above course {course}, which is"
         " {joint_m:.4g} m above datum.bottom_z_m; expected rings on plates: {hint}",
-        near_mm=1000 * near,
-        course=courses.of("course")[at],
-        joint_m=joints[at],
+        near_mm=1000 * distance,
+        course=courses.of("course")[joint],
+        joint_m=joints[joint],
         hint=hint,
     )
-    log.warning(courses.file, text, courses.rows[at], "height_m")
+    log.warning(courses.file, text, courses.rows[joint], "height_m")
 
 
 def _nearest(rings, joints):
-    """Smallest distance of a ring from a joint, and the place of that joint."""
-    away = np.abs(rings[:, None] - joints).min(axis=0)
-    return float(away.min()), int(away.argmin())
+    """Smallest distance of a ring from a joint, and index of this joint."""
+    distances = np.abs(rings[:, None] - joints).min(axis=0)
+    return float(distances.min()), int(distances.argmin())
 
 
 def _rings(z):
-    """Heights of level rings; none where the points do not lie in rings."""
+    """Heights of level rings; empty if the points do not form rings."""
     z = np.sort(z)
     parts = np.split(z, np.flatnonzero(np.diff(z) > RING_GAP_M) + 1)
     level = [part for part in parts if len(part) >= MIN_POINTS_PER_COURSE]
@@ -80,7 +80,7 @@ ALIKE = dict.fromkeys(END_DEPTH, ("depth_m",)) | {
 
 
 def check_sizes(values, kind, raw, log):
-    """Sizes of the kinds that are given by sizes."""
+    """Check the dimensions of tanks that are described by dimensions, and of heads."""
     if kind in ("sphere", "horizontal"):
         _check_inside(values, kind, raw, log)
     if kind == "sphere":
@@ -92,7 +92,7 @@ def check_sizes(values, kind, raw, log):
 
 
 def _check_inside(values, kind, raw, log):
-    """A diameter that was measured, against a drawing that says which one its own is."""
+    """Compare a measured diameter with a nominal diameter of known definition."""
     found, side = values[kind]["diameter_m"], values["survey"]["side"]
     plate = (values[kind]["thickness_mm"] or 0.0) / 1000
     if None in (found, side):
@@ -138,7 +138,7 @@ def _check_lying(values, raw, log):
 
 
 def _compare(found, nominal, section, key, drawn, raw, log):
-    """A size against the drawing's."""
+    """Compare a dimension with the drawing."""
     if None in (found, nominal) or abs(found - nominal) <= SIZE_MISS * nominal + SIZE_MISS_M:
         return
     text = message(
@@ -201,7 +201,7 @@ def _check_end(given, end, diameter, raw, log):
 
 
 def _check_top(values, raw, log):
-    """The head on an upright tank."""
+    """Check the depth of the head on a vertical tank."""
     form, depth = values["top"]["form"], values["top"]["depth_m"]
     diameter = values["tank"]["nominal_diameter_m"]
     if None not in (form, depth, diameter):
@@ -226,7 +226,7 @@ def _check_depth(section, key, depth, form, diameter, raw, log):
 
 
 def _check_alike(given, sizes, raw, log):
-    """Two ends of one form."""
+    """Warn about different dimensions of two ends of one form."""
     for name in sizes:
         a, b = (given[f"end_{end}_{name}"] for end in "ab")
         if None in (a, b) or abs(a - b) < max(ENDS_DIFFER_M, (ENDS_DIFFER - 1) * min(a, b)):

@@ -1,4 +1,4 @@
-"""Targets on a wall: how far their centres may be from it."""
+"""Plausibility of the distance of targets from the wall."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from tankcal.messages import message
 
 
 def check_targets(values, tables, log):
-    """Offsets that targets of their kind do not have: one line for all of them.
+    """Warn once about offsets that do not fit the kind of target.
 
     An offset is subtracted from every radius, and no reading of the survey contradicts it.
     """
@@ -18,17 +18,17 @@ def check_targets(values, tables, log):
     kind = values["checks"]["targets"] or FLAT
     offset = np.nan_to_num(table.numbers("offset_mm"))
     least, most = TARGET_MM[kind]
-    strange = np.flatnonzero((offset < least) | (offset > most))
-    if len(strange) == 0:
+    outliers = np.flatnonzero((offset < least) | (offset > most))
+    if len(outliers) == 0:
         return
-    worst = strange[int(np.argmax(np.abs(offset[strange])))]
+    worst = outliers[int(np.argmax(np.abs(offset[outliers])))]
     text = message(
         "target_offset_strange",
         "{found_mm:g} mm from the wall to the centre of the target, {count} targets of {all} so;"
         " expected {least_mm:g} to {most_mm:g} mm with checks.targets = {kind}: is it in another"
         " unit or the constant of a prism, or are the targets {other}?",
         found_mm=float(offset[worst]),
-        count=len(strange),
+        count=len(outliers),
         all=len(offset),
         least_mm=least,
         most_mm=most,

@@ -1,7 +1,7 @@
-"""Does the survey make sense, as far as its files alone can tell?
+"""Checks of the files of a survey before its adjustment.
 
-What only the adjustment can tell (a swapped point, an undetermined one, a datum that is missing or
-in excess) is told after it.
+The adjustment detects further faults: a swapped or undetermined point, a missing or redundant
+datum.
 """
 
 from tankcal.job.checking import has_rows, tell
@@ -14,9 +14,14 @@ __all__ = ["check_survey"]
 
 
 def check_survey(values, tables, registers, raw, is_whole, log):
-    """All checks of the survey's files that the readable parts allow.
+    """Run all checks of the files of the survey that the readable parts allow.
 
-    is_whole  False: the survey alone is asked for, so that it must be there
+    Parameters
+    ----------
+    values, tables, registers, raw, log
+        As for `checks.check_all`.
+    is_whole : bool
+        False: the job is only adjusted, so that a survey is required.
     """
     if not has_survey(tables):
         if not (is_whole and is_sighted(tables)):
@@ -29,10 +34,10 @@ def check_survey(values, tables, registers, raw, is_whole, log):
             "come from its adjustment",
         )
         log.problem(tables["points"].file, expected)
-    told = frozenset((problem.file, problem.row) for problem in log.problems)
+    reported = frozenset((problem.file, problem.row) for problem in log.problems)
     from tankcal.job.checks.survey.whole import check_files
 
-    check_files(values, tables, registers, raw, log, told)
+    check_files(values, tables, registers, raw, log, reported)
 
 
 def _tell_nothing_to_adjust(values, tables, raw, is_whole, log):

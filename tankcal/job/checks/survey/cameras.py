@@ -1,4 +1,4 @@
-"""cameras.toml and [adjustment.camera]: format and pixels of a camera, its names and blocks."""
+"""Checks of cameras.toml and [adjustment.camera]: format and pixels, names, block parameters."""
 
 import numpy as np
 
@@ -14,47 +14,47 @@ from tankcal.job.checks.survey.lens import (
 from tankcal.job.contract.registers import PARAMETER_KEYS, SECOND_NAMES
 from tankcal.messages import message
 
-SAME_SIZE = 0.01
-SMALLEST_PIXEL_UM, LARGEST_FORMAT_MM = 0.1, 1000
-PART_OF_PIXEL = 0.1  # by which a format in mm may miss a whole number of pixels
+SAME_SIZE = 0.01  # largest relative difference of two statements of the format
+SMALLEST_PIXEL_UM, LARGEST_FORMAT_MM = 0.1, 1000  # limits of plausible units
+PART_OF_PIXEL = 0.1  # largest difference of a format from whole pixels, in pixels
 
 
 def check_cameras(files):
-    """Each camera by itself, and with the settings of [adjustment.camera]."""
+    """Check each camera alone and with the settings of [adjustment.camera]."""
     settings = None if files.values is None else files.values["adjustment.camera"]
     if settings is not None:
         _refuse_two_names(files, settings)
         _refuse_two_blocks(files, settings)
     for name, given in files.registers["cameras"].items():
-        is_sound = _check_format(files, name, given)
+        is_valid = _check_format(files, name, given)
         check_affinity(files, name, given)
         check_focus(files, name, given)
         if settings is not None:
             parameters = parameters_of(given, settings)
             check_convention(files, name, given, parameters)
             check_states(files, name, parameters)
-        if is_sound:
+        if is_valid:
             check_sizes(files, name, given)
 
 
 def check_calibrations(files, in_pixels=True):
-    """Each camera by itself, of a file of cameras that belongs to no job.
+    """Check each camera of a file that belongs to no job.
 
-    in_pixels  whether the size of a pixel must be known
+    in_pixels is True if the size of a pixel is required.
     """
     none_adjusted = dict.fromkeys((*PARAMETER_KEYS, *SECOND_NAMES.values())) | {"default": "off"}
     for name, given in files.registers["cameras"].items():
-        is_sound = _check_format(files, name, given)
+        is_valid = _check_format(files, name, given)
         check_affinity(files, name, given)
         check_focus(files, name, given)
         check_convention(files, name, given, parameters_of(given, none_adjusted))
-        if is_sound:
+        if is_valid:
             _check_pixels(files, name, given, in_pixels)
             check_sizes(files, name, given)
 
 
 def _check_pixels(files, name, given, in_pixels):
-    """The size of a pixel is known, and the format is a whole number of them."""
+    """Require the size of a pixel, and a format of whole pixels."""
     if given["format_px"] is not None:
         return
     if given["pixel_um"] is None:
@@ -85,15 +85,18 @@ def _refuse_two_names(files, settings):
 
 
 def _refuse_two_blocks(files, settings):
-    """One unknown of the whole block cannot be declared with two values."""
+    """Refuse different values of a parameter that is common to the whole block."""
     cameras = {
         name: parameters_of(given, settings) for name, given in files.registers["cameras"].items()
     }
-    for same in zip(*cameras.values(), strict=True):
-        if same[0].scope != "block" or same[0].state != "weighted":
+    for same_parameters in zip(*cameras.values(), strict=True):
+        if same_parameters[0].scope != "block" or same_parameters[0].state != "weighted":
             continue
-        for name, parameter in zip(cameras, same, strict=True):
-            if (parameter.value or 0.0, parameter.sd) != (same[0].value or 0.0, same[0].sd):
+        for name, parameter in zip(cameras, same_parameters, strict=True):
+            if (parameter.value or 0.0, parameter.sd) != (
+                same_parameters[0].value or 0.0,
+                same_parameters[0].sd,
+            ):
                 first = next(iter(cameras))
                 expected = message(
                     "block_of_two_values",
@@ -106,7 +109,7 @@ def _refuse_two_blocks(files, settings):
 
 
 def _check_format(files, name, given):
-    """Returns whether the format is known."""
+    """Check the keys of the format; returns True if the format is known."""
 
     def problem(key, expected):
         files.tell_key(files.log.problem, "cameras", name, key, expected)
@@ -142,7 +145,7 @@ def _check_format(files, name, given):
         return False
     size = format_of(given)[0]
     if size is None:
-        return False  # what is wrong is told
+        return False  # reported already
     in_px, in_mm = given["format_px"], given["format_mm"]
     if in_px is not None and any(number != round(number) for number in in_px):
         problem("format_px", message("whole_pixels", "expected whole numbers of pixels"))
@@ -161,7 +164,7 @@ def _check_format(files, name, given):
 
 
 def _check_unit(files, name, given, size_mm):
-    """Is a pixel as large as micrometres make it? Returns whether it is."""
+    """Return True if the size of a pixel is plausible in micrometres."""
     pixel = given["pixel_um"]
     if pixel is None or (min(pixel) >= SMALLEST_PIXEL_UM and max(size_mm) <= LARGEST_FORMAT_MM):
         return True

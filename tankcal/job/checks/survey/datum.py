@@ -1,4 +1,4 @@
-"""[adjustment]: what holds the frame must exist."""
+"""Checks of the datum in [adjustment], and of control, check points and targets."""
 
 import numpy as np
 
@@ -11,32 +11,32 @@ from tankcal.job.tables import nearest
 from tankcal.messages import join_with_and, list_some, message
 from tankcal.survey.observations import KINDS
 
-# control.csv, check.csv and targets.csv: each point once, sds of what is given.
+# control.csv, check.csv and targets.csv: unique points, sds of given coordinates only.
 
-MOST_NAMED = 5
+MOST_NAMED = 5  # largest number of points named in a message
 
 
 def check_known(files):
-    """Points known beforehand, and where targets sit."""
-    seen = observed_names(files)
+    """Check known points and targets."""
+    observed = observed_names(files)
     for name in ("control", "check"):
         table = files.tables[name]
         if has_rows(table):
             _refuse_point_twice(files, table)
             _check_coordinates(files, table)
-            _warn_unobserved(files, table, seen, _bear_on_nothing)
+            _warn_unobserved(files, table, observed, _bear_on_nothing)
     targets = files.tables["targets"]
     if has_rows(targets):
         refuse_repeated(targets, "point", files.log)
-        _warn_unobserved(files, targets, seen, _left_out)
+        _warn_unobserved(files, targets, observed, _left_out)
     _warn_control_that_checks(files)
 
 
 def _refuse_point_twice(files, table):
     first = {}
     for row, point, system in zip(table.rows, table.of("point"), table.of("system"), strict=True):
-        before = first.setdefault((point, system), row)
-        if point is not None and before != row:
+        first_row = first.setdefault((point, system), row)
+        if point is not None and first_row != row:
             within = (
                 ""
                 if system is None
@@ -47,24 +47,24 @@ def _refuse_point_twice(files, table):
                 "{point!r} is already given{within}, in row {row}; expected once",
                 point=point,
                 within=within,
-                row=before,
+                row=first_row,
             )
             files.log.problem(table.file, expected, row, "point")
 
 
 def _check_coordinates(files, table):
-    sound, known = files.sound(table), np.zeros(len(table.rows), dtype=bool)
+    is_valid, has_coordinate = files.sound(table), np.zeros(len(table.rows), dtype=bool)
     for axis in "xyz":
         value, sd = (~np.isnan(table.numbers(name)) for name in (f"{axis}_m", f"s{axis}_mm"))
-        known |= value
+        has_coordinate |= value
         expected = message(
             "known_sd_without_value",
             "given without {axis}_m; expected both, or no standard deviation",
             axis=axis,
         )
-        tell_rows(files.log.problem, table, sound & sd & ~value, f"s{axis}_mm", expected)
+        tell_rows(files.log.problem, table, is_valid & sd & ~value, f"s{axis}_mm", expected)
     expected = message("no_coordinate", "no coordinate; expected at least one")
-    tell_rows(files.log.problem, table, sound & ~known, "x_m", expected)
+    tell_rows(files.log.problem, table, is_valid & ~has_coordinate, "x_m", expected)
 
 
 def _bear_on_nothing(names):
@@ -81,22 +81,22 @@ def _left_out(names):
     )
 
 
-def _warn_unobserved(files, table, seen, told):
-    """told: told(names) -> the Message of points that nothing observes"""
+def _warn_unobserved(files, table, observed, message_about):
+    """Warn about points without observations; message_about(names) returns the message."""
     if any(files.is_unreadable(name) for name in ("image_points", "setups", "directions")):
         return
-    lacking = [
+    unobserved = [
         (row, point)
         for row, point in zip(table.rows, table.of("point"), strict=True)
-        if point is not None and point not in seen
+        if point is not None and point not in observed
     ]
-    if lacking:
-        names = list_some([point for _, point in lacking], MOST_NAMED)
-        files.log.warning(table.file, told(names), lacking[0][0], "point")
+    if unobserved:
+        names = list_some([point for _, point in unobserved], MOST_NAMED)
+        files.log.warning(table.file, message_about(names), unobserved[0][0], "point")
 
 
 def _warn_control_that_checks(files):
-    """A control point that is a check point, too, is compared with itself."""
+    """Warn about a check point that is also a control point, so not independent."""
     control, check = files.tables["control"], files.tables["check"]
     if not has_rows(control) or not has_rows(check):
         return
@@ -117,13 +117,13 @@ def _warn_control_that_checks(files):
             files.log.warning(check.file, expected, row, "point")
 
 
-# What is held (sd 0) twice: values that contradict each other, or that leave nothing to adjust.
+# Values held (sd 0) twice: contradictory, or without a remaining unknown.
 
-SAME_M, SAME_DEG = 1e-9, 1e-9
+SAME_M, SAME_DEG = 1e-9, 1e-9  # largest difference of equal values
 
 
 def check_held(files):
-    """Observations held exactly between points that are held, and held twice at two values."""
+    """Check exact observations between held points, and observations held at two values."""
     held = _held_axes(files)
     for name in READINGS:
         table = files.tables[name]
@@ -138,7 +138,7 @@ def check_held(files):
 
 
 def _held_axes(files):
-    """{point: text of its axes that control.csv holds}."""
+    """{point: its axes held by control.csv, as text}."""
     control = files.tables["control"]
     if not has_rows(control):
         return {}
@@ -157,36 +157,36 @@ def _ends(name, table):
 
 
 def _refuse_between_held(files, name, table, places, held):
-    sd = "s_arcsec" if name in ANGLES else "s_mm"
+    sd_column = "s_arcsec" if name in ANGLES else "s_mm"
     is_horizontal = (
         [kind == "horizontal" for kind in table.of("kind")] if name == "distances" else None
     )
     ends = _ends(name, table)
     for place in places:
         points = [column[place] for column in ends]
-        # all axes that enter must be held at all points before a value is held already
+        # An observation is determined only if all its axes are held at all its points.
         axes = "xy" if is_horizontal and is_horizontal[place] else KINDS[name].axes
         if all(set(axes) <= set(held.get(point, "")) for point in points):
-            named = join_with_and([repr(point) for point in points])
+            listed = join_with_and([repr(point) for point in points])
             expected = message(
                 "held_already",
                 "found 0, but {named} are already held ({axes} in control.csv); expected a "
                 "standard deviation above 0, or no such row",
-                named=named,
+                named=listed,
                 axes=axes,
             )
-            files.log.problem(table.file, expected, table.rows[place], sd)
+            files.log.problem(table.file, expected, table.rows[place], sd_column)
 
 
 def _refuse_two_values(files, name, table, places):
-    """One quantity held at two values; of distances either direction is the same quantity."""
+    """Report a quantity held at two values; the direction of a distance is irrelevant."""
     if name == "plumb_lines":
         return
     if name in ANGLES:
         columns = [f"{ANGLES[name]}_{unit}" for unit in ("deg", "gon", "dms")]
-        same = SAME_DEG
+        tolerance = SAME_DEG
     else:
-        columns, same = ["dz_m" if name == "height_differences" else "distance_m"], SAME_M
+        columns, tolerance = ["dz_m" if name == "height_differences" else "distance_m"], SAME_M
     values = np.column_stack([table.numbers(column) for column in columns])
     kinds = table.of("kind") if name == "distances" else [None] * len(values)
     ends, first = _ends(name, table), {}
@@ -195,13 +195,13 @@ def _refuse_two_values(files, name, table, places):
         if None in points:
             continue
         key = (kinds[place] or "spatial", *(sorted(points) if name == "distances" else points))
-        before = first.setdefault(key, place)
-        if not np.allclose(values[before], values[place], rtol=0, atol=same, equal_nan=True):
+        earlier = first.setdefault(key, place)
+        if not np.allclose(values[earlier], values[place], rtol=0, atol=tolerance, equal_nan=True):
             expected = message(
                 "held_at_two",
                 "not the value at which row {row} holds it; expected one value, or a "
                 "standard deviation above 0",
-                row=table.rows[before],
+                row=table.rows[earlier],
             )
             files.log.problem(table.file, expected, table.rows[place], "to")
 
@@ -210,13 +210,13 @@ WITH_POINTS = ("minimal", "inner")
 
 
 def check_datum(files):
-    """datum_points and fixed_photo: given with the datum that they are for, and defined."""
+    """Check datum_points and fixed_photo: used by the datum, and defined."""
     if files.values is None:
         return
     given = files.values["adjustment"]
     datum = given["datum"] or "control"
     if given["datum"] is None and not is_not_given(files.raw, "adjustment", "datum"):
-        return  # a bad value, told already
+        return  # an invalid value, reported already
     _check_photo(files, datum, given["fixed_photo"])
     if given["datum_points"] is not None:
         _check_points(files, datum, given["datum_points"])
@@ -246,12 +246,12 @@ def _check_photo(files, datum, photo):
         return
     names = [] if photos is None else [name for name in photos.of("photo") if name]
     if photo not in names:
-        where = files.raw.file_of("photos")
+        file = files.raw.file_of("photos")
         expected = message(
             "fixed_photo_unknown",
             "found {photo!r}; expected a photo of {where}{hint}",
             photo=photo,
-            where=where,
+            where=file,
             hint=nearest(photo, names),
         )
         _problem(files, "fixed_photo", expected)
@@ -276,7 +276,7 @@ def _check_points(files, datum, texts):
         )
         _problem(files, "datum_points", expected)
         return
-    names, seen = dict.fromkeys(all_points(files)), set()
+    names, listed = dict.fromkeys(all_points(files)), set()
     for text in texts:
         name, axes = datum_point(text)
         if not axes:
@@ -295,7 +295,7 @@ def _check_points(files, datum, texts):
                 hint=nearest(name, names),
             )
             _problem(files, "datum_points", expected)
-        elif name in seen:
+        elif name in listed:
             _problem(
                 files,
                 "datum_points",
@@ -303,27 +303,27 @@ def _check_points(files, datum, texts):
             )
         elif datum == "minimal":
             _check_known(files, name, axes)
-        seen.add(name)
+        listed.add(name)
 
 
 def _check_known(files, name, axes):
-    """A minimal datum holds points where control.csv says that they are."""
+    """Require coordinates in control.csv for the points of a minimal datum."""
     control = files.tables["control"]
     if files.is_unreadable("control"):
         return
-    known = ""
+    known_axes = ""
     if has_rows(control):
-        is_it = [
+        is_point = [
             point == name and system is None
             for point, system in zip(control.of("point"), control.of("system"), strict=True)
         ]
-        place = np.flatnonzero(is_it)
-        known = "".join(
+        place = np.flatnonzero(is_point)
+        known_axes = "".join(
             axis for axis in "xyz" if not np.all(np.isnan(control.numbers(f"{axis}_m")[place]))
         )
-    lacking = [axis for axis in axes if axis not in known]
-    if lacking:
-        axes = join_with_and(lacking)
+    missing = [axis for axis in axes if axis not in known_axes]
+    if missing:
+        axes = join_with_and(missing)
         expected = message(
             "datum_point_without",
             "{name!r} has no {axes} in control.csv; expected coordinates there",

@@ -1,4 +1,4 @@
-"""What can be told from the files alone of wrong units and swapped coordinates."""
+"""Checks of units and swapped coordinates, from the files of the survey alone."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,18 +10,23 @@ from tankcal.job.checks.survey.gon import check_gon
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.messages import message
 
-# Where things are before anything is adjusted: known coordinates, distances between them.
+# Known coordinates, and distances between them, before the adjustment.
 
-MANY = 100  # points
+MANY = 100  # with more points, a single point does not affect the median
 
 
 @dataclass(frozen=True)
 class Places:
-    """Known places in the survey's frame.
+    """Known positions in the frame of the survey.
 
-    of         {point: (3,) coordinates, m, nan where not known}; photos as ("photo", name)
-    measured   {point: list of (other point, distance m, is it horizontal?)}
-    extent_m   largest extent of the known coordinates along an axis; None: fewer than 3 points
+    Attributes
+    ----------
+    of : dict
+        {point: coordinates (3,), m, nan where not known}; photos as ("photo", name).
+    measured : dict
+        {point: list of (other point, distance in m, is it horizontal)}.
+    extent_m : float or None
+        Largest extent of the known coordinates along an axis; None: fewer than 3 points.
     """
 
     of: dict
@@ -29,9 +34,9 @@ class Places:
     extent_m: float | None
 
     def where_others_lie(self, name):
-        """How many other points there are, their middle (2,), and how far from it they lie.
+        """Number of the other points, their centre (2,), and their typical distance from it, m.
 
-        Of many points all count: one does not move their median.
+        For many points, the point itself is included, because it does not affect the median.
         """
         names, xy = self._in_plan
         if len(xy) > MANY:
@@ -45,8 +50,8 @@ class Places:
     @cached_property
     def _in_plan(self):
         xy = np.array([place[:2] for place in self.of.values()]).reshape(-1, 2)
-        there = ~np.isnan(xy).any(axis=1)
-        return [name for name, one in zip(self.of, there, strict=True) if one], xy[there]
+        is_known = ~np.isnan(xy).any(axis=1)
+        return [name for name, keep in zip(self.of, is_known, strict=True) if keep], xy[is_known]
 
 
 def _middle_of(xy):
@@ -57,7 +62,7 @@ def _middle_of(xy):
 
 
 def places_of(files):
-    """The Places of a survey."""
+    """`Places` of a survey."""
     of = {}
     for name, key in (("photos", "photo"), ("check", "point"), ("control", "point")):
         table = files.tables[name]
@@ -84,29 +89,29 @@ def _measured(table):
     )
     for start, end, distance, kind in rows:
         if None not in (start, end, distance) and start != end:
-            for one, other in ((start, end), (end, start)):
-                measured.setdefault(one, []).append((other, distance, kind == "horizontal"))
+            for point, other in ((start, end), (end, start)):
+                measured.setdefault(point, []).append((other, distance, kind == "horizontal"))
     return measured
 
 
-TINY = {"mm": 0.005, "um": 0.05, "arcsec": 0.01}  # sds: all below that are doubted
-SURE = 0.1  # part of that, below which those of readings are refused
+TINY = {"mm": 0.005, "um": 0.05, "arcsec": 0.01}  # if all sds are smaller, they are suspicious
+SURE = 0.1  # share of TINY below which sds of readings are refused
 OF_SDS = {
     **dict.fromkeys(("s_mm", "sx_mm", "sy_mm", "sz_mm"), "mm"),
     **dict.fromkeys(("sx_um", "sy_um", "s_um"), "um"),
     "s_arcsec": "arcsec",
 }
-MUCH_LARGER = 200  # distances in parts of the survey's extent
-THOUSANDFOLD = (500, 2000)  # distances in parts of those between known points
-MIN_OF_OTHERS = 4  # points that tell where the survey is
-FAR, NEAR = 20, 5  # times the usual distance from the middle
-VERY_FAR = 1000  # the same, beyond any doubt
-MISFIT, FIT = 0.10, 0.02  # of a measured distance
-MIN_MISFIT_M = 1.0
+MUCH_LARGER = 200  # implausible ratio of distances to the extent of the survey
+THOUSANDFOLD = (500, 2000)  # ratio to known distances that indicates millimetres
+MIN_OF_OTHERS = 4  # smallest number of points that determine the centre of the survey
+FAR, NEAR = 20, 5  # multiples of the typical distance from the centre
+VERY_FAR = 1000  # multiple of the typical distance that is certainly wrong
+MISFIT, FIT = 0.10, 0.02  # relative difference from a measured distance
+MIN_MISFIT_M = 1.0  # smallest difference that counts as a misfit
 
 
 def check_doubtful(files):
-    """Standard deviations, distances, control and angles that look wrong."""
+    """Check standard deviations, distances, control and angles for implausible values."""
     for name in ("image_points", "fiducials", "control", "check", *READINGS):
         if has_rows(files.tables[name]):
             _warn_tiny_sds(files, name, files.tables[name])
@@ -134,25 +139,25 @@ def _warn_tiny_sds(files, name, table):
 
 
 def _check_size(files, places):
-    """Control that lies much further apart than the tank is large."""
-    size, known = _tank_size_m(files), np.array(list(places.of.values())).reshape(-1, 3)
-    known = known[~np.isnan(known).any(axis=1)]
-    if size is None or len(known) < MIN_OF_OTHERS:
+    """Refuse control points much farther apart than the size of the tank."""
+    size, coordinates = _tank_size_m(files), np.array(list(places.of.values())).reshape(-1, 3)
+    coordinates = coordinates[~np.isnan(coordinates).any(axis=1)]
+    if size is None or len(coordinates) < MIN_OF_OTHERS:
         return
-    usual = float(np.median(np.linalg.norm(known - np.median(known, axis=0), axis=1)))
-    if usual > MUCH_LARGER * size:
+    typical = float(np.median(np.linalg.norm(coordinates - np.median(coordinates, axis=0), axis=1)))
+    if typical > MUCH_LARGER * size:
         expected = message(
             "known_in_millimetres",
             "the known points typically lie {usual:.4g} m from their middle, and the tank "
             "measures {size:.4g} m; expected metres: are they in millimetres?",
-            usual=usual,
+            usual=typical,
             size=size,
         )
         files.log.problem(files.tables["control"].file, expected, None, "x_m")
 
 
 def _tank_size_m(files):
-    """Nominal diagonal of the tank, or None."""
+    """Nominal diagonal of the tank, m; None if not given."""
     if files.values is None:
         return None
     sizes = [files.values["tank"][f"nominal_{name}_m"] for name in ("diameter", "height")]
@@ -160,53 +165,53 @@ def _tank_size_m(files):
 
 
 def _check_distances(files, places, table):
-    """Distances that only fit the known points, the tank or one another in millimetres."""
+    """Refuse distances that fit known points, tank or other distances only in millimetres."""
     distance = table.numbers("distance_m")
-    there = ~np.isnan(distance)
-    if not there.any():
+    is_given = ~np.isnan(distance)
+    if not is_given.any():
         return
-    typical, extent = float(np.median(distance[there])), places.extent_m
-    of = message("the_known_points", "the known points")
-    for i in np.flatnonzero(there & (distance > MUCH_LARGER * typical)):
-        found = distance[i]
+    typical, extent = float(np.median(distance[is_given])), places.extent_m
+    region = message("the_known_points", "the known points")
+    for i in np.flatnonzero(is_given & (distance > MUCH_LARGER * typical)):
+        evidence = distance[i]
         expected = message(
             "distance_in_millimetres",
             "found {found:.4g} m where half of the distances are below {typical:.4g} m; "
             "expected metres: is it in millimetres?",
-            found=found,
+            found=evidence,
             typical=typical,
         )
         files.log.problem(table.file, expected, table.rows[i], "distance_m")
     if extent is None:
         extent = _tank_size_m(files)
-        of = message("the_tank", "the tank")
+        region = message("the_tank", "the tank")
     ratio = _ratio_to_known(places) if table is files.tables["distances"] else 0.0
-    found = ""
+    evidence = ""
     if extent and typical > MUCH_LARGER * extent:
-        found = message(
+        evidence = message(
             "distances_beside_extent",
             "half of them are above {typical:.4g} m, but {of} extend over {extent:.4g} m",
             typical=typical,
-            of=of,
+            of=region,
             extent=extent,
         )
     elif THOUSANDFOLD[0] < ratio < THOUSANDFOLD[1]:
-        found = message(
+        evidence = message(
             "distances_beside_known",
             "those between known points are {ratio:.4g} times what follows from their coordinates",
             ratio=ratio,
         )
-    if found:
+    if evidence:
         expected = message(
             "distances_in_millimetres",
             "{found}; expected metres: are they in millimetres?",
-            found=found,
+            found=evidence,
         )
         files.log.problem(table.file, expected, None, "distance_m")
 
 
 def _ratio_to_known(places):
-    """Median ratio of measured distances between known points to computed ones; 0: none."""
+    """Median ratio of measured to computed distances between known points; 0 without any."""
     ratios = []
     for point, measured in places.measured.items():
         for other, distance, is_horizontal in measured:
@@ -219,9 +224,10 @@ def _ratio_to_known(places):
 
 
 def _tell_swapped(files, places):
-    """Control points that lie with the others, or fit their distances, once x and y are swapped.
+    """Report control points that fit other points or distances only with x and y swapped.
 
-    Refused where the others lie a thousand times closer together.
+    A point is refused if the other points lie a thousand times closer together; else it is a
+    warning.
     """
     control = files.tables["control"]
     for row, point, system in zip(
@@ -243,39 +249,43 @@ def _is_swapped(evidence):
 
 
 def _far_unless_swapped(point, places, times=FAR, of_others=MIN_OF_OTHERS):
-    here = places.of[point][:2]
-    count, middle, usual = places.where_others_lie(point)
-    if np.isnan(here).any() or count < of_others:
+    xy = places.of[point][:2]
+    count, middle, typical = places.where_others_lie(point)
+    if np.isnan(xy).any() or count < of_others:
         return ""
-    far, swapped = (float(np.hypot(*(place - middle))) for place in (here, here[::-1]))
-    if far > times * usual > 0 and swapped < NEAR * usual:
+    distance, swapped = (float(np.hypot(*(place - middle))) for place in (xy, xy[::-1]))
+    if distance > times * typical > 0 and swapped < NEAR * typical:
         return message(
             "far_from_others",
             "{point!r} is {far_m:.4g} m from the middle of the other known points, which "
             "typically lie {usual_m:.3g} m from it; with x and y swapped {swapped_m:.3g} m",
             point=point,
-            far_m=far,
-            usual_m=usual,
+            far_m=distance,
+            usual_m=typical,
             swapped_m=swapped,
         )
     return ""
 
 
 def _misfit_unless_swapped(point, places):
-    """Distances to two points or more that do not fit, but all of them do with x and y swapped."""
-    here = places.of[point]
+    """Evidence that two distances or more fit only with x and y swapped."""
+    xyz = places.of[point]
     misfits, others = [], set()
     for other, distance, is_horizontal in places.measured.get(point, ()):
         use = slice(0, 2) if is_horizontal else slice(0, 3)
-        ends = (here[use], here[[1, 0, 2]][use], places.of.get(other, np.full(3, np.nan))[use])
+        ends = (xyz[use], xyz[[1, 0, 2]][use], places.of.get(other, np.full(3, np.nan))[use])
         as_given, swapped = (float(np.linalg.norm(end - ends[2])) for end in ends[:2])
         if np.isfinite(as_given):
             others.add(other)
             misfits.append((abs(as_given - distance), abs(swapped - distance), distance))
     if len(others) < 2:
         return ""
-    bad = sum(one > max(MISFIT * distance, MIN_MISFIT_M) for one, _, distance in misfits)
-    if 2 * bad > len(misfits) and all(two < FIT * distance for _, two, distance in misfits):
+    misfit_count = sum(
+        given > max(MISFIT * distance, MIN_MISFIT_M) for given, _, distance in misfits
+    )
+    if 2 * misfit_count > len(misfits) and all(
+        after < FIT * distance for _, after, distance in misfits
+    ):
         worst = max(misfits)
         return message(
             "misses_distances",

@@ -1,4 +1,4 @@
-"""fiducials.csv: comparator readings of fiducial marks, and what becomes of them."""
+"""Checks of fiducials.csv: comparator readings of fiducial marks, and their transformations."""
 
 import numpy as np
 from scipy.special import chdtri
@@ -12,16 +12,16 @@ from tankcal.job.imagery import cameras_of_photos, readings_of_marks
 from tankcal.job.tables import nearest
 from tankcal.messages import join_with_and, join_with_or, list_some, message
 
-LEVEL = 0.001  # of the tests of all photos together
-GROWTH = 2.0  # of the sd of an image coordinate: a fourfold variance (Silva)
-TOLD = 5
-ALIKE = 2  # degrees of freedom with which the residuals of all marks are alike
+LEVEL = 0.001  # significance level of the tests of all photos together
+GROWTH = 2.0  # largest factor of the sd of an image coordinate: fourfold variance (Silva)
+TOLD = 5  # largest number of photos named in a message
+ALIKE = 2  # up to so many degrees of freedom, residuals do not identify a mark
 
 
 def check_fiducials(files, imagery):
-    """Marks, their readings, and what the transformations of `imagery` make of image points.
+    """Check marks, readings, and the transformations of `imagery`.
 
-    Returns the photos whose image points say nothing, for their marks are told already.
+    Returns the photos whose image points are not checked further, because of faults of their marks.
     """
     table, cameras = files.tables["fiducials"], files.registers["cameras"]
     for name, given in cameras.items():
@@ -37,8 +37,8 @@ def check_fiducials(files, imagery):
         return set()
     of_photos = cameras_of_photos(photos, cameras)
     _refuse_unknown_marks(files, table, of_photos)
-    bad = _check_photos(files, table, of_photos, imagery)
-    return bad | _check_images_of_comparator(files, table, of_photos)
+    rejected = _check_photos(files, table, of_photos, imagery)
+    return rejected | _check_images_of_comparator(files, table, of_photos)
 
 
 def _check_marks(files, name, given):
@@ -73,8 +73,8 @@ def _warn_unused(files, cameras):
 
 
 def _refuse_missing_sd(files, table):
-    lacking = files.sound(table) & np.isnan(table.numbers("s_um"))
-    if files.values is None or not lacking.any():
+    is_missing = files.sound(table) & np.isnan(table.numbers("s_um"))
+    if files.values is None or not is_missing.any():
         return
     if is_not_given(files.raw, "adjustment", "image_sd_um"):
         expected = message(
@@ -82,22 +82,22 @@ def _refuse_missing_sd(files, table):
             "missing; expected a value for the rows of {file} without s_um, the first of "
             "them row {row}",
             file=table.file,
-            row=table.rows[int(np.argmax(lacking))],
+            row=table.rows[int(np.argmax(is_missing))],
         )
         tell(files.log.problem, files.raw, "adjustment", "image_sd_um", expected)
 
 
 def _refuse_unknown_marks(files, table, of_photos):
-    """A mark that its camera does not have; of a camera without marks once."""
-    bare, told = {}, set()
+    """Report marks that their camera lacks; once for a camera without marks."""
+    without_marks, reported = {}, set()
     for row, photo, mark in zip(table.rows, table.of("photo"), table.of("mark"), strict=True):
         if photo not in of_photos or mark is None:
             continue
         camera, given = of_photos[photo]
         if not any(key.startswith(f"{MARKS}.") for key in _keys(files, camera)):
-            bare.setdefault(camera, row)
-        elif f"{MARKS}.{mark}" not in _keys(files, camera) and (camera, mark) not in told:
-            told.add((camera, mark))
+            without_marks.setdefault(camera, row)
+        elif f"{MARKS}.{mark}" not in _keys(files, camera) and (camera, mark) not in reported:
+            reported.add((camera, mark))
             hint = nearest(mark, given[MARKS])
             expected = message(
                 "mark_unknown",
@@ -107,7 +107,7 @@ def _refuse_unknown_marks(files, table, of_photos):
                 hint=hint,
             )
             files.log.problem(table.file, expected, row, "mark")
-    for camera, row in bare.items():
+    for camera, row in without_marks.items():
         expected = message(
             "marks_not_calibrated",
             "marks of camera {camera!r}, which has none in cameras.toml; expected their "
@@ -123,37 +123,39 @@ def _keys(files, camera):
 
 
 def _check_photos(files, table, of_photos, imagery):
-    """The transformation of each photo; returns the photos that have none."""
-    bare, turned, grown, bad = [], [], [], set()
+    """Check the transformation of each photo; returns the photos without one."""
+    uncontrolled, mirrored, coarse, rejected = [], [], [], set()
     settings = {"image_sd_um": None} if files.values is None else files.values["adjustment"]
-    settings = settings | {"image_sd_um": settings["image_sd_um"] or 1.0}  # one missing is told
-    for photo, read in readings_of_marks(table, of_photos, settings).items():
-        _warn_rejected(files, table, read.rejected)
-        if not len(read.rows) and not read.rejected:
+    settings = settings | {
+        "image_sd_um": settings["image_sd_um"] or 1.0
+    }  # a missing sd is reported already
+    for photo, readings in readings_of_marks(table, of_photos, settings).items():
+        _warn_rejected(files, table, readings.rejected)
+        if not len(readings.rows) and not readings.rejected:
             continue
-        if not _is_possible(files, table, photo, read):
-            bad.add(photo)
+        if not _is_possible(files, table, photo, readings):
+            rejected.add(photo)
             continue
-        if len(set(read.names)) == KINDS[read.kind]:
-            bare.append(photo)
+        if len(set(readings.names)) == KINDS[readings.kind]:
+            uncontrolled.append(photo)
         fit = imagery.fits.get(photo)
         if fit is None:
             continue
         if fit.transformation.is_mirrored:
-            turned.append(photo)
+            mirrored.append(photo)
         if fit.growth > GROWTH:
-            grown.append((fit.growth, photo))
-        _test_fit(files, table, photo, fit, read, len(imagery.fits))
-    _warn_of_all(files, table, bare, turned, grown)
-    return bad
+            coarse.append((fit.growth, photo))
+        _test_fit(files, table, photo, fit, readings, len(imagery.fits))
+    _warn_of_all(files, table, uncontrolled, mirrored, coarse)
+    return rejected
 
 
-def _is_possible(files, table, photo, read):
-    """Can the marks of a photo be what they are said to be? What is told stops the job."""
-    row = table.rows[read.rows[0]] if len(read.rows) else None
-    names, fewest = list(dict.fromkeys(read.names)), KINDS[read.kind]
+def _is_possible(files, table, photo, readings):
+    """Return False, after a problem, if the marks of a photo cannot be correct."""
+    row = table.rows[readings.rows[0]] if len(readings.rows) else None
+    names, fewest = list(dict.fromkeys(readings.names)), KINDS[readings.kind]
     if len(names) < fewest:
-        left = message("left_over", " left") if read.rejected else ""
+        left = message("left_over", " left") if readings.rejected else ""
         expected = message(
             "marks_too_few",
             "photo {photo!r} has {count} marks{left}; expected {fewest} or more for "
@@ -162,16 +164,16 @@ def _is_possible(files, table, photo, read):
             count=len(names),
             left=left,
             fewest=fewest,
-            of_kind=read.kind,
+            of_kind=readings.kind,
         )
-        row = row if row is not None else read.rejected[0].row
+        row = row if row is not None else readings.rejected[0].row
         files.log.problem(table.file, expected, row, "mark")
         return False
-    same = read.repeats
-    found = suspicion(same.mean, read.marks_mm[same.first], read.kind)
-    if found is None:
+    repeated = readings.repeats
+    suspected = suspicion(repeated.mean, readings.marks_mm[repeated.first], readings.kind)
+    if suspected is None:
         try:
-            read.fit(photo, None)
+            readings.fit(photo, None)
         except SolutionError as error:
             files.log.problem(
                 table.file,
@@ -181,17 +183,17 @@ def _is_possible(files, table, photo, read):
             )
             return False
         return True
-    if found.marks:
-        row = table.rows[read.rows[same.first[found.marks[0][0]]]]
-    files.log.problem(table.file, _suspected(photo, found, names), row, "mark")
+    if suspected.marks:
+        row = table.rows[readings.rows[repeated.first[suspected.marks[0][0]]]]
+    files.log.problem(table.file, _suspected(photo, suspected, names), row, "mark")
     return False
 
 
-def _suspected(photo, found, names):
-    """One line about a comparator.Suspicion."""
-    named = [join_with_and([repr(names[i]) for i in group]) for group in found.marks]
-    if found.what == "unit":
-        times = 1 / found.size
+def _suspected(photo, suspicion_of_marks, names):
+    """Message about a comparator.Suspicion."""
+    listed = [join_with_and([repr(names[i]) for i in group]) for group in suspicion_of_marks.marks]
+    if suspicion_of_marks.what == "unit":
+        times = 1 / suspicion_of_marks.size
         return message(
             "marks_in_other_unit",
             "the marks of photo {photo!r} were read {times:.4g} times as large as they are "
@@ -199,8 +201,8 @@ def _suspected(photo, found, names):
             photo=photo,
             times=times,
         )
-    if found.what == "sheared":
-        share = 100 * (found.size - 1)
+    if suspicion_of_marks.what == "sheared":
+        share = 100 * (suspicion_of_marks.size - 1)
         return message(
             "marks_sheared",
             "the marks of photo {photo!r} give a transformation with a shear of {share:.2g} "
@@ -208,8 +210,8 @@ def _suspected(photo, found, names):
             photo=photo,
             share=share,
         )
-    if found.what == "exchanged" and found.size < GROSS:
-        marks = join_with_or(named)
+    if suspicion_of_marks.what == "exchanged" and suspicion_of_marks.size < GROSS:
+        marks = join_with_or(listed)
         return message(
             "marks_exchanged",
             "the marks of photo {photo!r} fit no transformation of a comparator unless "
@@ -217,12 +219,12 @@ def _suspected(photo, found, names):
             photo=photo,
             marks=marks,
         )
-    return _misplaced(photo, found, named)
+    return _misplaced(photo, suspicion_of_marks, listed)
 
 
-def _misplaced(photo, found, named):
-    """One line about marks that are far from their calibrated places."""
-    share = 100 * found.size
+def _misplaced(photo, suspicion_of_marks, listed):
+    """Message about marks far from their calibrated positions."""
+    share = 100 * suspicion_of_marks.size
     start = message(
         "marks_off",
         "the marks of photo {photo!r} miss their calibrated places by {share:.2g} % of their "
@@ -230,23 +232,23 @@ def _misplaced(photo, found, named):
         photo=photo,
         share=share,
     )
-    if found.what == "mirrored":
+    if suspicion_of_marks.what == "mirrored":
         return message(
             "marks_mirrored",
             "{start}, and fit mirrored: the plate was read from the other side; change the "
             "sign of x, or set fiducial_transformation = affine",
             start=start,
         )
-    if found.what == "exchanged":
-        marks = join_with_or(named)
+    if suspicion_of_marks.what == "exchanged":
+        marks = join_with_or(listed)
         return message(
             "marks_fit_exchanged",
             "{start}, and fit when {marks} are exchanged",
             start=start,
             marks=marks,
         )
-    worst = named[0]
-    if found.what == "wrong":
+    worst = listed[0]
+    if suspicion_of_marks.what == "wrong":
         return message(
             "mark_wrong",
             "{start}; without {worst} the others fit: is it misread, or is it another mark?",
@@ -261,63 +263,63 @@ def _misplaced(photo, found, named):
     )
 
 
-def _test_fit(files, table, photo, fit, read, photos):
-    """A warning where the residuals of a photo's marks are larger than their sds say."""
-    found = fit.transformation
-    if found.dof < 1 or found.chi2 <= chdtri(found.dof, LEVEL / photos):
+def _test_fit(files, table, photo, fit, readings, photos):
+    """Warn if the residuals of the marks of a photo exceed their standard deviations."""
+    fitted = fit.transformation
+    if fitted.dof < 1 or fitted.chi2 <= chdtri(fitted.dof, LEVEL / photos):
         return
     worst = int(np.argmax(np.abs(fit.residual_mm).max(axis=1)))
-    of = message("no_single_mark", "which mark it is cannot be told")
-    if found.dof > ALIKE:
-        of = message("of_mark", "of mark {mark!r}", mark=fit.marks[worst])
+    of_mark = message("no_single_mark", "which mark it is cannot be told")
+    if fitted.dof > ALIKE:
+        of_mark = message("of_mark", "of mark {mark!r}", mark=fit.marks[worst])
     expected = message(
         "marks_fit_badly",
         "the marks of photo {photo!r} fit {times:.1f} times worse than their standard "
         "deviations say (largest residual {largest_um:.1f} um, {of}); the transformation "
         "therefore multiplies the sd of an image coordinate by up to {growth:.1f}",
         photo=photo,
-        times=found.sigma0,
+        times=fitted.sigma0,
         largest_um=1e3 * np.abs(fit.residual_mm[worst]).max(),
-        of=of,
-        # what the variance of the transformation would be by its residuals
-        growth=np.sqrt(1 + (fit.growth**2 - 1) * found.sigma0**2),
+        of=of_mark,
+        # variance of the transformation, scaled by its residuals
+        growth=np.sqrt(1 + (fit.growth**2 - 1) * fitted.sigma0**2),
     )
-    files.log.warning(table.file, expected, table.rows[read.rows[0]], "mark")
+    files.log.warning(table.file, expected, table.rows[readings.rows[0]], "mark")
 
 
 def _warn_rejected(files, table, rejected):
-    for one in rejected:
+    for mark in rejected:
         expected = message(
             "mark_rejected",
             "the {count} readings of mark {mark!r} of photo {photo!r} are rejected: their standard"
             " deviation of {sd_um:.1f} um exceeds reading_limit_um",
-            count=one.count,
-            mark=one.name,
-            photo=one.photo,
-            sd_um=1e3 * np.nanmax(one.sd_mm),
+            count=mark.count,
+            mark=mark.name,
+            photo=mark.photo,
+            sd_um=1e3 * np.nanmax(mark.sd_mm),
         )
-        files.log.warning(table.file, expected, one.row, "mark")
+        files.log.warning(table.file, expected, mark.row, "mark")
 
 
-def _warn_of_all(files, table, bare, turned, grown):
-    if bare:
+def _warn_of_all(files, table, uncontrolled, mirrored, coarse):
+    if uncontrolled:
         expected = message(
             "marks_uncontrolled",
             "photos {photos} have no more marks than the transformation needs: a misread "
             "mark cannot be detected",
-            photos=list_some(bare, TOLD),
+            photos=list_some(uncontrolled, TOLD),
         )
         files.log.warning(table.file, expected)
-    if turned:
+    if mirrored:
         expected = message(
             "read_mirrored",
             "photos {photos} were read mirrored; the transformation turns them back (was the "
             "plate turned over, or are marks exchanged?)",
-            photos=list_some(turned, TOLD),
+            photos=list_some(mirrored, TOLD),
         )
         files.log.warning(table.file, expected)
-    if grown:
-        growth, photo = max(grown)
+    if coarse:
+        growth, photo = max(coarse)
         expected = message(
             "transformation_coarse",
             "the transformation makes the sd of image coordinates up to {growth:.1f} times "
@@ -326,24 +328,24 @@ def _warn_of_all(files, table, bare, turned, grown):
             growth=growth,
             photo=photo,
             limit=GROWTH,
-            photos=len(grown),
+            photos=len(coarse),
         )
         files.log.warning(table.file, expected)
 
 
 def _check_images_of_comparator(files, table, of_photos):
-    """All photos of a camera are read on the comparator, or none; and in millimetres.
+    """Require comparator readings, in millimetres, for all photos of a camera or for none.
 
-    Returns those that lack their marks.
+    Returns the photos without marks.
     """
     images = files.tables["image_points"]
-    read = set(table.of("photo"))
-    cameras = {camera for photo, (camera, _) in of_photos.items() if photo in read}
-    seen, lacking = {}, set()
+    with_marks = set(table.of("photo"))
+    cameras = {camera for photo, (camera, _) in of_photos.items() if photo in with_marks}
+    first_rows, without_marks = {}, set()
     for row, photo in zip(images.rows, images.of("photo"), strict=True):
-        seen.setdefault(photo, row)
-    for photo, row in seen.items():
-        if photo in of_photos and photo not in read and of_photos[photo][0] in cameras:
+        first_rows.setdefault(photo, row)
+    for photo, row in first_rows.items():
+        if photo in of_photos and photo not in with_marks and of_photos[photo][0] in cameras:
             expected = message(
                 "photo_without_marks",
                 "photo {photo!r} has no marks in {file}, others of its camera have; expected "
@@ -352,9 +354,9 @@ def _check_images_of_comparator(files, table, of_photos):
                 file=table.file,
             )
             files.log.problem(images.file, expected, row, "photo")
-            lacking.add(photo)
+            without_marks.add(photo)
     in_px = ~np.isnan(images.numbers("column_px")) | ~np.isnan(images.numbers("s_px"))
-    in_px &= np.array([photo in read for photo in images.of("photo")], dtype=bool)
+    in_px &= np.array([photo in with_marks for photo in images.of("photo")], dtype=bool)
     expected = message(
         "pixels_beside_marks",
         "in pixels, in a photo whose marks are read in {file}; expected x_mm and y_mm of the "
@@ -362,4 +364,4 @@ def _check_images_of_comparator(files, table, of_photos):
         file=table.file,
     )
     tell_rows(files.log.problem, images, in_px, "column_px", expected)
-    return lacking
+    return without_marks

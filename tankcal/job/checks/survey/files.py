@@ -1,4 +1,4 @@
-"""The files of a survey as its checks see them."""
+"""Files of a survey, as used by its checks."""
 
 from dataclasses import dataclass, field
 
@@ -10,18 +10,27 @@ from tankcal.job.fields import is_blank
 from tankcal.job.tables import REGISTERS, nearest
 from tankcal.messages import message
 
-MAX_HINTS = 50  # a suggestion for every one of thousands of names would cost minutes
+MAX_HINTS = 50  # largest number of suggestions; thousands of them would take minutes
 
 
 @dataclass(frozen=True)
 class SurveyFiles:
-    """What was read of a survey, and the log.
+    """Content of the files of a survey, and the log.
 
-    values     of the settings, or None: unreadable
-    tables     {name: ColumnValues, or None: not there or unreadable}
-    registers  {"cameras" or "instruments": {name: {key: value}}}
-    raw        RawJob
-    told       (file, row) of the rows that have a problem already
+    Attributes
+    ----------
+    values : dict or None
+        {section: {key: value}} of the settings; None: unreadable.
+    tables : dict
+        {name: ColumnValues; None: missing or unreadable}.
+    registers : dict
+        {"cameras" or "instruments": {name: {key: value}}}.
+    raw : RawJob
+        Job as read.
+    log : Log
+        Receives problems and warnings.
+    told : frozenset of (str, int)
+        File and row of the rows with problems reported before.
     """
 
     values: dict | None
@@ -32,34 +41,59 @@ class SurveyFiles:
     told: frozenset = field(default_factory=frozenset)
 
     def is_unreadable(self, name):
-        """Is the table or register there, but not readable?"""
+        """Return True if the table or register exists but is not readable."""
         among = self.raw.registers if name in REGISTERS else self.raw.tables
         return name in among and among[name] is None
 
     def sound(self, table):
-        """(n,) True for the rows of a table without a problem."""
+        """True for the rows of a table without a problem, shape (n,)."""
         return np.array([(table.file, row) not in self.told for row in table.rows], dtype=bool)
 
     def is_given(self, register, owner, key):
-        """Does a camera or an instrument have the key, be its value good or bad?"""
+        """Return True if a camera or an instrument has the key, with a valid or invalid value."""
         entries = self.raw.registers[register].entries[owner]
         value = entries.get(as_spelt(register, entries, key))
         return value is not None and not is_blank(value.raw)
 
-    def tell_key(self, to, register, owner, key, expected):
-        """Tell log.problem or log.warning about one key of a camera or an instrument."""
-        known = self.raw.registers[register]
-        key = as_spelt(register, known.entries[owner], key)
-        value = known.entries[owner].get(key)
-        row = known.rows[owner] if value is None else value.row
-        to(known.file, expected, row, f"{owner}.{key}")
+    def tell_key(self, report, register, owner, key, expected):
+        """Report on one key of a camera or an instrument.
+
+        Parameters
+        ----------
+        report : callable
+            log.problem or log.warning.
+        register : str
+            "cameras" or "instruments".
+        owner, key : str
+            Name of the camera or instrument, and key.
+        expected : Message
+            Text of the report.
+        """
+        entries_of_register = self.raw.registers[register]
+        key = as_spelt(register, entries_of_register.entries[owner], key)
+        value = entries_of_register.entries[owner].get(key)
+        row = entries_of_register.rows[owner] if value is None else value.row
+        report(entries_of_register.file, expected, row, f"{owner}.{key}")
 
 
 def refuse_undefined(files, table, column, defined, where):
-    """A problem for each name in a column that `defined` lacks; `where` is its table or register.
+    """Report each name in a column that is not defined.
 
-    A table that is not there at all is one problem. Where a name in it could not be read, nothing
-    is told: it may be that one.
+    A missing table of definitions is reported once. If one of its names is unreadable, nothing is
+    reported, because the unreadable name may be the missing one.
+
+    Parameters
+    ----------
+    files : SurveyFiles
+        Files of the survey.
+    table : ColumnValues
+        Table with the names.
+    column : str
+        Column of the names.
+    defined : collection of str or None
+        Defined names; None for an unreadable name.
+    where : str
+        Table or register with the definitions.
     """
     its_table = files.tables.get(where)
     if files.is_unreadable(where) or None in defined or (its_table and its_table.skipped):
@@ -91,14 +125,27 @@ def refuse_undefined(files, table, column, defined, where):
         files.log.problem(table.file, expected, row, column)
 
 
-def tell_rows(to, table, is_told, column, expected):
-    """Tell log.problem or log.warning the same of each row where `is_told` (n,) is True.
+def tell_rows(report, table, is_told, column, expected):
+    """Report the rows where `is_told` (n,) is True.
 
-    Once only where several do because the table has no such column, or nothing in it.
+    If several rows are concerned because the column is missing or blank, one message is sufficient.
+
+    Parameters
+    ----------
+    report : callable
+        log.problem or log.warning.
+    table : ColumnValues
+        Table with n rows.
+    is_told : ndarray of bool, shape (n,)
+        Rows to be reported.
+    column : str
+        Column of the fault.
+    expected : Message
+        Text of the report.
     """
     if np.count_nonzero(is_told) > 1 and table.columns.get(column) is None:
-        without = message("column_missing_or", "the column is missing or {what}", what=expected)
-        to(table.file, without, None, column)
+        summary = message("column_missing_or", "the column is missing or {what}", what=expected)
+        report(table.file, summary, None, column)
         return
     for place in np.flatnonzero(is_told):
-        to(table.file, expected, table.rows[place], column)
+        report(table.file, expected, table.rows[place], column)

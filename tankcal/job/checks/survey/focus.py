@@ -1,4 +1,4 @@
-"""Distance-dependent distortion: the keys of a camera's focus, and [adjustment] depth_of_field."""
+"""Checks of distance-dependent distortion: focus of a camera, [adjustment] depth_of_field."""
 
 from tankcal.camera.focus import RADIAL
 from tankcal.job.cameras import focus_keys, lens_of
@@ -6,13 +6,13 @@ from tankcal.job.checking import tell
 from tankcal.job.contract.registers import PARAMETER_KEYS
 from tankcal.messages import message
 
-NEAREST = 2.0  # focal lengths: nearer no lens of a camera makes an image
-ALIKE = 0.3  # part by which c and the focal length may differ
+NEAREST = 2.0  # smallest distance of an object, in focal lengths
+ALIKE = 0.3  # largest relative difference of c and the focal length
 BESIDE = ("focus_m", "lens_focal_length_mm")
 
 
 def check_focus(files, name, given):
-    """The keys of one camera: all of them or none, in metres, and no K beside them."""
+    """Require all keys of the focus or none, distances in metres, and no additional K."""
 
     def problem(key, expected):
         files.tell_key(files.log.problem, "cameras", name, key, expected)
@@ -104,7 +104,7 @@ def _check_sizes(given, key, problem):
         )
         problem("lens_focal_length_mm", expected)
         return
-    for where, values in ((key, distances), ("focus_m", (given["focus_m"],))):
+    for place, values in ((key, distances), ("focus_m", (given["focus_m"],))):
         for value in values or ():
             if value is not None and 1000 * value <= NEAREST * focal:
                 expected = message(
@@ -114,25 +114,25 @@ def _check_sizes(given, key, problem):
                     value=value,
                     nearest=NEAREST,
                 )
-                problem(where, expected)
+                problem(place, expected)
 
 
 def check_depth_of_field(files):
-    """[adjustment] depth_of_field with cameras that say nothing of it."""
+    """Report depth_of_field in [adjustment] for cameras without focus calibrations."""
     if files.values is None or not files.values["adjustment"]["depth_of_field"]:
         return
     cameras = files.registers["cameras"]
-    lacking = [name for name, given in cameras.items() if lens_of(given) is None]
-    if len(lacking) == len(cameras):
+    without_lens = [name for name, given in cameras.items() if lens_of(given) is None]
+    if len(without_lens) == len(cameras):
         expected = message(
             "no_focus_at_all",
             "found true, but no camera has focus_calibrations; expected them in cameras.toml",
         )
         tell(files.log.problem, files.raw, "adjustment", "depth_of_field", expected)
-    elif lacking:
+    elif without_lens:
         expected = message(
             "no_depth_of_field",
             "without effect on camera {cameras}: no focus_calibrations",
-            cameras=lacking,
+            cameras=without_lens,
         )
         tell(files.log.warning, files.raw, "adjustment", "depth_of_field", expected)

@@ -1,7 +1,8 @@
-"""Angles in gon given as degrees, or the other way round, where the files alone show it.
+"""Checks for angles in gon declared as degrees, and vice versa.
 
-Two kinds of evidence. Reciprocal sights: azimuths there and back differ by half a circle, zenith
-angles add up to half a circle. Known points: the angle between them follows from coordinates.
+There are two kinds of evidence. Reciprocal sights: forward and back azimuths differ by half a
+circle; forward and back zenith angles have the sum of half a circle. Known points: coordinates
+determine the angle between them.
 """
 
 import numpy as np
@@ -13,15 +14,15 @@ from tankcal.messages import message
 HALF_CIRCLE = {"deg": 180.0, "gon": 200.0}
 OTHER = {"deg": "gon", "gon": "deg"}
 IN_WORDS = {"deg": message("degrees", "degrees"), "gon": message("gon", "gon")}
-OF_RECIPROCAL = 2.0  # degrees or gon; the two half circles are 20 apart
-OF_KNOWN_DEG = 1.0
-MIN_SIGHTS = 3
-SAME_HEIGHT_M = 0.1  # of instrument and target: else zenith angles there and back do not add up
-MIN_TURN_DEG = 20.0  # below it the two units differ by less than 2 degrees
+OF_RECIPROCAL = 2.0  # tolerance of half a circle, degrees or gon; the units differ by 20
+OF_KNOWN_DEG = 1.0  # tolerance of angles between known points
+MIN_SIGHTS = 3  # smallest number of such angles
+SAME_HEIGHT_M = 0.1  # largest difference of the heights of instrument and target
+MIN_TURN_DEG = 20.0  # for smaller angles, the units differ by less than 2 degrees
 
 
 def check_gon(files, places):
-    """A problem for each column of angles that fits the other unit, and not its own."""
+    """Report each column of angles that fits the other unit only."""
     for name, angle in ANGLES.items():
         table = files.tables[name]
         if not has_rows(table):
@@ -39,7 +40,7 @@ def check_gon(files, places):
 
 
 def _sights(files, name, table, values):
-    """Rows (at, from or set, to, value) of a table of angles, those without a problem."""
+    """Valid rows (at, from or set, to, value) of a table of angles."""
     if "setup" in table.columns:
         setups = files.tables["setups"]
         if not has_rows(setups):
@@ -60,7 +61,7 @@ def _sights(files, name, table, values):
 
 
 def _is_level(files, name, table):
-    """(n,) Is the target as high above its mark as the instrument is?"""
+    """True where instrument and target have the same height above their marks, shape (n,)."""
     setups = files.tables["setups"]
     if name != "zenith_angles" or not has_rows(setups):
         return np.ones(len(table.rows), dtype=bool)
@@ -71,15 +72,15 @@ def _is_level(files, name, table):
 
 
 def _reciprocal(name, sights, unit):
-    """Half a circle, as sights there and back give it, against that of the column's unit."""
+    """Message if reciprocal sights give half a circle in the other unit, else ""."""
     if name not in ("azimuths", "zenith_angles"):
         return ""
     value = {(at, to): angle for at, _, to, angle in sights}
     pairs = [(value[ends], value[ends[::-1]]) for ends in value if ends[::-1] in value]
     if name == "azimuths":
-        halves = [abs(there - back) for there, back in pairs if there > back]
+        halves = [abs(forward - back) for forward, back in pairs if forward > back]
     else:
-        halves = [there + back for there, back in pairs]
+        halves = [forward + back for forward, back in pairs]
     if not halves:
         return ""
     half, other = float(np.median(halves)), OTHER[unit]
@@ -98,7 +99,7 @@ def _reciprocal(name, sights, unit):
 
 
 def _known(name, sights, unit, places):
-    """Angles between points of known coordinates: do they fit in the other unit only?"""
+    """Message if angles between known points fit in the other unit only, else ""."""
     if name in ("zenith_angles", "vertical_angles"):
         return ""
     turns = _turns(name, sights, places)
@@ -106,9 +107,9 @@ def _known(name, sights, unit, places):
         return ""
     observed, computed = np.array(turns).T
     misfit = {}
-    for tried in HALF_CIRCLE:
-        turn = observed * 180.0 / HALF_CIRCLE[tried]
-        misfit[tried] = float(np.median(np.abs((turn - computed + 180.0) % 360.0 - 180.0)))
+    for candidate in HALF_CIRCLE:
+        turn = observed * 180.0 / HALF_CIRCLE[candidate]
+        misfit[candidate] = float(np.median(np.abs((turn - computed + 180.0) % 360.0 - 180.0)))
     other = OTHER[unit]
     if misfit[other] > OF_KNOWN_DEG or misfit[unit] < 5 * max(misfit[other], 0.2):
         return ""
@@ -127,7 +128,7 @@ def _known(name, sights, unit, places):
 
 
 def _turns(name, sights, places):
-    """(observed in the column's unit, computed in degrees) of angles between known points."""
+    """(observed in the unit of the column, computed in degrees) of angles between known points."""
     turns, zero = [], {}
     for at, origin, to, value in sights:
         azimuth = _azimuth_deg(places, at, to)
@@ -146,10 +147,10 @@ def _turns(name, sights, places):
 
 
 def _azimuth_deg(places, at, to):
-    one, other = places.of.get(at), places.of.get(to)
-    if one is None or other is None:
+    station, target = places.of.get(at), places.of.get(to)
+    if station is None or target is None:
         return None
-    dx, dy = (other - one)[:2]
+    dx, dy = (target - station)[:2]
     if not np.isfinite(dx + dy) or (dx == 0 and dy == 0):
         return None
     return float(np.degrees(np.arctan2(dx, dy)))

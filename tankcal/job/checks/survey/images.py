@@ -1,4 +1,4 @@
-"""photos.csv and image_points.csv: complete, in the format, and enough points in each photo."""
+"""Checks of photos.csv, image_points.csv and film.csv: completeness, format, number of points."""
 
 import numpy as np
 
@@ -9,32 +9,32 @@ from tankcal.job.checks.survey.files import refuse_undefined, tell_rows
 from tankcal.job.imagery import imagery_of, is_surface, surfaces_of
 from tankcal.messages import message
 
-# film.csv: the form of the film of a camera or a photo.
+# film.csv: unflatness of the film of a camera or a photo.
 
-FLAT_UM = 0.5  # a film whose heights are all below it: in millimetres?
+FLAT_UM = 0.5  # smaller heights of a film are probably in millimetres
 
 
 def check_film(files, imagery):
-    """Each film belongs to one camera or photo, and is a surface."""
+    """Require one camera or photo for each film, and heights that define a surface."""
     table = files.tables["film"]
     if not has_rows(table):
         return
-    sound = files.sound(table)
-    has = {
+    is_valid = files.sound(table)
+    is_given = {
         name: np.array([value is not None for value in table.of(name)], dtype=bool)
         for name in ("camera", "photo")
     }
     for is_told, expected in (
         (
-            has["camera"] & has["photo"],
+            is_given["camera"] & is_given["photo"],
             message("film_of_both", "camera and photo are both given; expected only one of them"),
         ),
         (
-            ~has["camera"] & ~has["photo"],
+            ~is_given["camera"] & ~is_given["photo"],
             message("film_of_none", "blank; expected a camera, or a photo"),
         ),
     ):
-        tell_rows(files.log.problem, table, sound & is_told, "camera", expected)
+        tell_rows(files.log.problem, table, is_valid & is_told, "camera", expected)
     refuse_undefined(files, table, "camera", files.registers["cameras"], "cameras")
     photos = files.tables["photos"]
     defined = () if photos is None else dict.fromkeys(photos.of("photo"))
@@ -63,26 +63,26 @@ def check_film(files, imagery):
 
 
 def _warn_beyond_film(table, imagery, log):
-    for (_, name), (beyond, count) in imagery.outside.items():
-        if beyond:
+    for (_, name), (outside, count) in imagery.outside.items():
+        if outside:
             expected = message(
                 "beyond_film",
                 "{beyond} of {count} image points of {name!r} lie outside the places of its film:"
                 " the height of the nearest is taken",
-                beyond=beyond,
+                beyond=outside,
                 count=count,
                 name=name,
             )
             log.warning(table.file, expected)
 
 
-MIN_POINTS = 3
+MIN_POINTS = 3  # smallest number of points that determine an orientation
 ANGLES = ("omega", "phi", "kappa")
 COORDINATES = ("x_mm", "y_mm", "column_px", "line_px")
 
 
 def check_images(files):
-    """Photos and their image points."""
+    """Check photos and their image points."""
     photos, images = files.tables["photos"], files.tables["image_points"]
     if photos is not None:
         refuse_repeated(photos, "photo", files.log)
@@ -95,9 +95,9 @@ def check_images(files):
         _check_sds(files, images)
         adjustment = None if files.values is None else files.values["adjustment"]
         imagery = imagery_of(files.tables, files.registers["cameras"], adjustment)
-        told = check_fiducials(files, imagery)
+        rejected = check_fiducials(files, imagery)
         check_film(files, imagery)
-        _check_format(files, images, imagery, told)
+        _check_format(files, images, imagery, rejected)
     if photos is not None:
         _check_counts(files, photos, images)
     if has_rows(photos) and not has_rows(images) and not files.is_unreadable("image_points"):
@@ -128,29 +128,29 @@ def _check_orientations(files, photos):
         )
         for angle in ANGLES
     ]
-    sound = files.sound(photos)
+    is_valid = files.sound(photos)
     two_units = message("in_two_units", "given in two units; expected one")
     for column, values, sds in elements:
         count, count_sd = (
             sum(~np.isnan(photos.numbers(name)) for name in names) for names in (values, sds)
         )
-        in_two = sound & (count > 1)
+        in_two = is_valid & (count > 1)
         tell_rows(files.log.problem, photos, in_two, column, two_units)
-        in_two = sound & (count_sd > 1)
+        in_two = is_valid & (count_sd > 1)
         tell_rows(files.log.problem, photos, in_two, sds[0], two_units)
         expected = message(
             "sd_without_value",
             "given without {column}; expected both, or no standard deviation",
             column=column,
         )
-        alone = sound & (count == 0) & (count_sd > 0)
+        alone = is_valid & (count == 0) & (count_sd > 0)
         tell_rows(files.log.problem, photos, alone, sds[0], expected)
 
 
 def _check_coordinates(files, images):
-    """Each row in millimetres or in pixels, both coordinates."""
-    log, sound = files.log, files.sound(images)
-    if all(images.columns[name] is None for name in COORDINATES) and sound.any():
+    """Require both coordinates of each row, in millimetres or in pixels."""
+    log, is_valid = files.log, files.sound(images)
+    if all(images.columns[name] is None for name in COORDINATES) and is_valid.any():
         expected = message(
             "image_columns_missing",
             "missing columns; expected x_mm and y_mm, or column_px and line_px",
@@ -162,17 +162,17 @@ def _check_coordinates(files, images):
     tell_rows(
         log.problem,
         images,
-        sound & in_mm & in_px,
+        is_valid & in_mm & in_px,
         "x_mm",
         message(
             "image_in_two_units",
             "x_mm and y_mm are given together with column_px and line_px; expected only one pair",
         ),
     )
-    nothing = sound & ~in_mm & ~in_px
+    is_blank = is_valid & ~in_mm & ~in_px
     expected = message("image_blank", "blank; expected x_mm and y_mm, or column_px and line_px")
-    tell_rows(log.problem, images, nothing, "x_mm", expected)
-    for one, other, name in (
+    tell_rows(log.problem, images, is_blank, "x_mm", expected)
+    for is_given, other, name in (
         (x, y, "y_mm"),
         (y, x, "x_mm"),
         (column, line, "line_px"),
@@ -181,7 +181,7 @@ def _check_coordinates(files, images):
         tell_rows(
             log.problem,
             images,
-            sound & one & ~other & ~(in_mm & in_px),
+            is_valid & is_given & ~other & ~(in_mm & in_px),
             name,
             message("image_of_one", "blank; expected both coordinates"),
         )
@@ -190,12 +190,12 @@ def _check_coordinates(files, images):
     _tell_cameras_without_pixels(files, images, in_px & np.isnan(pixel[:, 0]))
 
 
-def _tell_cameras_without_pixels(files, images, lacking):
+def _tell_cameras_without_pixels(files, images, is_missing):
     photos, cameras = files.tables["photos"], files.registers["cameras"]
     if photos is None:
         return
     of_photo = dict(zip(photos.of("photo"), photos.of("camera"), strict=True))
-    names = {of_photo.get(images.of("photo")[place]) for place in np.flatnonzero(lacking)}
+    names = {of_photo.get(images.of("photo")[place]) for place in np.flatnonzero(is_missing)}
     for name in sorted(names & set(cameras)):
         if not files.is_given("cameras", name, "pixel_um"):
             expected = message(
@@ -206,44 +206,44 @@ def _tell_cameras_without_pixels(files, images, lacking):
 
 
 def _check_sds(files, images):
-    sound = files.sound(images)
+    is_valid = files.sound(images)
     sx, sy, s_px = (~np.isnan(images.numbers(name)) for name in ("sx_um", "sy_um", "s_px"))
-    for one, other, name in ((sx, sy, "sy_um"), (sy, sx, "sx_um")):
+    for is_given, other, name in ((sx, sy, "sy_um"), (sy, sx, "sx_um")):
         expected = message("image_sd_of_one", "blank; expected both sx_um and sy_um, or none")
-        tell_rows(files.log.problem, images, sound & one & ~other, name, expected)
+        tell_rows(files.log.problem, images, is_valid & is_given & ~other, name, expected)
     expected = message(
         "image_sd_in_two_units", "given together with sx_um; expected only one of them"
     )
-    tell_rows(files.log.problem, images, sound & (sx | sy) & s_px, "s_px", expected)
-    lacking = sound & ~sx & ~sy & ~s_px
-    if files.values is None or not lacking.any():
+    tell_rows(files.log.problem, images, is_valid & (sx | sy) & s_px, "s_px", expected)
+    is_missing = is_valid & ~sx & ~sy & ~s_px
+    if files.values is None or not is_missing.any():
         return
     if is_not_given(files.raw, "adjustment", "image_sd_um"):
-        row = images.rows[int(np.argmax(lacking))]
+        row = images.rows[int(np.argmax(is_missing))]
         expected = message(
             "image_sd_missing",
             "missing; expected the standard deviation of image coordinates, micrometres; "
             "rows of {file} without one: {count}, the first of them row {row}",
             file=images.file,
-            count=int(lacking.sum()),
+            count=int(is_missing.sum()),
             row=row,
         )
         tell(files.log.problem, files.raw, "adjustment", "image_sd_um", expected)
 
 
-def _check_format(files, images, imagery, told):
-    """Image points within the format, but for those of photos that are told already."""
+def _check_format(files, images, imagery, rejected):
+    """Require image points within the format, except in rejected photos."""
     size, pixel = image_frames(images, files.tables["photos"], files.registers["cameras"])
     xy = imagery.xy_mm
     with np.errstate(invalid="ignore"):
         outside = np.abs(xy) > size / 2 * (1 + 1e-9)
-        of_corner = np.nanmin(xy, axis=0, initial=np.inf) >= 0
-    outside[[photo in told for photo in images.of("photo")]] = False
+        is_positive = np.nanmin(xy, axis=0, initial=np.inf) >= 0
+    outside[[photo in rejected for photo in images.of("photo")]] = False
     if not outside.any():
         return
     in_px = ~np.isnan(images.numbers("column_px"))
     hint = ""
-    if of_corner.all() and not in_px.any():
+    if is_positive.all() and not in_px.any():
         hint = message("from_a_corner", ": is it counted from a corner instead of the middle?")
     for place in np.flatnonzero(outside.any(axis=1)):
         axis = int(np.argmax(outside[place]))
@@ -257,14 +257,14 @@ def _check_format(files, images, imagery, told):
             allowed = message(
                 "millimetres_allowed", "at most {half:g} mm from the middle", half=half
             )
-        found = images.of(column)[place]
+        coordinate = images.of(column)[place]
         if images.of("photo")[place] in imagery.fits:
-            found = xy[place, axis]
+            coordinate = xy[place, axis]
             hint = message("after_transformation", " after the transformation")
         expected = message(
             "outside_format",
             "found {found:g}, outside the format; expected {allowed}{hint}",
-            found=found,
+            found=coordinate,
             allowed=allowed,
             hint=hint,
         )
@@ -272,7 +272,7 @@ def _check_format(files, images, imagery, told):
 
 
 def _check_counts(files, photos, images):
-    """Three points fix a photo; fewer do where its orientation is known."""
+    """Require three points in each photo, unless its orientation is known."""
     if images is None or images.skipped:
         return
     points, is_seen = {}, set(images.of("photo"))
@@ -281,9 +281,9 @@ def _check_counts(files, photos, images):
         if use != "check":
             points.setdefault(photo, set()).add(point)
     sds = [f"s{axis}_m" for axis in "xyz"]
-    known = sum(~np.isnan(photos.numbers(name)) for name in sds)
+    known_elements = sum(~np.isnan(photos.numbers(name)) for name in sds)
     for angle in ANGLES:
-        known = known + (
+        known_elements = known_elements + (
             ~np.isnan(photos.numbers(f"s_{angle}_deg"))
             | ~np.isnan(photos.numbers(f"s_{angle}_gon"))
         )
@@ -298,7 +298,7 @@ def _check_counts(files, photos, images):
                 photo=name,
             )
             files.log.warning(photos.file, expected, row, "photo")
-        elif known[place] < 6:
+        elif known_elements[place] < 6:
             expected = message(
                 "photo_of_few_points",
                 "photo {name!r} has {count} image points; expected {fewest} or more, or a "

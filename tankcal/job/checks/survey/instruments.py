@@ -1,4 +1,4 @@
-"""instruments.toml, setups.csv, and who uses them."""
+"""Checks of instruments.toml and setups.csv, and of references to them."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from tankcal.job.checking import has_rows, refuse_repeated, temperature_missing
 from tankcal.job.checks.survey.files import refuse_undefined
 from tankcal.messages import message
 
-DOUBTFUL_CORRECTION = 5e-4  # no sound instrument is off by more
+DOUBTFUL_CORRECTION = 5e-4  # largest plausible scale correction
 TAKEN_FROM_SETUPS = ("slope_distances", "directions", "zenith_angles")
 
 
 def check_instruments(files):
-    """Instruments complete and used; set-ups named once, and those that are named defined."""
+    """Check instruments, unique set-ups, and references to them."""
     for name, given in files.registers["instruments"].items():
         _check_instrument(files, name, given)
     setups, instruments = files.tables["setups"], files.registers["instruments"]
@@ -29,7 +29,7 @@ def check_instruments(files):
 
 
 def check_correction(files, name, given):
-    """Warn of a scale that no instrument has: a percentage, or a millimetre for a metre."""
+    """Warn about an implausible scale correction, such as a percentage or millimetres."""
     correction = given["correction"]
     if correction is not None and abs(correction) > DOUBTFUL_CORRECTION:
         expected = message(
@@ -51,7 +51,7 @@ def _check_instrument(files, name, given):
 
 
 def _check_temperatures(files, distances, instruments):
-    """Every reading of a tape that expands has a temperature, and no other one."""
+    """Warn about missing and ineffective temperatures of tape readings."""
     temperature = distances.numbers("temperature_c")
     expands = np.array(
         [
@@ -60,26 +60,26 @@ def _check_temperatures(files, distances, instruments):
         ],
         dtype=bool,
     )
-    without = expands & np.isnan(temperature)
-    idle = ~expands & ~np.isnan(temperature) & files.sound(distances)
-    for told, expected in (
+    is_missing = expands & np.isnan(temperature)
+    is_ineffective = ~expands & ~np.isnan(temperature) & files.sound(distances)
+    for is_reported, expected in (
         (
-            without,
+            is_missing,
             message(
                 "tape_without_temperature",
                 "blank in {rows} rows of a tape with expansion_per_k; they are not corrected",
-                rows=int(without.sum()),
+                rows=int(is_missing.sum()),
             ),
         ),
         (
-            idle,
+            is_ineffective,
             message(
                 "temperature_idle",
                 "without effect in {rows} rows: the instrument has no expansion_per_k",
-                rows=int(idle.sum()),
+                rows=int(is_ineffective.sum()),
             ),
         ),
     ):
-        if told.any():
-            row = distances.rows[int(np.argmax(told))]
+        if is_reported.any():
+            row = distances.rows[int(np.argmax(is_reported))]
             files.log.warning(distances.file, expected, row, "temperature_c")

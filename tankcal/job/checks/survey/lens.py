@@ -1,4 +1,4 @@
-"""The interior of a camera in cameras.toml: form of its distortion, states, credible sizes."""
+"""Checks of the interior orientation in cameras.toml: distortion, states, plausible sizes."""
 
 import numpy as np
 
@@ -13,19 +13,20 @@ from tankcal.job.checking import same_parameter
 from tankcal.job.contract.registers import PARAMETER_KEYS, SECOND_NAMES, sd_key
 from tankcal.messages import message
 
-CREDIBLE_LENGTHS = (0.1, 100)  # principal distance, in diagonals of the format
-POSSIBLE_LENGTHS = (0.05, 200)
+CREDIBLE_LENGTHS = (0.1, 100)  # plausible principal distance, in diagonals of the format
+POSSIBLE_LENGTHS = (0.05, 200)  # possible principal distance, in diagonals of the format
 RADIAL_TERMS, DECENTRING_TERMS = ("K1", "K2", "K3", "K4"), ("P1", "P2", "P3", "P4")
-DOUBTFUL_DISTORTION, IMPOSSIBLE_DISTORTION = 0.1, 0.5  # at the corner, part of the radius
+# Displacement of the corner of the image, as a share of its radius.
+DOUBTFUL_DISTORTION, IMPOSSIBLE_DISTORTION = 0.1, 0.5
 
 
 def check_affinity(files, name, given):
-    """One name for a parameter, and the form of the affinity where it is given."""
+    """Require one name for each parameter, and the form of a given affinity."""
     form = given["affinity"]
     for first, second in SECOND_NAMES.items():
-        for one, other in ((first, second), (sd_key(first), sd_key(second))):
-            if given[one] is not None and given[other] is not None:
-                expected = same_parameter(one)
+        for key, other in ((first, second), (sd_key(first), sd_key(second))):
+            if given[key] is not None and given[other] is not None:
+                expected = same_parameter(key)
                 files.tell_key(files.log.problem, "cameras", name, other, expected)
         if given[second] and affinity_of(given) != "b1_b2":
             expected = message(
@@ -46,11 +47,11 @@ def check_affinity(files, name, given):
 
 
 def check_convention(files, name, given, parameters):
-    """The sign of K and P is said, for sources differ in it."""
+    """Require the sign convention of K and P, in which sources differ."""
     if files.is_given("cameras", name, "convention"):
         return
     lens = [parameter for parameter in parameters if parameter.name[0] in "KPAB"]
-    with_value = [one.key for one in lens if one.value and one.name[0] in "KP"]
+    with_value = [term.key for term in lens if term.value and term.name[0] in "KP"]
     if with_value:
         expected = message(
             "convention_missing",
@@ -69,11 +70,11 @@ def check_convention(files, name, given, parameters):
 
 
 def check_states(files, name, parameters):
-    """What is weighted has a standard deviation, and none is without effect."""
+    """Require the standard deviation of weighted parameters; warn about ineffective ones."""
     unused = []
     for parameter in parameters:
         section = f"adjustment.camera.{parameter.setting}"
-        asked = f"{parameter.scope} {parameter.state}"
+        state = f"{parameter.scope} {parameter.state}"
         if parameter.scope == "off":
             _warn_held(files, name, parameter)
         elif parameter.state == "weighted" and parameter.sd is None:
@@ -81,7 +82,7 @@ def check_states(files, name, parameters):
                 expected = message(
                     "parameter_sd_missing",
                     "missing; expected a value above 0: the parameter is {asked}",
-                    asked=asked,
+                    asked=state,
                 )
                 files.tell_key(files.log.problem, "cameras", name, parameter.sd_key, expected)
         elif parameter.sd == 0 and parameter.is_own and _asks_free(files, parameter):
@@ -121,7 +122,7 @@ def _warn_held(files, name, parameter):
 
 
 def check_sizes(files, name, given):
-    """Interior parameters and standard deviations of a credible size for the format."""
+    """Check interior parameters and standard deviations for values plausible for the format."""
     size_mm = format_of(given)[0]
     _check_principal_distance(files, name, given, size_mm)
     _check_principal_point(files, name, given, size_mm)
@@ -161,7 +162,7 @@ def _is_between(value, limits):
 
 
 def _check_principal_point(files, name, given, size_mm):
-    """The principal point is in the frame."""
+    """Require a principal point within the format."""
     for key, length in zip(("x0_mm", "y0_mm"), size_mm, strict=True):
         if abs(given[key] or 0.0) > length / 2:
             found, half = given[key], length / 2
@@ -186,35 +187,47 @@ def _check_principal_point(files, name, given, size_mm):
 
 
 def _check_distortion(files, name, given, size_mm):
-    """No term moves the corner of the image by an incredible part of its radius.
+    """Check the displacement of the image corner by each term of the distortion.
 
-    Of radial and of decentring terms the worst is told.
+    The largest radial term and the largest decentring term are reported.
     """
     values = at_focus(given)
     for names in (RADIAL_TERMS, DECENTRING_TERMS):
-        keys = [PARAMETER_KEYS[one][0] for one in names]
-        parts = _parts_at_corner([values[key] or 0.0 for key in keys], names, size_mm)
-        worst = int(np.argmax(parts))
-        if parts[worst] > DOUBTFUL_DISTORTION:
-            is_problem = parts[worst] > IMPOSSIBLE_DISTORTION
-            to = files.log.problem if is_problem else files.log.warning
+        keys = [PARAMETER_KEYS[parameter][0] for parameter in names]
+        shares = _parts_at_corner([values[key] or 0.0 for key in keys], names, size_mm)
+        worst = int(np.argmax(shares))
+        if shares[worst] > DOUBTFUL_DISTORTION:
+            is_problem = shares[worst] > IMPOSSIBLE_DISTORTION
+            report = files.log.problem if is_problem else files.log.warning
             expected = message(
                 "large_distortion",
                 "moves the corner of the image by {percent:.3g} % of its radius; expected "
                 "less: is it in another unit than millimetres, or for normalised coordinates?",
-                percent=100 * parts[worst],
+                percent=100 * shares[worst],
             )
-            files.tell_key(to, "cameras", name, keys[worst], expected)
+            files.tell_key(report, "cameras", name, keys[worst], expected)
 
 
 def _parts_at_corner(values, names, size_mm):
-    """What each K or P moves the corner of the image by, in parts of its radius.
+    """Displacement of the image corner by each K or P, as a share of its radius.
 
-    names  of the values, RADIAL_TERMS or DECENTRING_TERMS
+    With the corner (x, y) and its radius r, the radial terms are |K1| r^2, |K2| r^4, ... The
+    displacements by P1 (r^2 + 2 x^2, 2 x y) and by P2 (2 x y, r^2 + 2 y^2) have the lengths |P1| r
+    sqrt(r^2 + 8 x^2) and |P2| r sqrt(r^2 + 8 y^2). P3 r^2 and P4 r^4 are factors of both, whose
+    effects are added.
 
-    With (x, y) the corner and r its radius: |K1| r^2, |K2| r^4, ...; of P1 (r^2 + 2 x^2, 2 x y) and
-    of P2 (2 x y, r^2 + 2 y^2) the length is |P| r sqrt(r^2 + 8 x^2) and the same with y; P3 r^2 and
-    P4 r^4 are factors of both, taken as adding up.
+    Parameters
+    ----------
+    values : sequence of float, length 4
+        Coefficients.
+    names : tuple of str
+        RADIAL_TERMS or DECENTRING_TERMS.
+    size_mm : ndarray, shape (2,)
+        Format.
+
+    Returns
+    -------
+    ndarray, shape (4,)
     """
     radius, size = np.hypot(*size_mm) / 2, np.abs(values)
     squares = radius ** (2 * np.arange(1, 5))
@@ -225,7 +238,7 @@ def _parts_at_corner(values, names, size_mm):
 
 
 def _check_sds(files, name, given, size_mm):
-    """No standard deviation of the principal distance or point is larger than the format."""
+    """Require standard deviations of principal distance and point below the size of the format."""
     across = float(np.hypot(*size_mm))
     for key in map(sd_key, ("c", "x0", "y0")):
         if (given[key] or 0.0) > across:

@@ -1,4 +1,4 @@
-"""One point in two spellings: P1, p1, P 1, P-1, P01."""
+"""Checks for one point in two spellings: P1, p1, P 1, P-1, P01."""
 
 import re
 
@@ -10,7 +10,7 @@ KNOWN = (("control", "point"), ("check", "point"), ("targets", "point"), ("setup
 
 
 def _columns():
-    """(table, column) of every name of a point that is observed."""
+    """(table, column) of all names of observed points."""
     yield "image_points", "point"
     yield "stadia", "to"
     for name in READINGS:
@@ -19,7 +19,7 @@ def _columns():
 
 
 def observed_names(files):
-    """{name: number of rows} of the points that observations name, stations among them."""
+    """{name: number of rows} of the observed points and of the stations."""
     counts = {}
     for name, column in (*_columns(), ("setups", "station")):
         table = files.tables[name]
@@ -39,16 +39,16 @@ def all_points(files):
 
 
 def plain(name):
-    """What two spellings of one name have in common: P1 for p1, P 1, P-1, P_01."""
+    """Common form of the spellings of one name: P1 for p1, P 1, P-1, P_01."""
     text = re.sub(r"[\s_.\-/#()]+", "-", name.casefold())
     text = re.sub(r"(?<=[^\W\d])-(?=\d)|(?<=\d)-(?=[^\W\d])", "", text)
     return re.sub(r"(?<!\d)0+(?=\d)", "", text).strip("-")
 
 
 def check_names(files):
-    """Spellings that look like one point: a problem where one of them stands there once only.
+    """Report similar spellings; a spelling in a single row is a problem.
 
-    A point in one row alone cannot be determined; in more rows it may well be another point.
+    A point in a single row cannot be determined; a point in several rows may be another point.
     """
     places = {}
     for name, column in (*KNOWN, *_columns()):
@@ -56,28 +56,28 @@ def check_names(files):
         if has_rows(table) and column in table.columns:
             for row, point in zip(table.rows, table.of(column), strict=True):
                 if point is not None:
-                    first = places.setdefault(point, [table.file, row, column, 0])
-                    first[3] += 1
-    alike = {}
+                    entry = places.setdefault(point, [table.file, row, column, 0])
+                    entry[3] += 1
+    similar = {}
     for point in places:
-        alike.setdefault(plain(point), []).append(point)
-    for spellings in alike.values():
+        similar.setdefault(plain(point), []).append(point)
+    for spellings in similar.values():
         if len(spellings) > 1:
             _tell(files, sorted(spellings, key=lambda point: -places[point][3]), places)
 
 
 def _tell(files, spellings, places):
-    most, *others = spellings
+    most_frequent, *others = spellings
     for point in others:
         file, row, column, count = places[point]
         if count == 1:
-            rows_of_other = places[most][3]
+            rows_of_other = places[most_frequent][3]
             expected = message(
                 "spelt_once",
                 "{point!r} is in 1 row, {other!r} in {rows} rows; expected one spelling of "
                 "one point, or another name",
                 point=point,
-                other=most,
+                other=most_frequent,
                 rows=rows_of_other,
             )
             if rows_of_other == 1:
@@ -86,7 +86,7 @@ def _tell(files, spellings, places):
                     "{point!r} is in 1 row, {other!r} in 1 row; expected one spelling of one "
                     "point, or another name",
                     point=point,
-                    other=most,
+                    other=most_frequent,
                 )
             files.log.problem(file, expected, row, column)
         else:
@@ -96,7 +96,7 @@ def _tell(files, spellings, places):
                 "point in two spellings?",
                 point=point,
                 rows=count,
-                other=most,
-                rows_of_other=places[most][3],
+                other=most_frequent,
+                rows_of_other=places[most_frequent][3],
             )
             files.log.warning(file, expected, row, column)

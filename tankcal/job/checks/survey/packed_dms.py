@@ -1,26 +1,26 @@
-"""Degrees, minutes and seconds that stand packed (12.3045 for 12° 30' 45") among decimal degrees.
+"""Detection of packed degrees, minutes and seconds (12.3045 for 12° 30' 45") among decimal degrees.
 
-The second pair of decimals of decimal degrees reaches 60 in four of ten readings, whatever is read;
-packed seconds never do, nor packed minutes.
+In decimal degrees, the second pair of decimals reaches 60 in four of ten readings. Packed minutes
+and seconds never reach 60.
 """
 
 import numpy as np
 
 from tankcal.messages import message
 
-OF_PAIR, BY_CHANCE = 0.6, 1e-6  # pairs of digits below 60; columns of decimal degrees without one
-EACH = 1e-3  # degrees: readings that share so many decimals are one
-DIGITS = 7  # beyond the decimals that any circle shows
+OF_PAIR, BY_CHANCE = 0.6, 1e-6  # probability of a pair below 60; smallest probability of a column
+EACH = 1e-3  # readings that agree to this interval count once, degrees
+DIGITS = 7  # number of decimals, more than any circle shows
 
 
 def chance_of_packed(degrees):
-    """Probability that decimal degrees look as packed as these; 1.0 where a pair reaches 60.
+    """Probability that decimal degrees look as packed as these; 1.0 if a pair reaches 60.
 
     Parameters
     ----------
     degrees : array_like, shape (n,)
-        As written. Those of at most two decimals do not count, nor those that share three with
-        another one.
+        Values as written. Values with at most two decimals, and repetitions to three decimals, do
+        not count.
 
     Returns
     -------
@@ -34,16 +34,16 @@ def chance_of_packed(degrees):
     values = np.abs(np.asarray(degrees, dtype=float))
     values = values[np.isfinite(values)]
     unit = 10**DIGITS
-    part = np.rint(values % 1 * unit).astype(int) % unit
-    minutes, seconds = part // 10 ** (DIGITS - 2), part // 10 ** (DIGITS - 4) % 100
+    decimals = np.rint(values % 1 * unit).astype(int) % unit
+    minutes, seconds = decimals // 10 ** (DIGITS - 2), decimals // 10 ** (DIGITS - 4) % 100
     if np.any((minutes >= 60) | (seconds >= 60)):
         return 1.0
-    fine = part % 10 ** (DIGITS - 2) > 0
-    return round(OF_PAIR ** len(np.unique(np.floor(values[fine] / EACH + EACH))), 12)
+    has_seconds = decimals % 10 ** (DIGITS - 2) > 0
+    return round(OF_PAIR ** len(np.unique(np.floor(values[has_seconds] / EACH + EACH))), 12)
 
 
 def refuse_packed(table, column, log):
-    """A problem for a column of degrees whose minutes and seconds are packed."""
+    """Report a column of degrees with packed minutes and seconds."""
     degrees = table.numbers(column)
     chance = chance_of_packed(degrees)
     if chance < BY_CHANCE:

@@ -1,4 +1,4 @@
-"""The tables of readings: one angle in each row, two different ends, sets that say something."""
+"""Checks of the tables of readings: one angle in each row, different ends, sufficient sets."""
 
 import math
 
@@ -12,28 +12,28 @@ from tankcal.job.checks.survey.packed_dms import refuse_packed
 from tankcal.job.contract.observations import ANGLE_UNITS, ANGLES, READINGS
 from tankcal.messages import join_with_or, list_some, message
 
-# correlated_readings.csv: pairs of values that exist, each pair once, and none with itself.
+# correlated_readings.csv: unique pairs of two different existing values.
 
 OF_AXES = ("control", "vectors")  # tables with x, y and z in a row
 
 
 def check_correlated(files):
-    """Every pair names two values of two rows that are adjusted."""
+    """Require two different adjusted values in each row of correlated_readings.csv."""
     table = files.tables["correlated_readings"]
     if not has_rows(table):
         return
     first = {}
-    columns = [table.of(f"{what}_{i}") for i in "12" for what in ("table", "row", "value")]
+    columns = [table.of(f"{part}_{i}") for i in "12" for part in ("table", "row", "value")]
     for row, *cells in zip(table.rows, *columns, strict=True):
         ends = []
-        for i, (name, at, axis) in enumerate((cells[:3], cells[3:]), start=1):
-            if name is None or at is None:
-                break  # told already
-            column, expected = _doubt_of_end(files.tables[name], name, at, axis)
+        for i, (name, number, axis) in enumerate((cells[:3], cells[3:]), start=1):
+            if name is None or number is None:
+                break  # reported already
+            column, expected = _doubt_of_end(files.tables[name], name, number, axis)
             if column:
                 files.log.problem(table.file, expected, row, f"{column}_{i}")
                 break
-            ends.append((name, int(at), axis))
+            ends.append((name, int(number), axis))
         if len(ends) < 2:
             continue
         if ends[0] == ends[1]:
@@ -43,22 +43,31 @@ def check_correlated(files):
             )
             files.log.problem(table.file, expected, row, "row_2")
             continue
-        before = first.setdefault(frozenset(ends), row)
-        if before != row:
+        first_row = first.setdefault(frozenset(ends), row)
+        if first_row != row:
             expected = message(
                 "correlated_twice",
                 "this pair is already in row {before}; expected once",
-                before=before,
+                before=first_row,
             )
             files.log.problem(table.file, expected, row, "row_2")
 
 
-def _doubt_of_end(named, name, at, axis):
-    """Column ("row" or "value") and text of what is wrong with one end of a pair, or (None, None).
+def _doubt_of_end(referenced, name, at, axis):
+    """Column ("row" or "value") and message of a fault at one end of a pair, or (None, None).
 
-    named  the table of that name, None: not there        at, axis  row and x, y or z, or None
+    Parameters
+    ----------
+    referenced : ColumnValues or None
+        Table of the value; None: missing.
+    name : str
+        Name of the table.
+    at : float
+        Row.
+    axis : str or None
+        x, y or z.
     """
-    if named is None or at not in named.rows:
+    if referenced is None or at not in referenced.rows:
         return "row", message(
             "correlated_no_such_row",
             "found {at:g}, and {table} has no such row; expected a row of that table, the heading"
@@ -66,8 +75,8 @@ def _doubt_of_end(named, name, at, axis):
             at=at,
             table=name,
         )
-    place = list(named.rows).index(at)
-    if "use" in named.columns and named.of("use")[place] == "check":
+    place = list(referenced.rows).index(at)
+    if "use" in referenced.columns and referenced.of("use")[place] == "check":
         return "row", message(
             "correlated_only_compared",
             "row {at:g} of {table} is only compared (use = check); expected one that is adjusted",
@@ -75,7 +84,7 @@ def _doubt_of_end(named, name, at, axis):
             table=name,
         )
     if name == "control" and axis is not None:
-        return _doubt_of_control(named, place, axis)
+        return _doubt_of_control(referenced, place, axis)
     if (name in OF_AXES) == (axis is not None):
         return None, None
     if axis is None:
@@ -92,34 +101,41 @@ def _doubt_of_end(named, name, at, axis):
     )
 
 
-def _doubt_of_control(named, place, axis):
-    """The same of a control coordinate: it must be an observation in the survey's own system."""
-    if "system" in named.columns and named.of("system")[place] is not None:
+def _doubt_of_control(referenced, place, axis):
+    """Column and message of a fault of a control coordinate, or (None, None).
+
+    The coordinate must be an observation in the system of the survey.
+    """
+    if "system" in referenced.columns and referenced.of("system")[place] is not None:
         return "row", message(
             "correlated_other_system",
             "row {at:g} of control is in the system {system}; expected one in the system of the"
             " survey: coordinates of further systems have no correlations",
-            at=named.rows[place],
-            system=named.of("system")[place],
+            at=referenced.rows[place],
+            system=referenced.of("system")[place],
         )
-    sd = named.numbers(f"s{axis}_mm")[place] if f"s{axis}_mm" in named.columns else math.nan
+    sd = (
+        referenced.numbers(f"s{axis}_mm")[place]
+        if f"s{axis}_mm" in referenced.columns
+        else math.nan
+    )
     if not sd > 0:
         return "value", message(
             "correlated_no_observation",
             "{axis} in row {at:g} of control has no standard deviation above 0; expected "
             "one: a coordinate that is held, or only approximate, has no correlations",
             axis=axis,
-            at=named.rows[place],
+            at=referenced.rows[place],
         )
     return None, None
 
 
-BY_CHANCE = 0.1  # share of the rows: coarse readings repeat themselves
-MOST_REPEATED = 3  # rows that a warning names
+BY_CHANCE = 0.1  # share of rows that may be equal, because coarse readings repeat
+MOST_REPEATED = 3  # largest number of rows named in a warning
 
 
 def check_readings(files):
-    """All tables of readings, one by one."""
+    """Check all tables of readings, one by one."""
     for name in READINGS:
         table = files.tables[name]
         if not has_rows(table):
@@ -135,27 +151,42 @@ def check_readings(files):
 
 
 def check_angle(files, table, angle, *, is_needed=True):
-    """One of the units in each row, a column of one unit at least; not needed: at most one."""
+    """Require an angle in exactly one unit in each row.
+
+    Parameters
+    ----------
+    files : SurveyFiles
+        Files of the survey.
+    table : ColumnValues
+        Table of readings.
+    angle : str
+        Name of the angle, such as "direction".
+    is_needed : bool, optional
+        False: the angle may be missing.
+    """
     columns = [f"{angle}_{unit}" for unit in ANGLE_UNITS]
-    wanted = join_with_or(columns)
+    expected_columns = join_with_or(columns)
     filled = [name for name, values in table.columns.items() if values is not None]
-    headings = {*files.raw.tables[files_name(table)].headings, *filled}  # foreign ones by column
+    headings = {
+        *files.raw.tables[files_name(table)].headings,
+        *filled,
+    }  # renamed headings by their columns
     if not any(column in headings for column in columns):
         if not is_needed:
             return
         expected = message(
-            "angle_column_missing", "missing column; expected {wanted}", wanted=wanted
+            "angle_column_missing", "missing column; expected {wanted}", wanted=expected_columns
         )
         files.log.problem(table.file, expected, None, columns[0])
         return
-    sound = files.sound(table)
+    is_valid = files.sound(table)
     count = sum(~np.isnan(table.numbers(column)) for column in columns)
     first = next(column for column in columns if column in headings)
-    expected = message("angle_blank", "blank; expected {wanted}", wanted=wanted)
-    tell_rows(files.log.problem, table, is_needed & sound & (count == 0), first, expected)
-    twice = sound & (count > 1)
+    expected = message("angle_blank", "blank; expected {wanted}", wanted=expected_columns)
+    tell_rows(files.log.problem, table, is_needed & is_valid & (count == 0), first, expected)
+    twice = is_valid & (count > 1)
     expected = message(
-        "angle_in_two_units", "in two units; expected one of {wanted}", wanted=wanted
+        "angle_in_two_units", "in two units; expected one of {wanted}", wanted=expected_columns
     )
     tell_rows(files.log.problem, table, twice, first, expected)
     if f"{angle}_deg" in headings:
@@ -163,12 +194,12 @@ def check_angle(files, table, angle, *, is_needed=True):
 
 
 def files_name(table):
-    """Name of a table of a job from that of its file or sheet."""
+    """Name of a table from the name of its file or sheet."""
     return table.file.removeprefix(SHEET).removesuffix(".csv")
 
 
 def _refuse_same_ends(files, name, table):
-    """Nothing can be measured between one point and itself."""
+    """Report readings between a point and itself."""
     ends = ["from", "to"]
     if name == "horizontal_angles":
         ends = ["at", "from", "to"]
@@ -179,7 +210,7 @@ def _refuse_same_ends(files, name, table):
             return
         stations = dict(zip(setups.of("setup"), setups.of("station"), strict=True))
         columns = [[stations.get(setup) for setup in table.of("setup")], table.of("to")]
-    what = name.replace("_", " ").rstrip("s")
+    reading = name.replace("_", " ").rstrip("s")
     for row, points in zip(table.rows, zip(*columns, strict=True), strict=True):
         given = [point for point in points if point is not None]
         if len(set(given)) == len(given):
@@ -188,59 +219,59 @@ def _refuse_same_ends(files, name, table):
         expected = message(
             "between_itself",
             "{kind} between {twice!r} and itself; expected different points",
-            kind=what,
+            kind=reading,
             twice=twice,
         )
         if name in TAKEN_FROM_SETUPS:
             expected = message(
                 "station_to_itself",
                 "{kind} from station {twice!r} to itself; expected another point",
-                kind=what,
+                kind=reading,
                 twice=twice,
             )
         files.log.problem(table.file, expected, row, "to")
 
 
 def warn_copies(files, table, *, are_sights=False):
-    """Rows that are the same to the last digit, more than chance brings; one warning for a file.
+    """Warn once about identical rows, if there are more than by chance.
 
-    are_sights  of the wall, of which chance brings none that are alike
+    are_sights is True for sights to the wall, which are never equal by chance.
     """
     raw = files.raw.tables[files_name(table)]
     first, copies = {}, []
     for row, cells in zip(raw.row_numbers, raw.rows, strict=True):
         try:
-            before = first.setdefault(cells, row)
-        except TypeError:  # a cell that cannot be compared is told already
+            first_row = first.setdefault(cells, row)
+        except TypeError:  # a cell that cannot be compared is reported already
             continue
-        if before != row:
-            copies.append((row, before))
+        if first_row != row:
+            copies.append((row, first_row))
     if len(copies) <= BY_CHANCE * len(raw.rows):
         return
-    told = {
+    figures = {
         "count": len(copies),
-        "pairs": list_some([f"{row} = {before}" for row, before in copies], MOST_REPEATED),
+        "pairs": list_some([f"{row} = {first_row}" for row, first_row in copies], MOST_REPEATED),
     }
     expected = (
         message(
             "pasted_rows",
             "{count} rows are the same as another one to the last digit (rows {pairs}): was a part"
             " of the file pasted twice?",
-            **told,
+            **figures,
         )
         if are_sights
         else message(
             "copied_rows",
             "{count} rows are the same as another one to the last digit (rows {pairs}): were "
             "they copied? Each counts as a separate reading",
-            **told,
+            **figures,
         )
     )
     files.log.warning(table.file, expected, copies[0][0])
 
 
 def _warn_single_directions(files, table):
-    """A direction that is alone in its set only says where the zero of the circle was."""
+    """Warn about a single direction in a set, which determines the orientation only."""
     sets = {}
     rows = zip(
         table.rows, table.of("setup"), table.of("set"), table.of("to"), table.of("use"), strict=True
@@ -248,15 +279,15 @@ def _warn_single_directions(files, table):
     for row, setup, name, to, use in rows:
         if setup is not None and to is not None and use != "check":
             sets.setdefault((setup, name), {})[to] = row
-    for (setup, name), seen in sets.items():
-        if len(seen) == 1 and not table.skipped:
-            where = setup
+    for (setup, name), rows_of_targets in sets.items():
+        if len(rows_of_targets) == 1 and not table.skipped:
+            set_name = setup
             if name is not None:
-                where = message("set_of_setup", "{setup}, set {set}", setup=setup, set=name)
+                set_name = message("set_of_setup", "{setup}, set {set}", setup=setup, set=name)
             expected = message(
                 "single_direction",
                 "set-up {where} has directions to one point only; they determine only its "
                 "orientation",
-                where=where,
+                where=set_name,
             )
-            files.log.warning(table.file, expected, next(iter(seen.values())), "to")
+            files.log.warning(table.file, expected, next(iter(rows_of_targets.values())), "to")

@@ -1,4 +1,4 @@
-"""Readings of a stadia: its bar described, its set-ups known, its angles those of a distance."""
+"""Checks of stadia readings: bars, set-ups, angles."""
 
 from tankcal.job.checking import has_rows, tell_missing
 from tankcal.job.checks.survey.files import refuse_undefined
@@ -8,24 +8,24 @@ from tankcal.messages import message
 
 
 def bars_of(registers):
-    """{name: {key: value}} of the stadias of instruments.toml."""
+    """{name: {key: value}} of the stadia bars of instruments.toml."""
     instruments = registers["instruments"]
-    return {name: one for name, one in instruments.items() if is_bar(one["kind"])}
+    return {name: keys for name, keys in instruments.items() if is_bar(keys["kind"])}
 
 
 def is_bar(kind):
-    """Is it the kind of a stadia, however it is written?"""
+    """Return True for the kind of a stadia bar, in any spelling."""
     return (kind or "").strip().lower() == KIND
 
 
 def bars_used(table, bars):
-    """(n,) the bar of each reading: the only one where it is blank; None: there are more."""
-    usual = next(iter(bars)) if len(bars) == 1 else None
-    return [usual if name is None else name for name in table.of("bar")]
+    """Bar of each reading, shape (n,); blank: the only bar; None: several bars."""
+    only = next(iter(bars)) if len(bars) == 1 else None
+    return [only if name is None else name for name in table.of("bar")]
 
 
 def check_bars(files, table):
-    """The stadias of instruments.toml, and that readings of stadias name none but these."""
+    """Check the stadia bars of instruments.toml, and the references of readings to them."""
     bars = bars_of(files.registers)
     for name, given in bars.items():
         for key in ("length_m", "u_mm"):
@@ -35,15 +35,15 @@ def check_bars(files, table):
                     "missing; expected it of a stadia: distances are read against its length",
                 )
                 files.tell_key(files.log.problem, "instruments", name, key, expected)
-    if files.raw.registers.get("instruments", 0) is None:  # unreadable, which is told
+    if files.raw.registers.get("instruments", 0) is None:  # unreadable, reported already
         return
     if not files.registers["instruments"]:
         tell_missing(files.log, files.raw.file_of("instruments"), table.file, "bar")
         return
-    told = set()
+    reported = set()
     for row, bar in zip(table.rows, bars_used(table, bars), strict=True):
-        if bar not in bars and bar not in told:
-            told.add(bar)
+        if bar not in bars and bar not in reported:
+            reported.add(bar)
             expected = message(
                 "no_such_bar",
                 "found {name!r}; expected a stadia of {file}: kind = stadia, length_m, u_mm",
@@ -54,7 +54,7 @@ def check_bars(files, table):
 
 
 def check_stadia(files):
-    """All readings of stadias, and the bars that they name."""
+    """Check all stadia readings and their bars."""
     table = files.tables["stadia"]
     if not has_rows(table):
         return
@@ -72,7 +72,7 @@ def check_stadia(files):
 
 
 def refuse_itself(log, table, row, to):
-    """A problem for a bar that stands over the station that reads it."""
+    """Report a bar on the station of its own set-up."""
     expected = message(
         "stadia_at_itself",
         "found station {to!r} of the set-up itself; expected another one",

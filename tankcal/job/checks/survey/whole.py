@@ -1,4 +1,4 @@
-"""All checks of the files of a survey, in the order in which their problems are told."""
+"""All checks of the files of a survey, in the order of their reports."""
 
 from tankcal.job.checks.survey.cameras import check_cameras
 from tankcal.job.checks.survey.datum import check_datum, check_held, check_known
@@ -12,12 +12,17 @@ from tankcal.job.checks.survey.readings import check_correlated, check_readings
 from tankcal.job.checks.survey.stadia import check_stadia
 
 
-def check_files(values, tables, registers, raw, log, told):
-    """Check what a survey consists of.
+def check_files(values, tables, registers, raw, log, reported):
+    """Check the files of a survey.
 
-    told  (file, row) of each problem that was told before
+    Parameters
+    ----------
+    values, tables, registers, raw, log
+        As for `checks.check_all`.
+    reported : frozenset of (str, int)
+        File and row of each problem reported before.
     """
-    files = SurveyFiles(values, tables, registers, raw, log, told)
+    files = SurveyFiles(values, tables, registers, raw, log, reported)
     check_cameras(files)
     check_depth_of_field(files)
     check_instruments(files)

@@ -1,7 +1,8 @@
-"""The dip calculator: a form of live formulas, and the sheets that it reads.
+"""The dip calculator: a form with formulas, and the sheets that the formulas read.
 
-A dip gives the volume with U, in service and at the temperature of the product; a volume gives its
-dip; two dips a delivery with its own U. Everything is refused in words that the table cannot give.
+The form computes the volume of a dip with U, in service and at the temperature of the product. It
+also computes the dip of a volume, and a delivery between two dips with its U. Input outside the
+table is refused with a message.
 """
 
 from tankcal.report.workbook.calculator.factor import factor_sheet

@@ -1,7 +1,7 @@
-"""Lines of the calculator's two sheets, and the addresses by which their formulas call each other.
+"""Lines of the two sheets of the calculator, and the addresses in their formulas.
 
-All formulas stand in column B and refer to column B, to named ranges and to constants. In a text
-here `[dip]` stands for the cell of the line "dip", `#within` for the number of that sentence.
+All formulas are in column B and refer to column B, named ranges and constants. In the texts of
+formulas, `[dip]` denotes the cell of the line "dip", and `#within` the number of this sentence.
 """
 
 import re
@@ -12,21 +12,34 @@ from xlsxwriter.utility import quote_sheetname
 from tankcal.text.digits import NOTHING
 
 VALUES = 1  # column B
-NANOMETRE = "1E-9"  # so that 0.35 typed finds the row 0.35, whatever its last bit is
+NANOMETRE = "1E-9"  # m; tolerance for rounding, so that the input 0.35 finds the row 0.35
 _CELL, _NUMBER = re.compile(r"\[(\w+)\]"), re.compile(r"#(\w+)")
 
 
 @dataclass(frozen=True)
 class Line:
-    """One formula with its label, and the result for the dips that the workbook opens with.
+    """Line with label and formula.
 
-    Without a formula it is a value of the record.
-
-    key      of its cell; its label is that of [calculator.labels] unless `label` is given
-    formula  without "=", in the terms of this module
-    digits   decimals, or a number format, or None: text
-    by       key of the U whose size gives more decimals, or None
-    remark   key of the line whose sentence stands beside it, or None
+    Attributes
+    ----------
+    key : str
+        Key of the cell, and of its label in [calculator.labels].
+    formula : str
+        Formula without "=", in the notation of this module; "": the line is a value of the record.
+    result : float or str
+        Result of the formula for the initial dips.
+    digits : int, str or None
+        Decimals, or a number format; None: text.
+    unit : str
+        Printed unit.
+    strong : bool
+        Whether the line is a main result.
+    by : str or None
+        Key of the U that determines additional decimals.
+    remark : str or None
+        Key of the line with the sentence beside this line.
+    label : str or None
+        Label that replaces the label of the key.
     """
 
     key: str
@@ -41,25 +54,31 @@ class Line:
 
 
 def if_number(condition, expression):
-    """A formula with a result only where a cell or product of cells is a number."""
+    """Return a formula with a result only if a cell or product of cells is a number."""
     return f'IF(ISNUMBER({condition}),{expression},"{NOTHING}")'
 
 
 def is_no_number(cell):
-    """A condition: LibreOffice takes a truth value for a number, Excel does not."""
+    """Return the condition "no number"; LibreOffice, unlike Excel, treats booleans as numbers."""
     return f"OR(ISLOGICAL({cell}),NOT(ISNUMBER({cell})))"
 
 
 def quoted(text):
-    """A text of the words as it stands inside the quotes of a formula."""
+    """Escape a text for the quotation marks of a formula."""
     return text.replace('"', '""')
 
 
 class Places:
-    """Where each line stands: addresses for formulas, numbers for sentences.
+    """Addresses of the lines and numbers of the sentences.
 
-    rows       {key: (code of the sheet, row from 0)}
-    sentences  keys of the sentences, the first has number 1
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    rows : dict
+        {key: (code of the sheet, row from 0)}.
+    sentences : sequence of str
+        Keys of the sentences; the first sentence has the number 1.
     """
 
     def __init__(self, book, rows, sentences):
@@ -68,18 +87,20 @@ class Places:
         self._numbers = {key: number for number, key in enumerate(sentences, start=1)}
 
     def number(self, sentence):
+        """Return the number of a sentence."""
         return self._numbers[sentence]
 
     def row(self, key):
+        """Return the row of a line, from 0."""
         return self._rows[key][1]
 
     def formula(self, text, sheet):
-        """The formula as it stands on a sheet (by its code)."""
+        """Return a formula with addresses for the sheet with a code."""
 
-        def cell(found):
-            code, row = self._rows[found[1]]
+        def cell(match):
+            code, row = self._rows[match[1]]
             place = "" if code == sheet else quote_sheetname(self._names[code]) + "!"
             return f"{place}B{row + 1}"
 
-        numbered = _NUMBER.sub(lambda found: str(self._numbers[found[1]]), text)
+        numbered = _NUMBER.sub(lambda match: str(self._numbers[match[1]]), text)
         return "=" + _CELL.sub(cell, numbered)

@@ -1,13 +1,13 @@
-"""The coverage factor of any degrees of freedom, whole or not, by a formula of the sheet.
+"""Formulas of the coverage factor for integer and non-integer degrees of freedom v.
 
-TINV cuts degrees of freedom to whole numbers; the record does not. Up to 1000 of them the beta
-distribution gives Student's t exactly, t^2 / (v + t^2) being Beta(1/2, v/2); above, Fisher's
-expansion in 1/v to its fourth power. Source: Abramowitz and Stegun, Handbook of
-Mathematical Functions, 26.5.27 and 26.7.5.
+The function TINV truncates degrees of freedom to integers, unlike the record. Up to v = 1000,
+Student's t follows exactly from the beta distribution, since t^2 / (v + t^2) is Beta(1/2, v/2).
+Above, Fisher's expansion is used up to the fourth power of 1/v. Source: Abramowitz and Stegun,
+Handbook of Mathematical Functions, 26.5.27 and 26.7.5.
 """
 
-_MOST_BETA = 1000
-_TERMS = (  # of the expansion: divisor, then coefficients of z, z^3, z^5, ...
+_MOST_BETA = 1000  # largest degrees of freedom for the beta distribution
+_TERMS = (  # terms of the expansion: divisor, and coefficients of z, z^3, z^5, ...
     (4, (1, 1)),
     (96, (3, 16, 5)),
     (384, (-15, 17, 19, 3)),
@@ -16,14 +16,29 @@ _TERMS = (  # of the expansion: divisor, then coefficients of z, z^3, z^5, ...
 
 
 def normal(probability):
-    """The formula of k for infinite degrees of freedom."""
+    """Return the formula of k for infinite degrees of freedom."""
     return f"NORMSINV((1+{probability!r})/2)"
 
 
 def student(probability, dof, z):
-    """The formula of k; dof and z are cells, z that of `normal`."""
+    """Return the formula of k for finite degrees of freedom.
+
+    Parameters
+    ----------
+    probability : float
+        Coverage probability.
+    dof : str
+        Cell of the degrees of freedom.
+    z : str
+        Cell with k of the normal distribution (`normal`).
+
+    Returns
+    -------
+    str
+    """
     beta = f"BETAINV({probability!r},0.5,{dof}/2)"
     expansion = "0"
+    # Horner's scheme in 1/dof, from the highest power.
     for divisor, coefficients in reversed(_TERMS):
         inner = "+".join(f"{c}*{z}^{2 * place + 1}" for place, c in enumerate(coefficients))
         expansion = f"(({inner})/{divisor}+{expansion})/{dof}"

@@ -1,7 +1,8 @@
-"""A delivery between two dips, with its own U: what both dips have in common cancels.
+"""A delivery between two dips with its U, in which common errors of both dips cancel.
 
-u^2 is the sum of squares of f(high) - f(low), f a row of the covariance factor, linear between
-rows; k by Welch-Satterthwaite over the inputs that were found together (tankcal.tank.deliveries).
+u^2 is the sum of squares of f(high) - f(low). f is a row of the covariance factor, interpolated
+linearly between rows. k follows from the Welch-Satterthwaite formula over the sources
+(tankcal.tank.deliveries).
 """
 
 import math
@@ -13,26 +14,26 @@ from tankcal.report.workbook.calculator.coverage import normal, student
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.uncertainty import dof_of, least_of, sum_of_fourths
 
-_INFINITE = "1E+99"  # degrees of freedom, in the workings
-_SHOWN_INFINITE = "1E+15"
+_INFINITE = "1E+99"  # replaces infinite degrees of freedom in the workings
+_SHOWN_INFINITE = "1E+15"  # degrees of freedom above which the form prints the sign of infinity
 
 
 def state(table, number):
-    """The line that says whether there is a delivery between the two dips."""
+    """Return the line with the number of the sentence on the validity of the two dips."""
     both = "AND([low_dip_state]=#within,[high_dip_state]=#within)"
     formula = f"IF({both},IF([high_dip]-[low_dip]>1E-9,#delivery,#swapped),#no_delivery)"
-    found = number("delivery" if table.low < table.at else "swapped")
-    return Line("delivery_state", formula, found, 0)
+    result = number("delivery" if table.low < table.at else "swapped")
+    return Line("delivery_state", formula, result, 0)
 
 
 def differences(table, names):
-    """One line for each column of the factor: what of it does not cancel, m³.
+    """Return a line for each column of the factor: f(high) - f(low), m³ (list of Line).
 
-    names  of the columns, as the sheet of the factor has them
+    `names` are the names of the columns in the sheet of the factor.
     """
     lines = []
     for column, (name, value) in enumerate(zip(names, table.differences, strict=True), start=1):
-        low, high = (_at(dip, column) for dip in ("low_dip", "high_dip"))
+        low, high = (_factor_at(dip, column) for dip in ("low_dip", "high_dip"))
         formula = f"IF([delivery_state]=#delivery,{high}-{low},{_NONE})"
         lines.append(Line(f"column_{column}", formula, _if(table, value), 6, "m³", label=name))
     return lines
@@ -42,21 +43,21 @@ _NONE = f'"{NOTHING}"'
 
 
 def _if(table, value):
-    """The result where the workbook opens with a delivery."""
+    """Return the value if the initial dips form a delivery, otherwise a dash."""
     return value if table.low < table.at else NOTHING
 
 
-def _at(dip, column):
-    """The factor at a dip, linear between two rows."""
+def _factor_at(dip, column):
+    """Return the formula of a column of the factor at a dip, linear between two rows."""
     low = f"INDEX(covariance_factor,[{dip}_row],{column})"
     high = f"INDEX(covariance_factor,[{dip}_next],{column})"
     return f"({low}*(1-[{dip}_part])+{high}*[{dip}_part])"
 
 
 def combining(table, label):
-    """Lines that make u, degrees of freedom and k of these differences.
+    """Return the lines of u, degrees of freedom and k of a delivery (list of Line).
 
-    label  function of a `Group` that names the line of its variance
+    `label` is a function of a `Group` that returns the label of the line of its variance.
     """
     groups = [group for group in table.groups() if math.isfinite(group.dof)]
     squares = [value**2 for value in table.differences]
@@ -71,6 +72,7 @@ def combining(table, label):
         )
         shares.append(f"[variance_{place}]^2/{group.dof!r}")
     dofs = [group.dof for group in groups]
+    # Welch-Satterthwaite: dof = u^4 / sum(variance^2 / dof), at least the smallest dof.
     least = least_of(dofs)
     fourth = float(sum_of_fourths(np.array(variances), dofs))
     u = math.sqrt(sum(squares))
@@ -78,15 +80,17 @@ def combining(table, label):
     z, k = table.coverage(dof)
     probability = table.job["table"]["coverage_probability"]
     every = f"[column_1]:[column_{len(squares)}]"
-    found = "[delivery_state]=#delivery"
+    is_delivery = "[delivery_state]=#delivery"
     shown_dof = dof if math.isfinite(dof) else float(_INFINITE)
     student_k = student(probability, "[delivery_dof]", "[normal]")
     return [
         *lines,
-        Line("delivery_u", f"IF({found},SQRT(SUMSQ({every})),{_NONE})", _if(table, u), 6, "m³"),
+        Line(
+            "delivery_u", f"IF({is_delivery},SQRT(SUMSQ({every})),{_NONE})", _if(table, u), 6, "m³"
+        ),
         Line(
             "fourth",
-            f"IF({found},{'+'.join(shares) or '0'},{_NONE})",
+            f"IF({is_delivery},{'+'.join(shares) or '0'},{_NONE})",
             _if(table, fourth),
             "0.00E+00",
         ),
@@ -105,7 +109,7 @@ def combining(table, label):
 
 
 def results(table):
-    """Lines of the result of a delivery."""
+    """Return the lines of the result of a delivery (list of Line)."""
     volume = table.volume_m3[table.at] - table.volume_m3[table.low]
     values = {line.key: line.result for line in combining(table, lambda group: "")}
     u, k, dof = values["delivery_u"], values["delivery_k"], values["delivery_dof"]

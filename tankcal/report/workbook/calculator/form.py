@@ -1,7 +1,8 @@
-"""The sheet Dip calculator, a form to be typed into, and the sheet Workings, how it is found.
+"""The sheet Dip calculator with the form, and the sheet Workings with intermediate results.
 
-Only functions that Excel 2007 and LibreOffice both know; no macros, no arrays. Sentences and
-products are cells of the workings that formulas call by number, so that no text is in a formula.
+The formulas use only functions of both Excel 2007 and LibreOffice, without macros and arrays.
+Sentences and products are cells of the workings. Formulas refer to them by number and contain no
+texts.
 """
 
 from dataclasses import dataclass
@@ -18,41 +19,41 @@ from tankcal.text.digits import bound_of_decimals, shortest
 from tankcal.text.words import marks_of, name_of_input
 
 FORM, WORKINGS = "dip_calculator", "workings"
-_WIDTHS = (54, 30, 9, 62)
+_WIDTHS = (54, 30, 9, 62)  # widths of the columns, letters
 _REMARKS = 3  # column D
 _FIRST_ROW = 3
-_WRONG = "#B00020"
+_WRONG = "#B00020"  # colour of refusals
 
 
 @dataclass(frozen=True)
 class Block:
-    """Lines under one heading of [calculator.headings]."""
+    """Lines below a heading of [calculator.headings]."""
 
     heading: str
     lines: list
 
 
 def calculator_sheets(book, record):
-    """Write the form and its workings; the form opens with the middle row of the table."""
+    """Write the form and its workings; the initial dip is the middle row of the table."""
     table = Table(record)
     inputs = inputs_of(table)
     results, workings = _results(book, table), _workings(book, table)
     first_results = _FIRST_ROW + len(inputs) + 2
-    rows = {one.key: (FORM, _FIRST_ROW + 1 + place) for place, one in enumerate(inputs)}
+    rows = {entry.key: (FORM, _FIRST_ROW + 1 + place) for place, entry in enumerate(inputs)}
     rows |= _rows(results, FORM, first_results) | _rows(workings, WORKINGS, _FIRST_ROW)
     places = Places(book, rows, KEYS)
-    said = sentences(book, table)
+    texts = sentences(book, table)
     sheet = book.sheet(FORM, _units(book, table), tab="input")
     book.widths(sheet, *_WIDTHS)
     book.heading(sheet, _FIRST_ROW, _heading(book, "inputs"), len(_WIDTHS))
-    for one in inputs:
-        write_input(book, sheet, places.row(one.key), one)
+    for entry in inputs:
+        write_input(book, sheet, places.row(entry.key), entry)
     last = _Writer(book, sheet, FORM, places, table).blocks(results, first_results)
-    remarks = [(one.key, one.check) for one in inputs]
-    remarks += [(one.key, one.remark) for block in results for one in block.lines if one.remark]
+    remarks = [(entry.key, entry.check) for entry in inputs]
+    remarks += [(line.key, line.remark) for block in results for line in block.lines if line.remark]
     numbers = {line.key: line.result for block in workings for line in block.lines}
     for key, check in remarks:
-        _remark(book, sheet, places, key, check, said[numbers[check] - 1])
+        _remark(book, sheet, places, key, check, texts[numbers[check] - 1])
     if table.reference_m is not None:
         row = places.row("reference_height")
         book.name("reference_height", sheet, row, row, VALUES)
@@ -60,11 +61,11 @@ def calculator_sheets(book, record):
     sheet.set_selection(places.row("dip"), VALUES, places.row("dip"), VALUES)
     sheet.fit_to_pages(1, 1)
     sheet.activate()
-    _workings_sheet(book, workings, places, table, said)
+    _workings_sheet(book, workings, places, table, texts)
 
 
 def _units(book, table):
-    """What is said of the units where the table is in others, too."""
+    """Return the remark on units if the capacity table has other units than m and m³."""
     spec = table.job["table"]
     if (spec["height_unit"], spec["volume_unit"]) == ("m", "m3"):
         return ""
@@ -84,14 +85,15 @@ def _results(book, table):
 
 
 def _workings(book, table):
+    """Return the blocks of intermediate results (list of Block)."""
     marks = marks_of(book.words)
 
     def density(value):
         return book.word("texts.at_density", of="calculator", density=shortest(value, marks))
 
-    def group(one):
-        dof = shortest(one.dof, marks)
-        name = name_of_input(book.words, one.name)
+    def group(source):
+        dof = shortest(source.dof, marks)
+        name = name_of_input(book.words, source.name)
         return book.word("texts.variance", of="calculator", input=name, dof=dof)
 
     blocks = [
@@ -121,13 +123,13 @@ def _finding(table, dip, row):
 
 
 def _rows(blocks, sheet, row):
-    """{key: (sheet, row)} of the lines of blocks, each with a heading and an empty row after."""
-    found = {}
+    """Return {key: (sheet, row)} of the lines of blocks with heading and empty row."""
+    places = {}
     for block in blocks:
         for place, line in enumerate(block.lines, start=row + 1):
-            found[line.key] = (sheet, place)
+            places[line.key] = (sheet, place)
         row += len(block.lines) + 2
-    return found
+    return places
 
 
 def _heading(book, key):
@@ -135,14 +137,14 @@ def _heading(book, key):
 
 
 class _Writer:
-    """Writes lines: label, formula with its result, unit; more decimals where U is small."""
+    """Writer of lines: label, formula with result, unit; more decimals for a small U."""
 
     def __init__(self, book, sheet, code, places, table):
         self._book, self._sheet, self._code = book, sheet, code
         self._places, self._table = places, table
 
     def blocks(self, blocks, row):
-        """Blocks one below the other; returns the row after the last."""
+        """Write blocks below each other; return the next row."""
         for block in blocks:
             self._book.heading(self._sheet, row, _heading(self._book, block.heading), len(_WIDTHS))
             for line in block.lines:
@@ -151,6 +153,7 @@ class _Writer:
         return row
 
     def line(self, line: Line):
+        """Write a line."""
         row, book = self._places.row(line.key), self._book
         label = line.label or book.word(f"labels.{line.key}", of="calculator")
         strong = {"bold": True, "font_size": 13} if line.strong else {}
@@ -169,12 +172,13 @@ class _Writer:
             self._sheet.write_number(row, VALUES, line.result, look)
         book.put(self._sheet, row, 2, line.unit, indent=1)
         if line.by:
-            self._digits_by_u(row, line.by, range(digits + 1, self._table.finest + 1))
+            self._add_decimals(row, line.by, range(digits + 1, self._table.finest + 1))
 
-    def _digits_by_u(self, row, by, finer):
+    def _add_decimals(self, row, U_key, finer):
+        """Add conditional formats with more decimals for smaller values of the U of a line."""
         for digits in reversed(finer):
             bound = f"{bound_of_decimals(digits):.10g}"
-            cell = f"$B${self._places.row(by) + 1}"
+            cell = f"$B${self._places.row(U_key) + 1}"
             self._sheet.conditional_format(
                 row,
                 VALUES,
@@ -189,12 +193,12 @@ class _Writer:
             )
 
 
-def _remark(book, sheet, places, key, check, said):
-    """What is said of a line, in column D; a refusal in red."""
+def _remark(book, sheet, places, key, check, text):
+    """Write the sentence on a line into column D; refusals are red."""
     row = places.row(key)
     formula = places.formula(f"INDEX(calculator_sentences,[{check}])", FORM)
     look = book.format(font_color=ACCENT, text_wrap=True, align="left")
-    sheet.write_formula(row, _REMARKS, formula, look, said)
+    sheet.write_formula(row, _REMARKS, formula, look, text)
     refused = refused_word(book)
     criteria = f'=LEFT($D${row + 1},{len(refused)})="{quoted(refused)}"'
     wrong = book.format(font_color=_WRONG, bold=True)
@@ -203,7 +207,7 @@ def _remark(book, sheet, places, key, check, said):
 
 
 def _notes(book, sheet, row, table):
-    """What the reader has to know about the results, under them."""
+    """Write the notes below the results."""
     values = {
         "temperature": shortest(
             table.job["table"]["reference_temperature_c"], marks_of(book.words)
@@ -222,8 +226,8 @@ def _notes(book, sheet, row, table):
         row += 1
 
 
-def _workings_sheet(book, blocks, places, table, said):
-    """The workings, then the sentences and the products that formulas call by number."""
+def _workings_sheet(book, blocks, places, table, messages):
+    """Write the workings, and the sentences and products to which formulas refer by number."""
     sheet = book.sheet(WORKINGS, book.word("texts.workings", of="calculator"), tab="origin")
     book.widths(sheet, 64, 24, 9, 30)
     writer = _Writer(book, sheet, WORKINGS, places, table)
@@ -231,7 +235,7 @@ def _workings_sheet(book, blocks, places, table, said):
     products = [book.word(f"products.{code}", of="calculator") for code in CODES]
     for heading, name, texts in (
         ("products", "product_groups", products),
-        ("sentences", "calculator_sentences", said),
+        ("sentences", "calculator_sentences", messages),
     ):
         book.heading(sheet, row, _heading(book, heading), len(_WIDTHS))
         for place, text in enumerate(texts, start=row + 1):

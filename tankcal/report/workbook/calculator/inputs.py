@@ -1,4 +1,4 @@
-"""The cells that are typed into: what each takes, and what it says."""
+"""Input cells of the calculator, with their limits and messages."""
 
 from dataclasses import dataclass
 
@@ -11,11 +11,24 @@ from tankcal.text.words import marks_of
 
 @dataclass(frozen=True)
 class Input:
-    """One open cell: its key, what it opens with (None: blank), digits, unit, and what it takes.
+    """Input cell of the form.
 
-    low, high  of a number; None for a choice from the list of products
-    check      key of the line whose sentence stands beside it
-    name       of its cell, the same in every language
+    Attributes
+    ----------
+    key : str
+        Key of the cell and of its label.
+    value : float or None
+        Initial value; None: blank.
+    digits : int
+        Decimals.
+    unit : str
+        Printed unit.
+    low, high : float or None
+        Limits of a number; None: a choice from the list of products.
+    check : str
+        Key of the line with the sentence beside the cell.
+    name : str
+        Name of the cell, which does not depend on the language.
     """
 
     key: str
@@ -29,7 +42,7 @@ class Input:
 
 
 def inputs_of(table):
-    """The inputs from the top down, in groups: the tank now, a volume, a delivery."""
+    """Return the inputs from the top: dip and product, a volume, a delivery (list of Input)."""
     heights, volumes = table.height_m, table.volume_m3
     ends = heights[0], max(heights[-1], round(heights[-1], table.digits))
     base = table.job["table"]["reference_temperature_c"]
@@ -41,7 +54,7 @@ def inputs_of(table):
     def dip(key, row, name):
         return Input(key, heights[row], table.digits, "m", *ends, f"{key}_state", name)
 
-    found = [
+    inputs = [
         dip("dip", table.at, "dip_m"),
         Input("shell", base, 1, "°C", *SHELL_C, "shell_state", "shell_temperature"),
         Input("product", None, 0, "", None, None, "product_state", "product_chosen"),
@@ -60,58 +73,70 @@ def inputs_of(table):
         ),
     ]
     if table.capacity["inputs"]:
-        found += [
+        inputs += [
             dip("low_dip", table.low, "delivery_low_dip"),
             dip("high_dip", table.at, "delivery_high_dip"),
         ]
-    return found
+    return inputs
 
 
-def write_input(book, sheet, row, one):
-    """The cell of an input in column B, with its label, unit, name and validation."""
+def write_input(book, sheet, row, entry):
+    """Write an input into column B, with label, unit, name and validation.
+
+    Parameters
+    ----------
+    book : Book
+        Workbook.
+    sheet : Sheet
+        Sheet of the form.
+    row : int
+        Row of the cell, from 0.
+    entry : Input
+        Input to write.
+    """
     look = {"bg_color": INPUT, "border": 1, "border_color": ACCENT, "locked": False, "bold": True}
-    look |= {"align": "right" if one.low is not None else "left", "font_size": 11}
+    look |= {"align": "right" if entry.low is not None else "left", "font_size": 11}
     sheet.set_row(row, 18)
-    book.put(sheet, row, 0, book.word(f"inputs.{one.key}", of="calculator"), bold=True)
-    if one.value is None:
-        shown = {} if one.low is None else {"num_format": number_format(one.digits)}
+    book.put(sheet, row, 0, book.word(f"inputs.{entry.key}", of="calculator"), bold=True)
+    if entry.value is None:
+        shown = {} if entry.low is None else {"num_format": number_format(entry.digits)}
         sheet.write_blank(row, 1, None, book.format(**look, **shown))
     else:
-        book.put(sheet, row, 1, one.value, num_format=number_format(one.digits), **look)
-    book.put(sheet, row, 2, one.unit, indent=1)
-    book.name(one.name, sheet, row, row, 1)
-    rule = _list(book) if one.low is None else _numbers(book, one)
+        book.put(sheet, row, 1, entry.value, num_format=number_format(entry.digits), **look)
+    book.put(sheet, row, 2, entry.unit, indent=1)
+    book.name(entry.name, sheet, row, row, 1)
+    rule = _list(book) if entry.low is None else _numbers(book, entry)
     sheet.data_validation(row, 1, row, 1, {**rule, "ignore_blank": True})
 
 
-def _numbers(book, one):
+def _numbers(book, entry):
     marks = marks_of(book.words)
-    low, high = _ends(one, marks)
-    said = {"low": low, "high": high, "unit": one.unit}
+    low, high = _ends(entry, marks)
+    values = {"low": low, "high": high, "unit": entry.unit}
     return {
         "validate": "decimal",
         "criteria": "between",
-        "minimum": one.low,
-        "maximum": one.high,
-        "input_title": book.word(f"short.{one.key}", of="calculator"),
-        "input_message": book.word(f"prompts.{one.key}", of="calculator", **said),
+        "minimum": entry.low,
+        "maximum": entry.high,
+        "input_title": book.word(f"short.{entry.key}", of="calculator"),
+        "input_message": book.word(f"prompts.{entry.key}", of="calculator", **values),
         "error_title": book.word("texts.error_title", of="calculator"),
-        "error_message": book.word(f"errors.{_kind(one)}", of="calculator", **said),
+        "error_message": book.word(f"errors.{_kind(entry)}", of="calculator", **values),
     }
 
 
-def _kind(one):
-    """Which message of refusal belongs to an input."""
-    if one.check.endswith("dip_state"):
+def _kind(entry):
+    """Return the key of the error message of an input."""
+    if entry.check.endswith("dip_state"):
         return "dip"
-    return "wanted" if one.key == "wanted" else "number"
+    return "wanted" if entry.key == "wanted" else "number"
 
 
-def _ends(one, marks):
-    """The least and the largest value, as they are said."""
-    if one.unit in ("m", "m³"):
-        return fixed(one.low, one.digits, marks), fixed(one.high, one.digits, marks)
-    return shortest(one.low, marks), shortest(one.high, marks)
+def _ends(entry, marks):
+    """Return the smallest and largest value as texts."""
+    if entry.unit in ("m", "m³"):
+        return fixed(entry.low, entry.digits, marks), fixed(entry.high, entry.digits, marks)
+    return shortest(entry.low, marks), shortest(entry.high, marks)
 
 
 def _list(book):

@@ -1,10 +1,10 @@
-"""Products, and the factor that brings their volume from one temperature to 15 °C.
+"""Groups of products, and the factor of volume correction to 15 °C.
 
     VCF = exp(-a dT (1 + 0.8 a dT)),   a = K0 / rho^2 + K1 / rho + K2,   dT = t - 15 °C
 
 rho is the density at 15 °C. Source: ASTM D1250-80, API Standard 2540, IP 200, Tables 54A (crude
-oil) and 54B (products); docs/workbook.md says against which printed values this is held. The tables
-round on their way, this does not: four printed decimals agree.
+oil) and 54B (products). docs/workbook.md lists the printed values of the comparison. The tables
+round intermediate results, this module does not; four printed decimals agree.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Zone:
-    """Densities at 15 °C up to `to_kg_m3`, with the constants of their expansion."""
+    """Range of densities at 15 °C up to `to_kg_m3`, with the constants of the expansion."""
 
     to_kg_m3: float
     k0: float
@@ -22,7 +22,7 @@ class Zone:
 
 @dataclass(frozen=True)
 class Product:
-    """A group of products: code of its words, least density (kg/m3), zones from the lightest."""
+    """Group of products: code of its words, smallest density (kg/m3), zones from the lightest."""
 
     code: str
     from_kg_m3: float
@@ -30,10 +30,11 @@ class Product:
 
     @property
     def to_kg_m3(self):
+        """Largest density, kg/m3."""
         return self.zones[-1].to_kg_m3
 
     def expansion(self, density):
-        """The formula of a, 1/K, for the density in this cell."""
+        """Return the formula of a, 1/K, for a cell with the density."""
         *lighter, heaviest = self.zones
         formula = _expansion(heaviest, density)
         for zone in reversed(lighter):
@@ -61,15 +62,16 @@ PRODUCTS = (
     ),
     Product("crude_54a", 610.5, (Zone(1075.0, 613.9723),)),
 )
-OWN_FACTOR = len(PRODUCTS) + 1  # number in the list of products: a factor typed by the user
+# Number of the last entry in the list of products: factor of the user.
+OWN_FACTOR = len(PRODUCTS) + 1
 CODES = (*(product.code for product in PRODUCTS), "own_factor")
-BASE_C = 15.0
-LEAST_C, MOST_C = -40.0, 90.0  # temperatures of the liquid that the formula is offered for
-LEAST_KG_M3, MOST_KG_M3 = 300.0, 2000.0  # densities beside a factor typed by the user
-LEAST_FACTOR, MOST_FACTOR = 0.7, 1.3
+BASE_C = 15.0  # reference temperature of the products
+LEAST_C, MOST_C = -40.0, 90.0  # limits of the temperature of the liquid
+LEAST_KG_M3, MOST_KG_M3 = 300.0, 2000.0  # limits of the density with a factor of the user
+LEAST_FACTOR, MOST_FACTOR = 0.7, 1.3  # limits of a factor of the user
 
 
 def factor(expansion, temperature):
-    """The formula of the factor, of cells with a and the temperature of the liquid."""
+    """Return the formula of the factor for cells with a and the temperature of the liquid."""
     step = f"({temperature}-{BASE_C!r})"
     return f"EXP(-{expansion}*{step}*(1+0.8*{expansion}*{step}))"

@@ -1,6 +1,6 @@
-"""From a volume back to its dip: a straight line between two rows, as the table is read.
+"""Dip of a volume, by linear interpolation between two rows of the table.
 
-A volume that stands in the table at more than one dip (rows of equal volume) has none.
+A volume with more than one dip (rows of equal volume) has no result.
 """
 
 from bisect import bisect_left, bisect_right
@@ -8,11 +8,11 @@ from bisect import bisect_left, bisect_right
 from tankcal.report.workbook.calculator.cells import NANOMETRE, Line, is_no_number
 from tankcal.text.digits import NOTHING
 
-_CUBIC_MICROMETRE = "1E-12"
+_CUBIC_MICROMETRE = "1E-12"  # m³; tolerance for rounding
 
 
 def finding(table, number):
-    """Lines that find the volume of the input `wanted` in the table."""
+    """Return the lines that determine the dip of the input `wanted` (list of Line)."""
     top = "MAX(MAX(capacity_volume),ROUND(MAX(capacity_volume),3))"
     inside = "IF([wanted_first]<[wanted_row],#no_single_dip,#wanted_within)"
     if table.critical is not None:
@@ -59,14 +59,14 @@ def finding(table, number):
 
 
 def _rows(table):
-    """(last, first) row of the volume that the workbook opens with."""
+    """Return (last, first) row with the initial volume."""
     volume = table.volume_m3[table.at]
     last = bisect_right(table.volume_m3, volume) - 1
     return last, min(bisect_left(table.volume_m3, volume), last)
 
 
 def _state(table):
-    """What is said of that volume."""
+    """Return the key of the sentence on the initial volume."""
     row, first = _rows(table)
     if not table.rises:
         return "volumes_fall"
@@ -79,7 +79,7 @@ def _when_typed(key, expression, result, digits=0, unit="", otherwise='"–"'):
 
 
 def results(table):
-    """The line of the dip that holds the volume."""
+    """Return the line of the dip of the volume, in a list."""
     formula = 'IF([wanted_state]=#wanted_within,[wanted_dip],"–")'
-    found = table.height_m[table.at] if _state(table) == "wanted_within" else NOTHING
-    return [Line("dip_of_volume", formula, found, table.digits + 1, "m", strong=True)]
+    result = table.height_m[table.at] if _state(table) == "wanted_within" else NOTHING
+    return [Line("dip_of_volume", formula, result, table.digits + 1, "m", strong=True)]

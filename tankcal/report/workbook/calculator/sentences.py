@@ -1,6 +1,6 @@
-"""What the calculator says of what was typed: sentences in a list, called by their number.
+"""Sentences of the calculator on its input, with numbers.
 
-The first are for what can be used; all others begin with the word for "refused".
+The first sentences concern valid input; all others begin with the word for "refused".
 """
 
 from tankcal.report.workbook.calculator import products
@@ -22,12 +22,12 @@ KEYS = (*GOOD, *REFUSED)
 
 
 def number(key):
-    """The number of a sentence in the list, from 1."""
+    """Return the number of a sentence, from 1."""
     return KEYS.index(key) + 1
 
 
 def sentences(book, table):
-    """Every sentence, in the order of `KEYS`."""
+    """Return all sentences in the order of `KEYS` (list of str)."""
     marks = marks_of(book.words)
     heights, volumes = table.height_m, table.volume_m3
     critical = table.critical or (0.0, 0.0)
@@ -49,14 +49,14 @@ def sentences(book, table):
         "densities": book.sheet_name("other_densities"),
         "deliveries": book.sheet_name("deliveries"),
     }
-    said = [book.word(f"sentences.{key}", of="calculator", **values) for key in KEYS]
+    texts = [book.word(f"sentences.{key}", of="calculator", **values) for key in KEYS]
     refused = refused_word(book)
     return [
         f"{refused} {text}" if key in REFUSED else text
-        for key, text in zip(KEYS, said, strict=True)
+        for key, text in zip(KEYS, texts, strict=True)
     ]
 
 
 def refused_word(book):
-    """The word that every refusal begins with."""
+    """Return the first word of all refusals."""
     return book.word("texts.refused", of="calculator")

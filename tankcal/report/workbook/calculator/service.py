@@ -1,10 +1,11 @@
-"""What the tank holds in service: shell at another temperature, another liquid, and its product.
+"""Volume in service: other temperature of the shell, other liquid, and volume of the product.
 
-    V = (V table + head) CTSh + roof,   V at the product's own temperature = V * VCF
+    V = (V table + head) CTSh + roof,   V at the reference temperature of the product = V * VCF
 
-The head is the table for another density less the table, both without what the roof makes of the
-density, linear between the densities that the record has. U of the table is U of none of these:
-what is typed here has an uncertainty of its own.
+The head is the difference between the tables for another density and for the reference density,
+without the effect of the density on a floating roof. It is interpolated linearly between the
+densities of the record. U of the table does not apply to these volumes, since the input values have
+an uncertainty as well.
 """
 
 from itertools import pairwise
@@ -17,11 +18,11 @@ from tankcal.report.workbook.parts import name_of_density
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3, floating_roof
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 
-SHELL_C = (-50.0, 150.0)
+SHELL_C = (-50.0, 150.0)  # limits of the temperature of the shell
 
 
 def checks(number):
-    """Lines that say of each input whether it can be used."""
+    """Return the lines with the state of each input (list of Line)."""
     listed = "MATCH([product],product_groups,0)"
     code = f"IF(ISBLANK([product]),0,IF(ISNUMBER({listed}),{listed},-1))"
     state = "IF([product_code]=0,#product_none,IF([product_code]<0,#product_unknown,#fine))"
@@ -30,12 +31,15 @@ def checks(number):
         Line("shell_state", shell, number("shell_fine"), 0),
         Line("product_code", code, 0, 0),
         Line("product_state", state, number("product_none"), 0),
-        *(Line(f"{key}_state", check, number("not_used"), 0) for key, check in _of_product()),
+        *(
+            Line(f"{key}_state", check, number("not_used"), 0)
+            for key, check in _checks_of_product()
+        ),
     ]
 
 
-def _of_product():
-    """(input, formula of its check) of those that a product needs."""
+def _checks_of_product():
+    """Yield (input, formula of its check) for the inputs of a product."""
     ranges = [(product.from_kg_m3, product.to_kg_m3) for product in PRODUCTS]
     ranges.append((products.LEAST_KG_M3, products.MOST_KG_M3))
     densities = [
@@ -56,7 +60,7 @@ def _unless(unused, check):
 
 
 def _check(key, ends, blank, good="#fine"):
-    """The formula of the number of the sentence that is true of an input."""
+    """Return the formula of the number of the sentence on an input."""
     cell, (low, high) = f"[{key}]", ends
     return (
         f"IF(ISBLANK({cell}),{blank},IF({is_no_number(cell)},#no_number,"
@@ -65,34 +69,45 @@ def _check(key, ends, blank, good="#fine"):
 
 
 def product_lines():
-    """Lines of the workings: expansion, factor, density of the liquid as it is in the tank."""
-    good, none = "[good_density]", f'"{NOTHING}"'
-    expansions = ",".join(product.expansion(good) for product in PRODUCTS)
-    of_group = f"AND([product_code]>0,[product_code]<{OWN_FACTOR},[liquid_state]=#fine)"
-    own = f"IF([factor_state]=#fine,[factor],{none})"
+    """Return the lines of expansion, factor and density of the liquid in the tank."""
+    density, none = "[good_density]", f'"{NOTHING}"'
+    expansions = ",".join(product.expansion(density) for product in PRODUCTS)
+    has_group = f"AND([product_code]>0,[product_code]<{OWN_FACTOR},[liquid_state]=#fine)"
+    user_factor = f"IF([factor_state]=#fine,[factor],{none})"
     computed = if_number("[expansion]", products.factor("[expansion]", "[liquid]"))
     return [
         Line("good_density", f"IF([density_state]=#fine,[density],{none})", NOTHING, 1, "kg/m³"),
         Line(
             "expansion",
-            if_number(good, f"IF({of_group},CHOOSE([product_code],{expansions}),{none})"),
+            if_number(density, f"IF({has_group},CHOOSE([product_code],{expansions}),{none})"),
             NOTHING,
             "0.000000E+00",
             "1/K",
         ),
-        Line("vcf", f"IF([product_code]={OWN_FACTOR},{own},{computed})", NOTHING, 6),
-        Line("liquid_density", _if_both(good, "[vcf]", f"{good}*[vcf]"), NOTHING, 2, "kg/m³"),
+        Line("vcf", f"IF([product_code]={OWN_FACTOR},{user_factor},{computed})", NOTHING, 6),
+        Line("liquid_density", _if_both(density, "[vcf]", f"{density}*[vcf]"), NOTHING, 2, "kg/m³"),
     ]
 
 
-def _if_both(one, other, expression):
-    return f'IF(AND(ISNUMBER({one}),ISNUMBER({other})),{expression},"{NOTHING}")'
+def _if_both(first, second, expression):
+    return f'IF(AND(ISNUMBER({first}),ISNUMBER({second})),{expression},"{NOTHING}")'
 
 
 def head_lines(table, number, label):
-    """Lines of the workings: the volume for each density, and what the head adds to the table.
+    """Return the lines of the volume for each density and of the head.
 
-    label  function of a density, names its line
+    Parameters
+    ----------
+    table : Table
+        Capacity table.
+    number : callable
+        number(key) returns the number of a sentence.
+    label : callable
+        label(density) returns the label of the line of a density.
+
+    Returns
+    -------
+    list of Line
     """
     volumes = []
     densities = table.densities
@@ -100,7 +115,7 @@ def head_lines(table, number, label):
         low, high = (f"INDEX({name_of_density(place)},[dip_{end}])" for end in ("row", "next"))
         volume = table.record["densities"][place - 2]["volume_m3"][table.at]
         floating = ""
-        if table.critical is not None:  # the roof is added by its own line
+        if table.critical is not None:  # the line of the roof adds its effect
             roof = draught_m3(table, repr(density))
             floating = f"-{when_afloat(table, roof)}"
             volume -= _roof_at_opening(table, density)
@@ -129,18 +144,18 @@ def head_lines(table, number, label):
 
 
 def _between(densities, density):
-    """The formula of the volume at a density, linear between the two nearest of the record."""
+    """Return the formula of the volume at a density, linear between densities of the record."""
     cells = ["[dip_volume]", *(f"[density_{i}]" for i in range(2, len(densities) + 1))]
     ordered = sorted(zip(densities, cells, strict=True))
     formula = ""
-    for (low, of_low), (high, of_high) in reversed(list(pairwise(ordered))):
-        part = f"{of_low}+({density}-{low!r})/{high - low!r}*({of_high}-{of_low})"
+    for (low, low_volume), (high, high_volume) in reversed(list(pairwise(ordered))):
+        part = f"{low_volume}+({density}-{low!r})/{high - low!r}*({high_volume}-{low_volume})"
         formula = f"IF({density}<={high!r},{part},{formula})" if formula else part
     return formula
 
 
 def roof_lines(table):
-    """The line of the workings with the correction of a floating roof, where there is one."""
+    """Return the line of the correction for a floating roof, in a list; [] without roof."""
     if table.critical is None:
         return []
     afloat = when_afloat(table, draught_m3(table, "[liquid_density]"))
@@ -149,7 +164,7 @@ def roof_lines(table):
 
 
 def draught_m3(table, density):
-    """The formula of what the roof takes less of a liquid of this density than of the table's."""
+    """Return the formula of the displacement by the roof, m³, reference minus this density."""
     roof = roof_of(table.record)
     air = AIR_KG_M3 if roof["roof_weighing"] == "air" else 0.0
     mass = f"{roof['roof_mass']!r}*(1-{air!r}/{WEIGHTS_KG_M3!r})"
@@ -158,12 +173,12 @@ def draught_m3(table, density):
 
 
 def when_afloat(table, expression):
-    """The formula of what counts only above the critical zone of the roof."""
+    """Return the formula of an expression that applies above the critical zone only."""
     return f"IF([dip]>={table.critical[1]!r}-{NANOMETRE},{expression},0)"
 
 
 def _roof_at_opening(table, density):
-    """m3: `draught_m3` of a density at the dip with which the calculator opens."""
+    """Return the value of `draught_m3` for a density at the initial dip, m³."""
     if table.height_m[table.at] < table.critical[1]:
         return 0.0
     roof = roof_of(table.record)
@@ -172,9 +187,10 @@ def _roof_at_opening(table, density):
 
 
 def results(table):
-    """Lines of the result: volume in service, volume at the product's own temperature, masses."""
+    """Return the lines of volume in service, volume at reference temperature, and masses."""
     base = table.job["table"]["reference_temperature_c"]
     step = f"{table.job['material']['expansion_per_k']!r}*([shell]-{base!r})"
+    # Expansion of the shell in two directions: (1 + step)^2.
     ctsh = f'IF([shell_state]=#shell_fine,1+2*{step}+({step})^2,"{NOTHING}")'
     roof = "" if table.critical is None else "+[roof_m3]"
     volume = table.volume_m3[table.at]

@@ -1,4 +1,4 @@
-"""What the calculator needs of a record, and the dips that it opens with."""
+"""Data of a record for the calculator, and its initial dips."""
 
 import math
 from functools import cached_property
@@ -11,14 +11,18 @@ from tankcal.report.workbook.capacity import digits_of_heights
 from tankcal.text.digits import decimals_of_rows
 from tankcal.uncertainty import coverage_factor
 
-_FINER_DELIVERY = 2  # decimals by which a delivery may be better known than any row
+_FINER_DELIVERY = 2  # additional decimals of a delivery, whose U may be smaller than U of any row
 
 
 class Table:
-    """The capacity table of a record as the calculator reads it.
+    """Capacity table of a record for the calculator.
 
-    at   number of the row that the calculator opens with: the middle one, or the next for use
-    low  number of the first row for use, where the delivery begins
+    Attributes
+    ----------
+    at : int
+        Row of the initial dip: the middle row, or the next row that may be used.
+    low : int
+        First row that may be used, the lower dip of the initial delivery.
     """
 
     def __init__(self, record):
@@ -37,28 +41,30 @@ class Table:
         self.critical = critical_zone(record)
         self.reference_m = self.job["datum"]["reference_height_m"]
         self.has_interval = "interval" in self.capacity
-        others = [other["density_kg_m3"] for other in record["densities"]]
-        self.densities = [self.job["table"]["liquid_density_kg_m3"], *others]  # kg/m3, own first
+        further = [entry["density_kg_m3"] for entry in record["densities"]]
+        # kg/m3; the density of the table is the first.
+        self.densities = [self.job["table"]["liquid_density_kg_m3"], *further]
 
     @property
     def rises(self):
-        """Whether no volume is below the one of the row before."""
+        """Whether the volumes never decrease from row to row."""
         return all(low <= high for low, high in pairwise(self.volume_m3))
 
     def after(self, row):
+        """Return the next row, or the last row."""
         return min(row + 1, len(self.height_m) - 1)
 
     def groups(self):
-        """`Group`s of the columns of the factor, in their order."""
+        """Return the sources of the columns of the factor (list of Group)."""
         return groups_of(self.capacity["input_kind"], self.record["budget"])
 
     @cached_property
     def differences(self):
-        """f(at) - f(low), column by column: what does not cancel in the first delivery."""
+        """Differences f(at) - f(low) of the columns of the factor for the initial delivery, m³."""
         factor = factor_of(self.capacity)
         return (factor[self.at] - factor[self.low]).tolist()
 
     def coverage(self, dof):
-        """(k of infinite, k of `dof`) degrees of freedom, at the probability of the job."""
+        """Return k for infinite and for `dof` degrees of freedom at the probability of the job."""
         probability = self.job["table"]["coverage_probability"]
         return tuple(float(k) for k in coverage_factor(probability, [math.inf, dof]))
