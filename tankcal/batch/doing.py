@@ -71,7 +71,7 @@ def do_job(task):
         return _do_steps(task)
     except OSError as error:
         if error.errno in IN_THE_WAY:
-            return _in_the_way(task, error)
+            return _report_obstacle(task, error)
         text = message(
             "batch_no_room",
             "no more data can be written there ({reason}); expected space for the results: make "
@@ -81,7 +81,7 @@ def do_job(task):
         raise InputError(Problem(task.out, text)) from error
 
 
-def _in_the_way(task, error):
+def _report_obstacle(task, error):
     """Return the result of `do_job` if another object occupies the path of a folder or outcome."""
     path = error.filename2 or error.filename or folder_of(task.out, task.job.name)
     text = message(
@@ -150,19 +150,19 @@ def _outcome_of(step, task, clock):
                 "batch_changed",
                 "input files changed during the computation; the next batch computes the job again",
             )
-            return _unfinished(key, "failed", [Problem(name, text)])
+            return _make_failure(key, "failed", [Problem(name, text)])
     except TankcalError as error:
         status = STATUS_OF_EXIT.get(error.exit_status, "failed")
         problems = getattr(error, "problems", None)
-        return _unfinished(key, status, problems or [Problem(name, text) for text in error.texts])
+        return _make_failure(key, status, problems or [Problem(name, text) for text in error.texts])
     except MemoryError:
         text = message("batch_no_memory", "not enough memory")
-        return _unfinished(key, "failed", [Problem(name, text)])
+        return _make_failure(key, "failed", [Problem(name, text)])
     except OSError as error:
         if error.errno in NO_ROOM:
             raise
         place = os.path.basename(str(error.filename or "")) or name
-        return _unfinished(key, "failed", [Problem(place, reason_of(error))])
+        return _make_failure(key, "failed", [Problem(place, reason_of(error))])
     except Exception as error:  # a mistake of tankcal: it must not stop the other jobs
         text = message(
             "batch_mistake",
@@ -170,7 +170,7 @@ def _outcome_of(step, task, clock):
             name=type(error).__name__,
             error=" ".join(str(error).split())[:300],
         )
-        return _unfinished(key, "failed", [Problem(name, text)])
+        return _make_failure(key, "failed", [Problem(name, text)])
     return StepOutcome(
         key,
         "done",
@@ -181,7 +181,7 @@ def _outcome_of(step, task, clock):
     )
 
 
-def _unfinished(key, status, problems):
+def _make_failure(key, status, problems):
     """Return the `StepOutcome` of a step with problems."""
     plain_problems = [problem_of(problem) for problem in problems[:MOST_TOLD]]
     return StepOutcome(key, status, problems=plain_problems, problem_count=len(problems))

@@ -106,12 +106,12 @@ def find_jobs(arguments, asked, out=None, known=None):
         A list cannot be read, or an argument names no job.
     """
     log, jobs = Log(), {}
-    wants = _Wanted(_wanted(asked.do), out)
+    wants = _Wanted(_kind_of_input(asked.do), out)
     for argument in arguments:
-        for job in _named(argument, wants, log):
+        for job in _find_named(argument, wants, log):
             jobs.setdefault(os.path.abspath(job.source), job)  # a link is a job of its own
     log.stop_if_problems()
-    return _with_names(jobs, asked, known or {})
+    return _assign_names(jobs, asked, known or {})
 
 
 @dataclass(frozen=True)
@@ -122,39 +122,41 @@ class _Wanted:
     out: str | None
 
 
-def _wanted(do):
+def _kind_of_input(do):
     """Return the input of the steps: "jobs", "records", or "either" with jobs preferred."""
     if "run" in do:
         return "jobs"
     return "either" if do == ("inspect",) else "records"
 
 
-def _named(argument, wants, log):
+def _find_named(argument, wants, log):
     """Return the `Found` objects of an argument."""
     path = Path(argument.removeprefix("@"))
     if argument.startswith("@") or (path.suffix.lower() == ".csv" and path.is_file()):
-        return _listed(path, wants, log)
+        return _find_listed(path, wants, log)
     if PATTERN.search(argument) and not os.path.lexists(argument):
         names = sorted(glob.glob(argument, recursive=True))
         if not names:
             text = message("batch_no_match", "no file or folder matches; expected jobs")
             log.problem(argument, text)
-        return [job for name in names for job in _in_path(Path(name), wants, log, strict=False)]
-    return _in_path(path, wants, log)
+        return [
+            job for name in names for job in _find_in_path(Path(name), wants, log, strict=False)
+        ]
+    return _find_in_path(path, wants, log)
 
 
-def _in_path(path, wants, log, strict=True):
+def _find_in_path(path, wants, log, strict=True):
     """Return the jobs of a path: the path itself, or the jobs in a folder.
 
     strict  whether a folder without jobs is a problem
     """
-    own = _of_itself(path, wants)
+    own = _job_of_path(path, wants)
     if own is not None:
         return [Found(own, {})]
     if not path.is_dir():
         return [Found(path, {})] if strict or path.suffix.lower() == BOOK else []
     try:
-        inside = _in_folder(path, wants)
+        inside = _find_in_folder(path, wants)
     except OSError as error:
         text = message("batch_folder_unreadable", "the folder cannot be read ({reason})",
                        reason=reason_of(error))  # fmt: skip
@@ -180,7 +182,7 @@ def _nothing_inside(kind):
     )
 
 
-def _of_itself(path, wants):
+def _job_of_path(path, wants):
     """Return the job that a path is, or None."""
     if path.name == SETTINGS_FILE and path.is_file():
         path = path.parent
@@ -197,7 +199,7 @@ def _of_itself(path, wants):
     )
 
 
-def _in_folder(folder, wants):
+def _find_in_folder(folder, wants):
     """Return the sorted jobs below a folder, without hidden folders and contents of jobs."""
     sources = []
 
@@ -243,7 +245,7 @@ def _is_job(book):
 # ---- lists
 
 
-def _listed(path, wants, log):
+def _find_listed(path, wants, log):
     """Return the jobs of a list: one per line, or a CSV file with a column job."""
     data, is_csv = read_bytes(path, log, MOST_LIST_BYTES), path.suffix.lower() == ".csv"
     text = None if data is None else decode(path.name, data, log)
@@ -259,7 +261,7 @@ def _listed(path, wants, log):
             if cells.get(name) and (name == "former" or beside.is_file()):
                 cells[name] = os.path.abspath(beside)
         source = path.parent / job
-        inside = _in_path(source, wants, log, strict=False) or [Found(source, {})]
+        inside = _find_in_path(source, wants, log, strict=False) or [Found(source, {})]
         jobs += [Found(job_found.source, cells) for job_found in inside]
     if not jobs and len(log.problems) == problems_before:
         log.problem(
@@ -328,7 +330,7 @@ def _dicts(path, headings, table, log):
 # ---- names
 
 
-def _with_names(found, asked, known):
+def _assign_names(found, asked, known):
     """Return a `BatchJob` with a unique name for each job."""
     labels = {source: _label(job) for source, job in found.items()}
     taken = {name.casefold(): source for source, name in known.items() if os.path.exists(source)}

@@ -63,7 +63,7 @@ def keys_of(job, former=None):
             "step": step,
             "inputs": inputs,
             **{name: getattr(asked, name) for name in OF_STEP[step]},
-            **{name: _content(getattr(asked, name)) for name in FILES_OF_STEP[step]},
+            **{name: _digest_content(getattr(asked, name)) for name in FILES_OF_STEP[step]},
         }
         if step == "run" and not asked.papers:
             bears.pop("letterhead")
@@ -83,9 +83,9 @@ def inputs_of(source):
         return []
     names = [path.name]
     if path.suffix.lower() == BOOK:
-        names += _named_in_book(path)
+        names += _files_of_workbook(path)
     elif path.suffix.lower() == ".toml":
-        names += _named_in_former(path)
+        names += _files_of_former(path)
     elif path.name == "record.json":
         beside = (COVARIANCE_FILE, long_tables.FILE)
         names += [one for one in beside if path.with_name(one).is_file()]
@@ -112,7 +112,7 @@ def _files_below(folder):
 _files_beside = lru_cache(maxsize=64)(_files_below)  # of folders with many workbooks
 
 
-def _named_in_book(path):
+def _files_of_workbook(path):
     """Return the sorted files named in a workbook, and the tables of an inspection beside it."""
     beside = [name for name in _files_beside(str(path.parent)) if not name.lower().endswith(BOOK)]
     if not beside:
@@ -128,7 +128,7 @@ def _named_in_book(path):
     return [name for name in beside if name in text or name in OF_INSPECTIONS]
 
 
-def _named_in_former(path):
+def _files_of_former(path):
     """Return the table named in a former.toml, if it is beside this file."""
     from tankcal.recalibration.inputs import rows_file
 
@@ -139,7 +139,7 @@ def _named_in_former(path):
         return []
 
 
-def _content(named):
+def _digest_content(named):
     """Return the digest of a file; any other text is returned unchanged."""
     path = None if named is None else Path(named)
     return named if path is None or not path.is_file() else _digest(path)

@@ -39,7 +39,7 @@ def _of_record(record):
     return values
 
 
-def _of_comparison(comparison):
+def _read_comparison(comparison):
     last = comparison["waterfall"][-1] if comparison["waterfall"] else None
     return {
         "comparison_verdict": comparison["verdict"] or "none",
@@ -48,13 +48,13 @@ def _of_comparison(comparison):
     }
 
 
-def _of_inspection(inspection):
+def _read_inspection(inspection):
     counts = Counter(check["verdict"] for check in inspection["checks"])
     worst = next((verdict for verdict in VERDICTS if counts[verdict]), None)
     return {"tank": inspection["tank"]["id"], "inspection_verdict": worst}
 
 
-_READERS = dict(zip(SAVED, (_of_record, _of_comparison, _of_inspection), strict=True))
+_READERS = dict(zip(SAVED, (_of_record, _read_comparison, _read_inspection), strict=True))
 
 
 def source_of_inspection(job, results):

@@ -125,9 +125,11 @@ def run_batch(arguments, asked, out, *, workers="local", worker_bytes=WORKER_BYT
     asking.refuse_incomplete(asked, jobs)
     with opened_folder(out) as journal:
         batch = Batch(total=len(jobs))
-        waiting = list(_unsettled(jobs, journal, batch, telling))
+        waiting = list(_select_tasks(jobs, journal, batch, telling))
         if waiting:
-            _do(waiting, journal, batch, telling, _workers_for(workers, waiting), worker_bytes)
+            _run_tasks(
+                waiting, journal, batch, telling, _workers_for(workers, waiting), worker_bytes
+            )
         batch.rows, batch.files = write_summary(out, jobs, language)
         return batch
 
@@ -139,7 +141,7 @@ def _workers_for(workers, waiting):
     return workers
 
 
-def _unsettled(jobs, journal, batch, telling):
+def _select_tasks(jobs, journal, batch, telling):
     """Yield a `Task` for each job with steps to run; count the other jobs."""
     looking = message("batch_comparing", "checking for finished jobs")
     for number, job in enumerate(jobs):
@@ -172,7 +174,7 @@ def _tell_known(outcome, job, status, telling):
     telling.ended(job.name, status, problems[:1], sum(step.problem_count for step in steps))
 
 
-def _do(waiting, journal, batch, telling, workers, worker_bytes):
+def _run_tasks(waiting, journal, batch, telling, workers, worker_bytes):
     """Run all tasks, one after the other or by workers."""
     text = message("batch_doing", "jobs done")
 

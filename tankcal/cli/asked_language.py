@@ -25,9 +25,9 @@ def asked_language(path):
         if (path / WORKBOOK_FILE).is_file() and not (path / SETTINGS_FILE).is_file():
             path /= WORKBOOK_FILE
         if path.suffix.lower() == ".xlsx":
-            code = _in_workbook(path, log)
+            code = _read_workbook(path, log)
         else:
-            code = _in_settings(path / SETTINGS_FILE if path.is_dir() else path, log)
+            code = _read_settings(path / SETTINGS_FILE if path.is_dir() else path, log)
     except (OSError, ValueError):
         return None
     return nearest_language(code)
@@ -39,7 +39,7 @@ def asked_of_plan(path):
 
     path = Path(path)
     try:
-        return nearest_language(_in_settings(path / PLAN_FILE if path.is_dir() else path, Log()))
+        return nearest_language(_read_settings(path / PLAN_FILE if path.is_dir() else path, Log()))
     except (OSError, ValueError):
         return None
 
@@ -56,7 +56,7 @@ def asked_of_record(path):
         return None
 
 
-def _in_settings(path, log):
+def _read_settings(path, log):
     """Return the language in job.toml or plan.toml."""
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     parsed = None if data is None else parsed_toml(path.name, data, log)
@@ -64,7 +64,7 @@ def _in_settings(path, log):
     return section.get("language") if isinstance(section, dict) else None
 
 
-def _in_workbook(path, log):
+def _read_workbook(path, log):
     """Return the language in a job workbook."""
     from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
     from tankcal.job.grids import table_rows
@@ -85,11 +85,11 @@ def _in_workbook(path, log):
             for _, cells in rows[1:]:
                 section, key, value = (cells[position] for position in place)
                 if (section, key) == ("table", "language"):
-                    return value if nearest_language(value) else _of_form(cells)
+                    return value if nearest_language(value) else _language_of_form(cells)
     return None
 
 
-def _of_form(cells):
+def _language_of_form(cells):
     """Return the language of the explanations of a form."""
     for language in LANGUAGES:
         notes = load_words(language)["input"].get("notes", {})

@@ -136,11 +136,11 @@ def convert(options):
     speak(options.language)
     cameras, covariances = _cameras_of(options)
     if options.name is not None:
-        cameras, covariances = _only(options, cameras, covariances)
+        cameras, covariances = _select_camera(options, cameras, covariances)
     for name, camera in cameras:
         _tell_error(message("convert_as_read", "{name}, as read", name=name), camera)
     if options.form is not None:
-        cameras, covariances = _in_form(options.form, cameras, covariances)
+        cameras, covariances = _convert_to_form(options.form, cameras, covariances)
         for name, camera in cameras:
             what = message(
                 "convert_in_form", "{name}, in the form of {form}", name=name, form=options.form
@@ -162,7 +162,7 @@ def convert(options):
     _write_new(Path(options.out), written.text)
 
 
-def _in_form(form, cameras, covariances):
+def _convert_to_form(form, cameras, covariances):
     """Return [(name, FramedCamera)] in the form of a publication, and covariances or None."""
     from tankcal.camera.formats.published import camera_in_form
 
@@ -183,24 +183,24 @@ def _cameras_of(options):
         return framed_in(_record_of(options.file), pixel_mm)
     is_register = options.kind is None and Path(options.file).suffix.lower() == ".toml"
     if is_register or options.kind == "cameras.toml":
-        return _registered(options.file, options.pixel_um)
+        return _read_cameras_toml(options.file, options.pixel_um)
     size_px = None if options.size_px is None else tuple(options.size_px)
     cameras = read_camera(options.file, options.kind, options.pixel_um, size_px)
     return cameras, [None] * len(cameras)
 
 
-def _registered(path, pixel_um):
+def _read_cameras_toml(path, pixel_um):
     """Return [(name, FramedCamera)] of a cameras.toml, and covariances from standard deviations."""
     import numpy as np
 
     from tankcal.job.calibrations import read_cameras, with_pixels
 
     setups = with_pixels(read_cameras(path, in_pixels=False), pixel_um)
-    cameras = [(setup.camera.name, _framed(setup)) for setup in setups]
+    cameras = [(setup.camera.name, _make_framed_camera(setup)) for setup in setups]
     return cameras, [np.diag(setup.camera.sd**2) for setup in setups]
 
 
-def _framed(setup):
+def _make_framed_camera(setup):
     """Return the FramedCamera of a CameraSetup."""
     from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
 
@@ -210,7 +210,7 @@ def _framed(setup):
     return make_framed_camera(values, form, setup.pixel_mm, setup.format_px)
 
 
-def _only(options, cameras, covariances):
+def _select_camera(options, cameras, covariances):
     """Return the camera with the requested name only."""
     names = [name for name, _ in cameras]
     if options.name not in names:

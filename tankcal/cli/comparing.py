@@ -117,7 +117,10 @@ def _sum(column):
         "at {dip} m, m3: former {former}, zero {zero}, temperature {temperature}, head {head}, "
         "roof {roof}, rounding {rounding}, the tank itself {tank}, new {new}",
         dip=_plain(column["height_m"]),
-        **{name: _signed(column[f"{name}_m3"], name not in ("former", "new")) for name in names},
+        **{
+            name: _format_signed(column[f"{name}_m3"], name not in ("former", "new"))
+            for name in names
+        },
     )
 
 
@@ -130,7 +133,7 @@ def _verdict(comparison, paper):
     )
 
 
-def _signed(value, is_change):
+def _format_signed(value, is_change):
     text = fixed(value, 3, marks())
     return f"+{text}" if is_change and value > 0 else text
 

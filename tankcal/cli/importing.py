@@ -123,7 +123,7 @@ def _time(text):
         ) from None
 
 
-def _asked_of_folder(folder):
+def _language_of_folder(folder):
     """Return the language of the job in a folder, or None."""
     from tankcal.cli.asked_language import asked_language
 
@@ -133,7 +133,7 @@ def _asked_of_folder(folder):
 def _import(options):
     prepare_for_small_work()
     options.out = options.out or _folder_here()
-    speak(options.language or _asked_of_folder(Path(options.out)))
+    speak(options.language or _language_of_folder(Path(options.out)))
     _refuse_workbook(Path(options.out))
     as_list = _list_of(options)
     if as_list is not None:
@@ -262,12 +262,12 @@ def _say_next(folder, survey):
         )
         say(text)
         of_survey = "" if survey is None else f" --survey {survey}"
-        print(f"  tankcal new {_quoted(job)}{of_survey}")
-        print(f"  tankcal import ... --out {_quoted(job)}")
+        print(f"  tankcal new {_quote_path(job)}{of_survey}")
+        print(f"  tankcal import ... --out {_quote_path(job)}")
     say(message("import_next", "then"))
-    print(f"  tankcal run {_quoted(job)}")
+    print(f"  tankcal run {_quote_path(job)}")
 
 
-def _quoted(path):
+def _quote_path(path):
     """Return a path quoted for a shell, with escaped control characters."""
     return printable(shlex.quote(str(path)))

@@ -104,7 +104,7 @@ def _plan(options):
         for line in _remedies(plan, error, options, show):
             say(line)
         raise
-    effects, path = _studied(plan, prediction, options, show)
+    effects, path = _study_changes(plan, prediction, options, show)
     simulated = _simulated(prediction, options, show)
     written = ()
     if options.out is not None:
@@ -167,7 +167,7 @@ def _refuse_unlimited(plan):
         raise InputError(Problem("plan.toml", expected, None, "limits.relative_u"))
 
 
-def _studied(plan, prediction, options, show):
+def _study_changes(plan, prediction, options, show):
     """Return the effects of all changes, or (), and the path to the smallest design, or None."""
     from tankcal.planning.improvements import smallest, what_helps
 
@@ -269,7 +269,7 @@ def _verdict(prediction):
             relative=_percent(worst.relative),
         )
     if plan.limits.relative_u is not None:
-        yield _judged(_percent(plan.limits.relative_u), prediction.meets)
+        yield _describe_limit(_percent(plan.limits.relative_u), prediction.meets)
 
 
 def _top(table):
@@ -285,7 +285,7 @@ def _top(table):
     )
 
 
-def _judged(limit, meets):
+def _describe_limit(limit, meets):
     if meets is None:
         return message("plan_limit", "limit {limit}", limit=limit)
     if meets:

@@ -53,10 +53,10 @@ def _straps(result):
     if straps is None:
         return _RejectedKind(what)
     gone = straps.adjusted[~straps.accepted]
-    return _RejectedKind(what, (_in_row(straps.reduced[i].strap) for i in gone))
+    return _RejectedKind(what, (_name_with_row(straps.reduced[i].strap) for i in gone))
 
 
-def _in_row(strap):
+def _name_with_row(strap):
     return message("named_in_row", "{name} (row {row})", name=strap.name, row=str(strap.row))
 
 
@@ -65,10 +65,10 @@ def _offsets(result):
     if read is None or result.job.lines is None:
         return _RejectedKind(what)
     gone = read.places[read.are("offsets")][~read.tests_of("offsets")[2]]
-    return _RejectedKind(what, (_at_level(result.job.lines.offsets[i]) for i in gone))
+    return _RejectedKind(what, (_name_with_level(result.job.lines.offsets[i]) for i in gone))
 
 
-def _at_level(offset):
+def _name_with_level(offset):
     return message("named_at_level", "line {line} at {level_m:g} m (row {row})", line=offset.line,
                    level_m=offset.level_m, row=str(offset.row))  # fmt: skip
 
@@ -78,10 +78,10 @@ def _readings(adjustment):
     what = message("set_aside_readings", "readings rejected")
     removed = () if adjustment is None else adjustment.removed
     worst = sorted(removed, key=lambda reading: -abs(reading.w))
-    return _RejectedKind(what, (_of_file(reading) for reading in worst))
+    return _RejectedKind(what, (_name_with_file(reading) for reading in worst))
 
 
-def _of_file(reading):
+def _name_with_file(reading):
     return message(
         "named_in_file",
         "{ends} ({file}, row {row})",

@@ -81,7 +81,7 @@ def _new(options):
         text = "wrote {file}: fill in job.toml and the CSV files, then"
         _say_then(message("wrote_folder", text, file=str(directory)), directory)
         say(message("workbook_instead", "to use an Excel workbook in place of these files:"))
-        _print_command("new", directory, *_given(options), "--workbook")
+        _print_command("new", directory, *_repeat_options(options), "--workbook")
         return
     path = write_input_workbook(directory, *form)
     if path != directory:
@@ -99,7 +99,7 @@ def _print_command(*words):
     print(f"  {printable(shlex.join(['tankcal', *map(str, words)]))}")
 
 
-def _given(options):
+def _repeat_options(options):
     """Return the options of the same form as words of a command."""
     choices = {"--kind": options.kind, "--survey": options.survey, "--language": options.language}
     usual = {"--kind": USUAL_KIND, "--survey": None, "--language": None}

@@ -101,7 +101,7 @@ def _summary(read):
         high=fixed(former.height_m[-1], 3, marks()),
     )
     for k, name in enumerate(read.names[:MOST_SHOWN]):
-        radius, u = _with_u(geometry.radii_m[k], geometry.u_m[k])
+        radius, u = _format_with_u(geometry.radii_m[k], geometry.u_m[k])
         yield message(
             "read_radius",
             "course {name}: radius {radius} m, u {u} m",
@@ -110,12 +110,12 @@ def _summary(read):
             u=u,
         )
     if hasattr(geometry, "head"):
-        yield from _of_table(geometry)
+        yield from _describe_shell(geometry)
     elif not read.names:
-        yield from _of_solid(geometry)
+        yield from _describe_solid(geometry)
 
 
-def _of_solid(geometry):
+def _describe_solid(geometry):
     """Yield the dimensions of a horizontal tank or a sphere."""
     fit = getattr(geometry, "best", geometry)
     values = dict(zip(fit.names, zip(fit.values, fit.u, strict=True), strict=True))
@@ -188,16 +188,16 @@ def _tilt(geometry):
 
 
 def _size(name, size):
-    value, u = _with_u(*map(float, size))
+    value, u = _format_with_u(*map(float, size))
     return message("read_size", "{name}: {value} m, u {u} m", name=name, value=value, u=u)
 
 
-def _with_u(value, u):
+def _format_with_u(value, u):
     both = format_with_u(value, u, marks(), least=0)
     return both.value, both.uncertainty
 
 
-def _of_table(geometry):
+def _describe_shell(geometry):
     yield _head(geometry)
     if geometry.without_head is not None:
         rms, largest, radii = geometry.without_head
@@ -213,15 +213,15 @@ def _of_table(geometry):
     for number, seam in enumerate(geometry.seams_m, 1):
         yield _seam(number, seam)
     for fitting in geometry.fittings:
-        yield _thing(fitting)
+        yield _describe_deadwood(fitting)
     if not geometry.fittings:
         yield message("read_no_things", "no deadwood detected")
     if geometry.roof_m3 is not None:
-        volume, u = _with_u(geometry.roof_m3.value, geometry.roof_m3.u)
+        volume, u = _format_with_u(geometry.roof_m3.value, geometry.roof_m3.u)
         yield message(
             "read_roof", "floating roof: {volume} m3 above its zone, u {u} m3", volume=volume, u=u
         )
-    volume, u = _with_u(geometry.base_m3.value, geometry.base_m3.u or geometry.expected_m3)
+    volume, u = _format_with_u(geometry.base_m3.value, geometry.base_m3.u or geometry.expected_m3)
     yield message(
         "read_lowest",
         "rows used from {lowest} m upwards; {volume} m3 below, u {u} m3",
@@ -239,7 +239,7 @@ def _of_table(geometry):
 
 
 def _head(geometry):
-    density, u = _with_u(geometry.density_kg_m3.value, geometry.density_kg_m3.u)
+    density, u = _format_with_u(geometry.density_kg_m3.value, geometry.density_kg_m3.u)
     if geometry.head == "with":
         return message(
             "read_with_head",
@@ -270,7 +270,7 @@ def _zero(geometry):
         return message("read_zero_held", "zero: the bottom of the first course")
     if not geometry.zero_m.u <= 0.05:
         return message("read_zero_unknown", "zero: not determined by this table")
-    zero, u = _with_u(1000 * geometry.zero_m.value, 1000 * geometry.zero_m.u)
+    zero, u = _format_with_u(1000 * geometry.zero_m.value, 1000 * geometry.zero_m.u)
     return message(
         "read_zero",
         "zero: the first course begins at the dip {zero} mm, u {u} mm",
@@ -282,12 +282,12 @@ def _zero(geometry):
 def _seam(number, seam):
     if not seam.u < 0.04:
         return message("read_no_seam", "seam {number}: not determined", number=number)
-    dip, u = _with_u(seam.value, seam.u)
+    dip, u = _format_with_u(seam.value, seam.u)
     return message("read_seam", "seam {number}: {dip} m, u {u} m", number=number, dip=dip, u=u)
 
 
-def _thing(fitting):
-    volume, u = _with_u(1000 * fitting.volume_m3.value, 1000 * fitting.volume_m3.u)
+def _describe_deadwood(fitting):
+    volume, u = _format_with_u(1000 * fitting.volume_m3.value, 1000 * fitting.volume_m3.u)
     return message(
         "read_thing",
         "deadwood from {bottom} to {top} m: {volume} L, u {u} L",

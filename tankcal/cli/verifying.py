@@ -167,7 +167,7 @@ def _numbers(again):
         )
 
 
-def _in_part(result):
+def _list_partial(result):
     """Yield the files that were not compared with files created again."""
     by_hash, by_numbers = (", ".join(map(printable, names))
                            for names in (result.by_hash, result.by_numbers))  # fmt: skip
@@ -198,7 +198,7 @@ def _sum(result):
         say(message("verify_agree", "{count} files compared, all agree: {file} is sha256:{digest}",
                     **values))  # fmt: skip
     else:
-        for text in _in_part(result):
+        for text in _list_partial(result):
             say(text)
         say(
             message(

@@ -66,7 +66,7 @@ def _port(text):
     return int(text)
 
 
-def _written(options, out):
+def _write_notebook(options, out):
     """Return the path of the notebook of a job, after writing it or keeping manual changes."""
     from tankcal.cli.asked_language import asked_language
     from tankcal.workbench.draft import Draft, source_of
@@ -98,7 +98,7 @@ def _written(options, out):
 def _notebook(options):
     from tankcal.workbench import serving
 
-    path = _written(options, options.out)
+    path = _write_notebook(options, options.out)
     if options.no_open:
         return
     if not serving.has_lab():
@@ -125,7 +125,7 @@ def _app(options):
             command=install_command("app"),
         )
         raise InputError(Problem("tankcal app", expected))
-    path = _written(options, None)
+    path = _write_notebook(options, None)
     port = serving.free_port(options.address, options.port)
     token = ""
     if not serving.is_local(options.address):

@@ -85,14 +85,14 @@ def reduce_faces(shots, log):
                 readings.append(Reading(replace(mean, row=shot.row, time=shot.time), "both"))
         else:
             tally[str(shot.face)] += 1
-            readings.append(Reading(_on_face_1(shot), str(shot.face)))
+            readings.append(Reading(_convert_to_face_1(shot), str(shot.face)))
     reports = {setup: _report(setup, tally) for setup, tally in errors.items()}
-    return [_freed(reading, reports[reading.shot.setup]) for reading in readings], [
+    return [_correct_single(reading, reports[reading.shot.setup]) for reading in readings], [
         *reports.values()
     ]
 
 
-def _freed(reading, report):
+def _correct_single(reading, report):
     """Return a single reading corrected by the mean c and i of its set-up."""
     if reading.faces == "both":
         return reading
@@ -113,25 +113,25 @@ def _sine(zenith):
     return max(math.sin(zenith * DEGREE), 1e-3)
 
 
-def _on_face_1(shot):
+def _convert_to_face_1(shot):
     """Return a shot converted to face 1."""
     if shot.face == 1:
         return shot
     return replace(
         shot,
-        direction_deg=None if shot.direction_deg is None else _turned(shot.direction_deg),
+        direction_deg=None if shot.direction_deg is None else _turn_half(shot.direction_deg),
         zenith_deg=None if shot.zenith_deg is None else FULL_TURN - shot.zenith_deg,
     )
 
 
-def _turned(direction):
+def _turn_half(direction):
     """Return a direction plus half a turn, degrees."""
     return (direction + HALF_TURN) % FULL_TURN
 
 
 def _mean(first, second, tally, log):
     """Return the mean of a pair on face 1, or None after reporting that the faces disagree."""
-    turned, means = _on_face_1(second), {}
+    turned, means = _convert_to_face_1(second), {}
     sine = 1.0
     collimation = index = None
     if None not in (first.zenith_deg, turned.zenith_deg):

@@ -138,7 +138,7 @@ def _blocks(words):
 
 def _take_code(book, log, row, words, state, custom):
     """Read a code block: a station, a code of readings, or a block of unknown meaning."""
-    values = _known_words(book, log, row, words)
+    values = _select_words(book, log, row, words)
     if values is None:
         return
     texts = [_text(values[index]) if index in values else "" for index in CODES]
@@ -194,7 +194,7 @@ def _say_codes(book, blocks):
 
 def _take(book, log, row, words, state):
     """Read a block."""
-    words_by_index = _known_words(book, log, row, words)
+    words_by_index = _select_words(book, log, row, words)
     if words_by_index is None:
         return
     values = {}
@@ -233,7 +233,7 @@ def _take(book, log, row, words, state):
         book.leave_out(message("gsi_without_reading", "blocks without a reading"), row)
 
 
-def _known_words(book, log, row, words):
+def _select_words(book, log, row, words):
     """Return {index: (unit, signed value)} of known words; None after reporting a repeated word."""
     words_by_index = {}
     for index, digits, unit, value in words:

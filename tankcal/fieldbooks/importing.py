@@ -124,13 +124,13 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     _check_times(choices, log)
     books = _read_all(files, choices, log)
     log.stop_if_problems()
-    stands, shots = _joined(books)
-    shots = _with_times(shots, choices)
+    stands, shots = _join_books(books)
+    shots = _complete_times(shots, choices)
     readings, reports = reduce_faces(shots, log)
     log.stop_if_problems()
     places = sorted({shot.setup for shot in shots})
     names = _names_of_setups(stands, places)
-    known = _known_points(books, stands, places, names, log)
+    known = _collect_coordinates(books, stands, places, names, log)
     stands = {place: (replace(stand, station=_station(stand, names[place])), file)
               for place, (stand, file) in enumerate(stands) if place in names}  # fmt: skip
     unused = {}
@@ -139,7 +139,7 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
         lambda what, reading: unused.setdefault(what, []).append(reading.shot),
     )  # fmt: skip
     _tell_empty_setups(books)
-    chosen = _control_with_times(chosen, choices, unused, log)
+    chosen = _keep_timed_control(chosen, choices, unused, log)
     _check_ties(chosen, choices, log)
     log.stop_if_problems()
     stations = {} if choices.no_control else _stations(known, stands, chosen, log)
@@ -154,11 +154,11 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     result.paths, standing = write_tables(folder, tables, replace=replace_tables)
     result.summary = summarise(books, chosen, unused, names, stands, reports, (known, stations),
                               standing)  # fmt: skip
-    result.warnings = [*_unused_customs(choices, books), *warn_of(chosen, names, stands, reports)]
+    result.warnings = [*_warn_of_customs(choices, books), *warn_of(chosen, names, stands, reports)]
     return result
 
 
-def _unused_customs(choices, books):
+def _warn_of_customs(choices, books):
     """Yield warnings about options for code blocks if no file is GSI."""
     if any(book.format == "gsi" for book in books):
         return
@@ -204,7 +204,7 @@ def _read_all(files, choices, log):
     return books
 
 
-def _joined(books):
+def _join_books(books):
     """Return ([(SetUp, file)], shots) of all books, with consecutive indices of set-ups."""
     stands, shots = [], []
     for book in books:
@@ -243,7 +243,7 @@ def _station(stand, name):
     return stand.station or name
 
 
-def _known_points(books, stands, places, names, log):
+def _collect_coordinates(books, stands, places, names, log):
     """Return {name: list of (xyz, file, row)} of all coordinates in the files."""
     occupied = [(names[place], *stands[place]) for place in places]
     items = [
@@ -265,7 +265,7 @@ def _known_points(books, stands, places, names, log):
     return coordinates
 
 
-def _with_times(shots, choices):
+def _complete_times(shots, choices):
     """Return shots with complete times.
 
     The year comes from `begin`. If begin and end are given, shots without a time get times evenly
@@ -276,7 +276,7 @@ def _with_times(shots, choices):
     for shot in shots:
         time = shot.time
         if time is not None and time.year == NO_YEAR:
-            time = None if begin is None else _in_year(time, begin.year)
+            time = None if begin is None else _set_year(time, begin.year)
         dated.append(replace(shot, time=time))
     if begin is None or end is None or len(dated) < 2:
         return dated
@@ -288,7 +288,7 @@ def _with_times(shots, choices):
     ]  # fmt: skip
 
 
-def _in_year(time, year):
+def _set_year(time, year):
     """Return the same day in another year; None for 29 February in other years."""
     try:
         return time.replace(year=year)
@@ -296,7 +296,7 @@ def _in_year(time, year):
         return None
 
 
-def _control_with_times(chosen, choices, unused, log):
+def _keep_timed_control(chosen, choices, unused, log):
     """Remove control readings without a time; report them if the user selected them."""
     without = [reading.shot for reading in chosen.control if reading.shot.time is None]
     if choices.control:

@@ -81,10 +81,10 @@ def read_list(path, folder, name="points", given=None):
     """
     log, fields = Log(), COLUMNS[name]
     data = read_bytes(path, log, MAX_BYTES)
-    decimal = _declared_decimal(folder, log)
+    decimal = _read_decimal(folder, log)
     table = None if data is None else read_csv(path.name, data, ",", decimal, log)
     log.stop_if_problems()
-    stated = _remembered(folder, name, log) | (given or {})
+    stated = _read_memory(folder, name, log) | (given or {})
     stated = {head: column for head, column in stated.items() if head in table.headings}
     for heading, column in (given or {}).items():
         _check_given(heading, column, table, fields, log)
@@ -101,7 +101,7 @@ def read_list(path, folder, name="points", given=None):
         if meaning.factor is not None
     }
     recognised |= identical | {
-        head: _stated(head, column, fields) for head, column in stated.items()
+        head: _make_meaning(head, column, fields) for head, column in stated.items()
     }
     meanings = {head: recognised[head] for head in table.headings if head in recognised}
     return ForeignList(name, table, meanings, tuple(log.warnings))
@@ -112,7 +112,7 @@ def _names(fields):
     return {field.name for field in fields}
 
 
-def _stated(heading, column, fields):
+def _make_meaning(heading, column, fields):
     """Return the Meaning stated by the user, with the factor of the unit in the heading."""
     [field] = [field_ for field_ in fields if field_.name == column]
     return stated_meaning(heading, field)
@@ -140,7 +140,7 @@ def _check_given(heading, column, table, fields, log):
         log.problem("--column", text)
 
 
-def _declared_decimal(folder, log):
+def _read_decimal(folder, log):
     """Return the decimal mark declared in job.toml, or NOT_KNOWN."""
     path = folder / SETTINGS_FILE
     data = read_bytes(path, log) if path.is_file() else None
@@ -149,7 +149,7 @@ def _declared_decimal(folder, log):
     return NOT_KNOWN if marks is None else marks[1]
 
 
-def _remembered(folder, name, log):
+def _read_memory(folder, name, log):
     """Return {heading: column} of earlier lists for a table."""
     path = folder / MEMORY_FILE
     data = read_bytes(path, log) if path.is_file() else None
@@ -185,7 +185,7 @@ def write_list(found, folder, *, replace=False):
     refuse_missing(found)
     standing = [] if replace else tables_with_rows(folder, [found.name])
     refuse_standing(folder, standing)
-    table = _in_columns(found, log)
+    table = _convert_table(found, log)
     log.stop_if_problems()
     read_columns(found.name, table, log)
     log.stop_if_problems()
@@ -194,7 +194,7 @@ def write_list(found, folder, *, replace=False):
     return write_grids(folder, {found.name: [table.headings, *rows]}, memory)
 
 
-def _in_columns(found, log):
+def _convert_table(found, log):
     """Return the Table with the columns of the job, decimal points, and lengths in their units."""
     table = found.table
     fields = {field.name: field for field in COLUMNS[found.name]}
@@ -208,7 +208,7 @@ def _in_columns(found, log):
     kinds = [fields[meaning.column].kind for _, meaning in used]
     rows = tuple(
         tuple(
-            _converted(cell, meaning.factor, decimal) if kind == "number" else cell
+            _convert_cell(cell, meaning.factor, decimal) if kind == "number" else cell
             for cell, kind, (_, meaning) in zip(row, kinds, used, strict=True)
         )
         for row in rows
@@ -217,7 +217,7 @@ def _in_columns(found, log):
                  table.skipped)  # fmt: skip
 
 
-def _converted(cell, factor, decimal):
+def _convert_cell(cell, factor, decimal):
     """Return a number with a decimal point in the unit of its column; other texts are unchanged."""
     if is_blank(cell):
         return cell

@@ -235,14 +235,14 @@ def _angle(book, log, row, text, values):
             return value * DEGREES[values["angle"]]
         value = unpacked(value)
     else:
-        value = _of_parts(text.replace(",", "."))
+        value = _join_parts(text.replace(",", "."))
     if value is None:
         refuse_minutes(log, book.file, row, text)
         return False
     return value
 
 
-def _of_parts(text):
+def _join_parts(text):
     """Convert a text with degrees, minutes and seconds to degrees, or return None."""
     sign = -1.0 if text.startswith("-") else 1.0
     parts = [number_of(part) for part in text.translate(_MARKS).split()]

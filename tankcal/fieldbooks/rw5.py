@@ -240,7 +240,7 @@ def _add(book, log, row, kind, texts, code, state, name):
         for field_code, text in texts.items()
         if field_code not in ("SD", "HD")
     }
-    angles |= {"BR": _of_bearing(texts["BR"], state)} if "BR" in texts else {}
+    angles |= {"BR": _convert_bearing(texts["BR"], state)} if "BR" in texts else {}
     bad = [field_code for field_code, value in angles.items() if value is None]
     if bad:
         refuse_minutes(log, book.file, row, texts[bad[0]])
@@ -285,7 +285,7 @@ def _direction(angles):
     return angles.get("AZ", angles.get("BR")), False
 
 
-def _of_bearing(text, state):
+def _convert_bearing(text, state):
     """Return the azimuth of a quadrant bearing such as N45.3000E."""
     match = _BEARING.fullmatch(text.strip())
     value = _angle(match[2], state) if match else None

@@ -126,7 +126,7 @@ def _targets(control, others, of_hits, choices, known, leave_out):
 
 def _refuse_without_hits(readings, choices, log):
     """Report that no reading is a hit."""
-    names = _in_ranges([reading.shot.point for reading in readings])
+    names = _join_ranges([reading.shot.point for reading in readings])
     shown = [*names[:SHOWN], *(["..."] if len(names) > SHOWN else [])]
     text = message(
         "which_are_hits",
@@ -137,7 +137,7 @@ def _refuse_without_hits(readings, choices, log):
     log.problem("--hits", text)
 
 
-def _in_ranges(names):
+def _join_ranges(names):
     """Return names in their order, with consecutive numbers as 1-200."""
     runs = []
     for name in dict.fromkeys(names):

@@ -32,14 +32,14 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
     """
     lines = []
     for book in books:
-        lines += _of_book(book)
-    shown = [_of_setup(name, stands[place][0].station) for place, name in names.items()]
+        lines += _describe_book(book)
+    shown = [_describe_setup(name, stands[place][0].station) for place, name in names.items()]
     lines.append(message("import_setups", "set-ups: {names}", names=list_some(shown, SHOWN)))
     reports = [report for report in reports if report.setup in names]
     for report in reports:
-        lines += _of_faces(names[report.setup], report)
+        lines += _describe_faces(names[report.setup], report)
     lines.append(message("import_hits", "hits of the wall: {count}", count=len(chosen.hits)))
-    lines += _of_targets(chosen)
+    lines += _describe_targets(chosen)
     known, stations = coordinates
     if known:
         lines.append(
@@ -73,12 +73,12 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
     return lines
 
 
-def _of_setup(name, station):
+def _describe_setup(name, station):
     """Return the name of a set-up, with its station if different."""
     return name if name == station else f"{name} ({station})"
 
 
-def _of_book(book):
+def _describe_book(book):
     """Yield the lines about a file."""
     source = [NAMES[book.format], *([book.instrument] if book.instrument else [])]
     yield message("import_file", "{file}: {made}; {units}", file=book.file, made=source,
@@ -108,7 +108,7 @@ def _of_book(book):
                 )
 
 
-def _of_faces(setup, report):
+def _describe_faces(setup, report):
     """Yield the lines about the faces of a set-up."""
     yield message(
         "import_faces",
@@ -142,7 +142,7 @@ def _of_faces(setup, report):
         )
 
 
-def _of_targets(chosen):
+def _describe_targets(chosen):
     """Yield the lines about targets."""
     for readings, is_control in ((chosen.control, True), (chosen.ties, False)):
         points = list(dict.fromkeys(reading.shot.point for reading in readings))
@@ -217,7 +217,7 @@ def warn_of(chosen, names, stands, reports):
             most=MOST_HITS,
         )
         problems.append(Problem(shot.file, text, shot.row))
-    problems += _of_constants(chosen)
+    problems += _check_constants(chosen)
     if chosen.ties:
         text = message(
             "frame_not_held",
@@ -229,7 +229,7 @@ def warn_of(chosen, names, stands, reports):
     return problems
 
 
-def _of_constants(chosen):
+def _check_constants(chosen):
     """Yield warnings about hits with an unlikely prism constant."""
     hits = {reading.shot.prism_mm for reading in chosen.hits} - {None}
     targets = {reading.shot.prism_mm for reading in (*chosen.control, *chosen.ties)} - {None}

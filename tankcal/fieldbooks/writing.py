@@ -26,7 +26,7 @@ def write_tables(folder, tables, *, replace):
     folder = Path(folder)
     standing = tables_with_rows(folder, CONTRACT)
     refuse_standing(folder, [] if replace else [name for name in standing if name in tables])
-    grids = {name: _grid(name, rows) for name, rows in tables.items()}
+    grids = {name: _make_grid(name, rows) for name, rows in tables.items()}
     paths = write_grids(folder, grids)
     return paths, [table for table in standing if table not in tables]
 
@@ -92,7 +92,7 @@ def _comments(path):
     return "".join(f"{line}\n" for line in _lines(path) if line.startswith("#"))
 
 
-def _grid(name, rows):
+def _make_grid(name, rows):
     columns = columns_of(name, rows)
     return [columns, *([row.cells.get(column, "") for column in columns] for row in rows)]
 

@@ -161,7 +161,7 @@ def decimals_of_mantissa(value, u, *, significant=SIGNIFICANT):
     if not (_is_number(u) and u and _is_number(value) and value):
         return UNKNOWN_DECIMALS
     last = _decimals(_exact(u), significant, None)
-    return max(_rounded(_exact(value), last).adjusted() + last, 0)
+    return max(_round(_exact(value), last).adjusted() + last, 0)
 
 
 def decimals_of_rows(
@@ -228,7 +228,7 @@ def shortest(value, marks=ENGLISH, *, digits=6):
     if not _is_number(value):
         return NOTHING
     number, decimals, exponent = _mantissa(value, digits)
-    needed = -_rounded(number, decimals).normalize(_WIDE).as_tuple().exponent
+    needed = -_round(number, decimals).normalize(_WIDE).as_tuple().exponent
     return _text(number, max(needed, 0), marks) + _power(exponent)
 
 
@@ -252,7 +252,7 @@ def _mantissa(value, digits):
     number = _exact(value)
     if not number:
         return number, 0, 0
-    exponent = _rounded(number, digits - 1 - number.adjusted()).adjusted()
+    exponent = _round(number, digits - 1 - number.adjusted()).adjusted()
     if exponent in WITHOUT_U:
         return number, max(digits - 1 - exponent, 0), 0
     return number.scaleb(-exponent, _WIDE), digits - 1, exponent
@@ -279,30 +279,30 @@ def _decimals(u, significant, least):
 
 def _spread(u, decimals):
     """Round an uncertainty to a number of decimals; up, where rounding loses more than 5 %."""
-    rounded = _rounded(u, decimals)
+    rounded = _round(u, decimals)
     if u and (u - rounded) / u > _LARGEST_LOSS:
-        return _rounded(u, decimals, ROUND_UP)
+        return _round(u, decimals, ROUND_UP)
     return rounded
 
 
-def _rounded(number, decimals, rounding=ROUND_HALF_UP):
+def _round(number, decimals, rounding=ROUND_HALF_UP):
     """Round a number to a number of decimals, halves away from zero."""
     return number.quantize(Decimal(1).scaleb(-decimals), rounding, _WIDE)
 
 
 def _text(number, decimals, marks):
     """Digits with their marks; a zero has no sign."""
-    rounded = _rounded(number, decimals)
+    rounded = _round(number, decimals)
     whole, _, behind = f"{rounded.copy_abs():f}".partition(".")
     if marks.group and len(whole) >= marks.least:
-        whole = _grouped(whole[::-1], marks.group)[::-1]
+        whole = _group_digits(whole[::-1], marks.group)[::-1]
     if marks.group and marks.of_decimals and len(behind) >= marks.least:
-        behind = _grouped(behind, marks.group)
+        behind = _group_digits(behind, marks.group)
     sign = marks.minus if rounded < 0 else ""
     return sign + whole + (marks.decimal + behind if behind else "")
 
 
-def _grouped(digits, mark):
+def _group_digits(digits, mark):
     return mark.join(digits[i : i + 3] for i in range(0, len(digits), 3))
 
 

@@ -59,14 +59,14 @@ def write_labels(ax, labels, marks, *, size, room=MARK, **style):
     int
     """
     ax.apply_aspect()
-    places = _in_points(ax, np.array([[item.x, item.y] for item in labels]).reshape(-1, 2))
-    around = _in_points(ax, np.asarray(marks, dtype=float).reshape(-1, 2))
+    places = _convert_to_points(ax, np.array([[item.x, item.y] for item in labels]).reshape(-1, 2))
+    around = _convert_to_points(ax, np.asarray(marks, dtype=float).reshape(-1, 2))
     half = np.broadcast_to(np.asarray(room, dtype=float), len(around))[:, None]
     taken = np.column_stack([around - half, around + half])
-    frame = _in_points(ax, np.array([[*ax.get_xlim()], [*ax.get_ylim()]]).T).ravel()
+    frame = _convert_to_points(ax, np.array([[*ax.get_xlim()], [*ax.get_ylim()]]).T).ravel()
     left_out = 0
     for label, place in zip(labels, places, strict=True):
-        position = _free(label, place, taken, frame, size)
+        position = _find_place(label, place, taken, frame, size)
         if position is None:
             left_out += 1
             continue
@@ -79,12 +79,12 @@ def write_labels(ax, labels, marks, *, size, room=MARK, **style):
     return left_out
 
 
-def _in_points(ax, xy):
+def _convert_to_points(ax, xy):
     """Convert positions in the axes to typographic points of the figure."""
     return ax.transData.transform(xy) * 72 / ax.figure.dpi
 
 
-def _free(label, place, taken, frame, size):
+def _find_place(label, place, taken, frame, size):
     """Return (text, side, offset, box) of the first free form and position, or None."""
     sides = sorted(AROUND, key=lambda side: -np.dot(side, label.outward) / np.hypot(*side))
     for text in label.texts:

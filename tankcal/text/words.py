@@ -66,7 +66,7 @@ def message_sentence(words, text, code, values):
     )
     if template is None:
         return text
-    named = {key: _named(words, key, value) for key, value in values.items()}
+    named = {key: _name_value(words, key, value) for key, value in values.items()}
     return fill_template(
         template,
         named,
@@ -88,8 +88,10 @@ def translate_record(words, record):
     adjustment, corrections = record["adjustment"], record["corrections"]
     return {
         **record,
-        "warnings": [_placed(words, _said(words, row, "text")) for row in record["warnings"]],
-        "corrections": [_said(words, row, "formula", "formula_") for row in corrections],
+        "warnings": [
+            _placed(words, _translate_row(words, row, "text")) for row in record["warnings"]
+        ],
+        "corrections": [_translate_row(words, row, "formula", "formula_") for row in corrections],
         "adjustment": adjustment and _adjustment_in_language(words, adjustment),
         "rule": record.get("rule") and _rule_in_language(words, record),
     }
@@ -97,18 +99,18 @@ def translate_record(words, record):
 
 def _adjustment_in_language(words, adjustment):
     """Return the adjustment of a record with translated texts."""
-    left_out = [_said(words, row, "text") for row in adjustment.get("left_out", [])]
+    left_out = [_translate_row(words, row, "text") for row in adjustment.get("left_out", [])]
     places = {}
     if residuals := adjustment.get("residuals"):  # by columns
         files = residuals["file"]
-        translated = {file: _place_said(words, file) for file in set(files)}
+        translated = {file: _translate_place(words, file) for file in set(files)}
         places["residuals"] = residuals | {"file": [translated[file] for file in files]}
     if held := adjustment.get("held"):
         places["held"] = [_placed(words, row) for row in held]
     return {
         **adjustment,
         **places,
-        "datum": _said(words, adjustment["datum"], "words", "words_"),
+        "datum": _translate_row(words, adjustment["datum"], "words", "words_"),
         "aside": [row["text"] for row in left_out] or adjustment["aside"],
     }
 
@@ -119,7 +121,7 @@ def _rule_in_language(words, record):
     return {**rule, "rule": {**rule["rule"], **texts.get(record["job"]["table"]["rule"], {})}}
 
 
-def _said(words, row, key, of=""):
+def _translate_row(words, row, key, of=""):
     """Return a row with a translated text in `key`; rows of older records have no code."""
     code, values = row.get(f"{of}code"), row.get(f"{of}values", {})
     return {**row, key: message_sentence(words, row[key], code, values)}
@@ -127,10 +129,10 @@ def _said(words, row, key, of=""):
 
 def _placed(words, row):
     """Return a row of the record with a translated name of its sheet."""
-    return {**row, "file": _place_said(words, row["file"])}
+    return {**row, "file": _translate_place(words, row["file"])}
 
 
-def _place_said(words, file):
+def _translate_place(words, file):
     """Return a file name unchanged, or the translated name of a sheet."""
     if not file.startswith(SHEET):
         return file
@@ -150,7 +152,7 @@ def _number(value, form, marks):
     return sign + fixed(value, int(digits or 0), marks)
 
 
-def _named(words, key, value):
+def _name_value(words, key, value):
     """Replace codes among the values of a message by names."""
     if key == "row" or key.endswith("_row"):
         return str(value)  # no count
@@ -236,19 +238,19 @@ def global_test_sentence(words, adjustment):
     if bounds is None:
         return words["texts"]["test_none"]
     verdict = "above" if adjustment["chi2"] > bounds[1] else "below"
-    low, high, chi2 = (_fixed(words, value, 1) for value in (*bounds, adjustment["chi2"]))
+    low, high, chi2 = (_format_fixed(words, value, 1) for value in (*bounds, adjustment["chi2"]))
     return words["texts"][f"test_{'passed' if adjustment['passed'] else verdict}"].format(
         low=low,
         high=high,
         statistic=chi2,
-        dof=_fixed(words, adjustment["redundancy"]),
+        dof=_format_fixed(words, adjustment["redundancy"]),
         confidence=percent(words, adjustment["confidence"]),
     )
 
 
 def scale_sentence(words, adjustment):
     """Return the variance factor used for the covariances."""
-    factor = _fixed(words, adjustment["cov_scale"], 3)
+    factor = _format_fixed(words, adjustment["cov_scale"], 3)
     return words["texts"][f"scale_{adjustment['scale']}"].format(factor=factor)
 
 
@@ -258,9 +260,9 @@ def snooping_sentence(words, adjustment):
         return words["texts"]["snooping_off"]
     removed = {(row["kind"], tuple(row["ids"]), row["row"]) for row in adjustment["removed"]}
     return words["texts"]["snooping_on"].format(
-        critical=_fixed(words, adjustment["critical_w"], 2),
-        rounds=_fixed(words, adjustment["rounds"]),
-        removed=_fixed(words, len(removed)),
+        critical=_format_fixed(words, adjustment["critical_w"], 2),
+        rounds=_format_fixed(words, adjustment["rounds"]),
+        removed=_format_fixed(words, len(removed)),
     )
 
 
@@ -306,16 +308,18 @@ def method_line(words, adjustment):
     if adjustment["photos"]:
         cameras = list_names(words, dict.fromkeys(row["camera"] for row in adjustment["photos"]))
         photographs = words["observed"]["photographs"]
-        parts.append(f"{photographs} ({cameras}): {_fixed(words, len(adjustment['photos']))}")
+        parts.append(
+            f"{photographs} ({cameras}): {_format_fixed(words, len(adjustment['photos']))}"
+        )
     groups = [row for row in adjustment["groups"] if row["kind"] != "weighted unknown"]
     for row in sorted(groups, key=lambda row: row["kind"] != "image coordinate"):
         name = group_name(words, row)
-        parts.append(f"{name[:1].lower()}{name[1:]}: {_fixed(words, row['count'])}")
+        parts.append(f"{name[:1].lower()}{name[1:]}: {_format_fixed(words, row['count'])}")
     sigma0 = adjustment["sigma0"]
     return words["texts"]["method_of_survey"].format(
         observed=", ".join(parts),
-        points=_fixed(words, len(adjustment["points"])),
-        sigma=NOTHING if sigma0 is None else _fixed(words, sigma0, 2),
+        points=_format_fixed(words, len(adjustment["points"])),
+        sigma=NOTHING if sigma0 is None else _format_fixed(words, sigma0, 2),
     )
 
 
@@ -342,8 +346,8 @@ def percent(words, share):
 
 def factor_text(words, value):
     """Format a ratio of standard deviations."""
-    return _fixed(words, value, 2 if value < 10 else 1)
+    return _format_fixed(words, value, 2 if value < 10 else 1)
 
 
-def _fixed(words, value, decimals=0):
+def _format_fixed(words, value, decimals=0):
     return fixed(value, decimals, marks_of(words))
