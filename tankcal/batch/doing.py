@@ -23,7 +23,7 @@ from tankcal.batch.outcomes import (
 from tankcal.errors import InputError, Problem, TankcalError, problem_of, reason_of
 from tankcal.messages import message
 
-IN_THE_WAY = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR)  # of one job, not of the batch
+IN_THE_WAY = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR)  # errors of one job, not of the batch
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 STATUS_OF_EXIT = {2: "refused", 3: "unsound"}
 
@@ -96,7 +96,7 @@ def _do_steps(task):
     """Return the result of `do_job`."""
     name, steps = task.job.name, task.job.asked.do
     outcome = load_outcome(task.out, name) or Outcome(name, task.job.source)
-    if not outcome.is_settled_for(task.keys):  # or its worker died before it could say so
+    if not outcome.is_settled_for(task.keys):  # settled if a worker died before its answer
         journal, clock = Journal(task.out, task.run), Clock()
         journal.note("begun", name)
         outcome = _after_steps(replace(outcome, source=task.job.source), task, clock)
@@ -163,7 +163,7 @@ def _outcome_of(step, task, clock):
             raise
         place = os.path.basename(str(error.filename or "")) or name
         return _make_failure(key, "failed", [Problem(place, reason_of(error))])
-    except Exception as error:  # a mistake of tankcal: it must not stop the other jobs
+    except Exception as error:  # an internal error must not stop the other jobs
         text = message(
             "batch_mistake",
             "internal error of tankcal; please report it with the job ({name}: {error})",
@@ -187,7 +187,7 @@ def _make_failure(key, status, problems):
     return StepOutcome(key, status, problems=plain_problems, problem_count=len(problems))
 
 
-# ---- the steps: each writes its folder, all or nothing, and gives the paths
+# ---- steps: each writes its folder, all or nothing, and returns the paths
 
 
 def _run(task, clock):

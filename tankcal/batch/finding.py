@@ -39,8 +39,8 @@ SAVED = (RECORD, "comparison.json", "inspection.json")
 BOOK = ".xlsx"
 OUTCOME, OF_BATCH = "outcome.json", ("report", "export")
 PATTERN = re.compile(r"[*?\[]")
-HEADINGS = ("job", "name", *OWN)  # of a list of jobs; the first is needed
-DIGITS = 6  # of a digest behind a name
+HEADINGS = ("job", "name", *OWN)  # headings of a list of jobs; only the first is required
+DIGITS = 6  # hexadecimal digits of a digest appended to a name
 MOST_LIST_BYTES = 100_000_000
 
 
@@ -109,7 +109,7 @@ def find_jobs(arguments, asked, out=None, known=None):
     wants = _Wanted(_kind_of_input(asked.do), out)
     for argument in arguments:
         for job in _find_named(argument, wants, log):
-            jobs.setdefault(os.path.abspath(job.source), job)  # a link is a job of its own
+            jobs.setdefault(os.path.abspath(job.source), job)  # a link is a separate job
     log.stop_if_problems()
     return _assign_names(jobs, asked, known or {})
 
@@ -150,9 +150,9 @@ def _find_in_path(path, wants, log, strict=True):
 
     strict  whether a folder without jobs is a problem
     """
-    own = _job_of_path(path, wants)
-    if own is not None:
-        return [Found(own, {})]
+    job_path = _job_of_path(path, wants)
+    if job_path is not None:
+        return [Found(job_path, {})]
     if not path.is_dir():
         return [Found(path, {})] if strict or path.suffix.lower() == BOOK else []
     try:
@@ -211,7 +211,7 @@ def _find_in_folder(folder, wants):
         if os.path.abspath(place) == wants.out:
             folders.clear()
             continue
-        of_batch = OUTCOME in names  # a job in the folder of another batch: its papers are no job
+        of_batch = OUTCOME in names  # a job of another batch: its reports are not jobs
         folders[:] = sorted(
             folder_name
             for folder_name in folders
@@ -256,7 +256,7 @@ def _find_listed(path, wants, log):
     jobs = []
     for cells in rows:
         job = cells.pop("job")
-        for name in OWN:  # files from the list's folder; else names, such as of a shipped rule
+        for name in OWN:  # files relative to the list, else names, such as a shipped rule
             beside = path.parent / cells.get(name, "")
             if cells.get(name) and (name == "former" or beside.is_file()):
                 cells[name] = os.path.abspath(beside)
@@ -274,7 +274,7 @@ def _find_listed(path, wants, log):
 def _plain_rows(lines):
     """Return the rows of a list with one job per line."""
     stripped = (line.strip() for line in lines)
-    return [{"job": one} for one in stripped if one and not one.startswith("#")]
+    return [{"job": text} for text in stripped if text and not text.startswith("#")]
 
 
 def _rows(path, text, log):
@@ -330,19 +330,19 @@ def _dicts(path, headings, table, log):
 # ---- names
 
 
-def _assign_names(found, asked, known):
+def _assign_names(jobs_found, asked, known):
     """Return a `BatchJob` with a unique name for each job."""
-    labels = {source: _label(job) for source, job in found.items()}
+    labels = {source: _label(job) for source, job in jobs_found.items()}
     taken = {name.casefold(): source for source, name in known.items() if os.path.exists(source)}
     counts = Counter(label.casefold() for label in labels.values())
     jobs = []
-    for source, one in found.items():
+    for source, job in jobs_found.items():
         label = labels[source]
         owner = taken.get(label.casefold(), source)
         name = known.get(source, label)
         if source not in known and (counts[label.casefold()] > 1 or owner != source):
             name = f"{label}~{sha256(source.encode(errors='replace')).hexdigest()[:DIGITS]}"
-        own_choices = {key: value for key, value in one.own.items() if key in OWN}
+        own_choices = {key: value for key, value in job.own.items() if key in OWN}
         jobs.append(BatchJob(name, label, source, asked.with_own(own_choices)))
     _refuse_doubles(jobs)
     return sorted(jobs, key=lambda job: job.name)

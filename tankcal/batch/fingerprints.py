@@ -19,13 +19,13 @@ from tankcal.job.tables import COVARIANCE_FILE, SETTINGS_FILE
 from tankcal.record import long_tables
 from tankcal.record.manifest import digest_of
 
-NEVER_READ = (  # endings of what lies beside jobs
+NEVER_READ = (  # endings of files that no job reads
     *(".jpg", ".jpeg", ".png", ".tif", ".tiff", ".gif", ".bmp", ".dng", ".raw", ".heic"),
     *(".mp4", ".mov", ".avi", ".pdf", ".doc", ".docx", ".odt", ".zip", ".html"),
 )
 RESULTS = frozenset(("record.json", "comparison.json", "inspection.json", SETTINGS_FILE))
-MOST_UNPACKED_BYTES = 300_000_000  # of a workbook that is looked through for names
-OF_STEP = {  # attributes of `Asked` that bear on a step; of files their content
+MOST_UNPACKED_BYTES = 300_000_000  # largest unpacked workbook to search for names
+OF_STEP = {  # attributes of `Asked` that affect a step
     "run": ("papers",),
     "report": ("language",),
     "compare": ("language",),
@@ -88,7 +88,7 @@ def inputs_of(source):
         names += _files_of_former(path)
     elif path.name == "record.json":
         beside = (COVARIANCE_FILE, long_tables.FILE)
-        names += [one for one in beside if path.with_name(one).is_file()]
+        names += [file for file in beside if path.with_name(file).is_file()]
     return [[name, _digest(path.parent / name)] for name in names]
 
 
@@ -99,7 +99,7 @@ def _files_below(folder):
         if place != folder and not RESULTS.isdisjoint(names):
             folders.clear()
             continue
-        folders[:] = [one for one in folders if not one.startswith(".")]
+        folders[:] = [folder_name for folder_name in folders if not folder_name.startswith(".")]
         for name in names:
             if name[0] in ".~" or os.path.splitext(name)[1].lower() in NEVER_READ:
                 continue
@@ -109,7 +109,7 @@ def _files_below(folder):
     return sorted(paths)
 
 
-_files_beside = lru_cache(maxsize=64)(_files_below)  # of folders with many workbooks
+_files_beside = lru_cache(maxsize=64)(_files_below)  # cached for folders with many workbooks
 
 
 def _files_of_workbook(path):

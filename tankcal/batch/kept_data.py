@@ -13,7 +13,7 @@ from tankcal.text.words import load_words
 TEXTS = ("tank", "kind", "date", "rule", *OF_RULE)
 NUMBERS = ("height_m", "volume_m3", "U_m3", "former_m3", "of_tank_m3")
 PLACES = ("book", "column", "cell")
-PASSED = "global_test"  # the verdict that is true or false
+PASSED = "global_test"  # the only Boolean verdict
 
 
 def is_step(step):

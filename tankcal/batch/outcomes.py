@@ -16,8 +16,8 @@ from tankcal.record import manifest
 from tankcal.report.batch.paper import STATUSES
 
 JOBS, FILE, FORMAT = "jobs", "outcome.json", "tankcal-outcome/1"
-FINAL = ("done", "unsound", "refused")  # what the same input would give again
-MOST_TOLD = 20  # problems and warnings of a step that are kept
+FINAL = ("done", "unsound", "refused")  # statuses that the same input would give again
+MOST_TOLD = 20  # largest number of saved problems and warnings of a step
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Outcome:
             if not self.is_settled(step, key):
                 return False
             if step == "run" and self.steps[step].status != "done":
-                return True  # the others would have nothing to be done with
+                return True  # the other steps need the results of the run
         return True
 
 

@@ -29,10 +29,10 @@ from tankcal.errors import Problem, problem_of, reason_of
 from tankcal.messages import message
 from tankcal.pipeline.cluster import Watch, count_cores, failures_told, is_installed, open_client
 
-TRIES = 3  # of a job whose worker dies while it is computed
-MOST_DEATHS = 12  # of workers that a job was given to, begun or not
-AHEAD = 2  # jobs of each worker that are with the scheduler
-LOOK_S = 1.0  # between looks at whether there are workers at all
+TRIES = 3  # attempts for a job whose worker dies during the computation
+MOST_DEATHS = 12  # dead workers with this job in their queue, computed or not
+AHEAD = 2  # submitted jobs per worker
+LOOK_S = 1.0  # seconds between checks for workers
 WORKER_BYTES = 2 << 30
 ALLOWED_FAILURES = "distributed.scheduler.allowed-failures"
 
@@ -189,7 +189,7 @@ def _run_tasks(waiting, journal, batch, telling, workers, worker_bytes):
         for task in waiting:
             ended(task, *do_job(task))
         return
-    settings = {ALLOWED_FAILURES: 0}  # how many times it is tried is decided here
+    settings = {ALLOWED_FAILURES: 0}  # TRIES limits the attempts instead
     with open_client(workers, worker_bytes=worker_bytes, settings=settings) as client:
         _ByWorkers(client, journal, ended).do(waiting)
 
@@ -211,12 +211,12 @@ class _ByWorkers:
                 try:
                     future = self._ended.get(timeout=LOOK_S)
                 except queue.Empty:
-                    self._fill(left)  # there may be more workers now, or none
+                    self._fill(left)  # the number of workers may have changed
                 else:
                     self._take(future)
                     self._submit_some(left, 1)
         finally:
-            with contextlib.suppress(Exception):  # of a scheduler that is gone
+            with contextlib.suppress(Exception):  # the scheduler may have ended
                 self._client.cancel(list(self._running))
 
     def _fill(self, left):
@@ -230,7 +230,7 @@ class _ByWorkers:
                 self._submit(task)
 
     def _submit(self, task):
-        key = f"tankcal_job-{uuid.uuid4().hex}"  # one group for the scheduler, whatever the job
+        key = f"tankcal_job-{uuid.uuid4().hex}"  # one task group for all jobs
         with failures_told():
             future = self._client.submit(do_job, task, key=key, pure=False)
         self._running[future] = task
@@ -274,7 +274,9 @@ def fail_job(task, problem):
     plain = problem_of(problem)
     known = load_outcome(task.out, task.job.name) or Outcome(task.job.name, task.job.source)
     step = next(
-        one for one in task.job.asked.do if not known.is_settled(one, task.keys.get(one, ""))
+        unsettled
+        for unsettled in task.job.asked.do
+        if not known.is_settled(unsettled, task.keys.get(unsettled, ""))
     )
     outcome = StepOutcome(task.keys.get(step, ""), "failed", problems=[plain], problem_count=1)
     save_outcome(task.out, replace(known, steps={**known.steps, step: outcome}))

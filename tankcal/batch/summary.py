@@ -19,11 +19,11 @@ VALUES = (
     *("rule_verdict", "comparison_verdict", "inspection_verdict"),
 )
 VERDICTS = ("global_test", "rule_verdict", "comparison_verdict", "inspection_verdict")
-PAPERS = (  # of each job the first of these is the one that the summary leads to
+PAPERS = (  # in order of priority: the summary links to the first
     *("certificate.pdf", "report.pdf", "comparison.pdf", "inspection.pdf", "capacity.xlsx"),
     *("capacity.csv", "record.json"),
 )
-MOST_TOLD = 1  # problem or warning of a job
+MOST_TOLD = 1  # problems and warnings of a job in the summary
 
 
 def write_summary(out, jobs, language):

@@ -87,7 +87,7 @@ def main(arguments=None):
         for text in error.texts:
             complain(text)
         return error.exit_status
-    except BrokenPipeError:  # the reader of our output went away: nothing to say to nobody
+    except BrokenPipeError:  # the reader of the output ended, such as `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except BaseException as error:

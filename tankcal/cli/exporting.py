@@ -149,13 +149,21 @@ def _list(options):
             ],
         )
         return 0
-    for code, one in profiles.items():
+    for code, profile in profiles.items():
         points = message("export_any_points", "any number of rows")
-        if one.max_points:
-            points = message("export_most_points", "at most {most} rows", most=one.max_points)
+        if profile.max_points:
+            points = message("export_most_points", "at most {most} rows", most=profile.max_points)
         known = message("export_unverified", "not verified")
-        if one.verified:
+        if profile.verified:
             known = message("export_verified", "verified")
-        say(message("export_listed", "{profile} {name}: {points}; {known}",
-                    profile=code.ljust(26), name=one.name, points=points, known=known))  # fmt: skip
+        say(
+            message(
+                "export_listed",
+                "{profile} {name}: {points}; {known}",
+                profile=code.ljust(26),
+                name=profile.name,
+                points=points,
+                known=known,
+            )
+        )
     return 0

@@ -81,7 +81,7 @@ def _ask_missing(foreign_list):
     """Return the ForeignList with headings chosen by the user for missing columns."""
     meanings = dict(foreign_list.meanings)
     for field in foreign_list.missing:
-        free = [one for one in foreign_list.table.headings if one not in meanings]
+        free = [title for title in foreign_list.table.headings if title not in meanings]
         if not free:
             break
         say(message("list_ask", "which heading is {column}?", column=field.name))

@@ -14,10 +14,12 @@ from tankcal.text.languages import DEFAULT, nearest_language
 from tankcal.text.time_left import how_far
 
 RECORD = "record.json"
-OBJECTS_AT_ONCE = 10_000  # are made before the garbage collector looks: those of modules stay
-_LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set counts
-TO_THE_END = "\x1b[K"  # a terminal clears the rest of the line
-_spoken = {}  # the words of the language that is spoken; nothing: English as it was made
+OBJECTS_AT_ONCE = (
+    10_000  # allocations between garbage collections: objects of modules are permanent
+)
+_LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # in order of priority
+TO_THE_END = "\x1b[K"  # control sequence: clear the rest of the line
+_spoken = {}  # words of the current language; empty: the English of the messages
 
 
 def speak(language=None):
@@ -92,7 +94,7 @@ def read_job(source, show, **options):
     if language is not None:
         speak(language)
     show.step(message("reading_job", "reading {file}", file=str(source)))
-    from tankcal.job import load  # half a second: the line above is told before
+    from tankcal.job import load  # takes half a second: print the line above first
 
     return load(source, **options)
 
@@ -157,7 +159,7 @@ class Progress:
             so_far = say_in_language(how_far(done, total, done - first, time.monotonic() - began))
             width = shutil.get_terminal_size().columns - 1
             if self._line and len(self._line) + 1 + len(so_far) > width:
-                print(file=sys.stderr)  # one that wraps could not be written over
+                print(file=sys.stderr)  # a wrapped line cannot be overwritten
                 self._line = ""
             shown = f"{self._line} {so_far}".lstrip()[:width]
             print(f"\r{shown}{TO_THE_END}", end="", file=sys.stderr, flush=True)

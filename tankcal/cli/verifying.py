@@ -154,16 +154,20 @@ def _numbers(again):
             relative=f"{difference.relative:.1e}",
             tolerance=f"{difference.tolerance:.0e}",
         )
-    made, now = (", ".join(f"{name} {version}" for name, version in versions.items())
-                 for versions in (again.made_by, again.computed_by))  # fmt: skip
-    if made == now:
-        yield message("verify_same_versions", "computed both times with {versions}", versions=made)
+    versions_then, versions_now = (
+        ", ".join(f"{name} {version}" for name, version in versions.items())
+        for versions in (again.made_by, again.computed_by)
+    )
+    if versions_then == versions_now:
+        yield message(
+            "verify_same_versions", "computed both times with {versions}", versions=versions_then
+        )
     else:
         yield message(
             "verify_other_versions",
             "computed with {made}; computed again with {now}",
-            made=made,
-            now=now,
+            made=versions_then,
+            now=versions_now,
         )
 
 

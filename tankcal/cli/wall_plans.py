@@ -5,7 +5,7 @@ from tankcal.cli.showing import marks
 from tankcal.messages import message
 from tankcal.text.digits import fixed, format_significant
 
-SCALES = ("meter_factor", "scale", "instrument_scale")  # that liquid tells something of
+SCALES = ("meter_factor", "scale", "instrument_scale")  # parameters that metered liquid determines
 
 
 def wall_summary(prediction):

@@ -16,7 +16,7 @@ FARTHEST_M, HIGHEST_M, MOST_M = 1e4, 50.0, 1e8
 METRES = {"m": 1.0, "mm": 1e-3, "ft": 0.3048, "usft": 1200 / 3937}
 DEGREES = {"deg": 1.0, "gon": 0.9, "mil": 360 / 6400}
 MAX_NUMBER = 40  # characters
-NO_YEAR = 1904  # of a time whose year the file does not say (a leap year)
+NO_YEAR = 1904  # year of times without year in the file (a leap year)
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ class FieldBook:
             )
             log.problem(self.file, text, row)
             return
-        distance = distance or None  # 0 is how instruments write that none was measured
+        distance = distance or None  # instruments write 0 for no measurement
         if direction is None and zenith is None and distance is None:
             self.leave_out(message("no_reading", "points without readings"), row)
             return
@@ -256,7 +256,7 @@ def unpacked(value):
     text = f"{abs(value):.10f}"
     whole, _, behind = text.partition(".")
     minutes, seconds = int(behind[:2]), float(f"{behind[2:4]}.{behind[4:]}")
-    if minutes >= 60 or seconds > 60:  # 60 is how some round 59.99
+    if minutes >= 60 or seconds > 60:  # some instruments round 59.99 to 60
         return None
     return math.copysign(int(whole) + minutes / 60 + seconds / 3600, value)
 

@@ -12,8 +12,8 @@ from statistics import median
 
 from tankcal.messages import message
 
-FEWER = 3  # decimals; fewer where the median has fewer than these are not judged
-OFTEN, SHARE = 3, 0.1  # so many numbers, and that part of a field, are a way of writing
+FEWER = 3  # missing decimals of a truncated number; fields with a smaller median are not tested
+OFTEN, SHARE = 3, 0.1  # count and share of a field that make a number of decimals regular
 
 
 def tell_cut_numbers(book, log):

@@ -19,12 +19,12 @@ NAMES = {
 }
 MAX_BYTES, MAX_LINES, MAX_LINE, LOOKED_AT = 50_000_000, 100_000, 4000, 60  # of a file, characters
 _JOBXML = re.compile(r"<(\w+:)?JOBFile[\s>]")
-# A serial transfer puts controls (STX, ETX, Ctrl-Z, zero bytes) around lines, and controls of its
-# flow (XON, XOFF) anywhere.
+# Serial transfers add control characters (STX, ETX, Ctrl-Z, zero bytes) around lines and flow
+# control characters (XON, XOFF) anywhere.
 _AROUND_BYTES = bytes((*range(0x09), *range(0x0B, 0x20), 0x7F))
 _AROUND = _AROUND_BYTES.decode("ascii") + "\ufeff"
 _FLOW = str.maketrans(dict.fromkeys("\x11\x13"))
-_FOREIGN = {  # formats that are not read: a regular expression of their lines
+_FOREIGN = {  # unsupported formats: regular expressions of their lines
     "Nikon RAW": r"CO,\s*Nikon RAW|(MP|CC|ST|CP|SS|F[12]|UP)(,[^,]*){4,}$",
     "Trimble DC": r"00NMSC|10NM.*SCV",
     "Geodimeter": r"\d{1,3}=[^,;\t]*$",
@@ -63,12 +63,16 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
         log.problem(file, text)
         return None
     if format_name == "jxl":
-        is_plain = find_encoding(data) == "utf-8"  # the bytes of letters in UTF-16 can be controls
+        is_plain = (
+            find_encoding(data) == "utf-8"
+        )  # bytes of UTF-16 letters may be control characters
         if is_plain:
             return jobxml.read(data.strip(_AROUND_BYTES + b"\r\n\t "), file, log)
         # An editor that writes UTF-16 leaves encoding="UTF-8" in the declaration.
         return jobxml.read(text.strip().encode(errors="replace"), file, log, "utf-8")
-    if has_too_many_lines(file, text, log, MAX_LINES):  # JobXML has many lines for each reading
+    if has_too_many_lines(
+        file, text, log, MAX_LINES
+    ):  # not for JobXML, with many lines per reading
         return None
     for row, line in enumerate(text.split("\n"), 1):
         if len(line) > MAX_LINE and not (format_name == "gsi" and gsi.LINE.match(line)):

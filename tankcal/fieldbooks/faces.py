@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from tankcal.fieldbooks.book import FULL_TURN, HALF_TURN
 from tankcal.messages import message
 
-NO_PAIR_DEG = 0.1  # the two faces of one point do not differ by more
-LARGE_DEG = 0.0045  # 0.005 gon: an instrument to be adjusted (own choice)
-LARGE_M = 0.005  # between the distances of both faces
+NO_PAIR_DEG = 0.1  # largest difference of the two faces of one point
+LARGE_DEG = 0.0045  # 0.005 gon: larger errors cause a warning (own choice)
+LARGE_M = 0.005  # largest difference of the distances on both faces
 DEGREE = math.pi / HALF_TURN
 
 
@@ -96,7 +96,9 @@ def _correct_single(reading, report):
     """Return a single reading corrected by the mean c and i of its set-up."""
     if reading.faces == "both":
         return reading
-    sign = 1.0 if reading.faces == "1" else -1.0  # face 2 is turned already
+    sign = (
+        1.0 if reading.faces == "1" else -1.0
+    )  # readings of face 2 are already converted to face 1, which reverses the sign
     shot, sine = reading.shot, 1.0
     if shot.zenith_deg is not None and report.index is not None:
         shot = replace(shot, zenith_deg=shot.zenith_deg - sign * report.index[0])

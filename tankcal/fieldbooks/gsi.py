@@ -27,7 +27,7 @@ from tankcal.messages import message
 LINE = re.compile(r"\s*\*?\d\d[0-9. ]{4}[+-]")
 _WORD = re.compile(r"(\d\d)(.)(.)(.)(.)([+-])(.+)", re.DOTALL)
 _TWO_VALUES = re.compile(r"([+-]\d+)([+-]\d+)")
-LENGTHS = {  # digit 6: unit, how many of the last digit are one of it
+LENGTHS = {  # digit 6: (unit, number of last digits in one unit)
     "0": ("m", 1e3),
     "1": ("ft", 1e3),
     "6": ("m", 1e4),
@@ -41,11 +41,11 @@ LENGTH_WORDS = ("31", "32", "33", *OF_TARGET, *OF_STATION, "87", "88")
 CODES = tuple(f"4{digit}" for digit in range(1, 10))
 KNOWN = (*TEXTS, *CODES, *LENGTH_WORDS, "12", "13", "17", "19", "21", "22", "51", "58", "59")
 SHOWN = 3  # code blocks
-FILLER = re.compile(r"[-?]*")  # some instruments write these characters for no code or name
-NO_VALUE = re.compile(r"0*[-?*. ]+")  # the digits of a word without a value, mostly -----
+FILLER = re.compile(r"[-?]*")  # characters for a missing code or name
+NO_VALUE = re.compile(r"0*[-?*. ]+")  # digits of a word without a value, usually -----
 EARLIEST, LATEST = 1980, 2200  # years
-SAME_M = 0.001  # heights of an instrument, coordinates of a station
-UNLIKE_M = 0.003  # between the horizontal distance of the file and that of slope and angle
+SAME_M = 0.001  # tolerance of instrument heights and station coordinates
+UNLIKE_M = 0.003  # tolerance between the horizontal distance and slope distance times sine
 
 
 @dataclass(frozen=True)
@@ -99,11 +99,11 @@ class _State:
 
     height = prism = None
     year = time = None
-    code = ""  # of the code block that holds
-    first = 0  # shot after the last code block
+    code = ""  # code of the current code block
+    first = 0  # index of the first shot after the last code block
 
     def __init__(self):
-        self.blocks = []  # (text, row) of code blocks that nobody explained
+        self.blocks = []  # (text, row) of code blocks of unknown meaning
 
 
 def _words(line):
@@ -214,9 +214,7 @@ def _take(book, log, row, words, state):
     name = "" if FILLER.fullmatch(name) else name
     is_reading = any(index in values for index in ("21", "22", "31", "32"))
     _take_station(book, row, name, values, is_reading, state)
-    if (
-        "87" in words_by_index
-    ):  # without a value, the height of the target before does not hold either
+    if "87" in words_by_index:  # a word without value also cancels the previous target height
         state.height = values.get("87")
     if is_reading:
         texts = [
@@ -286,7 +284,7 @@ def _value(book, log, row, index, unit, text):
     book.say_units(angle=name)
     if name != "dms":
         return sign * number / parts * DEGREES[name]
-    degrees, rest = divmod(number, 100000)  # dddmmsss: the last one is a tenth of a second
+    degrees, rest = divmod(number, 100000)  # dddmmsss: the last digit is a tenth of a second
     minutes, tenths = divmod(rest, 1000)
     if minutes >= 60 or tenths >= 600:
         refuse_minutes(log, book.file, row, text)
@@ -309,7 +307,7 @@ def _take_times(words_by_index, state):
         state.year = int(date[-4:])
     if clock.isdigit():
         month, day, hour, minute = (int(clock[place : place + 2]) for place in (0, 2, 4, 6))
-        try:  # without a year, that of the reader's choice: NO_YEAR stands for it
+        try:  # without a year, NO_YEAR marks a time to be completed
             state.time = datetime.datetime(state.year or NO_YEAR, month, day, hour, minute)
         except ValueError:
             state.time = None
@@ -341,7 +339,9 @@ def _take_station(book, row, name, values, is_reading, state):
         return
     if book.setups:
         now = book.setups[-1]
-        same_name = is_reading or name == now.station  # a block of a reading names its target
+        same_name = (
+            is_reading or name == now.station
+        )  # in a block with a reading, the name is the target
         same_place = None in (xyz, now.xyz_m) or all(map(_are_same, xyz, now.xyz_m))
         same_height = _are_same(height, now.height_m)
         if same_name and same_place and (same_height or not book.has_shots):

@@ -18,7 +18,7 @@ from tankcal.fieldbooks.writing import write_tables
 from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import list_some, message
 
-SAME_M = 0.001  # coordinates of one point that are given twice
+SAME_M = 0.001  # tolerance of repeated coordinates of one point
 SHOWN = 6
 
 
@@ -228,14 +228,14 @@ def _names_of_setups(stands, places):
     named = {stands[place][0].station for place in places} - {""}
     free = (f"S{number}" for number in range(1, len(places) + len(named) + 2))
     free = (candidate for candidate in free if candidate not in named)
-    found, counts = {}, Counter()
+    setup_names, counts = {}, Counter()
     for place in places:
         name = stands[place][0].station or next(free)
         counts[name] += 1
-        while counts[name] > 1 and f"{name}-{counts[name]}" in (*named, *found.values()):
+        while counts[name] > 1 and f"{name}-{counts[name]}" in (*named, *setup_names.values()):
             counts[name] += 1
-        found[place] = name if counts[name] == 1 else f"{name}-{counts[name]}"
-    return found
+        setup_names[place] = name if counts[name] == 1 else f"{name}-{counts[name]}"
+    return setup_names
 
 
 def _station(stand, name):

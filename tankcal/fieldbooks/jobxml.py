@@ -11,7 +11,7 @@ from xml.parsers import expat
 from tankcal.fieldbooks.book import FieldBook, KnownPoint, number_of, refuse_number
 from tankcal.messages import message
 
-DEEPEST, LONGEST = 30, 20_000  # elements in one another, characters of one value
+DEEPEST, LONGEST = 30, 20_000  # nested elements; characters of one value
 READ = ("", "DirectReading", "AngleOnly", "AnglesOnly", "DistanceOnly", "Direct")
 MEANS = ("MeanTurnedAngle", "MeanAngle", "MTA")
 QUIET = ("UnitsRecord", "BackBearingRecord", "JobPropertiesRecord", "CorrectionsRecord",
@@ -46,7 +46,7 @@ def read(data, file, log, encoding=None):
         log.problem(file, text, error.lineno)
     except _Refused:
         return book
-    except (ValueError, LookupError):  # an encoding that it declares, and that nobody knows
+    except (ValueError, LookupError):  # an unknown declared encoding
         text = message("xml_encoding", "unknown XML encoding; expected UTF-8")
         log.problem(file, text, 1)
     taker.tell_strays()

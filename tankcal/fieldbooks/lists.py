@@ -17,8 +17,8 @@ from tankcal.messages import message
 from tankcal.text.naming import MAX_NAME
 from tankcal.text.numerals import NUMBER
 
-MEMORY_FILE = "headings.toml"  # in the job folder: what the headings of earlier lists meant
-MOST_DECIMALS = 9  # of a converted length, in the unit of the column
+MEMORY_FILE = "headings.toml"  # in the job folder: meanings of headings of earlier lists
+MOST_DECIMALS = 9  # decimals of a converted length in the unit of the column
 MAX_BYTES = 50_000_000
 
 
@@ -160,46 +160,46 @@ def _read_memory(folder, name, log):
     return {heading: column for heading, column in section.items() if column in columns}
 
 
-def refuse_missing(found):
+def refuse_missing(foreign_list):
     """Raise InputError with one problem for each required column without a heading."""
     log = Log()
-    for field in found.missing:
+    for field in foreign_list.missing:
         text = message(
             "list_lacks_column",
             "no heading for {column} ({note}); expected --column 'HEADING={column}', where "
             "HEADING is one of {headings}",
             column=field.name,
             note=field.expectation(),
-            headings=found.unused or [*found.table.headings],
+            headings=foreign_list.unused or [*foreign_list.table.headings],
         )
-        log.problem(found.table.file, text, found.table.heading_row)
+        log.problem(foreign_list.table.file, text, foreign_list.table.heading_row)
     log.stop_if_problems()
 
 
-def write_list(found, folder, *, replace=False):
+def write_list(foreign_list, folder, *, replace=False):
     """Write a ForeignList as a table of the job, save its headings, and return the paths.
 
     Raises InputError with all problems of its values; no file is written then.
     """
     folder, log = Path(folder), Log()
-    refuse_missing(found)
-    standing = [] if replace else tables_with_rows(folder, [found.name])
+    refuse_missing(foreign_list)
+    standing = [] if replace else tables_with_rows(folder, [foreign_list.name])
     refuse_standing(folder, standing)
-    table = _convert_table(found, log)
+    table = _convert_table(foreign_list, log)
     log.stop_if_problems()
-    read_columns(found.name, table, log)
+    read_columns(foreign_list.name, table, log)
     log.stop_if_problems()
     rows = [["" if cell is None else cell for cell in row] for row in table.rows]
-    memory = {MEMORY_FILE: _memory_text(found, folder)}
-    return write_grids(folder, {found.name: [table.headings, *rows]}, memory)
+    memory = {MEMORY_FILE: _memory_text(foreign_list, folder)}
+    return write_grids(folder, {foreign_list.name: [table.headings, *rows]}, memory)
 
 
-def _convert_table(found, log):
+def _convert_table(foreign_list, log):
     """Return the Table with the columns of the job, decimal points, and lengths in their units."""
-    table = found.table
-    fields = {field.name: field for field in COLUMNS[found.name]}
-    used = [(place, found.meanings[heading]) for place, heading in enumerate(table.headings)
-            if heading in found.meanings]  # fmt: skip
+    table = foreign_list.table
+    fields = {field.name: field for field in COLUMNS[foreign_list.name]}
+    used = [(place, foreign_list.meanings[heading]) for place, heading in enumerate(table.headings)
+            if heading in foreign_list.meanings]  # fmt: skip
     headings = tuple(meaning.column for _, meaning in used)
     rows = [tuple(row[place] for place, _ in used) for row in table.rows]
     plain = Table(table.file, headings, table.heading_row, tuple(rows), table.row_numbers,
@@ -233,15 +233,15 @@ def _convert_cell(cell, factor, decimal):
     return value.rstrip("0").rstrip(".")
 
 
-def _memory_text(found, folder):
+def _memory_text(foreign_list, folder):
     """Return headings.toml with the meanings of the headings of this and earlier lists."""
     path = folder / MEMORY_FILE
     kept = {}
     if path.is_file():
         parsed = parsed_toml(MEMORY_FILE, path.read_bytes(), Log())
         kept = {name: columns for name, columns in (parsed or ({},))[0].items() if is_table(name)}
-    now = {heading: meaning.column for heading, meaning in found.meanings.items()}
-    kept[found.name] = kept.get(found.name, {}) | now
+    now = {heading: meaning.column for heading, meaning in foreign_list.meanings.items()}
+    kept[foreign_list.name] = kept.get(foreign_list.name, {}) | now
     lines = []
     for name, headings in kept.items():
         lines += [f"[{name}]", *(f"{json.dumps(head, ensure_ascii=False)} = {json.dumps(column)}"

@@ -215,7 +215,7 @@ def _number(book, log, row, text, values):
     if not text:
         return None
     mark = values["decimal"]
-    is_other = mark == "," and "." in text  # 1.234 is a thousand there
+    is_other = mark == "," and "." in text  # 1.234 may mean one thousand
     value = None if is_other else number_of(text.replace(mark, "."))
     if value is None:
         refuse_number(log, book.file, row, text)

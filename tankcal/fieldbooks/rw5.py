@@ -28,7 +28,7 @@ UNITS = {0: "ft", 1: "m", 2: "usft"}
 _CODES = ("OP", "FP", "BP", "PN", "BS", "BC", "HI", "HR", "AR", "AL", "AZ", "DR", "DL", "BR", "ZE",
           "VA", "CE", "SD", "HD", "EL", "NM", "DT", "TM", "UN", "AU", "AD", "SF", "EC", "EO", "FE",
           "TS", "FC", "N", "E")  # fmt: skip
-# Two fields with their codes, because a raw file of Nikon has records SS without codes.
+# Two fields with codes, because Nikon raw files have records SS without codes.
 _FIELD = rf"\s*(?:{'|'.join(_CODES)})"
 LINE = re.compile(
     rf"\s*(--|(JB|MO|OC|BK|LS|SS|TR|BD|FD|BR|FR|SP)\s*,{_FIELD}[^,]*(,(--|{_FIELD})|$))"
@@ -43,14 +43,14 @@ class _State:
     """Values that apply from one line to the next."""
 
     length = angle = None  # of MO
-    units_told = False  # that they are not known
+    units_told = False  # whether unknown units were reported
     station = back = height = rod = None
     azimuth = circle = None  # of the backsight
     key = None  # of the set-up
-    is_told = False  # has there been a record OC?
-    date = None  # of the last note that has one
-    follows_shot = False  # is a time that stands here that of the last reading?
-    kind = None  # of horizontal angle in this set-up: "turned" or "azimuth"
+    is_told = False  # whether there was a record OC
+    date = None  # date of the last note with a date
+    follows_shot = False  # whether a time in this line belongs to the last reading
+    kind = None  # kind of horizontal angle in this set-up: "turned" or "azimuth"
 
 
 def read(text, file, log):
@@ -194,7 +194,7 @@ def _take_shot(book, log, row, kind, fields, code, state):
             )
             log.problem(book.file, text, row)
         return
-    if state.station is None:  # no record OC: the reading itself names its station
+    if state.station is None:  # without record OC the reading names its station
         state.station = fields.get("OP")
     if "OP" in fields and fields["OP"] != state.station:
         text = message(

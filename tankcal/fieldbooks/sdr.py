@@ -24,10 +24,10 @@ ANGLES, LENGTHS = {"1": "deg", "2": "gon", "4": "mil"}, {"1": "m", "2": "ft"}
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _STAMP = re.compile(r"(\d\d?)-([A-Za-z]{3})-(\d\d(?:\d\d)?)\s+(\d\d?):(\d\d)(?::(\d\d))?")
 _CONSTANT = re.compile(r"(?:P\.?C\.?\s*mm[^:]*|\bPrism):\s*([+-]?[0-9.]+)", re.IGNORECASE)
-# What the mount and the vertical circle are, before the three constants at the end of record 01.
-# Not by its column: names of 17 characters are written where 16 have room.
+# Mounting and vertical circle, before the three constants at the end of record 01. The column is
+# not fixed, because some programs write names of 17 characters.
 _FLAGS = re.compile(r"\d([12])(?:\s+[+-]?\d*\.\d*)*\s*$")
-OTHERS = ("04", "05", "10", "12")  # collimation, atmosphere, job: said by other records
+OTHERS = ("04", "05", "10", "12")  # collimation, atmosphere, job: not needed
 
 
 class _State:
@@ -49,7 +49,7 @@ def read(text, file, log):
         if not line.strip():
             continue
         kind, way = line[:2], line[2:4]
-        if line.strip() == "0000":  # ends a file
+        if line.strip() == "0000":  # end of a file
             continue
         if kind == "00":
             _take_header(book, log, row, line, state)
@@ -202,7 +202,7 @@ def _take_shot(book, log, row, line, state):
         book.leave_out(message("sdr_observations", "observations {kind}", kind=line[:4]), row)
         return
     station, point, distance, vertical, direction, code = _fields(line, state, 2, 3)
-    if not book.setups:  # no record 02: the reading itself names its station
+    if not book.setups:  # without record 02 the reading names its station
         book.stand(plain_name(station), None, None, row, is_told=False)
     if plain_name(station) != book.setups[-1].station:
         text = message(

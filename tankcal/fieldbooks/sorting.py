@@ -7,7 +7,7 @@ from fnmatch import fnmatchcase
 
 from tankcal.messages import message
 
-SAID = ("WALL", "HIT", "PAREDE", "PARED")  # a code or name that begins so is a bare hit
+SAID = ("WALL", "HIT", "PAREDE", "PARED")  # initial letters of codes and names of hits
 SHOWN = 8
 _RANGE = re.compile(r"(\d{1,9})-(\d{1,9})")
 

@@ -8,7 +8,7 @@ from tankcal.messages import list_some, message
 
 SHOWN = 8
 ARCSEC = 3600.0
-APPLIED_BY_INSTRUMENT = ("gsi", "sdr")  # formats whose distances have the prism constant in them
+APPLIED_BY_INSTRUMENT = ("gsi", "sdr")  # formats with distances that include the prism constant
 
 
 def summarise(books, chosen, unused, names, stands, reports, coordinates, standing):

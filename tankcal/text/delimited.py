@@ -34,7 +34,7 @@ def separator_of_table(lines, usual):
     usual : str
         Separator returned for a table with one column.
     """
-    heading = "".join(lines[0].split('"')[::2]) if lines else ""  # what is outside the quotes
+    heading = "".join(lines[0].split('"')[::2]) if lines else ""  # text outside quotation marks
     marks = [mark for mark in BY_CERTAINTY if mark in heading]
     if len(marks) == 1:
         return marks[0]
@@ -60,12 +60,12 @@ def split_cells(line, separator):
         return [cell.strip() for cell in line.split(separator)]
     try:
         cells = _read_cells(line, separator)
-    except csv.Error:  # `csv` takes blanks before a quotation mark, but none behind it
+    except csv.Error:  # `csv` accepts blanks before a quotation mark, not after it
         cells = _read_cells(_BLANKS_BEHIND[separator].sub('"', line), separator)
     return [cell.strip() for cell in cells]
 
 
-_BLANKS_BEHIND = {  # a quotation mark: blanks that end its cell
+_BLANKS_BEHIND = {  # pattern of blanks between a quotation mark and the end of its cell
     mark: re.compile(rf'"[^\S{mark}]+(?={mark}|$)') for mark in BY_CERTAINTY
 }
 

@@ -12,10 +12,14 @@ from decimal import ROUND_HALF_UP, ROUND_UP, Context, Decimal
 from math import inf, isfinite
 
 NOTHING = "–"
-LITRE_DECIMALS = 3  # rows of a table in m3 keep their litres: deliveries are far better known
-UNKNOWN_DECIMALS = 6  # of a value without an uncertainty: it is not rounded to one
-WITH_U = range(-12, 15)  # powers of ten of a first digit that are written out beside an uncertainty
-WITHOUT_U = range(-4, 6)  # and in a number that has none
+LITRE_DECIMALS = (
+    3  # rows of a table in m3 show litres, because deliveries have a smaller uncertainty
+)
+UNKNOWN_DECIMALS = 6  # decimals of a value without uncertainty
+WITH_U = range(
+    -12, 15
+)  # powers of ten of the first digit without separate power, for values with uncertainty
+WITHOUT_U = range(-4, 6)  # the same for values without uncertainty
 _LARGEST_LOSS = Decimal("0.05")
 SIGNIFICANT = 2  # digits of u (JCGM 100:2008 7.2.6)
 _WIDE = Context(prec=400)
@@ -51,7 +55,7 @@ ENGLISH = Marks()
 ENGLISH_SI = Marks(group="\N{NARROW NO-BREAK SPACE}", of_decimals=True)
 PORTUGUESE = Marks(decimal=",", group=".", least=4)
 COMMA_SI = Marks(decimal=",", group="\N{NARROW NO-BREAK SPACE}", of_decimals=True)
-PROGRAM = Marks(minus="-")  # CSV, and whatever a program reads again
+PROGRAM = Marks(minus="-")  # CSV and other machine-readable output
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-LETTER, LINE = 0.56, 1.15  # of the size of the type: mean width of a letter, height of a line
-MARK = 2.5  # points about a mark that no name covers
+LETTER, LINE = 0.56, 1.15  # mean letter width and line height, relative to the type size
+MARK = 2.5  # free radius around a mark, points
 AROUND = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
-FARTHER = (1.0, 2.2)  # times the least distance from the mark
+FARTHER = (1.0, 2.2)  # multiples of the smallest distance from the mark
 _SIDES = {-1: "right", 0: "center", 1: "left"}
 _ENDS = {-1: "top", 0: "center", 1: "bottom"}
 

@@ -2,7 +2,10 @@
 
 from tankcal.messages import message
 
-JUDGED_S, MILLION = 2.0, 1_000_000  # of a step, before the time left is told
+JUDGED_S, MILLION = (
+    2.0,
+    1_000_000,
+)  # seconds before the remaining time is estimated; limit for counts in millions
 
 
 def how_far(done, total, fresh, seconds):

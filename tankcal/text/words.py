@@ -7,12 +7,12 @@ from tankcal.messages import as_plain, fill_template
 from tankcal.text.digits import NOTHING, Marks, fixed, shortest
 from tankcal.text.form_words import NOTES, word_of
 from tankcal.text.languages import DEFAULT
-from tankcal.text.word_files import load_words as load_words  # the door to words of every kind
+from tankcal.text.word_files import load_words as load_words  # re-exported
 
 
 def language_of(record):
     """Return the language of the job of a record."""
-    table = record["job"]["table"] or {}  # a survey alone has none
+    table = record["job"]["table"] or {}  # None for a survey without tank
     return table.get("language") or DEFAULT
 
 
@@ -54,9 +54,9 @@ def choice_sentence(words, choice):
     return sentence(words, "choices", code, value)
 
 
-# ---- texts that the record has in English, with a code and the values in them
+# ---- English texts of the record, with a code and values
 
-MESSAGES = ("warnings", "formulas", "datum", "problems")  # groups of their templates
+MESSAGES = ("warnings", "formulas", "datum", "problems")  # groups of templates
 
 
 def message_sentence(words, text, code, values):
@@ -155,13 +155,13 @@ def _number(value, form, marks):
 def _name_value(words, key, value):
     """Replace codes among the values of a message by names."""
     if key == "row" or key.endswith("_row"):
-        return str(value)  # no count
+        return str(value)  # a row number has no group marks
     if key == "note":
         return _notes(words).get(value, value) if isinstance(value, str) else value
     if key == "choice":
         return word_of(words["language"].get("code"), value)
     if key == "kind":
-        known = words["observations"]  # some by the table that they stand in
+        known = words["observations"]  # some kinds are named after their table
         return known.get(value, known.get(f"{value.replace(' ', '_')}s", value))
     if key in ("group", "of_group"):
         name = words["observed"].get(value, value)
@@ -184,7 +184,7 @@ def _notes(words):
     }
 
 
-_DECLARED = ("head",)  # choices whose number the job gave: it is not rounded
+_DECLARED = ("head",)  # choices with a number of the job, which is not rounded
 
 
 NAMED_INPUTS = (
@@ -212,9 +212,9 @@ def name_of_input(words, code):
     return " & ".join(words["inputs"].get(part, part) for part in code.split(" & "))
 
 
-# ---- what the record says of an adjustment: the same sentences on paper and in the workbook
+# ---- sentences about an adjustment, for reports and workbook
 
-MOST_NAMES = 12  # that a sentence lists
+MOST_NAMES = 12  # largest number of names in a sentence
 
 
 def group_name(words, group):
