@@ -1,12 +1,12 @@
 """Exports of a table to gauging and inventory systems.
 
-profiles      what a file for a system is like (TOML), the shipped ones
+profiles      description of a file for a system (TOML), and the shipped profiles
 marks         rows as whole numbers of last digits, each rounded once
-chords, breakpoints, splines   the rows that a polyline, or a spline, of few points keeps
-choosing      rows of a record by a profile, and why it cannot take them
-writing       the text, and the same text read back by the linter
-facts         provenance, and what the report says
-shell_movement   HyTD of a gauge that hangs on the shell
+chords, breakpoints, splines   rows selected for a polyline or a spline of few points
+choosing      rows of a record for a profile, or the reasons why the profile does not fit
+writing       the text, and the text read back by the linter
+facts         provenance, and content of the report
+shell_movement   HyTD of a gauge supported by the shell
 exporting     from a record to the file
 """
 

@@ -1,14 +1,14 @@
-"""The rows of a table that a polyline of few points keeps: the least largest error of K points.
+"""Breakpoints of a table for a polyline of few points: minimise the largest error of K points.
 
 Let E(i, j) be the largest distance of the chord from row i to row j from the rows between. The best
-K points make
+K points minimise D_K at the last row:
 
     D_k(j) = min over i < j of max(D_k-1(i), E(i, j))
 
-least at the last row. It is found turned round: for an error eps the fewest chords to each row are
-counted (`tankcal.exports.chords`), from both ends, and eps is halved between what K points reach
-and what they do not. The greedy way, the longest chord each time, is where it begins: no row counts
-any more that is on no way of K points within the greedy error.
+The inverse problem is solved: for an error eps, the fewest chords to each row are counted
+(`tankcal.exports.chords`) from both ends. eps is bisected between an error that K points reach and
+one that they do not. The start value is the greedy solution, the longest chord each time. Rows that
+no solution of K points within the greedy error uses are excluded.
 """
 
 import sys
@@ -19,26 +19,26 @@ import numpy as np
 from tankcal.exports import chords
 from tankcal.solver.compiled import available, compile_functions
 
-_CLOSE = 1e-9  # of an error: nearer to the optimum nobody sees
-_FIRST_STEP = 0.01  # below the greedy error
-_PLAIN = 3_000_000  # steps of a walk: fewer are done before a compiler is loaded
+_CLOSE = 1e-9  # relative tolerance of the minimum error
+_FIRST_STEP = 0.01  # first reduction relative to the greedy error
+_PLAIN = 3_000_000  # loop steps; fewer take less time than loading a compiler
 _MOST_TURNS = 200
 
 
 @dataclass(frozen=True)
 class Breakpoints:
-    """Rows that a polyline runs through.
+    """Rows that are the points of a polyline.
 
     Attributes
     ----------
     rows : (points,) ndarray of int
-        Ascending; the first and the last row of the table are among them.
+        Ascending, including the first and the last row of the table.
     error : float
         Largest distance of the polyline from the table at any height, in the unit of volumes.
     at : float
-        The height where it is.
+        Height of the largest distance.
     greedy : float
-        What the longest chords each time would reach with as many points; nan: not asked for.
+        Error of the greedy solution with the same number of points; nan if not computed.
     """
 
     rows: np.ndarray
@@ -49,10 +49,18 @@ class Breakpoints:
 
 @dataclass(frozen=True)
 class Written:
-    """A table and its rows as they are written.
+    """A table, and its rows as written.
 
-    height, volume  (rows,) of the table, ascending       at, written  (rows,) rounded, with offsets
-    last, is_open   as `chords` takes them                loops        compiled or plain
+    Attributes
+    ----------
+    height, volume : ndarray, shape (rows,)
+        The table, ascending.
+    at, written : ndarray, shape (rows,)
+        Rounded heights and volumes, with offsets.
+    last, is_open : ndarray, shape (rows,)
+        As in `chords`.
+    loops : module
+        Compiled or plain loops.
     """
 
     height: np.ndarray
@@ -69,41 +77,41 @@ class Written:
 
     @property
     def own_error(self):
-        """(rows,) distance of each written row from the table."""
+        """Distance of each written row from the table, shape (rows,)."""
         return np.abs(self.written - np.interp(self.at, self.height, self.volume))
 
     def fewest_chords(self, is_open, eps, most):
-        """(fewest chords to each row, the row before it) of chords within eps."""
+        """Fewest chords within eps to each row, and the row before it."""
         count = len(self.height)
         fewest, before = np.full(count, chords.NEVER), np.full(count, -1)
         if self.loops is chords:
             fewest, before = fewest.tolist(), before.tolist()
-        given = self._for_loops(*self.lines, self.last, is_open)
-        self.loops.fewest_chords(*given, eps, most, fewest, before)
+        arrays = self._for_loops(*self.lines, self.last, is_open)
+        self.loops.fewest_chords(*arrays, eps, most, fewest, before)
         return np.asarray(fewest), np.asarray(before)
 
     def longest_chords(self, is_open, eps):
-        """Rows of the way that takes the longest chord within eps each time; empty: none."""
+        """Rows of the path of longest chords within eps; empty if there is none."""
         rows = np.zeros(len(self.height), dtype=int)
-        given = self._for_loops(*self.lines, self.last, is_open)
-        return rows[: self.loops.longest_chords(*given, eps, rows)]
+        arrays = self._for_loops(*self.lines, self.last, is_open)
+        return rows[: self.loops.longest_chords(*arrays, eps, rows)]
 
     def error_of(self, rows):
-        """What the loops judge: errors of chords at rows between, and of the rows themselves."""
+        """Largest error of chords at rows between, and of the rows themselves."""
         between = self.loops.largest_error(*self._for_loops(*self.lines, rows))
         return max(float(between), float(self.own_error[rows].max()))
 
     def _for_loops(self, *arrays):
-        """Arrays for compiled loops, lists for plain ones, which take numbers out faster."""
-        return [one.tolist() for one in arrays] if self.loops is chords else arrays
+        """Arrays for compiled loops, lists for plain loops, which access lists faster."""
+        return [array.tolist() for array in arrays] if self.loops is chords else arrays
 
     def reversed(self):
-        """The same table from its top down."""
+        """Return the table from its top down."""
         count = len(self.height)
         must = np.zeros(count, dtype=bool)
         must[self.last] = must[0] = True
         return Written(
-            *(np.ascontiguousarray(-one[::-1]) for one in self.lines),
+            *(np.ascontiguousarray(-line[::-1]) for line in self.lines),
             _next_fixed(must[::-1]),
             np.ascontiguousarray(self.is_open[::-1]),
             self.loops,
@@ -111,35 +119,35 @@ class Written:
 
 
 def best_breakpoints(height, volume, points, *, fixed=(), at=None, written=None, candidates=None):
-    """The `Breakpoints` of at most so many points with the least largest error.
+    """Return the `Breakpoints` of at most `points` points with the smallest largest error.
 
     Parameters
     ----------
     height, volume : array_like, shape (rows,)
         The table, heights strictly ascending.
     points : int
-        Two or more, and at least as many as there are fixed rows.
+        At least two, and at least the number of fixed rows.
     fixed : sequence of int, optional
-        Rows that have to stand, beside the first and the last.
+        Required rows, besides the first and the last.
     at, written : array_like, optional
-        Heights and volumes as they will be written; None: as they are.
+        Heights and volumes as written; None: those of the table.
     candidates : array_like of bool, optional
-        Rows that may stand; None: all.
+        Permitted rows; None: all.
 
     Returns
     -------
     Breakpoints
-        The error is that of the polyline through what is written, everywhere.
+        The error is that of the polyline through the written points, at any height.
 
     Raises
     ------
     ValueError
-        For fewer points than rows that have to stand.
+        For fewer points than required rows.
 
     Examples
     --------
-    >>> found = best_breakpoints([0, 1, 2, 3, 4], [0, 1, 4, 9, 16], 3)
-    >>> found.rows.tolist(), found.error
+    >>> best = best_breakpoints([0, 1, 2, 3, 4], [0, 1, 4, 9, 16], 3)
+    >>> best.rows.tolist(), best.error
     ([0, 2, 4], 1.0)
     """
     table = _table(height, volume, fixed, at, written, candidates)
@@ -152,14 +160,14 @@ def best_breakpoints(height, volume, points, *, fixed=(), at=None, written=None,
 
 
 def fewest_breakpoints(height, volume, error, *, fixed=(), at=None, written=None, candidates=None):
-    """The `Breakpoints` of the fewest points that keep an error, or None where no points do.
+    """Return the `Breakpoints` with the fewest points within an error, or None if impossible.
 
     Parameters
     ----------
     height, volume, fixed, at, written, candidates
-        As of `best_breakpoints`.
+        As in `best_breakpoints`.
     error : float
-        That is not to be exceeded, in the unit of volumes.
+        Largest permitted error, in the unit of volumes.
 
     Examples
     --------
@@ -168,26 +176,35 @@ def fewest_breakpoints(height, volume, error, *, fixed=(), at=None, written=None
     """
     table = _table(height, volume, fixed, at, written, candidates)
     eps = error
-    for _ in range(_MOST_TURNS):  # more than once only where heights are rounded
+    for _ in range(_MOST_TURNS):  # repeated only if heights are rounded
         if eps <= 0 and error > 0:
             return None
         rows = _way(table, eps, chords.NEVER)
         if rows is None:
             return None
-        found = best_breakpoints(
+        best = best_breakpoints(
             height, volume, len(rows), fixed=fixed, at=at, written=written, candidates=candidates
         )
-        if found.error <= error * (1 + _CLOSE):
-            return found
-        eps -= max(found.error - error, 0.01 * error)
+        if best.error <= error * (1 + _CLOSE):
+            return best
+        eps -= max(best.error - error, 0.01 * error)
     return None
 
 
 def polyline_error(height, volume, at, written, rows):
-    """(largest error of the polyline through the written rows at any height, that height).
+    """Return the largest error of the polyline through the written rows, and its height.
 
-    Table and polyline are straight between all their heights, so no error is larger than at these.
-    A height beyond the ends is judged as if the polyline went on level.
+    Table and polyline are linear between all their heights, so the largest error is at one of
+    these. The polyline is constant beyond its ends.
+
+    Parameters
+    ----------
+    height, volume : ndarray, shape (rows,)
+        The table.
+    at, written : ndarray, shape (rows,)
+        Heights and volumes as written.
+    rows : ndarray of int
+        Rows of the polyline.
     """
     heights = np.union1d(height, at[rows])
     exact = np.interp(heights, height, volume)
@@ -197,7 +214,7 @@ def polyline_error(height, volume, at, written, rows):
 
 
 def _table(height, volume, fixed, at, written, candidates):
-    height, volume = (np.ascontiguousarray(one, dtype=float) for one in (height, volume))
+    height, volume = (np.ascontiguousarray(values, dtype=float) for values in (height, volume))
     at = height if at is None else np.ascontiguousarray(at, dtype=float)
     written = volume if written is None else np.ascontiguousarray(written, dtype=float)
     must = np.zeros(len(height), dtype=bool)
@@ -207,7 +224,7 @@ def _table(height, volume, fixed, at, written, candidates):
 
 
 def _next_fixed(must):
-    """(rows,) the next row that has to stand after each; of the last row itself."""
+    """Next required row after each row, shape (rows,); the last row for itself."""
     fixed = np.flatnonzero(must)
     place = np.searchsorted(fixed, np.arange(len(must)), side="right")
     return fixed[np.minimum(place, len(fixed) - 1)]
@@ -220,19 +237,22 @@ def _is_fixed(table):
 
 
 def _loops(rows):
-    """The loops, compiled where a walk over every chord would be long."""
+    """Return the loops, compiled if the number of steps is large."""
     if rows * rows < _PLAIN or not available():
         return chords
     return compile_functions(sys.modules[chords.__name__], chords.COMPILED)
 
 
 def _within(table, eps):
-    """(rows,) whether each row may stand: it is open, and itself no more than eps off."""
+    """Mask (rows,): permitted rows with an own error of at most eps."""
     return table.is_open & (table.own_error <= eps * (1 + _CLOSE))
 
 
 def _way(table, eps, most):
-    """Rows of a way of the fewest chords within eps, at most so many; None: there is none."""
+    """Rows of a path of the fewest chords within eps, at most `most` chords.
+
+    None if there is none.
+    """
     is_open = _within(table, eps)
     if not np.all(is_open[_is_fixed(table)]):
         return None
@@ -248,15 +268,17 @@ def _traced(before):
 
 
 def _greedy(table, points):
-    """(rows, error) of the better of the two greedy ways, from the bottom and from the top."""
+    """(rows, error) of the better of the two greedy solutions, from the bottom and from the top."""
     up = _greedy_way(table, points)
     down = len(table.height) - 1 - _greedy_way(table.reversed(), points)[::-1]
-    error, rows = min(((table.error_of(rows), rows) for rows in (up, down)), key=lambda one: one[0])
+    error, rows = min(
+        ((table.error_of(rows), rows) for rows in (up, down)), key=lambda solution: solution[0]
+    )
     return rows, error
 
 
 def _greedy_way(table, points):
-    """Rows of the longest chords, at most so many, with the least error."""
+    """Rows of the longest chords, at most `points` points, with the smallest error."""
     low, high, best = 0.0, 2 * float(np.ptp(table.volume)) + float(table.own_error.max()), None
     for _ in range(_MOST_TURNS):
         eps = high if best is None else 0.5 * (low + high)
@@ -271,13 +293,13 @@ def _greedy_way(table, points):
 
 
 def _longest(table, eps):
-    """Rows of the longest chords within eps; empty where a row that has to stand is further off."""
+    """Rows of the longest chords within eps; empty if a required row has a larger error."""
     is_open = _within(table, eps)
     return table.longest_chords(is_open, eps) if np.all(is_open[_is_fixed(table)]) else ()
 
 
 def _optimum(table, points, rows):
-    """Rows of the least error; `rows` are those of the greedy way."""
+    """Rows with the smallest error; `rows` are those of the greedy solution."""
     high, low, step = table.error_of(rows), 0.0, _FIRST_STEP
     table = _kept(table, high, points)
     for _ in range(_MOST_TURNS):
@@ -289,14 +311,14 @@ def _optimum(table, points, rows):
             low = eps
             continue
         step *= 2
-        rows, found = better, table.error_of(better)
-        high = max(min(found, eps), low)
+        rows, best = better, table.error_of(better)
+        high = max(min(best, eps), low)
         table = _kept(table, high, points)
     return rows
 
 
 def _kept(table, eps, points):
-    """The table with those rows open that are on a way of so many points within eps."""
+    """Return the table restricted to rows on a path of at most `points` points within eps."""
     if np.count_nonzero(table.is_open) <= points:
         return table
     is_open = _within(table, eps)

@@ -1,4 +1,4 @@
-"""Which rows of a record's table go into an export, and why a profile cannot take them."""
+"""Select the rows of a record's table for an export, or report why a profile does not fit."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from tankcal.exports.profiles import MOST_POINTS
 from tankcal.exports.splines import fewest_spline_breakpoints, spline_breakpoints, spline_error
 from tankcal.messages import message
 
-_ON_STEP = 1e-6  # of a step
+_ON_STEP = 1e-6  # tolerance relative to a step
 ZERO_M = 1e-9
-_MOST_OF_SPLINE = 200  # points that are tried for an error
+_MOST_OF_SPLINE = 200  # largest number of points tried for an error
 
 
 class Asked:
-    """What is asked of a record: rows by a profile, so many, or within an error."""
+    """A request for rows of a record: by a profile, by a number of points, or within an error."""
 
     def __init__(self, file, record, profile, points, max_error_m3, log):
         self.file, self.record, self.profile, self.log = file, record, profile, log
@@ -29,7 +29,7 @@ class Asked:
         self.log.problem(f"{self.profile.code}.toml", text, None, key)
 
     def marks(self):
-        """(`Marks`, fixed rows); what does not fit is told."""
+        """Return (`Marks`, required rows); report values that do not fit."""
         profile, reference = self.profile, self.record.job.datum.reference_height_m
         if "ullage" in profile.columns and reference is None:
             text = message("export_no_reference", "the record has no reference height; expected "
@@ -49,11 +49,11 @@ class Asked:
                                                             missing])  # fmt: skip
             self.tell(text, "levels.decimals")
         if self.is_zero_left_out:
-            marks.at_m[0], marks.written_m3[0] = 0.0, 0.0  # what such a system begins with
+            marks.at_m[0], marks.written_m3[0] = 0.0, 0.0  # required first row of such a system
         return marks, fixed
 
     def _fixed(self):
-        """Rows that have to stand: the ends, and those about the critical zone of a roof."""
+        """Required rows: the ends, and rows about the critical zone of a roof."""
         fixed = {0, len(self.height) - 1}
         for_use = np.array(self.record.capacity.for_use, dtype=bool)
         if len(for_use) == len(self.height):
@@ -62,7 +62,10 @@ class Asked:
         return sorted(fixed)
 
     def chosen(self, marks, fixed):
-        """(rows, bound of the error without own_m3, dip of it); what cannot be kept is told."""
+        """Return (rows, bound of the error without own_m3, its dip).
+
+        Report an impossible request.
+        """
         grid = self.profile.grid
         if self.points is None and self.max_error_m3 is None and grid != "breakpoints":
             rows = np.flatnonzero(marks.stands) if grid == "every row" else self._steps(marks)
@@ -70,15 +73,19 @@ class Asked:
             if grid == "every row":
                 rows = _less_shifted_top(marks, rows, self.height)
             read = slice(int(rows[-1]) + 1) if grid == "every row" else slice(None)
-            given = (self.height[read], self.volume[read], marks.at_m, marks.written_m3, rows)
-            return (rows, *judge(*given)) if len(rows) > 1 else (rows, 0.0, 0.0)
+            table = (self.height[read], self.volume[read], marks.at_m, marks.written_m3, rows)
+            return (rows, *judge(*table)) if len(rows) > 1 else (rows, 0.0, 0.0)
         if "volume" not in self.profile.columns:
             text = message("export_increments_only", "has volumes of increments only; expected "
                            "every row there: leave out --points and --max-error-l")  # fmt: skip
             self.tell(text, "table.columns")
             return np.array(fixed), 0.0, 0.0
-        found = self._breakpoints(marks, fixed)
-        return (np.array(fixed), 0.0, 0.0) if found is None else (found.rows, found.error, found.at)
+        solution = self._breakpoints(marks, fixed)
+        return (
+            (np.array(fixed), 0.0, 0.0)
+            if solution is None
+            else (solution.rows, solution.error, solution.at)
+        )
 
     def _breakpoints(self, marks, fixed):
         more = int(self.is_zero_left_out)
@@ -88,44 +95,48 @@ class Asked:
             text = message("export_how_many", "no limit of points is known; expected --points or "
                            "--max-error-l")  # fmt: skip
             return self.tell(text, "table.max_points")
-        given = dict(fixed=fixed, at=marks.at_m, written=marks.written_m3, candidates=marks.stands)
+        options = dict(
+            fixed=fixed, at=marks.at_m, written=marks.written_m3, candidates=marks.stands
+        )
         table, is_spline = (self.height, self.volume), self.profile.interpolation == "spline"
         if self.max_error_m3 is not None:
-            return self._within(table, given, is_spline, most)
+            return self._within(table, options, is_spline, most)
         points = min(points + more, len(self.height))
         if points < len(fixed):
             text = message("export_few_points", "{points} points; expected {least} or more: the "
                            "ends and the critical zone have to stand", points=points - more,
                            least=len(fixed) - more)  # fmt: skip
             return self.tell(text, "table.max_points")
-        found = (spline_breakpoints if is_spline else best_breakpoints)(*table, points, **given)
-        return found if found is not None else self._tell_no_spline()
+        solution = (spline_breakpoints if is_spline else best_breakpoints)(
+            *table, points, **options
+        )
+        return solution if solution is not None else self._tell_no_spline()
 
-    def _within(self, table, given, is_spline, most):
-        """The fewest rows within the error that was asked for, the table's own taken off."""
+    def _within(self, table, options, is_spline, most):
+        """Fewest rows within the requested error, reduced by the error of the table itself."""
         error = self.max_error_m3 - self.own_m3
         if is_spline:
             most = min(most or _MOST_OF_SPLINE, len(self.height))
-            found = fewest_spline_breakpoints(*table, error, most=most, **given)
+            solution = fewest_spline_breakpoints(*table, error, most=most, **options)
         else:
-            found = fewest_breakpoints(*table, error, **given) if error > 0 else None
-        if found is None:
-            rows = np.flatnonzero(given["candidates"])
-            least = polyline_error(*table, given["at"], given["written"], rows)[0] + self.own_m3
+            solution = fewest_breakpoints(*table, error, **options) if error > 0 else None
+        if solution is None:
+            rows = np.flatnonzero(options["candidates"])
+            least = polyline_error(*table, options["at"], options["written"], rows)[0] + self.own_m3
             text = message(
                 "export_not_within", "no rows keep {asked:.4g} L: all of them, rounded as the "
                 "profile writes them, err by {least:.4g} L", asked=1000 * self.max_error_m3,
                 least=1000 * least,
             )  # fmt: skip
             self.tell(text, "--max-error-l")
-        return found
+        return solution
 
     def _tell_no_spline(self):
         self.tell(message("export_no_spline", "no spline of so many points rises everywhere; "
                           "expected more points"), "table.interpolation")  # fmt: skip
 
     def _steps(self, marks):
-        """Rows at every step, and the highest."""
+        """Rows at every step, and the highest row."""
         step, height = self.profile.step_m, self.height
         if (height[-1] - height[0]) / step > MOST_POINTS:
             text = message("export_many_steps", "a step of {step:.6g} m; expected a larger one",
@@ -145,7 +156,7 @@ class Asked:
         return np.flatnonzero(is_on & marks.stands)
 
     def refuse_limits(self, marks, rows):
-        """Tell what the profile's system does not take: so many rows, digits, so large a volume."""
+        """Report rows, digits or volumes beyond the limits of the profile's system."""
         profile, count = self.profile, len(rows)
         fewest, most = profile.min_points or 1, profile.max_points or MOST_POINTS
         if not fewest <= count <= most:
@@ -167,8 +178,9 @@ class Asked:
 
 
 def _less_shifted_top(marks, rows, height):
-    """The rows without the highest one, where it alone is on no mark: at the next mark its volume
-    would stand for another dip.
+    """Return the rows without the highest one if only this row is off the marks.
+
+    At the next mark, its volume would belong to another dip.
     """
     is_off = np.abs(marks.at_m[rows] - height[rows]) > ON_THE_MARK_M
     return rows[:-1] if len(rows) > 2 and is_off[-1] and not is_off[:-1].any() else rows

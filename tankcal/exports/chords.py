@@ -1,26 +1,37 @@
-"""Loops over the chords of a table: which rows a straight line from a row may end at.
+"""Loops over the chords of a table: rows at which a straight line from a row may end.
 
-A chord from row i is within eps of every row k that it passes when its slope lies between the
-largest of (V_k - eps - W_i) / (h_k - g_i) and the smallest of (V_k + eps - W_i) / (h_k - g_i): one
-walk from i judges the chords to all rows, until no slope is left. (g, W) are the rows as written,
-(h, V) as they are.
+A chord from row i is within eps of every row k that it passes if its slope lies between the
+largest of (V_k - eps - W_i) / (h_k - g_i) and the smallest of (V_k + eps - W_i) / (h_k - g_i). One
+pass from i tests the chords to all rows, until the range of slopes is empty. (g, W) are the rows as
+written, (h, V) those of the table.
 
-Plain Python here; `tankcal.exports.breakpoints` has them compiled where there is enough to do.
+The code is plain Python; `tankcal.exports.breakpoints` compiles it for large tables.
 """
 
 COMPILED = ("fewest_chords", "longest_chords", "largest_error")
-NEVER = 1 << 30  # more chords than any table has rows
+NEVER = 1 << 30  # number of chords to an unreachable row, above any number of rows
 FAR = float("inf")
 
 
 def fewest_chords(height, volume, at, written, last, is_open, eps, most, fewest, before):
-    """Fill in the fewest chords to each row, and the row before it, of chords within eps.
+    """Compute the fewest chords within eps to each row, and the row before it, in place.
 
-    height, volume  (rows,) of the table         at, written  (rows,) the same as they are written
-    last            (rows,) row that a chord from each may end at: the next one that has to stand
-    is_open         (rows,) whether a chord may begin or end there
-    most            chords; longer ways are not followed
-    fewest, before  (rows,) what is filled in: NEVER and -1 at first
+    Parameters
+    ----------
+    height, volume : (rows,)
+        The table.
+    at, written : (rows,)
+        Heights and volumes as written.
+    last : (rows,)
+        Last row at which a chord from each row may end: the next required row.
+    is_open : (rows,)
+        Whether a chord may begin or end at the row.
+    eps : float
+        Largest permitted error.
+    most : int
+        Largest number of chords.
+    fewest, before : (rows,)
+        Results; NEVER and -1 initially.
     """
     count = len(height)
     fewest[0] = 0
@@ -48,9 +59,9 @@ def fewest_chords(height, volume, at, written, last, is_open, eps, most, fewest,
 
 
 def longest_chords(height, volume, at, written, last, is_open, eps, rows):
-    """How many rows the way of the longest chords within eps has; 0: none leads on.
+    """Return the number of rows on the path of longest chords within eps; 0 if there is none.
 
-    rows  (rows,) where its rows are filled in
+    rows (rows,) receives the rows of the path.
     """
     count = len(height)
     rows[0] = 0
@@ -82,7 +93,17 @@ def longest_chords(height, volume, at, written, last, is_open, eps, rows):
 
 
 def largest_error(height, volume, at, written, rows):
-    """The largest distance of the chords through these rows from the rows that they pass."""
+    """Largest distance of the chords through the given rows from the rows that they pass.
+
+    Parameters
+    ----------
+    height, volume : (rows,)
+        The table.
+    at, written : (rows,)
+        Heights and volumes as written.
+    rows : sequence of int
+        Rows of the chords.
+    """
     largest = 0.0
     for n in range(len(rows) - 1):
         i, j = rows[n], rows[n + 1]

@@ -1,4 +1,4 @@
-"""The export of a record: which rows, how far off, written by a profile and read back."""
+"""Export of a record: selection of rows, error bound, writing by a profile, reading back."""
 
 import hashlib
 import os
@@ -22,34 +22,33 @@ from tankcal.text.words import load_words, say
 
 @dataclass(frozen=True)
 class Export:
-    """A table as a system will read it, with what that costs.
+    """A table as a system will read it, with its error.
 
     Attributes
     ----------
     profile : Profile
     tank : str
-        Its name.
+        Name of the tank.
     dip_m, volume_m3 : (points,) ndarray
-        What the system makes of the rows of the file, ascending.
+        Rows of the file as the system interprets them, ascending.
     rows : int
-        Of the table in the record.
+        Number of rows of the table in the record.
     error_m3 : float
-        Bound of the distance of what the system reads from the exact volume at any dip: rounding,
-        the line or spline, and `own_m3`.
+        Bound of the error at any dip: rounding, line or spline, and `own_m3`.
     at_m : float
-        Dip where it is reached (but for own_m3).
+        Dip of the largest error (without own_m3).
     own_m3 : float
-        Largest error of straight lines between the rows of the record, as the record states it.
+        Largest error of linear interpolation in the record, as stated in the record.
     rounded_levels : int
-        Rows whose level is not the row's own, for the profile has no such mark.
+        Number of rows whose level is rounded to a mark of the profile.
     gauge : GaugeCorrection or None
-        HyTD of a gauge that hangs on the shell.
+        HyTD of a gauge supported by the shell.
     facts : tuple of Message
         Provenance.
     data : bytes
         The file.
     left_out_m : float or None
-        Dip of the highest row of the table, where the file ends below it.
+        Dip of the highest row of the table, if the file ends below it.
     """
 
     profile: object
@@ -68,13 +67,13 @@ class Export:
 
     @property
     def lines(self):
-        """Messages: what the report says of the export."""
+        """Messages of the report."""
         return report_of(self)
 
 
 def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_shell=False,
                   language="en"):  # fmt: skip
-    """The `Export` of the table in a record.
+    """Return the `Export` of the table in a record.
 
     Parameters
     ----------
@@ -82,18 +81,18 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
         A record.json.
     profile : Profile
     points : int, optional
-        Rows of the file at most: those that err least are taken.
+        Largest number of rows of the file; rows with the smallest error are selected.
     max_error_m3 : float, optional
-        The fewest rows that err by no more.
+        Largest error; the fewest rows are selected.
     hangs_on_shell : bool, optional
-        Whether the gauge hangs on the shell: then HyTD is worked out.
+        Whether the gauge is supported by the shell; HyTD is then computed.
     language : str, optional
-        Of the lines of provenance.
+        Language of the lines of provenance.
 
     Raises
     ------
     InputError
-        With every reason why the profile cannot take the table.
+        With every reason why the profile does not fit the table.
     """
     path, log = Path(source), Log()
     record = records.read(path, tables=False)
@@ -118,9 +117,9 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
         "level_unit": profile.increment if profile.leading == "increments" else profile.level_unit,
         "volume_unit": profile.volume_unit,
     }  # fmt: skip
-    text = file_text(body, profile, [say(words, one) for one in facts], values)
+    text = file_text(body, profile, [say(words, fact) for fact in facts], values)
     data = text.encode(profile.encoding)
-    own, off_mark = asked.own_m3, np.abs(marks.at_m[listed] - height[listed]) > ON_THE_MARK_M
+    own_errors, off_mark = asked.own_m3, np.abs(marks.at_m[listed] - height[listed]) > ON_THE_MARK_M
     read_back(
         data,
         body,
@@ -130,29 +129,29 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
     )
     return Export(
         profile, record.job.tank.id, marks.at_m[listed], marks.written_m3[listed], len(height),
-        error + own, at, own, int(off_mark.sum()), gauge, tuple(facts), data,
+        error + own_errors, at, own_errors, int(off_mark.sum()), gauge, tuple(facts), data,
         None if rows[-1] == len(height) - 1 else float(height[-1]),
     )  # fmt: skip
 
 
 def default_name(export):
-    """What the file of an export is called where nobody says: by the tank and the profile."""
+    """Default name of the file of an export, from the tank and the profile."""
     return f"{file_name(export.tank, 'tank')}-{export.profile.code}{export.profile.ending}"
 
 
 def write_export(export, out, language="en"):
-    """Write the file and its report beside it (NAME-report.txt), both or none; their paths."""
+    """Write the file and its report (NAME-report.txt), both or none; return their paths."""
     out, words = Path(out), load_words(language)
     report = out.with_name(f"{out.stem}-report.txt")
-    lines = [say(words, one) for one in (*export.lines, *export.facts)]
-    made = {out: export.data, report: "".join(f"{one}\n" for one in lines).encode()}
+    lines = [say(words, line) for line in (*export.lines, *export.facts)]
+    contents = {out: export.data, report: "".join(f"{line}\n" for line in lines).encode()}
     waiting = {}
-    for path in made:
-        if path.is_dir():  # told before anything is written
+    for path in contents:
+        if path.is_dir():  # reported before any file is written
             raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(path))
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        for path, data in made.items():
+        for path, data in contents.items():
             waiting[path] = path.with_name(f".{path.name}.{os.getpid()}.tmp")
             waiting[path].write_bytes(data)
         for path, temporary in waiting.items():
@@ -160,11 +159,11 @@ def write_export(export, out, language="en"):
     finally:
         for temporary in waiting.values():
             temporary.unlink(missing_ok=True)
-    return [*made]
+    return [*contents]
 
 
 def _check_table(file, record, log):
-    """Tell why a record has no table that can be exported."""
+    """Report why the table of a record cannot be exported."""
     if record.capacity is None:
         text = message("export_no_table", "has no capacity table: its survey was only adjusted")
         log.problem(file, text, None, "capacity")
@@ -175,15 +174,20 @@ def _check_table(file, record, log):
                        "rows or more that do, with a volume each")  # fmt: skip
         log.problem(file, text, None, "capacity.height_m")
     columns = ("k", "stated_U_m3")
-    if any(len(getattr(record.capacity, one)) != len(height) for one in columns):
+    if any(len(getattr(record.capacity, column)) != len(height) for column in columns):
         text = message("export_columns", "columns of different lengths; expected one value a row")
         log.problem(file, text, None, "capacity.stated_U_m3")
 
 
 def _gauge(file, record, log):
-    """The `GaugeCorrection` of the record's shell; None after telling why there is none."""
-    head = next((one.value for one in record.choices if one.code == "head"), None)
-    courses = [(one.height_m, one.thickness_m, one.inside_radius_m) for one in record.courses]
+    """Return the `GaugeCorrection` of the record's shell.
+
+    None after reporting why there is none.
+    """
+    head = next((choice.value for choice in record.choices if choice.code == "head"), None)
+    courses = [
+        (course.height_m, course.thickness_m, course.inside_radius_m) for course in record.courses
+    ]
     if not courses or min(thickness for _, thickness, _ in courses) <= 0:
         text = message("export_no_plates", "has no courses with the thickness of their plates; "
                        "expected them for --gauge-on-shell")  # fmt: skip

@@ -1,4 +1,4 @@
-"""What goes with an exported table: its provenance, and what the report says of its errors."""
+"""Provenance of an exported table, and statements about its errors in the report."""
 
 from tankcal.messages import message
 
@@ -6,9 +6,9 @@ _SURVEYS = ("strapping", "lines", "clouds", "hits", "tangents", "liquid", "adjus
 
 
 def facts_of(record, sha256):
-    """Messages, one for each line: what the table is, what it refers to, how uncertain it is.
+    """Return lines of provenance: the table, its references, its uncertainty; a tuple of Message.
 
-    record  record.making.Record        sha256  of its file
+    record: record.making.Record; sha256: SHA-256 of its file.
     """
     table, capacity = record.job.table, record.capacity
     provenance = message("export_record", "record SHA-256 {sha256}, tankcal {version}",
@@ -36,7 +36,7 @@ def facts_of(record, sha256):
 
 
 def report_of(export):
-    """Messages, one for each line: how far off an `Export` is, and what is to be known of it."""
+    """Return the lines of the report of an `Export`: its errors and further facts, as Messages."""
     profile, litres = export.profile, 1000 * export.error_m3
     rows = message(
         "export_rows", "{points} of the {rows} rows of the table, dips {low:.6g} to {high:.6g} m, "
@@ -48,10 +48,10 @@ def report_of(export):
         "{at:.6g} m; rounding included, and {own:.4g} L that straight lines between the rows of "
         "the table err themselves", error=litres, at=export.at_m, own=1000 * export.own_m3,
     )  # fmt: skip
-    found = [rows, error, message("export_error_delivery", "of a delivery up to twice that: "
+    lines = [rows, error, message("export_error_delivery", "of a delivery up to twice that: "
                                   "{twice:.4g} L", twice=2 * litres)]  # fmt: skip
     if profile.interpolation == "spline":
-        found.append(
+        lines.append(
             message(
                 "export_spline",
                 "for natural cubic splines between the rows: a "
@@ -59,7 +59,7 @@ def report_of(export):
             )
         )
     if export.left_out_m is not None:
-        found.append(
+        lines.append(
             message(
                 "export_top_left_out",
                 "the highest row, {dip:.6g} m, is on no level of this profile and is left out: "
@@ -69,7 +69,7 @@ def report_of(export):
             )
         )
     if export.rounded_levels:
-        found.append(
+        lines.append(
             message(
                 "export_rounded",
                 "levels that had to be rounded: {count}; the error above counts it",
@@ -77,7 +77,7 @@ def report_of(export):
             )
         )
     if not profile.verified:
-        found.append(
+        lines.append(
             message(
                 "export_not_verified",
                 "the profile was not verified with the system's own text: {source}",
@@ -85,8 +85,8 @@ def report_of(export):
             )
         )
     if profile.remark:
-        found.append(message("export_remark", "{remark}", remark=profile.remark))
-    return found if export.gauge is None else [*found, _hytd(export.gauge)]
+        lines.append(message("export_remark", "{remark}", remark=profile.remark))
+    return lines if export.gauge is None else [*lines, _hytd(export.gauge)]
 
 
 def _hytd(gauge):
@@ -99,10 +99,10 @@ def _hytd(gauge):
 
 
 def was_surveyed(record):
-    """Whether anything of the tank was measured: not where all of its sizes were declared."""
+    """Whether any quantity of the tank was measured, not only declared."""
     if record.job.tank.kind == "mesh":
         return True
-    return record.points != [] or any(getattr(record, one) is not None for one in _SURVEYS)
+    return record.points != [] or any(getattr(record, survey) is not None for survey in _SURVEYS)
 
 
 def _tank(record):
@@ -115,7 +115,7 @@ def _tank(record):
 
 
 def _density(record):
-    head = next((one.value for one in record.choices if one.code == "head"), "none")
+    head = next((choice.value for choice in record.choices if choice.code == "head"), "none")
     if not isinstance(head, int | float):
         return message("export_no_head", "head of the liquid: none in this table")
     return message("export_head", "with the head of a liquid of {density:.5g} kg/m3: not to be "
@@ -135,7 +135,7 @@ def _zero(record):
 
 
 def _roof(record):
-    roof = {one.code: one.value for one in record.roof or ()}
+    roof = {roof.code: roof.value for roof in record.roof or ()}
     mass = roof.get("roof_mass")
     if mass is None:
         return []
@@ -164,7 +164,7 @@ def _expansion(record):
 def _least_delivery(record):
     if not record.deliveries:
         return []
-    least = min(record.deliveries, key=lambda one: one.minimum_m)
+    least = min(record.deliveries, key=lambda delivery: delivery.minimum_m)
     worst = least.at_minimum or least.relative
     text = message(
         "export_U_delivery", "U of the least delivery ({height:.4g} m): at most {U:.4g} L of "

@@ -1,4 +1,4 @@
-"""The rows of a table as a profile writes them: whole numbers of quanta, each rounded once."""
+"""Rows of a table as a profile writes them: whole numbers of quanta, each rounded once."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -9,7 +9,7 @@ import numpy as np
 from tankcal.exports.profiles import INCREMENTS_M
 
 ON_THE_MARK_M = 1e-8
-_MOSTLY = 0.5  # of the rows that lie on marks of the profile: then only these may stand
+_MOSTLY = 0.5  # share of rows on marks of the profile above which only these are permitted
 
 
 @dataclass(frozen=True)
@@ -19,11 +19,11 @@ class Marks:
     Attributes
     ----------
     level, volume : (rows,) list of int
-        Quanta of the leading column of levels, and of volumes, offsets taken off.
+        Quanta of the leading column of levels, and of volumes, offsets subtracted.
     at_m, written_m3 : (rows,) ndarray
-        Dip and volume that a system makes of them.
+        Dip and volume as a system interprets them.
     stands : (rows,) ndarray of bool
-        Rows that may stand: on a mark where most are, and no two with the same level.
+        Permitted rows: on a mark if most rows are, and only one row per level.
     """
 
     level: list
@@ -34,7 +34,7 @@ class Marks:
 
 
 def to_quanta(value, quantum):
-    """The whole number of quanta nearest to a number, exactly; halves go up.
+    """Whole number of quanta nearest to a number, exact; halves are rounded up.
 
     Examples
     --------
@@ -47,7 +47,7 @@ def to_quanta(value, quantum):
 
 
 def increments_of(height_m, increment):
-    """A height as a whole number of increments, such as "1/16 in".
+    """Height as a whole number of increments, such as "1/16 in".
 
     Examples
     --------
@@ -61,9 +61,16 @@ def increments_of(height_m, increment):
 
 
 def marks_of(height_m, volume_m3, profile, reference_m=None, must=()):
-    """`Marks` of a table in a profile.
+    """Return the `Marks` of a table in a profile.
 
-    reference_m  height that ullages count from         must  rows that stand before all others
+    Parameters
+    ----------
+    height_m, volume_m3 : (rows,) ndarray
+    profile : Profile
+    reference_m : float, optional
+        Reference height of ullages.
+    must : sequence of int, optional
+        Rows that take precedence over other rows of equal level.
     """
     quantum, volume_quantum = profile.level_quantum_m, profile.volume_quantum_m3
     is_ullage = profile.leading == "ullage"
@@ -80,18 +87,18 @@ def marks_of(height_m, volume_m3, profile, reference_m=None, must=()):
 
 def _quanta(values, quantum, offset):
     if offset == 0:
-        return [to_quanta(one, quantum) for one in values.tolist()]
+        return [to_quanta(value, quantum) for value in values.tolist()]
     half = Fraction(1, 2)
-    return [floor((Fraction(one) - offset) / quantum + half) for one in values.tolist()]
+    return [floor((Fraction(value) - offset) / quantum + half) for value in values.tolist()]
 
 
 def _standing(height_m, at_m, level, must):
-    """(rows,) which rows may stand."""
+    """Mask (rows,) of the permitted rows."""
     off = np.abs(at_m - height_m)
     on_mark = off <= ON_THE_MARK_M
     stands = on_mark.copy() if on_mark.mean() >= _MOSTLY else np.ones(len(off), dtype=bool)
     stands[list(must)] = True
-    off[list(must)] = -1.0  # stands before all others of its level
+    off[list(must)] = -1.0  # takes precedence over other rows of its level
     best = {}
     for row in np.flatnonzero(stands):
         n = level[row]

@@ -1,4 +1,4 @@
-"""Texts of the shipped profiles as Messages, so that each language has its own."""
+"""Texts of the shipped profiles as Messages, for translation."""
 
 from tankcal.messages import message
 
@@ -64,9 +64,9 @@ _TEXTS = (
     message("profile_own_choice", "own choice of tankcal"),
     message("profile_from_memory", "from memory: 1, 4 or 20 points"),
 )
-_KNOWN = {str(one): one for one in _TEXTS}
+_KNOWN = {str(text): text for text in _TEXTS}
 
 
 def as_message(text):
-    """A text of a shipped profile as a Message; any other text unchanged."""
+    """Return a text of a shipped profile as a Message; any other text unchanged."""
     return _KNOWN.get(text, text)

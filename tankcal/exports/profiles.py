@@ -1,8 +1,7 @@
-"""Profiles of gauging and inventory systems: what a file for one of them is like (TOML).
+"""Profiles of gauging and inventory systems: descriptions of their files (TOML).
 
-`[profile]` says what it is for and where that was read, `[table]` which rows and columns,
-`[levels]` and `[volumes]` how these are written, `[file]` what stands between and above them.
-docs/exports.md has every key.
+`[profile]` states the system and the source, `[table]` the rows and columns, `[levels]` and
+`[volumes]` their format, `[file]` separators and headers. docs/exports.md lists every key.
 """
 
 import string
@@ -90,16 +89,16 @@ _FOLDER, _ENDING = "exports/shipped_profiles", ".toml"
 
 @dataclass(frozen=True)
 class Profile:
-    """What a file for a system is like; the keys of its file, with what is usual filled in.
+    """Description of a file for a system: the keys of its TOML file, with defaults.
 
     Attributes
     ----------
     code : str
-        Name of the profile's file without its ending.
+        Name of the profile's file without its extension.
     step_m : float or None
-        From row to row, where grid is "step".
+        Step between rows, if grid is "step".
     min_points, max_points : int or None
-        None: no limit is known.
+        None: no known limit.
     largest : float or None
         Largest volume, in the unit of volumes.
     """
@@ -139,8 +138,8 @@ class Profile:
 
     @property
     def leading(self):
-        """The column of levels that the others follow: dip, ullage or increments."""
-        return next(one for one in self.columns if one in LEVEL_COLUMNS)
+        """The leading column of levels: dip, ullage or increments."""
+        return next(column for column in self.columns if column in LEVEL_COLUMNS)
 
     @property
     def level_quantum_m(self):
@@ -164,9 +163,9 @@ def shipped_profiles():
 
 
 def find_profile(name):
-    """The Profile of a name that ships with tankcal, or of a TOML file.
+    """Return the Profile with a shipped name, or of a TOML file.
 
-    Raises InputError with every problem of the file, or with the names there are.
+    Raises InputError with every problem of the file, or with the list of names.
     """
     shipped = shipped_folder(_FOLDER) / f"{name}{_ENDING}"
     if "/" not in name and "\\" not in name and shipped.is_file():
@@ -191,12 +190,12 @@ def _read(path):
 
 
 def parse_profile(file, data, log):
-    """The Profile in the bytes of a TOML file, or None after telling `log` every problem of it."""
-    told = len(log.problems)
+    """Return the Profile in the bytes of a TOML file; None after reporting its problems."""
+    problems_before = len(log.problems)
     settings, sections = read_toml(file, data, log)
     if settings is None:
         return None
-    for section in [one for one in settings if one not in FIELDS]:
+    for section in [setting for setting in settings if setting not in FIELDS]:
         text = message(
             "export_section", "unknown section; expected one of {names}{hint}",
             names=list(FIELDS), hint=nearest(section, FIELDS),
@@ -204,21 +203,21 @@ def parse_profile(file, data, log):
         log.problem(file, text, sections.get(section), f"[{section}]")
     values = {}
     for section, fields in FIELDS.items():
-        given, row = dict(settings.get(section, {})), sections.get(section)
-        for (_, key), needed in (one for one in LISTS.items() if one[0][0] == section):
+        stated, row = dict(settings.get(section, {})), sections.get(section)
+        for (_, key), needed in (entry for entry in LISTS.items() if entry[0][0] == section):
             place = (file, f"{section}.{key}")
-            values[section, key] = _texts(*place, given.pop(key, None), row, needed, log)
-        read = read_section(file, section, fields, given, row, log)
+            values[section, key] = _texts(*place, stated.pop(key, None), row, needed, log)
+        read = read_section(file, section, fields, stated, row, log)
         values |= {(section, key): value for key, value in read.items()}
     tell = _Teller(file, settings, sections, log)
     _check_columns(values, tell)
     _check_table(values, tell)
     _check_marks(values, tell)
-    return _profile(file, values) if len(log.problems) == told else None
+    return _profile(file, values) if len(log.problems) == problems_before else None
 
 
 def _texts(file, name, value, row, needed, log):
-    """Tuple of texts of a list, () where there is none."""
+    """Return a tuple of texts of a list; () without a list."""
     raw = None if value is None else value.raw
     if raw is None or raw == []:
         if needed:
@@ -226,8 +225,8 @@ def _texts(file, name, value, row, needed, log):
                         row, name)  # fmt: skip
         return ()
     sound = isinstance(raw, list) and len(raw) <= MOST_LINES
-    if not sound or not all(isinstance(one, str) and one.isprintable() and len(one) <= 300
-                            for one in raw):  # fmt: skip
+    if not sound or not all(isinstance(text, str) and text.isprintable() and len(text) <= 300
+                            for text in raw):  # fmt: skip
         text = message(
             "export_texts", "found {found}; expected a list of at most {most} texts, each of one "
             "line", found=shown(raw), most=MOST_LINES,
@@ -238,7 +237,7 @@ def _texts(file, name, value, row, needed, log):
 
 
 class _Teller:
-    """Tells what is wrong with a key of the profile, in its row."""
+    """Reports problems of a key of the profile, with its row."""
 
     def __init__(self, file, settings, sections, log):
         self.file, self.settings, self.sections, self.log = file, settings, sections, log
@@ -288,7 +287,7 @@ def _check_columns(values, tell):
 
 
 def _unknown_placeholders(line):
-    """What stands in braces and is none of the placeholders; of braces that are not in pairs {}."""
+    """Unknown placeholders in braces; {} for unpaired braces."""
     try:
         parts = list(string.Formatter().parse(line))
     except ValueError:
@@ -353,11 +352,11 @@ def _profile(file, values):
         for key in ("unit", "decimals")
     }
     whole = {"min_points", "max_points", "level_decimals", "volume_decimals", "digits"}
-    given = {}
+    settings = {}
     for place, value in values.items():
         name = renamed.get(place, place[1])
         if value is not None:
-            given[name] = int(value) if name in whole else value
-    for name in given.keys() & {"name", "source", "remark"}:
-        given[name] = as_message(given[name])
-    return Profile(code=file.removesuffix(_ENDING), **given)
+            settings[name] = int(value) if name in whole else value
+    for name in settings.keys() & {"name", "source", "remark"}:
+        settings[name] = as_message(settings[name])
+    return Profile(code=file.removesuffix(_ENDING), **settings)

@@ -1,31 +1,33 @@
-"""Rows that a natural cubic spline runs through, for systems that read a spline between points.
+"""Points of a natural cubic spline, for systems that interpolate by a spline.
 
-No chord can be judged alone here, so the best rows are sought, not proved: from a few rows on the
-worst one is added each time, then single rows are moved while the error becomes less.
+The pieces of a spline cannot be judged separately, so the result is a good solution, not a proven
+optimum. Starting from a few rows, the row with the largest error is added each time. Then single
+rows are moved while the error decreases.
 """
 
 import numpy as np
 
 from tankcal.exports.breakpoints import Breakpoints
 
-_PART_AT_ONCE = 4  # of the rows still to add, one in four where several pieces are bad
-_MOST_MOVED = 64  # points: more are not moved
-_MOST_TRIED = 1200  # splines
-_FALL = 1e-9  # of the mean slope
+_PART_AT_ONCE = 4  # one in four of the remaining rows is added at once
+_MOST_MOVED = 64  # largest number of points that are moved
+_MOST_TRIED = 1200  # largest number of splines tried
+_FALL = 1e-9  # tolerance of a falling slope, relative to the mean slope
 
 
 def spline_breakpoints(height, volume, points, *, fixed=(), at=None, written=None, candidates=None):
-    """`Breakpoints` of at most so many points for a natural cubic spline; None: none is monotone.
+    """Return `Breakpoints` of at most `points` points of a natural cubic spline, or None.
 
     Parameters
     ----------
     height, volume, points, fixed, at, written, candidates
-        As of `breakpoints.best_breakpoints`.
+        As in `breakpoints.best_breakpoints`.
 
     Returns
     -------
     Breakpoints or None
-        The error bounds the distance of the spline from the table at any height.
+        The error bounds the distance of the spline from the table at any height. None if no
+        spline found is monotone.
     """
     seeker = _Seeker(height, volume, at, written)
     count = len(seeker.height)
@@ -40,20 +42,20 @@ def spline_breakpoints(height, volume, points, *, fixed=(), at=None, written=Non
 
 
 def fewest_spline_breakpoints(height, volume, error, *, most, **given):
-    """The same of as few points as keep an error, at most so many; None: none were found."""
+    """Return `Breakpoints` of a spline with few points within an error, at most `most`, or None."""
     low, high, best = 2, most, None
     while low <= high:
         points = (low + high) // 2
-        found = spline_breakpoints(height, volume, points, **given)
-        if found is not None and found.error <= error:
-            best, high = found, min(points, len(found.rows)) - 1
+        solution = spline_breakpoints(height, volume, points, **given)
+        if solution is not None and solution.error <= error:
+            best, high = solution, min(points, len(solution.rows)) - 1
         else:
             low = points + 1
     return best
 
 
 def spline_error(height, volume, at, written, rows):
-    """(bound of the error of the spline through the written rows at any height, the worst)."""
+    """(bound of the error of the spline through the written rows at any height, its height)."""
     error, where, _ = _Seeker(height, volume, at, written).judge(rows)
     return error, where
 
@@ -62,7 +64,7 @@ class _Seeker:
     """A table, its rows as written, and splines through some of them."""
 
     def __init__(self, height, volume, at, written):
-        self.height, self.volume = (np.asarray(one, dtype=float) for one in (height, volume))
+        self.height, self.volume = (np.asarray(values, dtype=float) for values in (height, volume))
         self.at = self.height if at is None else np.asarray(at, dtype=float)
         self.written = self.volume if written is None else np.asarray(written, dtype=float)
 
@@ -75,8 +77,8 @@ class _Seeker:
     def judge(self, rows):
         """(bound of the error at any height, height of the worst row, whether the spline rises).
 
-        Between two heights the spline is off its own chord by at most max |s''| d^2/8, and s'' is
-        straight there.
+        Between two heights the spline differs from its own chord by at most max |s''| d^2/8, and
+        s'' is linear there.
         """
         spline, ends = self._spline(rows), self.at[[rows[0], rows[-1]]]
         heights = np.union1d(self.height, self.at[rows])
@@ -90,7 +92,7 @@ class _Seeker:
         return max(float(beside.max()), float(off[worst])), float(heights[worst]), rises(spline)
 
     def filled(self, rows, free, points):
-        """Rows with the worst ones added until there are so many."""
+        """Return the rows with the worst rows added, up to `points` rows."""
         rows = list(rows)
         while len(rows) < points:
             off = np.abs(self._spline(rows)(self.at[free]) - self.volume[free])
@@ -106,7 +108,7 @@ class _Seeker:
         return rows
 
     def moved(self, rows, must, is_open):
-        """Rows moved one by one, by ever smaller steps, while the error becomes less."""
+        """Return the rows moved singly, by decreasing steps, while the error decreases."""
         rows, best, left = list(rows), self._rank(rows), _MOST_TRIED
         step = max(len(self.height) // (2 * len(rows)), 1)
         while step and left > 0:
@@ -125,13 +127,13 @@ class _Seeker:
         return rows
 
     def _rank(self, rows):
-        """What is to become less: a spline that falls comes after all others, then the error."""
+        """Sort key: rising splines before falling ones, then by error."""
         error, _, is_rising = self.judge(rows)
         return (not is_rising, error)
 
 
 def rises(spline):
-    """Whether a cubic spline falls nowhere: its slope is judged at knots and where it is least."""
+    """Whether a cubic spline falls nowhere, judged at its knots and at the minima of its slope."""
     slope = spline.derivative()
     knots = spline.x
     bend = spline.derivative(2)

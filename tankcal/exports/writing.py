@@ -1,4 +1,4 @@
-"""The text of an export by its profile, and the same text read back by the linter."""
+"""Text of an export by its profile, and the text read back by the linter."""
 
 import tempfile
 import unicodedata
@@ -15,17 +15,17 @@ from tankcal.messages import message
 from tankcal.tank.dips import dip_label
 
 _READ_AS = {"dip": "height", "ullage": "ullage", "increments": "height"}
-_UNITS_READ = {one: one for one in ("m", "cm", "mm", "in", "ft", "m3", "L", "bbl", "hL", "ft3")} | {
-    "gal": "US gal"
-}  # names of units that the linter reads
-_FEW = 3  # rows that the linter needs
+_UNITS_READ = {
+    unit: unit for unit in ("m", "cm", "mm", "in", "ft", "m3", "L", "bbl", "hL", "ft3")
+} | {"gal": "US gal"}  # names of units known to the linter
+_FEW = 3  # fewest rows required by the linter
 _BY_NEIGHBOURS = ("lint_odd_volume", "lint_shifted", "lint_volumes_swapped", "lint_rough")
-_OF_UNITS = ("lint_no_units",)  # what it says of a heading without a unit
-_MOST_TOLD = 5  # findings
+_OF_UNITS = ("lint_no_units",)  # finding about a heading without a unit
+_MOST_TOLD = 5  # largest number of findings listed
 
 
 def body_of(rows, height_m, marks, profile, reference_m):
-    """The rows of the file as lists of cells, in its order."""
+    """Return the rows of the file as lists of cells, in its order."""
     lines, before = [], 0
     for row in rows:
         cells = []
@@ -42,7 +42,7 @@ def body_of(rows, height_m, marks, profile, reference_m):
 
 
 def _level(column, row, height_m, marks, profile, reference_m):
-    """The cell of a level: that of the leading column as it was rounded, others by themselves."""
+    """Cell of a level; the leading column as rounded, other columns rounded independently."""
     number = marks.level[row]
     if column == "increments":
         if column != profile.leading:
@@ -64,7 +64,7 @@ def _volume(number, profile):
 
 
 def written(number, decimals, mark=".", thousands=""):
-    """A whole number of last digits as text.
+    """Text of a whole number of last digits.
 
     Examples
     --------
@@ -78,23 +78,31 @@ def written(number, decimals, mark=".", thousands=""):
 
 
 def file_text(body, profile, facts, values):
-    """The text of the file: header, provenance, headings, rows.
+    """Return the text of the file: header, provenance, headings, rows.
 
-    facts  lines of provenance        values  {placeholder: text} of the header
+    Parameters
+    ----------
+    body : list of list of str
+        Rows of the file.
+    profile : Profile
+    facts : sequence of str
+        Lines of provenance.
+    values : dict
+        {placeholder: text} of the header.
     """
     head = [line.format(**values) for line in profile.header]
     if profile.provenance:
-        head += [f"{profile.comment} {one}".strip() for one in facts]
+        head += [f"{profile.comment} {fact}".strip() for fact in facts]
     if profile.headings:
         head.append(profile.separator.join(profile.headings))
     end = LINE_ENDS[profile.line_end]
-    lines = [plain(one, profile.encoding) for one in head]
+    lines = [plain(line, profile.encoding) for line in head]
     lines += [profile.separator.join(cells) for cells in body]
-    return "".join(f"{one}{end}" for one in lines)
+    return "".join(f"{line}{end}" for line in lines)
 
 
 def plain(text, encoding):
-    """A text without the characters that an encoding lacks: without accents, then left out."""
+    """Return a text without characters missing in an encoding: accents removed, others left out."""
     kept = []
     for char in text:
         try:
@@ -107,13 +115,23 @@ def plain(text, encoding):
 
 
 def read_back(data, body, profile, is_even=False, rounded=0):
-    """Read the bytes of the file again; InputError where the linter finds anything in its rows.
+    """Read the bytes of the file again.
 
-    The linter reads the rows as they were written, under headings that it knows: the words of a
-    system's headings are not judged. Where only increments of volume stand, their sums are.
+    Raise InputError if the linter reports problems of its rows.
 
-    is_even  whether the rows are those of the table itself, unrounded: then none may be missing
-    rounded  levels that had to be rounded
+    The linter reads the rows as written under headings that it knows; the headings of the system
+    are not examined. Increments of volume are summed before the examination.
+
+    Parameters
+    ----------
+    data : bytes
+    body : list of list of str
+        Rows of the file.
+    profile : Profile
+    is_even : bool, optional
+        Whether the rows are those of the table itself, unrounded; then no row may be missing.
+    rounded : int, optional
+        Number of rounded levels.
     """
     lines = data.decode(profile.encoding).split(LINE_ENDS[profile.line_end])[:-1]
     rows = lines[len(lines) - len(body) :]
@@ -128,17 +146,17 @@ def read_back(data, body, profile, is_even=False, rounded=0):
     entries = max((table.entries for table in tables), key=len, default=())
     _refuse_other_rows(entries, body, profile)
     findings = [
-        one
-        for one in report.findings
-        if not _is_of_profile(one, len(body), profile) and not _is_of_tank(one, is_even)
+        finding
+        for finding in report.findings
+        if not _is_of_profile(finding, len(body), profile) and not _is_of_tank(finding, is_even)
     ]
     if findings:
-        told = [_finding(one, profile) for one in findings[:_MOST_TOLD]]
-        raise InputError([*_rounded(rounded, profile), *told])
+        shown = [_finding(finding, profile) for finding in findings[:_MOST_TOLD]]
+        raise InputError([*_rounded(rounded, profile), *shown])
 
 
 def _rounded(count, profile):
-    """The likely reason why rows do not fit any more: levels that had to be rounded."""
+    """Likely reason for rows that do not fit: rounded levels."""
     if not count:
         return []
     text = message("export_off_mark", "{count} levels had to be rounded, for the rows of the table "
@@ -148,7 +166,7 @@ def _rounded(count, profile):
 
 
 def _headings(profile):
-    """Headings that the linter knows, for the columns of the file."""
+    """Headings, known to the linter, of the columns of the file."""
     known, is_led = [], False
     only_increments = "volume" not in profile.columns
     for column in profile.columns:
@@ -167,7 +185,7 @@ def _headings(profile):
 
 
 def _as_read(rows, profile):
-    """The rows as the linter reads them: as they are, but increments of volume summed up."""
+    """Rows as the linter reads them, with increments of volume summed."""
     if "volume" in profile.columns:
         return rows
     place = profile.columns.index("increment_volume")
@@ -186,19 +204,19 @@ def _number(text, profile):
 
 
 def _refuse_other_rows(entries, body, profile):
-    """InputError unless the linter read the same numbers, row by row."""
+    """Raise InputError unless the linter read equal numbers, row by row."""
     level = profile.columns.index(profile.leading)
     same = len(entries) == len(body)
     if "volume" in profile.columns:
         volume = profile.columns.index("volume")
         same = same and all(
-            one.volume.value == _number(cells[volume], profile) / 10**profile.volume_decimals
-            for one, cells in zip(entries, body, strict=False)
+            entry.volume.value == _number(cells[volume], profile) / 10**profile.volume_decimals
+            for entry, cells in zip(entries, body, strict=False)
         )
     if profile.level_unit not in MARKED or profile.leading == "increments":
         same = same and all(
-            one.height.value == float(cells[level].replace(profile.decimal, "."))
-            for one, cells in zip(entries, body, strict=False)
+            entry.height.value == float(cells[level].replace(profile.decimal, "."))
+            for entry, cells in zip(entries, body, strict=False)
         )
     if not same:
         text = message(
@@ -210,7 +228,7 @@ def _refuse_other_rows(entries, body, profile):
 
 
 def _is_of_profile(finding, rows, profile):
-    """Whether the profile itself asks for what was found: marks of thousands, two rows, a unit."""
+    """Whether a finding is a consequence of the profile: thousands separators, two rows, a unit."""
     code = getattr(finding.problem.expected, "code", None)
     return (
         (code == "lint_written_in_all" and bool(profile.thousands))
@@ -220,10 +238,10 @@ def _is_of_profile(finding, rows, profile):
 
 
 def _is_of_tank(finding, is_even):
-    """Whether it is of the tank, not of its file: proportions, edges of fittings, kinks.
+    """Whether a finding concerns the tank, not the file: proportions, edges of fittings, kinks.
 
-    Rows that stand where the table bends are no smooth table, so no neighbours tell what they
-    should be; what was read is the table's own number all the same.
+    Breakpoints are not a smooth table, so neighbours do not predict their volumes. The number read
+    is that of the table all the same.
     """
     code = getattr(finding.problem.expected, "code", None)
     is_warning = finding.severity == "warning"
@@ -231,7 +249,10 @@ def _is_of_tank(finding, is_even):
 
 
 def _has_units_read(profile):
-    """Whether the linter knows the units of both columns: it has none of feet cubed or 1/16 in."""
+    """Whether the linter knows the units of both columns.
+
+    It knows neither cubic feet nor 1/16 in.
+    """
     level = profile.increment if profile.leading == "increments" else profile.level_unit
     return profile.volume_unit in _UNITS_READ and (level in _UNITS_READ or level in MARKED)
 

@@ -1,9 +1,9 @@
-"""A linter for any capacity table: CSV, Excel workbook, or a record of tankcal.
+"""Linter for capacity tables in CSV files, Excel workbooks, PDFs, or records of tankcal.
 
 grids, headings, numbers, layout   from a file to pairs of height and volume
-heights                            order, steps, rows missing, doubled or swapped
-volumes, examination               rounding, falls, rows that are not where the others put them
-screening, hypotheses, suggestions   how that is found, how it is explained, what was meant
+heights                            order, steps, missing, doubled and swapped rows
+volumes, examination               rounding, falls, rows that disagree with their neighbours
+screening, hypotheses, suggestions   detection, explanation and likely intended values
 linting, totals, parts             units, total, last row; proportional parts
 """
 

@@ -1,7 +1,7 @@
-"""The headings of a grid and the rows under them: which columns are heights, which volumes.
+"""Headings of a grid and the rows below them: columns of heights and columns of volumes.
 
-A heading may have a row of units over or below it, a title over it, heights in several columns, or
-steps of the height as columns (`tankcal.linter.wide`).
+A heading may have a row of units above or below it, a title above it, heights in several columns,
+or steps of the height as columns (`tankcal.linter.wide`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -22,17 +22,22 @@ from tankcal.linter.units import INCH_M, Unit, countries_in
 from tankcal.linter.wide import WideHeading, refused_columns, title_unit, wide_heading
 from tankcal.messages import message
 
-_LINES_OF_HEADING = 3  # over the steps of a wide table
-_LONGEST_UNIT = 24  # letters of a cell in a row of units
+_LINES_OF_HEADING = 3  # largest number of heading lines above the steps of a wide table
+_LONGEST_UNIT = 24  # largest number of letters of a cell in a row of units
 
 
 @dataclass(frozen=True)
 class Pair:
     """Positions and headings of a column of heights and a column of volumes.
 
-    beside  {"uncertainty" or "k": position} of what stands beside them
-    uncertainty  what that heading says, or None
-    parts        ((position, heading), ...) of the other columns of heights before the volumes
+    Attributes
+    ----------
+    beside : dict
+        {"uncertainty" or "k": position} of related columns.
+    uncertainty : Uncertainty or None
+        From the heading of that column.
+    parts : tuple
+        ((position, heading), ...) of other columns of heights before the volumes.
     """
 
     height: int
@@ -46,11 +51,16 @@ class Pair:
 
 @dataclass(frozen=True)
 class Block:
-    """The rows under one heading: pairs of each kind of volume, left to right.
+    """The rows below one heading, with the pairs of each kind of volume from left to right.
 
-    heading     (row number, cells) of the heading; None without one
-    wide        `WideHeading` of a table whose columns are steps of the height
-    complaints  Problems of its columns
+    Attributes
+    ----------
+    heading : tuple or None
+        (row number, cells) of the heading.
+    wide : WideHeading or None
+        Heading of a table whose columns are steps of the height.
+    complaints : tuple of Problem
+        Problems of its columns.
     """
 
     pairs: tuple[Pair, ...]
@@ -67,15 +77,15 @@ class Block:
 
     @property
     def kind(self):
-        """Blocks of the same kind are pages of one table."""
+        """Key of the block; blocks of equal kind are pages of one table."""
         pairs = tuple((p.height_heading, p.volume_heading) for p in self.pairs)
         return pairs, None if self.wide is None else self.wide.texts
 
 
 def blocks_of(grid):
-    """Tuple of `Block` of a grid; a text without headings is one block of columns 1 and 2."""
+    """Return the `Block`s of a grid; a text without headings is one block of columns 1 and 2."""
     rows = list(grid.rows)
-    found, start, is_parts, end = [], None, False, 0
+    blocks, start, is_parts, end = [], None, False, 0
     first_pages = {}
     index = 0
     while index < len(rows):
@@ -102,19 +112,19 @@ def blocks_of(grid):
             index += 1
             continue
         pairs = _as_first_page(pairs, wide, first_pages)
-        found.append((first, pairs, heading, is_parts, index if start is None else start, wide))
+        blocks.append((first, pairs, heading, is_parts, index if start is None else start, wide))
         is_parts, start, index, end = False, None, first, first
-    if not found:
+    if not blocks:
         return _without_heading(grid.name, rows) if grid.is_text else ()
-    ends = [heading_start for *_, heading_start, _ in found[1:]] + [len(rows)]
+    ends = [heading_start for *_, heading_start, _ in blocks[1:]] + [len(rows)]
     return tuple(
         _block(grid, pairs, tuple(rows[first:end]), parts, heading, wide)
-        for (first, pairs, heading, parts, _, wide), end in zip(found, ends, strict=True)
+        for (first, pairs, heading, parts, _, wide), end in zip(blocks, ends, strict=True)
     )
 
 
 def _block(grid, pairs, rows, is_parts, heading, wide):
-    """A `Block`; heights in several columns are joined, unnamed columns of numbers refused."""
+    """Return a `Block` with combined heights; report unnamed columns of numbers."""
     width = len(trimmed(heading[1]))
     if wide is not None:
         return Block(pairs, width, rows, is_parts, heading, wide)
@@ -132,9 +142,9 @@ def _block(grid, pairs, rows, is_parts, heading, wide):
 
 
 def _as_first_page(pairs, wide, first_pages):
-    """The pairs, with the units that a title over the first page alone names.
+    """Return the pairs with units that only a title above the first page states.
 
-    first_pages  {texts of a heading: its pairs}, added to
+    first_pages {texts of a heading: its pairs} is extended.
     """
     heights = tuple(pair.height_heading.text for pair in pairs)
     volumes = wide.texts if wide else tuple(pair.volume_heading.text for pair in pairs)
@@ -159,11 +169,11 @@ def _is_over_wide(rows, index, above):
 
 
 def _with_title(pair, above):
-    """A pair whose unit of volumes a title over the heading names where the heading does not."""
+    """Return a pair with the unit of volumes of a title, if its heading states none."""
     named = pair.volume_heading.named
     if named.choices:
         texts = [cell for line in above for cell in line if isinstance(cell, str)]
-        sizes = {found[0] for text in texts if len(found := countries_in(text)) == 1}
+        sizes = {countries[0] for text in texts if len(countries := countries_in(text)) == 1}
         if len(sizes) == 1:
             named = Unit(named.factor * sizes.pop(), named.factor, named.is_multiplied)
     elif not named.is_named:
@@ -172,7 +182,7 @@ def _with_title(pair, above):
 
 
 def _with_units(rows, index):
-    """(heading cells, rows used): a row of units over or below a heading belongs to it."""
+    """Return (heading cells, rows used), including a row of units above or below it."""
     cells = rows[index][1]
     if index + 1 >= len(rows):
         return cells, 1
@@ -187,7 +197,7 @@ def _with_units(rows, index):
 
 
 def _is_row_of_units(cells):
-    """Whether most cells of a row are units, usable or not, and the others short texts."""
+    """Whether most cells of a row are units, usable or not, and the other cells are short texts."""
     named = [cell for cell in cells if not is_blank(cell)]
     are_texts = all(isinstance(cell, str) and len(cell) <= _LONGEST_UNIT for cell in named)
     if not named or not are_texts or not any(is_unit(cell) for cell in named):
@@ -197,7 +207,7 @@ def _is_row_of_units(cells):
 
 
 def _joined(names, units):
-    """Cells of names and of units as cells of one heading."""
+    """Combine cells of names and cells of units into heading cells."""
     joined = []
     for name, unit in zip_longest(names, units):
         parts = [str(part).strip() for part in (name, unit) if not is_blank(part)]
@@ -207,9 +217,9 @@ def _joined(names, units):
 
 
 def _pairs(cells):
-    """Pairs of a heading: each run of heights, then volumes, gives the first height to each.
+    """Return the pairs of a heading; in each run of heights and volumes, the first height applies.
 
-    A column whose unit cannot be used gives way to another column of its run.
+    A column with an unusable unit is replaced by another column of its run.
     """
     headings = [heading_of(cell) for cell in cells]
     pairs, heights, volumes, before = [], [], [], []
@@ -224,7 +234,7 @@ def _pairs(cells):
         elif heading.role == "volume":
             (volumes if heights else before).append((position, heading))
     pairs += _pairs_of_run(heights, volumes)
-    if not pairs and heights:  # volumes left of their heights
+    if not pairs and heights:  # volumes stand to the left of their heights
         pairs = _pairs_of_run(heights, before)
     return tuple(_with_uncertainty(pairs, cells))
 
@@ -232,32 +242,37 @@ def _pairs(cells):
 def _pairs_of_run(heights, volumes):
     if not volumes:
         return []
-    dips = [one for one in heights if one[1].role == "height"] or heights
-    dips = [one for one in dips if not one[1].named.complaint] or dips
-    volumes = [one for one in volumes if not one[1].named.complaint] or volumes[:1]
+    dips = [height for height in heights if height[1].role == "height"] or heights
+    dips = [height for height in dips if not height[1].named.complaint] or dips
+    volumes = [volume for volume in volumes if not volume[1].named.complaint] or volumes[:1]
     (place, heading), *parts = dips
     return [Pair(place, k, heading, volume, parts=tuple(parts)) for k, volume in volumes]
 
 
 def _with_uncertainty(pairs, cells):
-    """Pairs with the columns of uncertainties and coverage factors that follow their volumes."""
+    """Return pairs with the columns of uncertainties and coverage factors next to their volumes."""
     starts = [min(pair.height, pair.volume) for pair in pairs if pair.height] + [len(cells)]
     for pair in pairs:
         end = min(start for start in starts if start > pair.volume)
-        end = min([end, *(other.volume for other in pairs if other.volume > pair.volume)])
-        said = {n: uncertainty_of(cells[n]) for n in range(pair.volume + 1, end)}
-        known = sorted((n for n in said if said[n]), key=lambda n: not said[n].is_expanded)
+        end = min(
+            [end, *(following.volume for following in pairs if following.volume > pair.volume)]
+        )
+        announced = {n: uncertainty_of(cells[n]) for n in range(pair.volume + 1, end)}
+        known = sorted(
+            (n for n in announced if announced[n]), key=lambda n: not announced[n].is_expanded
+        )
         if not known:
             yield pair
             continue
         beside = {"uncertainty": known[0]}
-        factors = [n for n in said if said[n] is None and is_coverage_factor(cells[n])]
+        factors = [n for n in announced if announced[n] is None and is_coverage_factor(cells[n])]
         if factors:
             beside["k"] = factors[0]
-        yield replace(pair, beside=beside, uncertainty=said[known[0]])
+        yield replace(pair, beside=beside, uncertainty=announced[known[0]])
 
 
 def trimmed(cells):
+    """Return the cells without trailing blank cells."""
     cells = list(cells)
     while cells and is_blank(cells[-1]):
         cells.pop()
@@ -289,14 +304,14 @@ def _without_heading(name, rows):
 
 
 def _refuse_half_a_heading(name, rows):
-    """Raise InputError for a heading that names heights without volumes, or the reverse."""
+    """Raise InputError for a heading with heights but no volumes, or the reverse."""
     for row, cells in rows:
         texts = [cell for cell in cells if has_letter(cell)]
         headings = [heading_of(cell) for cell in texts]
         roles = {heading.role for heading in headings} - {""}
         if len(texts) < 2 or not roles:
             continue
-        refused = next((one for one in headings if one.named.complaint), None)
+        refused = next((heading for heading in headings if heading.named.complaint), None)
         if refused is not None:
             raise InputError(Problem(name, refused.named.complaint, row, refused.text))
         text = message(

@@ -1,4 +1,4 @@
-"""Examination of a table's volumes: one suspicious row after the other, until all are explained."""
+"""Examination of the volumes of a table: explain suspicious rows in turn until none is left."""
 
 from dataclasses import dataclass
 
@@ -6,32 +6,41 @@ import numpy as np
 
 from tankcal.linter.hypotheses import explain
 
-# Screening of a table: is each volume where its neighbours put it?
+# Screening of a table: does each volume agree with its neighbours?
 #
-# A cubic through the rows around row i, without row i, predicts its volume. Rows of a table that
-# are rounded to a quantum q are off by at most q/2 each, so the prediction differs from the row by
-# at most q/2 (1 + sum |w|), with w the weights of the prediction: what exceeds that is no rounding.
-# A table that is rougher than its rounding (accumulated rounding, or rows too far apart for a
-# cubic) is judged by its own roughness instead, the running median of these differences.
+# A cubic through the rows around row i, without row i, predicts its volume. Rows rounded to a
+# quantum q have errors of at most q/2 each, so the prediction differs from the row by at most
+# q/2 (1 + sum |w|), with w the weights of the prediction. A larger difference is not rounding.
+# For a table rougher than its rounding (accumulated rounding, or rows too far apart for a cubic),
+# the limit is its own roughness, the running median of these differences.
 # Source of the leave-one-out formula: Allen 1974, Technometrics 16(1) 125-127 (PRESS).
 
 DEGREE, WINDOW = 3, 13
-FEWEST_ROWS = 6  # of a stretch that is screened
-LEAST_SPARED = 1e-6  # of a row's own share: below it, the others say nothing about it
+FEWEST_ROWS = 6  # fewest rows of a screened stretch
+LEAST_SPARED = 1e-6  # smallest 1 - leverage; below it, other rows do not predict the row
 ROUGHNESS_ROWS, ROUGHNESS_FACTOR = 25, 6.0
 
 
 @dataclass
 class Rows:
-    """The rows under examination; the findings change them as they are made.
+    """The rows under examination; findings modify them.
 
-    height     (rows,) ascending, in steps of the table
-    volume     (rows,) in quanta; corrected where a finding explains what is wrong
-    is_sound   (rows,) False for rows whose volume is known to be wrong
-    is_settled (rows,) True for rows whose difference has been explained
-    joints     rows that begin a new stretch: across them nothing is smooth
-    weight     (rows,) 1 where only the volume is rounded, less where the height is rounded, too
-    noise      largest rounding error of a row of weight 1, in quanta
+    Attributes
+    ----------
+    height : ndarray, shape (rows,)
+        Ascending, in steps of the table.
+    volume : ndarray, shape (rows,)
+        In quanta; corrected where a finding explains an error.
+    is_sound : ndarray of bool, shape (rows,)
+        False for rows with a wrong volume.
+    is_settled : ndarray of bool, shape (rows,)
+        True for rows whose difference is explained.
+    joints : set of int
+        Rows that begin a new stretch; the table is not smooth across them.
+    weight : ndarray, shape (rows,)
+        1 if only the volume is rounded, less if the height is rounded as well.
+    noise : float
+        Largest rounding error of a row of weight 1, in quanta.
     """
 
     height: np.ndarray
@@ -43,7 +52,7 @@ class Rows:
     noise: float
 
     def window(self, row, width):
-        """Rows of the same stretch around a row, itself among them; at most `width`."""
+        """Return at most `width` rows of the same stretch around a row, including the row."""
         sound = np.flatnonzero(self.is_sound)
         stretch = np.searchsorted(self.joints, sound, side="right")
         place = int(np.searchsorted(sound, row))
@@ -53,42 +62,46 @@ class Rows:
 
 
 def leave_one_out(rows):
-    """((rows,) row minus prediction, (rows,) what rounding allows), in quanta, times the weight.
+    """Return row minus prediction (rows,) and its limit by rounding (rows,), in quanta, weighted.
 
-    The second is infinite for rows that are not screened.
+    The limit is infinite for rows that are not screened.
     """
     difference, allowed = np.zeros(len(rows.height)), np.full(len(rows.height), np.inf)
     sound = np.flatnonzero(rows.is_sound)
     stretch = np.searchsorted(rows.joints, sound, side="right")
     low = np.searchsorted(stretch, stretch, side="left")
     high = np.searchsorted(stretch, stretch, side="right")
-    own = np.flatnonzero(high - low >= FEWEST_ROWS)
-    if len(own) == 0:
+    screened = np.flatnonzero(high - low >= FEWEST_ROWS)
+    if len(screened) == 0:
         return difference, allowed
-    start = np.clip(own - WINDOW // 2, low[own], np.maximum(low[own], high[own] - WINDOW))
+    start = np.clip(
+        screened - WINDOW // 2, low[screened], np.maximum(low[screened], high[screened] - WINDOW)
+    )
     place = start[:, None] + np.arange(WINDOW)
-    is_in = place < high[own][:, None]
+    is_in = place < high[screened][:, None]
     others = sound[np.minimum(place, len(sound) - 1)]
-    row = sound[own]
+    row = sound[screened]
     apart = (rows.height[others] - rows.height[row][:, None]) * is_in
+    # Heights scaled to 1 keep the powers of the cubic well conditioned.
     apart /= np.abs(apart).max(axis=1)[:, None]
     weight = rows.weight[others] * is_in
     basis = apart[..., None] ** np.arange(DEGREE + 1) * weight[..., None]
     values = (rows.volume[others] - rows.volume[row][:, None]) * weight
     q, _ = np.linalg.qr(basis)
-    number = np.arange(len(own))
-    hat = np.einsum("nk,njk->nj", q[number, own - start], q)
-    leverage = hat[number, own - start]
+    number = np.arange(len(screened))
+    # Row of the hat matrix: prediction with the row. Division by 1 - leverage removes the row.
+    hat = np.einsum("nk,njk->nj", q[number, screened - start], q)
+    leverage = hat[number, screened - start]
     spared = np.maximum(1 - leverage, LEAST_SPARED)
     difference[row] = -np.einsum("nj,nj->n", hat, values) / spared
-    weights = (np.abs(hat).sum(axis=1) - leverage) / spared
+    weights = (np.abs(hat).sum(axis=1) - leverage) / spared  # sum |w| of the prediction
     is_predicted = 1 - leverage > LEAST_SPARED
     allowed[row] = np.where(is_predicted, rows.noise * (1 + weights) * (1 + 1e-9), np.inf)
     return difference, allowed
 
 
 def most_suspicious(rows):
-    """The row that is furthest from what its neighbours allow, or None when all are explained."""
+    """Row with the largest difference relative to its limit, or None if all rows are explained."""
     difference, allowed = leave_one_out(rows)
     screened = np.flatnonzero(np.isfinite(allowed))
     if len(screened) == 0:
@@ -105,21 +118,26 @@ def most_suspicious(rows):
 
 
 MOST_STORIES = 150
-_SECOND_LOOK = 10  # rows about a joint that only looked like one
+_SECOND_LOOK = 10  # rows examined again about a rejected joint
 _SAME_SIZE = 0.02
 _FEWEST_FOR_SLOPES = 4  # rows
-# The area of the cut in the last interval, against the intervals before it. Where the last row is
-# at a part of a step, curves through the rows predict it poorly, but no tank doubles its area.
+# Area of the cross section in the last interval over that of the intervals before it. If the last
+# step is shorter, curves through the rows predict it poorly, but no tank doubles its area.
 _INTERVALS_BEFORE_LAST, _LEAST_RATIO, _MOST_RATIO = 3, 0.25, 2.0
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong with some rows.
+    """An error of some rows.
 
-    kind   "row", "swap", "block" (rows first to last are off together) or "shift" (all from first)
-    first, last  rows concerned, numbers within the table
-    size   by how much the volumes are too large, quanta; of a swap 0
+    Attributes
+    ----------
+    kind : str
+        "row", "swap", "block" (rows first to last have a common error) or "shift" (all from first).
+    first, last : int
+        Rows concerned, numbered within the table.
+    size : float
+        Error of the volumes, quanta; 0 for a swap.
     """
 
     kind: str
@@ -132,10 +150,16 @@ class Fault:
 class Examination:
     """Result of an examination.
 
-    faults    in the order of the table
-    joints    rows after which the area of the cut jumps, or its derivative
-    volume    (rows,) mended, quanta; nan where a row is wrong
-    complete  False when the table is too rough to be examined to its end
+    Attributes
+    ----------
+    faults : tuple of Fault
+        In the order of the table.
+    joints : tuple of int
+        Rows after which the area of the cross section or its derivative jumps.
+    volume : ndarray, shape (rows,)
+        Corrected volumes, quanta; nan for wrong rows.
+    complete : bool
+        False if the table is too rough for a complete examination.
     """
 
     faults: tuple[Fault, ...]
@@ -145,9 +169,10 @@ class Examination:
 
 
 def examine(height, volume, rounding):
-    """`Examination` of (rows,) rising heights, in steps, and (rows,) volumes, in quanta.
+    """Return the `Examination` of ascending heights, in steps, and volumes, in quanta.
 
-    rounding  (rows,) largest rounding error of each height, in steps: 0 where it is a multiple
+    All arrays have shape (rows,). rounding is the largest rounding error of each height, in steps:
+    0 for a multiple of a step.
     """
     count = len(height)
     noise = 0.5 + 8e-16 * float(np.abs(volume).max())
@@ -187,7 +212,7 @@ def examine(height, volume, rounding):
 
 
 def _excess_of_last(rows, rounding):
-    """A list of the Fault of the last row, where its volume needs twice the area below it."""
+    """Return a list with the Fault of the last row, if its interval implies twice the area."""
     height, volume = rows.height, rows.volume
     if len(height) < FEWEST_ROWS:
         return []
@@ -205,9 +230,10 @@ def _excess_of_last(rows, rounding):
 
 
 def _slopes_around(slope):
-    """(rows,) the larger slope beside each row, without the two intervals that it ends.
+    """Larger slope (rows,) beside each row, excluding the two intervals that end at the row.
 
-    A wrong volume makes these two steep, and would so excuse itself by the rounding of its height.
+    A wrong volume makes these two intervals steep, which would raise the limit for rounding of
+    heights.
     """
     count = len(slope) + 1
     if count < _FEWEST_FOR_SLOPES:
@@ -218,31 +244,31 @@ def _slopes_around(slope):
 
 
 def _reopen(rows, joint):
-    """Look again, without a joint that left more than rounding, now that the others are known."""
-    rows.joints = [one for one in rows.joints if one != joint]
+    """Examine rows again without a joint that leaves more than rounding."""
+    rows.joints = [kept_joint for kept_joint in rows.joints if kept_joint != joint]
     rows.is_settled[max(joint - _SECOND_LOOK, 0) : joint + _SECOND_LOOK] = False
 
 
 def _beyond_joint(rows, best, moved):
-    """The best hypothesis, or a better one: a wrong row beside a joint may be a joint elsewhere.
+    """Return the best hypothesis; a wrong row beside a joint may be a joint elsewhere.
 
-    moved  joints that were asked about already
+    moved: joints already tested.
     """
     beside = [j for j in rows.joints if best.kind == "row" and best.rows[0] in (j, j - 1)]
     if not beside or beside[0] in moved:
         return best
     joint = beside[0]
     moved.add(joint)
-    rows.joints = [one for one in rows.joints if one != joint]
-    other = explain(rows, best.rows[0])
-    if other.kind == "joint" and other.rows[0] != joint:
-        return other
+    rows.joints = [near_joint for near_joint in rows.joints if near_joint != joint]
+    alternative = explain(rows, best.rows[0])
+    if alternative.kind == "joint" and alternative.rows[0] != joint:
+        return alternative
     rows.joints = sorted([*rows.joints, joint])
     return best
 
 
 def _mend(rows, best):
-    """The faults of an alternative; its rows are mended, or left out from now on."""
+    """Return the faults of an alternative; correct its rows, or exclude them from now on."""
     first, last = best.rows[0], best.rows[-1]
     if best.kind == "swap":
         rows.volume[[first, last]] = rows.volume[[last, first]]
@@ -261,16 +287,16 @@ def _mend(rows, best):
 
 
 def _is_below_nothing(volume, size):
-    """Whether an expected volume is so far below zero that the row is right: near the bottom.
+    """Whether an expected volume is so far below zero that the row is right, as near the bottom.
 
-    An empty tank above its bottom, or one that leans: nothing is the nearer to what was found.
+    The tank may be empty above its bottom, or tilted; zero is then nearer to the row.
     """
     expected = volume - size
     return volume >= 0 and expected < 0 and -expected > 0.5 * size
 
 
 def _merged(faults, count):
-    """Shifts that undo each other are one block; one that leaves a single row is that row."""
+    """Merge opposite shifts into a block, and a block of one row into a wrong row."""
     shifts = sorted((f for f in faults if f.kind == "shift"), key=lambda fault: fault.first)
     others = [f for f in faults if f.kind != "shift"]
     left = []

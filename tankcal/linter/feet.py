@@ -1,13 +1,13 @@
-"""Heights in feet and inches: which of the ways to write them a column keeps to.
+"""Heights in feet and inches: determine the notation of a column.
 
-    5' 3 3/16", 5 ft 3 3/16 in   marks say what is what
-    5-3 3/16, 5-03-3/16, 5-3     feet and inches, a fraction where there is one
+    5' 3 3/16", 5 ft 3 3/16 in   marks identify the parts
+    5-3 3/16, 5-03-3/16, 5-3     feet and inches, with an optional fraction
     5-03-03                      feet, inches, and eighths or sixteenths of an inch
-    10 1/4, 10¼, 10-1/4          inches, or another unit of the heading that is not feet
+    10 1/4, 10¼, 10-1/4          inches, or another unit in the heading except feet
 
-The last part of the last one is of the unit that the heading names (ft-in-16, ft-in-8ths). Where
-the heading names none, a part of 8 or more somewhere in the column can only be a sixteenth; a
-column of parts up to 7 may be either, and is asked about.
+In 5-03-03, the heading states the unit of the last part (ft-in-16, ft-in-8ths). Without such a
+heading, a part of 8 or more anywhere in the column means sixteenths. Parts up to 7 are ambiguous
+and cause an error.
 """
 
 import re
@@ -23,7 +23,7 @@ from tankcal.messages import message
 from tankcal.tank.dips import INCHES_PER_FOOT, METRES_PER_INCH, parse_dip
 
 _SAME = 1e-9
-_FEET_DECIMALS = 4  # of a metre, in a label with decimals of an inch
+_FEET_DECIMALS = 4  # decimals of a metre in a label with decimals of an inch
 _MARKS = ("'", '"', "\u2032", "\u2033", "\u2019", "\u201d", "ft")
 _FRACTION = re.compile(r"\d{1,3}-\d{1,2}(?:[ -]+\d{1,2}/\d{1,2})?", re.ASCII)
 _PARTS = re.compile(r"(\d{1,3})-(\d{1,2})-(\d{1,2})", re.ASCII)
@@ -33,22 +33,32 @@ _EIGHTHS, _SIXTEENTHS = 8, 16
 
 
 def feet_reader(name, cells, heading, rows, log):
-    """Function of a cell that gives its `Reading` in metres; None for a column of plain numbers.
+    """Return a function from a cell to its `Reading` in metres; None for a column of plain numbers.
 
-    name     of the table, for messages
-    cells    of the column of heights
-    heading  of that column
-    rows     where the cells stand in the file
-    log      told where sixteenths are known by the parts alone
+    Parameters
+    ----------
+    name : str
+        Name of the table, for messages.
+    cells : sequence
+        Cells of the column of heights.
+    heading : str
+        Heading of the column.
+    rows : sequence of int
+        Row numbers of the cells in the file.
+    log : Log
+        Receives a note if only the parts show that they are sixteenths.
 
-    Raises InputError where parts of an inch may be eighths or sixteenths.
+    Raises
+    ------
+    InputError
+        If parts of an inch may be eighths or sixteenths.
     """
     cells = [(cell, row) for cell, row in zip(cells, rows, strict=True) if has_digit(cell)]
     texts = [_typed(cell) if isinstance(cell, str) else "" for cell, _ in cells]
-    most, said = len(texts) / 2, parts_of_inch(heading.text)
+    most, unit_of_parts = len(texts) / 2, parts_of_inch(heading.text)
     in_parts = [_PARTS.fullmatch(text) for text in texts]
-    if sum(one is not None for one in in_parts) > most:
-        unit = said or _parts_by_shape(name, in_parts, [row for _, row in cells], log)
+    if sum(in_part is not None for in_part in in_parts) > most:
+        unit = unit_of_parts or _parts_by_shape(name, in_parts, [row for _, row in cells], log)
         return lambda cell: _read_parts(cell, unit)
     in_fractions = sum(_FRACTION.fullmatch(text) is not None for text in texts)
     is_told = heading.is_in_feet or any("/" in text for text in texts)
@@ -59,11 +69,18 @@ def feet_reader(name, cells, heading, rows, log):
 
 
 def fraction_reader(cells, heading, style):
-    """Function of a cell that gives its `Reading` in the unit of the heading; None without any.
+    """Return a function from a cell to its `Reading` in the unit of the heading.
 
-    cells    of the column of heights
-    heading  of that column: 10 1/4 under feet may be 10 ft 1/4 in, and is refused
-    style    of the plain numbers among them
+    None if not needed.
+
+    Parameters
+    ----------
+    cells : sequence
+        Cells of the column of heights.
+    heading : str
+        Heading of the column; 10 1/4 under feet may be 10 ft 1/4 in, and is refused.
+    style : Style
+        Style of plain numbers in the column.
     """
     if not any(number_with_fraction(cell) is not None for cell in cells):
         return None
@@ -83,11 +100,11 @@ def fraction_reader(cells, heading, style):
 
 
 def number_with_fraction(cell):
-    """The Fraction of a cell such as 10 1/4, 10-1/4, 10¼ or 3/8; None of any other cell."""
-    found = _WITH_FRACTION.fullmatch(_typed(cell)) if isinstance(cell, str) else None
-    if found is None or not 0 <= int(found[2]) < int(found[3]):
+    """Return the Fraction of a cell such as 10 1/4, 10-1/4, 10¼ or 3/8; None for any other cell."""
+    match = _WITH_FRACTION.fullmatch(_typed(cell)) if isinstance(cell, str) else None
+    if match is None or not 0 <= int(match[2]) < int(match[3]):
         return None
-    return int(found[1] or 0) + Fraction(int(found[2]), int(found[3]))
+    return int(match[1] or 0) + Fraction(int(match[2]), int(match[3]))
 
 
 def _no_fraction(cell):
@@ -100,42 +117,42 @@ def _no_fraction(cell):
 
 
 def _typed(text):
-    """A label with its fraction in figures: 10¼ as 10 1/4."""
+    """Return a label with its fraction in digits: 10¼ as 10 1/4."""
 
-    def figures(found):
-        return f"{found[1]} " * bool(found[1]) + normalize("NFKD", found[2]).replace("\u2044", "/")
+    def figures(match):
+        return f"{match[1]} " * bool(match[1]) + normalize("NFKD", match[2]).replace("\u2044", "/")
 
     return _VULGAR.sub(figures, text.strip())
 
 
 def _parts_by_shape(name, in_parts, rows, log):
-    """16, or any where no part says anything; InputError where eighths are as likely."""
-    parts = {int(one[3]): row for one, row in zip(in_parts, rows, strict=True) if one}
-    first = next(row for one, row in zip(in_parts, rows, strict=True) if one)
+    """Return 16, or any value if no part matters; raise InputError if eighths are as likely."""
+    parts = {int(parts[3]): row for parts, row in zip(in_parts, rows, strict=True) if parts}
+    first = next(row for parts, row in zip(in_parts, rows, strict=True) if parts)
     if max(parts) == 0:
         return _SIXTEENTHS
     if max(parts) < _EIGHTHS:
-        found = next(one[0] for one in in_parts if one and int(one[3]))
+        example = next(in_part[0] for in_part in in_parts if in_part and int(in_part[3]))
         text = message(
             "lint_parts_of_inch",
             "found {found}, and no part of an inch over 7; expected a heading that says ft-in-8 or "
             "ft-in-16",
-            found=found,
+            found=example,
         )
         raise InputError(Problem(name, text, first))
     text = message(
         "lint_by_sixteenths",
         "heights such as {found} are taken as feet, inches and sixteenths: the heading does not "
         "say so",
-        found=next(one[0] for one in in_parts if one and int(one[3]) >= _EIGHTHS),
+        found=next(in_part[0] for in_part in in_parts if in_part and int(in_part[3]) >= _EIGHTHS),
     )
     log.warning(name, text, first)
     return _SIXTEENTHS
 
 
 def _read_parts(cell, unit):
-    found = _PARTS.fullmatch(cell.strip()) if isinstance(cell, str) else None
-    feet, inches, parts = map(int, found.groups()) if found else (0, INCHES_PER_FOOT, 0)
+    match = _PARTS.fullmatch(cell.strip()) if isinstance(cell, str) else None
+    feet, inches, parts = map(int, match.groups()) if match else (0, INCHES_PER_FOOT, 0)
     if inches >= INCHES_PER_FOOT or parts >= unit:
         text = message(
             "lint_no_parts_of_inch",

@@ -1,4 +1,4 @@
-"""Any file as grids of cells: CSV, an Excel workbook, text of a PDF, or a record."""
+"""Read any file as grids of cells: CSV, Excel workbook, text of a PDF, or record."""
 
 import csv
 import json
@@ -19,12 +19,18 @@ MOST_LINES = 100_000
 
 @dataclass(frozen=True)
 class Grid:
-    """Cells as they stand.
+    """Cells of a sheet as written.
 
-    name     of the file, or file and sheet, as messages show it
-    rows     (row number, cells) of each row that is not blank
-    is_text  CSV: every number is text, and a row wider than its heading is wrong
-    sheet    name of the sheet
+    Attributes
+    ----------
+    name : str
+        File, or file and sheet, as shown in messages.
+    rows : tuple
+        (row number, cells) of each row that is not blank.
+    is_text : bool
+        CSV: every number is text, and a row wider than its heading is an error.
+    sheet : str
+        Name of the sheet.
     """
 
     name: str
@@ -34,7 +40,7 @@ class Grid:
 
 
 def read_grids(path, log):
-    """Tuple of `Grid`; empty after telling `log` why the file cannot be read."""
+    """Return the `Grid`s of a file; () after reporting to `log` why it cannot be read."""
     if not path.exists():
         log.problem(
             path.name,

@@ -1,7 +1,7 @@
-"""Which columns of a table hold heights and which volumes, and in which units, by their headings.
+"""Identify columns of heights and volumes, and their units, from their headings.
 
-English, Portuguese and Spanish; the unit stands in the heading, in brackets or as a word, or in a
-row of units below it.
+Headings may be in English, Portuguese or Spanish. The unit is part of the heading, in brackets or
+as a word, or stands in a row of units below it.
 """
 
 import re
@@ -39,7 +39,7 @@ _STANDARD = re.compile("standard|padrao|estandar|tipica")
 _FACTOR = re.compile("coverage|abrangencia|cobertura")
 _OF_SOMETHING_ELSE = re.compile("radius|raio|radio|area|input|entrada|height|altura|dip")
 _COVERAGE = re.compile(r"\bk ?= ?(\d{1,2}(?:[.,]\d{1,4})?)", re.ASCII)
-_BOUND = re.compile("from|to|de|a|ate|desde|hasta")  # of an interval of volumes
+_BOUND = re.compile("from|to|de|a|ate|desde|hasta")  # bounds of a range of volumes
 _RATE = re.compile(r"(\w*)[ )\]]*/ ?(mm|cm|dm|m|in|ft|pol)\b")
 _SYMBOL = re.compile("h|hl")  # h/cm: a height in cm
 _FEET = re.compile("ft|foot|feet|pes|pies")
@@ -50,10 +50,10 @@ _PARTS = re.compile("proportional|proporciona|interpola|milimetrica")
 
 @dataclass(frozen=True)
 class Heading:
-    """Role and unit of a column by its heading.
+    """Role and unit of a column from its heading.
 
-    role   "height", "ullage", "volume" or "" (anything else)
-    named  the `Unit`; NO_UNIT of other roles
+    role is "height", "ullage", "volume" or "" (other); named is the `Unit`, NO_UNIT for other
+    roles.
     """
 
     text: str
@@ -62,17 +62,17 @@ class Heading:
 
     @property
     def unit(self):
-        """Size of the unit in m or m3; None when the heading names none that can be used."""
+        """Size of the unit in m or m3; None if the heading states no usable unit."""
         return self.named.size
 
     @property
     def is_in_feet(self):
-        """Whether it names feet."""
+        """Whether the heading contains feet."""
         return _any(_FEET, _words(self.text))
 
     @property
     def is_in_feet_and_inches(self):
-        """Whether it names both, as the heading of labels such as 5-3 does."""
+        """Whether the heading contains feet and inches, as for labels such as 5-3."""
         return self.is_in_feet and (
             self.role != "volume"
             and len({size_of(w, LENGTH) for w in _words(self.text)} - {None}) > 1
@@ -81,13 +81,20 @@ class Heading:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Kind and unit of a column of uncertainties by its heading.
+    """Kind and unit of a column of uncertainties from its heading.
 
-    is_expanded  U; else the standard uncertainty u
-    unit         size of its unit in m3; None when the heading names none
-    in_percent   of the volume
-    k            coverage factor that the heading names, or None
-    complaint    why the unit that is written cannot be used, or ""
+    Attributes
+    ----------
+    is_expanded : bool
+        True: U; False: standard uncertainty u.
+    unit : float or None
+        Size of its unit in m3; None if the heading states no usable unit.
+    in_percent : bool
+        Whether it is in percent of the volume.
+    k : float or None
+        Coverage factor in the heading.
+    complaint : str
+        Why the stated unit cannot be used, or "".
     """
 
     is_expanded: bool
@@ -98,7 +105,7 @@ class Uncertainty:
 
 
 def uncertainty_of(cell):
-    """The `Uncertainty` of volumes that a heading announces, or None."""
+    """Return the `Uncertainty` of volumes in a heading, or None."""
     if not isinstance(cell, str):
         return None
     words, letters = _words(cell), re.findall(r"[A-Za-z]+", cell)
@@ -118,13 +125,13 @@ def uncertainty_of(cell):
 
 
 def is_coverage_factor(cell):
-    """Whether a heading announces coverage factors."""
+    """Whether a heading is that of coverage factors."""
     words = _words(cell) if isinstance(cell, str) else []
     return words[:1] == ["k"] or _any(_FACTOR, words)
 
 
 def heading_of(cell):
-    """The `Heading` of a cell; without a role for a cell that is no text."""
+    """Return the `Heading` of a cell; no role for a cell without text."""
     if not isinstance(cell, str):
         return Heading("", "")
     text, words = cell.strip(), _words(cell)
@@ -152,30 +159,30 @@ def heading_of(cell):
 
 
 def _is_rate(text):
-    """Whether a heading is of volumes per height (L/cm); h/cm and ft/in are none."""
-    found = _RATE.search(plain_text(text))
-    if found is None:
+    """Whether a heading is of volume per height (L/cm); h/cm and ft/in are not."""
+    match = _RATE.search(plain_text(text))
+    if match is None:
         return False
-    over = found[1]
+    over = match[1]
     is_height = _HEIGHT.fullmatch(over) or _ULLAGE.fullmatch(over) or _SYMBOL.fullmatch(over)
     return not (is_height or size_of(over, LENGTH) is not None)
 
 
 def is_unit(cell):
-    """Whether a cell names a unit, with its factor perhaps, and nothing else."""
+    """Whether a cell contains only a unit, possibly with a factor."""
     return isinstance(cell, str) and names_only_units(cell)
 
 
 def parts_of_inch(text):
-    """8 or 16 where a heading of feet and inches names eighths or sixteenths, else None."""
-    found = _OF_INCH.search(plain_text(text)) if _any(_FEET, _words(text)) else None
-    if found is None:
+    """Return 8 or 16 if a heading of feet and inches contains eighths or sixteenths, else None."""
+    match = _OF_INCH.search(plain_text(text)) if _any(_FEET, _words(text)) else None
+    if match is None:
         return None
-    return int(found[1]) if found[1] else 8 if found[2] else 16
+    return int(match[1]) if match[1] else 8 if match[2] else 16
 
 
 def announces_parts(cell):
-    """Whether a cell announces proportional parts."""
+    """Whether a cell is a heading of proportional parts."""
     return isinstance(cell, str) and _PARTS.search(plain_text(cell)) is not None
 
 

@@ -1,4 +1,7 @@
-"""The heights of a table: readable, rising by a constant step, no row missing, twice or astray."""
+"""Checks of the heights of a table.
+
+Readable, constant steps, missing, doubled or misplaced rows.
+"""
 
 from bisect import bisect_left
 from dataclasses import dataclass
@@ -8,20 +11,27 @@ import numpy as np
 from tankcal.messages import message
 
 FEWEST_ROWS = 3
-_EXACT = 1e-6  # of a step
-_SHORTEST_ZONE = 3  # steps
-_MOST_STRAY = 100  # rows out of order that are told one by one
+_EXACT = 1e-6  # tolerance of exact heights, relative to a step
+_SHORTEST_ZONE = 3  # fewest equal steps of a zone
+_MOST_STRAY = 100  # largest number of rows out of order that are reported separately
 
 
 @dataclass(frozen=True)
 class Series:
     """The rows of a table in the order of rising volumes.
 
-    entries    of the table, without doubled rows
-    height     (rows,) strictly rising, in the unit of the table; what was mended is mended here
-    direction  1, or -1 where these are ullages with their sign changed
-    step       usual step
-    rounding   (rows,) largest rounding error of each height; 0 where the steps are even
+    Attributes
+    ----------
+    entries : list of Entry
+        Entries of the table, without doubled rows.
+    height : ndarray, shape (rows,)
+        Strictly rising, in the unit of the table, with corrections applied.
+    direction : int
+        1, or -1 for ullages with changed sign.
+    step : float
+        Usual step.
+    rounding : ndarray, shape (rows,)
+        Largest rounding error of each height; 0 if the steps are even.
     """
 
     entries: tuple
@@ -32,9 +42,9 @@ class Series:
 
 
 def series_of(table, log, even_steps=True):
-    """`Series` of a table; None after telling `log` that there are too few to judge.
+    """Return the `Series` of a table; None after reporting to `log` that it has too few rows.
 
-    even_steps  False: rows stand where they are needed, and no step says that one is missing
+    even_steps False: the rows are breakpoints, so that uneven steps do not show missing rows.
     """
     entries = [entry for entry in table.entries if _is_readable(table, entry, log)]
     if len(entries) < FEWEST_ROWS:
@@ -97,13 +107,13 @@ def _is_readable(table, entry, log):
 
 
 def _trend(values):
-    """1 where most values rise, -1 where most fall."""
+    """Return 1 if most values rise, -1 if most fall."""
     steps = np.sign(np.diff(values))
     return 1 if steps.sum() >= 0 else -1
 
 
 def _usual_step(height, entries):
-    """(usual step, what steps may differ by): heights may be rounded multiples of a step."""
+    """Return (usual step, tolerance of steps); heights may be rounded multiples of a step."""
     steps = np.diff(height)
     rising = steps[steps > 0]
     if len(rising) == 0:
@@ -120,7 +130,7 @@ def _usual_step(height, entries):
 
 
 class _Teller:
-    """Tells what is wrong with a row's height, in the heights and rows of the file."""
+    """Reports problems of heights, with the heights and rows of the file."""
 
     def __init__(self, table, entries, height, direction, log):
         self.table, self.entries, self.log = table, entries, log
@@ -138,7 +148,7 @@ class _Teller:
 
 
 def _in_order(teller, step, tolerance):
-    """(heights, which rows to keep) with the rows that break the order told and mended."""
+    """Return (heights, mask of kept rows); rows that break the order are reported and corrected."""
     height = teller.height.copy()
     keep = np.ones(len(height), dtype=bool)
     chain = _longest_rise(height)
@@ -160,7 +170,7 @@ def _in_order(teller, step, tolerance):
             continue
         partner = _partner(k, stray, expected, height, tolerance)
         twin = _twin(height[k], chain, teller.height, tolerance)
-        found = teller.shown(height[k])
+        shown = teller.shown(height[k])
         if partner is not None:
             done.add(partner)
             teller.problem(k, _swapped(teller, height, k, k, partner))
@@ -168,7 +178,7 @@ def _in_order(teller, step, tolerance):
             keep[k] = False
             _tell_twin(teller, k, twin)
         elif expected[k] is not None:
-            teller.problem(k, _rather(found, teller.shown(expected[k])))
+            teller.problem(k, _rather(shown, teller.shown(expected[k])))
             height[k] = expected[k]
         else:
             _tell_astray(teller, k, height)
@@ -176,7 +186,7 @@ def _in_order(teller, step, tolerance):
 
 
 def _rising(height, rows, tolerance):
-    """The rows by their heights; of rows that were mended to the same height the first."""
+    """Return the rows sorted by height; of rows corrected to equal heights, keep the first."""
     order = sorted(rows, key=lambda k: height[k])
     return [
         k for n, k in enumerate(order) if n == 0 or height[k] - height[order[n - 1]] > tolerance
@@ -203,7 +213,7 @@ def _longest_rise(height):
 
 
 def _place(k, chain, stray, height, step, tolerance):
-    """Height that a stray row should have where it stands; None where no row is missing."""
+    """Height that a misplaced row should have at its position; None if no row is missing there."""
     place = bisect_left(chain, k)
     left = chain[place - 1] if place else None
     right = chain[place] if place < len(chain) else None
@@ -218,57 +228,57 @@ def _place(k, chain, stray, height, step, tolerance):
 
 
 def _twin(value, chain, height, tolerance):
-    """The row in order that has a height, or None."""
+    """Return the row in order with a given height, or None."""
     place = bisect_left(chain, value - tolerance, key=lambda c: height[c])
     is_twin = place < len(chain) and abs(height[chain[place]] - value) <= tolerance
     return chain[place] if is_twin else None
 
 
 def _partner(k, stray, expected, height, tolerance):
-    """The stray row whose place this one has, and the other way round."""
-    for other in stray:
-        if other > k and expected[k] is not None and expected[other] is not None:
-            here = abs(expected[k] - height[other]) <= tolerance
-            there = abs(expected[other] - height[k]) <= tolerance
-            if here and there:
-                return other
+    """Return the misplaced row with which this row is swapped, or None."""
+    for candidate in stray:
+        if candidate > k and expected[k] is not None and expected[candidate] is not None:
+            here = abs(expected[k] - height[candidate]) <= tolerance
+            is_expected = abs(expected[candidate] - height[k]) <= tolerance
+            if here and is_expected:
+                return candidate
     return None
 
 
 def _tell_twin(teller, k, twin):
     first, second = teller.entries[twin].volume, teller.entries[k].volume
-    found = message(
+    text = message(
         "lint_height_twice",
         "height {height} is also in row {row}",
         height=teller.shown(teller.height[k]),
         row=teller.row(twin),
     )
     if first.value == second.value:
-        teller.problem(k, message("lint_row_twice", "{found}: the row is given twice", found=found))
+        teller.problem(k, message("lint_row_twice", "{found}: the row is given twice", found=text))
         return
     expected = message(
         "lint_two_volumes",
         "{found}, with volume {there}, here {here}",
-        found=found,
+        found=text,
         there=first.text,
         here=second.text or message("lint_none", "none"),
     )
     teller.problem(k, expected)
 
 
-def _rather(found, expected):
+def _rather(text, expected):
     return message(
-        "lint_rather", "found {found}; expected {expected}", found=found, expected=expected
+        "lint_rather", "found {found}; expected {expected}", found=text, expected=expected
     )
 
 
-def _swapped(teller, height, k, one, other):
+def _swapped(teller, height, k, first_row, second_row):
     return message(
         "lint_rows_swapped",
         "found {found}; rows {row} and {other_row} are swapped",
         found=teller.shown(height[k]),
-        row=teller.row(one),
-        other_row=teller.row(other),
+        row=teller.row(first_row),
+        other_row=teller.row(second_row),
     )
 
 
@@ -291,7 +301,7 @@ def _tell_astray(teller, k, height):
 
 
 def _even_steps(teller, step, tolerance):
-    """Heights with single odd ones mended; rows that are missing are told."""
+    """Return heights with single odd ones corrected; missing rows are reported."""
     height = teller.height.copy()
     for k in range(1, len(height) - 1):
         low, high = height[k] - height[k - 1], height[k + 1] - height[k]
@@ -323,7 +333,7 @@ def _tell_gaps(teller, height, tolerance):
             continue
         missing = round(steps[k] / largest) - 1
         fits = missing > 0 and abs(steps[k] - (missing + 1) * largest) <= 2 * tolerance
-        found = message(
+        order = message(
             "lint_follows",
             "{after} follows {before}",
             after=teller.shown(height[k + 1]),
@@ -345,29 +355,29 @@ def _tell_gaps(teller, height, tolerance):
                 "lint_a_step", "a step of {step}, as in the other rows", step=f"{largest:.9g}"
             )
         text = message(
-            "lint_gap", "found that {found}; expected {expected}", found=found, expected=expected
+            "lint_gap", "found that {found}; expected {expected}", found=order, expected=expected
         )
         teller.problem(k + 1, text)
 
 
 def _rounding(entries, height, tolerance):
-    """(rows,) half of the last decimal of the heights that stand in no run of even steps.
+    """Half of the last decimal, shape (rows,), of heights outside runs of even steps; 0 inside.
 
-    The last row, the top of the tank, may be rounded to its place in such a run.
+    The last row, the top of the tank, may be rounded to its position in such a run.
     """
     is_even = ~np.isnan(_zone_steps(np.diff(height), tolerance))
     is_exact = np.append(is_even, False) | np.append(False, is_even)
     half = np.array([0.5 * 10.0**-entry.height.decimals for entry in entries])
-    if tolerance > 0.5 * half.max():  # rows of a step that is no whole number of decimals
+    if tolerance > 0.5 * half.max():  # the step is not a whole number of last decimals
         return half
     is_exact[-1] &= 10.0 ** -entries[-1].height.decimals > 0.05 * np.diff(height).min()
     return np.where(is_exact, 0.0, half)
 
 
 def _zone_steps(steps, tolerance):
-    """(steps,) the step of the zone that each belongs to; nan for single odd steps.
+    """Step (steps,) of the zone of each step; nan for single odd steps.
 
-    A zone has three equal steps or more; in a shorter table a single one will do.
+    A zone has at least three equal steps, or one in a shorter table.
     """
     zone = np.full(len(steps), np.nan)
     start = 0

@@ -1,13 +1,13 @@
-"""What explains a row that is not where its neighbours put it: the simplest hypothesis.
+"""Hypotheses that explain a suspicious row: select the simplest sufficient one.
 
-Null hypotheses: the rows around are smooth after all (a polynomial, or the series of a lying
-cylinder at its end), or the area of the cut jumps there (a joint, an edge of deadwood): then the
-curves through the rows on its two sides meet between its two rows. Alternatives: one volume is
-wrong, two neighbouring volumes are swapped, some rows are shifted together, two volumes are wrong.
+Null hypotheses: the rows are smooth after all (a polynomial, or the series of a lying cylinder at
+its end), or the area of the cross section jumps (a joint, an edge of deadwood). The curves through
+the rows on both sides of a jump then meet between its two rows. Alternatives: one volume is wrong,
+two neighbouring volumes are swapped, some rows are shifted together, or two volumes are wrong.
 
-An alternative is believed when it leaves nothing but rounding about a cubic (or less) while no
-hypothesis of fewer parameters does; or, where rows lie too far apart for that, when it leaves a
-sixth of what the best null hypothesis leaves.
+An alternative is accepted if it leaves only rounding about a cubic (or lower degree) while no
+hypothesis with fewer parameters does. If rows are too far apart for that, it must leave at most a
+sixth of the residuals of the best null hypothesis.
 """
 
 from dataclasses import dataclass
@@ -15,26 +15,34 @@ from functools import cached_property
 
 import numpy as np
 
-WIDTHS = 17, 11  # rows that are looked at together; fewer where more fit no simple hypothesis
-PLAIN = 4  # parameters of a cubic
-MOST_IN_FEW = 4  # parameters of a hypothesis that few rows may fit: a line and one wrong row
+WIDTHS = 17, 11  # numbers of rows examined together; the second if no simple hypothesis fits
+PLAIN = 4  # number of parameters of a cubic
+MOST_IN_FEW = 4  # largest number of parameters for few rows: a line and one wrong row
 BETTER_FACTOR = 6.0
-LEAST_SIZE = 2.5  # quanta
-POINTS_BETWEEN, TOUCH = 9, 0.02  # gap of curves that touch, seen at 9 points, over its largest
-_LEAST_FREE = 1e-6  # share of a block that the curve leaves free
-PRICE = 3.0  # of a parameter, in units of twice the log likelihood; about the log of the rows
+LEAST_SIZE = 2.5  # smallest error of a volume that rounding does not explain, quanta
+POINTS_BETWEEN, TOUCH = 9, 0.02  # points between two rows; smallest relative gap of touching curves
+_LEAST_FREE = 1e-6  # smallest share of a block that the curve does not absorb
+PRICE = 3.0  # penalty of a parameter, in twice the log likelihood; about the log of the rows
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One explanation of a few rows.
+    """An explanation of a few rows.
 
-    kind        "smooth", "joint", "row", "swap", "block", "shift" or "pair"
-    parameters  how many numbers it needs
-    rss         sum of the squares of what it leaves, quanta
-    excess      largest part of what rounding allows that it leaves; above 1: more than rounding
-    rows        (first, last) rows concerned; last is None for "from there on"
-    sizes       by how much they are off, quanta
+    Attributes
+    ----------
+    kind : str
+        "smooth", "joint", "row", "swap", "block", "shift" or "pair".
+    parameters : int
+        Number of parameters.
+    rss : float
+        Sum of squares of the residuals, quanta.
+    excess : float
+        Largest residual over its limit by rounding; above 1: more than rounding.
+    rows : tuple
+        (first, last) rows concerned; last None: all rows from first.
+    sizes : tuple of float
+        Errors of the rows, quanta.
     """
 
     kind: str
@@ -50,15 +58,15 @@ class Hypothesis:
 
     @property
     def is_telling(self):
-        """A null hypothesis, or of a size that two rounded digits do not explain."""
+        """Whether it is a null hypothesis, or its size exceeds the effect of two rounded digits."""
         return not self.sizes or max(abs(size) for size in self.sizes) >= LEAST_SIZE
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Least squares of (n,) values over an (n, p) basis; residuals carry the rows' weights.
+    """Least-squares curve of values (n,) with a basis (n, p); residuals are weighted.
 
-    noise  largest rounding error of a row of weight 1
+    noise: largest rounding error of a row of weight 1.
     """
 
     basis: np.ndarray
@@ -76,7 +84,7 @@ class Curve:
 
     @cached_property
     def residual_maker(self):
-        """(n, n) matrix that turns weighted values into residuals."""
+        """Matrix (n, n) from weighted values to residuals."""
         q = self._qr[0]
         return np.eye(len(self.values)) - q @ q.T
 
@@ -95,8 +103,9 @@ class Curve:
         return _excess(self.residuals, self.residual_maker, self.noise)
 
     def at(self, basis):
-        """((m,) values, (m,) what rounding may do to them) at (m, p) rows of the basis."""
+        """Values (m,) and their largest errors by rounding (m,) at rows (m, p) of the basis."""
         q, r = self._qr
+        # weights of the observed values in the predicted values
         weights = q @ np.linalg.solve(r.T, basis.T)
         return (self.values * self.weight) @ weights, self.noise * np.abs(weights).sum(axis=0)
 
@@ -107,7 +116,7 @@ def _excess(residuals, maker, noise):
 
 
 def explain(rows, row):
-    """The `Hypothesis` to be believed about a row that is suspicious."""
+    """Return the accepted `Hypothesis` about a suspicious row."""
     hypothesis = _explain(rows, row, WIDTHS[0])
     if hypothesis.is_null and hypothesis.excess > 1:
         closer = _explain(rows, row, WIDTHS[1])
@@ -136,6 +145,7 @@ def _bases(rows, members, x):
     """Polynomials of degree 1 to 5, and the series of a lying cylinder at the ends of the table."""
     bases = [x[:, None] ** np.arange(degree + 1) for degree in range(1, 6) if len(x) >= degree + 3]
     sound = np.flatnonzero(rows.is_sound)
+    # The volume of a lying cylinder grows with the power 1.5 of the height above its end.
     powers = np.array([0, 1.5, 2, 2.5, 3, 3.5])
     for is_end, away in (
         (members[0] == sound[0], x - x[0]),
@@ -153,10 +163,10 @@ def _ends(rows, members):
 
 
 def _blocks(curve, members, ends):
-    """Hypotheses of one row, or of neighbouring rows, that are off together.
+    """Hypotheses of one row, or of neighbouring rows, with a common error.
 
-    Where the members begin or end for good, "all but the first" is the first that is wrong, and
-    the last alone is no shift of what follows.
+    At an end of the table or a joint, "all but the first" is replaced by a wrong first row. The
+    last row only is not a shift of the rows that follow.
     """
     count = len(members)
     first, end = np.triu_indices(count + 1, 1)
@@ -167,9 +177,10 @@ def _blocks(curve, members, ends):
     number = np.arange(count)[:, None]
     blocks = ((number >= first) & (number < end)) * curve.weight[:, None]
     maker, residuals = curve.residual_maker, curve.residuals
+    # A block adds one column to the basis: its size and the rss follow without another fit.
     moved = maker @ blocks
     norm = np.einsum("nk,nk->k", blocks, moved)
-    # relative: a row whose height is rounded has a small weight
+    # relative, as a row with a rounded height has a small weight
     keep = norm > _LEAST_FREE * np.einsum("nk,nk->k", blocks, blocks)
     first, end, moved, norm = first[keep], end[keep], moved[:, keep], norm[keep]
     size = residuals @ blocks[:, keep] / norm
@@ -178,6 +189,7 @@ def _blocks(curve, members, ends):
     hypotheses = []
     for k in np.argsort(rss)[:12]:
         left = residuals - size[k] * moved[:, k]
+        # residual maker of the basis with the block
         maker_left = maker - np.outer(moved[:, k], moved[:, k]) / norm[k]
         excess = _excess(left, maker_left, curve.noise) if parameters <= PLAIN else np.inf
         low, high = int(members[first[k]]), int(members[end[k] - 1])
@@ -194,7 +206,7 @@ def _blocks(curve, members, ends):
 
 
 def _swaps(curve, members):
-    """Hypotheses of two neighbouring volumes in each other's place."""
+    """Hypotheses of two neighbouring volumes swapped."""
     hypotheses = []
     maker = curve.residual_maker
     for first in range(len(members) - 1):
@@ -209,12 +221,12 @@ def _swaps(curve, members):
 
 
 def _joints(all_rows, members):
-    """Hypotheses of two curves that meet between two rows, neither of them falling there.
+    """Hypotheses of two rising curves that meet between two rows.
 
-    At a joint of courses they cross, at the edge of a cone they only touch.
+    They cross at a joint of courses; at the edge of a cone they only touch.
     """
     hypotheses, x = [], all_rows.basis
-    bottom = 0 if members[0] == 0 else 1  # bottoms have shapes of their own, two rows are enough
+    bottom = 0 if members[0] == 0 else 1  # bottoms have varied shapes; two rows are enough
     for cut in range(2, len(x) - 1):
         between = np.linspace(x[cut - 1], x[cut], POINTS_BETWEEN)
         left = _side(all_rows, slice(0, cut), between, bottom)
@@ -235,11 +247,11 @@ def _joints(all_rows, members):
 
 
 def _side(all_rows, part, between, spare):
-    """[(curve, its values between two rows, what rounding does to them)] of degree 1 to 3.
+    """Curves of degree 1 to 3: (curve, values between two rows, their errors by rounding).
 
-    Only curves that do not fall there, with `spare` rows more than parameters.
+    Only curves that do not fall there, with `spare` more rows than parameters.
     """
-    found, x = [], all_rows.basis[part]
+    curves, x = [], all_rows.basis[part]
     for degree in (1, 2, 3):
         if len(x) > degree + spare:
             powers = np.arange(degree + 1)
@@ -247,12 +259,12 @@ def _side(all_rows, part, between, spare):
             curve = Curve(basis, values, all_rows.weight[part], all_rows.noise)
             values, allowed = curve.at(between[:, None] ** powers)
             if values[-1] - values[0] >= -(allowed[0] + allowed[-1]):
-                found.append((curve, values, allowed))
-    return found
+                curves.append((curve, values, allowed))
+    return curves
 
 
 def _pairs(curve, members):
-    """The best hypothesis of two rows that are wrong, each by its own amount."""
+    """Best hypothesis of two wrong rows with independent errors."""
     maker, residuals = curve.residual_maker, curve.residuals
     first, second = np.triu_indices(len(members), 1)
     a, b, c = maker[first, first], maker[first, second], maker[second, second]

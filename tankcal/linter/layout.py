@@ -1,7 +1,7 @@
-"""The tables of a grid: heights and volumes of each row, as they are read.
+"""Tables of a grid: heights and volumes of each row as read.
 
-A printed table repeats its pair of columns across the page, and its heading on every page. The
-pairs are read column by column or row by row, whichever lets the heights rise.
+A printed table repeats its pair of columns across the page, and its heading on every page. Pairs
+are read by column or by row, whichever makes the heights rise.
 """
 
 import re
@@ -18,7 +18,7 @@ from tankcal.linter.wide import wide_cells
 from tankcal.messages import message
 
 _FEW_SPLIT_ROWS = 5
-_FEWEST_MULTIPLES = 3  # volumes that a factor may be the rounding of
+_FEWEST_MULTIPLES = 3  # fewest volumes that show whether a factor is the rounding
 _WHOLE = 1e-9
 _TOTAL = re.compile("(?:(?:grand|sub)[ -]?)?tota(?:ls?|is|les)|sum(?:a|as|me)?|soma|average|mean|"
                     "media|promedio|maximum|maximo|end|fim|fin")  # fmt: skip
@@ -26,9 +26,9 @@ _TOTAL = re.compile("(?:(?:grand|sub)[ -]?)?tota(?:ls?|is|les)|sum(?:a|as|me)?|s
 
 @dataclass(frozen=True)
 class Entry:
-    """One pair: its row in the file, heading of its volume column, height and volume as read.
+    """One pair: row in the file, heading of its volumes, height and volume as read.
 
-    uncertainty, k  as read beside them; None where the table has no such column
+    uncertainty and k are read from columns beside them; None without such columns.
     """
 
     row: int
@@ -42,18 +42,30 @@ class Entry:
 
 @dataclass(frozen=True)
 class Table:
-    """One capacity table as it stands.
+    """A capacity table as read.
 
-    name           of file and sheet, for messages
-    entries        in the order of the table
-    height_unit_m  size of the unit of heights, m; None: the heading names none
-    volume_unit_m3 size of the unit of volumes, m3; None: the heading names none
-    is_ullage      heights fall while volumes rise
-    has_heading    False: the first two columns were taken
-    is_text        every number is text (CSV)
-    uncertainty    what the heading of its uncertainties says; None: it has none
-    volume_choices sizes of a unit of volumes that has several meanings (gallons), m3
-    complaints     Problems of the heading for which the table cannot be read
+    Attributes
+    ----------
+    name : str
+        File and sheet, for messages.
+    entries : list of Entry
+        In the order of the table.
+    height_unit_m : float or None
+        Size of the unit of heights, m; None: not stated.
+    volume_unit_m3 : float or None
+        Size of the unit of volumes, m3; None: not stated.
+    is_ullage : bool
+        Whether heights fall while volumes rise.
+    has_heading : bool
+        False: the first two columns were used.
+    is_text : bool
+        Whether every number is text (CSV).
+    uncertainty : Uncertainty or None
+        From the heading of its uncertainties.
+    volume_choices : tuple of float
+        Sizes of an ambiguous unit of volumes (gallons), m3.
+    complaints : tuple of Problem
+        Problems of the heading that prevent reading the table.
     """
 
     name: str
@@ -69,7 +81,7 @@ class Table:
 
 
 def tables_of(grid, log):
-    """Tuple of `Table`: blocks with the same headings are pages of one table."""
+    """Return the `Table`s of a grid; blocks with equal headings are pages of one table."""
     pages = {}
     for block in blocks_of(grid):
         pages.setdefault((block.kind, block.is_parts), []).append(block)
@@ -83,10 +95,10 @@ def tables_of(grid, log):
 
 
 def _kinds(pairs):
-    """Numbers of the pairs of each kind: of the same units, and the same place after a height."""
+    """Indices of the pairs of each kind: equal units and equal position after a height."""
     kinds = {}
     for number, pair in enumerate(pairs):
-        place = sum(other.height == pair.height for other in pairs[:number])
+        place = sum(earlier.height == pair.height for earlier in pairs[:number])
         units = (pair.height_heading.named, pair.volume_heading.named)
         kinds.setdefault((place, units), []).append(number)
     return list(kinds.values())
@@ -94,17 +106,17 @@ def _kinds(pairs):
 
 def _table(grid, blocks, numbers, log):
     cells = [_cells(grid, block, [block.pairs[k] for k in numbers], log) for block in blocks]
-    by_column = [one for page in cells for column in page for one in column]
+    by_column = [item for page in cells for column in page for item in column]
     orders = [by_column]
     if len(numbers) > 1 or blocks[0].wide is not None:
-        orders.append([one for page in cells for row in _by_row(page) for one in row])
-    style = style_of([[one[3] for one in by_column], [one[4] for one in by_column]])
+        orders.append([item for page in cells for row in _by_row(page) for item in row])
+    style = style_of([[item[3] for item in by_column], [item[4] for item in by_column]])
     first = blocks[0].pairs[numbers[0]]
-    heights, rows = [one[3] for one in by_column], [one[0] for one in by_column]
+    heights, rows = [item[3] for item in by_column], [item[0] for item in by_column]
     in_feet = feet_reader(grid.name, heights, first.height_heading, rows, log)
     in_fractions = None if in_feet else fraction_reader(heights, first.height_heading, style)
-    orders = [[_entry(one, style, in_feet or in_fractions) for one in order] for order in orders]
-    entries = min(orders, key=_turns)
+    orders = [[_entry(item, style, in_feet or in_fractions) for item in order] for order in orders]
+    entries = min(orders, key=_count_reversals)
     height_m = 1.0 if in_feet else _height_unit(grid.name, first, in_fractions, entries, log)
     complaints = [problem for block in blocks for problem in block.complaints]
     if blocks[0].has_heading:
@@ -127,25 +139,25 @@ def _table(grid, blocks, numbers, log):
 
 
 def _height_unit(name, pair, in_fractions, entries, log):
-    """Unit of the heights, m; fractions of a unit that no heading names are of inches."""
+    """Unit of the heights, m; fractions without a unit in the heading are of inches."""
     named = pair.height_heading.named
     if not in_fractions:
         return named.size
     if named.is_named:
-        # 10 1/4 below "1/8 in" counts inches: the factor is the graduation
+        # 10 1/4 below "1/8 in" is in inches: the factor is the graduation
         return None if named.size is None else named.size / min(named.factor, 1.0)
-    found = next(one for one in entries if "/" in one.height.text)
+    example = next(entry for entry in entries if "/" in entry.height.text)
     text = message(
         "lint_by_inches",
         "heights such as {found} are taken as inches: the heading names no unit",
-        found=found.height.text,
+        found=example.height.text,
     )
-    log.warning(name, text, found.row, found.height_column)
+    log.warning(name, text, example.row, example.height_column)
     return INCH_M
 
 
 def _complaints_of_heights(pair, in_fractions, entries):
-    """(text, column) of a heading of heights that cannot be read."""
+    """Return (text, column) of headings of heights that cannot be used."""
     heading = pair.height_heading
     if heading.named.complaint:
         yield heading.named.complaint, heading.text
@@ -171,9 +183,9 @@ def _complaints_of_volumes(pair, entries):
 
 
 def _complaints_of_factor(heading, readings):
-    """(text, column) where a factor may as well be the rounding of the numbers: 10 L, 1/8 in."""
+    """Return (text, column) if a factor may be the rounding of the numbers: 10 L, 1/8 in."""
     factor = heading.named.factor
-    values = [one.value for one in readings if one.value]
+    values = [reading.value for reading in readings if reading.value]
     if factor == 1 or heading.named.is_multiplied or not values:
         return
     multiples = values if factor < 1 else [value / factor for value in values]
@@ -192,13 +204,13 @@ def _complaints_of_factor(heading, readings):
 
 
 def _example(readings, are_whole, factor):
-    """Text of a number that is no whole number of a graduation, or of the last multiple."""
-    texts = [one.text for one in readings if one.value]
+    """Text of a number that is not a multiple of the graduation, or of the last multiple."""
+    texts = [reading.text for reading in readings if reading.value]
     return texts[-1] if factor > 1 else texts[are_whole.index(False)]
 
 
 def _cells(grid, block, pairs, log):
-    """For each pair of columns the list of (row, two names, height, volume, what is beside)."""
+    """For each pair of columns, the list of (row, two names, height, volume, related cells)."""
     if block.wide is not None:
         rows = [row for row in block.rows if not _is_total(row[1], block.pairs[0])]
         return wide_cells(grid.name, block.wide, rows, log)
@@ -220,20 +232,20 @@ def _cells(grid, block, pairs, log):
             height = cells[pair.height] if pair.height < len(cells) else None
             volume = cells[pair.volume] if pair.volume < len(cells) else None
             if not has_digit(height) and (not has_digit(volume) or _is_total(cells, pair)):
-                continue  # a note between the rows, or their total
-            told = Reading(None) if is_split else None  # told already
+                continue  # a note or a total between the rows
+            unreadable = Reading(None) if is_split else None  # reported already
             beside = {
-                what: cells[place] if place < len(cells) else None
-                for what, place in pair.beside.items()
+                kind: cells[place] if place < len(cells) else None
+                for kind, place in pair.beside.items()
             }
             column.append(
-                (row, names[pair.height], names[pair.volume], height, told or volume, beside)
+                (row, names[pair.height], names[pair.volume], height, unreadable or volume, beside)
             )
     return columns
 
 
 def _is_total(cells, pair):
-    """Whether a row without a height is named as a total, or another summary of the rows."""
+    """Whether a row without a height is a total or another summary of the rows."""
     if pair.height < len(cells) and has_digit(cells[pair.height]):
         return False
     words = (re.findall("[a-z-]+", plain_text(cell)) for cell in cells if isinstance(cell, str))
@@ -241,7 +253,7 @@ def _is_total(cells, pair):
 
 
 def _refuse_split_rows(grid, block):
-    """Raise InputError when the numbers themselves are split into cells, row after row."""
+    """Raise InputError if the numbers themselves are split into several cells, row after row."""
     split = [(row, cells) for row, cells in block.rows if len(trimmed(cells)) > block.width]
     if grid.is_text and len(split) > max(_FEW_SPLIT_ROWS, 0.2 * len(block.rows)):
         row, cells = split[0]
@@ -257,7 +269,7 @@ def _refuse_split_rows(grid, block):
 
 
 def _names(pairs):
-    """{position: heading}, with the number of the column where a heading stands there twice."""
+    """{position: heading}, with the number of the column if a heading appears twice."""
     named = {p.height: p.height_heading.text for p in pairs}
     named |= {p.volume: p.volume_heading.text for p in pairs}
     texts = list(named.values())
@@ -280,12 +292,12 @@ def _entry(cells, style, read_height):
     row, height_name, volume_name, height, volume, beside = cells
     volume = volume if isinstance(volume, Reading) else read_number(volume, style)
     height = read_height(height) if read_height else read_number(height, style)
-    beside = {what: read_number(cell, style) for what, cell in beside.items()}
+    beside = {kind: read_number(cell, style) for kind, cell in beside.items()}
     return Entry(row, height_name, volume_name, height, volume, **beside)
 
 
-def _turns(entries):
-    """How often the heights turn back."""
+def _count_reversals(entries):
+    """Number of reversals of the heights."""
     heights = [entry.height.value for entry in entries if entry.height.value is not None]
     rises = [b > a for a, b in pairwise(heights)]
     return min(sum(rises), len(rises) - sum(rises))

@@ -1,4 +1,4 @@
-"""From a file to findings."""
+"""Examine a file and return its findings."""
 
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -16,18 +16,26 @@ from tankcal.linter.volumes import Volumes, volumes_of
 from tankcal.messages import message
 from tankcal.text.display import table_html
 
-# Proportional parts beside a table: in proportion to each other, and to the table's own rise.
+# Proportional parts beside a table: proportional to each other, and to the rise of the table.
 
-MOST_PARTS = 15  # rows: 9 of a centimetre, 7 or 15 of an inch
+MOST_PARTS = 15  # largest number of rows: 9 for a centimetre, 7 or 15 for an inch
 _AS_THE_TABLE = 0.02
 
 
 def check_parts(table, main, log):
-    """Tell parts that are out of proportion, or unlike the rise of the main table.
+    """Report parts that are not proportional, or disagree with the rise of the main table.
 
-    table  of parts: marks 1, 2, ... and their volumes; main  (area low, area high), m2, of the
-    steps of the main table
-    Part j is rounded j * p: some p must lie between (v_j - q/2) / j and (v_j + q/2) / j for all j.
+    Parameters
+    ----------
+    table : Table
+        Table of parts: marks 1, 2, ... and their volumes.
+    main : (float, float)
+        Smallest and largest area of the steps of the main table, m2.
+    log : Log
+
+    Notes
+    -----
+    Part j is j * p, rounded. Some p must lie between (v_j - q/2) / j and (v_j + q/2) / j for all j.
     """
     entries = [e for e in table.entries if e.height.value and e.volume.value is not None]
     if len(entries) < 2:
@@ -74,18 +82,18 @@ def _check_size(table, entries, low, high, main, log):
         log.problem(table.name, text, entries[0].row, entries[0].volume_column)
 
 
-_PART_OF_LARGEST = 0.5  # of its rows: smaller tables beside it are not capacity tables
+_PART_OF_LARGEST = 0.5  # smallest share of the rows of the largest table of a capacity table
 _ROWS_OF_SLOPE = 10
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was found in a table.
+    """A finding about a table.
 
     Attributes
     ----------
     severity : str
-        "error", or "warning" for what only deserves a look.
+        "error" or "warning".
     problem : Problem
         With its row and column.
     """
@@ -98,25 +106,25 @@ class Finding:
 
     @property
     def text(self):
-        """The whole line as a Message."""
-        said = self.problem.expected
+        """The complete line as a Message."""
+        expected = self.problem.expected
         if self.severity == "error":
-            text = message("is_error", "error: {text}", text=said)
+            text = message("is_error", "error: {text}", text=expected)
         else:
-            text = message("is_warning", "warning: {text}", text=said)
+            text = message("is_warning", "warning: {text}", text=expected)
         return replace(self.problem, expected=text).text
 
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """What was found in the tables of a file.
+    """Findings about the tables of a file.
 
     Attributes
     ----------
     findings : tuple of Finding
         In the order of the file.
     summaries : tuple of str
-        One line about each table that was read.
+        One line about each table read.
     """
 
     findings: tuple[Finding, ...]
@@ -136,8 +144,13 @@ class Report:
 
     def _repr_html_(self) -> str:
         rows = [
-            [one.severity, one.problem.row, one.problem.column, str(one.problem.expected)]
-            for one in self.findings
+            [
+                finding.severity,
+                finding.problem.row,
+                finding.problem.column,
+                str(finding.problem.expected),
+            ]
+            for finding in self.findings
         ]
         caption = "; ".join([*self.summaries, str(self)])
         return table_html(caption, ["", "row", "column", "finding"], rows)
@@ -192,7 +205,7 @@ def lint(
 
 @dataclass(frozen=True)
 class CheckedTable:
-    """A table with what its checks made of it: all but `table` None where it cannot be read."""
+    """A table and the results of its checks; all results None if it cannot be read."""
 
     table: Table
     series: Series | None
@@ -202,7 +215,7 @@ class CheckedTable:
 
 @dataclass(frozen=True)
 class Checked:
-    """The report of a file, and the capacity tables that it is about, the longest ones."""
+    """Report of a file, and its capacity tables, the longest ones."""
 
     report: Report
     tables: tuple[CheckedTable, ...]
@@ -216,11 +229,21 @@ def checked(
     choose=None,
     even_steps=True,
 ):
-    """`Checked` tables of a file, as `lint` examines them.
+    """Return the `Checked` tables of a file, examined as in `lint`.
 
-    declared  Units (None for what is not) of columns whose headings name none
-    choose    function of the tables of all sheets that gives the number of the sheet to read;
-              None: that of the longest table
+    Parameters
+    ----------
+    path : path
+    nominal : Nominal, optional
+    sheet : str, optional
+        As in `lint`.
+    declared : Units, optional
+        Units of columns whose headings state none; None for unknown ones.
+    choose : callable, optional
+        Function of the tables of all sheets that returns the index of the sheet; None: the sheet
+        with the longest table.
+    even_steps : bool, optional
+        As in `lint`.
     """
     path, log = Path(path), Log()
     grids = read_grids(path, log)
@@ -236,22 +259,22 @@ def checked(
     ]
     if complaints:
         raise InputError(list(dict.fromkeys(complaints)))
-    summaries, areas, found = [], None, []
+    summaries, areas, checked_tables = [], None, []
     for table in tables:
         if len(table.entries) >= _PART_OF_LARGEST * longest:
-            has_several = sum(other.name == table.name for other in tables) > 1
-            one, summary, areas = _check(table, nominal, log, even_steps, has_several)
+            has_several = sum(other_table.name == table.name for other_table in tables) > 1
+            checked_table, summary, areas = _check(table, nominal, log, even_steps, has_several)
             summaries.append(summary)
-            found.append(one)
+            checked_tables.append(checked_table)
     for table in tables:
         if len(table.entries) <= MOST_PARTS < longest:
             check_parts(table, areas, log)
     report = Report(_findings(log), tuple(line for line in summaries if line))
-    return Checked(report, tuple(found))
+    return Checked(report, tuple(checked_tables))
 
 
 def _declared(table, declared):
-    """The table with units that were declared, where its headings name none."""
+    """Return the table with declared units where its headings state none."""
     choices = table.volume_choices
     is_choice = not choices or declared.volume_m3 in choices
     is_settled = bool(choices) and is_choice and declared.volume_m3 is not None
@@ -264,7 +287,7 @@ def _declared(table, declared):
 
 
 def _tables(file, grids, sheet, log, choose=None):
-    """The tables of the sheet to be read; raises InputError where there is none."""
+    """Return the tables of the selected sheet; raise InputError if there is none."""
     if sheet is not None:
         names = [grid.sheet for grid in grids if grid.sheet]
         if sheet not in names:
@@ -277,17 +300,19 @@ def _tables(file, grids, sheet, log, choose=None):
             )
             raise InputError(Problem(file, expected))
         grids = [grid for grid in grids if grid.sheet == sheet]
-    found = []
+    sheets_read = []
     for grid in grids:
-        told = Log()
-        tables = tables_of(grid, told)
+        sheet_log = Log()
+        tables = tables_of(grid, sheet_log)
         size = max((len(table.entries) for table in tables), default=0)
-        found.append((size, tables, told))
-    size, tables, told = max(found, key=lambda one: one[0], default=(0, (), Log()))
+        sheets_read.append((size, tables, sheet_log))
+    size, tables, sheet_log = max(
+        sheets_read, key=lambda candidate: candidate[0], default=(0, (), Log())
+    )
     if size and choose is not None:
-        _, tables, told = found[choose([one[1] for one in found])]
+        _, tables, sheet_log = sheets_read[choose([candidate[1] for candidate in sheets_read])]
     if size == 0:
-        refusals = [problem for *_, one in found for problem in one.problems]
+        refusals = [problem for *_, candidate in sheets_read for problem in candidate.problems]
         if refusals:
             raise InputError(refusals)
         expected = message(
@@ -296,15 +321,15 @@ def _tables(file, grids, sheet, log, choose=None):
             "such as height_m, volume_m3",
         )
         raise InputError(Problem(file, expected))
-    log.problems += told.problems
-    log.warnings += told.warnings
+    log.problems += sheet_log.problems
+    log.warnings += sheet_log.warnings
     return tables
 
 
 def _check(table, nominal, log, even_steps, has_several):
-    """(CheckedTable, summary, (least, largest) area in m2) of one table, its faults told.
+    """Return (CheckedTable, summary, (least, largest) area in m2) of one table; report its faults.
 
-    has_several  the summary names the column of volumes, since the file has more of them
+    has_several: whether the summary names the column of volumes, as the file has several.
     """
     if not table.has_heading:
         log.warning(
@@ -334,7 +359,7 @@ def _check(table, nominal, log, even_steps, has_several):
 
 
 def _areas(volumes, units):
-    """(least, largest) mean area of the cut over ten rows, m2."""
+    """Least and largest mean area of the cross section over ten rows, m2."""
     apart = min(_ROWS_OF_SLOPE, len(volumes.height) - 1)
     rise = volumes.volume[apart:] - volumes.volume[:-apart]
     area = rise / (volumes.height[apart:] - volumes.height[:-apart])
@@ -343,6 +368,6 @@ def _areas(volumes, units):
 
 
 def _findings(log):
-    found = [Finding("error", problem) for problem in log.problems]
-    found += [Finding("warning", problem) for problem in log.warnings]
-    return tuple(sorted(dict.fromkeys(found), key=lambda one: one.problem.row or 0))
+    findings = [Finding("error", problem) for problem in log.problems]
+    findings += [Finding("warning", problem) for problem in log.warnings]
+    return tuple(sorted(dict.fromkeys(findings), key=lambda finding: finding.problem.row or 0))

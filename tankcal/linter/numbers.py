@@ -1,7 +1,7 @@
-"""Numbers as people type them: decimal comma or point, thousands marks, how many decimals.
+"""Parse numbers as people write them: decimal comma or point, thousands separators, decimals.
 
-A file is read in the one style that leaves the fewest cells unreadable and lets the columns fall
-least often, so that 1.234 is read as 1.234 m3 in one file and as 1234 L in another.
+A file is read in the style that leaves the fewest cells unreadable and the fewest falls in its
+columns. So 1.234 is 1.234 m3 in one file and 1234 L in another.
 """
 
 import re
@@ -21,7 +21,7 @@ BLANK = message("lint_blank", "blank; expected a number")
 
 
 class Style(NamedTuple):
-    """How numbers are written: decimal mark, and the mark between thousands ("": none)."""
+    """Number format: decimal mark, and thousands separator ("": none)."""
 
     decimal: str
     thousands: str
@@ -29,13 +29,20 @@ class Style(NamedTuple):
 
 @dataclass(frozen=True)
 class Reading:
-    """One cell as a number.
+    """A cell read as a number.
 
-    value     None when it cannot be read, with the `complaint`
-    text      as written, with a decimal point and without thousands marks
-    decimals  written after the decimal mark
-    marks     whether it carries thousands marks
-    is_typed  whether it is text (in a workbook: a text that looks like a number)
+    Attributes
+    ----------
+    value : float or None
+        None if unreadable; see `complaint`.
+    text : str
+        As written, with a decimal point and without thousands separators.
+    decimals : int
+        Number of decimals written.
+    marks : bool
+        Whether it has thousands separators.
+    is_typed : bool
+        Whether it is text (in a workbook: text that looks like a number).
     """
 
     value: float | None
@@ -57,22 +64,22 @@ _PLAIN_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.AS
 
 
 def is_blank(cell):
-    """Whether a cell holds nothing."""
+    """Whether a cell is empty."""
     return cell is None or (isinstance(cell, str) and not cell.strip())
 
 
 def has_digit(cell):
-    """Whether a cell holds a number, or a text with a digit in it."""
+    """Whether a cell is a number, or text with a digit."""
     return not is_blank(cell) and (not isinstance(cell, str) or bool(re.search(r"\d", cell)))
 
 
 def has_letter(cell):
-    """Whether a cell is a text with a letter in it."""
+    """Whether a cell is text with a letter."""
     return isinstance(cell, str) and bool(re.search(r"[^\W\d_]", cell))
 
 
 def read_number(cell, style):
-    """`Reading` of a cell of a sheet (a number or a text) in a style."""
+    """Return the `Reading` of a cell (a number or text) in a style."""
     if isinstance(cell, str):
         text = cell.strip()
         return _read_text(text, style) if text else Reading(None, complaint=BLANK)
@@ -85,11 +92,11 @@ def read_number(cell, style):
     return _read_text(f"{cell:.15g}" if isinstance(cell, float) else str(cell), PLAIN, False)
 
 
-def _no_number(found):
-    return message("lint_no_number", "found {found}; expected a number", found=shown(found))
+def _no_number(text):
+    return message("lint_no_number", "found {found}; expected a number", found=shown(text))
 
 
-@lru_cache(maxsize=50_000)  # style_of reads most cells first
+@lru_cache(maxsize=50_000)  # cached because style_of reads most cells several times
 def _read_text(text, style, is_typed=True):
     plain, marks = text, False
     if style.thousands and style.thousands in text:
@@ -135,9 +142,9 @@ def _read_text(text, style, is_typed=True):
 
 
 def style_of(columns):
-    """The style that reads the columns best.
+    """Return the style that reads the columns best.
 
-    columns  lists of cells, each in the order of its table: heights, volumes
+    columns: lists of cells, in the order of the table: heights, volumes.
     """
     texts = [[cell.strip() for cell in column if isinstance(cell, str)] for column in columns]
     sample = "".join("".join(column) for column in texts)
@@ -164,9 +171,9 @@ def style_of(columns):
 
     best, least = PLAIN, float("inf")
     for style in possible:
-        found = badness(style, least)
-        if found < least:
-            best, least = style, found
+        score = badness(style, least)
+        if score < least:
+            best, least = style, score
         if least == 0:
             break
     return best

@@ -1,8 +1,8 @@
 """Tables in the text of a PDF: lines of numbers below a heading, as grids of cells.
 
-The text comes laid out, so that what stands below each other on the page does so in the text. Each
-heading that names heights and volumes begins a table, which goes on over the pages; lines of prose
-are left out. Cells of a line go to the columns that the numbers of its page stand in.
+The text keeps the layout of the page, so that cells below each other stay below each other. Each
+heading with heights and volumes begins a table, which may continue over pages; lines of prose are
+skipped. The cells of a line are assigned to the columns of numbers on its page.
 """
 
 import re
@@ -17,15 +17,15 @@ _NUMBER = re.compile(r"[+-]?[\d.,'\u2019\u00a0\u2009\u202f ]*\d[\d.,'\u2019\u00a
 _FEET = re.compile(r"\d+ ?(?:'|\u2032|\u2019|ft)[\d /.]*(?:\"|\u2033|\u201d|''|in)?|"
                    r"\d{1,3}-\d{1,2}(?:-\d{1,2}|[ -]\d{1,2}/\d{1,2})?")  # fmt: skip
 _GROUPED = re.compile(r"\d{1,3}(?: \d{3})+(?:[.,]\d+)?")
-_MARKS = "*\u2020\u2021"  # of a footnote
+_MARKS = "*\u2020\u2021"  # footnote marks
 _MOSTLY = 0.6
 _LINES_OF_HEADING = 3
-_HALF = 0.5  # of the lines
+_HALF = 0.5  # share of the lines
 
 
 @dataclass(frozen=True)
 class Word:
-    """A cell as it lies on its line, from column `start` of the text to `end`."""
+    """A cell on its line, from column `start` of the text to `end`."""
 
     start: int
     end: int
@@ -34,7 +34,7 @@ class Word:
 
 @dataclass
 class _Section:
-    """A heading, and the lines below it of each page."""
+    """A heading, and the lines below it on each page."""
 
     heading: list
     units: list = field(default_factory=list)
@@ -43,7 +43,7 @@ class _Section:
 
 
 def tables_of_text(pages):
-    """Rows (number, cells) of each table in the text of pages, its heading first."""
+    """Return rows (number, cells) of each table in the text of pages, heading first."""
     sections, current, since = [], None, 0
     for page, text in enumerate(pages, 1):
         for line, content in enumerate(text.split("\n")[: MOST_LINES_OF_PAGE - 1], 1):
@@ -63,7 +63,7 @@ def tables_of_text(pages):
 
 
 def words_of(line):
-    """The `Word`s of a line: cells stand two blanks apart, or are numbers one blank apart."""
+    """Return the `Word`s of a line; cells are two blanks apart, or numbers one blank apart."""
     words = []
     for match in _CELL.finditer(line):
         text = match[0].rstrip(_MARKS + " ")
@@ -80,7 +80,7 @@ def words_of(line):
 
 
 def is_data(words):
-    """Whether a line holds a row of a table: two cells or more, most of them numbers."""
+    """Whether a line is a row of a table: at least two cells, most of them numbers."""
     numbers = sum(_is_number(word.text) for word in words)
     return len(words) > 1 and numbers > _MOSTLY * len(words) and numbers > 1
 
@@ -95,7 +95,7 @@ def _is_heading(words):
 
 
 def _pages(section):
-    """[rows (number, cells)] of a section, page by page, each with the heading first."""
+    """Return the rows (number, cells) of a section by page, each page with the heading first."""
     pages, heading = [], None
     for lines in section.pages.values():
         columns = _columns(lines)
@@ -116,7 +116,7 @@ def _pages(section):
 
 
 def _columns(lines):
-    """[(start, end)] that the words of lines cover, those that overlap joined."""
+    """Return [(start, end)] covered by the words of lines, overlapping ranges merged."""
     spans = sorted((word.start, word.end) for _, words in lines for word in words)
     joined = [list(spans[0])]
     for start, end in spans[1:]:
@@ -128,7 +128,7 @@ def _columns(lines):
 
 
 def _with_empty(columns, heading):
-    """The columns, and those of the heading that no number stands in."""
+    """Return the columns, including columns of the heading without numbers."""
     if len(heading) <= len(columns):
         return columns
     empty = [
@@ -140,7 +140,7 @@ def _with_empty(columns, heading):
 
 
 def _column(word, columns):
-    """Number of the column that a word is in, or next to."""
+    """Index of the column that contains a word, or is nearest to it."""
 
     def apart(column):
         overlap = min(word.end, column[1]) - max(word.start, column[0])
@@ -151,7 +151,7 @@ def _column(word, columns):
 
 
 def _placed(words, columns):
-    """The texts of a heading, each over its column; those of the same column joined."""
+    """Return the heading texts by column; texts of one column are joined."""
     if len(words) == len(columns):
         return [word.text for word in words]
     texts = [None] * len(columns)
@@ -162,18 +162,20 @@ def _placed(words, columns):
 
 
 def _joined(pages):
-    """Pages with the same heading are one table, and those that have only its first columns."""
+    """Merge pages with the same heading, and pages that have only its first columns."""
     headings = [page[0][1] for page in pages]
-    found = {}
+    merged = {}
     for (row, heading), *rows in pages:
-        wider = [one for one in headings if one[: len(heading)] == heading]
+        wider = [
+            known_heading for known_heading in headings if known_heading[: len(heading)] == heading
+        ]
         widest = max(wider, key=len)
-        found.setdefault(widest, []).extend([(row, widest), *rows])
-    return list(found.values())
+        merged.setdefault(widest, []).extend([(row, widest), *rows])
+    return list(merged.values())
 
 
 def _headed(rows):
-    """The rows without a column that has no heading; more of them are kept, to be refused."""
+    """Remove one column without a heading from the rows; several are kept, to be refused."""
     width = max(len(cells) for _, cells in rows)
     texts = [rows[0][1][k] if k < len(rows[0][1]) else None for k in range(width)]
     filled = [sum(k < len(cells) and bool(cells[k]) for _, cells in rows[1:]) for k in range(width)]

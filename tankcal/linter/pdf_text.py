@@ -1,6 +1,6 @@
-"""The text of a PDF as it lies on its pages, by pypdf in a child: what ends the child, we survive.
+"""Text of a PDF in its layout, extracted with pypdf in a child process.
 
-Libraries that read PDFs can be led to hang or to ask for all the memory there is.
+PDF libraries may hang or exhaust the memory. The child process limits the damage.
 """
 
 import contextlib
@@ -11,9 +11,9 @@ import sys
 from tankcal.messages import message
 
 MOST_PAGES = 300
-MOST_CONTENT = 2_500_000  # bytes that draw the pages; it takes some ten seconds to lay out as many
+MOST_CONTENT = 2_500_000  # largest size of the page content, bytes; layout takes some ten seconds
 MOST_SECONDS = 60
-MEMORY_LIMIT = 2 << 30  # bytes of address space
+MEMORY_LIMIT = 2 << 30  # address space of the child, bytes
 PAGES, ENCRYPTED, MANY_PAGES, LONG_TEXT, DAMAGED = "pages", "encrypted", "many", "long", "damaged"
 _CODE = (
     "import json, sys; request = json.loads(sys.argv[1]); sys.path[:] = request['sys_path']; "
@@ -22,15 +22,18 @@ _CODE = (
 
 
 def pages_of(path, log):
-    """Tuple of the text of each page, laid out; None after telling `log` why there is none."""
-    kind, said = _asked_child(path)
-    if kind == PAGES and any(page.strip() for page in said):
-        return tuple(said)
-    log.problem(path.name, _refusal(kind, said))
+    """Return the text of each page in its layout.
+
+    None after reporting to `log` why there is none.
+    """
+    kind, answer = _asked_child(path)
+    if kind == PAGES and any(page.strip() for page in answer):
+        return tuple(answer)
+    log.problem(path.name, _refusal(kind, answer))
     return None
 
 
-def _refusal(kind, said):
+def _refusal(kind, answer):
     if kind == PAGES:
         return message(
             "lint_scanned_pdf",
@@ -43,7 +46,7 @@ def _refusal(kind, said):
         return message(
             "lint_long_pdf",
             "{count} pages; expected at most {most}: only those of the table",
-            count=said,
+            count=answer,
             most=MOST_PAGES,
         )
     if kind == LONG_TEXT:
@@ -57,7 +60,7 @@ def _refusal(kind, said):
 
 
 def _asked_child(path):
-    """(kind, pages or whatever is said of them) that a child answers."""
+    """Return the answer of a child process: (kind, pages or message)."""
     request = {"path": str(path.resolve()), "sys_path": sys.path}
     try:
         done = subprocess.run(
@@ -68,14 +71,14 @@ def _asked_child(path):
             timeout=MOST_SECONDS,
             check=False,
         )
-        kind, said = json.loads(done.stdout)
+        kind, answer = json.loads(done.stdout)
     except (subprocess.TimeoutExpired, OSError, ValueError):
         return DAMAGED, None
-    return kind, said
+    return kind, answer
 
 
 def main(request):
-    """Print [kind, what is said] of the PDF of a request as JSON."""
+    """Print [kind, answer] for the PDF of a request, as JSON."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 
@@ -102,7 +105,7 @@ def _answer(path):
 
 
 def _is_short(pages):
-    """Whether the pages draw at most MOST_CONTENT; counting it is quick, the layout is slow."""
+    """Whether the page content is at most MOST_CONTENT; counting is fast, the layout is slow."""
     size = 0
     for page in pages:
         content = page.get_contents()

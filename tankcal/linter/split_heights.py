@@ -1,8 +1,8 @@
-"""Heights in several columns: feet beside inches, metres beside centimetres.
+"""Heights in several columns: feet and inches, metres and centimetres.
 
-Two columns of heights before the volumes are either one height in two units (1.25 m, 125 cm), of
-which the first is read, or the parts of one height (4 ft, 3 in), which are added up. The rows
-decide.
+Two columns of heights before the volumes are either one height in two units (1.25 m, 125 cm) or the
+parts of one height (4 ft, 3 in). In the first case the first column is read; in the second case the
+parts are added. The rows decide between the cases.
 """
 
 import re
@@ -19,8 +19,8 @@ from tankcal.linter.numbers import has_digit, is_blank, read_number, style_of
 from tankcal.linter.units import INCH_M, Unit, plain_text
 from tankcal.messages import message
 
-_MOSTLY = 0.9  # of the rows
-_ROUNDED = 1.001  # of a last digit: heights in two units
+_MOSTLY = 0.9  # share of the rows
+_ROUNDED = 1.001  # largest difference of heights in two units, last digits
 _SAME = 1e-9
 _PARTS = re.compile(r"(?:1/)?(8|16|32|64) ?(?:ths?|nds?|avos?)?|(eighths?|oitavos?|octavos?)|"
                     r"(sixteenths?|dezesseis ?avos?|dieciseis ?avos?)|"
@@ -28,22 +28,27 @@ _PARTS = re.compile(r"(?:1/)?(8|16|32|64) ?(?:ths?|nds?|avos?)?|(eighths?|oitavo
 
 
 def parts_heading(cell):
-    """`Heading` of a column of parts of an inch behind one of inches; None for any other."""
-    found = _PARTS.fullmatch(plain_text(str(cell)).strip(" ()[].")) if not is_blank(cell) else None
-    if found is None:
+    """Return the `Heading` of parts of an inch after a column of inches; None for other columns."""
+    match = _PARTS.fullmatch(plain_text(str(cell)).strip(" ()[].")) if not is_blank(cell) else None
+    if match is None:
         return None
-    parts = int(found[1]) if found[1] else 8 if found[2] else 16 if found[3] else 1
+    parts = int(match[1]) if match[1] else 8 if match[2] else 16 if match[3] else 1
     return Heading(str(cell).strip(), "height", Unit(INCH_M / parts))
 
 
 def with_joined_heights(name, rows, places, headings):
-    """(rows, Problem or None): the heights of several columns joined in the first of them.
+    """Return (rows, Problem or None), with the heights of several columns combined in the first.
 
-    name      of the table, for messages
-    rows      (row number, cells); the cell of the first column becomes a number in its unit, or a
-              `BadCell`, where the columns are parts of one height
-    places    positions of the columns of heights, left to right
-    headings  their `Heading`s
+    Parameters
+    ----------
+    name : str
+        Name of the table, for messages.
+    rows : sequence
+        (row number, cells). If columns are parts of one height, the first cell becomes a number in
+        its unit, or a `BadCell`.
+    places : sequence of int
+        Positions of the columns of heights, left to right.
+    headings : sequence of Heading
     """
     sizes = [heading.unit for heading in headings]
     if len(places) < 2 or None in sizes or not all(a >= b for a, b in pairwise(sizes)):
@@ -51,7 +56,7 @@ def with_joined_heights(name, rows, places, headings):
     body = [(row, cells) for row, cells in rows if _has_height(cells, places)]
     columns = [_values([cells[k] if k < len(cells) else None for _, cells in body]) for k in places]
     columns[0] = _filled_down(columns[0])
-    values = np.array([[np.nan if one is None else float(one) for one in c] for c in columns])
+    values = np.array([[np.nan if cell is None else float(cell) for cell in c] for c in columns])
     if len(body) < 2 or _are_one_height(values[:2], sizes[:2]):
         return rows, None
     ratios = [round(a / b) for a, b in pairwise(sizes)]
@@ -80,7 +85,7 @@ def _has_height(cells, places):
 
 
 def _values(cells):
-    """Numbers of a column, of typed fractions too; None where a cell is none."""
+    """Numbers of a column, fractions included; None for a cell without a number."""
     style = style_of([cells])
     fractions = [number_with_fraction(cell) for cell in cells]
     return [
@@ -90,7 +95,7 @@ def _values(cells):
 
 
 def _filled_down(column):
-    """A column whose value is written only where it changes, with the value in every row."""
+    """Return a column with omitted repetitions of a value filled in."""
     last, filled = None, []
     for value in column:
         last = value if value is not None else last
@@ -99,7 +104,7 @@ def _filled_down(column):
 
 
 def _are_one_height(values, sizes):
-    """Whether two columns are one height in two units, up to the last digit of the coarser."""
+    """Whether two columns are one height in two units, within the last digit of the coarser one."""
     metres = values * np.array(sizes)[:, None]
     known = ~np.isnan(metres).any(axis=0)
     if not known.any():
@@ -118,7 +123,7 @@ def _digit(values):
 
 
 def _are_parts(values, ratios):
-    """Whether all columns but the last are whole numbers, and the parts smaller than a whole."""
+    """Whether all columns but the last are whole numbers, and each part is smaller than a whole."""
     whole = values[:-1]
     parts = values[1:]
     is_whole = np.isnan(whole) | (np.abs(whole - np.round(whole)) < _SAME)
@@ -128,7 +133,7 @@ def _are_parts(values, ratios):
 
 
 def _sum(values, cells, places, sizes, ratios):
-    """The height of a row in the unit of the first column, or a `BadCell`."""
+    """Height of a row in the unit of the first column, or a `BadCell`."""
     total = Fraction(0)
     for k, (value, place) in enumerate(zip(values, places, strict=True)):
         cell = cells[place] if place < len(cells) else None

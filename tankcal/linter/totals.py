@@ -1,4 +1,4 @@
-"""The table as a whole: units, total and last row against what the tank is meant to be."""
+"""Checks of the whole table: units, total and last row compared with the nominal tank."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -7,16 +7,16 @@ from math import log10, pi, sqrt
 from tankcal.messages import message
 
 _USUAL_HEIGHT_UNITS_M, _USUAL_VOLUME_UNITS_M3 = [1.0, 0.01, 0.001], [1.0, 0.001]
-_LEAST_VOLUME = 1e-9  # so that an empty table has proportions, too
-_LOWEST_M, _HIGHEST_M = 0.5, 40.0  # usual tanks
-_SLIMMEST, _FLATTEST = 1 / 20, 30  # diameter over height
+_LEAST_VOLUME = 1e-9  # avoids division by zero for an empty table
+_LOWEST_M, _HIGHEST_M = 0.5, 40.0  # range of usual tank heights
+_SLIMMEST, _FLATTEST = 1 / 20, 30  # range of usual ratios of diameter to height
 _CLOSE_DIAMETER, _CLOSE_VOLUME, _FAR = 0.02, 0.05, 0.2  # relative differences from nominal
-_LEAST_GAP_M, _USUAL_GAP_M = 0.005, 0.02  # between the last row and the nominal height
+_LEAST_GAP_M, _USUAL_GAP_M = 0.005, 0.02  # distance of the last row from the nominal height
 
 
 @dataclass(frozen=True)
 class Nominal:
-    """What the tank is meant to hold, and how high its shell is; None: not known.
+    """Nominal volume, diameter and shell height of the tank; None: unknown.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ NOTHING_NOMINAL = Nominal()
 
 @dataclass(frozen=True)
 class Units:
-    """Sizes of the units of a table: m, m3; None where they are not known."""
+    """Sizes of the units of a table, m and m3; None if unknown."""
 
     height_m: float | None
     volume_m3: float | None
@@ -43,17 +43,17 @@ NO_UNITS = Units(None, None)
 
 
 def units_of(table, volumes, log):
-    """`Units` by the headings; where one is silent, those that give a tank of usual proportions."""
+    """Return the `Units` from the headings, or those that give a tank of usual proportions."""
     pairs = _possible(table)
-    if table.volume_choices:  # volumes cannot tell gallons apart
-        pairs = [one for one in pairs if one.volume_m3 == table.volume_choices[0]]
-        told = message(
+    if table.volume_choices:  # volumes do not distinguish gallons
+        pairs = [pair for pair in pairs if pair.volume_m3 == table.volume_choices[0]]
+        note = message(
             "lint_gallons",
             "gallons of no country: taken as US gallons (3.7854 L); imperial gallons (4.54609 L) "
             "give volumes 20 % larger; expected US gal or imp gal in the heading",
         )
-        log.warning(table.name, told)
-    units = min(pairs, key=lambda one: _oddity(volumes, one))
+        log.warning(table.name, note)
+    units = min(pairs, key=lambda pair: _oddity(volumes, pair))
     if len(pairs) > 1:
         text = message(
             "lint_no_units",
@@ -66,8 +66,8 @@ def units_of(table, volumes, log):
 
 
 def likely_units(table, volumes):
-    """The `Units` that the headings allow and that give a tank of usual proportions."""
-    return [one for one in _possible(table) if _is_usual(volumes, one)]
+    """Return the `Units` permitted by the headings that give a tank of usual proportions."""
+    return [units for units in _possible(table) if _is_usual(volumes, units)]
 
 
 def _possible(table):
@@ -93,19 +93,19 @@ def _is_usual(volumes, units):
 
 
 def _proportions(volumes, units):
-    """(height in m, diameter over height) of a table in units."""
+    """(height in m, diameter over height) of a table in given units."""
     height_m = float(volumes.height[-1] - volumes.height[0]) * units.height_m
     total = max(float(volumes.volume[-1]), _LEAST_VOLUME) * units.volume_m3
     return height_m, _slenderness(height_m, total)
 
 
 def _slenderness(height_m, volume_m3):
-    """Diameter over height of the upright cylinder of that height and volume."""
+    """Diameter over height of the upright cylinder with a given height and volume."""
     return sqrt(4 * volume_m3 / (pi * height_m)) / height_m
 
 
 def check_totals(table, volumes, units, step, nominal, log):
-    """Tell what does not agree with the nominal tank, or with any tank."""
+    """Report disagreement with the nominal tank, or with any plausible tank."""
     height_m = float(abs(volumes.height[-1] - volumes.height[0])) * units.height_m
     total_m3 = float(volumes.volume[-1]) * units.volume_m3
     if total_m3 <= 0:

@@ -1,7 +1,7 @@
-"""Units in headings: their names in three languages, the factors before them, unusable units.
+"""Units in headings: names in three languages, factors before them, unusable units.
 
-A heading without a unit leaves the unit open. A heading with a unit that is no height or volume
-(kg, %, V), or that is not known, must not: `unit_of` then has a complaint in place of a size.
+A heading without a unit leaves the unit open. A heading with a unit of another quantity (kg, %, V),
+or with an unknown unit, must not: `unit_of` then returns a complaint instead of a size.
 
 Exact sizes: 1 in = 0.0254 m, 1 US gallon = 231 in3, 1 barrel = 42 US gallons, 1 imperial gallon =
 4.54609 L.
@@ -21,7 +21,7 @@ FOOT3_M3 = float((INCHES_PER_FOOT * METRES_PER_INCH) ** 3)
 LENGTH, VOLUME = "length", "volume"
 US_GALLON_M3 = float(231 * METRES_PER_INCH**3)
 IMPERIAL_GALLON_M3 = 4.54609e-3
-GALLONS_M3 = (US_GALLON_M3, IMPERIAL_GALLON_M3)  # of a heading that names no country
+GALLONS_M3 = (US_GALLON_M3, IMPERIAL_GALLON_M3)  # possible sizes if no country is stated
 _BARREL_M3 = float(VOLUME_UNITS_M3["bbl"])
 
 _SIZES = {
@@ -50,7 +50,7 @@ _SIZES = {
         (r"yd3", 27 * FOOT3_M3),
     ),
 }
-MOST_LETTERS = 500  # of a heading: patterns are looked for in it from each letter on
+MOST_LETTERS = 500  # largest length of a heading, which limits the time of pattern searches
 _GALLON = re.compile("gals?|gallons?|galao|galoes|galon|galones")
 _BARREL = re.compile("k?bbls?|bls|brls?|barrels?|barril|barris|barriles")
 _US = re.compile("us|american|americanos?|americanas?|estadounidenses?")
@@ -92,7 +92,7 @@ _BY_POSITION = re.compile("v|t|g|counts?|digits?|min|mils?|libras?|oz|dias?|hora
 _LARGE_PREFIX = re.compile(r"(?<![A-Za-z])(M{1,2}(?:bbls?|BBLS?|CFs?|cf|SCF|scf|gals?|GALS?)|"
                            r"Mm[3³]|MM[3³]|M[Ll]|GL|Gl)(?![A-Za-z])")  # fmt: skip
 
-# words of headings in brackets, or behind a comma, that name no unit
+# words in brackets or after a comma in headings that are not units
 _ORDINARY = re.compile(
     "net|gross|total|tot|liq|liquid|liquido|liquida|bruto|bruta|neto|neta|util|agua|water|product|"
     "produto|producto|oil|gas|glp|lpg|oleo|aceite|tank|tk|tq|tanque|shell|bottom|top|fundo|fondo|"
@@ -114,7 +114,7 @@ _BREAKS = frozenset((",", ";", ":", "/", "-", "=", *_OPENS))
 _INTRODUCES = frozenset(("in", "em", "en"))
 _PARTS_OF_INCH = (2, 4, 8, 16, 32, 64)
 _PLAIN_FACTORS = frozenset((2.0, 5.0, 20.0, 25.0, 50.0, *(1 / n for n in (3, *_PARTS_OF_INCH))))
-_LEAST_BARE_FACTOR = 100.0  # (10) may be the number of a column
+_LEAST_BARE_FACTOR = 100.0  # smallest factor without a sign; (10) may be the number of a column
 
 _SUBSTITUTIONS = tuple(
     (re.compile(pattern, re.ASCII), into)
@@ -166,20 +166,20 @@ _POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit that a heading names.
+    """The unit in a heading.
 
     Attributes
     ----------
     size : float or None
-        In m or m3, with its factor; None where no unit is named, or none that can be used.
+        In m or m3, with its factor; None if no usable unit is stated.
     factor : float
-        Number before the unit (10 in "10 L"); 1 without one.
+        Number before the unit (10 in "10 L"); 1 without a number.
     is_multiplied : bool
         Whether the factor has a multiplication sign ("x 10 L"), and so is no rounding.
     choices : tuple of float
-        Sizes of a name with several meanings, in m3.
+        Sizes of an ambiguous name, in m3.
     complaint : Message or str
-        Why the unit that is written cannot be used; empty if it can.
+        Why the stated unit cannot be used; empty if it can.
     """
 
     size: float | None = None
@@ -190,7 +190,7 @@ class Unit:
 
     @property
     def is_named(self):
-        """Whether the heading names a unit, usable or not."""
+        """Whether the heading states a unit, usable or not."""
         return self.size is not None or bool(self.choices or self.complaint)
 
 
@@ -198,7 +198,7 @@ NO_UNIT = Unit()
 
 
 def plain_text(text):
-    """Lower case, without accents, superscripts as digits, ½ as 1/2; "" for no heading's length."""
+    """Lower-case text without accents, superscripts as digits, ½ as 1/2; "" if too long."""
     if len(text) > MOST_LETTERS:
         return ""
     text = re.sub("10([⁰¹²³⁴⁵⁶⁷⁸⁹]+)", lambda power: "10^" + power[1].translate(_POWERS), text)
@@ -208,7 +208,7 @@ def plain_text(text):
 
 
 def tokens_of(text):
-    """Words, numbers, units and marks of a heading, units by one name each."""
+    """Words, numbers, units and marks of a heading; each unit by one name."""
     plain = plain_text(text)
     for pattern, into in _SUBSTITUTIONS:
         plain = pattern.sub(into, plain)
@@ -216,7 +216,7 @@ def tokens_of(text):
 
 
 def size_of(token, dimension):
-    """Size of the unit that a token names, in m or m3; None for any other token."""
+    """Size of the unit of a token, in m or m3; None for any other token."""
     for pattern, size in _PATTERNS[dimension]:
         if pattern.fullmatch(token):
             return size
@@ -230,7 +230,7 @@ _PATTERNS = {
 
 
 def unit_of(text, dimension):
-    """The `Unit` of a heading whose column has heights (LENGTH) or volumes (VOLUME)."""
+    """Return the `Unit` in a heading of heights (LENGTH) or volumes (VOLUME)."""
     tokens = without_prepositions(tokens_of(text))
     large = _LARGE_PREFIX.search(text) if dimension == VOLUME else None
     if large is not None:
@@ -261,28 +261,28 @@ def unit_of(text, dimension):
 
 
 def names_only_units(text):
-    """Whether a cell has units, usable or not, with factors and marks, and no other word."""
+    """Whether a cell contains only units, usable or not, with factors and marks."""
     tokens = tokens_of(text)
     words = [token for token in tokens if token[0].isalpha() or token in ("%", "‰", "°")]
     is_unit = [
-        any(size_of(word, one) is not None for one in (LENGTH, VOLUME))
+        any(size_of(word, dimension) is not None for dimension in (LENGTH, VOLUME))
         or _kind(word) is not None
         or word in _TIMES
-        or any(one.fullmatch(word) for one in (_US, _IMPERIAL, _DRY))
+        or any(dimension.fullmatch(word) for dimension in (_US, _IMPERIAL, _DRY))
         for word in words
     ]
     return all(is_unit) and any(word not in _TIMES for word in words)
 
 
 def countries_in(text):
-    """Sizes of the gallons that a text gives a country for, in m3."""
+    """Sizes of the gallons of the countries in a text, in m3."""
     tokens = tokens_of(text)
     gallons = [token for token in tokens if _GALLON.fullmatch(token)]
     return _countries(tokens, gallons)[0] if gallons else ()
 
 
 def without_prepositions(tokens):
-    """The tokens without an "in" that is no inch: before a word, a unit or a number."""
+    """Tokens without an "in" that is no inch: before a word, a unit or a number."""
     kept = []
     for k, token in enumerate(tokens):
         after = tokens[k + 1] if k + 1 < len(tokens) else ")"
@@ -292,19 +292,22 @@ def without_prepositions(tokens):
             is_last_word = k + 2 == len(tokens) or tokens[k + 2] in _CLOSES | {","}
         has_number = k > 0 and tokens[k - 1][0].isdigit()
         if token == "in" and not (is_last_word or has_number or after in _TIMES):
-            kept.append("em")  # a preposition, of another language
+            kept.append("em")  # replaced by a preposition of another language
             continue
         kept.append(token)
     return kept
 
 
 def _kind(token):
-    """The kind of a unit that is neither height nor volume; None for any other token."""
+    """Kind of a unit that is neither height nor volume; None for any other token."""
     return next((kind for pattern, kind in _FOREIGN if pattern.fullmatch(token)), None)
 
 
 def _unit_without_size(tokens, dimension, text):
-    """The `Unit` of a heading without a usable unit: a complaint where it names another."""
+    """Return the `Unit` of a heading without a usable unit.
+
+    A complaint if it states another unit.
+    """
 
     def unusable(token, kind):
         written = re.search(re.escape(token), text, re.IGNORECASE)
@@ -335,12 +338,12 @@ def _unit_without_size(tokens, dimension, text):
 
 
 def _around(tokens, k):
-    """The tokens before and behind a token; "(" and ")" at the ends."""
+    """The tokens before and after a token; "(" and ")" at the ends."""
     return tokens[k - 1] if k else "(", tokens[k + 1] if k + 1 < len(tokens) else ")"
 
 
 def _is_placed(tokens, k):
-    """Whether a token has the place of a unit: in brackets, last, or behind a comma or "in"."""
+    """Whether a token is at the position of a unit: in brackets, last, or after a comma or "in"."""
     before, after = _around(tokens, k)
     is_last = k + 1 == len(tokens) and (k > 0 or len(tokens) == 1)
     is_symbol = tokens[k] == "v" and before not in _BREAKS | _INTRODUCES  # volume V
@@ -350,25 +353,25 @@ def _is_placed(tokens, k):
 
 
 def _is_alone(tokens, k):
-    """Whether a word is the only one in brackets, or behind a comma, a slash or "in"."""
+    """Whether a word is the only one in brackets, or after a comma, a slash or "in"."""
     before, after = _around(tokens, k)
     is_end = k + 1 == len(tokens) or after in _CLOSES or after in (",", ";")
     return k > 0 and is_end and (before in _BREAKS - {"-"} or before in _INTRODUCES)
 
 
 def _foreign_ratio(tokens, places):
-    """A unit over another kind of unit, such as kg/L, as text; "" where there is none."""
+    """Text of a ratio of units such as kg/L; "" if there is none."""
     for k in places:
-        for other, slash in ((k - 2, k - 1), (k + 2, k + 1)):
-            if 0 <= other < len(tokens) and 0 <= slash < len(tokens) and tokens[slash] == "/":
-                kind = _kind(tokens[other])
-                if kind is not None and not _BY_POSITION.fullmatch(tokens[other]):
-                    return "".join(tokens[min(k, other) : max(k, other) + 1])
+        for neighbour, slash in ((k - 2, k - 1), (k + 2, k + 1)):
+            if 0 <= neighbour < len(tokens) and 0 <= slash < len(tokens) and tokens[slash] == "/":
+                kind = _kind(tokens[neighbour])
+                if kind is not None and not _BY_POSITION.fullmatch(tokens[neighbour]):
+                    return "".join(tokens[min(k, neighbour) : max(k, neighbour) + 1])
     return ""
 
 
 def number_of(token):
-    """Value of a number or a fraction as typed; None for any other token."""
+    """Value of a typed number or fraction; None for any other token."""
     if not token[0].isdigit():
         return None
     if "/" in token:
@@ -383,8 +386,8 @@ def number_of(token):
 
 
 def _factor(tokens, places):
-    """(factor, whether it has a sign of multiplication, unclear number as text or "")."""
-    found, is_multiplied = {}, False
+    """(factor, whether it has a multiplication sign, text of an unclear number or "")."""
+    numbers, is_multiplied = {}, False
     for k, token in enumerate(tokens):
         value = number_of(token)
         if value is None:
@@ -393,7 +396,7 @@ def _factor(tokens, places):
         ahead = k + 1
         while ahead < len(tokens) and (
             tokens[ahead] in _TIMES | _BETWEEN
-            or any(one.fullmatch(tokens[ahead]) for one in (_US, _IMPERIAL))
+            or any(pattern.fullmatch(tokens[ahead]) for pattern in (_US, _IMPERIAL))
         ):
             ahead += 1
         signs = {before, *tokens[k + 1 : ahead]} & _TIMES
@@ -418,8 +421,8 @@ def _factor(tokens, places):
             is_free = False
         if is_free or not _is_usual_factor(value):
             return 1.0, False, token
-        found[k], is_multiplied = value, is_multiplied or bool(signs)
-    return float(prod(found.values())), is_multiplied, ""
+        numbers[k], is_multiplied = value, is_multiplied or bool(signs)
+    return float(prod(numbers.values())), is_multiplied, ""
 
 
 _ROLE_WORD = re.compile(
@@ -433,9 +436,9 @@ def _is_usual_factor(value):
 
 
 def _countries(tokens, names):
-    """(sizes of gallons, complaint) by the country that the tokens name."""
+    """(sizes of gallons, complaint) from the country in the tokens."""
     is_us, is_imperial, is_dry = (
-        any(one.fullmatch(token) for token in tokens) for one in (_US, _IMPERIAL, _DRY)
+        any(pattern.fullmatch(token) for token in tokens) for pattern in (_US, _IMPERIAL, _DRY)
     )
     gallons = [name for name in names if _GALLON.fullmatch(name)]
     is_odd = is_imperial and any(_BARREL.fullmatch(name) for name in names)

@@ -1,4 +1,4 @@
-"""The volumes of a table: readable, rounded alike, never falling, each where the others put it."""
+"""Checks of the volumes of a table: readable, equally rounded, not falling, smooth."""
 
 from dataclasses import dataclass
 from itertools import groupby, pairwise
@@ -10,17 +10,25 @@ from tankcal.linter.heights import FEWEST_ROWS
 from tankcal.linter.numbers import BLANK
 from tankcal.messages import message
 
-# What a wrong number was meant to be: slips of the pen that lead to the expected value.
+# Likely intended number: slips of the pen that lead from the expected value to the wrong one.
 
 
 def suggestion(text, expected, tolerance, decimals):
-    """(number as text, what the slip was), or None.
+    """Return (number as text, kind of slip) for a wrong number, or None.
 
-    text       as written, decimal point, no thousands marks
-    expected   value from the neighbouring rows, and how far it may be off
-    decimals   that the other rows have
-    The nearest of the one-digit slips is taken, else of the others in this order: two digits
-    changed places, a decimal mark moved, a digit missing, a digit too many.
+    Parameters
+    ----------
+    text : str
+        As written, with a decimal point and without thousands separators.
+    expected : float
+        Value from the neighbouring rows.
+    tolerance : float
+        Tolerance of the expected value.
+    decimals : int
+        Number of decimals of the other rows.
+
+    Notes ----- The nearest one-digit slip takes precedence. Then follow two digits swapped, a
+    decimal mark moved, a digit missing, a digit too many.
     """
     for slip, candidates in (
         (message("slip_one_digit", "one digit"), _one_digit(text)),
@@ -42,7 +50,7 @@ def suggestion(text, expected, tolerance, decimals):
 
 
 def _is_written_so(text, decimals):
-    """Whether people write it so: no needless zero before it, no more decimals than usual."""
+    """Whether a number looks natural: no needless leading zero, no more decimals than usual."""
     whole, _, part = text.partition(".")
     return not (whole[:1] == "0" and len(whole) > 1) and len(part) <= decimals
 
@@ -58,12 +66,12 @@ def _one_digit(text):
 
 def _transposed(text):
     places = [k for k, char in enumerate(text) if char.isdigit()]
-    found = []
+    numbers = []
     for a, b in pairwise(places):
         chars = list(text)
         chars[a], chars[b] = chars[b], chars[a]
-        found.append("".join(chars))
-    return found
+        numbers.append("".join(chars))
+    return numbers
 
 
 def _moved_mark(text, decimals):
@@ -88,20 +96,25 @@ def _removed(text):
     ]
 
 
-_USUAL = 0.98  # part of the rows that have at most the usual number of decimals
-_FINEST = 1e-9  # of the total: what lies below it is no rounding
-_MOST_WRITTEN = 6  # decimals that people write
-_LONG_BLANK = 10  # rows
-_FITTING, _EDGE = 0.5, 0.01  # of a step's volume: fittings take up, or give, no more
+_USUAL = 0.98  # share of the rows with at most the usual number of decimals
+_FINEST = 1e-9  # smallest rounding relative to the total
+_MOST_WRITTEN = 6  # largest number of decimals that people write
+_LONG_BLANK = 10  # fewest rows of an intended blank
+_FITTING, _EDGE = 0.5, 0.01  # largest effect of a fitting, relative to the volume of a step
 
 
 @dataclass(frozen=True)
 class Volumes:
     """Volumes of a table.
 
-    height, volume  (n,) of the rows that can be read, heights rising, in the units of the table
-    decimals        usual number of them
-    joints          heights at which the area of the cut jumps
+    Attributes
+    ----------
+    height, volume : ndarray, shape (n,)
+        Readable rows, heights rising, in the units of the table.
+    decimals : int
+        Usual number of decimals.
+    joints : sequence
+        Heights at which the area of the cross section jumps.
     """
 
     height: np.ndarray
@@ -111,7 +124,7 @@ class Volumes:
 
 
 def volumes_of(table, series, log):
-    """`Volumes` of a series, after telling `log` what is wrong with them; None when too few."""
+    """Return the `Volumes` of a series after reporting their problems to `log`; None if too few."""
     left_out = _left_out(table, series.entries, log)
     good = [
         k
@@ -119,7 +132,7 @@ def volumes_of(table, series, log):
         if k not in left_out and _is_readable(table, entry, log)
     ]
     if len(good) < FEWEST_ROWS:
-        if not log.problems:  # long blanks alone: a cell that cannot be read is a problem
+        if not log.problems:  # only long blanks; an unreadable cell is a problem
             expected = message(
                 "lint_few_volumes",
                 "{count} rows with a volume; expected {fewest} or more",
@@ -135,23 +148,23 @@ def volumes_of(table, series, log):
     decimals = _check_rounding(table, entries, log)
     quantum = max(10.0**-decimals, _FINEST * float(np.abs(volume).max()), 1e-300)
     rounding = series.rounding[good] / series.step
-    found = examine(height / series.step, volume / quantum, rounding)
-    teller = _Teller(table, entries, volume, quantum, decimals, found.joints, log)
-    for fault in found.faults:
+    examined = examine(height / series.step, volume / quantum, rounding)
+    teller = _Teller(table, entries, volume, quantum, decimals, examined.joints, log)
+    for fault in examined.faults:
         teller.tell(fault)
-    _check_falls(teller, found.volume * quantum)
-    if not found.complete:
+    _check_falls(teller, examined.volume * quantum)
+    if not examined.complete:
         log.warning(
             table.name,
             message("lint_rough", "the volumes are too rough for every row to be examined"),
         )
-    joints = tuple(float(height[row]) for row in found.joints)
+    joints = tuple(float(height[row]) for row in examined.joints)
     return Volumes(height, volume, decimals, joints)
 
 
 def _left_out(table, entries, log):
-    """Rows of long blanks, which somebody meant: a critical zone of a roof is not for use."""
-    found = set()
+    """Rows of long, intended blanks, such as a critical zone of a roof that is not for use."""
+    left_out = set()
     for is_blank, run in groupby(
         range(len(entries)), lambda k: entries[k].volume.complaint == BLANK
     ):
@@ -164,8 +177,8 @@ def _left_out(table, entries, log):
                 last_row=last.row,
             )
             log.warning(table.name, text, first.row, first.volume_column)
-            found.update(rows)
-    return found
+            left_out.update(rows)
+    return left_out
 
 
 def _is_readable(table, entry, log):
@@ -183,8 +196,8 @@ def _is_readable(table, entry, log):
 
 
 def _check_marks(table, entries, log):
-    """Tell thousands marks, and in a workbook texts that look like numbers."""
-    for having, what in (
+    """Report thousands separators, and texts that look like numbers in a workbook."""
+    for having, description in (
         (
             [e for e in entries if e.volume.marks],
             message("lint_thousands_mark", "a thousands mark"),
@@ -198,7 +211,7 @@ def _check_marks(table, entries, log):
             text = message(
                 "lint_written_in_all",
                 "{what} in {count} volumes; expected numbers that any program can read",
-                what=what,
+                what=description,
                 count=len(having),
             )
             log.warning(table.name, text, having[0].row, having[0].volume_column)
@@ -207,14 +220,14 @@ def _check_marks(table, entries, log):
                 text = message(
                     "lint_written_so",
                     "found {what}; expected {expected}, as the other rows are written",
-                    what=what,
+                    what=description,
                     expected=entry.volume.text,
                 )
                 log.problem(table.name, text, entry.row, entry.volume_column)
 
 
 def _check_rounding(table, entries, log):
-    """The usual number of decimals, after telling which rows have more, or fewer."""
+    """Return the usual number of decimals; report rows with more or fewer."""
     decimals = sorted(entry.volume.decimals for entry in entries)
     usual = decimals[int(_USUAL * (len(decimals) - 1))]
     if usual > _MOST_WRITTEN:
@@ -251,7 +264,7 @@ def _other_decimals(entry, usual):
 
 
 def _check_falls(teller, mended):
-    """Tell volumes that fall although no other fault explains it."""
+    """Report falling volumes that no other fault explains."""
     sound = np.flatnonzero(np.isfinite(mended))
     for before, row in pairwise(sound):
         if mended[row] < mended[before] - 0.5 * teller.quantum:
@@ -265,7 +278,7 @@ def _check_falls(teller, mended):
 
 
 class _Teller:
-    """Tells faults of volumes in the words and rows of the file."""
+    """Reports faults of volumes with the texts and rows of the file."""
 
     def __init__(self, table, entries, volume, quantum, decimals, joints, log):
         self.table, self.entries, self.volume, self.log = table, entries, volume, log
@@ -338,7 +351,7 @@ class _Teller:
         self.problem(fault.first, text, not is_fitting)
 
     def _may_be_fitting(self, fault):
-        """Whether something in the tank may take up, or give, that volume within one step."""
+        """Whether a fitting may remove or add that volume within one step."""
         size, step = fault.size * self.quantum, self._step(fault)
         return -_FITTING * step <= size <= _EDGE * step
 

@@ -1,8 +1,9 @@
-"""Tables whose columns are steps of the height: rows of centimetres, columns of 0 to 9 mm.
+"""Wide tables, whose columns are steps of the height: rows of centimetres, columns of 0 to 9 mm.
 
 The height of a cell is the height of its row plus the label of its column. The unit of the labels
-comes from the heading; where it names none, from the rows: a row continues where the row below it
-ends, so that the step of the rows is the number of columns times the step of the labels.
+comes from the heading. If the heading states none, the rows determine it: a row continues where the
+row below it ends, so that the step of the rows is the number of columns times the step of the
+labels.
 """
 
 from dataclasses import dataclass, replace
@@ -25,24 +26,31 @@ from tankcal.linter.units import (
 )
 from tankcal.messages import message
 
-_FEWEST, _FEWEST_WITH_UNITS = 4, 2  # labels of columns
-_MOST_WORDS = 4  # of the heading of a column
+_FEWEST, _FEWEST_WITH_UNITS = 4, 2  # fewest labels of columns, without and with units
+_MOST_WORDS = 4  # largest number of words in the heading of a column
 _SAME = 1e-6
-# unit of the labels over the unit of the rows, where no heading names it
+# possible ratios of the unit of the labels to the unit of the rows, if no heading states it
 _RATIOS = (1.0, 0.1, 0.01, 0.001, 1 / 12, 1 / 8, 1 / 16)
 
 
 @dataclass(frozen=True)
 class WideHeading:
-    """The heading of a table whose columns are steps of the height.
+    """Heading of a table whose columns are steps of the height.
 
-    first    position of the first column of volumes
-    has_volumes_first  whether the first of them is named as volumes (height, volume, 1, 2 ... 9)
-    labels   heights that the columns add, in `label_m`
-    texts    of the labels
-    row_m    size of the unit of the rows, m; None where no heading names it
-    label_m  size of the unit of the labels, m; None likewise
-    height, volume  `Heading` of the rows and of the volumes
+    Attributes
+    ----------
+    first : int
+        Position of the first column of volumes.
+    has_volumes_first : bool
+        Whether the heading of this column is that of volumes (height, volume, 1, 2 ... 9).
+    labels : tuple of float
+        Heights added by the columns, in `label_m`.
+    texts : tuple of str
+        Labels as written.
+    row_m, label_m : float or None
+        Sizes of the units of rows and labels, m; None if no heading states them.
+    height, volume : Heading
+        Headings of the rows and of the volumes.
     """
 
     first: int
@@ -56,10 +64,9 @@ class WideHeading:
 
 
 def wide_heading(rows, index, above):
-    """The `WideHeading` in a row, or None.
+    """Return the `WideHeading` in a row, or None.
 
-    rows   (row number, cells) of a grid
-    above  cells of the rows over it that belong to the heading
+    rows: (row number, cells) of a grid; above: cells of the rows above that belong to the heading.
     """
     cells = rows[index][1]
     if len(cells) < 3 or (has_digit(cells[0]) and not has_letter(cells[0])):
@@ -82,9 +89,11 @@ def wide_heading(rows, index, above):
     volume = _volume_heading(cells, above)
     titles = [line[0] for line in (cells, *above[::-1]) if line and _is_short(line[0])]
     roles = [heading_of(title) for title in titles]
-    role = next((one.role for one in roles if one.role in ("height", "ullage")), "height")
+    role = next(
+        (heading.role for heading in roles if heading.role in ("height", "ullage")), "height"
+    )
     text = cells[0].strip() if isinstance(cells[0], str) else ""
-    text = text or next((one.text for one in roles if one.text), "")
+    text = text or next((heading.text for heading in roles if heading.text), "")
     texts = tuple(str(cell).strip() for cell in cells[1 : 1 + len(labels)])
     values = tuple(value for value, _ in labels)
     unit = Unit(row_m) if row_m is not None else Unit()
@@ -94,16 +103,16 @@ def wide_heading(rows, index, above):
 
 
 def _is_short(cell):
-    """Whether a cell may be the heading of a column; a title over the table has more words."""
+    """Whether a cell may be the heading of a column; a title of the table has more words."""
     return isinstance(cell, str) and len(cell.split()) <= _MOST_WORDS
 
 
 def _volume_heading(cells, above):
-    """`Heading` of the volumes: of a cell beside the heights, or of a title (volumes in litres)."""
+    """Return the `Heading` of the volumes: of a cell beside the heights, or a title."""
     for line in (cells, *above[::-1]):
         for position, cell in enumerate(line):
             heading = heading_of(cell)
-            is_title = position == 0 and sum(not is_blank(one) for one in line) == 1
+            is_title = position == 0 and sum(not is_blank(cell) for cell in line) == 1
             if heading.role == "volume" and not is_title:
                 return heading
     return Heading("", "volume", title_unit(above))
@@ -128,7 +137,7 @@ def _label(cell):
 
 
 def _is_even(labels):
-    """Whether labels rise from 0, or their first step, by even steps."""
+    """Whether labels rise by even steps from 0 or from their first step."""
     values = [value for value, _ in labels]
     has_units = any(unit is not None for _, unit in labels[1:])
     if len(values) < (_FEWEST_WITH_UNITS if has_units else _FEWEST):
@@ -142,7 +151,7 @@ def _is_even(labels):
 
 
 def _has_rows(rows, index, count):
-    """Whether the next row has a height and volumes below the labels."""
+    """Whether the next row has a height, and volumes below the labels."""
     if index + 1 >= len(rows):
         return False
     cells = rows[index + 1][1]
@@ -155,30 +164,34 @@ def _has_rows(rows, index, count):
 
 
 def _units(cells, above, of_labels):
-    """(unit of the rows, unit of the labels) that the heading names, m; None for what it does not.
+    """(unit of the rows, unit of the labels) in the heading, m; None if not stated.
 
-    A first cell such as cm / mm names both.
+    A first cell such as cm / mm states both.
     """
-    own = []
+    own_units = []
     for line in (cells, *above[::-1]):
         text = line[0] if line and _is_short(line[0]) else ""
         tokens = without_prepositions(tokens_of(text))
-        own += [size for size in (size_of(token, LENGTH) for token in tokens) if size is not None]
-        if own:
+        own_units += [
+            size for size in (size_of(token, LENGTH) for token in tokens) if size is not None
+        ]
+        if own_units:
             break
-    other = [of_labels] if of_labels is not None else own[1:]
-    if not other:
+    label_units = [of_labels] if of_labels is not None else own_units[1:]
+    if not label_units:
         texts = [cell for line in above for cell in line[1:] if isinstance(cell, str)]
         tokens = [token for text in texts for token in without_prepositions(tokens_of(text))]
-        other = [size for size in (size_of(token, LENGTH) for token in tokens) if size is not None]
-    return (own[0] if own else None), (other[0] if other else None)
+        label_units = [
+            size for size in (size_of(token, LENGTH) for token in tokens) if size is not None
+        ]
+    return (own_units[0] if own_units else None), (label_units[0] if label_units else None)
 
 
 def wide_cells(name, wide, rows, log):
-    """For each label a list of (row, name of height, name of volume, height, volume, {}).
+    """For each label, a list of (row, name of height, name of volume, height, volume, {}).
 
-    Heights are numbers in the unit of the rows. Tells `log` where rows and labels do not continue
-    each other; then the lists are empty.
+    Heights are numbers in the unit of the rows. If rows and labels do not continue each other, the
+    problem is reported to `log` and the lists are empty.
     """
     rows = [(row, cells) for row, cells in rows if has_digit(cells[0]) and not has_letter(cells[0])]
     style = style_of([[cells[0] for _, cells in rows]])
@@ -205,7 +218,7 @@ def wide_cells(name, wide, rows, log):
         )
         log.problem(name, text, rows[0][0])
         return columns
-    digits = 12  # of a height: binary fractions of decimal steps do not show
+    digits = 12  # decimals of a height, which hide binary fractions of decimal steps
     for number, ((row, cells), base) in enumerate(zip(rows, bases, strict=True)):
         volumes = [
             cells[wide.first + k] if wide.first + k < len(cells) else None
@@ -222,7 +235,7 @@ def wide_cells(name, wide, rows, log):
 
 
 def _are_parts(wide, rows):
-    """Whether the columns behind the first are smaller than it: parts, to be added to it."""
+    """Whether the columns after the first are smaller: parts, to be added to it."""
     columns = [
         [cells[wide.first + k] if wide.first + k < len(cells) else None for _, cells in rows]
         for k in (0, 1)
@@ -236,28 +249,36 @@ def _are_parts(wide, rows):
 
 
 def _ratio(wide, bases):
-    """Unit of the labels over the unit of the rows; None where they do not continue each other."""
+    """Ratio of the unit of the labels to that of the rows.
+
+    None if they do not continue each other.
+    """
     steps = [abs(b - a) for a, b in pairwise(bases) if b != a]
     if not steps:
         return None
     base_step, label_step = float(np.median(steps)), wide.labels[1] - wide.labels[0]
-    row_by_row = base_step / (len(wide.labels) * label_step)  # columns continue in the next row
-    # rows continue in the next column
+    row_by_row = base_step / (len(wide.labels) * label_step)  # the columns continue in the next row
+    # the rows continue in the next column
     by_column = (len(bases) * base_step) / label_step
     if wide.row_m is not None and wide.label_m is not None:
         ratio = wide.label_m / wide.row_m
         fits = (abs(ratio / one - 1) <= _SAME for one in (row_by_row, by_column))
         return ratio if any(fits) else None
-    known = (one for one in _RATIOS if abs(one / row_by_row - 1) <= _SAME)
+    known = (ratio for ratio in _RATIOS if abs(ratio / row_by_row - 1) <= _SAME)
     return next(known, None)
 
 
 def refused_columns(name, block_rows, pairs, heading_row, heading_cells):
-    """The Problem of two columns of numbers or more that no heading names; None without them."""
-    taken = {place for pair in pairs for place in (pair.height, pair.volume, *pair.beside.values())}
+    """Return the Problem of several columns of numbers without a heading.
+
+    None if there are none.
+    """
+    used_columns = {
+        place for pair in pairs for place in (pair.height, pair.volume, *pair.beside.values())
+    }
     width = max((len(cells) for _, cells in block_rows), default=0)
     unnamed = []
-    for place in set(range(width)) - taken:
+    for place in set(range(width)) - used_columns:
         title = heading_cells[place] if place < len(heading_cells) else None
         if has_letter(title):
             continue
@@ -281,7 +302,7 @@ def refused_columns(name, block_rows, pairs, heading_row, heading_cells):
 
 
 def title_unit(above):
-    """The `Unit` of volumes that a title over the heading names ("volumes in litres")."""
+    """Return the `Unit` of volumes in a title above the heading ("volumes in litres")."""
     for line in above[::-1]:
         for cell in line:
             if not isinstance(cell, str):

@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
+from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.line_departures import check_lines_apart, check_scale, check_sign
@@ -22,7 +23,6 @@ UNLIKE_SDS = 3.0  # largest deviation of a collimation from its certificate, in 
 # Largest distance of the centre of a level from the straight axis, in m and in sds.
 OFF_AXIS_M, OFF_AXIS_SDS = 0.01, 6.0
 OFF_LEVEL_M = 0.003  # largest deviation of the radius of a strap from the levels of its course
-SCALE_OF_MEDIAN = 1.4826  # standard deviation over median absolute deviation, normal distribution
 WRITTEN_M = 5e-5  # half the last digit of a reported difference
 # Critical value of the length of two slopes over their standard deviation: a chi-square with two
 # degrees of freedom exceeds its square in 0.1 % of cases.
@@ -298,7 +298,7 @@ def _check_axis(job, levels, lean):
     slope = np.median(slopes, axis=0)  # median of all pairs (Theil 1950): robust against an outlier
     axis = np.median(centres, axis=0) + (heights - np.median(heights))[:, None] * slope
     distances = np.linalg.norm(centres - axis, axis=1)
-    typical = SCALE_OF_MEDIAN * float(np.median(distances))
+    typical = SD_OVER_MEDIAN * float(np.median(distances))
     worst = int(np.argmax(distances))
     if distances[worst] > max(OFF_AXIS_M, OFF_AXIS_SDS * typical):
         level = levels[worst]

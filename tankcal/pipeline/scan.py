@@ -5,13 +5,14 @@ from functools import partial
 
 import numpy as np
 
+from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.cylinders import FittedCylinder, lying_cylinder
 from tankcal.geometry.primitives import fit_sphere
 from tankcal.messages import message
 from tankcal.pipeline.cross_checks import refuse_misfit
 from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
-from tankcal.pipeline.scanned_wall import SCALE_OF_MEDIAN, Fitted, agreeing, offsets, scanned_wall
+from tankcal.pipeline.scanned_wall import Fitted, agreeing, offsets, scanned_wall
 from tankcal.pipeline.survey_warnings import origin_of
 from tankcal.sections import covariance_of
 from tankcal.tank.factors import Factor
@@ -167,7 +168,7 @@ def _fit_or_refuse(job, is_used):
 
 def _near(residuals, is_used):
     """Mask of the points within `FAR` robust standard deviations of the shape."""
-    robust_sd = SCALE_OF_MEDIAN * np.median(np.abs(residuals[is_used]))
+    robust_sd = SD_OVER_MEDIAN * np.median(np.abs(residuals[is_used]))
     return np.abs(residuals) <= FAR * max(robust_sd, 1e-6)
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse
 
+from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.geometry.cylinders import FittedCylinder, cylinder_distances
 from tankcal.geometry.field.places import (
     DEGREES,
@@ -41,7 +42,6 @@ KINDS = ("bulge", "ovality", "oblateness", "seams")
 MOST_ROUNDS = 10
 NEIGHBOURS = 12
 DENT_M = 0.02  # depth of a dent that a single point may show
-SCALE_OF_MEDIAN = 1.4826  # standard deviation over median absolute deviation, normal noise
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ def _unlike_neighbours(job, fit, index, limit):
     distance = offsets(fit, xyz)
     neighbours = scipy.spatial.KDTree(xyz).query(xyz, NEIGHBOURS + 1)[1][:, 1:]
     deviation = np.abs(distance - np.median(distance[neighbours], axis=1))
-    return np.flatnonzero(deviation > max(limit * SCALE_OF_MEDIAN * np.median(deviation), DENT_M))
+    return np.flatnonzero(deviation > max(limit * SD_OVER_MEDIAN * np.median(deviation), DENT_M))
 
 
 def offsets(fit, xyz_m):

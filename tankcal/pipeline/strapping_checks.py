@@ -6,7 +6,7 @@ strap. Checks of the tapes and of their readings are in `tape_checks`.
 
 import numpy as np
 
-from tankcal.adjust import CRITICAL
+from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
@@ -26,8 +26,7 @@ SURELY_FLUSH, SURELY_SHORT_BY_PLATES = 0.25, (0.75, 1.25)
 FAR_REPEATS = 5  # least discrepancy of a course from the others, in limits of repeats
 FAR_LIMITS = 10  # discrepancy of a gross error, in limits of repeats: 5 mm of radius
 FARTHEST_M = 1.0  # largest standard deviation of a controlled discrepancy
-# Limit in standard deviations of ranges within a course; standard deviation over median.
-APART_SDS, SCALE_OF_MEDIAN = 6.0, 1.4826
+APART_SDS = 6.0  # limit of the range of the readings within a course, in standard deviations
 
 
 def limit_of_repeats(circumference_m, table="repeats"):
@@ -240,7 +239,7 @@ def straps_apart(names, straps):
             )
     if len(ranges) < 3:
         return
-    typical = SCALE_OF_MEDIAN * float(np.median([size for size, _, _ in ranges]))
+    typical = SD_OVER_MEDIAN * float(np.median([size for size, _, _ in ranges]))
     for size, reduced_strap, count in ranges:
         if size > max(APART_SDS * typical, 2 * limit_of_repeats(reduced_strap.circumference_m)):
             yield size, reduced_strap, count, typical

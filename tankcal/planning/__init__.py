@@ -1,6 +1,6 @@
-"""Planning a survey: what its table will be worth, before anyone drives to the site.
+"""Survey planning: predict the uncertainty of a capacity table before the survey is made.
 
-Names are resolved when they are first used.
+Names are imported when they are first used.
 """
 
 from importlib import import_module

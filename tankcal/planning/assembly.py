@@ -1,4 +1,4 @@
-"""From checked values to a Plan: rings become stations, patterns targets, tapes two points each."""
+"""Assemble a Plan from checked input: stations from rings, targets from patterns, tape ends."""
 
 from dataclasses import replace
 
@@ -11,13 +11,26 @@ from tankcal.planning.model import Known, Limits, Plan, Tie
 from tankcal.planning.obstacles import obstacles_of
 from tankcal.planning.patterns import photographs_of, setups_of, shell_of, tape_of, targets_of
 
+# Defaults of [limits]: largest angle of incidence, degrees, and fewest rays per point.
 INCIDENCE_DEG, RAYS = 70.0, 3
 
 
 def assemble_plan(job, given, bars, folder):
-    """The Plan of a Job and what its plan gives beside it (`given.Given`), both sound.
+    """Return the Plan of a Job and of the valid input of a plan.
 
-    bars  {name: {key: value}} of the stadias of its instruments
+    Parameters
+    ----------
+    job : Job
+    given : Given
+        Valid sections and tables of the plan.
+    bars : dict
+        {name: {key: value}} of the stadias in the instruments of the job.
+    folder : str
+        Name of the folder of the plan.
+
+    Returns
+    -------
+    Plan
     """
     pattern = given.single["pattern"]
     shell = shell_of(job, pattern)
@@ -33,14 +46,14 @@ def assemble_plan(job, given, bars, folder):
         ties.append(tie)
         extra |= ends
         facing |= dict.fromkeys(ends, out)
-    ties += _listed(given.ties)
+    ties += _listed_ties(given.ties)
     places = dict(zip(targets.names, targets.xyz_m, strict=True)) | extra
-    places |= {one.name: one.xyz_m for one in setups}
-    known = _known(job.measurements.control, places)
+    places |= {setup.name: setup.xyz_m for setup in setups}
+    known = _known_points(job.measurements.control, places)
     extra |= {
-        one.name: one.xyz_m
-        for one in known
-        if one.name not in places and np.isfinite(one.xyz_m).all()
+        control_point.name: control_point.xyz_m
+        for control_point in known
+        if control_point.name not in places and np.isfinite(control_point.xyz_m).all()
     }
     return Plan(
         job=replace(job, measurements=replace(job.measurements, control=None)),
@@ -49,16 +62,18 @@ def assemble_plan(job, given, bars, folder):
         photos=tuple(photos),
         setups=tuple(setups),
         ties=tuple(ties),
-        known=tuple(one for one in known if np.isfinite(one.sd_m).any()),
+        known=tuple(
+            control_point for control_point in known if np.isfinite(control_point.sd_m).any()
+        ),
         extra=extra,
         facing=facing,
         obstacles=obstacles_of(given),
         limits=limits_of(given.single["limits"]),
         bases=bases_of(given.stadia, bars),
         bars={
-            name: one["length_m"]
-            for name, one in bars.items()
-            if one["length_m"] and one["u_mm"] is not None
+            name: bar["length_m"]
+            for name, bar in bars.items()
+            if bar["length_m"] and bar["u_mm"] is not None
         },
         amplitudes=_amplitudes(pattern),
         costs={key: value or 0.0 for key, value in given.single["costs"].values.items()},
@@ -66,9 +81,9 @@ def assemble_plan(job, given, bars, folder):
     )
 
 
-def _listed(tables):
-    """Ties of the plan's tables."""
-    found = []
+def _listed_ties(tables):
+    """Return the ties listed in the tables of a plan."""
+    ties = []
     for name, table in tables.items():
         if table is None:
             continue
@@ -80,38 +95,41 @@ def _listed(tables):
         )  # fmt: skip
         for start, end, sd, readings, kind, tool in rows:
             named = (f"{start}-{end}", name, start, end)
-            found.append(Tie(*named, sd / 1000, kind or "spatial", tool, int(readings or 1)))
-    return found
+            ties.append(Tie(*named, sd / 1000, kind or "spatial", tool, int(readings or 1)))
+    return ties
 
 
-def _known(control, places):
-    """Known points; a coordinate left blank is the nominal one, where the plan has the point.
+def _known_points(control, places):
+    """Return the known points; a blank coordinate takes its nominal value where the plan has it.
 
-    What is only compared (use = "check") is a place and no control.
+    A check point (use = "check") has a position, but no standard deviations: it does not constrain
+    the network.
     """
     if control is None:
         return []
-    found = []
+    known = []
     sds = np.where(control.check[:, None], np.nan, control.sd_m)
     for name, xyz, sd in zip(control.point, control.xyz_m, sds, strict=True):
         nominal = places.get(name, np.full(3, np.nan))
-        found.append(Known(name, np.where(np.isnan(xyz), nominal, xyz), sd))
-    return found
+        known.append(Known(name, np.where(np.isnan(xyz), nominal, xyz), sd))
+    return known
 
 
-def limits_of(given):
-    """The `Limits` of a [limits]."""
-    incidence = INCIDENCE_DEG if given["incidence_deg"] is None else given["incidence_deg"]
+def limits_of(section):
+    """Return the `Limits` of a [limits] section."""
+    incidence = INCIDENCE_DEG if section["incidence_deg"] is None else section["incidence_deg"]
     return Limits(
         incidence_rad=float(np.radians(incidence)),
-        relative_u=given["relative_u"],
-        of=given["of"] or "top",
-        rays=int(given["rays"] or RAYS),
-        place=(PLAN_FILE, given.rows.get("of", given.row), "limits.of"),
+        relative_u=section["relative_u"],
+        of=section["of"] or "top",
+        rays=int(section["rays"] or RAYS),
+        place=(PLAN_FILE, section.rows.get("of", section.row), "limits.of"),
     )
 
 
 def _amplitudes(pattern):
-    """The `Amplitudes` of the wall to be surveyed: as assumed, but for what the plan says."""
-    given = (pattern[key] for key in ("form_mm", "common_form_mm"))
-    return assumed_amplitudes(*(None if one is None else one / 1000 for one in given))
+    """Return the `Amplitudes` of the wall: assumed values unless the plan states others."""
+    forms_mm = (pattern[key] for key in ("form_mm", "common_form_mm"))
+    return assumed_amplitudes(
+        *(None if form_mm is None else form_mm / 1000 for form_mm in forms_mm)
+    )

@@ -1,4 +1,4 @@
-"""Bases of a plan: a stadia over a station, read from another; what is read and how well."""
+"""Bases of a plan: distances from angles to a stadia over one station, read from another."""
 
 from dataclasses import replace
 
@@ -12,13 +12,17 @@ from tankcal.survey.measurements import Readings
 from tankcal.survey.stadia import angle_of_distance_rad, distance_sd_m
 
 STADIA_FILE = "stadia.csv"
-NEW_SD_RAD = ARCSEC  # of a base that is added where the plan has none to follow
+NEW_SD_RAD = ARCSEC  # standard deviation of the angle of an added base if the plan has no base
 
 
 def bases_of(table, bars):
-    """The `Base`s of a plan's stadia.csv, row by row; () of none.
+    """Return the `Base`s of the rows of a plan's stadia.csv; () if it has no rows.
 
-    table  ColumnValues or None      bars  {name: of it} of the stadias there are
+    Parameters
+    ----------
+    table : ColumnValues or None
+    bars : dict
+        {name: {key: value}} of the stadias in the instruments.
     """
     if not has_rows(table):
         return ()
@@ -30,28 +34,30 @@ def bases_of(table, bars):
     )
 
 
-def base_m(plan, one):
-    """Horizontal distance, m, that a Base of a Plan has at the nominal places."""
+def base_m(plan, base):
+    """Nominal horizontal length of a Base of a Plan, m."""
     points = plan.points
-    return float(np.hypot(*(points[one.to] - points[one.setup])[:2]))
+    return float(np.hypot(*(points[base.to] - points[base.setup])[:2]))
 
 
-def angle_of_base_rad(plan, one):
-    """Angle, rad, under which the bar of a Base will be seen."""
-    return float(angle_of_distance_rad(base_m(plan, one), plan.bars[one.bar]))
+def angle_of_base_rad(plan, base):
+    """Angle between the ends of the bar of a Base at its nominal length, rad."""
+    return float(angle_of_distance_rad(base_m(plan, base), plan.bars[base.bar]))
 
 
-def base_sd_m(plan, one):
-    """Standard deviation, m, of the distance that one reading of a Base tells."""
-    return float(distance_sd_m(angle_of_base_rad(plan, one), plan.bars[one.bar], one.angle_sd_rad))
+def base_sd_m(plan, base):
+    """Standard deviation of the distance from one reading of a Base, m."""
+    return float(
+        distance_sd_m(angle_of_base_rad(plan, base), plan.bars[base.bar], base.angle_sd_rad)
+    )
 
 
-def readings_of_bases(plan, there):
-    """The `Readings` of the bases between points that are `there`, without values; () of none.
+def readings_of_bases(plan, point_names):
+    """Return the `Readings`, without values, of bases between the points `there`; () if no base.
 
-    Readings that are repeated stand there once, with the standard deviation of their mean.
+    Repeated readings of a base are one value with the standard deviation of their mean.
     """
-    bases = [one for one in plan.bases if {one.setup, one.to} <= there]
+    bases = [base for base in plan.bases if {base.setup, base.to} <= point_names]
     if not bases:
         return ()
     n = len(bases)
@@ -59,43 +65,43 @@ def readings_of_bases(plan, there):
         Readings(
             table="distances",
             value=np.zeros(n),
-            sd=np.array([base_sd_m(plan, one) / np.sqrt(one.readings) for one in bases]),
-            start=tuple(one.setup for one in bases),
-            end=tuple(one.to for one in bases),
+            sd=np.array([base_sd_m(plan, base) / np.sqrt(base.readings) for base in bases]),
+            start=tuple(base.setup for base in bases),
+            end=tuple(base.to for base in bases),
             check=np.zeros(n, dtype=bool),
-            instrument=tuple(one.bar for one in bases),
+            instrument=tuple(base.bar for base in bases),
             horizontal=np.ones(n, dtype=bool),
             temperature_c=np.full(n, np.nan),
-            rows=tuple(one.row for one in bases),
+            rows=tuple(base.row for base in bases),
             sheet=STADIA_FILE,
         ),
     )
 
 
 def by_ends(bases):
-    """{names of both ends: its `Base`s}: read from one of them, from the other, or again."""
-    found = {}
-    for one in bases:
-        ends = (one.setup, one.to)
-        found.setdefault(ends[::-1] if ends[::-1] in found else ends, []).append(one)
-    return found
+    """Group `Base`s by their two ends, whichever end each is read from: {names of ends: bases}."""
+    groups = {}
+    for base in bases:
+        ends = (base.setup, base.to)
+        groups.setdefault(ends[::-1] if ends[::-1] in groups else ends, []).append(base)
+    return groups
 
 
 def new_bases(plan):
-    """Pairs of `Base`s, read from both ends, that a Plan with a stadia does not have yet.
+    """Return possible new pairs of `Base`s, read from both ends; () if the plan has no stadia.
 
-    They are between set-ups that sight each other.
+    Each pair connects two set-ups that sight each other and have no base yet.
     """
     if not plan.bars:
         return ()
-    like = plan.bases[0] if plan.bases else Base("", "", next(iter(plan.bars)), NEW_SD_RAD)
-    there = {frozenset((one.setup, one.to)) for one in plan.bases}
+    template = plan.bases[0] if plan.bases else Base("", "", next(iter(plan.bars)), NEW_SD_RAD)
+    connected = {frozenset((base.setup, base.to)) for base in plan.bases}
     pairs = {}
-    for one in plan.setups:
-        for other in one.sights:
-            pairs.setdefault(frozenset((one.name, other)), (one.name, other))
+    for setup in plan.setups:
+        for other in setup.sights:
+            pairs.setdefault(frozenset((setup.name, other)), (setup.name, other))
     return tuple(
-        tuple(replace(like, setup=a, to=b, row=None) for a, b in (ends, ends[::-1]))
+        tuple(replace(template, setup=a, to=b, row=None) for a, b in (ends, ends[::-1]))
         for key, ends in pairs.items()
-        if key not in there
+        if key not in connected
     )

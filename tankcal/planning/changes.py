@@ -1,4 +1,4 @@
-"""Changes of a plan by one item: a station, a tape, a control point, a row, a repeated reading."""
+"""Changes of a plan by one item, such as a station, tape, control point or repeated reading."""
 
 from dataclasses import dataclass, replace
 
@@ -12,20 +12,32 @@ from tankcal.planning.wall.changes import WALL_ITEMS, wall_changes_of, wall_coun
 from tankcal.planning.wall.model import WallPlan
 
 ITEMS = ("photo_station", "setup", "tape", "base", "control_point", "target_row", "reading")
-IMAGES, SETS = "all image points", "all sets of the total station"  # what is read again
-ROW, OF_COURSE = "row ", "row in course "  # how the names of rows begin
-NEW = "N-"  # what the name of a thing that is added begins with
-MOST_READINGS = 100  # of one thing, as in plan.toml
-CONTROL_SD_M, TAPE_SD_M = 0.002, 0.001  # of what is added where the plan has none to follow
+IMAGES, SETS = "all image points", "all sets of the total station"  # names of repeated readings
+ROW, OF_COURSE = "row ", "row in course "  # prefixes of the names of rows
+NEW = "N-"  # prefix of the name of an added item
+MOST_READINGS = 100  # largest number of readings of one item, as in plan.toml
+# Standard deviations of an added control point or tape if the plan has none to copy.
+CONTROL_SD_M, TAPE_SD_M = 0.002, 0.001
 
 
 @dataclass(frozen=True)
 class Change:
-    """One change of a Plan: what is done to which item, the plan after it, and what it costs.
+    """One change of a Plan.
 
-    action  "add", "drop" or "repeat"      item  of ITEMS     name  of the item
-    cost    of the plan after less of the plan before
-    why     it cannot be; "": it can
+    Attributes
+    ----------
+    action : str
+        "add", "drop" or "repeat".
+    item : str
+        One of ITEMS.
+    name : str
+        Name of the item.
+    plan : Plan
+        The plan after the change.
+    cost : float
+        Cost of the plan after the change minus its cost before.
+    why : str
+        Reason why the change is impossible; "" if it is possible.
     """
 
     action: str
@@ -37,7 +49,7 @@ class Change:
 
 
 def cost_of(plan):
-    """What a plan costs: the sum of its items times the costs that it states.
+    """Total cost of the items of a plan.
 
     Parameters
     ----------
@@ -46,7 +58,7 @@ def cost_of(plan):
     Returns
     -------
     float
-        In the unit of those costs; 0 where the plan states none.
+        Number of items times the unit costs of the plan; 0 if the plan states no costs.
     """
     if isinstance(plan, WallPlan):
         return _priced(plan, wall_count(plan))
@@ -54,12 +66,12 @@ def cost_of(plan):
         "photo_station": len(plan.stations),
         "photograph": len(plan.photos),
         "setup": len(plan.setups),
-        "tape": sum(one.table == "distances" for one in plan.ties),
+        "tape": sum(tie.table == "distances" for tie in plan.ties),
         "base": len(plan.bases),
         "control_point": len(plan.known),
         "target": len(plan.targets.names),
-        "reading": sum(one.readings - 1 for one in (*plan.photos, *plan.ties, *plan.bases))
-        + sum(one.sets - 1 for one in plan.setups),
+        "reading": sum(item.readings - 1 for item in (*plan.photos, *plan.ties, *plan.bases))
+        + sum(setup.sets - 1 for setup in plan.setups),
     }
     return _priced(plan, count)
 
@@ -69,50 +81,63 @@ def _priced(plan, count):
 
 
 def changes_of(plan, actions=("add", "drop", "repeat"), items=ITEMS):
-    """Every Change of one item of a Plan or a WallPlan."""
+    """Return every Change of one item of a Plan or a WallPlan.
+
+    Parameters
+    ----------
+    plan : Plan or WallPlan
+    actions : tuple of str, optional
+        Actions to include: "add", "drop", "repeat".
+    items : tuple of str, optional
+        Items to include.
+
+    Returns
+    -------
+    tuple of Change
+    """
     if isinstance(plan, WallPlan):
         return tuple(_changes_of_wall(plan, actions, WALL_ITEMS if items is ITEMS else items))
-    found = []
+    changes = []
     for item in items:
-        found += [one for one in _OF[item](plan) if one[0] in actions]
+        changes += [change for change in _OF[item](plan) if change[0] in actions]
     before = cost_of(plan)
     return tuple(
         Change(action, item, name, after, cost_of(after) - before)
-        for action, item, name, after in found
+        for action, item, name, after in changes
     )
 
 
 def _changes_of_wall(plan, actions, items):
     before = cost_of(plan)
-    for action, item, name, how in wall_changes_of(plan):
+    for action, item, name, apply_change in wall_changes_of(plan):
         if action not in actions or item not in items:
             continue
         try:
-            after, why = how(), ""
-        except TankcalError as error:  # its job is refused: nothing is left of that course
+            after, why = apply_change(), ""
+        except TankcalError as error:  # invalid job: a course would have no readings left
             after, why = plan, str(error).splitlines()[0]
         yield Change(action, item, name, after, cost_of(after) - before, why)
 
 
 def _stations(plan):
     for station in plan.stations:
-        left = tuple(one for one in plan.photos if one.station != station)
-        if left or plan.setups:
-            yield "drop", "photo_station", station, replace(plan, photos=left)
-    places = {one.station: one.xyz_m for one in plan.photos}
+        kept_photos = tuple(photo for photo in plan.photos if photo.station != station)
+        if kept_photos or plan.setups:
+            yield "drop", "photo_station", station, replace(plan, photos=kept_photos)
+    places = {photo.station: photo.xyz_m for photo in plan.photos}
     for station, _, place in _between(plan, places):
-        first = next(one for one in plan.photos if one.station == station)
-        like = [one for one in plan.photos if one.station == station]
+        first = next(photo for photo in plan.photos if photo.station == station)
+        copied = [photo for photo in plan.photos if photo.station == station]
         name = f"{NEW}{station}"
-        if any(one.station == name for one in plan.photos):
+        if any(photo.station == name for photo in plan.photos):
             continue
         turn = _azimuth(plan, place) - _azimuth(plan, first.xyz_m)
         added = tuple(
             replace(
-                one, name=f"{name}.{k + 1}", station=name, xyz_m=place,
-                rotation=one.rotation @ _about_z(turn).T,
+                copied_photo, name=f"{name}.{k + 1}", station=name, xyz_m=place,
+                rotation=copied_photo.rotation @ _about_z(turn).T,
             )
-            for k, one in enumerate(like)
+            for k, copied_photo in enumerate(copied)
         )  # fmt: skip
         yield "add", "photo_station", name, replace(plan, photos=(*plan.photos, *added))
 
@@ -123,15 +148,15 @@ def _azimuth(plan, place):
 
 
 def _about_z(turn):
-    """Rotation (3, 3) that turns places clockwise seen from above."""
+    """Rotation matrix (3, 3) that turns positions clockwise as seen from above."""
     c, s = np.cos(turn), np.sin(turn)
     return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _between(plan, places):
-    """(name, next name, place (3,)) half-way in azimuth between neighbours of one height.
+    """Yield (name, next name, position (3,)) half-way in azimuth between neighbours of one height.
 
-    places  {name: (3,)}
+    places: {name: position (3,)}.
     """
     levels = {}
     for name, xyz in places.items():
@@ -140,36 +165,41 @@ def _between(plan, places):
         names = sorted(names, key=lambda name: _azimuth(plan, places[name]))
         if len(names) < 2:
             continue
-        for one, other in zip(names, names[1:] + names[:1], strict=True):
-            here, there = places[one], places[other]
-            gap = (_azimuth(plan, there) - _azimuth(plan, here)) % (2 * np.pi)
-            radius = [np.hypot(*(place[:2] - plan.shell.axis_m)) for place in (here, there)]
+        for start, next_name in zip(names, names[1:] + names[:1], strict=True):
+            here, ends = places[start], places[next_name]
+            gap = (_azimuth(plan, ends) - _azimuth(plan, here)) % (2 * np.pi)
+            radius = [np.hypot(*(place[:2] - plan.shell.axis_m)) for place in (here, ends)]
             at = places_around(plan.shell.axis_m, _azimuth(plan, here) + gap / 2, np.mean(radius))
-            yield one, other, np.array([*at, (here[2] + there[2]) / 2])
+            yield start, next_name, np.array([*at, (here[2] + ends[2]) / 2])
 
 
 def _setups(plan):
-    for one in plan.setups:
-        left = tuple(
-            replace(other, sights=tuple(name for name in other.sights if name != one.name))
+    for setup in plan.setups:
+        kept_setups = tuple(
+            replace(other, sights=tuple(name for name in other.sights if name != setup.name))
             for other in plan.setups
-            if other is not one
+            if other is not setup
         )
-        if left or plan.photos:
-            ties = tuple(tie for tie in plan.ties if one.name not in (tie.start, tie.end))
-            bases = tuple(base for base in plan.bases if one.name not in (base.setup, base.to))
-            yield "drop", "setup", one.name, replace(plan, setups=left, ties=ties, bases=bases)
-    places = {one.name: one.xyz_m for one in plan.setups}
+        if kept_setups or plan.photos:
+            ties = tuple(tie for tie in plan.ties if setup.name not in (tie.start, tie.end))
+            bases = tuple(base for base in plan.bases if setup.name not in (base.setup, base.to))
+            yield (
+                "drop",
+                "setup",
+                setup.name,
+                replace(plan, setups=kept_setups, ties=ties, bases=bases),
+            )
+    places = {setup.name: setup.xyz_m for setup in plan.setups}
     for name, other, place in _between(plan, places):
-        like = next(one for one in plan.setups if one.name == name)
+        template = next(setup for setup in plan.setups if setup.name == name)
         new = f"{NEW}{name}"
         if new in places:
             continue
-        sights = (name, other) if like.sights else ()
-        added = replace(like, name=new, xyz_m=place, sights=sights)
+        sights = (name, other) if template.sights else ()
+        added = replace(template, name=new, xyz_m=place, sights=sights)
         beside = tuple(
-            replace(one, sights=(*one.sights, new)) if one.name in sights else one
-            for one in plan.setups
+            replace(setup, sights=(*setup.sights, new)) if setup.name in sights else setup
+            for setup in plan.setups
         )
         yield "add", "setup", new, replace(plan, setups=(*beside, added))
 
@@ -178,43 +208,45 @@ def _tapes(plan):
     for tie in plan.ties:
         yield "drop", "tape", tie.name, _without_tie(plan, tie)
         again = replace(tie, readings=2 * tie.readings)
-        ties = tuple(again if one is tie else one for one in plan.ties)
+        ties = tuple(again if other_tie is tie else other_tie for other_tie in plan.ties)
         if again.readings <= MOST_READINGS:
             yield "repeat", "tape", tie.name, replace(plan, ties=ties)
     yield from _new_tapes(plan)
 
 
 def _without_tie(plan, tie):
-    """The Plan without a tape, and without the marks at its ends that nothing else needs."""
-    left = tuple(one for one in plan.ties if one is not tie)
-    needed = {one.name for one in plan.known}.union(*((one.start, one.end) for one in left))
+    """Return the Plan without a tape, and without marks at its ends that no other item uses."""
+    kept_ties = tuple(kept for kept in plan.ties if kept is not tie)
+    needed = {control_point.name for control_point in plan.known}.union(
+        *((kept.start, kept.end) for kept in kept_ties)
+    )
     spare = {tie.start, tie.end} - needed
     extra, facing = (
-        {name: one for name, one in some.items() if name not in spare}
+        {name: kept for name, kept in some.items() if name not in spare}
         for some in (plan.extra, plan.facing)
     )
-    return replace(plan, ties=left, extra=extra, facing=facing)
+    return replace(plan, ties=kept_ties, extra=extra, facing=facing)
 
 
 def _new_tapes(plan):
-    """A tape of each kind, where the plan has none yet: upright over the shell, along a tangent."""
-    like = [one for one in plan.ties if one.table == "distances"]
-    tool = like[0].instrument if like else None
-    sd = min((one.sd_m for one in like), default=TAPE_SD_M)
+    """Yield a tape of each kind that the plan lacks: vertical along the shell, and horizontal."""
+    tapes = [tie for tie in plan.ties if tie.table == "distances"]
+    tool = tapes[0].instrument if tapes else None
+    sd = min((existing.sd_m for existing in tapes), default=TAPE_SD_M)
     tall = plan.shell.high_m - plan.shell.low_m
     for kind, length, low in (("vertical", 0.9 * tall, 0.05 * tall), ("horizontal", None, 1.5)):
         length = plan.shell.radius_m if length is None else length
         for quarter in range(4):
             azimuth = 22.5 + 90.0 * quarter
             name = f"{NEW}{kind[0].upper()}{quarter + 1}"
-            given = {
+            entry = {
                 "name": name, "kind": kind, "azimuth_deg": azimuth,
                 "length_m": length, "low_m": min(low, tall / 2), "off_m": None, "s_mm": 1000 * sd,
                 "readings": 1, "instrument": tool,
             }  # fmt: skip
-            if any(one.name == given["name"] for one in plan.ties):
+            if any(tie.name == entry["name"] for tie in plan.ties):
                 continue
-            tie, ends, out = tape_of(given, plan.shell)
+            tie, ends, out = tape_of(entry, plan.shell)
             after = replace(
                 plan, ties=(*plan.ties, tie), extra=plan.extra | ends,
                 facing=plan.facing | dict.fromkeys(ends, out),
@@ -223,26 +255,28 @@ def _new_tapes(plan):
 
 
 def _bases(plan):
-    """Bases of a stadia, each with all readings of it: from one end, or exchanged."""
-    for ends, mine in by_ends(plan.bases).items():
+    """Yield changes of bases; the readings of a base from either end change together."""
+    for ends, group in by_ends(plan.bases).items():
         name = "-".join(ends)
-        left = tuple(one for one in plan.bases if one not in mine)
-        yield "drop", "base", name, replace(plan, bases=left)
-        again = [replace(one, readings=2 * one.readings) for one in mine]
-        if max(one.readings for one in again) <= MOST_READINGS:
-            yield "repeat", "base", name, replace(plan, bases=(*left, *again))
+        kept_bases = tuple(base for base in plan.bases if base not in group)
+        yield "drop", "base", name, replace(plan, bases=kept_bases)
+        again = [replace(member, readings=2 * member.readings) for member in group]
+        if max(member.readings for member in again) <= MOST_READINGS:
+            yield "repeat", "base", name, replace(plan, bases=(*kept_bases, *again))
     for base in new_bases(plan):
         name = "-".join((base[0].setup, base[0].to))
         yield "add", "base", name, replace(plan, bases=(*plan.bases, *base))
 
 
 def _control(plan):
-    for one in plan.known:
-        left = tuple(other for other in plan.known if other is not one)
-        yield "drop", "control_point", one.name, replace(plan, known=left)
-    sds = [one.sd_m[one.sd_m > 0] for one in plan.known]
-    sd = min((float(one.min()) for one in sds if len(one)), default=CONTROL_SD_M)
-    names = {one.name for one in plan.known}
+    for control_point in plan.known:
+        kept_points = tuple(
+            known_point for known_point in plan.known if known_point is not control_point
+        )
+        yield "drop", "control_point", control_point.name, replace(plan, known=kept_points)
+    sds = [control_point.sd_m[control_point.sd_m > 0] for control_point in plan.known]
+    sd = min((float(group.min()) for group in sds if len(group)), default=CONTROL_SD_M)
+    names = {control_point.name for control_point in plan.known}
     for number in _spread_targets(plan, 8):
         name = plan.targets.names[number]
         if name not in names:
@@ -251,16 +285,16 @@ def _control(plan):
 
 
 def _spread_targets(plan, count):
-    """Numbers of targets around the shell, at its foot and at its top in turn."""
+    """Indices of targets around the shell, alternating between its foot and its top."""
     sections = list(dict.fromkeys(plan.targets.section))
     for k in range(count):
         row = sections[0] if k % 2 == 0 else sections[-1]
-        members = [i for i, one in enumerate(plan.targets.section) if one == row]
+        members = [i for i, name in enumerate(plan.targets.section) if name == row]
         yield members[(k * len(members)) // count]
 
 
 def _rows(plan):
-    """Rows of targets dropped, as long as their course keeps one, and one added to each course."""
+    """Yield changes of target rows: drop one unless it is the last of a course, or add one."""
     targets = plan.targets
     for course in dict.fromkeys(targets.course.tolist()):
         after = _with_row(plan, course)
@@ -268,32 +302,36 @@ def _rows(plan):
             name = f"{OF_COURSE}{plan.job.courses[course].name}"
             yield "add", "target_row", name, after
     for name in dict.fromkeys(targets.section):
-        mine = np.array([one == name for one in targets.section])
-        rest = targets.taken(~mine)
+        in_row = np.array([section == name for section in targets.section])
+        rest = targets.taken(~in_row)
         if set(rest.course) == set(targets.course):
-            gone = set(targets.taken(mine).names)
-            known = tuple(one for one in plan.known if one.name not in gone)
-            ties = tuple(one for one in plan.ties if not {one.start, one.end} & gone)
+            gone = set(targets.taken(in_row).names)
+            known = tuple(
+                control_point for control_point in plan.known if control_point.name not in gone
+            )
+            ties = tuple(tie for tie in plan.ties if not {tie.start, tie.end} & gone)
             after = replace(plan, targets=rest, known=known, ties=ties)
             yield "drop", "target_row", f"{ROW}{name}", after
 
 
 def _with_row(plan, course):
-    """The Plan with a row more in a course, all its rows at Gauss levels; None: too low for it."""
+    """Return the Plan with another row in a course, all rows at Gauss levels; None if too low."""
     targets = plan.targets
-    mine = targets.course == course
-    rows = sorted({*zip(targets.height_m[mine], np.array(targets.section)[mine], strict=True)})
-    below = sum(one.height_m for one in plan.job.courses[:course])
+    in_course = targets.course == course
+    rows = sorted(
+        {*zip(targets.height_m[in_course], np.array(targets.section)[in_course], strict=True)}
+    )
+    below = sum(lower_course.height_m for lower_course in plan.job.courses[:course])
     levels, _ = row_heights_m([plan.job.courses[course]], len(rows) + 1, targets.clearance_m)
     if len(levels) <= len(rows):
         return None
     xyz, heights = targets.xyz_m.copy(), targets.height_m.copy()
     for (height, section), level in zip(rows, levels, strict=False):
-        row = np.array([one == section for one in targets.section])
+        row = np.array([name == section for name in targets.section])
         xyz[row, 2] += below + level - height
         heights[row] = below + level
     moved = replace(targets, xyz_m=xyz, height_m=heights)
-    last = moved.taken([one == rows[-1][1] for one in moved.section])
+    last = moved.taken([name == rows[-1][1] for name in moved.section])
     section, rise = f"{NEW}{len(set(targets.section)) + 1}", levels[-1] - levels[-2]
     added = replace(
         last,
@@ -303,16 +341,19 @@ def _with_row(plan, course):
         xyz_m=last.xyz_m + [0.0, 0.0, rise],
     )
     places = dict(zip(moved.names, moved.xyz_m, strict=True))
-    known = tuple(replace(one, xyz_m=places.get(one.name, one.xyz_m)) for one in plan.known)
+    known = tuple(
+        replace(control_point, xyz_m=places.get(control_point.name, control_point.xyz_m))
+        for control_point in plan.known
+    )
     return replace(plan, targets=moved.followed_by(added), known=known)
 
 
 def _readings(plan):
-    if plan.photos and max(one.readings for one in plan.photos) <= MOST_READINGS / 2:
-        photos = tuple(replace(one, readings=2 * one.readings) for one in plan.photos)
+    if plan.photos and max(photo.readings for photo in plan.photos) <= MOST_READINGS / 2:
+        photos = tuple(replace(photo, readings=2 * photo.readings) for photo in plan.photos)
         yield "repeat", "reading", IMAGES, replace(plan, photos=photos)
-    if plan.setups and max(one.sets for one in plan.setups) <= MOST_READINGS / 2:
-        setups = tuple(replace(one, sets=2 * one.sets) for one in plan.setups)
+    if plan.setups and max(setup.sets for setup in plan.setups) <= MOST_READINGS / 2:
+        setups = tuple(replace(setup, sets=2 * setup.sets) for setup in plan.setups)
         yield "repeat", "reading", SETS, replace(plan, setups=setups)
 
 

@@ -1,4 +1,4 @@
-"""The keys of plan.toml and the columns of its tables that a job does not have."""
+"""Keys of plan.toml, and columns of its tables that a job does not have."""
 
 from tankcal.job.contract import columns_of
 from tankcal.job.contract.observations import ANGLE_UNITS

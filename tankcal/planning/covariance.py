@@ -1,10 +1,10 @@
-"""The covariance of many predicted points, as it acts and not as a matrix that is written out.
+"""Covariance of many predicted points as an operator, without forming the dense matrix.
 
-What a volume needs of all points together are products with a few columns: Q M comes from the
-reduced normal equations, 3n times d numbers and not 3n times 3n.
+The volume needs only products of the covariance with a few columns. Q M follows from the reduced
+normal equations with 3n times d numbers instead of 3n times 3n.
 
-Shifts and the turn about the vertical are taken out as `wall.s_transform` takes them out,
-by its D and A: C' = C - D A' - A D'.
+Common translations and the common rotation about the vertical are removed with D and A of
+`wall.s_transform`: C' = C - D A' - A D'.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ from tankcal.solver.effects import covariances
 
 @dataclass(frozen=True)
 class PredictedCovariance:
-    """Covariance (3n, 3n) of chosen points of a predicted network, among themselves.
+    """Covariance (3n, 3n) of selected points of a predicted network.
 
-    adjusted  network.Adjusted        points  (n,) numbers of the points there
+    adjusted: network.Adjusted; points: indices (n,) of the points in the network.
     """
 
     adjusted: object
@@ -29,11 +29,11 @@ class PredictedCovariance:
 
     @property
     def shape(self):
-        """(3n, 3n)."""
+        """Shape of the covariance, (3n, 3n)."""
         return (3 * len(self.points),) * 2
 
     def __matmul__(self, matrix):
-        """C' matrix, (3n, d)."""
+        """Product of C' and a matrix, shape (3n, d)."""
         return (
             self._in_frame(matrix)
             - self._basis @ (self._across.T @ matrix)
@@ -41,10 +41,10 @@ class PredictedCovariance:
         )
 
     def _in_frame(self, matrix):
-        """C matrix in the datum of the network."""
+        """Product of C, in the datum of the network, and a matrix."""
         columns = self.adjusted.problem.layout.points[self.points].ravel()
-        found = covariances(self.adjusted.solution.cofactor, columns, matrix.T)
-        return np.vstack([found, np.zeros((1, found.shape[1]))])[columns]
+        product = covariances(self.adjusted.solution.cofactor, columns, matrix.T)
+        return np.vstack([product, np.zeros((1, product.shape[1]))])[columns]
 
     @cached_property
     def _basis(self):
@@ -53,23 +53,24 @@ class PredictedCovariance:
     @cached_property
     def _across(self):
         trace = np.einsum("nii->", self.adjusted.point_covariances_m2[self.points])
+        # The trace of C determines s2 of A = C D - D (D'C D + s2 I) / 2.
         return s_transform_factors(self._basis, self._in_frame(self._basis), trace)
 
     def among(self, column):
-        """A column (3n,) of one cause, without the common motions."""
+        """Effects (3n,) of one cause on the points, without the common motions."""
         return column - self._basis @ (self._basis.T @ column)
 
     def diagonal(self):
-        """(3n,) variances."""
+        """Variances, shape (3n,)."""
         return self.of_each_point().diagonal()
 
     def written_out(self):
-        """(3n, 3n) dense, for few points."""
-        cross = self._basis @ self._across.T
+        """Dense covariance (3n, 3n); for few points only."""
+        cross = self._basis @ self._across.T  # D A'
         return self.adjusted.covariance_m2(self.points) - cross - cross.T
 
     def of_each_point(self):
-        """Sparse (3n, 3n): the block of each point, nothing between them."""
+        """Sparse matrix (3n, 3n) of the covariance blocks of single points, no correlations."""
         n = len(self.points)
         basis, across = (part.reshape(n, 3, 4) for part in (self._basis, self._across))
         cross = basis @ np.swapaxes(across, 1, 2)

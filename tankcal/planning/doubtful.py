@@ -1,11 +1,11 @@
-"""What a blunder could do that the planned survey would not notice.
+"""Reliability of a planned survey: effects of undetected blunders on the volume.
 
-The smallest blunder that is found has the size delta0 s / sqrt(r); below it a reading shifts the
-volume of the full tank by up to
+The smallest detectable blunder has the size delta0 s / sqrt(r). A smaller blunder of a reading
+changes the volume of the full tank by at most
 
     dV = g Q j' delta0 / sqrt(r)        g = dV/dx, j the whitened row of the reading
 
-All numbers are of one reading: of those that are repeated see `repeated`.
+All values refer to one reading; for repeated readings, see `SingleReadings`.
 
 Source: Baarda 1968, as in tankcal.survey.network.reliability.
 """
@@ -21,31 +21,40 @@ from tankcal.planning.model import TAPED
 from tankcal.solver.effects import covariances
 from tankcal.survey.observations import ImageCoordinates
 
-# Repeated readings one by one, of which the network of a plan has the mean alone.
+# Single readings of a repeated measurement. The network of a plan contains only their mean.
 #
-# A mean has the weight of its readings together, each with its share p of it (1/n of n alike):
+# A mean has the sum of the weights of its readings. A reading has the share p of this sum, which
+# is 1/n for n readings of equal weight:
 #
-#     r_i = 1 - p (1 - r)         redundancy number of one of them, r that of the mean
-#     s_i = s / sqrt(p)           its standard deviation, s that of the mean
+#     r_i = 1 - p (1 - r)         redundancy number of a reading; r redundancy number of the mean
+#     s_i = s / sqrt(p)           standard deviation of a reading; s that of the mean
 #
-# and an error e of one of them is an error p e of the mean. Readings of directions are in sets, and
-# each set has an orientation of its own. What the n sets of a set-up differ by takes part of it,
+# An error e of a reading is an error p e of the mean. Directions are read in sets, and each set
+# has its own orientation. Estimating the n orientations of a set-up reduces the redundancy:
 #
 #     r_i = 1 - (1 - r) / n - (1 - 1/n) q
 #
-# q the share of the direction in the weight of its set; the mean of the orientations is that of the
-# plan. Derivation: means and differences of equally weighted sets are orthogonal, so leverages add.
+# with q the share of the direction in the weight of its set. The mean of the orientations is the
+# orientation in the plan. Means and differences of equally weighted sets are orthogonal, so their
+# leverages add.
 
-SIGHTED = ("directions", "zenith_angles", "slope_distances")
+SIGHTED = ("directions", "zenith_angles", "slope_distances")  # tables of total station readings
 
 
 @dataclass(frozen=True)
 class SingleReadings:
-    """k readings, or lots of readings that are alike, of the n rows of a table of observations.
+    """The k single readings, or groups of equal readings, behind the n means in a table.
 
-    of     (k,) row that each belongs to      share  (k,) of its weight in that of the row
-    count  (k,) readings that are alike
-    turn   (k,) share of its weight in the row that the orientation of its own set takes away
+    Attributes
+    ----------
+    of : ndarray of int, shape (k,)
+        Row (mean) of each reading.
+    share : ndarray, shape (k,)
+        Share of the weight of each reading in the weight of its row.
+    count : ndarray of int, shape (k,)
+        Number of equal readings.
+    turn : ndarray, shape (k,)
+        Leverage of the orientation of the set of each reading, beyond that of the mean.
     """
 
     of: np.ndarray
@@ -54,58 +63,58 @@ class SingleReadings:
     turn: np.ndarray
 
     def redundancy(self, of_rows):
-        """(k, m) redundancy numbers of the readings, from those of the rows (n, m)."""
+        """Redundancy numbers (k, m) of the readings, from those of their rows, shape (n, m)."""
         return 1.0 - self.share[:, None] * (1.0 - of_rows[self.of]) - self.turn[:, None]
 
     def root(self):
-        """(k, 1) the factor on weights, and on what a whitened error of one does, of the rows."""
+        """Factor (k, 1) from the whitened row of the mean to the whitened row of a reading."""
         return np.sqrt(self.share)[:, None]
 
 
 def single_readings(plan, observations):
-    """The SingleReadings of some observations of a Plan."""
+    """Return the SingleReadings of observations of a Plan."""
     trace, times = observations.trace, {}
     if trace.table in TAPED:
-        return _of_ties(plan, observations)
+        return _single_ties(plan, observations)
     if trace.table in SIGHTED:
-        times = {one.name: one.sets for one in plan.setups}
+        times = {setup.name: setup.sets for setup in plan.setups}
     elif observations.kind == ImageCoordinates.kind:
-        times = {one.name: one.readings for one in plan.photos}
+        times = {photo.name: photo.readings for photo in plan.photos}
     count = np.array([times.get(ids[0], 1) for ids in trace.ids])
     turn = np.zeros(len(count))
     if trace.table == "directions":
-        turn = (1.0 - 1.0 / count) * _share_of_set(observations)
+        turn = (1.0 - 1.0 / count) * _share_of_set(observations)  # (1 - 1/n) q
     return SingleReadings(np.arange(len(count)), 1.0 / count, count, turn)
 
 
 def _share_of_set(directions):
-    """(n,) share of each direction in the weight of its set."""
+    """Share (n,) of each direction in the weight of its set."""
     weight = directions.using(np.ones(len(directions))).weight[:, 0] ** 2
     return weight / np.bincount(directions.set, weight)[directions.set]
 
 
-def _of_ties(plan, observations):
-    """Ties of one line may differ in their sds: each is a lot of readings that are alike."""
+def _single_ties(plan, observations):
+    """Return SingleReadings of ties; ties of one line with different sds are separate groups."""
     trace, lots = observations.trace, defaultdict(list)
-    for one in plan.ties:
-        if one.table == trace.table and one.sd_m > 0:
-            line = _line(one.table, (one.start, one.end), one.instrument, one.kind == "horizontal")
-            lots[line].append((one.sd_m**-2, one.readings))
-    for one in plan.bases if trace.table == "distances" else ():
-        line = _line(trace.table, (one.setup, one.to), one.bar, True)
-        lots[line].append((base_sd_m(plan, one) ** -2, one.readings))
+    for tie in plan.ties:
+        if tie.table == trace.table and tie.sd_m > 0:
+            line = _line(tie.table, (tie.start, tie.end), tie.instrument, tie.kind == "horizontal")
+            lots[line].append((tie.sd_m**-2, tie.readings))
+    for base in plan.bases if trace.table == "distances" else ():
+        line = _line(trace.table, (base.setup, base.to), base.bar, True)
+        lots[line].append((base_sd_m(plan, base) ** -2, base.readings))
     flat, of, share, count = getattr(observations, "horizontal", False), [], [], []
     for number, (ids, group) in enumerate(zip(trace.ids, trace.group, strict=True)):
-        mine = lots[_line(trace.table, ids, group, flat)]
-        weight, times = np.array(mine).T
-        of += [number] * len(mine)
+        lot = lots[_line(trace.table, ids, group, flat)]
+        weight, times = np.array(lot).T
+        of += [number] * len(lot)
         share += (weight / (weight @ times)).tolist()
         count += times.astype(int).tolist()
     return SingleReadings(np.array(of), np.array(share), np.array(count), np.zeros(len(of)))
 
 
 def _line(table, ends, instrument, flat):
-    """What readings of one line have in common; a tape is read either way."""
+    """Key of the readings of one line; a tape may be read in either direction."""
     if table != "distances":
         return tuple(ends)
     return frozenset(ends), instrument or "", bool(flat)
@@ -113,30 +122,32 @@ def _line(table, ends, instrument, flat):
 
 @dataclass(frozen=True)
 class GroupReliability:
-    """How far the readings of one kind control one another.
+    """Reliability of the readings of one kind.
 
     Attributes
     ----------
     kind, name : str
-        Such as "distance", "tape".
+        For example "distance" and "tape".
     unit : str
-        Of the blunder.
+        Unit of the blunder.
     count, uncontrolled : int
-        Values that are read, and how many of them nothing controls.
+        Number of values, and number of values that no other reading controls.
     redundancy : float
         Mean redundancy number.
     blunder : float
-        Largest undetectable one of a controlled value; nan: none is controlled.
+        Largest undetectable blunder of a controlled value; nan if no value is controlled.
     of : tuple
-        Names of the reading that it is of.
+        Names of the reading with this blunder.
     volume_m3 : float
-        Largest effect of an undetected blunder on the volume of the full tank, m3; nan alike.
+        Largest effect of an undetected blunder on the volume of the full tank, m3; nan if no value
+        is controlled.
     volume_of : tuple
-        Names of the reading that has it.
+        Names of the reading with this effect.
     per_unit_m3 : float
-        Largest effect on it of a blunder of one unit in an uncontrolled value, m3; nan: none.
+        Largest effect on the volume of a blunder of one unit in an uncontrolled value, m3; nan if
+        every value is controlled.
     per_unit_of : tuple
-        Names of the reading that has it.
+        Names of the reading with this effect.
     """
 
     kind: str
@@ -154,58 +165,77 @@ class GroupReliability:
 
 
 def reliability(plan, predicted, covariance, by_points_m2):
-    """A GroupReliability for each kind and name of readings (alpha 0.001, power 0.80).
+    """Return a GroupReliability of each kind and name of readings (alpha 0.001, power 0.80).
 
-    plan         Plan                        predicted     surveys.Predicted of it
-    covariance   PredictedCovariance         by_points_m2  (3n,) see PredictedTable
-                 of these n points
+    Parameters
+    ----------
+    plan : Plan
+    predicted : Predicted
+        Predicted survey of the plan.
+    covariance : PredictedCovariance
+        Covariance of n points.
+    by_points_m2 : ndarray, shape (3n,)
+        Derivative of the volume of the full tank by the coordinates of these points.
+
+    Returns
+    -------
+    tuple of GroupReliability
     """
     adjusted = predicted.adjusted
     problem, solution = adjusted.problem, adjusted.solution
-    pull = _pull(solution, problem.layout.points[covariance.points].ravel(), by_points_m2)
-    found = []
-    for number, one in enumerate(problem.observations):
-        if one.trace is None:
+    # Q g' is common to all readings; j Q g' is the effect of a whitened unit error.
+    pull = _covariance_with(
+        solution, problem.layout.points[covariance.points].ravel(), by_points_m2
+    )
+    groups = []
+    for number, table in enumerate(problem.observations):
+        if table.trace is None:
             continue
         jac = solution.cofactor.jacobians[number]
         r = 1.0 - solution.cofactor.leverage(number, jac)
         columns = problem.model.groups[number].columns
         effect = np.abs(np.einsum("nmk,nk->nm", jac, pull[columns]))
-        single = single_readings(plan, one)
-        found += _by_name(one, single, single.redundancy(r), effect)
-    return tuple(found)
+        single = single_readings(plan, table)
+        groups += _group_by_name(table, single, single.redundancy(r), effect)
+    return tuple(groups)
 
 
-def _pull(solution, columns, gradient):
-    """(unknowns + 1,) Q g' of a gradient by some unknowns; the last is 0, for the fixed ones."""
+def _covariance_with(solution, columns, gradient):
+    """Product Q g' of a gradient g, shape (unknowns + 1,).
+
+    The last element (fixed unknowns) is 0.
+    """
     return np.append(covariances(solution.cofactor, columns, gradient[None])[:, 0], 0.0)
 
 
-def _by_name(one, single, redundancy, effect):
-    """The groups of one table of observations.
+def _group_by_name(table, single, redundancy, effect):
+    """Yield the GroupReliability of each name in one table of observations.
 
-    single  SingleReadings (k)      redundancy  (k, m) of these     effect  (n, m) of the rows
+    single: SingleReadings of k readings; redundancy: (k, m) of the readings; effect: (n, m) of the
+    rows.
     """
-    trace = one.trace.taken(single.of)
+    trace = table.trace.taken(single.of)
     names = np.array(trace.group, dtype=object)
     controlled = redundancy > UNCONTROLLED
+    # delta0 / sqrt(r): smallest detectable blunder in standard deviations
     size = np.where(controlled, noncentrality() / np.sqrt(np.where(controlled, redundancy, 1)), 0)
-    weight = one.using(np.ones(len(one))).weight[single.of] * single.root()
+    weight = table.using(np.ones(len(table))).weight[single.of] * single.root()
+    # The weight and the whitened effect of a single reading are sqrt(p) times those of the mean.
     effect = effect[single.of] * single.root()
     blunder, volume = size / weight, size * effect
     per_unit = np.where(controlled, -1.0, effect * weight)
     for name in dict.fromkeys(names):
-        mine = np.flatnonzero(names == name)
+        members = np.flatnonzero(names == name)
         worst, moves, alone = (
-            mine[np.argmax(part[mine].max(axis=1))] for part in (blunder, volume, per_unit)
+            members[np.argmax(part[members].max(axis=1))] for part in (blunder, volume, per_unit)
         )
-        known, is_bare = controlled[mine].any(), bool((~controlled[mine]).any())
-        count = single.count[mine]
+        known, is_bare = controlled[members].any(), bool((~controlled[members]).any())
+        count = single.count[members]
         yield GroupReliability(
-            kind=one.kind, name=str(name), unit=one.unit,
+            kind=table.kind, name=str(name), unit=table.unit,
             count=int(count.sum() * redundancy.shape[1]),
-            uncontrolled=int(count @ np.sum(~controlled[mine], axis=1)),
-            redundancy=float(count @ redundancy[mine].mean(axis=1) / count.sum()),
+            uncontrolled=int(count @ np.sum(~controlled[members], axis=1)),
+            redundancy=float(count @ redundancy[members].mean(axis=1) / count.sum()),
             blunder=float(blunder[worst].max()) if known else float("nan"),
             of=trace.ids[worst],
             volume_m3=float(volume[moves].max()) if known else float("nan"),

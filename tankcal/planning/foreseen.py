@@ -1,4 +1,4 @@
-"""What the run of a planned survey will warn of, and what the plan counts on in vain."""
+"""Warnings of a planned survey: those that the job would issue, and items without effect."""
 
 from dataclasses import replace
 
@@ -16,36 +16,43 @@ from tankcal.planning.given import PLAN_FILE
 
 
 def foreseen(prediction):
-    """A tuple of Problem: those of the plan, of its network, of the wall and of the table."""
+    """Return a tuple of Problem for the plan, its network, the wall and the table."""
     tabled = prediction.tabled
-    of_table = check_table(_correlated(tabled), tabled.wall, tabled.made)
+    of_table = check_table(_with_full_covariance(tabled), tabled.wall, tabled.made)
     of_run = (
         *prediction.predicted.frame.warnings,
         *open_questions(tabled.job, prediction.datum, tabled.job.points.causes),
-        *(one for one in of_table if getattr(one.expected, "code", None) not in OF_SCATTER),
+        *(
+            problem
+            for problem in of_table
+            if getattr(problem.expected, "code", None) not in OF_SCATTER
+        ),
     )
     return (
         *prediction.plan.warnings,
-        *_unseen(prediction),
+        *_undetermined_targets(prediction),
         *idle_ties(prediction.plan, prediction.points),
         *_uncontrolled(prediction.reliability),
         *check_bases(prediction.measurements),
-        *(replace(one, file=PLAN_FILE) if one.file == SETTINGS_FILE else one for one in of_run),
+        *(
+            replace(problem, file=PLAN_FILE) if problem.file == SETTINGS_FILE else problem
+            for problem in of_run
+        ),
     )
 
 
-def _correlated(tabled):
-    """The job of a PredictedTable, its points with all that they have in common."""
+def _with_full_covariance(tabled):
+    """Return the job of a PredictedTable with the full covariance of its points."""
     points, adjusted = tabled.job.points, tabled.covariance.adjusted
     number = {name: i for i, name in enumerate(adjusted.survey.points)}
     covariance = PredictedCovariance(adjusted, np.array([number[name] for name in points.names]))
     return replace(tabled.job, points=replace(points, covariance_m2=covariance))
 
 
-def _unseen(prediction):
-    """Targets that nothing sees."""
+def _undetermined_targets(prediction):
+    """Return a Problem about targets that are not determined."""
     targets = set(prediction.plan.targets.names)
-    lost = [one.name for one in prediction.undetermined if one.name in targets]
+    lost = [point.name for point in prediction.undetermined if point.name in targets]
     if not lost:
         return ()
     text = message(
@@ -60,17 +67,17 @@ def _unseen(prediction):
 
 
 def idle_ties(plan, points):
-    """Tapes, bases, height differences and plumb lines with an end that is not determined.
+    """Return a Problem about tapes, bases, levels and plumb lines with an undetermined end.
 
-    points  PointOutlook of all points
+    points: PointOutlook of all points.
     """
-    lost = {one.name for one in points if one.undetermined}
-    ties = [(one.name, (one.start, one.end)) for one in plan.ties]
-    ties += [(one.name, (one.setup, one.to)) for one in plan.bases]
+    lost = {point.name for point in points if point.undetermined}
+    ties = [(tie.name, (tie.start, tie.end)) for tie in plan.ties]
+    ties += [(base.name, (base.setup, base.to)) for base in plan.bases]
     idle = [
-        message("plan_tie_end", "{tie} ({points})", tie=name, points=found)
+        message("plan_tie_end", "{tie} ({points})", tie=name, points=lost_ends)
         for name, ends in ties
-        if (found := [end for end in ends if end in lost])
+        if (lost_ends := [end for end in ends if end in lost])
     ]
     if not idle:
         return ()
@@ -86,8 +93,8 @@ def idle_ties(plan, points):
 
 
 def _uncontrolled(groups):
-    """Kinds of readings (`GroupReliability`) of which nothing controls some or all."""
-    idle = [_of_group(one) for one in groups if one.uncontrolled]
+    """Return a Problem about kinds of readings (`GroupReliability`) with uncontrolled values."""
+    idle = [_describe_group(group) for group in groups if group.uncontrolled]
     if not idle:
         return ()
     text = message(
@@ -98,14 +105,14 @@ def _uncontrolled(groups):
     return (Problem(PLAN_FILE, text),)
 
 
-def _of_group(one):
-    if one.count == 1:
+def _describe_group(group):
+    if group.count == 1:
         template = "the only value of {group} ({points})"
-        return message("plan_only_value", template, group=one.kind, points="-".join(one.of))
+        return message("plan_only_value", template, group=group.kind, points="-".join(group.of))
     return message(
         "plan_some_values",
         "{uncontrolled} of {count} values of {group}",
-        uncontrolled=one.uncontrolled,
-        count=one.count,
-        group=one.kind,
+        uncontrolled=group.uncontrolled,
+        count=group.count,
+        group=group.kind,
     )

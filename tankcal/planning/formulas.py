@@ -1,19 +1,19 @@
-"""Planning formulas: flights over flat ground, close range, what a lens shows, size of targets.
+"""Planning formulas: vertical photographs, close range, depth of field, diffraction, target size.
 
     M = GSD / pixel          Z = f M          B = (1 - overlap) frame M
-    s_X = Z/f sqrt((x/f Z/B s_p)^2 + s_x^2)   s_Y alike with y        s_Z = Z^2/(f B) s_p
+    s_X = Z/f sqrt((x/f Z/B s_p)^2 + s_x^2)   s_Y likewise with y     s_Z = Z^2/(f B) s_p
     s_p = sqrt(2) s_x        each stage may use a third of the error of the next
     s = q M s_image          close range
 
-They stand for the normal case of two vertical photos. What a network of a tank will give is better
-told by its simulation. A calculator beside the plan, for Python: no plan needs them.
+The formulas hold for the normal case of two vertical photographs. A simulation of the network
+predicts the precision of a tank survey better. No plan uses these functions.
 
     H = f^2 / (N c) + f            near = s (H - f) / (H + s - 2 f)       far = s (H - f) / (H - s)
     m = f / (s - f)                blur = 2.44 lambda N (1 + m)           D = n pixel M
 
-f focal length, N f-number, c largest blur that still counts as sharp, s distance that the lens is
-focused at, m scale of the image, M = distance over principal distance. From the hyperfocal distance
-H on everything beyond H/2 is sharp.
+f is the focal length, N the f-number, and c the largest blur that counts as sharp. s is the focus
+distance, m the scale of the image, and M = distance over principal distance. With the focus at the
+hyperfocal distance H, all points beyond H/2 are sharp.
 
 Source: Pessoa 2017 (31-39); Merchant 1982 (thirds); Silva 1995 (20); Ray 2002, Applied Photographic
 Optics, chs. 22 and 6.
@@ -21,34 +21,40 @@ Optics, chs. 22 and 6.
 
 import numpy as np
 
-THIRD = 1 / 3
-METRE = 1e-3  # of a millimetre
-GREEN_MM = 550e-6  # wavelength
-AIRY = 2.44  # diameter of the dark ring, in wavelengths times f-number
-PIXELS_OF_CIRCLE = 8.0  # across a circle whose centre is to be found to a tenth of a pixel
-PIXELS_OF_BIT = 3.0  # across one cell of a coded target
+THIRD = 1 / 3  # share of the error of a stage that the stage before it may use (Merchant 1982)
+METRE = 1e-3  # metres per millimetre
+GREEN_MM = 550e-6  # wavelength of green light, mm
+AIRY = 2.44  # diameter of the first dark ring, in units of wavelength times f-number
+PIXELS_OF_CIRCLE = 8.0  # diameter of a circle whose centre is located to a tenth of a pixel
+PIXELS_OF_BIT = 3.0  # width of one cell of a coded target
 
 
 def scale_denominator(gsd_m, pixel_mm):
-    """M = GSD/pixel, the number in the scale 1 : M, of a pixel of GSD metres on the ground."""
+    """Scale denominator M = GSD / pixel of the scale 1 : M."""
     return positive("gsd_m", gsd_m) / (METRE * positive("pixel_mm", pixel_mm))
 
 
 def ground_sample_distance_m(scale, pixel_mm):
-    """GSD = M pixel, the size of a pixel on the ground, m."""
+    """Ground sample distance GSD = M pixel, m."""
     return positive("scale", scale) * METRE * positive("pixel_mm", pixel_mm)
 
 
 def flying_height_m(focal_mm, scale):
-    """Z = f M above the ground, m, for a principal distance f and the scale 1 : M."""
+    """Flying height Z = f M above the ground, m, for principal distance f and scale 1 : M."""
     return METRE * positive("focal_mm", focal_mm) * positive("scale", scale)
 
 
 def base_m(overlap, frame_mm, scale):
-    """B = (1 - overlap) frame M between neighbouring photos, m.
+    """Base B = (1 - overlap) frame M between neighbouring photographs, m.
 
-    overlap   share of the frame that both show, 0 to below 1
-    frame_mm  side of the frame along the flight
+    Parameters
+    ----------
+    overlap : float
+        Common share of the frame, 0 to below 1.
+    frame_mm : float
+        Side of the frame along the flight, mm.
+    scale : float
+        Scale denominator M.
     """
     if not 0 <= overlap < 1:
         raise ValueError(f"found overlap = {overlap!r}; expected a share from 0 to below 1")
@@ -57,18 +63,28 @@ def base_m(overlap, frame_mm, scale):
 
 
 def parallax_sd(image_sd):
-    """s_p = sqrt(2) s_x of a difference of two image coordinates, in their unit."""
+    """Standard deviation s_p = sqrt(2) s_x of a difference of two image coordinates."""
     return np.sqrt(2) * positive("image_sd", image_sd)
 
 
 def object_sds_m(xy_mm, focal_mm, height_m, base_m, image_sd_mm):
-    """Standard deviations (..., 3) of X, Y, Z, m, of points at (..., 2) in the image, mm.
+    """Standard deviations (..., 3) of X, Y, Z, m, of points in two vertical photographs.
 
         s_X = Z/f sqrt((x/f Z/B s_p)^2 + s_x^2)        s_Z = Z^2/(f B) s_p
 
-    height_m  Z above the ground     base_m  B     image_sd_mm  s_x of an image coordinate
-
-    Two vertical photos, coordinates from the principal point; the largest are in the corners.
+    Parameters
+    ----------
+    xy_mm : array_like, shape (..., 2)
+        Image coordinates from the principal point, mm. The standard deviations are largest in the
+        corners.
+    focal_mm : float
+        Principal distance f, mm.
+    height_m : float
+        Height Z above the ground, m.
+    base_m : float
+        Base B, m.
+    image_sd_mm : float
+        Standard deviation s_x of an image coordinate, mm.
     """
     xy = np.asarray(xy_mm, dtype=float)
     if xy.shape[-1:] != (2,):
@@ -82,9 +98,10 @@ def object_sds_m(xy_mm, focal_mm, height_m, base_m, image_sd_mm):
 
 
 def thirds_m(limit_m, stages=3):
-    """Errors (stages,) that stages may have, m, from the last one back: limit, limit/3, limit/9.
+    """Permissible errors (stages,) of the stages of a process, m: limit, limit/3, limit/9.
 
-    limit_m  of the product; the stage before it may use a third, the one before that a ninth
+    limit_m is the permissible error of the product, the last stage. Each stage before it may use a
+    third of the error of the next stage.
     """
     if stages < 1:
         raise ValueError(f"found stages = {stages!r}; expected 1 or more")
@@ -92,32 +109,52 @@ def thirds_m(limit_m, stages=3):
 
 
 def classes_reached(sd_m, limits):
-    """The best class of each scale that a standard deviation reaches: a tuple of limits.
+    """Return the best class of each scale that a standard deviation meets, a tuple of limits.
 
-    sd_m    of the product; in plan sqrt(s_X^2 + s_Y^2)
-    limits  limits of one part, the best class of a scale first: things with `scale` and `sd_m`
-            (`tankcal.calibration.product.limits.Limit`)
+    Parameters
+    ----------
+    sd_m : float
+        Standard deviation of the product, m; in plan sqrt(s_X^2 + s_Y^2).
+    limits : sequence
+        Limits of one component with `scale` and `sd_m`, best class of a scale first
+        (`tankcal.calibration.product.limits.Limit`).
     """
-    found = {}
+    best = {}
     for limit in limits:
-        if limit.scale not in found and sd_m <= limit.sd_m:
-            found[limit.scale] = limit
-    return tuple(found.values())
+        if limit.scale not in best and sd_m <= limit.sd_m:
+            best[limit.scale] = limit
+    return tuple(best.values())
 
 
 def close_range_sd_m(design, scale, image_sd_mm):
-    """s = q M s_image, the mean standard deviation of object coordinates at close range, m.
+    """Mean standard deviation s = q M s_image of object coordinates at close range, m.
 
-    design  q, of the geometry of the network: the stronger, the smaller; below 1 where many rays
-            converge from all around, well above 1 for a pair of photos
-    scale   M, distance over principal distance
+    Parameters
+    ----------
+    design : float
+        Design factor q of the network geometry. It is below 1 for many convergent rays from all
+        around, and well above 1 for a pair of photographs.
+    scale : float
+        M, distance over principal distance.
+    image_sd_mm : float
+        Standard deviation s_image of an image coordinate, mm.
     """
     sd = METRE * positive("image_sd_mm", image_sd_mm)
     return positive("design", design) * positive("scale", scale) * sd
 
 
 def hyperfocal_m(focal_mm, f_number, sharp_mm):
-    """H = f^2 / (N c) + f, m."""
+    """Hyperfocal distance H = f^2 / (N c) + f, m.
+
+    Parameters
+    ----------
+    focal_mm : float
+        Focal length f, mm.
+    f_number : float
+        N.
+    sharp_mm : float
+        Largest blur c that counts as sharp, mm.
+    """
     f, n, c = (
         positive(name, value)
         for name, value in (("focal_mm", focal_mm), ("f_number", f_number), ("sharp_mm", sharp_mm))
@@ -126,7 +163,17 @@ def hyperfocal_m(focal_mm, f_number, sharp_mm):
 
 
 def depth_of_field_m(focal_mm, f_number, sharp_mm, focus_m):
-    """Nearest and farthest sharp distance from the lens, m; inf from the hyperfocal one on."""
+    """Nearest and farthest sharp distance from the lens, m.
+
+    The farthest distance is inf if the focus is at the hyperfocal distance or beyond.
+
+    Parameters
+    ----------
+    focal_mm, f_number, sharp_mm : float
+        As in `hyperfocal_m`.
+    focus_m : float
+        Focus distance, m.
+    """
     h, f = hyperfocal_m(focal_mm, f_number, sharp_mm), METRE * focal_mm
     s = _beyond(f, focus_m)
     near = s * (h - f) / (h + s - 2 * f)
@@ -135,7 +182,7 @@ def depth_of_field_m(focal_mm, f_number, sharp_mm, focus_m):
 
 
 def _beyond(focal_m, focus_m):
-    """The distance focused at, or ValueError where no lens can be."""
+    """Return the focus distance; raise ValueError if it does not exceed the focal length."""
     if positive("focus_m", focus_m) <= focal_m:
         expected = f"expected more than the focal length {focal_m:g} m"
         raise ValueError(f"found focus_m = {focus_m!r}; {expected}")
@@ -143,7 +190,7 @@ def _beyond(focal_m, focus_m):
 
 
 def focus_for_m(near_m, far_m):
-    """Distance s = 2 near far / (near + far) to focus at, so that both limits are equally sharp."""
+    """Focus distance s = 2 near far / (near + far), m, that makes both limits equally sharp."""
     near = positive("near_m", near_m)
     if not near <= far_m:
         raise ValueError(f"found {near_m!r} to {far_m!r}; expected the nearer distance first")
@@ -154,9 +201,18 @@ def focus_for_m(near_m, far_m):
 
 
 def f_number_for(focal_mm, sharp_mm, near_m, far_m):
-    """The least f-number that keeps everything between two distances sharp.
+    """Smallest f-number that keeps all points between two distances sharp.
 
     From the depth of field: H - f = near (s - f) / (s - near) at the focus of `focus_for_m`.
+
+    Parameters
+    ----------
+    focal_mm : float
+        Focal length f, mm.
+    sharp_mm : float
+        Largest blur that counts as sharp, mm.
+    near_m, far_m : float
+        Nearest and farthest distance, m.
     """
     f, s = METRE * positive("focal_mm", focal_mm), focus_for_m(near_m, far_m)
     if not f < near_m < far_m:
@@ -168,7 +224,14 @@ def f_number_for(focal_mm, sharp_mm, near_m, far_m):
 def diffraction_mm(f_number, focal_mm=None, focus_m=np.inf, wavelength_mm=GREEN_MM):
     """Diameter 2.44 lambda N (1 + m) of the Airy disk, mm.
 
-    focal_mm, focus_m  for m = f / (s - f); far away m is 0
+    Parameters
+    ----------
+    f_number : float
+        N.
+    focal_mm, focus_m : float, optional
+        Focal length, mm, and focus distance, m, for m = f / (s - f); m is 0 for an infinite focus
+        distance.
+    wavelength_mm : float, optional
     """
     m = 0.0
     if np.isfinite(focus_m):
@@ -179,10 +242,18 @@ def diffraction_mm(f_number, focal_mm=None, focus_m=np.inf, wavelength_mm=GREEN_
 
 
 def target_diameter_m(scale, pixel_mm, pixels=PIXELS_OF_CIRCLE, slant_rad=0.0):
-    """Least diameter D = n pixel M / cos(slant) of a circle, m.
+    """Smallest diameter D = n pixel M / cos(slant) of a circular target, m.
 
-    scale   M of the farthest photo        pixels  n, across its image
-    slant_rad  largest angle of sight from its normal: the image is narrower by its cosine
+    Parameters
+    ----------
+    scale : float
+        M of the farthest photograph.
+    pixel_mm : float
+        Pixel size, mm.
+    pixels : float, optional
+        Diameter n of the image of the target, pixels.
+    slant_rad : float, optional
+        Largest angle between line of sight and target normal, rad. Its cosine narrows the image.
     """
     n = positive("pixels", pixels)
     if not 0 <= slant_rad < np.pi / 2:
@@ -192,13 +263,23 @@ def target_diameter_m(scale, pixel_mm, pixels=PIXELS_OF_CIRCLE, slant_rad=0.0):
 
 
 def coded_target_m(scale, pixel_mm, cells, pixels=PIXELS_OF_BIT, slant_rad=0.0):
-    """Least side of a coded target of so many cells across, its border among them, m."""
+    """Smallest side of a coded target, m.
+
+    Parameters
+    ----------
+    scale, pixel_mm, slant_rad
+        As in `target_diameter_m`.
+    cells : float
+        Number of cells across, border included.
+    pixels : float, optional
+        Width of the image of a cell, pixels.
+    """
     return positive("cells", cells) * target_diameter_m(scale, pixel_mm, pixels, slant_rad)
 
 
 def positive(name, value):
-    """The value, or ValueError unless all of it is finite and above 0."""
-    found = np.asarray(value, dtype=float)
-    if not (np.isfinite(found).all() and (found > 0).all()):
+    """Return the value; raise ValueError unless it is finite and above 0."""
+    values = np.asarray(value, dtype=float)
+    if not (np.isfinite(values).all() and (values > 0).all()):
         raise ValueError(f"found {name} = {value!r}; expected a number above 0")
-    return value if np.isscalar(value) else found
+    return value if np.isscalar(value) else values

@@ -1,4 +1,4 @@
-"""What a plan says beside what a job says, and where it says it."""
+"""Sections and tables of a plan that a job does not have, with their places in the file."""
 
 from dataclasses import dataclass
 
@@ -9,10 +9,18 @@ PLAN_FILE = "plan.toml"
 class Entry:
     """One [section] or [[section]] of plan.toml.
 
-    name    as messages call it: "pattern", "tapes[2]"
-    values  {key: value}, None where blank or bad
-    filled  keys that say something, be it good or bad
-    row     where it begins              rows  {key: row}
+    Attributes
+    ----------
+    name : str
+        Name used in messages: "pattern", "tapes[2]".
+    values : dict
+        {key: value}; None if blank or invalid.
+    filled : frozenset of str
+        Keys that are not blank, valid or not.
+    row : int or None
+        First row of the section.
+    rows : dict
+        {key: row}.
     """
 
     name: str
@@ -26,15 +34,15 @@ class Entry:
 
     @property
     def place(self):
-        """(file, row, name) for messages about the whole."""
+        """(file, row, name) for messages about the section."""
         return PLAN_FILE, self.row, self.name
 
     def is_refused(self, key):
-        """Whether something stands there that cannot be used; that has been told."""
+        """Whether the value of a key is invalid; that problem has already been reported."""
         return key in self.filled and self.values[key] is None
 
     def tell(self, to, key, expected):
-        """Tell log.problem or log.warning about one key."""
+        """Report a problem of one key with log.problem or log.warning."""
         to(PLAN_FILE, expected, self.rows.get(key, self.row), f"{self.name}.{key}")
 
 
@@ -42,11 +50,20 @@ class Entry:
 class Given:
     """The sections and tables of a plan.
 
-    single    {section: Entry}               repeated  {section: [Entry]}
-    ties      {name: ColumnValues or None} of tapes, levels and plumb lines
-    stadia    ColumnValues of stadia.csv or None
-    control   ColumnValues of control.csv or None
-    is_wall   whether it is strapped, read from lines or hit, in place of targets
+    Attributes
+    ----------
+    single : dict
+        {section: Entry} of each [section].
+    repeated : dict
+        {section: [Entry]} of each [[section]].
+    ties : dict
+        {name: ColumnValues or None} of tapes, levels and plumb lines.
+    stadia : ColumnValues or None
+        stadia.csv.
+    control : ColumnValues or None
+        control.csv.
+    is_wall : bool
+        Whether the bare wall is measured instead of targets.
     """
 
     single: dict

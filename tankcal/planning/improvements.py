@@ -1,7 +1,7 @@
-"""What helps most: changes of a plan one at a time, the best ones in turn, the smallest that does.
+"""Search for improvements of a plan: effects of changes, a greedy search, the smallest design.
 
-A change is judged by U over volume of what the plan's limit is for. Where the targets stay the
-same, the wall with its outlines is that of the plan before, and only its covariance is new.
+A change is judged by U over volume of the quantity in the plan's limit. If the targets do not
+change, the wall and its outlines are taken from the plan before. Only the covariance is new.
 """
 
 from dataclasses import dataclass, replace
@@ -22,18 +22,28 @@ from tankcal.planning.wall.changes import SEARCHED
 from tankcal.planning.wall.model import WallPlan
 from tankcal.survey import predict_survey
 
-OF_FRAME = ("tape", "base", "control_point")  # items that may tell what a survey leaves open
-REPEATED = 10  # steps of a greedy search, where nothing else ends it
-LEAST_GAIN = 1e-3  # of U over volume, for which an item is added
+OF_FRAME = ("tape", "base", "control_point")  # items that can determine datum, scale or vertical
+REPEATED = 10  # largest number of steps of a greedy search
+LEAST_GAIN = 1e-3  # smallest relative reduction of U for which an item is added
 
 
 @dataclass(frozen=True)
 class Effect:
-    """What one Change does.
+    """Effect of one Change.
 
-    relative_u  of the plan after it; inf: the survey would not work any more, `why` says so
-    difference  to the plan before        U_m3  of the full tank after it
-    poor        targets that are not determined, or weak for want of rays
+    Attributes
+    ----------
+    change : Change
+    relative_u : float
+        U over volume after the change; inf if the survey would have no solution.
+    difference : float
+        Difference of U over volume from the plan before.
+    U_m3 : float
+        U of the full tank after the change, m3.
+    poor : int
+        Number of targets that are not determined, or have too few rays.
+    why : str
+        Reason why the survey has no solution; "" otherwise.
     """
 
     change: Change
@@ -46,7 +56,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class _NothingBefore:
-    """In place of the Prediction of a plan that has none."""
+    """Placeholder for the Prediction of a plan without a solution."""
 
     tabled: None = None
     relative_u: float = np.nan
@@ -57,10 +67,17 @@ NOTHING_BEFORE = _NothingBefore()
 
 @dataclass(frozen=True)
 class Path:
-    """Changes made one after the other, each the best of its round.
+    """Sequence of changes, each the best of its round.
 
-    start       Prediction before the first, prediction  after the last
-    steps       tuple of Effect                          tried  plans computed
+    Attributes
+    ----------
+    start : Prediction
+        Prediction before the first change.
+    steps : tuple of Effect
+    prediction : Prediction
+        Prediction after the last change.
+    tried : int
+        Number of plans computed.
     """
 
     start: Prediction
@@ -95,17 +112,17 @@ class Path:
 
 
 def what_helps(plan, changes=None, progress=None, before=None):
-    """Effect of each change of a plan, the one that helps most first.
+    """Return the effects of changes of a plan, largest improvement first.
 
     Parameters
     ----------
     plan : Plan
     changes : tuple of Change, optional
-        None: all of one item.
+        None: all changes of one item.
     progress : callable, optional
         progress(text, done, total).
     before : Prediction, optional
-        Of the plan, where it is known.
+        Prediction of the plan, if already computed.
 
     Returns
     -------
@@ -114,52 +131,56 @@ def what_helps(plan, changes=None, progress=None, before=None):
     changes = changes_of(plan) if changes is None else changes
     before = predict(plan) if before is None else before
     progress = progress or (lambda text, done, total: None)
-    found = []
-    for number, one in enumerate(changes, 1):
+    effects = []
+    for number, change in enumerate(changes, 1):
         progress(message("plan_trying_changes", "trying changes"), number, len(changes))
-        found.append(_effect(one, before))
-    return tuple(sorted(found, key=lambda one: one.relative_u))
+        effects.append(_effect(change, before))
+    return tuple(sorted(effects, key=lambda effect: effect.relative_u))
 
 
 def what_would_do(plan, progress=None):
-    """Effect of each addition that gives a solution to a plan that has none, the best first.
+    """Return the effects of additions that give a solution to a plan without one, best first.
 
     Parameters
     ----------
     plan : Plan
-        Whose survey would leave its datum, its scale or the vertical open.
+        Plan whose survey does not determine its datum, its scale or the vertical.
     progress : callable, optional
         progress(text, done, total).
 
     Returns
     -------
     tuple of Effect
-        Their difference is nan: there is nothing before.
+        Their difference is nan, as the plan has no U before.
     """
-    found = what_helps(plan, changes_of(plan, ("add",), OF_FRAME), progress, NOTHING_BEFORE)
-    return tuple(one for one in found if not one.why)
+    effects = what_helps(plan, changes_of(plan, ("add",), OF_FRAME), progress, NOTHING_BEFORE)
+    return tuple(effect for effect in effects if not effect.why)
 
 
 def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progress=None):
-    """Path of the best change of each round.
+    """Search greedily: apply the best change of each round.
 
     Parameters
     ----------
     plan : Plan
     add : bool, optional
-        True: items are added and repeated until the plan's limit is met, or `steps` are done;
-        False: items are dropped as long as the limit is met, the dearest for its loss first.
-    steps, items, progress : optional
-        Most rounds, what may be changed, progress(text, done, total).
+        True: add and repeat items until the limit of the plan is met or `steps` rounds are done.
+        False: drop items while the limit is met, in order of the cost saved for the loss of U.
+    steps : int, optional
+        Largest number of rounds.
+    items : tuple of str, optional
+        Items that may change.
     changes : callable, optional
-        Function plan -> tuple of Change; None: all of `items`.
+        Function plan -> tuple of Change; None: all changes of `items`.
+    progress : callable, optional
+        progress(text, done, total).
 
     Returns
     -------
     Path
     """
     start = now = predict(plan)
-    limit, made, tried = plan.limits.relative_u, [], 0
+    limit, steps_done, tried = plan.limits.relative_u, [], 0
     actions = ("add", "repeat") if add else ("drop",)
     if isinstance(plan, WallPlan) and items is ITEMS:
         items = SEARCHED
@@ -172,15 +193,15 @@ def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progres
         step, after = _best(effects, now, limit, add)
         if step is None:
             break
-        made.append(step)
+        steps_done.append(step)
         now = after
-    return Path(start, tuple(made), now, tried)
+    return Path(start, tuple(steps_done), now, tried)
 
 
 def smallest(plan, progress=None, items=ITEMS):
-    """Path to the smallest design that meets the limit of a plan.
+    """Find the smallest design that meets the limit of a plan.
 
-    Items are added until the limit is met, then dropped as long as it is.
+    Items are added until the limit is met, then dropped while it remains met.
 
     Parameters
     ----------
@@ -188,7 +209,7 @@ def smallest(plan, progress=None, items=ITEMS):
     progress : callable, optional
         progress(text, done, total).
     items : sequence, optional
-        What may be added and dropped.
+        Items that may be added and dropped.
 
     Returns
     -------
@@ -210,44 +231,44 @@ def smallest(plan, progress=None, items=ITEMS):
 
 
 def _best(effects, now, limit, add):
-    """The Effect of a round and the Prediction after it; None, None: nothing is left to be gained.
+    """Return the Effect of a round and the Prediction after it; (None, None) if none qualifies.
 
-    Effects were judged with the outlines of the wall before: the one that is taken is predicted
-    anew, and has to do then, too, what it was chosen for. What is dropped leaves no reading without
-    control that had some: a blunder in it would go into the table.
+    Effects are computed with the outlines of the wall before the change. The selected change is
+    therefore predicted anew and must still qualify. Dropping an item must not leave a controlled
+    reading without control, as a blunder in it would enter the table.
     """
-    for one in _candidates(effects, now, limit, add):
-        after = predict(one.change.plan)
+    for effect in _candidates(effects, now, limit, add):
+        after = predict(effect.change.plan)
         u = after.relative_u
         if u < now.relative_u if add else u <= limit and _uncontrolled(after) <= _uncontrolled(now):
             top = float(after.table.U_m3[-1])
-            return replace(one, relative_u=u, difference=u - now.relative_u, U_m3=top), after
+            return replace(effect, relative_u=u, difference=u - now.relative_u, U_m3=top), after
     return None, None
 
 
 def _uncontrolled(prediction):
-    """How many readings nothing controls."""
-    return sum(one.uncontrolled for one in prediction.reliability)
+    """Number of uncontrolled readings."""
+    return sum(group.uncontrolled for group in prediction.reliability)
 
 
 def _candidates(effects, now, limit, add):
-    """Effects that gain something, or that can be spared, the best first.
+    """Return the effects that reduce U enough, or whose items can be dropped, best first.
 
-    What is dropped leaves no target weaker than it may be, beside those that are weak already.
+    Dropping an item must not add to the targets that are weak already.
     """
-    works, before = [one for one in effects if not one.why], now.relative_u
+    works, before = [effect for effect in effects if not effect.why], now.relative_u
     if add:
-        gains = [one for one in works if one.relative_u < (1 - LEAST_GAIN) * before]
-        return sorted(gains, key=lambda one: _worth(one, before), reverse=True)
-    keeps = [one for one in works if limit is not None and one.relative_u <= limit]
+        gains = [effect for effect in works if effect.relative_u < (1 - LEAST_GAIN) * before]
+        return sorted(gains, key=lambda gain: _worth(gain, before), reverse=True)
+    keeps = [effect for effect in works if limit is not None and effect.relative_u <= limit]
     if not isinstance(now.plan, WallPlan):
         poor = poor_targets(now.plan, now.seen, now.tabled)
-        keeps = [one for one in keeps if one.poor <= poor]
-    return sorted(keeps, key=lambda one: _saving(one, before), reverse=True)
+        keeps = [effect for effect in keeps if effect.poor <= poor]
+    return sorted(keeps, key=lambda effect: _saving(effect, before), reverse=True)
 
 
 def poor_targets(plan, seen, tabled):
-    """How many targets of a plan are not determined, or have fewer rays than its limit."""
+    """Number of targets of a plan that are not determined, or have fewer rays than the limit."""
     count = len(plan.targets.names)
     lost = count - len(tabled.covariance.points)
     wanted = 0 if plan.setups else plan.limits.rays
@@ -255,19 +276,19 @@ def poor_targets(plan, seen, tabled):
 
 
 def _worth(effect, now):
-    """What is free comes first, by its gain; the rest by gain for cost, whatever money is in."""
+    """Sort key of additions: free ones first, by their gain; the others by gain over cost."""
     gain, cost = now - effect.relative_u, effect.change.cost
     return cost <= 0, gain / cost if cost > 0 else gain
 
 
 def _saving(effect, now):
-    """What saves money comes first, by saving for loss; the rest by its loss."""
+    """Sort key of removals: first by saving over loss if cost is saved, then by loss."""
     loss, cost = max(effect.relative_u - now, 1e-12), effect.change.cost
     return cost < 0, -cost / loss if cost < 0 else 1.0 / loss
 
 
 def _effect(change, before):
-    """The Effect of a Change, from the Prediction before it."""
+    """Return the Effect of a Change, given the Prediction before it."""
     plan = change.plan
     if isinstance(plan, WallPlan):
         return _effect_on_wall(change, before)
@@ -288,7 +309,7 @@ def _effect(change, before):
 
 
 def _effect_on_wall(change, before):
-    """The Effect of a Change of a WallPlan: its job, computed again."""
+    """Return the Effect of a Change of a WallPlan, by computing its job again."""
     why, inf = change.why, float("inf")
     if not why:
         try:

@@ -1,4 +1,4 @@
-"""What a plan has to meet, and what is said of it."""
+"""Compare a prediction with the limit of its plan."""
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
@@ -6,7 +6,7 @@ from tankcal.pipeline.statements import MINIMA_M
 
 
 def limited_u(tabled, limits):
-    """U over volume of the full tank, or of the worst delivery of the least minimum."""
+    """U over volume of the full tank, or of the worst delivery of the smallest minimum."""
     if limits.of == "delivery":
         return float(tabled.stated.worst[0].relative.relative)
     table = tabled.made.table
@@ -14,29 +14,29 @@ def limited_u(tabled, limits):
 
 
 class OfTable:
-    """What a prediction says of its table (`tabled`) and of the limit of its plan (`plan`)."""
+    """Mixin: properties of a prediction from its table (`tabled`) and its plan (`plan`)."""
 
     @property
     def table(self):
-        """The capacity table with U of every row (`capacity.Capacity`)."""
+        """Capacity table with U of every row (`capacity.Capacity`)."""
         return self.tabled.made.table
 
     @property
     def relative_u(self):
-        """U over volume of what the plan's limit is for: the full tank, or the worst delivery."""
+        """U over volume of the limited quantity: the full tank or the worst delivery."""
         return limited_u(self.tabled, self.plan.limits)
 
     @property
     def meets(self):
-        """Whether the limit is met; None without one."""
+        """Whether the limit is met; None if the plan has no limit."""
         limit = self.plan.limits.relative_u
         return None if limit is None else bool(self.relative_u <= limit)
 
 
 def refuse_without_delivery(plan, tabled, tall):
-    """Raise InputError where the limit is for deliveries and the table has none long enough.
+    """Raise InputError if the limit is for deliveries and no delivery of the table is long enough.
 
-    tall  height of the shell, m
+    tall: height of the shell, m.
     """
     if plan.limits.of == "delivery" and not tabled.stated.worst:
         least = min(plan.job.table.minimum_delivery_m or MINIMA_M)

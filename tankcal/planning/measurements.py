@@ -1,7 +1,7 @@
-"""A plan as measurements: those that will be made, with the values that they would have.
+"""Measurements of a plan, with the values that would be read at the nominal positions.
 
-Values are what the observations compute from the nominal places, without errors or with errors
-drawn from their standard deviations.
+Values are computed from the nominal positions, either without errors or with errors drawn from
+their standard deviations.
 """
 
 from dataclasses import replace
@@ -19,41 +19,45 @@ from tankcal.survey.readings import read_distance_m
 
 
 def nominal_of(plan):
-    """surveys.Nominal of a Plan."""
-    return Nominal(plan.points, {one.name: (one.xyz_m, one.rotation) for one in plan.photos})
-
-
-def measurements_of(plan, seen):
-    """job.Measurements of a Plan: what is measured and how well; values of readings are 0.
-
-    seen  visibility.Visibility
-
-    Readings that are repeated stand there once, with the standard deviation of their mean.
-    """
-    given, counts = plan.job.measurements, measurable(plan, seen)
-    seen = replace(seen, on_photo=seen.on_photo & counts, on_setup=seen.on_setup & counts)
-    there = {name for name, is_there in zip(seen.points, counts, strict=True) if is_there}
-    return replace(
-        given,
-        photos=tuple(_photo(one) for one in plan.photos),
-        image_points=_image_points(plan, seen),
-        control=_control(plan),
-        targets=targets_of(plan),
-        setups=tuple(Setup(one.name, one.name, one.instrument) for one in plan.setups),
-        readings=(*_sights(plan, seen), *_ties(plan, there), *readings_of_bases(plan, there)),
+    """Return the surveys.Nominal of a Plan."""
+    return Nominal(
+        plan.points, {photo.name: (photo.xyz_m, photo.rotation) for photo in plan.photos}
     )
 
 
-def _photo(one):
-    values = np.concatenate([one.xyz_m, angles_of(one.rotation)])
-    return Photo(one.name, one.camera, values, np.full(6, np.nan))
+def measurements_of(plan, seen):
+    """Return the job.Measurements of a Plan: standard deviations of all readings, with values 0.
+
+    Repeated readings are one value with the standard deviation of their mean.
+    """
+    given, counts = plan.job.measurements, measurable(plan, seen)
+    seen = replace(seen, on_photo=seen.on_photo & counts, on_setup=seen.on_setup & counts)
+    determined = {name for name, is_there in zip(seen.points, counts, strict=True) if is_there}
+    return replace(
+        given,
+        photos=tuple(_photo(photo) for photo in plan.photos),
+        image_points=_image_points(plan, seen),
+        control=_control(plan),
+        targets=targets_of(plan),
+        setups=tuple(Setup(setup.name, setup.name, setup.instrument) for setup in plan.setups),
+        readings=(
+            *_sights(plan, seen),
+            *_ties(plan, determined),
+            *readings_of_bases(plan, determined),
+        ),
+    )
+
+
+def _photo(photo):
+    values = np.concatenate([photo.xyz_m, angles_of(photo.rotation)])
+    return Photo(photo.name, photo.camera, values, np.full(6, np.nan))
 
 
 def _image_points(plan, seen):
     photo, point = np.nonzero(seen.on_photo)
     if not len(photo):
         return None
-    sd = np.array([one.sd_mm / np.sqrt(one.readings) for one in plan.photos])
+    sd = np.array([photo.sd_mm / np.sqrt(photo.readings) for photo in plan.photos])
     return ImageReadings(
         photo=tuple(plan.photos[k].name for k in photo.tolist()),
         point=tuple(seen.points[k] for k in point.tolist()),
@@ -67,16 +71,16 @@ def _control(plan):
     if not plan.known:
         return None
     return KnownPoints(
-        point=tuple(one.name for one in plan.known),
-        xyz_m=np.array([one.xyz_m for one in plan.known]),
-        sd_m=np.array([one.sd_m for one in plan.known]),
+        point=tuple(control_point.name for control_point in plan.known),
+        xyz_m=np.array([control_point.xyz_m for control_point in plan.known]),
+        sd_m=np.array([control_point.sd_m for control_point in plan.known]),
         system=(None,) * len(plan.known),
         check=np.zeros(len(plan.known), dtype=bool),
     )
 
 
 def targets_of(plan):
-    """The targets of a plan as a survey would have them: its targets.csv.
+    """Return the targets of a plan as the table targets.csv of a survey.
 
     Parameters
     ----------
@@ -87,49 +91,51 @@ def targets_of(plan):
     Targets
         As a job reads them; heights and offsets in m.
     """
-    one = plan.targets
+    targets = plan.targets
     return Targets(
-        one.names,
-        one.section,
-        one.generatrix,
-        one.xyz_m[:, 2],
-        np.full(len(one.names), one.offset_m),
+        targets.names,
+        targets.section,
+        targets.generatrix,
+        targets.xyz_m[:, 2],
+        np.full(len(targets.names), targets.offset_m),
     )
 
 
 def _sights(plan, seen):
-    """Readings of directions, zenith angles and slope distances of all set-ups."""
+    """Return the readings of directions, zenith angles and slope distances of all set-ups."""
     for table, key in (
         ("directions", "direction_sd_rad"),
         ("zenith_angles", "zenith_sd_rad"),
         ("slope_distances", "distance_sd_m"),
     ):
         setup, end, sd = [], [], []
-        for k, one in enumerate(plan.setups):
-            if getattr(one, key) is None:
+        for k, instrumented in enumerate(plan.setups):
+            if getattr(instrumented, key) is None:
                 continue
             names = [seen.points[i] for i in np.flatnonzero(seen.on_setup[k])]
-            setup += [one.name] * len(names)
+            setup += [instrumented.name] * len(names)
             end += names
-            sd += [getattr(one, key) / np.sqrt(one.sets)] * len(names)
+            sd += [getattr(instrumented, key) / np.sqrt(instrumented.sets)] * len(names)
         if end:
             yield _readings(table, [None] * len(end), end, sd, setup=tuple(setup))
 
 
-def _ties(plan, there):
-    """Readings of tapes, levels and plumb lines between points that are there, by name."""
+def _ties(plan, determined):
+    """Return the readings of tapes, levels and plumb lines between the points `there`."""
     for table in TAPED:
-        ties = [one for one in plan.ties if one.table == table and {one.start, one.end} <= there]
+        ties = [
+            tie for tie in plan.ties if tie.table == table and {tie.start, tie.end} <= determined
+        ]
         if not ties:
             continue
         more = {}
         if table == "distances":
             more = {
-                "instrument": tuple(one.instrument for one in ties),
-                "horizontal": np.array([one.kind == "horizontal" for one in ties]),
+                "instrument": tuple(tie.instrument for tie in ties),
+                "horizontal": np.array([tie.kind == "horizontal" for tie in ties]),
             }
-        sd = [one.sd_m / np.sqrt(one.readings) for one in ties]
-        yield _readings(table, [one.start for one in ties], [one.end for one in ties], sd, **more)
+        sd = [tie.sd_m / np.sqrt(tie.readings) for tie in ties]
+        yield _readings(table, [tie.start for tie in ties], [tie.end for tie in ties], sd, **more)
 
 
 def _readings(table, start, end, sd, **more):
@@ -141,71 +147,84 @@ def _readings(table, start, end, sd, **more):
 
 
 def draw_measurements(plan, measurements, predicted, rng=None):
-    """The Measurements with the values that they would have at the nominal places.
+    """Return the Measurements with values computed from the nominal positions.
 
-    predicted  surveys.Predicted of the same        rng  None: without errors; else every reading is
-               off by its own, and those of an instrument by its scale and offset together
+    Parameters
+    ----------
+    plan : Plan
+    measurements : Measurements
+    predicted : Predicted
+        Prediction of the measurements.
+    rng : numpy.random.Generator, optional
+        None: no errors. Otherwise each reading has its own error, and the readings of an instrument
+        share errors of its scale and offset.
     """
-    values, draw = _computed(predicted), _drawn(rng)
-    off = {one.name: _off(one, draw) for one in measurements.instruments}
-    tools = {one.name: one for one in measurements.instruments}
-    setups = {one.name: one for one in measurements.setups}
+    values, draw = _nominal_values(predicted), _error_function(rng)
+    off = {tool.name: _instrument_errors(tool, draw) for tool in measurements.instruments}
+    tools = {tool.name: tool for tool in measurements.instruments}
+    setups = {setup.name: setup for setup in measurements.setups}
     images, control = measurements.image_points, measurements.control
     if images is not None:
         images = replace(images, xy_mm=draw(images.xy_mm, images.sd_mm))
     if control is not None:
         control = replace(control, xyz_m=draw(control.xyz_m, np.nan_to_num(control.sd_m)))
     readings = tuple(
-        _filled(one, values, draw, (tools, off), setups) for one in measurements.readings
+        _with_values(reading, values, draw, (tools, off), setups)
+        for reading in measurements.readings
     )
     return replace(measurements, image_points=images, control=control, readings=readings)
 
 
-def _drawn(rng):
-    """Function (value, sd) -> value with an error."""
+def _error_function(rng):
+    """Return a function (value, sd) -> value with an error."""
     if rng is None:
         return lambda value, sd: np.array(value, dtype=float)
     return lambda value, sd: value + rng.standard_normal(np.shape(value)) * sd
 
 
-def _computed(predicted):
-    """{(table, horizontal, names): value} of all readings, computed from the nominal places."""
-    found, problem = {}, predicted.adjusted.problem
-    for one in (*problem.observations, *(held.observations for held in problem.exact)):
-        trace = one.trace
+def _nominal_values(predicted):
+    """Return {(table, horizontal, names): value} of all readings at the nominal positions."""
+    by_key, problem = {}, predicted.adjusted.problem
+    for table in (*problem.observations, *(held.observations for held in problem.exact)):
+        trace = table.trace
         if trace is None or not trace.table:
             continue
-        computed = one.computed(problem.state, False)[0]
+        computed = table.computed(problem.state, False)[0]
         for row, value in enumerate(computed[:, 0].tolist()):
-            key = trace.table, bool(getattr(one, "horizontal", False))
-            found[*key, *trace.ids[row]] = value
-            if KINDS[trace.table].either_way:  # a tape is read either way
-                found[*key, *reversed(trace.ids[row])] = value
-    return found
+            key = trace.table, bool(getattr(table, "horizontal", False))
+            by_key[*key, *trace.ids[row]] = value
+            if KINDS[trace.table].either_way:  # a tape may be read from either end
+                by_key[*key, *reversed(trace.ids[row])] = value
+    return by_key
 
 
-def _filled(readings, values, draw, tools, setups):
-    """Readings with their values; those of points that are left out stay 0."""
+def _with_values(readings, values, draw, tools, setups):
+    """Return readings with their values; readings of points that are left out keep the value 0."""
     starts = readings.setup or readings.start
     horizontal = readings.horizontal
     flat = np.zeros(len(starts), dtype=bool) if horizontal is None else horizontal
     keys = zip(flat.tolist(), starts, readings.end, strict=True)
     value = np.array([values.get((readings.table, *key), 0.0) for key in keys])
     if KINDS[readings.table].has("instrument"):
-        names = [setups[one].instrument for one in readings.setup] or readings.instrument
-        value = np.array([_read(one, name, *tools) for one, name in zip(value, names, strict=True)])
+        names = [setups[setup].instrument for setup in readings.setup] or readings.instrument
+        value = np.array(
+            [
+                _instrument_reading(setup, name, *tools)
+                for setup, name in zip(value, names, strict=True)
+            ]
+        )
     elif readings.table == "plumb_lines":
         return readings
     return replace(readings, value=draw(value, readings.sd))
 
 
-def _off(tool, draw):
-    """(scale, offset m) by which an instrument is off; 0 where it is not known beforehand."""
+def _instrument_errors(tool, draw):
+    """Error (scale, offset m) of an instrument; 0 for a quantity without a prior."""
     return tuple(float(draw(0.0, np.nan_to_num(u))) for u in (tool.u_scale, tool.u_offset_m))
 
 
-def _read(true_m, name, tools, off):
-    """What an instrument reads of a true distance, at the temperature of its certificate."""
+def _instrument_reading(true_m, name, tools, off):
+    """Reading of a true distance by an instrument at the temperature of its certificate."""
     if name is None:
         return true_m
     scale, offset = off[name]

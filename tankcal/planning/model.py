@@ -1,4 +1,7 @@
-"""A survey that is planned: where things will stand and how well they will be measured, in SI."""
+"""Data model of a planned survey.
+
+Positions of all items and precision of all readings, SI units.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -8,22 +11,33 @@ from tankcal.geometry.field.amplitudes import Amplitudes, assumed_amplitudes
 from tankcal.job.model import Job
 from tankcal.job.tables import RawJob
 
-TAPED = ("distances", "height_differences", "plumb_lines")  # tables of a plan, without values
+TAPED = ("distances", "height_differences", "plumb_lines")  # tables of ties
 
 
 @dataclass(frozen=True)
 class Targets:
     """Targets on the wall, row by row from the bottom up.
 
-    names, section, generatrix  (n,) text
-    course      (n,) index of the course
-    height_m    (n,) above the bottom of the shell
-    arc_m       (n,) along the lowest course from the reference weld, clockwise seen from above
-    xyz_m       (n, 3) centres of the targets, in the frame of the survey
-    outwards    (n, 3) unit normals of the wall, towards the observer
-    offset_m    from the wall to the centres, towards the observer
-    clearance_m  from any weld to a target
-    welds_rad   azimuths of the upright welds
+    Attributes
+    ----------
+    names, section, generatrix : tuple of str
+        One each for n targets.
+    course : ndarray of int, shape (n,)
+        Index of the course.
+    height_m : ndarray, shape (n,)
+        Height above the bottom of the shell.
+    arc_m : ndarray, shape (n,)
+        Arc along the lowest course from the reference weld, clockwise seen from above.
+    xyz_m : ndarray, shape (n, 3)
+        Centres of the targets in the frame of the survey.
+    outwards : ndarray, shape (n, 3)
+        Unit normals of the wall, towards the observer.
+    offset_m : float
+        Distance from the wall to the centres, towards the observer.
+    clearance_m : float
+        Smallest distance of a target from a weld.
+    welds_rad : tuple of float
+        Azimuths of the vertical welds.
     """
 
     names: tuple
@@ -39,21 +53,21 @@ class Targets:
     welds_rad: tuple = ()
 
     def taken(self, keep):
-        """The targets of a mask (n,)."""
-        keep, found = np.flatnonzero(keep), {}
+        """Return the targets selected by a mask (n,)."""
+        keep, selected = np.flatnonzero(keep), {}
         for name in _OF_EACH:
-            one = getattr(self, name)
-            is_array = isinstance(one, np.ndarray)
-            found[name] = one[keep] if is_array else tuple(one[i] for i in keep)
-        return replace(self, **found)
+            values = getattr(self, name)
+            is_array = isinstance(values, np.ndarray)
+            selected[name] = values[keep] if is_array else tuple(values[i] for i in keep)
+        return replace(self, **selected)
 
     def followed_by(self, others):
-        """These targets and others after them."""
+        """Return these targets followed by other targets."""
         both = {}
         for name in _OF_EACH:
-            one, other = getattr(self, name), getattr(others, name)
-            is_array = isinstance(one, np.ndarray)
-            both[name] = np.concatenate([one, other]) if is_array else one + other
+            first, second = getattr(self, name), getattr(others, name)
+            is_array = isinstance(first, np.ndarray)
+            both[name] = np.concatenate([first, second]) if is_array else first + second
         return replace(self, **both)
 
 
@@ -62,10 +76,23 @@ _OF_EACH = ("names", "section", "generatrix", "course", "height_m", "arc_m", "xy
 
 @dataclass(frozen=True)
 class Photograph:
-    """One exposure. station: the name of the place; readings: of each image point.
+    """One exposure.
 
-    xyz_m  (3,) projection centre      rotation  (3, 3)     sd_mm  of one reading, x and y
-    place  (file, row, column) where the plan has it, for messages
+    Attributes
+    ----------
+    name : str
+    station : str
+        Name of the position of the camera.
+    camera : str
+    xyz_m : ndarray, shape (3,)
+        Projection centre.
+    rotation : ndarray, shape (3, 3)
+    sd_mm : float
+        Standard deviation of one reading of an image coordinate.
+    readings : int
+        Number of readings of each image point.
+    place : tuple
+        (file, row, column) of its definition, for messages.
     """
 
     name: str
@@ -80,10 +107,11 @@ class Photograph:
 
 @dataclass(frozen=True)
 class Instrumented:
-    """One set-up of a total station, measured from its own centre; each angle `sets` times.
+    """One set-up of a total station; each reading is repeated in `sets` sets.
 
-    xyz_m  (3,)    direction_sd_rad, zenith_sd_rad, distance_sd_m  of one; None: not measured
-    sights names of other set-ups that are sighted, centre to centre
+    xyz_m (3,) is the centre of the instrument. direction_sd_rad, zenith_sd_rad and distance_sd_m
+    are standard deviations of one reading, None if not measured. sights lists the other set-ups
+    that are sighted, centre to centre.
     """
 
     name: str
@@ -99,9 +127,10 @@ class Instrumented:
 
 @dataclass(frozen=True)
 class Tie:
-    """One tape, levelled height or plumb line between two points, measured `readings` times.
+    """One taped distance, levelled height difference or plumb line between two points.
 
-    table  of TAPED     kind  "spatial" or "horizontal" of a distance
+    table is one of TAPED; kind is "spatial" or "horizontal" for a distance; readings is the number
+    of repeated readings.
     """
 
     name: str
@@ -116,11 +145,19 @@ class Tie:
 
 @dataclass(frozen=True)
 class Base:
-    """A stadia over a station, read from a set-up `readings` times: the base between them.
+    """A base between two points: a stadia over one station, read from a set-up at the other.
 
-    setup, to    names of points        bar  the stadia, as in instruments.toml
-    angle_sd_rad of one angle between the ends of the bar
-    row          of stadia.csv, for messages; None: not given there
+    Attributes
+    ----------
+    setup, to : str
+        Names of the points.
+    bar : str
+        Stadia, as in instruments.toml.
+    angle_sd_rad : float
+        Standard deviation of one angle between the ends of the bar.
+    readings : int
+    row : int or None
+        Row of stadia.csv, for messages; None if not listed there.
     """
 
     setup: str
@@ -132,13 +169,13 @@ class Base:
 
     @property
     def name(self):
-        """SETUP-TO."""
+        """Name of the base, "SETUP-TO"."""
         return f"{self.setup}-{self.to}"
 
 
 @dataclass(frozen=True)
 class Known:
-    """A control point: nominal coordinates (3,), sds (3,); nan: not known, 0: held exactly."""
+    """Control point: nominal coordinates (3,) and sds (3,); sd nan: unknown, 0: held exactly."""
 
     name: str
     xyz_m: np.ndarray
@@ -147,7 +184,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Box:
-    """An obstacle whose sides are along the axes of the survey's frame.
+    """Obstacle with sides parallel to the axes of the survey's frame.
 
     Attributes
     ----------
@@ -163,7 +200,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Pillar:
-    """An upright cylinder that stands in the way: axis (2,), radius, lowest and highest z, m."""
+    """Obstacle: a vertical cylinder with axis (2,), radius, lowest and highest z, m."""
 
     axis_m: np.ndarray
     radius_m: float
@@ -174,10 +211,10 @@ class Pillar:
 
 @dataclass(frozen=True)
 class Shell:
-    """The nominal shell: axis (2,), radius of its lowest course on the side of the survey, z of
-    bottom and top, m.
+    """Nominal shell as seen from the side of the survey, m.
 
-    outside  True: the observer stands outside
+    axis_m (2,) is the axis, radius_m the radius of the lowest course, low_m and high_m are z of
+    bottom and top. outside is True if the observer stands outside.
     """
 
     axis_m: np.ndarray
@@ -189,13 +226,20 @@ class Shell:
 
 @dataclass(frozen=True)
 class Limits:
-    """What the plan has to meet.
+    """Requirements on the plan.
 
-    incidence_rad  largest angle between the line of sight and the normal of the wall
-    relative_u     largest U over volume     of  "top": of the full tank; "delivery": of the worst
-                   delivery of the least minimum
-    rays           fewest rays of a point that is not weak
-    place          (file, row, column) where the plan has `of`, for messages
+    Attributes
+    ----------
+    incidence_rad : float
+        Largest angle between the line of sight and the normal of the wall.
+    relative_u : float or None
+        Largest U over volume.
+    of : str
+        "top": limit for the full tank; "delivery": for the worst delivery of the smallest minimum.
+    rays : int
+        Fewest rays of a point that is not weak.
+    place : tuple
+        (file, row, column) of `of` in the plan, for messages.
     """
 
     incidence_rad: float
@@ -207,28 +251,30 @@ class Limits:
 
 @dataclass(frozen=True)
 class Plan:
-    """A survey before it is made.
+    """A planned survey.
 
     Attributes
     ----------
     job : Job
-        Tank, courses, table, inputs, and, as its measurements, cameras, instruments, settings.
-    photos, setups, ties, known, extra, obstacles
-        Tuples of the classes above; extra are points off the wall, {name: (3,) nominal place}.
+        Tank, courses, table and inputs; its measurements hold cameras, instruments and settings.
+    photos, setups, ties, known, obstacles : tuple
+        Items of the classes above.
+    extra : dict
+        {name: (3,) nominal position} of points off the wall.
     facing : dict
-        {name: (3,) unit normal} of the marks among them that face one way, as tape ends do.
+        {name: (3,) unit normal} of extra points visible from one side only, such as tape ends.
     bases : tuple of Base
     bars : dict
-        {name: length, m} of the stadias of its instruments.
+        {name: length, m} of the stadias in the instruments.
     amplitudes : Amplitudes
-        How far the wall departs from a cylinder, as it is expected.
+        Expected deviations of the wall from a cylinder.
     costs : dict
-        {item: cost of one}: "photo_station", "photograph", "setup", "tape", "base",
+        {item: unit cost}: "photo_station", "photograph", "setup", "tape", "base",
         "control_point", "target", "reading".
     folder : str
-        Its name.
+        Name of the folder.
     given : RawJob or None
-        What stands in the folder, as it was read (`job.tables.RawJob`).
+        Content of the folder as read (`job.tables.RawJob`).
     """
 
     job: Job
@@ -253,11 +299,11 @@ class Plan:
     @property
     def stations(self):
         """Names of the photo stations, in order."""
-        return tuple(dict.fromkeys(one.station for one in self.photos))
+        return tuple(dict.fromkeys(photo.station for photo in self.photos))
 
     @property
     def points(self):
-        """{name: (3,) nominal place} of everything that can be measured, set-ups among them."""
-        found = dict(zip(self.targets.names, self.targets.xyz_m, strict=True))
-        found |= self.extra
-        return found | {one.name: one.xyz_m for one in self.setups}
+        """Nominal positions {name: (3,)} of all points that can be measured, set-ups included."""
+        positions = dict(zip(self.targets.names, self.targets.xyz_m, strict=True))
+        positions |= self.extra
+        return positions | {setup.name: setup.xyz_m for setup in self.setups}

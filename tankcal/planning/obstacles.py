@@ -1,7 +1,7 @@
-"""What stands in the way of a survey: boxes and upright cylinders, and the lines that they cut.
+"""Obstacles to sight (boxes and vertical cylinders) and the lines of sight that they cut.
 
-A line of sight from S to X is cut by a box when the slabs of its three axes overlap along it, by an
-upright cylinder when a part of it within the radius lies between bottom and top.
+A box cuts a line of sight from S to X if the slabs of its three axes overlap along the line. A
+vertical cylinder cuts it if a part within the radius lies between bottom and top.
 """
 
 import numpy as np
@@ -11,61 +11,61 @@ from tankcal.planning.model import Box, Pillar
 
 
 def check_obstacles(given, log):
-    """What boxes and cylinders need; `Given` of any plan."""
+    """Check the keys of boxes and cylinders in a `Given`."""
     needed = {"box": {"from_m": 3, "to_m": 3}, "cylinder": {"axis_m": 2}}
     numbers = {"box": (), "cylinder": ("radius_m", "low_m", "high_m")}
-    for one in given.repeated["obstacles"]:
-        for key, count in needed.get(one["kind"], {}).items():
-            if not one.is_refused(key) and len(one[key] or ()) != count:
-                one.tell(
+    for entry in given.repeated["obstacles"]:
+        for key, count in needed.get(entry["kind"], {}).items():
+            if not entry.is_refused(key) and len(entry[key] or ()) != count:
+                entry.tell(
                     log.problem,
                     key,
                     message("plan_numbers_metres", "expected {count} numbers, metres", count=count),
                 )
-        for key in numbers.get(one["kind"], ()):
-            if key not in one.filled:
-                one.tell(
+        for key in numbers.get(entry["kind"], ()):
+            if key not in entry.filled:
+                entry.tell(
                     log.problem,
                     key,
                     message("plan_number_metres", "missing; expected a number, metres"),
                 )
-        if None not in (one["low_m"], one["high_m"]) and one["high_m"] <= one["low_m"]:
+        if None not in (entry["low_m"], entry["high_m"]) and entry["high_m"] <= entry["low_m"]:
             expected = message(
                 "plan_high_low",
                 "found {high:g}; expected more than low_m, {low:g}",
-                high=one["high_m"],
-                low=one["low_m"],
+                high=entry["high_m"],
+                low=entry["low_m"],
             )
-            one.tell(log.problem, "high_m", expected)
-        if any(a == b for a, b in zip(one["from_m"] or (), one["to_m"] or (), strict=False)):
+            entry.tell(log.problem, "high_m", expected)
+        if any(a == b for a, b in zip(entry["from_m"] or (), entry["to_m"] or (), strict=False)):
             expected = message(
                 "plan_flat_box",
                 "in a plane with from_m; expected a corner that differs in x, y and z",
             )
-            one.tell(log.problem, "to_m", expected)
+            entry.tell(log.problem, "to_m", expected)
 
 
 def obstacles_of(given):
-    """A tuple of the `Box`es and `Pillar`s of sound [[obstacles]]."""
+    """Return the `Box`es and `Pillar`s of valid [[obstacles]], a tuple."""
     return tuple(map(_obstacle, given.repeated["obstacles"]))
 
 
-def _obstacle(given):
-    if given["kind"] == "box":
-        corners = np.array([given["from_m"], given["to_m"]])
-        return Box(corners.min(axis=0), corners.max(axis=0), given["name"])
+def _obstacle(entry):
+    if entry["kind"] == "box":
+        corners = np.array([entry["from_m"], entry["to_m"]])
+        return Box(corners.min(axis=0), corners.max(axis=0), entry["name"])
     return Pillar(
-        np.array(given["axis_m"]), given["radius_m"], given["low_m"], given["high_m"],
-        given["name"],
+        np.array(entry["axis_m"]), entry["radius_m"], entry["low_m"], entry["high_m"],
+        entry["name"],
     )  # fmt: skip
 
 
 def in_an_obstacle(obstacles, xyz_m):
-    """What is said of a place (3,) within one of them; "" where it is in none."""
-    for one in obstacles:
-        if _within(one, xyz_m):
+    """Return the message about a position (3,) within an obstacle; "" if it is in none."""
+    for obstacle in obstacles:
+        if _within(obstacle, xyz_m):
             return message(
-                "plan_in_an_obstacle", "stands in the obstacle {obstacle}", obstacle=one.name
+                "plan_in_an_obstacle", "stands in the obstacle {obstacle}", obstacle=obstacle.name
             )
     return ""
 
@@ -78,12 +78,12 @@ def _within(obstacle, xyz):
 
 
 def misplaced(station, why):
-    """What is said of a station that cannot stand where it is planned."""
+    """Return the message about a station at an impossible position."""
     return message("plan_misplaced", "station {station} {why}", station=station, why=why)
 
 
 def line_cut(start, end):
-    """What is said of a line between two stations that something is in the way of."""
+    """Return the message about an obstructed line between two stations."""
     return message(
         "plan_base_hidden",
         "the line from {one} to {other} is cut by the tank or an obstacle; expected it free",
@@ -93,7 +93,21 @@ def line_cut(start, end):
 
 
 def find_hidden(obstacle, place_m, xyz_m):
-    """(n,) True where the line from a place (3,) to a point (n, 3) meets a Box or a Pillar."""
+    """Find the points hidden by an obstacle.
+
+    Parameters
+    ----------
+    obstacle : Box or Pillar
+    place_m : ndarray, shape (3,)
+        Position of the observer.
+    xyz_m : ndarray, shape (n, 3)
+        Points.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        Whether the obstacle cuts the line from the position to each point.
+    """
     along = xyz_m - place_m
     if isinstance(obstacle, Box):
         first, last = _in_slabs(place_m, along, obstacle.low_m, obstacle.high_m)
@@ -103,22 +117,24 @@ def find_hidden(obstacle, place_m, xyz_m):
         first, last = _in_slabs(place_m, along, low, high)
         near, far = _in_round(place_m[:2] - obstacle.axis_m, along[:, :2], obstacle.radius_m)
         first, last = np.maximum(first, near), np.minimum(last, far)
+    # The line parameter is 0 at the observer and 1 at the point.
     return np.maximum(first, 0.0) < np.minimum(last, 1.0)
 
 
 def _in_slabs(place, along, low, high):
-    """Parts of the line (n,), (n,) between which it is within the slabs of three axes."""
-    still = along == 0
+    """First and last line parameters (n,), (n,) within the slabs of three axes."""
+    still = along == 0  # parallel to a slab: inside it everywhere or nowhere
     step = np.where(still, 1.0, along)
-    one, two = (low - place) / step, (high - place) / step
+    to_low, to_high = (low - place) / step, (high - place) / step
     inside = (place > low) & (place < high)
-    first = np.where(still, np.where(inside, -np.inf, np.inf), np.minimum(one, two))
-    last = np.where(still, np.where(inside, np.inf, -np.inf), np.maximum(one, two))
+    first = np.where(still, np.where(inside, -np.inf, np.inf), np.minimum(to_low, to_high))
+    last = np.where(still, np.where(inside, np.inf, -np.inf), np.maximum(to_low, to_high))
     return first.max(axis=1), last.min(axis=1)
 
 
 def _in_round(place, along, radius):
-    """The same within a circle: |place + t along| < radius."""
+    """First and last line parameters within a circle: |place + t along| < radius."""
+    # a t^2 + 2 b t + c < 0 between the roots; a vertical line (a = 0) is inside if c < 0
     a, b = np.einsum("ni,ni->n", along, along), along @ place
     c = place @ place - radius**2
     with np.errstate(invalid="ignore", divide="ignore"):

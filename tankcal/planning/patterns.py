@@ -1,4 +1,4 @@
-"""Patterns in one line: rings of stations, rows of targets at Gauss levels, tapes on the wall."""
+"""Expand patterns: rings into stations, rows into targets at Gauss levels, tapes into ends."""
 
 from itertools import pairwise
 
@@ -9,14 +9,15 @@ from tankcal.planning.model import Instrumented, Photograph, Shell, Targets, Tie
 from tankcal.quadrature import panels
 
 ARCSEC = np.pi / 180 / 3600
+# Default rows of targets per course, and default distance of targets from welds.
 LEVELS, CLEARANCE_M = 2, 0.3
-TOUCH_M = 0.02  # targets nearer than this to one another are one place
-ROUNDING_RAD = 1e-8
-STEEP = np.radians(89.9)  # steeper than this no camera of a ring looks
+TOUCH_M = 0.02  # smallest distance between two target rows
+ROUNDING_RAD = 1e-8  # rounding error of a full turn
+STEEP = np.radians(89.9)  # largest tilt of a camera
 
 
 def full_turn(angle_rad):
-    """Angles from 0 to 2 pi; what is a full turn but for rounding is 0.
+    """Reduce angles to 0 to 2 pi; a full turn within rounding becomes 0.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ def full_turn(angle_rad):
 
 
 def places_around(axis_m, azimuth_rad, radius_m):
-    """(..., 2) places at azimuths, clockwise from +y, and distances from an axis."""
+    """Positions (..., 2) at azimuths (clockwise from +y) and distances from an axis."""
     azimuth, radius = np.broadcast_arrays(azimuth_rad, radius_m)
     return np.asarray(axis_m) + radius[..., None] * np.stack(
         [np.sin(azimuth), np.cos(azimuth)], axis=-1
@@ -46,15 +47,30 @@ def places_around(axis_m, azimuth_rad, radius_m):
 
 
 def joints_of(courses):
-    """(courses + 1,) heights of the joints of courses above the bottom of the lowest, m."""
+    """Heights (courses + 1,) of the joints above the bottom of the lowest course, m."""
     return np.cumsum([0.0] + [course.height_m for course in courses])
 
 
 def row_heights_m(courses, levels, clearance_m):
-    """Heights above the bottom of rows of targets, and the index of the course of each.
+    """Heights of target rows above the bottom, and the course of each row.
 
-    The Gauss levels of every course, moved to the clearance from its welds where they are nearer
-    than that. A course too low for its clearance has one row in the middle.
+    Rows are at the Gauss levels of every course. Rows nearer to a weld than the clearance are moved
+    to the clearance. A course too low for the clearance has one row in the middle.
+
+    Parameters
+    ----------
+    courses : sequence of Course
+    levels : int
+        Number of Gauss levels per course.
+    clearance_m : float
+        Smallest distance from a weld.
+
+    Returns
+    -------
+    heights : ndarray, shape (rows,)
+        m.
+    index : ndarray of int, shape (rows,)
+        Index of the course.
     """
     joints = joints_of(courses)
     heights, index = [], []
@@ -69,27 +85,35 @@ def row_heights_m(courses, levels, clearance_m):
     return np.concatenate(heights), np.concatenate(index)
 
 
-def targets_of(given, shell, courses):
-    """The Targets of a [pattern].
+def targets_of(pattern, shell, courses):
+    """Return the Targets of a [pattern].
 
-    given    {key: value}, None where blank      shell   Shell      courses  of the job
+    Parameters
+    ----------
+    given : dict
+        {key: value}; None if blank.
+    shell : Shell
+    courses : sequence of Course
+        Courses of the job.
     """
-    clearance = _or(given["weld_clearance_mm"], 1000 * CLEARANCE_M) / 1000
+    clearance = _value_or(pattern["weld_clearance_mm"], 1000 * CLEARANCE_M) / 1000
     joints = joints_of(courses)
-    if given["heights_m"]:
-        rows = np.sort(given["heights_m"])
+    if pattern["heights_m"]:
+        rows = np.sort(pattern["heights_m"])
         course = np.searchsorted(joints[1:-1], rows, side="right")
     else:
-        levels = int(_or(given["levels"], LEVELS))
+        levels = int(_value_or(pattern["levels"], LEVELS))
         rows, course = row_heights_m(courses, levels, clearance)
-    n = int(given["generatrices"])
-    azimuth = np.radians(_or(given["first_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
-    welds = np.radians(given["weld_azimuths_deg"] or [])
-    azimuth = _beside(azimuth, welds, clearance / shell.radius_m)
-    offset = _or(given["offset_mm"], 0.0) / 1000
+    n = int(pattern["generatrices"])
+    azimuth = (
+        np.radians(_value_or(pattern["first_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
+    )
+    welds = np.radians(pattern["weld_azimuths_deg"] or [])
+    azimuth = _clear_of_welds(azimuth, welds, clearance / shell.radius_m)
+    offset = _value_or(pattern["offset_mm"], 0.0) / 1000
     row, line = (index.ravel() for index in np.indices((len(rows), n)))
     side = 1.0 if shell.outside else -1.0
-    plates = np.array([plate_m(one, shell.outside) for one in courses])
+    plates = np.array([plate_m(course, shell.outside) for course in courses])
     radius = shell.radius_m + (plates - plates[0])[course]
     out = np.zeros((len(row), 3))
     out[:, :2] = side * places_around((0.0, 0.0), azimuth[line], 1.0)
@@ -99,7 +123,7 @@ def targets_of(given, shell, courses):
             shell.low_m + rows[row],
         ]
     )
-    weld = np.radians(_or(given["reference_weld_deg"], 0.0))
+    weld = np.radians(_value_or(pattern["reference_weld_deg"], 0.0))
     return Targets(
         names=tuple(f"{g + 1}-{s + 1}" for s, g in zip(row, line, strict=True)),
         section=tuple(str(s + 1) for s in row),
@@ -115,8 +139,8 @@ def targets_of(given, shell, courses):
     )
 
 
-def _beside(azimuth, welds, clearance):
-    """Azimuths moved away from welds, to the clearance (rad) on the nearer side."""
+def _clear_of_welds(azimuth, welds, clearance):
+    """Azimuths moved away from welds to the clearance (rad), on the nearer side."""
     for weld in welds:
         off = np.angle(np.exp(1j * (azimuth - weld)))
         side = np.where(off < 0, -1.0, 1.0)
@@ -124,128 +148,156 @@ def _beside(azimuth, welds, clearance):
     return azimuth
 
 
-def _stands(given, shell):
-    """(azimuth, place (3,), station, height) of each stand of a ring, height by height."""
-    n = int(given["stations"])
-    azimuth = np.radians(_or(given["start_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
-    for level, height in enumerate(given["heights_m"]):
-        plan = places_around(shell.axis_m, azimuth, ring_radius_m(given, shell))
+def _stands(ring, shell):
+    """Yield (azimuth, position (3,), station, height index) of each stand of a ring, by height."""
+    n = int(ring["stations"])
+    azimuth = np.radians(_value_or(ring["start_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
+    for level, height in enumerate(ring["heights_m"]):
+        plan = places_around(shell.axis_m, azimuth, ring_radius_m(ring, shell))
         for i in range(n):
             yield azimuth[i], np.array([*plan[i], shell.low_m + height]), i, level
 
 
-def ring_radius_m(given, shell):
-    """Distance of a ring's stations from the axis; `distance_m` counts from the wall."""
-    if given["radius_m"] is not None:
-        return given["radius_m"]
-    return shell.radius_m + (given["distance_m"] if shell.outside else -given["distance_m"])
+def ring_radius_m(ring, shell):
+    """Distance of a ring's stations from the axis, m; `distance_m` is measured from the wall."""
+    if ring["radius_m"] is not None:
+        return ring["radius_m"]
+    return shell.radius_m + (ring["distance_m"] if shell.outside else -ring["distance_m"])
 
 
-def photographs_of(given, number, shell, image_sd_mm, place):
-    """The Photographs of one [[photo_rings]], the `number`th."""
-    found = []
-    sd = image_sd_mm if given["s_um"] is None else given["s_um"] / 1000
-    height = _or(given["aim_height_m"], (shell.high_m - shell.low_m) / 2)
-    radius = ring_radius_m(given, shell)
+def photographs_of(ring, number, shell, image_sd_mm, place):
+    """Return the Photographs of the `number`th [[photo_rings]].
+
+    Parameters
+    ----------
+    ring : Entry
+    number : int
+    shell : Shell
+    image_sd_mm : float
+        Default standard deviation of an image coordinate.
+    place : tuple
+        (file, row, column) of the ring, for messages.
+
+    Returns
+    -------
+    list of Photograph
+    """
+    photographs = []
+    sd = image_sd_mm if ring["s_um"] is None else ring["s_um"] / 1000
+    height = _value_or(ring["aim_height_m"], (shell.high_m - shell.low_m) / 2)
+    radius = ring_radius_m(ring, shell)
     far = radius - shell.radius_m if shell.outside else radius + shell.radius_m
-    for azimuth, xyz, i, level in _stands(given, shell):
-        station = f"R{number}-{i + 1}" + (f"-{level + 1}" if len(given["heights_m"]) > 1 else "")
+    for azimuth, xyz, i, level in _stands(ring, shell):
+        station = f"R{number}-{i + 1}" + (f"-{level + 1}" if len(ring["heights_m"]) > 1 else "")
         tilt = np.arctan2(shell.low_m + height - xyz[2], max(far, 1e-9))
         exposures = [
             (turn, roll)
-            for turn in given["directions_deg"] or [0.0]
-            for roll in given["rolls_deg"] or [0.0]
-            for _ in range(int(_or(given["photographs"], 1)))
+            for turn in ring["directions_deg"] or [0.0]
+            for roll in ring["rolls_deg"] or [0.0]
+            for _ in range(int(_value_or(ring["photographs"], 1)))
         ]
         for k, (turn, roll) in enumerate(exposures):
             ahead = azimuth + np.pi + np.radians(turn)
-            found.append(
+            photographs.append(
                 Photograph(
                     name=f"{station}.{k + 1}" if len(exposures) > 1 else station,
                     station=station,
-                    camera=given["camera"],
+                    camera=ring["camera"],
                     xyz_m=xyz,
                     rotation=rotation_of_view(
                         ahead, np.clip(tilt, -STEEP, STEEP), np.radians(roll)
                     ),
                     sd_mm=sd,
-                    readings=int(_or(given["readings"], 1)),
+                    readings=int(_value_or(ring["readings"], 1)),
                     place=place,
                 )
             )
-    return found
+    return photographs
 
 
-def setups_of(given, number, shell, place):
-    """The set-ups of one [[setup_rings]], the `number`th."""
-    found = []
-    stands = list(_stands(given, shell))
+def setups_of(entry, number, shell, place):
+    """Return the set-ups of the `number`th [[setup_rings]]."""
+    setups = []
+    stands = list(_stands(entry, shell))
     names = [f"T{number}-{i + 1}" + (f"-{k + 1}" if k else "") for _, _, i, k in stands]
     for at, (_, xyz, _, level) in enumerate(stands):
         ring = [name for name, stand in zip(names, stands, strict=True) if stand[3] == level]
-        found.append(
+        setups.append(
             Instrumented(
                 name=names[at],
-                instrument=given["instrument"],
+                instrument=entry["instrument"],
                 xyz_m=xyz,
-                direction_sd_rad=_scaled(given["s_direction_arcsec"], ARCSEC),
-                zenith_sd_rad=_scaled(given["s_zenith_arcsec"], ARCSEC),
-                distance_sd_m=_scaled(given["s_mm"], 1e-3),
-                sets=int(_or(given["sets"], 1)),
-                sights=() if given["sights"] is False else _neighbours(ring, names[at]),
+                direction_sd_rad=_scaled(entry["s_direction_arcsec"], ARCSEC),
+                zenith_sd_rad=_scaled(entry["s_zenith_arcsec"], ARCSEC),
+                distance_sd_m=_scaled(entry["s_mm"], 1e-3),
+                sets=int(_value_or(entry["sets"], 1)),
+                sights=() if entry["sights"] is False else _neighbours(ring, names[at]),
                 place=place,
             )
         )
-    return found
+    return setups
 
 
 def _neighbours(ring, name):
     at = ring.index(name)
     beside = (ring[at - 1], ring[(at + 1) % len(ring)])
-    return tuple(one for one in dict.fromkeys(beside) if one != name)
+    return tuple(neighbour for neighbour in dict.fromkeys(beside) if neighbour != name)
 
 
-def tape_of(given, shell):
-    """The Tie of one [[tapes]], {name: (3,)} of its two ends, and the way (3,) that they face.
+def tape_of(tape, shell):
+    """Return the Tie of one [[tapes]], the positions of its ends, and their normal.
 
-    A vertical tape hangs beside the wall; a horizontal one lies along a tangent outside, within
-    the tank along a chord whose ends are as far off the wall.
+    A vertical tape hangs beside the wall. Outside, a horizontal tape lies along a tangent; inside,
+    it lies along a chord whose ends have the stated distance from the wall.
+
+    Parameters
+    ----------
+    tape : Entry
+    shell : Shell
+
+    Returns
+    -------
+    tie : Tie
+    ends : dict
+        {name: (3,) position} of the two ends.
+    normal : ndarray, shape (3,)
+        Horizontal unit vector from the wall to the observer.
     """
-    azimuth, length = np.radians(given["azimuth_deg"]), given["length_m"]
+    azimuth, length = np.radians(tape["azimuth_deg"]), tape["length_m"]
     side = 1.0 if shell.outside else -1.0
-    radius = shell.radius_m + side * _or(given["off_m"], 0.1)
-    if given["kind"] == "horizontal" and not shell.outside:
+    radius = shell.radius_m + side * _value_or(tape["off_m"], 0.1)
+    if tape["kind"] == "horizontal" and not shell.outside:
         radius = np.sqrt(max(radius**2 - (length / 2) ** 2, 0.0))
-    middle, low = places_around(shell.axis_m, azimuth, radius), shell.low_m + given["low_m"]
-    if given["kind"] == "vertical":
+    middle, low = places_around(shell.axis_m, azimuth, radius), shell.low_m + tape["low_m"]
+    if tape["kind"] == "vertical":
         ends = np.array([[*middle, low], [*middle, low + length]])
     else:
         half = np.array([np.cos(azimuth), -np.sin(azimuth), 0.0]) * length / 2
         ends = np.array([*middle, low]) + np.array([-half, half])
-    names = f"{given['name']}a", f"{given['name']}b"
+    names = f"{tape['name']}a", f"{tape['name']}b"
     tie = Tie(
-        given["name"], "distances", *names, given["s_mm"] / 1000,
-        instrument=given["instrument"], readings=int(_or(given["readings"], 1)),
+        tape["name"], "distances", *names, tape["s_mm"] / 1000,
+        instrument=tape["instrument"], readings=int(_value_or(tape["readings"], 1)),
     )  # fmt: skip
     out = side * np.array([np.sin(azimuth), np.cos(azimuth), 0.0])
     return tie, dict(zip(names, ends, strict=True)), out
 
 
 def plate_m(course, outside):
-    """What lies between the nominal inside radius and the observer: plate and paint, or nothing."""
+    """Thickness of plate and paint between the nominal inside radius and the observer; 0 inside."""
     return course.thickness_m + course.paint_m if outside else 0.0
 
 
-def shell_of(job, given):
-    """The Shell of a job and a [pattern]: that of its lowest course, with its plate where outside.
+def shell_of(job, pattern):
+    """Return the Shell of a job and a [pattern]: the lowest course, with its plate if outside.
 
-    Courses with other plates have their targets further in or out (`targets_of`).
+    `targets_of` moves the targets of courses with other plate thicknesses.
     """
     outside = job.survey.side == "outside"
     plate = plate_m(job.courses[0], outside)
     low = job.datum.bottom_z_m
     return Shell(
-        axis_m=np.array([_or(given["axis_x_m"], 0.0), _or(given["axis_y_m"], 0.0)]),
+        axis_m=np.array([_value_or(pattern["axis_x_m"], 0.0), _value_or(pattern["axis_y_m"], 0.0)]),
         radius_m=job.tank.nominal_diameter_m / 2 + plate,
         low_m=low,
         high_m=low + sum(course.height_m for course in job.courses),
@@ -253,7 +305,7 @@ def shell_of(job, given):
     )
 
 
-def _or(value, default):
+def _value_or(value, default):
     return default if value is None else value
 
 

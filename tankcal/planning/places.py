@@ -1,4 +1,4 @@
-"""Where things stand as somebody on site finds them: along the wall, off it, above the bottom."""
+"""Positions relative to the tank: arc along the wall, distance off it, height above the bottom."""
 
 from dataclasses import dataclass
 
@@ -9,11 +9,18 @@ from tankcal.planning.patterns import full_turn, joints_of, plate_m
 
 @dataclass(frozen=True)
 class Place:
-    """A place by the tank itself.
+    """A position relative to the tank.
 
-    arc_m        along the wall from the reference weld, clockwise seen from above
-    azimuth_rad  from the axis, clockwise from +y
-    off_m        from the wall, on the side of the survey      height_m  above the bottom
+    Attributes
+    ----------
+    arc_m : float
+        Arc along the wall from the reference weld, clockwise seen from above.
+    azimuth_rad : float
+        Azimuth from the axis, clockwise from +y.
+    off_m : float
+        Distance from the wall, on the side of the survey.
+    height_m : float
+        Height above the bottom.
     """
 
     arc_m: float
@@ -23,13 +30,13 @@ class Place:
 
 
 def place_of(plan, xyz_m):
-    """Place of coordinates on the tank.
+    """Return the Place of a point.
 
     Parameters
     ----------
     plan : Plan
     xyz_m : array_like, shape (3,)
-        In the frame of the survey, m.
+        Coordinates in the frame of the survey, m.
 
     Returns
     -------
@@ -45,7 +52,7 @@ def place_of(plan, xyz_m):
 
 
 def reference_rad(plan):
-    """Azimuth of the reference weld: that of a target less its arc along the wall.
+    """Azimuth of the reference weld: azimuth of a target minus its arc along the wall.
 
     Parameters
     ----------
@@ -63,7 +70,7 @@ def reference_rad(plan):
 
 
 def wall_radius_m(plan, height_m):
-    """Radius of the wall on the side of the survey, of the course at a height above the bottom."""
+    """Radius of the wall on the side of the survey, m, at a height above the bottom."""
     courses, outside = plan.job.courses, plan.shell.outside
     course = courses[np.searchsorted(joints_m(plan)[1:-1], height_m, side="right")]
     return plan.shell.radius_m + plate_m(course, outside) - plate_m(courses[0], outside)

@@ -1,4 +1,4 @@
-"""A plan answered: how well points, sections and every row of the table will be known."""
+"""Predict a plan: precision of points and sections, and U of every row of the table."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,18 +25,18 @@ from tankcal.survey.network.quality import precision
 
 @dataclass(frozen=True)
 class PointOutlook:
-    """What is foreseen of one point.
+    """Prediction for one point.
 
     Attributes
     ----------
     name : str
-        The point.
+        Name of the point.
     rays : int
-        Rays that see it.
+        Number of rays to it.
     sd_m : ndarray, shape (3,)
-        Standard deviations, m; nan where the point is not determined.
+        Standard deviations, m; nan if the point is not determined.
     undetermined, weak : str
-        Why it is not determined, or weak; "" where sound.
+        Reason why the point is undetermined or weak; "" otherwise.
     """
 
     name: str
@@ -48,20 +48,20 @@ class PointOutlook:
 
 @dataclass(frozen=True)
 class SectionOutlook:
-    """What is foreseen of one section.
+    """Prediction for one section.
 
     Attributes
     ----------
     name : str
-        The section.
+        Name of the section.
     height_m : float
-        Its height above the bottom, m.
+        Height above the bottom, m.
     targets : int
-        Its targets.
+        Number of targets.
     centre_sd_m : ndarray, shape (2,)
-        Standard deviations of its centre, m.
+        Standard deviations of the centre, m.
     radius_sd_m : float
-        Standard deviation of its radius, m.
+        Standard deviation of the radius, m.
     """
 
     name: str
@@ -73,18 +73,20 @@ class SectionOutlook:
 
 @dataclass(frozen=True)
 class Prediction(OfTable):
-    """What a survey would give, before it is made.
+    """Predicted results of a planned survey.
 
     Attributes
     ----------
+    plan : Plan
     seen : Visibility
-        What is seen from where.
+        Visible points per photograph and set-up.
+    measurements : Measurements
     predicted : Predicted
         The network (`surveys.Predicted`).
     tabled : PredictedTable
         Wall, table and statements.
     points : tuple of PointOutlook
-        Of all points, targets first.
+        All points, targets first.
     """
 
     plan: Plan
@@ -96,7 +98,7 @@ class Prediction(OfTable):
 
     @property
     def datum(self):
-        """What holds the frame (`surveys.DatumReport`)."""
+        """Definition of the datum (`surveys.DatumReport`)."""
         return self.predicted.frame.report
 
     @cached_property
@@ -107,7 +109,7 @@ class Prediction(OfTable):
 
     @cached_property
     def reliability(self):
-        """What blunders could do unnoticed: a tuple of GroupReliability."""
+        """Effects of undetected blunders, a tuple of GroupReliability."""
         tabled = self.tabled
         return reliability(self.plan, self.predicted, tabled.covariance, tabled.by_points_m2)
 
@@ -118,18 +120,18 @@ class Prediction(OfTable):
 
     @cached_property
     def warnings(self):
-        """A tuple of Problem: what the run of such a survey will warn of, and what is in vain."""
+        """Warnings of the planned survey and of items without effect, a tuple of Problem."""
         return foreseen(self)
 
     @property
     def undetermined(self):
-        """The PointOutlook of targets and other points that are not determined."""
-        return tuple(one for one in self.points if one.undetermined)
+        """PointOutlook of targets and other points that are not determined."""
+        return tuple(point for point in self.points if point.undetermined)
 
     @property
     def weak(self):
-        """The PointOutlook of those that are determined, but weakly."""
-        return tuple(one for one in self.points if one.weak)
+        """PointOutlook of points that are determined, but weakly."""
+        return tuple(point for point in self.points if point.weak)
 
 
 def predict(plan):
@@ -146,9 +148,9 @@ def predict(plan):
     Raises
     ------
     InputError
-        For a camera or set-up that sees nothing, and where a course keeps too few targets.
+        If a camera or set-up sees no target, or a course keeps too few targets.
     SolutionError
-        When the survey would not determine its datum, its scale, the vertical.
+        If the survey does not determine its datum, its scale or the vertical.
     """
     if isinstance(plan, WallPlan):
         return predict_wall(plan)
@@ -161,14 +163,14 @@ def predict(plan):
     try:
         tabled = predicted_table(plan, predicted)
     except SolutionError as error:
-        idle = (one.expected for one in idle_ties(plan, points))
+        idle = (problem.expected for problem in idle_ties(plan, points))
         raise SolutionError(*error.texts, *idle) from error
     refuse_without_delivery(plan, tabled, plan.shell.high_m - plan.shell.low_m)
     return Prediction(plan, seen, measurements, predicted, tabled, points)
 
 
 def _predicted(plan, seen, measurements):
-    """surveys.Predicted; where there is none, in words of the plan as far as these are known."""
+    """Return surveys.Predicted; if there is no solution, explain why in terms of the plan."""
     try:
         return predict_survey(measurements, nominal_of(plan))
     except SolutionError as error:
@@ -179,11 +181,11 @@ def _predicted(plan, seen, measurements):
 
 
 def _refuse_exact(measurements):
-    """Raise where nothing that is measured has any uncertainty."""
-    sds = [one.sd for one in measurements.readings]
+    """Raise InputError if all standard deviations are zero."""
+    sds = [reading.sd for reading in measurements.readings]
     if measurements.image_points is not None:
         sds.append(measurements.image_points.sd_mm.ravel())
-    if not any((one > 0).any() for one in sds):
+    if not any((sd > 0).any() for sd in sds):
         expected = message(
             "plan_all_exact",
             "an accuracy of zero for everything: expected standard deviations above 0",
@@ -192,25 +194,27 @@ def _refuse_exact(measurements):
 
 
 def _points(plan, seen, predicted):
-    """PointOutlook of all points."""
+    """Return the PointOutlook of all points."""
     adjusted = predicted.adjusted
     place = {name: i for i, name in enumerate(adjusted.survey.points)}
-    there = np.array([place.get(name, -1) for name in seen.points])
-    sd = np.vstack([adjusted.point_sd_m, np.full(3, np.nan)])[there]
-    sd[[i for i, k in enumerate(there) if k >= 0 and adjusted.problem.set_aside[k]]] = np.nan
+    index = np.array([place.get(name, -1) for name in seen.points])
+    sd = np.vstack([adjusted.point_sd_m, np.full(3, np.nan)])[index]
+    sd[[i for i, k in enumerate(index) if k >= 0 and adjusted.problem.set_aside[k]]] = np.nan
     why = _reasons(predicted)
     middle = np.nanmedian(sd[: len(plan.targets.names)].max(axis=1))
-    found = []
-    for name, rays, own in zip(seen.points, seen.rays.tolist(), sd, strict=True):
+    outlooks = []
+    for name, rays, point_sd in zip(seen.points, seen.rays.tolist(), sd, strict=True):
         lost = ""
-        if np.isnan(own).any():
+        if np.isnan(point_sd).any():
             lost = why.get(name) or _too_few(rays)
-        found.append(PointOutlook(name, rays, own, lost, _weakness(plan, rays, own, middle)))
-    return tuple(found)
+        outlooks.append(
+            PointOutlook(name, rays, point_sd, lost, _weakness(plan, rays, point_sd, middle))
+        )
+    return tuple(outlooks)
 
 
 def _too_few(rays):
-    """Why a point without readings is not determined."""
+    """Reason why a point with too few readings is not determined."""
     if not rays:
         return "is seen from nowhere"
     return "has one ray" if rays == 1 else "has too few readings"
@@ -227,22 +231,23 @@ def _weakness(plan, rays, sd_m, middle_m):
 
 
 def _reasons(predicted):
-    """{name: why} of points that the survey leaves out."""
-    adjusted, found = predicted.adjusted, {}
+    """Return {name: reason} of points that the survey leaves out."""
+    adjusted, reasons = predicted.adjusted, {}
     for text in predicted.gathered.aside:
         name, _, why = text.removeprefix("point ").partition(" ")
-        found[name] = why
+        reasons[name] = why
     for i, why in enumerate(adjusted.problem.set_aside):
         if why:
             name = adjusted.survey.points[i]
-            found[name] = why.removeprefix(f"point {name} ")
-    return found
+            reasons[name] = why.removeprefix(f"point {name} ")
+    return reasons
 
 
 def sections_of(tabled):
-    """A SectionOutlook of each section: sds of the circle through its targets.
+    """Return the SectionOutlook of each section, from the circle through its targets.
 
-    The centre's are those within the wall: what all points have in common is left out.
+    Standard deviations of the centre are relative to the wall: common motions of all points are
+    excluded.
     """
     wall, covariance = tabled.wall, tabled.covariance
     rows, n = [], 3 * len(covariance.points)
@@ -251,6 +256,7 @@ def sections_of(tabled):
         x, y, _ = tabled.job.points.xyz_m[wall.accepted[members]].T
         away = np.column_stack([x - section.circle.x_m, y - section.circle.y_m])
         unit = away / np.linalg.norm(away, axis=1)[:, None]
+        # Circle fit, linearised: radial error = unit vector times centre shift + radius change.
         inverse = np.linalg.pinv(np.column_stack([unit, np.ones(len(unit))]))
         row = np.zeros((3, n))
         row[:, 3 * members], row[:, 3 * members + 1] = inverse * unit[:, 0], inverse * unit[:, 1]
@@ -260,8 +266,8 @@ def sections_of(tabled):
     sd = np.sqrt(np.maximum(variance, 0.0))
     return tuple(
         SectionOutlook(
-            section.group.name, section.group.height_m, len(section.group.members), one[:2],
-            float(one[2]),
+            section.group.name, section.group.height_m, len(section.group.members), section_sd[:2],
+            float(section_sd[2]),
         )
-        for section, one in zip(wall.sections, sd, strict=True)
+        for section, section_sd in zip(wall.sections, sd, strict=True)
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""From a plan's folder to a checked Plan, or to every problem that it has."""
+"""Read a plan from its folder and check it; report all problems at once."""
 
 import re
 from dataclasses import replace
@@ -58,7 +58,7 @@ from tankcal.planning.wall.contract import TABLES as WALL_TABLES
 from tankcal.planning.wall.reading import is_wall_plan, wall_plan_of
 from tankcal.text.numerals import NUMBER
 
-OF_LIQUID = ("horizontal", "sphere")  # kinds that runs of liquid alone may measure
+OF_LIQUID = ("horizontal", "sphere")  # kinds of tank that a plan may measure by liquid only
 
 
 def load_plan(path):
@@ -71,7 +71,7 @@ def load_plan(path):
 
     Returns
     -------
-    Plan
+    Plan or WallPlan
 
     Raises
     ------
@@ -100,23 +100,23 @@ def load_plan(path):
 
 
 def _wall_plan(raw, values, tables, given, folder, log):
-    """The WallPlan of a plan that says how its wall is strapped, read from lines, or hit."""
+    """Return the WallPlan of a plan that measures the bare wall."""
     courses = None if tables["courses"] is None else tuple(tables["courses"].of("course"))
     diameter = values["tank"]["nominal_diameter_m"]
     check_sections(given, courses, None if diameter is None else diameter / 2, raw, log)
     log.stop_if_problems()
-    told = tuple(log.warnings)
+    warnings = tuple(log.warnings)
     raw = _with_points(raw)
     check_tank(values, tables, raw, log)
     log.stop_if_problems()
     limits = limits_of(given.single["limits"])
     name = folder.resolve().name
     plan = wall_plan_of(raw, values, tables, given, limits, name)
-    return replace(plan, warnings=(*told, *plan.warnings))
+    return replace(plan, warnings=(*warnings, *plan.warnings))
 
 
 def _check_kind(raw, given, log):
-    """An upright tank; runs of liquid alone measure a lying tank or a sphere as well."""
+    """Check the kind of tank: upright, unless the plan measures by liquid only."""
     kind = kind_of(raw)
     if kind in (None, "vertical"):
         return
@@ -145,7 +145,7 @@ def _is_filled(given, name):
 
 
 def _with_points(raw):
-    """The RawJob with decimal points in its tables, and nothing said of marks: as jobs are made."""
+    """Return the RawJob with decimal points in its tables and no declared marks."""
     settings = {name: entries for name, entries in raw.settings.items() if name != "csv"}
     tables = {
         name: replace(table, decimal=".", rows=tuple(map(_in_points, table.rows)))
@@ -157,7 +157,7 @@ def _with_points(raw):
 
 
 def _in_points(row):
-    """A row of cells, numbers with decimal points."""
+    """Return a row of cells with decimal points."""
     numbers = ((cell or "").strip().replace(",", ".") for cell in row)
     return tuple(
         number if NUMBER.fullmatch(number) else cell
@@ -186,7 +186,7 @@ def _folder(path, log):
 
 
 def _read(folder, log):
-    """RawJob and Given of a plan's folder."""
+    """Return the RawJob and the Given of a plan's folder."""
     files = []
 
     def content(name, limit=None):
@@ -200,16 +200,22 @@ def _read(folder, log):
     log.stop_if_problems()
     text, (whole, rows) = decode(PLAN_FILE, data, log), parsed
     rows, text = _refuse_misspelt(whole, rows, text, log)
-    own = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
-    _refuse_nothing_measured(own, log)
+    own_sections = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
+    _refuse_nothing_measured(own_sections, log)
     settings, sections = flattened(PLAN_FILE, whole, rows, log)
-    needed = () if is_wall_plan(own) else ("pattern",)
-    single = {name: _single(name, own.get(name, {}), rows, log, name in needed) for name in SINGLE}
-    repeated = {name: _repeated(name, own.get(name, []), text, log) for name in REPEATED}
+    needed = () if is_wall_plan(own_sections) else ("pattern",)
+    single = {
+        name: _single(name, own_sections.get(name, {}), rows, log, name in needed)
+        for name in SINGLE
+    }
+    repeated = {name: _repeated(name, own_sections.get(name, []), text, log) for name in REPEATED}
     marks = declared_marks(PLAN_FILE, settings, log)
-    is_wall = is_wall_plan(own)
-    beside = tuple(one for one in JOB_TABLES if one != "control") + WALL_TABLES
-    tables, known = {}, [f"{one}.csv" for one in (beside if is_wall else (*JOB_TABLES, *TABLES))]
+    is_wall = is_wall_plan(own_sections)
+    beside = tuple(table_name for table_name in JOB_TABLES if table_name != "control") + WALL_TABLES
+    tables, known = (
+        {},
+        [f"{table_name}.csv" for table_name in (beside if is_wall else (*JOB_TABLES, *TABLES))],
+    )
     for path in sorted(folder.glob("*.csv")):
         if path.name not in known:
             log.problem(
@@ -238,27 +244,27 @@ def _read(folder, log):
     return raw, Given(single, repeated, ties, ties.pop("stadia"), is_wall=is_wall)
 
 
-def _refuse_misspelt(whole, rows, text, log):
-    """A problem for each section whose name is like one of a plan; (rows, text) as it was meant.
+def _refuse_misspelt(content, rows, text, log):
+    """Report sections with misspelt names; return (rows, text) with the corrected names.
 
-    It is read on under the name that was meant, so that nothing is told of a section that is
-    missing; twice the same, or in brackets of another kind, it is taken out of `whole`.
+    Reading continues under the corrected name, so that the section is not also reported as missing.
+    A name that would appear twice, or with other brackets, is removed from `whole`.
     """
     of_jobs = {name.partition(".")[0] for name in KEYS}
     known = (*of_jobs, *SINGLE, *REPEATED)
-    for name in [one for one in whole if one not in known]:
-        entries = whole[name] if isinstance(whole[name], list) else [whole[name]]
+    for name in [section_name for section_name in content if section_name not in known]:
+        entries = content[name] if isinstance(content[name], list) else [content[name]]
         right = meant(name, known)
-        if right is None or not all(isinstance(one, dict) for one in entries):
+        if right is None or not all(isinstance(entry, dict) for entry in entries):
             continue
         places = _rows_of(re.escape(name), text)
         row = places[0][0] if places else rows.get(name)
-        is_list = isinstance(whole[name], list)
+        is_list = isinstance(content[name], list)
         column = f"[[{name}]]" if is_list else f"[{name}]"
         log.problem(PLAN_FILE, unknown_section(name, known), row, column)
-        entries = whole.pop(name)
-        if right not in whole and is_list == (right in REPEATED):
-            whole[right] = entries
+        entries = content.pop(name)
+        if right not in content and is_list == (right in REPEATED):
+            content[right] = entries
             rows = rows | {
                 right + key[len(name) :]: row
                 for key, row in rows.items()
@@ -269,9 +275,9 @@ def _refuse_misspelt(whole, rows, text, log):
     return rows, text
 
 
-def _refuse_nothing_measured(own, log):
-    """Raise InputError for a plan that has neither targets nor the measuring of a bare wall."""
-    if "pattern" in own or is_wall_plan(own):
+def _refuse_nothing_measured(sections, log):
+    """Raise InputError for a plan with neither targets nor measurements of the bare wall."""
+    if "pattern" in sections or is_wall_plan(sections):
         return
     expected = message(
         "plan_of_nothing",
@@ -283,7 +289,7 @@ def _refuse_nothing_measured(own, log):
 
 
 def _table(name, table, log):
-    """ColumnValues of a table that a job has otherwise, or None."""
+    """Return the ColumnValues of a table whose columns differ from those of a job, or None."""
     if table is None:
         return None
     values = read_columns(name, table, log, TABLES[name])
@@ -304,13 +310,13 @@ def _single(section, entries, rows, log, is_needed):
             section,
         )
         entries = {}
-    found = {key: rows.get(f"{section}.{key}") for key in entries}
-    return _entry(section, SINGLE[section], entries, rows.get(section), found, log, is_needed)
+    key_rows = {key: rows.get(f"{section}.{key}") for key in entries}
+    return _entry(section, SINGLE[section], entries, rows.get(section), key_rows, log, is_needed)
 
 
 def _repeated(section, entries, text, log):
-    """[Entry] of the [[section]] of a plan."""
-    if not isinstance(entries, list) or not all(isinstance(one, dict) for one in entries):
+    """Return the list of Entry of a [[section]] of a plan."""
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         log.problem(
             PLAN_FILE,
             message(
@@ -322,25 +328,28 @@ def _repeated(section, entries, text, log):
             section,
         )
         return []
-    found, places = [], _rows_of(section, text)
-    for number, one in enumerate(entries):
+    result, places = [], _rows_of(section, text)
+    for number, entry in enumerate(entries):
         row, rows = places[number] if number < len(places) else (None, {})
         name = f"{section}[{number + 1}]"
-        found.append(_entry(name, REPEATED[section], one, row, rows, log, is_needed=True))
-    return found
+        result.append(_entry(name, REPEATED[section], entry, row, rows, log, is_needed=True))
+    return result
 
 
 def _rows_of(section, text):
-    """[(row, {key: row})] of each [[section]] in the text of a plan, for messages only."""
-    found, rows = [], {}
+    """Return [(row, {key: row})] of each [[section]] in the text of a plan.
+
+    Used in messages only.
+    """
+    sections, rows = [], {}
     for number, line in enumerate(text.splitlines(), 1):
         if re.match(r"\s*\[+[^\[\],]+\]+\s*(#|$)", line):
             rows = {}
             if re.match(rf"\s*\[\[\s*{section}\s*\]\]", line):
-                found.append((number, rows))
+                sections.append((number, rows))
         elif key := re.match(r"\s*[\"']?(\w+)[\"']?\s*=", line):
             rows.setdefault(key[1], number)
-    return found
+    return sections
 
 
 def _entry(name, fields, entries, row, rows, log, is_needed=False):
@@ -363,11 +372,11 @@ def _entry(name, fields, entries, row, rows, log, is_needed=False):
         for field in fields
     }
     filled = frozenset(key for key, value in entries.items() if not is_blank(value))
-    found = Entry(name, values, filled, row, rows)
+    checked = Entry(name, values, filled, row, rows)
     for field in fields:
         if isinstance(field, Count) and not _is_whole(values[field.name]):
-            found.tell(log.problem, field.name, _not_whole(field, values[field.name]))
-    return found
+            checked.tell(log.problem, field.name, _not_whole(field, values[field.name]))
+    return checked
 
 
 def _is_whole(value):
@@ -384,7 +393,7 @@ def _not_whole(field, value):
 
 
 def _job_tables(raw, log):
-    """{name: ColumnValues or None} of all tables that a job can have."""
+    """Return {name: ColumnValues or None} of all tables that a job can have."""
     tables = dict.fromkeys(JOB_FILES)
     for name in JOB_TABLES:
         if raw.tables.get(name) is not None:
@@ -398,12 +407,12 @@ def _job_tables(raw, log):
 
 
 def _measured(given):
-    """Tables of the plan, and a stand-in that says: image points will be measured."""
+    """Return the tables of the plan, and a placeholder for image points."""
     return given.ties | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
 
 
 def _check(raw, values, tables, registers, given, log):
-    """What can be told before anything is placed."""
+    """Check all values that do not depend on positions."""
     check_tank(values, tables, raw, log)
     files = SurveyFiles(values, tables, registers, raw, log)
     check_cameras(files)
@@ -414,7 +423,10 @@ def _check(raw, values, tables, registers, given, log):
 
 
 def _job(raw, values, tables, registers, log):
-    """The Job of a plan: its measurements are cameras, instruments, control and settings alone."""
+    """Return the Job of a plan.
+
+    Its measurements are cameras, instruments, control and settings only.
+    """
     rule = values["table"]["rule"]
     attached = Attached(None, None, None if rule is None else find_rule(raw, rule, log))
     log.stop_if_problems()

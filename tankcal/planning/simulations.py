@@ -1,8 +1,8 @@
-"""A plan made many times: readings drawn, adjusted, turned into a table; does the scatter agree?
+"""Simulate the surveys of a plan and compare the scatter of the results with the prediction.
 
-Every run draws the readings of the whole survey from their standard deviations, adjusts it with
-its search for blunders, fits the wall and integrates it. What the plan declares beside the survey
-(plates, temperature, the zero) is not drawn: the volumes scatter by the survey alone.
+Every run draws the readings of the whole survey from their standard deviations. It adjusts them,
+rejects outliers, fits the wall and integrates it. Other inputs (plates, temperature, the zero) are
+not drawn: the volumes scatter by the survey only.
 """
 
 from dataclasses import dataclass, replace
@@ -20,19 +20,35 @@ from tankcal.survey import adjust_survey, wall_points
 
 OF_SURVEY = ("points", "instrument_scale", "instrument_offset")
 SIMULATING = message("plan_simulating", "simulating surveys")
-BLUNDER_SDS = 20.0  # size of a blunder, in standard deviations of its reading
+BLUNDER_SDS = 20.0  # size of a simulated blunder, in standard deviations of its reading
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """What many simulated surveys of a plan gave.
+    """Results of many simulated surveys of a plan.
 
-    runs         those that had a solution      failed  messages of the others
-    scatter_m    (points, 3) sd of the coordinates, of the points that were adjusted in every run
-    predicted_m  (points, 3) as predicted       names   of these points
-    volumes_m3   (runs,) of the full tank       predicted_volume_m3  its predicted sd by the survey
-    set_aside    (runs,) values that the search for blunders took out
-    seed         of the draws                   blunders     share of readings that were off
+    Attributes
+    ----------
+    runs : int
+        Number of surveys with a solution.
+    failed : sequence
+        Messages of the surveys without a solution.
+    scatter_m : ndarray, shape (points, 3)
+        Standard deviations of the coordinates of points adjusted in every run.
+    predicted_m : ndarray, shape (points, 3)
+        Predicted standard deviations.
+    names : tuple of str
+        Names of these points.
+    volumes_m3 : ndarray, shape (runs,)
+        Volumes of the full tank.
+    predicted_volume_m3 : float
+        Predicted standard deviation of the volume by the survey.
+    set_aside : ndarray, shape (runs,)
+        Numbers of rejected values.
+    seed : int
+        Seed of the draws.
+    blunders : float
+        Share of readings with a blunder.
     """
 
     seed: int
@@ -48,17 +64,17 @@ class Simulated:
 
     @property
     def ratio(self):
-        """Rms scatter over rms predicted sd, of all coordinates."""
+        """Rms scatter of all coordinates over their rms predicted standard deviation."""
         return float(np.sqrt(np.mean(self.scatter_m**2) / np.mean(self.predicted_m**2)))
 
     @property
     def volume_ratio(self):
-        """Scatter of the full tank's volume over what is predicted."""
+        """Scatter of the volume of the full tank over its predicted standard deviation."""
         return float(self.volumes_m3.std(ddof=1) / self.predicted_volume_m3)
 
     @property
     def volume_ratio_sd(self):
-        """How well so many surveys tell that: the sd 1/sqrt(2 (n - 1)) of a ratio of sds."""
+        """Standard deviation 1/sqrt(2 (n - 1)) of volume_ratio for n surveys."""
         return float(1 / np.sqrt(2 * (self.runs - 1)))
 
 
@@ -71,7 +87,7 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
     runs, seed : int, optional
         Number of surveys, and seed of their errors.
     blunders : float, optional
-        Share of readings that are off by BLUNDER_SDS of their standard deviations.
+        Share of readings with an error of BLUNDER_SDS standard deviations.
     progress : callable, optional
         progress(text, done, total).
 
@@ -82,7 +98,7 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
     Raises
     ------
     SolutionError
-        When fewer than two of the surveys have a solution.
+        If fewer than two surveys have a solution.
     """
     rng, failed = np.random.default_rng(seed), []
     found, volumes, aside = [], [], []
@@ -93,7 +109,7 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
             prediction.plan, prediction.measurements, prediction.predicted, rng
         )
         try:
-            adjustment, volume = _made(prediction.plan, _spoilt(drawn, blunders, rng))
+            adjustment, volume = _adjust_drawn(prediction.plan, _add_blunders(drawn, blunders, rng))
         except TankcalError as error:
             failed.append(error.texts[0])
             continue
@@ -101,9 +117,9 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
         volumes.append(volume)
         aside.append(len(adjustment.removed))
     refuse_failed(failed, runs)
-    names = tuple(name for name in found[0] if all(name in one for one in found))
-    xyz = np.array([[one[name] for name in names] for one in found])
-    sds = {one.name: one.sd_m for one in prediction.points}
+    names = tuple(name for name in found[0] if all(name in result for result in found))
+    xyz = np.array([[result[name] for name in names] for result in found])
+    sds = {point.name: point.sd_m for point in prediction.points}
     return Simulated(
         seed=seed,
         blunders=blunders,
@@ -113,15 +129,15 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
         scatter_m=xyz.std(axis=0, ddof=1),
         predicted_m=np.array([sds[name] for name in names]),
         volumes_m3=np.array(volumes),
-        predicted_volume_m3=_by_survey(prediction.table),
+        predicted_volume_m3=_u_by_survey(prediction.table),
         set_aside=np.array(aside),
     )
 
 
 def refuse_failed(failed, runs):
-    """Raise SolutionError where fewer than two of the surveys have a solution.
+    """Raise SolutionError if fewer than two surveys have a solution.
 
-    failed  messages of those that have none
+    failed: messages of the surveys without a solution.
     """
     if runs - len(failed) < 2:
         raise SolutionError(
@@ -135,8 +151,8 @@ def refuse_failed(failed, runs):
         )
 
 
-def _made(plan, measurements):
-    """The Adjustment of drawn measurements, and the volume of the full tank."""
+def _adjust_drawn(plan, measurements):
+    """Return the Adjustment of drawn measurements, and the volume of the full tank."""
     quiet = replace(measurements.settings, explain=False)
     measurements = replace(measurements, settings=quiet)
     adjustment = adjust_survey(measurements)
@@ -147,8 +163,8 @@ def _made(plan, measurements):
     return adjustment, float(body.volume_m3(np.array([body.highest_m]))[0])
 
 
-def _spoilt(measurements, share, rng):
-    """Measurements with a share of readings off by BLUNDER_SDS, image points along x or y."""
+def _add_blunders(measurements, share, rng):
+    """Return measurements with blunders in a share of the readings; in x or y of image points."""
     if not share:
         return measurements
     images = measurements.image_points
@@ -157,19 +173,22 @@ def _spoilt(measurements, share, rng):
         off = blunders_in_sds(rng, share, len(along))[:, None] * along * images.sd_mm
         images = replace(images, xy_mm=images.xy_mm + off)
     readings = tuple(
-        replace(one, value=one.value + blunders_in_sds(rng, share, len(one.end)) * one.sd)
-        for one in measurements.readings
+        replace(
+            reading,
+            value=reading.value + blunders_in_sds(rng, share, len(reading.end)) * reading.sd,
+        )
+        for reading in measurements.readings
     )
     return replace(measurements, image_points=images, readings=readings)
 
 
 def blunders_in_sds(rng, share, count):
-    """(count,) errors in standard deviations: 0, or for a share of them a blunder."""
+    """Errors (count,) in standard deviations: 0, or a blunder for a share of them."""
     sign = np.where(rng.random(count) < 0.5, -1.0, 1.0)
     return BLUNDER_SDS * sign * (rng.random(count) < share)
 
 
-def _by_survey(table):
-    """Standard uncertainty of the top row by what the survey leaves uncertain."""
-    parts = [one.columns_m3[-1] for one in table.sources if one.kind in OF_SURVEY]
+def _u_by_survey(table):
+    """Standard uncertainty of the top row from the survey only."""
+    parts = [source.columns_m3[-1] for source in table.sources if source.kind in OF_SURVEY]
     return float(np.linalg.norm(np.concatenate(parts)))

@@ -1,4 +1,4 @@
-"""From a predicted survey to the table that it would give: wall, volumes, U of every row."""
+"""Predict the table of a surveyed tank: wall, volumes and U of every row."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,15 +19,15 @@ from tankcal.survey.causes import causes_of
 from tankcal.survey.points import Points
 from tankcal.survey.wall import move_to_wall
 
-MANY = 400  # points of a wall whose covariance is written out for its outlines
+MANY = 400  # largest number of points whose dense covariance weights the outlines
 
 
 @dataclass(frozen=True)
 class PredictedTable:
-    """The wall as it would be surveyed, the capacity table, and what is stated of it.
+    """Predicted wall, capacity table and statements.
 
-    job         the plan's, with the points of the wall
-    covariance  PredictedCovariance of the accepted points
+    job is the plan's job with the points of the wall; covariance is the PredictedCovariance of the
+    accepted points.
     """
 
     job: Job
@@ -42,35 +42,34 @@ class PredictedTable:
 
     @property
     def by_points_m2(self):
-        """(3n,) derivative of the full tank's volume by the coordinates of the accepted points."""
+        """Derivative (3n,) of the full tank's volume by coordinates of the accepted points."""
         return volume_by_points(self.job, self.wall, [self.made.body.highest_m])[0]
 
 
 def predicted_table(plan, predicted):
-    """The PredictedTable of a Plan and its surveys.Predicted.
+    """Return the PredictedTable of a Plan and its surveys.Predicted.
 
-    Raises SolutionError while the vertical or the scale is not determined, InputError when a
-    section or course keeps too few targets.
+    Raises SolutionError if the vertical or the scale is not determined, and InputError if a section
+    or course keeps too few targets.
     """
-    there, covariance = _covered(plan, predicted)
-    job = replace(plan.job, points=_points(plan, there, covariance), measurements=None)
+    targets, covariance = _covered(plan, predicted)
+    job = replace(plan.job, points=_points(plan, targets, covariance), measurements=None)
     wall = find_wall(job, lambda text: None, amplitudes=plan.amplitudes)
-    if len(wall.accepted) < len(there):
+    if len(wall.accepted) < len(targets):
         covariance = PredictedCovariance(covariance.adjusted, covariance.points[wall.accepted])
     wall = replace(wall, covariance_m2=covariance)
     return PredictedTable(job, wall, compute_table(job, wall), covariance)
 
 
 def recompute_table(plan, predicted, before):
-    """The PredictedTable of a Plan whose wall is that of another one; None where it is not.
+    """Return the PredictedTable of a Plan with the wall of another plan; None if the walls differ.
 
-    before  PredictedTable of a plan with the same targets and the same tank
-
-    Outlines keep the weights that they had; the propagation is that of the new covariance.
+    `before` is the PredictedTable of a plan with the same targets and tank. Outlines keep their
+    weights; uncertainties are propagated with the new covariance.
     """
-    there, covariance = _covered(plan, predicted)
+    targets, covariance = _covered(plan, predicted)
     known = before.job.points
-    names = tuple(plan.targets.names[i] for i in there)
+    names = tuple(plan.targets.names[i] for i in targets)
     if names != known.names or len(before.wall.accepted) < len(names):
         return None
     points = replace(known, causes=_causes(covariance))
@@ -80,45 +79,45 @@ def recompute_table(plan, predicted, before):
 
 
 def _covered(plan, predicted):
-    """Numbers of the targets that are determined, and their PredictedCovariance."""
+    """Return the indices of the determined targets, and their PredictedCovariance."""
     refuse_undetermined(predicted.frame.report)
     adjusted = predicted.adjusted
     place = {name: i for i, name in enumerate(adjusted.survey.points)}
-    there = [i for i, name in enumerate(plan.targets.names) if name in place]
-    there = [i for i in there if not adjusted.problem.set_aside[place[plan.targets.names[i]]]]
-    if not there:
+    indices = [i for i, name in enumerate(plan.targets.names) if name in place]
+    indices = [i for i in indices if not adjusted.problem.set_aside[place[plan.targets.names[i]]]]
+    if not indices:
         raise SolutionError(
             message("plan_no_target_determined", "no target of the wall would be determined")
         )
-    points = np.array([place[plan.targets.names[i]] for i in there])
-    return there, PredictedCovariance(adjusted, points)
+    points = np.array([place[plan.targets.names[i]] for i in indices])
+    return indices, PredictedCovariance(adjusted, points)
 
 
 def _causes(covariance):
-    """Causes that the points of the wall share, without what moves all of them alike."""
-    found = causes_of(covariance.adjusted, covariance.points, 1.0)
-    return tuple(replace(one, column_m=covariance.among(one.column_m)) for one in found)
+    """Return the common causes of error of the wall points, without their common motions."""
+    causes = causes_of(covariance.adjusted, covariance.points, 1.0)
+    return tuple(replace(cause, column_m=covariance.among(cause.column_m)) for cause in causes)
 
 
-def _points(plan, there, covariance):
-    """job.Points of the wall.
+def _points(plan, indices, covariance):
+    """Return job.Points of the wall.
 
-    A smoothed outline weighs its points against one another; on a wall of more than MANY points by
-    their own covariances alone. That changes weights a little, and never what is propagated.
+    A smoothed outline weights its points with their covariance. With more than MANY points, it uses
+    the covariance of single points. The weights change slightly; the propagation does not.
     """
     targets, adjusted = plan.targets, covariance.adjusted
-    section = tuple(targets.section[i] for i in there)
-    is_small = len(there) <= MANY
+    section = tuple(targets.section[i] for i in indices)
+    is_small = len(indices) <= MANY
     written = covariance.written_out() if is_small else covariance.of_each_point()
     outwards = targets.offset_m * (1.0 if plan.shell.outside else -1.0)
     return Points(
-        names=tuple(targets.names[i] for i in there),
-        xyz_m=move_to_wall(adjusted.xyz_m[covariance.points], np.full(len(there), outwards)),
+        names=tuple(targets.names[i] for i in indices),
+        xyz_m=move_to_wall(adjusted.xyz_m[covariance.points], np.full(len(indices), outwards)),
         sd_m=None,
         covariance_m2=written,
         section=section,
-        generatrix=tuple(targets.generatrix[i] for i in there),
-        rows=(None,) * len(there),
+        generatrix=tuple(targets.generatrix[i] for i in indices),
+        rows=(None,) * len(indices),
         causes=_causes(covariance),
         from_adjustment=True,
     )

@@ -1,4 +1,4 @@
-"""What a plan says in another unit than was meant, as far as its size tells. Nothing is refused."""
+"""Warn of values of a plan whose size suggests a wrong unit. No value is refused."""
 
 import numpy as np
 
@@ -8,9 +8,9 @@ from tankcal.messages import list_some, message
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.model import Box
 
-FAR_M = 1000.0  # from the wall: what stands further off hides nothing
-SHOWN = 5  # obstacles in a message
-LOOSE = 0.05  # of the volume: a limit that every survey meets
+FAR_M = 1000.0  # largest plausible distance of an obstacle from the wall
+SHOWN = 5  # largest number of obstacles listed in a message
+LOOSE = 0.05  # U over volume; a larger limit is suspected to be in percent
 OF_RINGS = {"photo_rings": {"s_um": "um"}, "tapes": {"s_mm": "mm"}}
 OF_RINGS["setup_rings"] = {
     "s_direction_arcsec": "arcsec",
@@ -20,15 +20,15 @@ OF_RINGS["setup_rings"] = {
 
 
 def warn_of_units(given, raw, values, log):
-    """Standard deviations that are tiny in their unit, a limit that looks like percent."""
+    """Warn of tiny standard deviations, and of a limit that looks like percent."""
     common = None if values is None else values["adjustment"]["image_sd_um"]
     if common and common < TINY["um"]:
         tell(log.warning, raw, "adjustment", "image_sd_um", tiny_sd("um", common))
     for section, units in OF_RINGS.items():
-        for one in given.repeated[section]:
+        for entry in given.repeated[section]:
             for key, unit in units.items():
-                if one[key] and one[key] < TINY[unit]:
-                    one.tell(log.warning, key, tiny_sd(unit, one[key]))
+                if entry[key] and entry[key] < TINY[unit]:
+                    entry.tell(log.warning, key, tiny_sd(unit, entry[key]))
     for table in (*given.ties.values(), given.stadia):
         unit = "arcsec" if table is given.stadia else "mm"
         sds = np.empty(0) if table is None else table.numbers(f"s_{unit}")
@@ -47,16 +47,16 @@ def warn_of_units(given, raw, values, log):
 
 
 def warn_of_places(plan, given, log):
-    """Obstacles that are nowhere near, tapes that do not hang on the shell."""
+    """Warn of obstacles far from the tank, and of tapes that cannot hang on the shell."""
     shell = plan.shell
     heights = [shell.low_m, shell.high_m]
-    heights += [one.xyz_m[2] for one in (*plan.photos, *plan.setups)]
+    heights += [stand.xyz_m[2] for stand in (*plan.photos, *plan.setups)]
     far = []
-    for one in plan.obstacles:
-        low, high = (float(np.ravel(end)[-1]) for end in (one.low_m, one.high_m))
-        away = _off_m(one, shell)
+    for obstacle in plan.obstacles:
+        low, high = (float(np.ravel(end)[-1]) for end in (obstacle.low_m, obstacle.high_m))
+        away = _distance_to_wall_m(obstacle, shell)
         if away > FAR_M or low > max(heights) or high < min(heights):
-            far.append(_told(one.name, away, low, high))
+            far.append(_describe_obstacle(obstacle.name, away, low, high))
     if far:
         text = message(
             "plan_obstacles_far",
@@ -71,7 +71,7 @@ def warn_of_places(plan, given, log):
         _warn_of_tape(plan, entry, log)
 
 
-def _told(name, away_m, low_m, high_m):
+def _describe_obstacle(name, away_m, low_m, high_m):
     return message(
         "plan_obstacle_place",
         "{obstacle} ({away_m:.6g} m from the wall, z {low_m:.6g} to {high_m:.6g} m)",
@@ -82,8 +82,8 @@ def _told(name, away_m, low_m, high_m):
     )
 
 
-def _off_m(obstacle, shell):
-    """How far an obstacle stands from the wall in plan; 0 where it reaches it."""
+def _distance_to_wall_m(obstacle, shell):
+    """Horizontal distance of an obstacle from the wall, m; 0 if it reaches the wall."""
     if isinstance(obstacle, Box):
         low, high = obstacle.low_m[:2], obstacle.high_m[:2]
         away = np.hypot(*(np.clip(shell.axis_m, low, high) - shell.axis_m))
@@ -93,7 +93,7 @@ def _off_m(obstacle, shell):
 
 
 def _warn_of_tape(plan, entry, log):
-    """A tape whose ends are further off the wall than the tank is wide, or above the shell."""
+    """Warn of a tape with ends above the shell, or farther from the wall than the tank radius."""
     shell = plan.shell
     ends = np.array([plan.extra[f"{entry['name']}{end}"] for end in "ab"])
     off = np.abs(np.hypot(*(ends[:, :2] - shell.axis_m).T) - shell.radius_m).max()

@@ -1,4 +1,4 @@
-"""What is seen from where: inside the frame, not too obliquely, nothing in the way."""
+"""Visibility of points: inside the frame, incidence within the limit, line of sight free."""
 
 from dataclasses import dataclass
 
@@ -8,19 +8,26 @@ from tankcal.camera.model import distort_image_points
 from tankcal.planning.model import Pillar
 from tankcal.planning.obstacles import find_hidden
 
-FEWEST_READINGS = 3
-AHEAD_M = 0.1  # nearest depth of a point before a camera
-ROOM = 1.3  # half formats; what lies further out without distortion is not in the frame
-GRAZE_M = 1e-3  # by which the tank is taken thinner, so that its own targets are not within it
+FEWEST_READINGS = 3  # for the three coordinates of a point  # for the three coordinates of a point
+AHEAD_M = 0.1  # smallest depth of a point in front of a camera
+ROOM = 1.3  # half formats; limit of undistorted image coordinates of points in the frame
+GRAZE_M = 1e-3  # reduction of the tank radius, so that the tank does not hide its own targets
 
 
 @dataclass(frozen=True)
 class Visibility:
-    """What can be measured.
+    """Points visible from each photograph and set-up.
 
-    points    names                 on_photo  (photos, points) True: seen
-    image_mm  (photos, points, 2)   on_setup  (set-ups, points) True: seen
-    place     (photos,) number of the place that each is taken from
+    Attributes
+    ----------
+    points : tuple of str
+        Names.
+    place : ndarray of int, shape (photos,)
+        Index of the position of each photograph.
+    on_photo : ndarray of bool, shape (photos, points)
+    image_mm : ndarray, shape (photos, points, 2)
+        Image coordinates.
+    on_setup : ndarray of bool, shape (setups, points)
     """
 
     points: tuple
@@ -31,19 +38,22 @@ class Visibility:
 
     @property
     def rays(self):
-        """(points,) places that each point is seen from: exposures from one are one ray."""
+        """Number of rays to each point, shape (points,).
+
+        Exposures from one position are one ray.
+        """
         return self.from_places.sum(axis=0) + self.on_setup.sum(axis=0)
 
     @property
     def from_places(self):
-        """(places, points) True: a photograph from there sees the point."""
-        found = np.zeros((len(set(self.place.tolist())), len(self.points)), dtype=bool)
-        np.logical_or.at(found, self.place, self.on_photo)
-        return found
+        """Mask (positions, points): whether a photograph from the position shows the point."""
+        mask = np.zeros((len(set(self.place.tolist())), len(self.points)), dtype=bool)
+        np.logical_or.at(mask, self.place, self.on_photo)
+        return mask
 
 
 def visible(plan):
-    """The Visibility of all points of a Plan from its photographs and set-ups."""
+    """Return the Visibility of all points of a Plan from its photographs and set-ups."""
     points = plan.points
     xyz = np.array(list(points.values()), dtype=float).reshape(-1, 3)
     normals = np.full((len(xyz), 3), np.nan)
@@ -51,8 +61,8 @@ def visible(plan):
     names = np.array(list(points), dtype=object)
     for name, out in plan.facing.items():
         normals[names == name] = out
-    is_setup = np.isin(names, [one.name for one in plan.setups])
-    cameras = {one.camera.name: one for one in plan.job.measurements.cameras}
+    is_setup = np.isin(names, [setup.name for setup in plan.setups])
+    cameras = {setup.camera.name: setup for setup in plan.job.measurements.cameras}
     on_photo = np.zeros((len(plan.photos), len(xyz)), dtype=bool)
     image = np.full((len(plan.photos), len(xyz), 2), np.nan)
     number, seen_from = {}, []
@@ -61,7 +71,7 @@ def visible(plan):
             seen_from.append(find_in_sight(plan, photo.xyz_m, xyz, normals))
         image[k], inside = find_in_frame(cameras[photo.camera], photo, xyz)
         on_photo[k] = inside & seen_from[number[tuple(photo.xyz_m)]] & ~is_setup
-    place = np.array([number[tuple(one.xyz_m)] for one in plan.photos], dtype=int)
+    place = np.array([number[tuple(photo.xyz_m)] for photo in plan.photos], dtype=int)
     on_setup = np.zeros((len(plan.setups), len(xyz)), dtype=bool)
     for k, setup in enumerate(plan.setups):
         sighted = ~is_setup | np.isin(names, setup.sights)
@@ -70,32 +80,34 @@ def visible(plan):
 
 
 def measurable(plan, seen):
-    """(points,) which points have three readings or more, known coordinates among them.
+    """Mask (points,): points with at least three readings, known coordinates included.
 
-    What photographs from a single place see has no depth, however many they are; with a tape
-    between two such points the count alone would be enough, and neither place determined.
+    Photographs from one position give no depth, however many there are. They therefore count once;
+    otherwise a tape between two such points would seem to determine both.
     """
     names = {name: i for i, name in enumerate(seen.points)}
     count = 2 * seen.from_places.sum(axis=0)
-    for k, one in enumerate(plan.setups):
-        kinds = (one.direction_sd_rad, one.zenith_sd_rad, one.distance_sd_m)
+    for k, setup in enumerate(plan.setups):
+        kinds = (setup.direction_sd_rad, setup.zenith_sd_rad, setup.distance_sd_m)
         count = count + seen.on_setup[k] * sum(sd is not None for sd in kinds)
-        count[names[one.name]] += FEWEST_READINGS
-    for one in plan.known:
-        if one.name in names:
-            count[names[one.name]] += np.isfinite(one.sd_m).sum()
+        count[names[setup.name]] += FEWEST_READINGS
+    for control_point in plan.known:
+        if control_point.name in names:
+            count[names[control_point.name]] += np.isfinite(control_point.sd_m).sum()
     return count >= FEWEST_READINGS
 
 
 def find_in_frame(setup, photo, xyz_m):
-    """Image coordinates (n, 2), mm, of points (n, 3), and which lie in the frame of a photograph.
+    """Image coordinates (n, 2), mm, of points (n, 3), and whether they lie in the frame.
 
-    setup  job.CameraSetup
+    setup is the job.CameraSetup of the photograph.
     """
+    # camera coordinates; the camera looks along -w
     u, v, w = photo.rotation @ (xyz_m - photo.xyz_m).T
     camera, half = setup.camera, setup.format_mm / 2
     ahead = w < -AHEAD_M
     ideal = -camera.values[0] * np.column_stack([u, v]) / np.where(ahead, w, -1.0)[:, None]
+    # Far outside the frame the distortion polynomial can fold points back into the frame.
     near = ahead & (np.abs(ideal) < ROOM * half).all(axis=1)
     image = np.full((len(xyz_m), 2), np.nan)
     image[near] = distort_image_points(ideal[near], camera.values, camera.form)
@@ -103,9 +115,21 @@ def find_in_frame(setup, photo, xyz_m):
 
 
 def find_in_sight(plan, place_m, xyz_m, normals):
-    """(n,) which points (n, 3) nothing hides from a place (3,), and that are not seen too aslant.
+    """Find the points visible from a position within the largest angle of incidence.
 
-    normals  (n, 3) of the wall at each point, or of a mark that faces one way; nan: neither
+    Parameters
+    ----------
+    plan : Plan
+    place_m : ndarray, shape (3,)
+        Position of the observer.
+    xyz_m : ndarray, shape (n, 3)
+        Points.
+    normals : ndarray, shape (n, 3)
+        Normals of the wall, or of marks visible from one side; nan for other points.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
     """
     back = place_m - xyz_m
     distance = np.linalg.norm(back, axis=1)

@@ -1,1 +1,1 @@
-"""The life of a table: what a former one says of its tank, and what has changed since."""
+"""Comparison and history of capacity tables of one tank, and the tank geometry behind a table."""

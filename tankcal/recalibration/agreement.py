@@ -1,8 +1,8 @@
-"""Do two tables agree: the normalised error of rows and deliveries, with their correlation.
+"""Agreement of two tables: normalised errors of rows and deliveries, with correlation.
 
     E_n = d / sqrt(U_new^2 + U_old^2 - 2 c U_new U_old)
 
-c is the correlation of the errors of both tables. |E_n| = 1 at
+c is the correlation of the errors of the two tables. |E_n| = 1 at
 c = (U_new^2 + U_old^2 - d^2) / (2 U_new U_old).
 Source: ISO/IEC 17043:2010, B.3 (E_n, c = 0); with correlation JCGM 100:2008, 5.2.
 """
@@ -12,65 +12,76 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-PROPORTIONAL = 0.01  # spread of U over V: a U in percent
-SAME_M = 1e-9
+PROPORTIONAL = 0.01  # largest spread of U over V of a U stated in percent
+SAME_M = 1e-9  # largest difference of equal dips
 
 
 def normalized_error(d, U_new, U_former, c=0.0):
-    """E_n of differences; nan where a U is not known, inf where no difference is allowed for.
+    """Normalised error E_n of differences; nan if a U is unknown, inf if the denominator is zero.
 
     Parameters
     ----------
     d, U_new, U_former : array_like
-        Difference and expanded uncertainties for the same coverage, in one unit.
+        Difference, and expanded uncertainties of equal coverage, in one unit.
     c : float
-        Correlation of the errors.
+        Correlation of the errors of the two tables.
 
     Examples
     --------
     >>> [round(float(normalized_error(0.70, 0.46, 0.60, c)), 2) for c in (0, 0.5)]
     [0.93, 1.29]
     """
-    d, one, two = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (d, U_new, U_former)))
-    variance = one**2 + two**2 - 2 * c * one * two
-    least = 1e-12 * (one**2 + two**2)
+    d, new, former = np.broadcast_arrays(
+        *(np.asarray(x, dtype=float) for x in (d, U_new, U_former))
+    )
+    variance = new**2 + former**2 - 2 * c * new * former
+    least = 1e-12 * (new**2 + former**2)
     U = np.sqrt(np.where(variance > least, variance, 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.where(d == 0, 0.0, d / U)
-    return np.where(np.isnan(one) | np.isnan(two), np.nan, found)
+        ratio = np.where(d == 0, 0.0, d / U)
+    return np.where(np.isnan(new) | np.isnan(former), np.nan, ratio)
 
 
 def critical_correlation(d, U_new, U_former):
-    """The correlation at which |E_n| is 1; nan where it is below 1 for every one, or a U unknown.
+    """Correlation at which |E_n| is 1.
 
-    -1 where it is above 1 for every one; without a difference there is none.
+    The result is nan if |E_n| is below 1 for every correlation, if a U is unknown, or if the
+    difference is zero. It is -1 if |E_n| exceeds 1 for every correlation.
+
+    Parameters
+    ----------
+    d, U_new, U_former : array_like
+        Difference, and expanded uncertainties of equal coverage, in one unit.
     """
-    d, one, two = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (d, U_new, U_former)))
-    product = 2 * one * two
+    d, new, former = np.broadcast_arrays(
+        *(np.asarray(x, dtype=float) for x in (d, U_new, U_former))
+    )
+    product = 2 * new * former
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = (one**2 + two**2 - d**2) / product
-    found = np.where(found > 1, np.nan, np.maximum(found, -1.0))
-    return np.where((product > 0) & (d != 0), found, np.nan)
+        correlation = (new**2 + former**2 - d**2) / product
+    correlation = np.where(correlation > 1, np.nan, np.maximum(correlation, -1.0))
+    return np.where((product > 0) & (d != 0), correlation, np.nan)
 
 
 @dataclass(frozen=True)
 class TableUncertainty:
-    """Expanded uncertainties of a table at some dips, all for one coverage.
+    """Expanded uncertainties of a table at some dips, all of one coverage.
 
     Attributes
     ----------
     k : float
-        Factor that they are for.
+        Coverage factor.
     volume_m3 : (rows,) ndarray
-        At the dips.
+        Volumes at the dips.
     U_m3 : (rows,) ndarray or None
-        Of them, rounding included; None: not known.
+        Expanded uncertainties, rounding included; None if unknown.
     rounding_m3 : float
-        The part of U that the last digit adds.
+        Contribution of the last digit to U.
     factor_m3 : (rows, inputs) ndarray or None
-        Of a record, scaled so that U of a difference is the length of that of its rows.
+        Factor of the covariance of a record, scaled such that U of a difference is the norm of the
+        difference of its rows.
     deliveries_by : {"record", "proportional", "independent_rows"} or None
-        How U of a delivery is made.
+        Method for U of a delivery.
     """
 
     k: float
@@ -81,26 +92,29 @@ class TableUncertainty:
     deliveries_by: str | None
 
     def rows(self):
-        """(rows,) U; nan: not known."""
+        """U of the rows, shape (rows,); nan if unknown."""
         return np.full(len(self.volume_m3), np.nan) if self.U_m3 is None else self.U_m3
 
     def deliveries(self, low, high):
-        """(n,) U of deliveries between rows, by their indices; nan: not known."""
+        """U (n,) of deliveries between rows, given by their indices; nan if unknown."""
         if self.deliveries_by is None:
             return np.full(len(low), np.nan)
         if self.deliveries_by == "record":
+            # covariance = factor factor', so U of a difference is the norm of the difference
             apart = self.factor_m3[high] - self.factor_m3[low]
             U = np.sqrt(np.einsum("ij,ij->i", apart, apart))
         elif self.deliveries_by == "proportional":
+            # errors proportional to the volume are fully correlated between rows
             part = self.U_m3[-1] / self.volume_m3[-1]
             U = part * np.abs(self.volume_m3[high] - self.volume_m3[low])
         else:
             return np.hypot(self.U_m3[low], self.U_m3[high])
+        # both rows of a delivery are rounded independently
         return np.hypot(U, np.sqrt(2) * self.rounding_m3)
 
 
 def coverage_factor_of(table):
-    """The factor of a normal distribution for the coverage that a table's U is for."""
+    """Coverage factor of a normal distribution for the coverage of a table's U."""
     if table.record is None:
         return table.k
     probability = table.record["job"]["table"].get("coverage_probability") or 0.95
@@ -108,20 +122,21 @@ def coverage_factor_of(table):
 
 
 def uncertainty_at(table, dips_m, volume_m3, k, error_m3=0.0):
-    """TableUncertainty of a FormerTable at dips.
+    """Return the TableUncertainty of a FormerTable at dips.
 
     Parameters
     ----------
     table : FormerTable
     dips_m : (rows,) ndarray
-        In its own range.
+        Dips within the range of the table.
     volume_m3 : (rows,) ndarray
-        That it is stated for.
+        Volumes at the dips.
     k : float
-        Factor of a normal distribution for the coverage that is asked for.
+        Coverage factor of a normal distribution for the required coverage.
     error_m3 : float
-        Largest error of what was interpolated, which is added as evenly spread.
+        Largest interpolation error, included as a rectangular distribution.
     """
+    # rectangular distributions: width of one digit, half width of the interpolation error
     spread = np.hypot(table.volume_quantum_m3 / np.sqrt(12), error_m3 / np.sqrt(3))
     rounding = float(k * spread)
     if table.U_m3 is None:
@@ -137,12 +152,13 @@ def uncertainty_at(table, dips_m, volume_m3, k, error_m3=0.0):
 
 
 def _factor_at(table, dips, stated):
-    """(rows, inputs) factor at dips, each row as long as the U that is stated there."""
+    """Covariance factor (rows, inputs) at dips; each row has the norm of the stated U."""
     upper = np.clip(np.searchsorted(table.height_m, dips), 1, len(table.height_m) - 1)
     below = table.height_m[upper - 1]
     part = ((dips - below) / (table.height_m[upper] - below))[:, None]
     factor = (1 - part) * table.factor_m3[upper - 1] + part * table.factor_m3[upper]
     length = np.sqrt(np.einsum("ij,ij->i", factor, factor))
+    # one scale for all rows, so that the factor remains that of one covariance
     usual = np.median(stated[length > 0] / length[length > 0]) if (length > 0).any() else 1.0
     return usual * factor
 
@@ -155,7 +171,7 @@ def _is_in_percent(table):
 
 @dataclass(frozen=True)
 class Deliveries:
-    """Differences of deliveries between rows, each field (n,)."""
+    """Differences of deliveries between rows; each field has shape (n,)."""
 
     low: np.ndarray
     high: np.ndarray
@@ -168,7 +184,17 @@ class Deliveries:
 
 
 def deliveries_between(basis, former_U, new_U, c, low, high):
-    """The `Deliveries` between rows of a OneBasis, by their indices."""
+    """Return the `Deliveries` between rows of a OneBasis.
+
+    Parameters
+    ----------
+    basis : OneBasis
+    former_U, new_U : TableUncertainty
+    c : float
+        Correlation of the errors of the two tables.
+    low, high : array_like of int, shape (n,)
+        Indices of the rows.
+    """
     low, high = np.atleast_1d(low), np.atleast_1d(high)
     new = basis.new_m3[high] - basis.new_m3[low]
     former = basis.on_basis_m3[high] - basis.on_basis_m3[low]
@@ -181,10 +207,11 @@ def deliveries_between(basis, former_U, new_U, c, low, high):
 
 
 def worst_by_share(basis, minimum_m):
-    """(low, high) rows of the delivery of at least `minimum_m` with the largest |d| / V, or None.
+    """Rows (low, high) of the delivery of at least `minimum_m` with the largest |d| / V, or None.
 
-    A delivery of twice the minimum and more is made up of two, one of which is not better: so only
-    lower ones are looked at. No delivery spans a zone that is not for use at one of its ends.
+    A delivery of at least twice the minimum consists of two shorter ones, one of which has at least
+    the same |d| / V. So only shorter deliveries are examined. No delivery begins or ends in a zone
+    that is not for use.
     """
     dips, use = basis.height_m, np.flatnonzero(basis.for_use)
     dips, d = dips[use], (basis.new_m3 - basis.on_basis_m3)[use]
@@ -206,19 +233,22 @@ def worst_by_share(basis, minimum_m):
 
 
 def worst_by_error(basis, former_U, new_U, c, minimum_m, also=()):
-    """The one-row Deliveries of the largest |E_n| among those of the minimum height, or None.
+    """Return the one-row Deliveries of minimum height with the largest |E_n|, or None.
 
-    also  further pairs of rows; None where a U is not known, or no delivery is so high
+    `also` lists further pairs of rows. The result is None if a U is unknown, or no delivery is high
+    enough.
     """
     use = np.flatnonzero(basis.for_use)
     dips = basis.height_m[use]
     first = np.searchsorted(dips, dips + minimum_m - SAME_M)
-    there = np.flatnonzero(first < len(dips))
-    low, high = use[there], use[first[there]]
+    starts = np.flatnonzero(first < len(dips))
+    low, high = use[starts], use[first[starts]]
     for pair in also:
         low, high = np.append(low, pair[0]), np.append(high, pair[1])
     if not len(low) or former_U.deliveries_by is None or new_U.deliveries_by is None:
         return None
-    found = deliveries_between(basis, former_U, new_U, c, low.astype(int), high.astype(int))
-    place = int(np.argmax(np.abs(found.E_n)))
-    return deliveries_between(basis, former_U, new_U, c, found.low[place], found.high[place])
+    deliveries = deliveries_between(basis, former_U, new_U, c, low.astype(int), high.astype(int))
+    place = int(np.argmax(np.abs(deliveries.E_n)))
+    return deliveries_between(
+        basis, former_U, new_U, c, deliveries.low[place], deliveries.high[place]
+    )

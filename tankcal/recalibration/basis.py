@@ -1,16 +1,16 @@
-"""A former table on the basis of a new one: zero, temperature, head, roof, rounding, in this order.
+"""Bring a former table to the basis of a new table: zero, temperature, head, roof, rounding.
 
-Each step starts from what those before it gave, so that together with what is left they add up to
-the difference of the tables:
+Each step starts from the result of the steps before it. The steps and the remaining difference
+therefore add up to the difference of the tables:
 
     zero         V(h + h0), h0 the height of the new zero above the former one
-    temperature  areas carry (1 + a (T_new - T_old))^2; of a tank that is one solid, and where dips
-                 expand too, V s^3 at the dip h / s, s = 1 + a (T_new - T_old)
-    head         of the new density less that of the former, in the rings of the former table
-    roof         what it displaces, of the former table less of the new one
+    temperature  areas are multiplied by (1 + a (T_new - T_old))^2; for a tank that is one solid, or
+                 whose dips also expand, V s^3 at the dip h / s, s = 1 + a (T_new - T_old)
+    head         head of the new density minus head of the former, in the rings of the former table
+    roof         displacement in the former table minus displacement in the new table
     rounding     to the last digit of the new table
 
-A step whose values are not known is not made, and its state says what is lacking.
+A step with unknown values is omitted; its state lists the missing values.
 """
 
 from dataclasses import dataclass, replace
@@ -25,23 +25,25 @@ from tankcal.recalibration.upright_shell import Rings
 from tankcal.record.comparison import BasisStep, ZeroShift
 from tankcal.tank.fittings import floating_roof
 
-ROUNDS = 5  # of the zero: each leaves a hundredth of the last, or less
-SAME_ZERO_M = 1e-7
-FEWEST_ROWS = 2
-SPARE = 1.1  # of a smooth curve: it bends a little more between rows than at them
-NOTICED, LEAST_ZERO_M = 2.0, 1e-4  # standard uncertainties, and size: a zero below either is none
+ROUNDS = 5  # iterations of the zero; each reduces the error to a hundredth or less
+SAME_ZERO_M = 1e-7  # convergence limit of the zero
+FEWEST_ROWS = 2  # fewest common rows of both tables
+SPARE = 1.1  # margin: a smooth curve may bend more between rows than at rows
+# Smallest fitted zero that counts: in standard uncertainties, and in metres.
+NOTICED, LEAST_ZERO_M = 2.0, 1e-4
 UNITS = {"zero": "m", "temperature": "C", "head": "kg/m3", "roof": "m3", "rounding": "m3"}
 
 
 @dataclass(frozen=True)
 class Step:
-    """One step.
+    """One step from the former basis to the new basis.
 
     Attributes
     ----------
     added_m3 : (rows,) ndarray
+        Change of the former volumes.
     state, source, former, new, lacking
-        As of `record.comparison.BasisStep`.
+        As in `record.comparison.BasisStep`.
     """
 
     added_m3: np.ndarray
@@ -54,25 +56,25 @@ class Step:
 
 @dataclass(frozen=True)
 class OneBasis:
-    """Rows of a new table, and what the former one says of them on its basis.
+    """Rows of a new table, and the former table on the basis of the new one.
 
     Attributes
     ----------
     height_m : (rows,) ndarray
-        Dips of the new table in the range of both.
+        Dips of the new table within the range of both.
     rows : (rows,) ndarray of int
-        Which rows of the new table they are.
+        Row numbers in the new table.
     former_m3, on_basis_m3, new_m3 : (rows,) ndarray
-        The former table as printed; on the basis of the new one; the new one.
+        Former table as printed; former table on the new basis; new table.
     steps : dict
-        {name: Step}, in their order.
+        {name: Step}, in order.
     zero : ZeroShift
     for_use : (rows,) ndarray of bool
         False where a roof is partly afloat.
     interpolation_m3 : float
-        Largest error of what was interpolated in the former table.
+        Largest interpolation error in the former table.
     densities : (Density, Density)
-        Of the former and the new table.
+        Former and new table.
     """
 
     height_m: np.ndarray
@@ -88,12 +90,12 @@ class OneBasis:
 
     @property
     def saved_steps(self):
-        """The `BasisStep` of each."""
-        return [_saved(name, one, self.height_m) for name, one in self.steps.items()]
+        """Return the `BasisStep` of each step."""
+        return [_saved(name, step, self.height_m) for name, step in self.steps.items()]
 
 
 def bring_to_one_basis(former, new, facts):
-    """`OneBasis` of two FormerTables of a tank.
+    """Return the `OneBasis` of two FormerTables of a tank.
 
     Parameters
     ----------
@@ -107,7 +109,7 @@ def bring_to_one_basis(former, new, facts):
     Raises
     ------
     InputError
-        When the tables have no two rows in common.
+        If the tables have fewer than two rows in common.
     """
     zero = _declared_zero(former, new)
     densities = densities_of(former, new, facts)
@@ -134,15 +136,15 @@ def bring_to_one_basis(former, new, facts):
 
 
 def rows_in_both(former, new, zero_m):
-    """Indices of the rows of the new table that the former one has, with and without a zero.
+    """Indices of the new rows within the range of the former table, with and without a zero.
 
-    Raises InputError where there are not two of them.
+    Raises InputError if there are fewer than two.
     """
     low, high = former.height_m[0] - 1e-9, former.height_m[-1] + 1e-9
     dips = new.height_m
     inside = (dips >= low) & (dips <= high) & (dips + zero_m >= low) & (dips + zero_m <= high)
-    found = np.flatnonzero(inside)
-    if len(found) < FEWEST_ROWS:
+    rows = np.flatnonzero(inside)
+    if len(rows) < FEWEST_ROWS:
         expected = message(
             "compare_no_common_range",
             "dips from {low:g} to {high:g} m; expected some in the range of {other}, {from_m:g} to "
@@ -154,20 +156,20 @@ def rows_in_both(former, new, zero_m):
             to_m=float(former.height_m[-1]),
         )
         raise InputError(Problem(new.name, expected))
-    return found
+    return rows
 
 
 def volume_at(table, dips_m):
-    """(n,) volumes of a table, linear between its rows as a gauge reads them."""
+    """Volumes (n,) of a table at dips, by linear interpolation as in a gauge, m3."""
     return np.interp(dips_m, table.height_m, table.volume_m3)
 
 
 def interpolation_error_m3(table, dips_m):
-    """A bound of the error of `volume_at`, by how far rows leave the chord of their neighbours.
+    """Bound of the error of `volume_at`, from distances of rows to chords of their neighbours.
 
-    Rows that stand in the table have none; what one digit explains is none. Of a smooth curve a row
-    leaves the chord by V'' s^2 / 2, the middle between rows by a fourth of that. A kink between two
-    rows makes them leave their chords by p and q, and the error at it is 2 p q / (p + q).
+    The error is 0 at rows of the table; distances within one digit are ignored. On a smooth curve,
+    a row is V'' s^2 / 2 off the chord, and the middle between rows a fourth of it. A kink between
+    two rows moves them off their chords by p and q; the error at the kink is 2 p q / (p + q).
     """
     heights, volumes = table.height_m, table.volume_m3
     if len(heights) < 3:
@@ -175,11 +177,12 @@ def interpolation_error_m3(table, dips_m):
     part = np.diff(heights)[:-1] / (heights[2:] - heights[:-2])
     chord = volumes[:-2] + part * (volumes[2:] - volumes[:-2])
     off = np.maximum(np.abs(volumes[1:-1] - chord) - table.volume_quantum_m3, 0.0)
-    off = np.pad(off, 2, mode="edge")  # of rows from the one below the first to that above the last
+    # Four rows around each interval: rows next to a kink are further off than those beyond.
+    off = np.pad(off, 2, mode="edge")  # from the row below the first to the row above the last
     four = np.array([off[k : len(off) - 3 + k] for k in range(4)])
-    smooth = four.min(axis=0)
-    one, two = four[1] - smooth, four[2] - smooth
-    kink = 2 * one * two / np.maximum(one + two, 1e-300)
+    smooth = four.min(axis=0)  # part of the distance that a smooth curve explains
+    below, above = four[1] - smooth, four[2] - smooth
+    kink = 2 * below * above / np.maximum(below + above, 1e-300)
     bound = smooth / 4 * SPARE + kink
     upper = np.clip(np.searchsorted(heights, dips_m - 1e-9), 1, len(heights) - 1)
     nearest = np.minimum(np.abs(heights[upper] - dips_m), np.abs(heights[upper - 1] - dips_m))
@@ -196,9 +199,10 @@ def _declared_zero(former, new):
 
 
 def _fitted_zero(former, new, facts, densities):
-    """(height of the new zero above the former one, its u) by the volumes; None: they are mum."""
-    zero, found = 0.0, None
+    """Fit the height of the new zero above the former one to the volumes: (height, u), or None."""
+    zero, difference = 0.0, None
     quanta = np.hypot(former.volume_quantum_m3, new.volume_quantum_m3) / np.sqrt(12)
+    # The area depends on the zero, so the linear adjustment is repeated.
     for _ in range(ROUNDS):
         try:
             rows = rows_in_both(former, new, zero)
@@ -207,13 +211,13 @@ def _fitted_zero(former, new, facts, densities):
         _, _, basis = _steps(former, new, facts, densities, zero, rows, until="roof")
         dips, volumes = new.height_m[rows], new.volume_m3[rows]
         usable = _for_use(former, new, zero, dips)
-        found = adjust_difference(facts, dips, volumes - basis, volumes, quanta, usable)
-        if found is None:
+        difference = adjust_difference(facts, dips, volumes - basis, volumes, quanta, usable)
+        if difference is None:
             return None
-        zero += found.zero_m
-        if abs(found.zero_m) < SAME_ZERO_M:
+        zero += difference.zero_m
+        if abs(difference.zero_m) < SAME_ZERO_M:
             break
-    return (zero, found.u_zero_m) if abs(zero) < former.height_m[-1] else None
+    return (zero, difference.u_zero_m) if abs(zero) < former.height_m[-1] else None
 
 
 def _zero_shift(former, new, zero, fitted, rows):
@@ -250,7 +254,10 @@ def _zero_step(step, shift, former, new):
 
 
 def _steps(former, new, facts, densities, zero, rows, until="rounding"):
-    """({name: Step}, former volumes as printed, on the new basis) in rows of the new table."""
+    """Return the steps, and the former volumes as printed and on the new basis, at new dips.
+
+    The steps are {name: Step}. `until` is the name of the last step.
+    """
     dips = new.height_m[rows]
     before = volume_at(former, dips)
     basis = volume_at(former, dips + zero)
@@ -290,9 +297,10 @@ def _temperature(former, new, facts, densities, zero, dips, basis):
         return _none(dips, "not_declared", lacking=("kind",), **values)
     scale = 1 + facts.expansion_per_k * (is_now - was)
     if facts.kind == "vertical" and not facts.dips_expand:
-        added = basis * (scale**2 - 1)
+        added = basis * (scale**2 - 1)  # only areas expand
     else:
         area = slopes_m2(dips, basis) if len(dips) > 2 else 0.0
+        # V s^3 at the dip h / s, to first order in the change of the dip
         added = basis * (scale**3 - 1) + scale**3 * area * dips * (1 / scale - 1)
     return Step(added, "done", "declared", **values)
 
@@ -312,7 +320,7 @@ def _head(former, new, facts, densities, zero, dips, basis):
         return _none(dips, "not_possible", lacking=lacking, **values)
     rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
     zone = former.roof and former.roof.critical_m
-    zone = zone and tuple(one - zero for one in zone)
+    zone = zone and tuple(edge - zero for edge in zone)
     radii = radii_of_rows(rings, dips, basis, was.kg_m3, zone)
     added = rings.volume_m3(dips, radii, is_now.kg_m3) - rings.volume_m3(dips, radii, was.kg_m3)
     source = "read" if "read" in (was.source, is_now.source) else "declared"
@@ -320,30 +328,43 @@ def _head(former, new, facts, densities, zero, dips, basis):
 
 
 def radii_of_rows(rings, dips, volumes, density, zone=None):
-    """(courses,) unloaded radii of the rings by what volumes rise within them.
+    """Unloaded radii (courses,) of the rings, from the rise of the volumes within them, m.
 
-    A ring that no two rows reach gets that of the next one below. Over the critical zone of a roof
-    (dips from and to) the rows rise by less than the ring holds: it counts on one side of it.
+    A ring between two rows takes the radius of the next ring below. Over the critical zone of a
+    roof, the rows rise by less than the ring holds. The ring is then evaluated on one side of the
+    zone.
+
+    Parameters
+    ----------
+    rings : Rings
+    dips, volumes : (rows,) ndarray
+        Dips, m, and volumes, m3.
+    density : float
+        Density of the head in the volumes, kg/m3.
+    zone : (float, float), optional
+        Lower and upper dip of the critical zone.
     """
     radii, edges = np.empty(len(rings.thickness_m)), rings.edges_m.copy()
     edges[-1] = max(edges[-1], dips[-1])
     head = np.zeros(len(dips))
-    for _ in range(2):  # once without, once with the head that these radii have
+    for _ in range(2):  # first without, then with the head in rings of these radii
         for k in range(len(radii)):
             inside = np.flatnonzero((dips >= edges[k] - 1e-9) & (dips <= edges[k + 1] + 1e-9))
+            # The lower half of the first ring may contain the bottom.
             inside = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
             inside = _beside(zone, inside, dips)
             radii[k] = radii[k - 1] if k else np.sqrt(volumes[-1] / np.pi / dips[-1])
             if len(inside) > 1:
-                one, two = inside[0], inside[-1]
-                rise = volumes[two] - head[two] - volumes[one] + head[one]
-                radii[k] = np.sqrt(max(rise, 1e-9) / np.pi / (dips[two] - dips[one]))
+                first, last = inside[0], inside[-1]
+                # pi r^2 times the height equals the rise without the effect of the head
+                rise = volumes[last] - head[last] - volumes[first] + head[first]
+                radii[k] = np.sqrt(max(rise, 1e-9) / np.pi / (dips[last] - dips[first]))
         head = rings.volume_m3(dips, radii, density) - rings.volume_m3(dips, radii, 0.0)
     return radii
 
 
 def _beside(zone, inside, dips):
-    """Those rows (indices) that lie on one side of a critical zone, the side of more rows."""
+    """Indices of the rows on one side of a critical zone, the side with more rows."""
     if zone is None:
         return inside
     above = inside[dips[inside] >= zone[1] - 1e-9]
@@ -358,7 +379,7 @@ def _roof(former, new, facts, densities, zero, dips, basis):
     lacking = _lacking(("former.roof", was), ("new.roof", is_now))
     if lacking:
         return _none(dips, "not_declared", lacking=lacking)
-    displaced = [_displaced_m3(one) for one in (was, is_now)]
+    displaced = [_displaced_m3(roof) for roof in (was, is_now)]
     values = {"former": displaced[0], "new": displaced[1]}
     zone = is_now.critical_m or (was.critical_m and tuple(x - zero for x in was.critical_m))
     if displaced[0] == displaced[1]:
@@ -386,12 +407,12 @@ def _rounding(former, new, facts, densities, zero, dips, basis):
 
 
 def _for_use(former, new, zero, dips):
-    found = np.full(len(dips), True)
+    for_use = np.full(len(dips), True)
     for table, shift in ((former, zero), (new, 0.0)):
         if table.roof is not None and table.roof.critical_m is not None:
             low, high = table.roof.critical_m
-            found &= (dips + shift <= low + 1e-9) | (dips + shift >= high - 1e-9)
-    return found
+            for_use &= (dips + shift <= low + 1e-9) | (dips + shift >= high - 1e-9)
+    return for_use
 
 
 def _saved(name, step, dips):

@@ -1,8 +1,8 @@
-"""The profile of each course, which bulges and tapers about its mean radius.
+"""Profiles of the courses: bulge and taper about the mean radius.
 
 With zeta from -1 at the lower joint of a course to 1 at the upper joint, the radius is
-r + sum over j of b_j P_j(zeta), P_j the Legendre polynomials of the degrees 1 to 10. Their mean
-over a course is 0, so that r remains the mean radius, and they add no volume at a joint:
+r + sum over j of b_j P_j(zeta), P_j the Legendre polynomials of the degrees 1 to 10. The mean of
+each P_j over a course is 0. So r remains the mean radius, and the added volume is 0 at the joints:
 
     V(zeta) = pi r H sum over j of b_j Q_j(zeta),     Q_j = (P_j+1 - P_j-1) / (2 j + 1)
 """
@@ -14,24 +14,25 @@ from numpy.polynomial.legendre import legvander
 
 from tankcal.recalibration.upright_shell import Rings
 
-DEGREES = np.arange(1, 11)
-BULGE_SD_M = 4e-3  # of degree 2: bulges of shells are a few millimetres
-FALL = 1.5  # sds of the higher degrees are as (2 / degree)^1.5: profiles are smooth but at joints
-TAPER_SD_M = 0.5e-3  # of degree 1, which looks like the head
-# Taper over bulge: a bulge whose highest point is a third of the course away from a joint has 0.22.
+DEGREES = np.arange(1, 11)  # degrees of the Legendre polynomials
+BULGE_SD_M = 4e-3  # prior sd of degree 2: bulges of shells are a few millimetres
+FALL = 1.5  # prior sds fall as (2 / degree)^1.5: profiles are smooth except at joints
+TAPER_SD_M = 0.5e-3  # prior sd of degree 1, which resembles the head
+# Taper over bulge: 0.22 for a bulge with its highest point a third of the course from a joint.
 TAPER_SHARE = 0.3
-EDGE_M = 0.03  # next to a joint, where a zero that is not known yet moves it
-SMOOTH_SHARE, CLEAR_GAIN = 0.2, 50.0  # of chi2: left by a smooth profile; gained in each course
-FEWEST_ROWS = 10  # of a course
+EDGE_M = 0.03  # excluded zone next to a joint, which an unknown zero moves
+# Largest share of chi2 that a smooth profile leaves, and smallest reduction of chi2 per course.
+SMOOTH_SHARE, CLEAR_GAIN = 0.2, 50.0
+FEWEST_ROWS = 10  # fewest rows of a course whose profile is estimated
 
 
 def no_bulges(count):
-    """Coefficients b of `count` courses, all 0; shape (count, degrees)."""
+    """Coefficients b = 0 of `count` courses, shape (count, degrees)."""
     return np.zeros((count, len(DEGREES)))
 
 
 def prior_sds(bulges_m):
-    """Standard deviations of b before an adjustment, the taper's by the bulges that were found."""
+    """Prior standard deviations of b; that of the taper depends on the estimated bulges."""
     sds = np.tile(BULGE_SD_M * (2 / DEGREES) ** FALL, (len(bulges_m), 1))
     size = float(np.sqrt(np.mean(bulges_m[:, 1] ** 2)))
     sds[:, 0] = TAPER_SHARE * size if size > 0 else TAPER_SD_M
@@ -39,13 +40,22 @@ def prior_sds(bulges_m):
 
 
 def largest_bulge_m(bulges_m):
-    """The largest distance of a profile from the mean radius of its course."""
+    """Largest distance of a profile from the mean radius of its course, m."""
     zeta = np.linspace(-1, 1, 41)
     return float(np.abs(legvander(zeta, int(DEGREES[-1]))[:, DEGREES] @ bulges_m.T).max())
 
 
 def bulge_volume_m3(rings: Rings, dips_m, radii_m, bulges_m):
-    """(rows,) volume that the profiles add below each dip."""
+    """Volume added by the profiles below each dip, shape (rows,), m3.
+
+    Parameters
+    ----------
+    rings : Rings
+    dips_m : (rows,) ndarray
+    radii_m : (courses,) ndarray
+    bulges_m : (courses, degrees) ndarray
+        Coefficients b.
+    """
     return np.einsum("rcj,cj->r", _unit_volumes(rings, dips_m, radii_m)[0], bulges_m)
 
 
@@ -56,9 +66,9 @@ def bulge_derivatives(rings: Rings, dips_m, radii_m, bulges_m):
     -------
     by_bulge : (rows, courses * degrees) ndarray
     by_radius, by_edge : (rows, courses) ndarray
-        By the edges but that at the top of the last course.
+        By radii, and by the edges except the top of the last course.
     by_zero : (rows, 1) ndarray
-        By all edges together.
+        By a common shift of all edges.
     """
     unit, zeta, p, is_inside = _unit_volumes(rings, dips_m, radii_m)
     by_radius = np.einsum("rcj,cj->rc", unit, bulges_m) / radii_m
@@ -72,7 +82,10 @@ def bulge_derivatives(rings: Rings, dips_m, radii_m, bulges_m):
 
 
 def _unit_volumes(rings, dips_m, radii_m):
-    """Volumes of b = 1 m (rows, courses, degrees); zeta, P_j and whether a dip is in a course."""
+    """Volumes for b = 1 m, shape (rows, courses, degrees).
+
+    Zeta; P_j; whether a dip is in a course.
+    """
     heights = np.diff(rings.edges_m)
     zeta = 2 * (np.asarray(dips_m)[:, None] - rings.edges_m[:-1]) / heights - 1
     is_inside = (zeta > -1) & (zeta < 1)
@@ -83,10 +96,16 @@ def _unit_volumes(rings, dips_m, radii_m):
 
 
 def show_bulges(dips_m, volumes_m3, sd_m3, edges_m):
-    """Whether rows of most courses follow a smooth profile that is no cylinder with a head.
+    """Whether the rows of most courses follow a smooth profile that is no cylinder with a head.
 
-    A thing in the tank has kinks: a smooth profile of its course leaves much of what a parabola
-    leaves.
+    Deadwood causes kinks: a smooth profile of its course would leave most of the residuals of a
+    parabola.
+
+    Parameters
+    ----------
+    dips_m, volumes_m3, sd_m3 : (rows,) ndarray
+    edges_m : (courses + 1,) ndarray
+        Dips of the edges of the courses.
     """
     shown = []
     for low, high in pairwise(edges_m):

@@ -1,4 +1,4 @@
-"""`tankcal compare`: a former table and a new one of the same tank, on one basis and judged."""
+"""`tankcal compare`: compare a former and a new table of one tank on a common basis."""
 
 from dataclasses import dataclass
 
@@ -43,19 +43,19 @@ from tankcal.record.comparison import (
 from tankcal.record.schema import filled_from
 from tankcal.record.texts import warnings_of
 
-MINIMUM_M = (1.5, 2.0, 3.0)  # of deliveries
+MINIMUM_M = (1.5, 2.0, 3.0)  # smallest heights of deliveries
 DEFAULT_RULE = "france_2020_recalibration"
-JUDGED_PART = 0.1  # of the range, above which rows of a low tank are judged
-MOST_APART = 0.2  # of a volume, by which tables of one tank may differ
-PARTS_OF_HEIGHT = (0.2, 0.4, 0.6, 0.8, 1.0)  # of the waterfall
-ZERO_APART = 3.0  # standard uncertainties of a fitted zero that differs from a declared one
-LEAST_ZERO_M = 1e-3
-BEFORE_ZERO = ("temperature", "head", "roof")  # what is not taken off goes into a fitted zero
+JUDGED_PART = 0.1  # share of the range above which rows of a low tank are judged
+MOST_APART = 0.2  # largest relative difference of volumes of one tank
+PARTS_OF_HEIGHT = (0.2, 0.4, 0.6, 0.8, 1.0)  # relative heights of the rows of the waterfall
+ZERO_APART = 3.0  # significant difference of fitted and declared zero, standard uncertainties
+LEAST_ZERO_M = 1e-3  # smallest reported difference of zeros
+BEFORE_ZERO = ("temperature", "head", "roof")  # steps that bias a fitted zero if omitted
 
 
 @dataclass(frozen=True)
 class _Agreement:
-    """What E_n is made of."""
+    """Uncertainties and correlation from which E_n is computed."""
 
     c: float | None
     former_U: object
@@ -69,17 +69,17 @@ class _Agreement:
 
 
 def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
-    """Compare a former table with a new one of the same tank.
+    """Compare a former table with a new table of one tank.
 
     Parameters
     ----------
     former, new : FormerTable
-        See `recalibration.reading.read_former`. `common` of either of them is the correlation of
+        See `recalibration.reading.read_former`. `common` of either table is the correlation of
         their errors.
     rule : (Rule, file name), optional
-        That the new table is judged by; None: the French rule of 2020.
+        Rule by which the new table is judged; None: the French rule of 2020.
     courses : (heights, thicknesses), optional
-        Of an upright tank, m: (n,) each, where neither table is a record that has them.
+        Courses of an upright tank, m, (n,) each, if neither table is a record with courses.
     fingerprints : (str, str)
         SHA-256 of both files.
 
@@ -90,8 +90,8 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     Raises
     ------
     InputError
-        For tables of other kinds of tank, without a common range, or whose volumes are so
-        different that they are not of one tank, or of one unit.
+        For tables of different kinds of tank, without a common range, or with volumes too different
+        for one tank or one unit.
 
     Examples
     --------
@@ -100,8 +100,8 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     >>> dips = np.linspace(0.0, 8.0, 81)
     >>> former = FormerTable("old.csv", dips, 100 * dips, U_m3=0.2 * dips, common=0.0)
     >>> new = FormerTable("new.csv", dips, 100.05 * dips, U_m3=0.15 * dips)
-    >>> found = compare(former, new)
-    >>> found.verdict, round(float(found.rows.d_m3[-1]), 3), round(float(found.rows.E_n[-1]), 2)
+    >>> result = compare(former, new)
+    >>> result.verdict, round(float(result.rows.d_m3[-1]), 3), round(float(result.rows.E_n[-1]), 2)
     ('keep', 0.4, 0.2)
     """
     c = _common(former, new)
@@ -149,22 +149,22 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     )
 
 
-# ---- what cannot be compared
+# ---- tables that cannot be compared
 
 
 def _common(former, new):
-    """The declared correlation, or None."""
-    one, two = former.common, new.common
-    if one is not None and two is not None and one != two:
+    """Declared correlation of the tables, or None."""
+    of_former, of_new = former.common, new.common
+    if of_former is not None and of_new is not None and of_former != of_new:
         expected = message(
             "compare_two_correlations",
             "common is {one:g} there and {two:g} for {other}; expected one correlation of both",
-            one=two,
-            two=one,
+            one=of_new,
+            two=of_former,
             other=former.name,
         )
         raise InputError(Problem(new.name, expected))
-    return one if one is not None else two
+    return of_former if of_former is not None else of_new
 
 
 def _refuse_other_kinds(former, new):
@@ -219,7 +219,7 @@ def _agreement(former, new, basis, c):
 
 
 def _deliveries(basis, agreement):
-    found = []
+    deliveries = []
     U = agreement.former_U, agreement.new_U, agreement.used_c
     use = np.flatnonzero(basis.for_use)
     for minimum in MINIMUM_M:
@@ -227,16 +227,16 @@ def _deliveries(basis, agreement):
         if pair is None:
             continue
         one = deliveries_between(basis, *U, *pair)
-        found.append(_delivery(basis, minimum, "relative", one))
+        deliveries.append(_delivery(basis, minimum, "relative", one))
         worst = worst_by_error(basis, *U, minimum, also=(pair, (use[0], use[-1])))
         if worst is not None:
-            found.append(_delivery(basis, minimum, "E_n", worst))
-    return found
+            deliveries.append(_delivery(basis, minimum, "E_n", worst))
+    return deliveries
 
 
-def _delivery(basis, minimum, by, one):
-    low, high = int(one.low[0]), int(one.high[0])
-    d, former = float(one.d_m3[0]), float(one.former_m3[0])
+def _delivery(basis, minimum, by, worst):
+    low, high = int(worst.low[0]), int(worst.high[0])
+    d, former = float(worst.d_m3[0]), float(worst.former_m3[0])
     return ComparedDelivery(
         minimum_m=minimum,
         by=by,
@@ -246,40 +246,50 @@ def _delivery(basis, minimum, by, one):
         new_m3=former + d,
         d_m3=d,
         relative=d / former if former else np.nan,
-        U_former_m3=float(one.U_former_m3[0]),
-        U_new_m3=float(one.U_new_m3[0]),
-        E_n=float(one.E_n[0]),
-        c_limit=float(one.c_limit[0]),
+        U_former_m3=float(worst.U_former_m3[0]),
+        U_new_m3=float(worst.U_new_m3[0]),
+        E_n=float(worst.E_n[0]),
+        c_limit=float(worst.c_limit[0]),
     )
 
 
 def _worst(basis, agreement, deliveries):
-    """(lowest dip whose row is judged, WorstError or None) of rows and deliveries."""
+    """Return the lowest judged dip, and the WorstError or None of rows and deliveries."""
     dips = basis.height_m
     reach = dips[-1] - dips[0]
     from_m = float(dips[0] + (MINIMUM_M[0] if reach > 2 * MINIMUM_M[0] else JUDGED_PART * reach))
     judged = np.flatnonzero(basis.for_use & (dips >= from_m - 1e-9))
-    found = []
+    candidates = []
     if len(judged) and not np.isnan(agreement.E_n[judged]).all():
         row = int(judged[np.nanargmax(np.abs(agreement.E_n[judged]))])
         d = float(basis.new_m3[row] - basis.on_basis_m3[row])
         U = float(agreement.new_U.rows()[row]), float(agreement.former_U.rows()[row])
-        found.append((agreement.E_n[row], None, dips[row], d, *U, agreement.c_limit[row]))
-    found += [
-        (one.E_n, one.low_m, one.high_m, one.d_m3, one.U_new_m3, one.U_former_m3, one.c_limit)
-        for one in deliveries
-        if not np.isnan(one.E_n)
+        candidates.append((agreement.E_n[row], None, dips[row], d, *U, agreement.c_limit[row]))
+    candidates += [
+        (
+            delivery.E_n,
+            delivery.low_m,
+            delivery.high_m,
+            delivery.d_m3,
+            delivery.U_new_m3,
+            delivery.U_former_m3,
+            delivery.c_limit,
+        )
+        for delivery in deliveries
+        if not np.isnan(delivery.E_n)
     ]
-    if not found:
+    if not candidates:
         return from_m, None
-    E_n, low, high, d, U_new, U_former, c_limit = max(found, key=lambda one: abs(one[0]))
+    E_n, low, high, d, U_new, U_former, c_limit = max(
+        candidates, key=lambda candidate: abs(candidate[0])
+    )
     half = float(normalized_error(d, U_new, U_former, 0.5))
     return from_m, WorstError(
         float(E_n), half, low, float(high), d, U_new, U_former, float(c_limit)
     )  # fmt: skip
 
 
-# ---- what is saved
+# ---- content of the file
 
 
 def _correlation(agreement, worst):
@@ -309,16 +319,16 @@ def _rows(basis, agreement):
 
 
 def _waterfall(basis):
-    """Rows at parts of the range: those for use that are nearest."""
+    """Return rows at given parts of the range, each the nearest row for use."""
     use = np.flatnonzero(basis.for_use)
     dips = basis.height_m[use]
     at = [dips[0] + part * (dips[-1] - dips[0]) for part in PARTS_OF_HEIGHT]
-    chosen = dict.fromkeys(int(use[np.argmin(np.abs(dips - one))]) for one in at)
+    chosen = dict.fromkeys(int(use[np.argmin(np.abs(dips - index))]) for index in at)
     return [
         Waterfall(
             height_m=float(basis.height_m[row]),
             former_m3=float(basis.former_m3[row]),
-            **{f"{name}_m3": float(one.added_m3[row]) for name, one in basis.steps.items()},
+            **{f"{name}_m3": float(step.added_m3[row]) for name, step in basis.steps.items()},
             tank_m3=float(basis.new_m3[row] - basis.on_basis_m3[row]),
             new_m3=float(basis.new_m3[row]),
         )
@@ -351,25 +361,25 @@ def _tank_id(former, new):
 
 
 def _notice(former, new):
-    """The notice on the papers of the new table, else of the former one; "" for none."""
+    """Notice in the report of the new table, else of the former table; "" if none."""
     records = [table.record for table in (new, former) if table.record is not None]
-    notices = [str(one["job"]["certificate"].get("notice") or "") for one in records]
+    notices = [str(record["job"]["certificate"].get("notice") or "") for record in records]
     return next(filter(None, notices), "")
 
 
 def _read(former, new, basis):
-    """What was read out of the tables because nobody declared it."""
-    found = []
+    """Return the values that were estimated from the tables because they are not declared."""
+    estimates = []
     for name, one in zip(("former", "new"), basis.densities, strict=True):
         if one.head is not None:
             sure = "sure" if one.head != "undecided" else "doubtful"
             used, value, u = one.source == "read", one.read_kg_m3, one.u_kg_m3
-            found.append(ReadOut(name, f"head_{one.head}", value, u, "kg/m3", sure, used))
+            estimates.append(ReadOut(name, f"head_{one.head}", value, u, "kg/m3", sure, used))
     zero = basis.zero
     if zero.fitted_m is not None:
         is_seen = abs(zero.fitted_m) > ZERO_APART * (zero.fitted_u_m or 0.0)
-        is_seen &= all(basis.steps[one].state in ("done", "same") for one in BEFORE_ZERO)
-        found.append(
+        is_seen &= all(basis.steps[density].state in ("done", "same") for density in BEFORE_ZERO)
+        estimates.append(
             ReadOut(
                 "former", "zero", zero.fitted_m, zero.fitted_u_m, "m",
                 "sure" if is_seen else "doubtful", zero.source == "fitted",
@@ -378,13 +388,13 @@ def _read(former, new, basis):
     for name, table in (("former", former), ("new", new)):
         if table.record is None:
             digit = table.volume_quantum_m3
-            found.append(ReadOut(name, "rounding_volume", digit, None, "m3", "sure", True))
-    return found
+            estimates.append(ReadOut(name, "rounding_volume", digit, None, "m3", "sure", True))
+    return estimates
 
 
 def _warnings(former, new, basis):
-    """Problems that deserve a look: of both tables, and of their zeros."""
-    found = [*former.warnings, *new.warnings]
+    """Return the warnings of both tables and of their zeros."""
+    problems = [*former.warnings, *new.warnings]
     if former.date and new.date and str(former.date)[:10] > str(new.date)[:10]:
         text = message(
             "compare_dates_turned",
@@ -394,7 +404,7 @@ def _warnings(former, new, basis):
             other=new.name,
             newer=str(new.date)[:10],
         )
-        found.append(Problem(former.name, text))
+        problems.append(Problem(former.name, text))
     zero = basis.zero
     if zero.source == "fitted":
         text = message(
@@ -405,7 +415,7 @@ def _warnings(former, new, basis):
             volume=zero.volume_m3,
             height=1000 * zero.height_m,
         )
-        found.append(Problem(new.name, text))
+        problems.append(Problem(new.name, text))
     if zero.source == "reference_heights" and zero.fitted_m is not None:
         apart = abs(zero.fitted_m - zero.height_m)
         if apart > max(LEAST_ZERO_M, ZERO_APART * zero.fitted_u_m):
@@ -416,5 +426,5 @@ def _warnings(former, new, basis):
                 declared=1000 * zero.height_m,
                 fitted=1000 * zero.fitted_m,
             )
-            found.append(Problem(new.name, text))
-    return found
+            problems.append(Problem(new.name, text))
+    return problems

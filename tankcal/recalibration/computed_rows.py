@@ -1,8 +1,8 @@
-"""Rows of a table that were computed, where the rows between them are proportional parts.
+"""Computed rows of a table whose other rows are proportional parts.
 
-Old tables were computed every decimetre, and linear interpolation gave the centimetres. The rows
-between computed rows contain no information on the shell, and a seam or a thing in the tank between
-computed rows looks like several kinks. So only the computed rows are read.
+Old tables were computed every decimetre; linear interpolation gave the centimetres. Interpolated
+rows contain no information on the shell. A seam or deadwood between computed rows looks like
+several kinks. So only the computed rows are used.
 """
 
 from dataclasses import dataclass, replace
@@ -11,21 +11,22 @@ import numpy as np
 
 from tankcal.recalibration.table_fit import Rows, tried
 
-USUAL_STEPS_M = (  # of computed rows; longer steps leave a course with too few of them
+USUAL_STEPS_M = (  # steps of computed rows; longer ones give too few rows per course
     0.2, 0.1524, 0.1, 0.0762, 0.0508, 0.05, 0.0254, 0.02, 0.0127, 0.01, 0.005
 )  # fmt: skip
-FEWEST_STEPS = 8  # of computed rows
-LEAST_PART = 0.75  # of the rows: above the bottom, which may have been computed row by row
-FEWEST_PARTS = 5  # rows of a step; in shorter steps exact rows look linear
-FEWEST_UNEVEN = 30  # uneven steps that prove interpolation
-INTERPOLATED, LINEAR = 0.5, 1.0  # last digits, farthest from a chord: of printed, of exact volumes
+FEWEST_STEPS = 8  # fewest steps between computed rows
+LEAST_PART = 0.75  # smallest share of rows; rows of the bottom may be computed row by row
+FEWEST_PARTS = 5  # fewest rows of a step; in shorter steps, exact rows look linear
+FEWEST_UNEVEN = 30  # fewest uneven steps that prove interpolation
+# Largest distance from a chord, in last digits: chords of printed and of exact volumes.
+INTERPOLATED, LINEAR = 0.5, 1.0
 ROUNDING = 1e-6
-LEAST_GAIN = 25.0  # of chi2, by interpolation
+LEAST_GAIN = 25.0  # smallest reduction of chi2 by interpolation
 
 
 @dataclass(frozen=True)
 class ComputedRows:
-    """The rows of a table that may have been computed, the other rows being linear between them.
+    """Rows of a table that may have been computed, while the other rows are linear between them.
 
     Attributes
     ----------
@@ -34,9 +35,9 @@ class ComputedRows:
     lowest : int
         Number of the row above which the other rows are linear.
     step_m : float
-        Between computed rows.
+        Step between computed rows.
     is_certain : bool
-        Whether the other rows were interpolated between printed volumes: the rounding shows it.
+        Whether rounding proves that the other rows were interpolated between printed volumes.
     """
 
     rows: np.ndarray
@@ -45,7 +46,7 @@ class ComputedRows:
     is_certain: bool
 
     def table(self, former):
-        """The FormerTable of these rows."""
+        """Return the FormerTable of these rows."""
         optional = {
             name: None if getattr(former, name) is None else getattr(former, name)[self.rows]
             for name in ("U_m3", "factor_m3", "height_rounding_m", "row")
@@ -64,9 +65,9 @@ class ComputedRows:
         ----------
         former : FormerTable
         state : State
-            Read out of the computed rows.
+            State estimated from the computed rows.
         sd_m3 : (rows,) ndarray
-            Of all rows, by rounding.
+            Standard deviations of all rows, by rounding.
         """
         if self.is_certain:
             return True
@@ -75,18 +76,13 @@ class ComputedRows:
         between = (dips >= lowest) & (dips <= dips[self.rows[-1]])
         linear = np.interp(dips, dips[self.rows], state.volume_m3(dips)[self.rows])
         by_parts = float(np.sum(((former.volume_m3 - linear) / sd_m3)[between] ** 2))
-        # The computed rows may place seams and zero badly: all rows place them again.
+        # Computed rows may locate seams and zero poorly, so all rows estimate them again.
         exact = tried(Rows(dips, former.volume_m3, sd_m3).of(between), state)
         return exact is not None and exact.chi2 - by_parts > LEAST_GAIN
 
 
 def find_computed_rows(former):
-    """The ComputedRows of the longest step between which all rows are linear; None without.
-
-    Parameters
-    ----------
-    former : FormerTable
-    """
+    """Return the ComputedRows of the longest step with linear rows in between, or None."""
     dips, quantum = former.height_m, former.volume_quantum_m3
     steps = np.diff(dips)
     step = float(np.median(steps))
@@ -94,7 +90,7 @@ def find_computed_rows(former):
     if quantum <= 0 or np.any(np.abs(steps[: count - 1] - step) > ROUNDING):
         return None
     volumes = former.volume_m3[:count] / quantum
-    found = []
+    candidates = []
     for long_step in USUAL_STEPS_M:
         parts = round(long_step / step)
         is_multiple = abs(parts * step - long_step) < ROUNDING
@@ -104,14 +100,16 @@ def find_computed_rows(former):
         if first is not None:
             rows = np.arange(first % parts, count, parts)
             is_certain = _is_interpolated(volumes, first, parts)
-            found.append(ComputedRows(rows, first, long_step, is_certain))
-    return max(found, key=lambda one: (one.is_certain, one.step_m), default=None)
+            candidates.append(ComputedRows(rows, first, long_step, is_certain))
+    return max(
+        candidates, key=lambda candidate: (candidate.is_certain, candidate.step_m), default=None
+    )
 
 
 def _first_linear_row(volumes, parts):
-    """The lowest computed row above which rows are linear between computed rows; None without.
+    """Lowest computed row above which the rows in between are linear, or None.
 
-    The middle of each step is compared with its chord first, for all offsets at once.
+    The middle of each step is first compared with its chord, for all offsets together.
     """
     count, middle = len(volumes), parts // 2
     starts = np.arange(count - parts)
@@ -123,15 +121,17 @@ def _first_linear_row(volumes, parts):
     for offset in np.argsort(highest_bent, kind="stable"):
         if highest_bent[offset] > (1 - LEAST_PART) * count:
             return None
-        bent = np.any(np.abs(_departures(volumes, int(offset), parts)) > LINEAR + ROUNDING, axis=1)
+        bent = np.any(
+            np.abs(_chord_distances(volumes, int(offset), parts)) > LINEAR + ROUNDING, axis=1
+        )
         above = int(np.flatnonzero(bent)[-1]) + 1 if bent.any() else 0
         if above * parts + offset <= (1 - LEAST_PART) * count:
             return int(above * parts + offset)
     return None
 
 
-def _departures(volumes, first, parts):
-    """(steps, parts - 1) departures of the rows between computed rows from their chords."""
+def _chord_distances(volumes, first, parts):
+    """Distances (steps, parts - 1) of the rows between computed rows from their chords."""
     steps = (len(volumes) - 1 - first) // parts
     ends = volumes[first : first + steps * parts + 1 : parts]
     share = np.arange(1, parts) / parts
@@ -140,12 +140,12 @@ def _departures(volumes, first, parts):
 
 
 def _is_interpolated(volumes, first, parts):
-    """Whether all rows between are within half a digit of the chord of printed volumes.
+    """Whether all rows in between lie within half a digit of the chord of printed volumes.
 
-    Volumes that were computed at each row are up to a whole digit off where steps are uneven.
+    Volumes computed at each row deviate by up to a whole digit where steps are uneven.
     """
     steps = (len(volumes) - 1 - first) // parts
     rises = np.diff(volumes[first : first + steps * parts + 1]).reshape(steps, parts)
     uneven = np.count_nonzero(np.ptp(rises, axis=1) > 0.5)
-    left = np.abs(_departures(volumes, first, parts))
+    left = np.abs(_chord_distances(volumes, first, parts))
     return bool(uneven >= FEWEST_UNEVEN and left.max() <= INTERPOLATED + ROUNDING)

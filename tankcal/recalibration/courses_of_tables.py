@@ -1,4 +1,4 @@
-"""How the radius of each course differs between two tables that are on one basis."""
+"""Difference of the radius of each course between two tables on a common basis."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from tankcal.record.comparison import ComparedCourse
 
 
 def compared_courses(facts, basis, former_U, new_U, c, sd_m3):
-    """The `ComparedCourse` of each course that the rows reach; none where they are not known.
+    """Return the `ComparedCourse` of each course within the rows; none if the courses are unknown.
 
     Parameters
     ----------
@@ -19,17 +19,19 @@ def compared_courses(facts, basis, former_U, new_U, c, sd_m3):
     c : float
         Correlation of the errors of both tables.
     sd_m3 : float
-        Of a difference of rows, by rounding.
+        Standard deviation of a difference of rows, by rounding.
     """
     if not facts.is_shell:
         return []
     difference = basis.new_m3 - basis.on_basis_m3
-    found = adjust_difference(facts, basis.height_m, difference, basis.new_m3, sd_m3, basis.for_use)
-    if found is None:
+    adjusted = adjust_difference(
+        facts, basis.height_m, difference, basis.new_m3, sd_m3, basis.for_use
+    )
+    if adjusted is None:
         return []
     new, edges = _radii(facts, basis), facts.edges_m()
-    changes = found.areas_m2 / (2 * np.pi * new)
-    rounding = found.u_areas_m2 / (2 * np.pi * new)
+    changes = adjusted.areas_m2 / (2 * np.pi * new)
+    rounding = adjusted.u_areas_m2 / (2 * np.pi * new)
     courses = []
     for k in np.flatnonzero(np.isfinite(changes)):
         parts = _u_of_tables(basis, (former_U, new_U), edges[k : k + 2], new[k])
@@ -53,7 +55,7 @@ def compared_courses(facts, basis, former_U, new_U, c, sd_m3):
 
 
 def _radii(facts, basis):
-    """(courses,) radii in the new table: of its record, else by what its rows rise."""
+    """Radii (courses,) in the new table: from its record, else from the rise of its rows."""
     if facts.inside_m is not None:
         return facts.inside_m
     rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
@@ -66,7 +68,9 @@ def _radii(facts, basis):
 
 
 def _u_of_tables(basis, tables, ends, radius):
-    """Standard uncertainty of a radius by the volume of its course in each table; None: unknown.
+    """Standard uncertainty of a radius from the volume of its course in each table.
+
+    None if unknown.
 
     u(r) = r u(V) / (2 V), V between the lowest and the highest row within the course.
     """
@@ -76,10 +80,12 @@ def _u_of_tables(basis, tables, ends, radius):
         return [None for _ in tables]
     low, high = inside[:1], inside[-1:]
     volume = basis.new_m3[high[0]] - basis.new_m3[low[0]]
-    found = [radius / 2 * float(one.deliveries(low, high)[0]) / one.k / volume for one in tables]
-    return [None if np.isnan(one) else one for one in found]
+    uncertainties = [
+        radius / 2 * float(table.deliveries(low, high)[0]) / table.k / volume for table in tables
+    ]
+    return [None if np.isnan(u) else u for u in uncertainties]
 
 
 def _u_of_change(former, new, c):
-    """Standard uncertainty of the difference of two radii, c being the correlation."""
+    """Standard uncertainty of the difference of two radii with correlation c."""
     return float(np.sqrt(max(former**2 + new**2 - 2 * c * former * new, 0.0)))

@@ -1,4 +1,4 @@
-"""former.toml: what is known of a former table beside its rows, and the checks of it."""
+"""former.toml: declared facts about a former table, and their checks."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -58,16 +58,21 @@ UNCERTAINTIES = ("U_m3", "U_percent", "u_m3", "u_percent")
 
 @dataclass(frozen=True)
 class Declared:
-    """What former.toml says.
+    """Content of a former.toml.
 
-    name    of the file
-    values  {key of [former]: value or None}
-    rows    {key: row of the file}
-    roof    FormerRoof or None
+    Attributes
+    ----------
+    name : str
+        Name of the file.
+    values : dict
+        {key of [former]: value or None}.
+    rows : dict
+        {key: row of the file}.
+    roof : FormerRoof or None
     """
 
     name: str = "former.toml"
-    values: dict = field(default_factory=lambda: dict.fromkeys(one.name for one in FORMER))
+    values: dict = field(default_factory=lambda: dict.fromkeys(field.name for field in FORMER))
     rows: dict = field(default_factory=dict)
     roof: FormerRoof | None = None
 
@@ -76,7 +81,7 @@ class Declared:
 
     @property
     def units(self):
-        """Units of columns whose headings name none."""
+        """Units of columns whose headings name no unit."""
         height, volume = self["height_unit"], self["volume_unit"]
         if height is None and volume is None:
             return NO_UNITS
@@ -84,19 +89,19 @@ class Declared:
 
     @property
     def uncertainty(self):
-        """(key, value) of the uncertainty that is declared, or None."""
-        given = [key for key in UNCERTAINTIES if self[key] is not None]
-        return (given[0], self[given[0]]) if given else None
+        """(key, value) of the declared uncertainty, or None."""
+        stated = [key for key in UNCERTAINTIES if self[key] is not None]
+        return (stated[0], self[stated[0]]) if stated else None
 
     def tell(self, log, key, expected):
-        """Note a problem of one key."""
+        """Report a problem of one key."""
         log.problem(self.name, expected, self.rows.get(key), f"former.{key}")
 
 
 def read_declared(path, log):
-    """`Declared` of a former.toml (a Path); what is wrong with it goes to `log`.
+    """Return the `Declared` of a former.toml (a Path); report its problems to `log`.
 
-    Keys that are wrong count as not given, so that the table is judged in the same run.
+    Invalid keys count as not stated, so that the table is examined in the same run.
     """
     path = Path(path)
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
@@ -107,54 +112,59 @@ def read_declared(path, log):
         if section not in SECTIONS:
             expected = unknown_section(section, SECTIONS)
             log.problem(path.name, expected, sections.get(section), f"[{section}]")
-    given = settings.get("former", {})
-    if not any(not is_blank(value.raw) for value in given.values()) and "former" not in settings:
+    entries = settings.get("former", {})
+    if not any(not is_blank(value.raw) for value in entries.values()) and "former" not in settings:
         expected = message("former_no_section", "missing section; expected [former] with its keys")
         log.problem(path.name, expected, None, "[former]")
-    values = read_section(path.name, "former", FORMER, given, sections.get("former"), log)
-    rows = {key: value.row for key, value in given.items()}
+    values = read_section(path.name, "former", FORMER, entries, sections.get("former"), log)
+    rows = {key: value.row for key, value in entries.items()}
     roof = _roof(path.name, settings.get("roof"), sections.get("roof"), log)
-    found = Declared(path.name, values, rows, roof)
-    _check(found, log)
-    return found
+    declared = Declared(path.name, values, rows, roof)
+    _check(declared, log)
+    return declared
 
 
-def _check(found, log):
-    """Uncertainties said once, U with its factor; a density that is one."""
-    given = [key for key in UNCERTAINTIES if found[key] is not None]
-    for key in given[1:]:
+def _check(declared, log):
+    """Check that the uncertainty is stated once, with a factor for U, and check the density."""
+    stated = [key for key in UNCERTAINTIES if declared[key] is not None]
+    for key in stated[1:]:
         expected = message(
             "former_two_uncertainties",
             "given together with {other}; expected only one of {keys}",
-            other=given[0],
+            other=stated[0],
             keys=[*UNCERTAINTIES],
         )
-        found.tell(log, key, expected)
-    if given and given[0].startswith("U") and found["k"] is None and not found.rows.get("k"):
-        found.tell(log, "k", missing_beside(given[0]))
-    density = found["liquid_density_kg_m3"]
+        declared.tell(log, key, expected)
+    if (
+        stated
+        and stated[0].startswith("U")
+        and declared["k"] is None
+        and not declared.rows.get("k")
+    ):
+        declared.tell(log, "k", missing_beside(stated[0]))
+    density = declared["liquid_density_kg_m3"]
     if density is not None and 0 < density < RELATIVE_DENSITY:
         expected = message(
             "former_relative_density",
             "found {density:g}; expected kg/m3: is it a relative density?",
             density=density,
         )
-        found.tell(log, "liquid_density_kg_m3", expected)
+        declared.tell(log, "liquid_density_kg_m3", expected)
 
 
-def _roof(file, given, row, log):
-    """FormerRoof of [roof], or None after telling what is wrong or missing."""
-    if given is None:
+def _roof(file, entries, row, log):
+    """Return the FormerRoof of [roof]; None after reporting invalid or missing keys."""
+    if entries is None:
         return None
-    told = len(log.problems)
-    values = read_section(file, "roof", ROOF, given, row, log)
-    if all(value is None for value in values.values()) and len(log.problems) == told:
+    problems_before = len(log.problems)
+    values = read_section(file, "roof", ROOF, entries, row, log)
+    if all(value is None for value in values.values()) and len(log.problems) == problems_before:
         return None
     needed = ("mass_kg", "reference_density_kg_m3", "weighing")
-    filled = [key for key in given if not is_blank(given[key].raw)]
+    filled = [key for key in entries if not is_blank(entries[key].raw)]
 
     def tell(key, expected):
-        value = given.get(key)
+        value = entries.get(key)
         log.problem(file, expected, value.row if value and value.row else row, f"roof.{key}")
 
     for key in needed:
@@ -166,7 +176,7 @@ def _roof(file, given, row, log):
             tell(key, missing_beside("critical_top_m" if other is high else "critical_bottom_m"))
     if None not in (low, high) and low >= high:
         tell("critical_top_m", upside_down(low, high))
-    if len(log.problems) != told:
+    if len(log.problems) != problems_before:
         return None
     return FormerRoof(
         values["mass_kg"],

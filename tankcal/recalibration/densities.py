@@ -1,4 +1,4 @@
-"""The density of the head in a table: declared, or read out of its rows."""
+"""Density of the head in a table: declared, or estimated from its rows."""
 
 from dataclasses import dataclass, replace
 
@@ -7,24 +7,24 @@ import numpy as np
 from tankcal.errors import SolutionError
 from tankcal.recalibration.upright_geometry import read_upright
 
-MOST_ROWS = 900  # that a density is read from
+MOST_ROWS = 900  # largest number of rows from which a density is estimated
 
 
 @dataclass(frozen=True)
 class Density:
-    """Density of the liquid that a table has the head of.
+    """Density of the liquid whose head a table includes.
 
     Attributes
     ----------
     kg_m3 : float or None
-        0: without head; None: not known.
+        0: no head; None: unknown.
     source : {"declared", "read"} or None
     u_kg_m3 : float or None
-        Of one that was read: standard, by rounding alone.
+        Standard uncertainty of an estimated density, by rounding only.
     read_kg_m3 : float or None
-        What the rows say, whether or not they decide.
+        Estimate from the rows, whether or not it is used.
     head : {"with", "without", "undecided"} or None
-        What was read of it.
+        Estimated from the rows.
     """
 
     kg_m3: float | None = None
@@ -35,7 +35,7 @@ class Density:
 
 
 def densities_of(former, new, facts):
-    """(Density, Density) of two tables; read out of rows only where one is not declared."""
+    """Return the Density of both tables, estimated from the rows if not declared."""
     return _density_of(former, facts), _density_of(new, facts)
 
 
@@ -45,19 +45,19 @@ def _density_of(table, facts):
     if not facts.has_plates:
         return Density()
     try:
-        found = read_upright(
+        geometry = read_upright(
             _thinned(table), facts.heights_m, facts.thickness_m, modulus_pa=facts.modulus_pa
         )
     except SolutionError:
         return Density()
-    read, head = found.density_kg_m3, found.head
+    read, head = geometry.density_kg_m3, geometry.head
     known = {"with": float(read.value), "without": 0.0, "undecided": None}[head]
     source = None if known is None else "read"
     return Density(known, source, float(read.u), float(read.value), head)
 
 
 def _thinned(table):
-    """A table of at most MOST_ROWS of its rows, evenly chosen, the last one among them."""
+    """Return a table of at most MOST_ROWS evenly chosen rows, including the last."""
     every = -(-len(table.height_m) // MOST_ROWS)
     if every == 1:
         return table

@@ -1,9 +1,9 @@
-"""Things in a tank, and a floating roof, that a table shows: where the area of the cut jumps.
+"""Deadwood and floating roofs in a table: heights where the area of the cross section jumps.
 
-A thing of volume v between the dips b and t changes the volume below h by v clip((h - b)/(t - b)):
-two kinks, at b and t. What stands in the tank has a negative v. Which pair of kinks explains most
-of what an adjustment leaves is found for all pairs at once: with ramps R_p = max(h - p, 0) and the
-projector P of the adjustment, a thing between b and t lowers chi2 by
+A fitting of volume v between the dips b and t changes the volume below h by v clip((h - b)/(t -
+b)): two kinks, at b and t. Deadwood has a negative v. All pairs of kinks are tested together for
+the pair that best explains the residuals of an adjustment. With ramps R_p = max(h - p, 0) and the
+projector P of the adjustment, a fitting between b and t lowers chi2 by
 
     [(R_b - R_t)' r]^2 / [(R_b - R_t)' P (R_b - R_t)]
 """
@@ -12,22 +12,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ROUNDING = 1e-11  # of a ramp, that is left when the adjustment takes it up
-GIVING = 0.5  # what gives room is rarer, and looks like the gap between two things that take it
-APART = 3  # places, of candidates
-MOST_PLACES = 300  # of kinks that are tried; a finer table is tried at some of its rows
+ROUNDING = 1e-11  # relative remainder of a ramp that the adjustment absorbs
+GIVING = 0.5  # weight of fittings that add volume: rarer, and similar to a gap between two others
+APART = 3  # smallest distance of candidates, in candidate places
+MOST_PLACES = 300  # largest number of places tested for kinks; finer tables are thinned
 
 
 @dataclass(frozen=True)
 class Fitting:
-    """One thing that takes or gives room.
+    """A fitting that reduces or increases the volume.
 
     Attributes
     ----------
     bottom_m, top_m : float
         Dips.
     volume_m3 : float
-        Negative: it takes room.
+        Negative: deadwood.
     """
 
     bottom_m: float
@@ -35,16 +35,16 @@ class Fitting:
     volume_m3: float
 
     def volume_below_m3(self, dips_m):
-        """(rows,) what it changes of the volume below each dip."""
+        """Change of the volume below each dip, shape (rows,), m3."""
         return self.volume_m3 * self.share(dips_m)
 
     def share(self, dips_m):
-        """(rows,) part of it that is below each dip."""
+        """Share of the fitting below each dip, shape (rows,)."""
         height = max(self.top_m - self.bottom_m, 1e-9)
         return np.clip((np.asarray(dips_m) - self.bottom_m) / height, 0.0, 1.0)
 
     def derivatives(self, dips_m):
-        """(rows, 3) derivatives of `volume_below_m3` by bottom, top and volume."""
+        """Derivatives (rows, 3) of `volume_below_m3` by bottom, top and volume."""
         dips = np.asarray(dips_m)
         height = max(self.top_m - self.bottom_m, 1e-9)
         share = self.share(dips)
@@ -54,42 +54,45 @@ class Fitting:
 
 
 def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
-    """Each `Fitting` that explains much of what an adjustment leaves, and by how much chi2 falls.
+    """Return each `Fitting` that explains residuals of an adjustment, with its reduction of chi2.
 
     Parameters
     ----------
     dips_m : (rows,) ndarray
-        Rising.
+        Rising dips.
     left_m3 : (rows,) ndarray
-        Volume of the table less that of the adjustment.
+        Residuals: volume of the table minus that of the adjustment.
     design : (rows, u) ndarray
         Derivatives of the adjustment by its unknowns.
     sd_m3 : (rows,) ndarray
         Standard deviations of the rows.
     longest_m : float, optional
-        Longer ones are not looked for.
+        Largest height of a fitting.
     most : int
-        Of them, the best first, each well apart from the others.
+        Largest number of fittings, best first, well apart from each other.
 
     Returns
     -------
     list of (Fitting, float)
     """
     places = dips_m[np.unique(np.linspace(0, len(dips_m) - 1, MOST_PLACES).astype(int))]
+    # Ramps without the part that the unknowns of the adjustment absorb: P R, P = 1 - q q'.
     q = np.linalg.qr(design / sd_m3[:, None])[0]
     ramps = np.maximum(dips_m[:, None] - places, 0.0) / sd_m3[:, None]
     left = ramps - q @ (q.T @ ramps)
     reach = np.maximum(np.einsum("np,np->p", ramps, ramps), 1e-300)
     gram, of_left = left.T @ left, left.T @ (left_m3 / sd_m3)
+    # (R_b - R_t)' P (R_b - R_t) of all pairs; too small values are rounding errors
     apart = np.diag(gram)[:, None] + np.diag(gram) - 2 * gram
     is_told = apart > ROUNDING * np.maximum(reach[:, None], reach)
     height = places - places[:, None]
     is_told &= (height > 0) & (height <= longest_m)
+    # numerator, reduction of chi2, and slope of the ramp: area of the fitting
     along = of_left[:, None] - of_left
     gain = np.where(is_told, along**2 / np.where(is_told, apart, 1.0), 0.0)
     slopes = along / np.where(is_told, apart, 1.0)
     likely = np.where(slopes > 0, GIVING * gain, gain)
-    found = []
+    fittings = []
     for _ in range(most):
         low, high = (int(k) for k in np.unravel_index(np.argmax(likely), gain.shape))
         if likely[low, high] <= 0:
@@ -99,15 +102,15 @@ def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
             slice(max(low - APART, 0), low + APART + 1),
             slice(max(high - APART, 0), high + APART + 1),
         )
-        likely[near] = 0.0
-        low, high = _standing(gain, low, high, slopes[low, high])
+        likely[near] = 0.0  # the next fitting is well apart
+        low, high = _reducing_alternative(gain, low, high, slopes[low, high])
         volume = float(slopes[low, high] * height[low, high])
-        found.append((Fitting(float(places[low]), float(places[high]), volume), best))
-    return found
+        fittings.append((Fitting(float(places[low]), float(places[high]), volume), best))
+    return fittings
 
 
-def _standing(gain, low, high, slope):
-    """Of the two things that one kink may be the end of, the one that takes room."""
+def _reducing_alternative(gain, low, high, slope):
+    """Of the two fittings that may end at one kink, return the one that reduces the volume."""
     last = len(gain) - 1
     if slope > 0:
         for pair in ((0, low), (high, last)):
@@ -118,15 +121,24 @@ def _standing(gain, low, high, slope):
 
 
 def in_other_pairs(fittings, near_m, least_share):
-    """The same kinks as other things: one above the other where they overlapped.
+    """Pair the kinks differently: fittings one above the other instead of overlapping ones.
 
-    Kinks nearer than `near_m` are one; those of less than a share of the largest change of slope
-    are none.
+    Parameters
+    ----------
+    fittings : sequence of Fitting
+    near_m : float
+        Kinks nearer than this are merged.
+    least_share : float
+        Kinks below this share of the largest change of slope are ignored.
+
+    Returns
+    -------
+    tuple of Fitting
     """
     kinks = []
-    for one in fittings:
-        slope = one.volume_m3 / max(one.top_m - one.bottom_m, 1e-9)
-        kinks += [(one.bottom_m, slope), (one.top_m, -slope)]
+    for fitting in fittings:
+        slope = fitting.volume_m3 / max(fitting.top_m - fitting.bottom_m, 1e-9)
+        kinks += [(fitting.bottom_m, slope), (fitting.top_m, -slope)]
     largest = max((abs(slope) for _, slope in kinks), default=0.0)
     joined = []
     for dip, slope in sorted(kinks):
@@ -137,6 +149,6 @@ def in_other_pairs(fittings, near_m, least_share):
     real = [(dip, slope) for dip, slope in joined if abs(slope) > least_share * largest]
     pairs = zip(real[::2], real[1::2], strict=False)
     return tuple(
-        Fitting(low, high, (slope - other) / 2 * (high - low))
-        for (low, slope), (high, other) in pairs
+        Fitting(low, high, (slope - high_slope) / 2 * (high - low))
+        for (low, slope), (high, high_slope) in pairs
     )

@@ -1,4 +1,4 @@
-"""A former capacity table in SI units, with what was declared of it: of any laboratory, or ours."""
+"""A capacity table in SI units with its declared facts, from any laboratory or from tankcal."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,17 +8,17 @@ import numpy as np
 
 @dataclass(frozen=True)
 class FormerRoof:
-    """The floating roof that a table has deducted.
+    """Floating roof deducted in a table.
 
     Attributes
     ----------
     mass_kg : float
     density_kg_m3 : float
-        Of the liquid that it was taken to float in.
+        Density of the liquid for which the displacement was computed.
     weighing : {"air", "vacuum"}
         How the mass was weighed.
     critical_m : (float, float) or None
-        Dips between which it is partly afloat.
+        Dips between which the roof is partly afloat.
     """
 
     mass_kg: float
@@ -29,47 +29,47 @@ class FormerRoof:
 
 @dataclass(frozen=True)
 class FormerTable:
-    """A capacity table as it was handed out, heights rising.
+    """An issued capacity table, heights rising.
 
     Attributes
     ----------
     name : str
-        File (and sheet), for messages and papers.
+        File (and sheet), for messages and reports.
     height_m, volume_m3 : (rows,) ndarray
-        Dips, never ullages, strictly rising; volumes as printed.
+        Dips (never ullages), strictly rising; volumes as printed.
     height_quantum_m, volume_quantum_m3 : float
-        Value of the last printed digit; 0 where nothing was rounded (a record, or heights that
-        rise by an even step: such rows stand where they say).
+        Value of the last printed digit; 0 if values are not rounded (a record, or heights with even
+        steps, which are exact).
     U_m3 : (rows,) ndarray or None
-        Expanded uncertainties; None where none is known.
+        Expanded uncertainties; None if unknown.
     k : float
-        Their coverage factor.
+        Coverage factor.
     common : float or None
-        Correlation of its errors with those of the table that it is compared with; None: not
-        declared.
+        Correlation of its errors with those of the table compared; None: not declared.
     reference_temperature_c : float or None
-        The shell's, that the table is for; None: not known.
+        Shell temperature of the table; None: unknown.
     liquid_density_kg_m3 : float or None
-        Of the head in the table; 0: without head; None: not known.
+        Density of the head in the table; 0: no head; None: unknown.
     roof : FormerRoof or None
     reference_height_m : float or None
         From the dip plate to the reference point.
     date, method, laboratory, number : str or None
-        As declared, or as the record has them.
+        As declared, or as in the record.
     kind : {"vertical", "horizontal", "sphere", "mesh"} or None
     dip_from_a_m : float or None
-        Of a lying tank: the dip point, along the axis from the start of its cylinder; None: half
-        the length.
+        Dip point of a lying tank, along the axis from the start of its cylinder; None: half the
+        length.
     factor_m3 : (rows, inputs) ndarray or None
-        Of a record: covariance = factor factor'.
+        For a record: covariance = factor factor'.
     record : dict or None
-        The record that it was read from, as plain data.
+        The record from which the table was read, as plain data.
     height_rounding_m : (rows,) ndarray or None
-        Largest rounding error of each height: 0 where the steps are even. None: none is rounded.
+        Largest rounding error of each height; 0 if the steps are even. None: heights are not
+        rounded.
     row : (rows,) ndarray of int or None
-        Where each row stands in the file.
+        Row number of each row in the file.
     warnings : tuple of Problem
-        What deserves a look: of the linter, and of reading.
+        Warnings of the linter and of reading.
     """
 
     name: str

@@ -1,8 +1,8 @@
-"""The tables of one tank over the years: volumes and radii on one basis, what changed when.
+"""History of the tables of one tank: volumes and radii on one basis, and changes between tables.
 
 Every table is compared with the newest one (`recalibration.comparison.compare`), which brings it
-to that basis; and each with the one before it, which says what changed between them. Nothing is
-computed here that a comparison does not say.
+to the newest basis. Each table is also compared with the one before it, which shows the changes
+between them. All results are results of these comparisons.
 """
 
 from dataclasses import dataclass
@@ -33,14 +33,14 @@ MOST_WARNINGS = 100
 
 @dataclass(frozen=True)
 class DatedTable:
-    """A capacity table of a tank, with its day.
+    """A capacity table of a tank, with its date.
 
     Attributes
     ----------
     table : FormerTable
-        Its name is where it was found.
+        Its name is its location.
     sha256 : str
-        Of its file.
+        SHA-256 of its file.
     day : date
     """
 
@@ -50,7 +50,7 @@ class DatedTable:
 
     @property
     def tank(self):
-        """Id of the tank in the record; None where there is none."""
+        """Id of the tank in the record; None without a record."""
         record = self.table.record
         return None if record is None else record["job"]["tank"].get("id")
 
@@ -58,19 +58,19 @@ class DatedTable:
 def history_of(
     tables, inspections=(), *, dips_m=None, courses=None, left_out=(), warnings=(), progress=None
 ):
-    """The history of a tank.
+    """Return the history of a tank.
 
     Parameters
     ----------
     tables : sequence of DatedTable
-        In any order, at least one.
+        At least one table, in any order.
     inspections : sequence of InspectionInHistory
     dips_m : sequence of float, optional
-        That volumes are shown at; None: at fifths of the range that all tables have.
+        Dips of the volumes shown; None: fifths of the common range of all tables.
     courses : (heights, thicknesses), optional
-        Of an upright tank, m, where no record has them.
+        Courses of an upright tank, m, if no record has them.
     left_out, warnings : sequence of Problem
-        Of finding and reading the files.
+        Problems met while files were searched and read.
     progress : callable, optional
         progress(text, done, total)
 
@@ -81,7 +81,7 @@ def history_of(
     Raises
     ------
     InputError
-        With every pair of tables that cannot be of one tank, and every dip that no table has.
+        With every pair of tables that cannot be of one tank, and every dip outside all tables.
 
     Examples
     --------
@@ -90,8 +90,8 @@ def history_of(
     >>> def table(year, area):
     ...     rows = FormerTable(f"{year}.csv", dips, area * dips, U_m3=0.2 * dips)
     ...     return DatedTable(rows, "", date(year, 5, 1))
-    >>> found = history_of([table(2020, 100.05), table(2010, 100.0)])
-    >>> [one.date for one in found.certificates], round(found.changes[0].top_d_m3, 3)
+    >>> history = history_of([table(2020, 100.05), table(2010, 100.0)])
+    >>> [entry.date for entry in history.certificates], round(history.changes[0].top_d_m3, 3)
     (['2010-05-01', '2020-05-01'], 0.4)
     """
     ordered = sorted(tables, key=_order)
@@ -100,54 +100,59 @@ def history_of(
     k = coverage_factor_of(_with_u(ordered))
     rows = _shown_rows(on_newest, dips_m)
     newest = ordered[-1].table
-    told = [*warnings, *warnings_of_tables(ordered)]
+    problems = [*warnings, *warnings_of_tables(ordered)]
     return HistoryFile(
         notice=_notice(newest),
-        tank=next((one.tank for one in reversed(ordered) if one.tank), None),
+        tank=next((table.tank for table in reversed(ordered) if table.tank), None),
         kind=newest.kind or ordered[0].table.kind,
         coverage_k=k,
         certificates=_certificates(ordered),
         dips_m=rows,
         volumes=[
             volume
-            for number, one in enumerate(on_newest, 1)
-            for volume in _volumes(number, one, rows)
+            for number, comparison in enumerate(on_newest, 1)
+            for volume in _volumes(number, comparison, rows)
         ],
         radii=[
-            radius for number, one in enumerate(on_newest, 1) for radius in _radii(number, one, k)
+            radius
+            for number, comparison in enumerate(on_newest, 1)
+            for radius in _radii(number, comparison, k)
         ],
         changes=[
-            _change(number, one, ordered[number - 1 : number + 1], k)
-            for number, one in enumerate(successive, 1)
+            _change(number, comparison, ordered[number - 1 : number + 1], k)
+            for number, comparison in enumerate(successive, 1)
         ],
-        inspections=sorted(inspections, key=lambda one: (one.date is None, one.date, one.file)),
+        inspections=sorted(
+            inspections,
+            key=lambda inspection: (inspection.date is None, inspection.date, inspection.file),
+        ),
         left_out=warnings_of(left_out),
-        warnings=_warnings(told, successive),
+        warnings=_warnings(problems, successive),
     )
 
 
-def _order(one):
-    """By day; of one day by number, program and file: the order is the same on every machine."""
-    record = one.table.record or {}
-    return one.day, str(one.table.number or ""), record.get("tankcal") or "", one.table.name
+def _order(table):
+    """Sort key: date, then number, program and file, so that the order is reproducible."""
+    record = table.table.record or {}
+    return table.day, str(table.table.number or ""), record.get("tankcal") or "", table.table.name
 
 
 def _with_u(ordered):
-    """The newest table with U, else the newest one."""
-    known = [one.table for one in ordered if one.table.U_m3 is not None]
+    """Newest table with U, else the newest table."""
+    known = [table.table for table in ordered if table.table.U_m3 is not None]
     return known[-1] if known else ordered[-1].table
 
 
 def _comparisons(ordered, courses, progress):
-    """(each with the newest, each with the one before): lists of ComparisonFile."""
+    """Compare each table with the newest, and with the one before: two lists of ComparisonFile."""
     newest, problems, found = ordered[-1].table, {}, ([], [])
-    pairs = [(0, one.table, newest) for one in ordered]
+    pairs = [(0, table.table, newest) for table in ordered]
     pairs += [(1, a.table, b.table) for a, b in pairwise(ordered)]
-    for done, (which, former, new) in enumerate(pairs):
+    for done, (role, former, new) in enumerate(pairs):
         text = message("history_comparing", "comparing {count} tables", count=len(ordered))
         progress(text, done, len(pairs))
         try:
-            found[which].append(compare(former, new, courses=courses))
+            found[role].append(compare(former, new, courses=courses))
         except InputError as error:
             problems |= dict.fromkeys(error.problems)
     if problems:
@@ -155,12 +160,14 @@ def _comparisons(ordered, courses, progress):
     return found
 
 
-def _warnings(told, comparisons):
-    """Problems, then what the comparisons warn of, each once; WarningRecords."""
-    found = warnings_of(told)
-    for one in comparisons:
-        found += [warning for warning in one.warnings if warning.code != "compare_dates_turned"]
-    return list({(one.file, one.text): one for one in found}.values())[:MOST_WARNINGS]
+def _warnings(problems, comparisons):
+    """Return problems and warnings of the comparisons as WarningRecords, without duplicates."""
+    records = warnings_of(problems)
+    for comparison in comparisons:
+        records += [
+            warning for warning in comparison.warnings if warning.code != "compare_dates_turned"
+        ]
+    return list({(record.file, record.text): record for record in records}.values())[:MOST_WARNINGS]
 
 
 def _notice(table):
@@ -168,25 +175,25 @@ def _notice(table):
     return str(certificate.get("notice") or "")
 
 
-# ---- what is saved
+# ---- content of the file
 
 
 def _certificates(ordered):
-    days = [one.day.isoformat() for one in ordered]
-    found = []
-    for number, (one, after) in enumerate(zip(ordered, [*days[1:], None], strict=True), 1):
-        table, record = one.table, one.table.record
+    days = [table.day.isoformat() for table in ordered]
+    certificates = []
+    for number, (dated, after) in enumerate(zip(ordered, [*days[1:], None], strict=True), 1):
+        table, record = dated.table, dated.table.record
         tank = {} if record is None else record["job"]["tank"]
         rule = None if record is None else record.get("rule")
         fit = None if record is None else record.get("adjustment")
-        found.append(
+        certificates.append(
             CertificateInHistory(
                 certificate=number,
                 file=table.name,
-                sha256=one.sha256,
+                sha256=dated.sha256,
                 origin="table" if record is None else "record",
-                tank=one.tank,
-                date=one.day.isoformat(),
+                tank=dated.tank,
+                date=dated.day.isoformat(),
                 superseded=after,
                 number=table.number,
                 laboratory=table.laboratory,
@@ -208,14 +215,16 @@ def _certificates(ordered):
                 global_test_passed=fit and fit["passed"] if fit and fit["redundancy"] else None,
             )
         )
-    return found
+    return certificates
 
 
 def _shown_rows(on_newest, dips_m):
-    """Dips of the newest table, for use in all comparisons, that volumes are shown at."""
+    """Dips of the newest table, for use in all comparisons, at which volumes are shown."""
     common = None
-    for one in on_newest:
-        use = set(np.asarray(one.rows.height_m)[np.asarray(one.rows.for_use)].tolist())
+    for comparison in on_newest:
+        use = set(
+            np.asarray(comparison.rows.height_m)[np.asarray(comparison.rows.for_use)].tolist()
+        )
         common = use if common is None else common & use
     dips = np.array(sorted(common))
     if not len(dips):
@@ -225,7 +234,7 @@ def _shown_rows(on_newest, dips_m):
         asked = [dips[0] + part * (dips[-1] - dips[0]) for part in PARTS_OF_HEIGHT]
     else:
         asked = list(dips_m)
-        outside = [one for one in asked if not dips[0] - 1e-9 <= one <= dips[-1] + 1e-9]
+        outside = [dip for dip in asked if not dips[0] - 1e-9 <= dip <= dips[-1] + 1e-9]
         if outside:
             raise InputError([
                 Problem(
@@ -233,12 +242,12 @@ def _shown_rows(on_newest, dips_m):
                     message(
                         "history_dip_outside",
                         "found {dip:g} m; expected {low:g} to {high:g} m, which every table has",
-                        dip=one, low=float(dips[0]), high=float(dips[-1]),
+                        dip=dip, low=float(dips[0]), high=float(dips[-1]),
                     ),
                 )
-                for one in outside
+                for dip in outside
             ])  # fmt: skip
-    nearest = dict.fromkeys(float(dips[np.argmin(np.abs(dips - one))]) for one in asked)
+    nearest = dict.fromkeys(float(dips[np.argmin(np.abs(dips - dip))]) for dip in asked)
     return sorted(nearest)
 
 
@@ -259,9 +268,11 @@ def _known(value):
 
 
 def _radii(number, comparison, k):
-    for one in comparison.courses:
-        U = None if one.u_former_m is None else float(k * one.u_former_m)
-        yield RadiusInHistory(number, one.course, one.bottom_m, one.top_m, one.former_m, U)
+    for course in comparison.courses:
+        U = None if course.u_former_m is None else float(k * course.u_former_m)
+        yield RadiusInHistory(
+            number, course.course, course.bottom_m, course.top_m, course.former_m, U
+        )
 
 
 def _change(number, comparison, pair, k):
@@ -285,17 +296,17 @@ def _change(number, comparison, pair, k):
         zero_m=comparison.zero.height_m,
         zero_source=comparison.zero.source,
         not_made=[
-            one.code for one in comparison.steps if one.state in ("not_declared", "not_possible")
+            step.code for step in comparison.steps if step.state in ("not_declared", "not_possible")
         ],
         verdict=comparison.verdict,
         rule=comparison.rule.name,
         radii=[
             RadiusChange(
-                one.course,
-                one.d_m,
-                None if one.u_m is None else float(k * one.u_m),
-                None if one.w is None else one.w / k,
+                course.course,
+                course.d_m,
+                None if course.u_m is None else float(k * course.u_m),
+                None if course.w is None else course.w / k,
             )
-            for one in comparison.courses
+            for course in comparison.courses
         ],
     )

@@ -1,4 +1,4 @@
-"""What deserves a look among the tables of one tank: days, names, sizes, zeros."""
+"""Checks of the tables of one tank: dates, tank names, dimensions, zeros."""
 
 from itertools import pairwise
 
@@ -7,11 +7,11 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.messages import message
 
-SAME_M = 1e-3  # of sizes and reference heights
+SAME_M = 1e-3  # largest difference of equal dimensions and reference heights
 
 
 def warnings_of_tables(ordered):
-    """Problems of tables (DatedTable, the oldest first), each with the one before it.
+    """Compare each table (DatedTable, oldest first) with the one before it; return Problems.
 
     Examples
     --------
@@ -22,37 +22,37 @@ def warnings_of_tables(ordered):
     ...     DatedTable(FormerTable("a.csv", [0, 1], [0, 1], reference_height_m=x), "", date.min)
     ...     for x in (9.1, 9.2)
     ... ]
-    >>> [one.expected.code for one in warnings_of_tables(tables)]
+    >>> [problem.expected.code for problem in warnings_of_tables(tables)]
     ['history_same_day', 'history_reference_height']
     """
-    found = []
-    for before, one in pairwise(ordered):
-        found += _of_pair(before, one)
-    return found
+    problems = []
+    for before, after in pairwise(ordered):
+        problems += _of_pair(before, after)
+    return problems
 
 
-def _of_pair(before, one):
-    name, other = one.table.name, before.table.name
-    if before.day == one.day:
+def _of_pair(before, after):
+    name, other = after.table.name, before.table.name
+    if before.day == after.day:
         text = message(
             "history_same_day",
             "of {date}, as {other}: which of them came first is not known; is one of them to be "
             "left out?",
-            date=one.day.isoformat(),
+            date=after.day.isoformat(),
             other=other,
         )
         yield Problem(name, text)
-    if None not in (before.tank, one.tank) and before.tank != one.tank:
+    if None not in (before.tank, after.tank) and before.tank != after.tank:
         text = message(
             "history_other_id",
             "of tank {tank}, {other} of tank {other_tank}: taken as one tank, as asked",
-            tank=one.tank,
+            tank=after.tank,
             other=other,
             other_tank=before.tank,
         )
         yield Problem(name, text)
-    yield from _sizes(name, other, _tank(before), _tank(one))
-    heights = before.table.reference_height_m, one.table.reference_height_m
+    yield from _sizes(name, other, _tank(before), _tank(after))
+    heights = before.table.reference_height_m, after.table.reference_height_m
     if None not in heights and abs(heights[1] - heights[0]) > SAME_M:
         text = message(
             "history_reference_height",
@@ -63,7 +63,7 @@ def _of_pair(before, one):
             other=other,
         )
         yield Problem(name, text)
-    zeros = _zero(before), _zero(one)
+    zeros = _zero(before), _zero(after)
     if None not in zeros and zeros[0] != zeros[1]:
         text = message(
             "history_other_zero",
@@ -75,16 +75,16 @@ def _of_pair(before, one):
         yield Problem(name, text)
 
 
-def _tank(one):
-    return {} if one.table.record is None else one.table.record["job"]
+def _tank(table):
+    return {} if table.table.record is None else table.table.record["job"]
 
 
-def _zero(one):
-    return None if one.table.record is None else one.table.record["capacity"].get("zero")
+def _zero(table):
+    return None if table.table.record is None else table.table.record["capacity"].get("zero")
 
 
-def _sizes(name, other, was, now):
-    """Other nominal sizes, or other courses."""
+def _sizes(name, former_name, was, now):
+    """Report changed nominal dimensions or courses."""
     for key in ("nominal_diameter_m", "nominal_height_m"):
         sizes = [(job.get("tank") or {}).get(key) for job in (was, now)]
         if None not in sizes and abs(sizes[1] - sizes[0]) > SAME_M:
@@ -94,10 +94,10 @@ def _sizes(name, other, was, now):
                 key=key,
                 new=sizes[1],
                 old=sizes[0],
-                other=other,
+                other=former_name,
             )
             yield Problem(name, text)
-    heights = [[one["height_m"] for one in job.get("courses") or ()] for job in (was, now)]
+    heights = [[course["height_m"] for course in job.get("courses") or ()] for job in (was, now)]
     if not all(heights):
         return
     same = len(heights[0]) == len(heights[1])
@@ -105,6 +105,6 @@ def _sizes(name, other, was, now):
         text = message(
             "history_other_courses",
             "courses of other heights than {other}: radii are compared by those of the newer one",
-            other=other,
+            other=former_name,
         )
         yield Problem(name, text)

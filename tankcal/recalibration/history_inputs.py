@@ -1,4 +1,4 @@
-"""What `tankcal history` is given: folders that hold results, saved files, former tables."""
+"""Input of `tankcal history`: folders of results, saved files, former tables."""
 
 import hashlib
 import json
@@ -20,25 +20,25 @@ from tankcal.record.inspection import INSPECTION, VERDICTS
 from tankcal.text.decoding import decode_text, find_encoding
 
 RECORD = "record.json"
-MOST_NAMED = 10  # tanks, in a message
+MOST_NAMED = 10  # largest number of tanks listed in a message
 TABLES = (".csv", ".xlsx", ".pdf", ".toml")
 
 
 @dataclass
 class Found:
-    """What lies in an archive.
+    """Content of an archive.
 
     Attributes
     ----------
     tables : list of DatedTable
     inspections : list of InspectionInHistory
     left_out : list of Problem
-        Files that no history can show, and why.
+        Files that cannot be part of a history, with the reason.
     warnings : list of Problem
     problems : list of Problem
-        Of files that cannot be read.
+        Unreadable files.
     ids : dict
-        {id of a tank: how many files are of it}.
+        {id of a tank: number of its files}.
     """
 
     tables: list = field(default_factory=list)
@@ -50,19 +50,21 @@ class Found:
 
 
 def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=None):
-    """The history of the tank whose results lie in folders.
+    """Return the history of the tank whose results are in the given folders.
 
     Parameters
     ----------
     paths : sequence of path
-        Folders, searched below for record.json and inspection.json; such files themselves; former
-        tables in any form that `read_former` reads, a former.toml with their date.
+        Folders, searched for record.json and inspection.json; such files; former tables in any form
+        that `read_former` reads, with a former.toml that states their date.
     tanks : sequence of str
-        Ids of the tank; files of others are passed over. None: all files must be of one tank.
+        Ids of the tank; files of other tanks are skipped. Empty: all files must be of one tank.
+    dips_m : sequence of float, optional
+        As in `history_of`.
     courses : path, optional
-        courses.csv of an upright tank, where no record has its courses.
-    dips_m, progress : optional
-        As of `history_of`.
+        courses.csv of an upright tank, if no record has its courses.
+    progress : callable, optional
+        As in `history_of`.
 
     Returns
     -------
@@ -71,75 +73,75 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=Non
     Raises
     ------
     InputError
-        With every file that cannot be read, for several tanks where none was asked for, and for
-        tables that cannot be of one tank.
+        With every unreadable file; for several tanks without `tanks`; and for tables that cannot be
+        of one tank.
     """
-    found = Found()
+    archive = Found()
     files = find_files(paths, progress)
     seen = {}
     for done, (path, name, is_sought) in enumerate(files):
         if progress is not None:
             progress(message("history_reading", "reading the files"), done, len(files))
         try:
-            _read(found, path, name, tanks, seen, is_sought)
+            _read(archive, path, name, tanks, seen, is_sought)
         except InputError as error:
-            found.problems += [
-                replace(one, file=name) if one.file in (path.name, RECORD) else one
-                for one in error.problems
+            archive.problems += [
+                replace(problem, file=name) if problem.file in (path.name, RECORD) else problem
+                for problem in error.problems
             ]
     log = Log()
     shell = None if courses is None else read_shell(Path(courses), log)
-    found.problems += log.problems
-    if found.problems:
-        raise InputError(found.problems)
-    _refuse_several(found, tanks, paths)
-    if not found.tables:
-        raise InputError(_nothing(found, tanks, paths))
+    archive.problems += log.problems
+    if archive.problems:
+        raise InputError(archive.problems)
+    _refuse_several(archive, tanks, paths)
+    if not archive.tables:
+        raise InputError(_nothing(archive, tanks, paths))
     return history_of(
-        found.tables,
-        found.inspections,
+        archive.tables,
+        archive.inspections,
         dips_m=dips_m,
         courses=shell,
-        left_out=found.left_out,
-        warnings=found.warnings,
+        left_out=archive.left_out,
+        warnings=archive.warnings,
         progress=progress,
     )
 
 
 def find_files(paths, progress=None):
-    """[(path, name as it is shown, whether it was found in a folder)] of all that may count.
+    """Return [(path, name shown, whether found in a folder)] of all candidate files.
 
-    Folders are walked without following links to other folders, so that no loop is endless; hidden
-    folders are passed over.
+    Links to other folders are not followed, which excludes endless loops. Hidden folders are
+    skipped.
     """
-    found, problems = [], []
-    for given in map(Path, paths):
-        if given.is_dir():
+    files, problems = [], []
+    for source in map(Path, paths):
+        if source.is_dir():
             if progress is not None:
-                text = message("history_searching", "searching {folder}", folder=str(given))
+                text = message("history_searching", "searching {folder}", folder=str(source))
                 progress(text, 0, 0)
-            for path in _below(given, problems):
-                found.append((path, len(path.relative_to(given).parts)))
-        elif given.is_file():
-            found.append((given, 0))
+            for path in _files_below(source, problems):
+                files.append((path, len(path.relative_to(source).parts)))
+        elif source.is_file():
+            files.append((source, 0))
         else:
             text = message(
                 "history_nothing_there",
                 "is not there; expected a folder with results, a record.json, an inspection.json "
                 "or a former table",
             )
-            problems.append(Problem(given.name or str(given), text))
+            problems.append(Problem(source.name or str(source), text))
     if problems:
         raise InputError(problems)
-    return _named(found)
+    return _name_files(files)
 
 
-def _named(found):
-    """(path, name, whether it was found in a folder): by as many folders as tell files apart.
+def _name_files(files):
+    """Return (path, name, whether found in a folder), named with enough folders to be unique.
 
-    found  (path, least number of parts of the name; 0: it was not found in a folder) of each
+    found: (path, fewest parts of the name, or 0 if not found in a folder) of each file.
     """
-    places = {Path(os.path.abspath(path)).parts: least for path, least in reversed(found)}
+    places = {Path(os.path.abspath(path)).parts: least for path, least in reversed(files)}
     tails, named = {}, []
     for parts, least in reversed(places.items()):
         count = max(least, 1)
@@ -150,14 +152,14 @@ def _named(found):
 
 
 def _count_tails(places, count, known):
-    """How many places end in the same so many parts; `known` keeps what was counted."""
+    """Number of paths that end in these `count` parts; `known` caches the counts."""
     if count not in known:
         known[count] = Counter(parts[-count:] for parts in places)
     return known[count]
 
 
-def _below(folder, problems):
-    """Paths of the files below a folder that may count; folders that cannot be read are told."""
+def _files_below(folder, problems):
+    """Paths of candidate files below a folder; unreadable folders are reported."""
 
     def tell(error):
         text = message(
@@ -168,42 +170,42 @@ def _below(folder, problems):
         problems.append(Problem(str(error.filename), text))
 
     for place, folders, files in os.walk(folder, onerror=tell):
-        folders[:] = sorted(one for one in folders if not one.startswith("."))
+        folders[:] = sorted(folder for folder in folders if not folder.startswith("."))
         for name in (RECORD, INSPECTION.file):
-            if name in files and Path(place, name).is_file():  # no pipe, no broken link
+            if name in files and Path(place, name).is_file():  # excludes pipes and broken links
                 yield Path(place, name)
 
 
-def _read(found, path, name, tanks, seen, is_sought):
-    """Put one file where it belongs."""
+def _read(archive, path, name, tanks, seen, is_sought):
+    """Read one file and add it to the archive."""
     if path.suffix.lower() in TABLES:
-        _take_former(found, path, name, seen)
+        _take_former(archive, path, name, seen)
         return
     data = path.read_bytes()
     content = data if find_encoding(data) == "utf-8" else _in_utf8(data, path)
-    if is_sought and tanks and not any(_may_name(content, one) for one in tanks):
+    if is_sought and tanks and not any(_may_name(content, tank) for tank in tanks):
         if content.rstrip()[-1:] != b"}":
             text = message("history_cut_off", "is cut off: of which tank it was is not known")
-            found.left_out.append(Problem(name, text))
+            archive.left_out.append(Problem(name, text))
         return
     saved = _parsed(content, path)
     kind = str(saved.get("format") or "") if isinstance(saved, dict) else ""
     if is_sought and not kind.startswith("tankcal-"):
         text = message("history_not_ours", "no file of tankcal: passed over")
-        found.left_out.append(Problem(name, text))
+        archive.left_out.append(Problem(name, text))
         return
     digest = hashlib.sha256(data).hexdigest()
     if kind.startswith(f"{INSPECTION.name}/"):
-        _take_inspection(found, INSPECTION.migrated(saved, path.name), name, digest, tanks, seen)
+        _take_inspection(archive, INSPECTION.migrated(saved, path.name), name, digest, tanks, seen)
     else:
-        _take_record(found, records.migrated(saved, path.name), path, name, digest, tanks, seen)
+        _take_record(archive, records.migrated(saved, path.name), path, name, digest, tanks, seen)
 
 
 def _may_name(content, tank):
-    """Whether bytes hold the id of a tank as JSON writes it: quick, for archives of many tanks."""
+    """Whether bytes contain the id of a tank as JSON; a fast filter for large archives."""
     return any(
-        json.dumps(tank, ensure_ascii=one).encode("utf-8", "replace") in content
-        for one in (False, True)
+        json.dumps(tank, ensure_ascii=is_ascii).encode("utf-8", "replace") in content
+        for is_ascii in (False, True)
     )
 
 
@@ -226,51 +228,51 @@ def _unreadable(error, path):
     return InputError(Problem(path.name, text))
 
 
-def _is_again(found, name, digest, seen):
-    """Whether the same file was read before; then a warning says so."""
+def _is_again(archive, name, digest, seen):
+    """Whether the file was read before; then a warning is added."""
     if digest not in seen:
         seen[digest] = name
         return False
     text = message(
         "history_same_file", "is the same file as {other}: it counts once", other=seen[digest]
     )
-    found.left_out.append(Problem(name, text))
+    archive.left_out.append(Problem(name, text))
     return True
 
 
-def _take_record(found, record, path, name, digest, tanks, seen):
+def _take_record(archive, record, path, name, digest, tanks, seen):
     tank = ((record["job"] or {}).get("tank") or {}).get("id")
     if tanks and tank not in tanks:
         return
-    if _is_again(found, name, digest, seen):
+    if _is_again(archive, name, digest, seen):
         return
     if tank is not None:
-        found.ids[tank] = found.ids.get(tank, 0) + 1
+        archive.ids[tank] = archive.ids.get(tank, 0) + 1
     if record["capacity"] is None:
         text = message("history_only_survey", "a survey that was only adjusted: it has no table")
-        found.left_out.append(Problem(name, text))
+        archive.left_out.append(Problem(name, text))
         return
-    _add_table(found, replace(read_former(path), name=name), digest)
+    _add_table(archive, replace(read_former(path), name=name), digest)
 
 
-def _take_former(found, path, name, seen):
+def _take_former(archive, path, name, seen):
     table = replace(read_former(path), name=name)
     digest = hashlib.sha256(rows_file(path).read_bytes()).hexdigest()
-    if not _is_again(found, name, digest, seen):
-        _add_table(found, table, digest)
+    if not _is_again(archive, name, digest, seen):
+        _add_table(archive, table, digest)
 
 
-def _add_table(found, table, digest):
-    found.warnings += table.warnings if table.record is None else ()
+def _add_table(archive, table, digest):
+    archive.warnings += table.warnings if table.record is None else ()
     day = _day(table.date)
     if day is None:
         text = message(
             "history_no_date",
             "without the date of its calibration: it has no place among the others",
         )
-        found.left_out.append(Problem(table.name, text))
+        archive.left_out.append(Problem(table.name, text))
         return
-    found.tables.append(DatedTable(table, digest, day))
+    archive.tables.append(DatedTable(table, digest, day))
 
 
 def _day(text):
@@ -280,15 +282,15 @@ def _day(text):
         return None
 
 
-def _take_inspection(found, saved, name, digest, tanks, seen):
+def _take_inspection(archive, saved, name, digest, tanks, seen):
     tank = saved["tank"]
     if tanks and tank["id"] not in tanks:
         return
-    if _is_again(found, name, digest, seen):
+    if _is_again(archive, name, digest, seen):
         return
-    found.ids[tank["id"]] = found.ids.get(tank["id"], 0) + 1
+    archive.ids[tank["id"]] = archive.ids.get(tank["id"], 0) + 1
     day = _day(tank["survey_date"])
-    found.inspections.append(
+    archive.inspections.append(
         InspectionInHistory(
             file=name,
             sha256=digest,
@@ -301,36 +303,36 @@ def _take_inspection(found, saved, name, digest, tanks, seen):
 
 
 def _worst_checks(checks):
-    """The worst figure of each check: by its verdict, then by value over limit."""
+    """Worst result of each check, by its verdict, then by value over limit."""
     worst = {}
-    for one in checks:
-        known = worst.get(one["code"])
-        if known is None or _gravity(one) > _gravity(known):
-            worst[one["code"]] = one
+    for check in checks:
+        known = worst.get(check["code"])
+        if known is None or _gravity(check) > _gravity(known):
+            worst[check["code"]] = check
     return [
         CheckInHistory(
-            code=one["code"],
-            unit=one["unit"],
-            value=one["value"],
-            U=one["U"],
-            limit=one["limit"] and one["limit"]["value"],
-            verdict=one["verdict"],
+            code=check["code"],
+            unit=check["unit"],
+            value=check["value"],
+            U=check["U"],
+            limit=check["limit"] and check["limit"]["value"],
+            verdict=check["verdict"],
         )
-        for one in worst.values()
+        for check in worst.values()
     ]
 
 
 def _gravity(check):
-    """How grave a figure is: what could not be judged hides behind nothing that passed."""
+    """Rank of a result; a result that could not be judged ranks above one that passed."""
     value = abs(check["value"] or 0.0)
     limit = check["limit"] and check["limit"]["value"]
     return -VERDICTS.index(check["verdict"]), value / limit if limit else value
 
 
-def _refuse_several(found, tanks, paths):
-    if tanks or len(found.ids) < 2:
+def _refuse_several(archive, tanks, paths):
+    if tanks or len(archive.ids) < 2:
         return
-    ids = sorted(found.ids)
+    ids = sorted(archive.ids)
     text = message(
         "history_several_tanks",
         "files of {count} tanks: {ids}; expected those of one: --tank ID, several times where one "
@@ -341,8 +343,8 @@ def _refuse_several(found, tanks, paths):
     raise InputError(Problem(Path(paths[0]).name or str(paths[0]), text))
 
 
-def _nothing(found, tanks, paths):
-    """Why there is no table, with what was found in place of one."""
+def _nothing(archive, tanks, paths):
+    """Message that no table was found, with the files found instead."""
     name = Path(paths[0]).name or str(paths[0])
     text = message(
         "history_no_table",
@@ -355,4 +357,4 @@ def _nothing(found, tanks, paths):
             "that id in or below it",
             tank=", ".join(tanks),
         )
-    return [Problem(name, text), *found.left_out]
+    return [Problem(name, text), *archive.left_out]

@@ -1,4 +1,4 @@
-"""What `tankcal compare` is given: two tables, what is declared of them, courses, a rule."""
+"""Input of `tankcal compare`: two tables, declared facts, courses, a rule."""
 
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -21,14 +21,14 @@ RECORD = "record.json"
 
 @dataclass(frozen=True)
 class Asked:
-    """What to compare, as paths.
+    """Paths of the tables to compare.
 
     Attributes
     ----------
     old, new : path
         Tables in any form that `read_former` reads, or folders of results.
     former, new_former : path or None
-        What is declared of them.
+        former.toml of each table.
     courses : path or None
         courses.csv.
     rule : str or None
@@ -44,7 +44,7 @@ class Asked:
 
 
 def compare_files(asked) -> ComparisonFile:
-    """Compare the tables of two files; all problems of all files are told at once.
+    """Compare the tables in two files; report all problems of all files together.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ def compare_files(asked) -> ComparisonFile:
     Raises
     ------
     InputError
-        With every problem of the tables, of what is declared of them, of courses.csv and the rule;
-        or with why the tables cannot be compared (`comparison.compare`).
+        With every problem of the tables, their former.toml, courses.csv and the rule; or if the
+        tables cannot be compared (`comparison.compare`).
     """
     log = Log()
     old, former = _table(asked.old, asked.former, log)
@@ -68,12 +68,14 @@ def compare_files(asked) -> ComparisonFile:
     log.stop_if_problems()
     if former.name == new.name:
         former, new = _with_folders((old, former), (recent, new))
-    fingerprints = tuple(sha256(rows_file(one).read_bytes()).hexdigest() for one in (old, recent))
+    fingerprints = tuple(
+        sha256(rows_file(source).read_bytes()).hexdigest() for source in (old, recent)
+    )
     return compare(former, new, rule=rule, courses=courses, fingerprints=fingerprints)
 
 
 def _table(source, declared, log):
-    """(path, FormerTable or None) of a file, or of the record in a folder of results."""
+    """Return (path, FormerTable or None) of a file, or of the record in a folder of results."""
     path = Path(source)
     if path.is_dir():
         folder, path = path, path / RECORD
@@ -92,7 +94,7 @@ def _table(source, declared, log):
 
 
 def _with_folders(*tables):
-    """Both FormerTables, named by as many of their folders as tell them apart."""
+    """Return both FormerTables, with enough folders in their names to make the names differ."""
     folders = [path.resolve().parent.parts for path, _ in tables]
     for count in range(1, max(map(len, folders))):
         first, second = ("/".join(parts[-count:]) for parts in folders)
@@ -105,7 +107,7 @@ def _with_folders(*tables):
 
 
 def rows_file(path):
-    """The file that holds the rows: beside a former.toml the one that it names."""
+    """Path of the file with the rows: for a former.toml, the file that it names."""
     if path.suffix.lower() != ".toml":
         return path
     content, _ = parsed_toml(path.name, path.read_bytes(), Log())
@@ -113,14 +115,17 @@ def rows_file(path):
 
 
 def read_shell(path, log):
-    """(heights, thicknesses) in a courses.csv, m, from the bottom up; None after telling `log`."""
-    found = read_courses(path, log)
-    if found is None:
+    """Return (heights, thicknesses) of a courses.csv, m, from the bottom up.
+
+    None after problems.
+    """
+    courses = read_courses(path, log)
+    if courses is None:
         return None
-    if np.isnan(found.heights_m).any():
+    if np.isnan(courses.heights_m).any():
         expected = message(
             "compare_no_height",
             "heights that are not known; expected all of them: tankcal read-table finds the seams",
         )
-        log.problem(found.file, expected, None, "height_m")
-    return found.heights_m, found.thickness_m
+        log.problem(courses.file, expected, None, "height_m")
+    return courses.heights_m, courses.thickness_m

@@ -1,4 +1,4 @@
-"""courses.csv beside a former table: rings whose heights may be unknown."""
+"""courses.csv of a former table: rings whose heights may be unknown."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +12,9 @@ from tankcal.job.folder import read_csv
 from tankcal.job.tables import read_bytes
 from tankcal.messages import message
 
-FIELDS = tuple(replace(one, required=False) if one.name == "height_m" else one for one in COLUMNS)
+FIELDS = tuple(
+    replace(field, required=False) if field.name == "height_m" else field for field in COLUMNS
+)
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Courses:
     file : str
     names : tuple of str
     heights_m : ndarray, shape (n,)
-        nan where it is not known.
+        nan if unknown.
     thickness_m : ndarray, shape (n,)
     """
 
@@ -34,7 +36,7 @@ class Courses:
     thickness_m: np.ndarray
 
     def first(self, count):
-        """The lowest of them."""
+        """Return the lowest `count` courses."""
         return replace(
             self,
             names=self.names[:count],
@@ -44,7 +46,7 @@ class Courses:
 
 
 def read_courses(path, log):
-    """`Courses` of a CSV file; None after telling `log` what is wrong with it."""
+    """Return the `Courses` of a CSV file; None after reporting its problems to `log`."""
     path = Path(path)
     if not path.exists():
         log.problem(path.name, message("read_no_file", "not found; expected a file of courses"))
@@ -75,7 +77,7 @@ def read_courses(path, log):
             log.problem(path.name, expected, row, "thickness_mm")
     if len(log.problems) > before:
         return None
-    heights = [np.nan if one is None else one for one in values.of("height_m")]
+    heights = [np.nan if height is None else height for height in values.of("height_m")]
     return Courses(
         path.name, tuple(values.of("course")), np.array(heights), np.array(plates) / 1000
     )

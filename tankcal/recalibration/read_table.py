@@ -1,4 +1,4 @@
-"""From a former table and its courses to what it says of its tank: the checks, and the dispatch."""
+"""Estimate the tank geometry from a former table and its courses: checks and dispatch."""
 
 from dataclasses import dataclass, replace
 
@@ -25,23 +25,24 @@ from tankcal.recalibration.upright_geometry import (
 
 FEWEST_ROWS = 8
 SOLIDS = "horizontal", "sphere"
-AS_GOOD, OTHER_PLACE_M = 1.05, 0.1  # of what is left; of seams that are not those declared
-LONG_M = 1.0  # of things in a tank
-ABOVE_M = 0.02  # that a table may go beyond its courses
-WORST_FIT = 5e-3  # of the highest volume, rms: rows that depart by more are of another tank
-LARGE_SHARE = 2e-3  # of the table, that a thing which may be a roof takes
+# Ratio of residuals of equally good fits, and smallest distance of a seam from a declared one.
+AS_GOOD, OTHER_PLACE_M = 1.05, 0.1
+LONG_M = 1.0  # height above which a fitting may be a misplaced seam
+ABOVE_M = 0.02  # largest height of a table above its courses
+WORST_FIT = 5e-3  # largest rms residual over the highest volume of a table of this tank
+LARGE_SHARE = 2e-3  # smallest share of the volume of a fitting that may be a roof
 
 
 @dataclass(frozen=True)
 class TableRead:
-    """What was read.
+    """Geometry estimated from a table.
 
     Attributes
     ----------
     former : FormerTable
     geometry : UprightGeometry, RecordedRadii, LyingGeometry or SolidFit
     names : tuple of str
-        Of the courses.
+        Names of the courses.
     job : JobOfTable
     warnings : tuple of Message
     """
@@ -131,7 +132,7 @@ def read_table(
 
 
 def _check_heights(former, courses):
-    """Refuse courses that have several seams of the table in them."""
+    """Refuse courses within which the table shows several seams."""
     heights = courses.heights_m
     if np.isnan(heights).any():
         return
@@ -144,7 +145,7 @@ def _check_heights(former, courses):
             "{seams} m, within this course; expected the height of one course",
             name=courses.names[number],
             height=float(heights[number]),
-            seams=[f"{one:.2f}" for one in seams],
+            seams=[f"{seam:.2f}" for seam in seams],
         )
         problems.append(Problem(courses.file, expected, number + 2, "height_m"))
     if problems:
@@ -152,7 +153,7 @@ def _check_heights(former, courses):
 
 
 def _read_computed(former, computed, courses, e_pa, bottom_m):
-    """TableRead of computed rows; None where each row may have been computed."""
+    """Return the TableRead of computed rows; None if each row may have been computed."""
     try:
         read = _read(former, computed.table(former), courses, e_pa, bottom_m)
     except TankcalError:
@@ -181,8 +182,8 @@ def _former(path, former_toml, log):
 
 
 def _read_solid(former, kind):
-    found = fit_sphere(former) if kind == "sphere" else fit_lying(former, former.dip_from_a_m)
-    fit = found if kind == "sphere" else found.best
+    geometry = fit_sphere(former) if kind == "sphere" else fit_lying(former, former.dip_from_a_m)
+    fit = geometry if kind == "sphere" else geometry.best
     share = fit.rms_m3 / former.volume_m3[-1]
     if fit.variance_factor > 1 and share > WORST_FIT:
         raise SolutionError(
@@ -196,11 +197,11 @@ def _read_solid(former, kind):
             )
         )
     job = job_of_solid(former, fit, tank_id=_tank_of(former))
-    return TableRead(former, found, (), job, (*_of_solid(found), *_of_job(former, 0.0)))
+    return TableRead(former, geometry, (), job, (*_of_solid(geometry), *_of_job(former, 0.0)))
 
 
-def _of_solid(found):
-    fit = getattr(found, "best", found)
+def _of_solid(geometry):
+    fit = getattr(geometry, "best", geometry)
     if fit.variance_factor > 1:
         yield message(
             "read_rough_solid",
@@ -215,12 +216,12 @@ def _of_solid(found):
             "count from the bottom: they are less by that",
             below=1000 * fit.below_bottom_m,
         )
-    others = getattr(found, "not_told_apart", ())
+    others = getattr(geometry, "not_told_apart", ())
     if others:
         yield message(
             "read_other_ends",
             "these ends fit as well: {ends}",
-            ends=[one.replace("_", " ") for one in others],
+            ends=[name.replace("_", " ") for name in others],
         )
 
 
@@ -256,7 +257,7 @@ def _check_bottom(former, bottom_m, log):
 
 
 def _fitting(former, courses):
-    """(the courses that the table reaches, warnings, whether their seams are known)."""
+    """Return the courses within the table, warnings, and whether the seams are known."""
     heights = courses.heights_m
     unknown = np.isnan(heights)
     last = float(former.height_m[-1])
@@ -294,12 +295,12 @@ def _fitting(former, courses):
 
 
 def _slack(former):
-    """What the bottom of the first course may be above the zero."""
+    """Largest possible height of the bottom of the first course above the zero, m."""
     return 0.35 + ABOVE_M if former.height_m[0] == 0 else ABOVE_M
 
 
 def _with_seams(former, courses):
-    """The courses with heights by the seams that the table shows."""
+    """Return the courses with heights from the seams that the table shows."""
     count = len(courses.names)
     seams = find_seams(former.height_m, former.volume_m3, sd_of_rows(former), count - 1)
     if len(seams) < count - 1:
@@ -315,9 +316,9 @@ def _with_seams(former, courses):
 
 
 def _read(former, chosen, courses, e_pa, bottom_m):
-    """TableRead of a FormerTable by the rows that are chosen of it, a FormerTable as well."""
+    """Return the TableRead of a FormerTable from selected rows, given as a FormerTable."""
     courses, warnings, seams_known = _fitting(chosen, courses)
-    found = read_upright(
+    geometry = read_upright(
         chosen,
         courses.heights_m,
         courses.thickness_m,
@@ -325,26 +326,30 @@ def _read(former, chosen, courses, e_pa, bottom_m):
         lowest_m=bottom_m,
         seams_known=seams_known,
     )
-    u_common = _u_common_m(former, found)
+    u_common = _u_common_m(former, geometry)
     job = job_of_geometry(
-        former, found, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
+        former, geometry, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
     )
     if seams_known:
-        warnings = (*warnings, *_other_seams(chosen, courses, found, e_pa, bottom_m))
-    told = (*warnings, *_of_geometry(former, found, seams_known), *_of_job(former, u_common))
-    return TableRead(former, found, courses.names, job, told)
+        warnings = (*warnings, *_other_seams(chosen, courses, geometry, e_pa, bottom_m))
+    messages = (*warnings, *_of_geometry(former, geometry, seams_known), *_of_job(former, u_common))
+    return TableRead(former, geometry, courses.names, job, messages)
 
 
-def _other_seams(former, courses, found, e_pa, bottom_m):
-    """What to say where seams elsewhere explain by fewer things what those declared leave over."""
-    declared = np.cumsum(found.heights_m)[:-1]
-    doubtful = [one for one in found.fittings if _may_be_seams(one, declared + found.zero_m.value)]
-    is_bulged = found.state.bulges_m is not None  # profiles take up what seams elsewhere show
-    is_doubtful = is_bulged or doubtful or found.roughness > 1
-    if found.seams_are == "found" or not is_doubtful:
+def _other_seams(former, courses, geometry, e_pa, bottom_m):
+    """Warn if other seams explain the residuals with fewer fittings than the declared seams."""
+    declared = np.cumsum(geometry.heights_m)[:-1]
+    doubtful = [
+        fitting
+        for fitting in geometry.fittings
+        if _may_be_seams(fitting, declared + geometry.zero_m.value)
+    ]
+    is_bulged = geometry.state.bulges_m is not None  # profiles absorb the effect of displaced seams
+    is_doubtful = is_bulged or doubtful or geometry.roughness > 1
+    if geometry.seams_are == "found" or not is_doubtful:
         return
     try:
-        other = read_upright(
+        alternative = read_upright(
             former,
             _with_seams(former, courses).heights_m,
             courses.thickness_m,
@@ -352,37 +357,40 @@ def _other_seams(former, courses, found, e_pa, bottom_m):
             lowest_m=bottom_m,
             seams_known=False,
         )
-    except TankcalError:  # no such seams: those declared stand
+    except TankcalError:  # no solution with other seams: the declared seams are kept
         return
-    seams = np.cumsum(other.heights_m)[:-1]
-    is_simpler = len(other.fittings) < len(found.fittings) or found.roughness > other.roughness
+    seams = np.cumsum(alternative.heights_m)[:-1]
+    is_simpler = (
+        len(alternative.fittings) < len(geometry.fittings)
+        or geometry.roughness > alternative.roughness
+    )
     if is_bulged:
-        is_simpler = other.state.bulges_m is None
-    is_as_good = other.rms_m3 <= AS_GOOD * max(found.rms_m3, found.expected_m3)
+        is_simpler = alternative.state.bulges_m is None
+    is_as_good = alternative.rms_m3 <= AS_GOOD * max(geometry.rms_m3, geometry.expected_m3)
     if is_simpler and is_as_good and np.any(abs(seams - declared) > OTHER_PLACE_M):
         yield message(
             "read_doubtful_seams",
             "the seams of courses.csv ({declared} m above the bottom) do not fit the table: with "
             "seams at {seams} m less is left over, or in the tank; check the heights of the "
             "courses, what is told of things in the tank may be none",
-            declared=[f"{one:.2f}" for one in declared],
-            seams=[f"{one:.2f}" for one in seams],
+            declared=[f"{seam:.2f}" for seam in declared],
+            seams=[f"{seam:.2f}" for seam in seams],
         )
 
 
 def _may_be_seams(thing, seams):
-    """Whether a thing is long, or ends at a declared seam: what seams elsewhere look like."""
+    """Whether a fitting is long or ends at a declared seam, so that it may be a displaced seam."""
     ends = np.array([thing.bottom_m.value, thing.top_m.value])
     return ends[1] - ends[0] > LONG_M or np.any(abs(ends[:, None] - seams) < OTHER_PLACE_M)
 
 
-def _u_common_m(former, found):
-    """Standard uncertainty of all radii together, by the U of the former table; 0: not known."""
+def _u_common_m(former, geometry):
+    """Common standard uncertainty of all radii, from U of the former table, m; 0 if unknown."""
     if former.U_m3 is None:
         return 0.0
     upper = former.height_m > 0.5 * former.height_m[-1]
     relative = np.median(former.U_m3[upper] / former.volume_m3[upper]) / former.k
-    return float(relative * np.mean(found.radii_m) / 2)
+    return float(relative * np.mean(geometry.radii_m) / 2)
 
 
 def _tank_of(former):
@@ -391,49 +399,49 @@ def _tank_of(former):
     return str(former.name).partition(",")[0].rpartition(".")[0] or "tank"
 
 
-def _of_geometry(former, found, seams_known):
-    """What has to be known before the radii are used."""
-    if found.roughness > 1:
+def _of_geometry(former, geometry, seams_known):
+    """Messages about the geometry that the user must consider before using the radii."""
+    if geometry.roughness > 1:
         yield message(
             "read_rough",
             "the rows depart by {rms:.3g} L (rms) from such a tank, rounding leaves {expected:.3g} "
             "L: there is more in this table than courses, head and things in the tank; u is "
             "{factor:.3g} times that of rounding",
-            rms=1000 * found.rms_m3,
-            expected=1000 * found.expected_m3,
-            factor=found.roughness,
+            rms=1000 * geometry.rms_m3,
+            expected=1000 * geometry.expected_m3,
+            factor=geometry.roughness,
         )
-    yield from _of_density(former.liquid_density_kg_m3, found)
-    if found.state.bulges_m is not None:
+    yield from _of_density(former.liquid_density_kg_m3, geometry)
+    if geometry.state.bulges_m is not None:
         yield message(
             "read_bulges",
             "the courses bulge, up to {largest:.2g} mm from their mean radius: profiles of the "
             "courses are estimated, too, and less is known of head, zero and things in the tank",
-            largest=1000 * largest_bulge_m(found.state.bulges_m),
+            largest=1000 * largest_bulge_m(geometry.state.bulges_m),
         )
-    if found.seams_are == "found" and seams_known:
+    if geometry.seams_are == "found" and seams_known:
         yield message(
             "read_other_seams",
             "the seams are not where courses.csv has them; the radii are for the seams that were "
             "found",
         )
     total = float(former.volume_m3[-1])
-    for one in found.fittings:
-        if -one.volume_m3.value > LARGE_SHARE * total and former.roof is None:
+    for fitting in geometry.fittings:
+        if -fitting.volume_m3.value > LARGE_SHARE * total and former.roof is None:
             yield message(
                 "read_like_roof",
                 "{volume:.4g} m3 less from {bottom:.3f} to {top:.3f} m: is that a floating roof? "
                 "Its mass is needed then ([roof] of former.toml)",
-                volume=-one.volume_m3.value,
-                bottom=one.bottom_m.value,
-                top=one.top_m.value,
+                volume=-fitting.volume_m3.value,
+                bottom=fitting.bottom_m.value,
+                top=fitting.top_m.value,
             )
 
 
-def _of_density(declared, found):
-    """What the density of the head is compared with: those of liquids, and the declared one."""
-    density = found.density_kg_m3
-    held = found.state.density_kg_m3
+def _of_density(declared, geometry):
+    """Compare the estimated density of the head with liquids and with the declared density."""
+    density = geometry.density_kg_m3
+    held = geometry.state.density_kg_m3
     if not is_possible(density):
         yield message(
             "read_strange_density",
@@ -443,7 +451,7 @@ def _of_density(declared, found):
             u=density.u,
             held=held,
         )
-    value = 0.0 if found.head == "without" else density.value
+    value = 0.0 if geometry.head == "without" else density.value
     if declared is None or abs(declared - value) <= 3 * density.u + 0.001 * declared:
         return
     if abs(held - declared) <= 3 * DECLARED_SD_KG_M3:
@@ -468,7 +476,7 @@ def _of_density(declared, found):
 
 
 def _of_job(former, u_common):
-    """What the job lacks because nobody declared it."""
+    """Messages about values that the job lacks because they are not declared."""
     if former.record is None and u_common == 0:
         yield message(
             "read_no_U",

@@ -1,4 +1,4 @@
-"""A former table from its file: rows by the linter's readers, the rest by former.toml."""
+"""Read a former table: rows with the linter's readers, other facts from former.toml."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,9 +14,9 @@ from tankcal.recalibration.former import FormerRoof, FormerTable
 from tankcal.record import load
 from tankcal.record.covariance_factor import factor_of
 
-MOST_FINDINGS = 20  # of the linter, that a refusal repeats
+MOST_FINDINGS = 20  # largest number of linter findings listed in an error
 USUAL_K = 2.0
-COLUMNS = ("volume_m3", "stated_U_m3", "k")  # of a table in a record
+COLUMNS = ("volume_m3", "stated_U_m3", "k")  # columns of the table in a record
 _RECORD_VALUES = (
     "reference_temperature_c", "liquid_density_kg_m3", "reference_height_m", "date", "method",
     "laboratory", "number", "kind", "dip_from_a_m",
@@ -82,7 +82,7 @@ def read_former(path, former_toml=None) -> FormerTable:
 
 
 def _named_file(declared, path, log):
-    """The table's file that a former.toml names; InputError where it names none."""
+    """Return the file of the table named in a former.toml; raise InputError if none is named."""
     if declared["file"] is None:
         if not log.problems:
             expected = message("former_no_file", "missing; expected the table's file")
@@ -112,7 +112,7 @@ def _check_name(declared, path, log):
 
 
 def _rows(path, declared, log):
-    """(TableRows or None, warnings), the linter's errors told to `log`."""
+    """Return (TableRows or None, warnings); errors of the linter are reported to `log`."""
     try:
         rows, report = read_rows(
             path, log, declared["sheet"], declared.units, declared["volume_column"]
@@ -120,7 +120,7 @@ def _rows(path, declared, log):
     except InputError as error:
         log.problems += error.problems[:MOST_FINDINGS]
         return None, ()
-    errors = [one.problem for one in report.findings if one.severity == "error"]
+    errors = [finding.problem for finding in report.findings if finding.severity == "error"]
     if errors:
         expected = message(
             "former_is_wrong",
@@ -131,18 +131,18 @@ def _rows(path, declared, log):
         log.problem(path.name, expected)
         log.problems += errors[:MOST_FINDINGS]
         return None, ()
-    return rows, tuple(one.problem for one in report.findings)
+    return rows, tuple(finding.problem for finding in report.findings)
 
 
 def _record(path):
-    """The record in a file, of the last version; None of any other file."""
+    """Return the record in a file, migrated to the latest version; None for any other file."""
     with path.open("rb") as file:
         start = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")
     return load(path) if path.suffix.lower() == ".json" or start[:1] == b"{" else None
 
 
 def _of_rows(path, rows, declared, log):
-    """FormerTable of rows and of what is declared."""
+    """Return the FormerTable of rows and of declared facts."""
     height = rows.height_m
     if rows.is_ullage:
         height = _dips(rows, declared, log)
@@ -165,7 +165,7 @@ def _of_rows(path, rows, declared, log):
 
 
 def _dips(rows, declared, log):
-    """(rows,) dips of ullages, by the reference height."""
+    """Return dips (rows,) from ullages and the reference height."""
     reference = declared["reference_height_m"]
     if reference is None:
         expected = message(
@@ -190,7 +190,7 @@ def _dips(rows, declared, log):
 
 
 def _uncertainty(rows, declared, log):
-    """((rows,) U in m3 or None, k), of the table or as declared."""
+    """Return ((rows,) U in m3 or None, k), from the table or as declared."""
     k = rows.k if rows.k is not None else declared["k"]
     in_table = rows.U_m3 is not None or rows.u_m3 is not None
     if declared.uncertainty is not None and in_table:
@@ -221,7 +221,7 @@ def _uncertainty(rows, declared, log):
 
 
 def _of_record(path, record, declared, log):
-    """FormerTable of a record; what is declared beside it must not contradict it."""
+    """Return the FormerTable of a record; declared facts must not contradict it."""
     factor_m3 = _factor_of(record["capacity"], path, log)
     table, job = record["capacity"], record["job"]
     certificate, choices = job.get("certificate") or {}, _choices(record)
@@ -239,15 +239,15 @@ def _of_record(path, record, declared, log):
         "dip_from_a_m": (job.get("horizontal") or {}).get("dip_from_a_m"),
     }
     for key in _RECORD_VALUES:
-        said = declared[key]
+        stated = declared[key]
         if values[key] is None:
-            values[key] = said
-        elif said is not None and not _same(said, values[key]):
+            values[key] = stated
+        elif stated is not None and not _same(stated, values[key]):
             expected = message(
                 "former_against_record",
                 "found {found}, but the record has {has}; expected no such key: it is taken from "
                 "the record",
-                found=str(said),
+                found=str(stated),
                 has=str(values[key]),
             )
             declared.tell(log, key, expected)
@@ -273,7 +273,10 @@ def _of_record(path, record, declared, log):
 
 
 def _factor_of(table, path, log):
-    """The factor of a record's table; InputError where columns are not as long as its heights."""
+    """Return the covariance factor of a record's table.
+
+    Raise InputError for inconsistent lengths.
+    """
     rows = len(table["height_m"])
     lengths = {name: len(table[name]) for name in COLUMNS}
     lengths["factor"] = sum(block["rows"] for block in table["factor"])
@@ -300,18 +303,18 @@ def _factor_of(table, path, log):
 
 
 def _choices(record):
-    return {one["code"]: one["value"] for one in record["choices"]}
+    return {choice["code"]: choice["value"] for choice in record["choices"]}
 
 
-def _same(said, has):
-    if isinstance(said, int | float) and isinstance(has, int | float):
-        return abs(said - has) <= 1e-9 * max(abs(said), abs(has))
-    return said == has
+def _same(stated, has):
+    if isinstance(stated, int | float) and isinstance(has, int | float):
+        return abs(stated - has) <= 1e-9 * max(abs(stated), abs(has))
+    return stated == has
 
 
 def _roof_of(record):
-    """FormerRoof whose displacement the record's table has deducted, or None."""
-    details = {one["code"]: one["value"] for one in record.get("roof") or ()}
+    """Return the FormerRoof deducted in the record's table, or None."""
+    details = {roof["code"]: roof["value"] for roof in record.get("roof") or ()}
     if not details or _choices(record).get("roof") == "off":
         return None
     critical = details.get("roof_critical_bottom"), details.get("roof_critical_top")

@@ -1,4 +1,4 @@
-"""The radii of a saved result, with the covariance that its capacity table has."""
+"""Radii of a saved result, with their covariance from its capacity table."""
 
 from dataclasses import dataclass
 
@@ -10,15 +10,15 @@ from tankcal.messages import message
 
 @dataclass(frozen=True)
 class RecordedRadii:
-    """Radii of the courses of a record.
+    """Radii of the courses in a record.
 
     Attributes
     ----------
     names : tuple of str
     radii_m : ndarray, shape (n,)
-        Inside, empty, at the temperature of the record's table.
+        Inside radii of the empty tank at the temperature of the record's table.
     covariance_m2 : ndarray, shape (n, n)
-        By the covariance of the rows of its table.
+        From the covariance of the rows of its table.
     heights_m, thickness_m : ndarray, shape (n,)
     """
 
@@ -30,17 +30,17 @@ class RecordedRadii:
 
     @property
     def u_m(self):
-        """(n,) standard uncertainties."""
+        """Standard uncertainties (n,), m."""
         return np.sqrt(np.diag(self.covariance_m2))
 
 
 def read_recorded(former):
-    """Radii out of the record that a former table is of.
+    """Return the radii in the record of a former table.
 
     Parameters
     ----------
     former : FormerTable
-        With its record.
+        Table with its record.
 
     Returns
     -------
@@ -49,8 +49,8 @@ def read_recorded(former):
     Raises
     ------
     InputError
-        For a tank that is not upright, that held liquid while it was measured, or a course that
-        no two rows of the table are in.
+        For a tank that is not upright, or that held liquid during the survey, or a course with
+        fewer than two rows of the table.
     """
     record = former.record
     courses = record.get("courses") or []
@@ -66,20 +66,20 @@ def read_recorded(former):
         )
         _refuse(former, expected)
     zero = record["capacity"].get("zero_m") or 0.0
-    radii = np.array([one["inside_radius_m"] for one in courses])
-    parts = [_by_rows(former, one, zero) for one in courses]
+    radii = np.array([course["inside_radius_m"] for course in courses])
+    parts = [_by_rows(former, course, zero) for course in courses]
     factor = np.array(parts) / (2 * np.pi * radii[:, None])
     return RecordedRadii(
-        tuple(one["course"] for one in courses),
+        tuple(course["course"] for course in courses),
         radii,
         factor @ factor.T,
-        np.array([one["height_m"] for one in courses]),
-        np.array([one["thickness_m"] for one in courses]),
+        np.array([course["height_m"] for course in courses]),
+        np.array([course["thickness_m"] for course in courses]),
     )
 
 
 def _by_rows(former, course, zero):
-    """(inputs,) derivative factor of the mean area between the rows of a course."""
+    """Covariance factor (inputs,) of the mean area between the rows of a course."""
     low, high = course["bottom_m"] - zero, course["top_m"] - zero
     rows = np.flatnonzero((former.height_m >= low - 1e-6) & (former.height_m <= high + 1e-6))
     if len(rows) < 2:

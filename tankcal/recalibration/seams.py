@@ -1,23 +1,24 @@
-"""Seams that nobody declared: where the second difference of a table jumps."""
+"""Undeclared seams: dips where the second difference of a table jumps."""
 
 import numpy as np
 
-LEAST_APART_M = 0.8  # of two seams, and of a seam from the ends of the table
+LEAST_APART_M = 0.8  # smallest distance of two seams, and of a seam from the ends of the table
 PLACES_APART_M = 0.01
-LEAST_GAIN = 30.0  # of chi2 by a seam
-MOST_ROWS = 300  # that heights of courses are checked by
-ABOVE_BOTTOM_M = 0.4  # of rows that heights of courses are checked by
-FROM_ENDS_M = 0.3  # of a course, that a seam within it is away
-WIDEST_PLATE_M, TALL = 3.1, 1.4  # of a course; over the median: only taller courses are checked
-CLEAR_RATIO = 30.0  # of chi2, between the seams that are declared and those that the table shows
-OPPOSITE = 0.25  # of the larger of two jumps of the area: a thing in the tank begins and ends there
+LEAST_GAIN = 30.0  # smallest reduction of chi2 by a seam
+MOST_ROWS = 300  # largest number of rows for checking heights of courses
+ABOVE_BOTTOM_M = 0.4  # lowest row for checking heights of courses
+FROM_ENDS_M = 0.3  # smallest distance of a seam within a course from its ends
+# Height of a course, and height over the median; only taller courses are checked.
+WIDEST_PLATE_M, TALL = 3.1, 1.4
+CLEAR_RATIO = 30.0  # ratio of chi2 with declared seams to chi2 with seams from the table
+OPPOSITE = 0.25  # relative sum of two opposite jumps of area that are the ends of a fitting
 
 
 def find_seams(dips_m, volumes_m3, sd_m3, count):
-    """Dips of the seams, rising; fewer than `count` where fewer can be found.
+    """Dips of the seams, rising; fewer than `count` if fewer are significant.
 
-    A parabola for each ring, the next one meeting it at the seam: seams are added one after the
-    other where they lower chi2 most, and moved again while the others stand.
+    Each ring is a parabola that meets the next one at the seam. Seams are added in order of their
+    reduction of chi2. After each addition the other seams are moved again.
 
     Parameters
     ----------
@@ -45,7 +46,7 @@ def find_seams(dips_m, volumes_m3, sd_m3, count):
 
 
 def find_seams_within(dips_m, volumes_m3, sd_m3, heights_m):
-    """Dips of the seams that a table shows within each declared course; empty where these fit.
+    """Dips of the seams that a table shows within each declared course; empty if the courses fit.
 
     Parameters
     ----------
@@ -56,7 +57,7 @@ def find_seams_within(dips_m, volumes_m3, sd_m3, heights_m):
     Returns
     -------
     dict of {int: list of float}
-        For the courses with two or more seams in them.
+        Courses with two or more seams in them.
     """
     tall = np.flatnonzero((heights_m > WIDEST_PLATE_M) | (heights_m > TALL * np.median(heights_m)))
     some = np.flatnonzero((volumes_m3 > 0) & (dips_m > dips_m[0] + ABOVE_BOTTOM_M))
@@ -87,20 +88,20 @@ def find_seams_within(dips_m, volumes_m3, sd_m3, heights_m):
 
 
 def _chi2(dips, volumes, sds, seams):
-    """(chi2 of a parabola for each ring, (seams,) jumps of the slope)."""
+    """Return chi2 of a parabola for each ring, and the jumps (seams,) of the slope."""
     x = dips / dips[-1]
     columns = [np.ones_like(x), x, x**2]
     for seam in seams:
         above = np.maximum(x - seam / dips[-1], 0.0)
         columns += [above, above**2]
     basis = np.column_stack(columns) / sds[:, None]
-    found = np.linalg.lstsq(basis, volumes / sds, rcond=None)[0]
-    left = volumes / sds - basis @ found
-    return float(left @ left), found[3::2]
+    solution = np.linalg.lstsq(basis, volumes / sds, rcond=None)[0]
+    left = volumes / sds - basis @ solution
+    return float(left @ left), solution[3::2]
 
 
 def _gains(dips, volumes, sds, seams, places):
-    """(places,) by how much one seam more lowers chi2; 0 near one that is there."""
+    """Reduction (places,) of chi2 by another seam; 0 near an existing seam."""
     x = dips / dips[-1]
     columns = [np.ones_like(x), x, x**2]
     for seam in seams:

@@ -1,7 +1,7 @@
-"""One fit of a lying tank or a sphere to the rows of its capacity table, by least squares.
+"""Least-squares fit of a lying tank or a sphere to the rows of its capacity table.
 
-The volumes are those of `tankcal.tank.solids`. Weights: volumes rounded to q have a standard
-deviation of q / sqrt(12), and rounded dips one of their own times the area of the surface.
+Volumes are those of `tankcal.tank.solids`. Volumes rounded to q have a standard deviation of
+q / sqrt(12). Rounded dips contribute their own standard deviation times the area of the surface.
 """
 
 from dataclasses import dataclass, replace
@@ -15,41 +15,41 @@ from tankcal.tank.heads import End, standard_end
 from tankcal.tank.solids import LyingTank, Sphere
 
 FEWEST_ROWS = 8
-MOST_ROWS = 120  # that ends and tilt are chosen by; the sizes are of all rows
+MOST_ROWS = 120  # rows used to choose ends and tilt; all rows determine the dimensions
 LARGEST_TILT = 0.1
-HIGHEST_PART = 30.0  # diameter over the highest row: a table may end near the bottom
-_SPREAD = 0.8  # variance of the square of a rounding error over its own variance
-_FINEST = 1e-9  # of the highest volume: what a table without rounding is exact to
-_BOUND = 1e-4  # of D: an end that comes so near to a limit of its form is at it
-_STEEP = 1e-6  # relative: below, an unknown is not determined
+HIGHEST_PART = 30.0  # largest ratio of diameter to highest row of a table
+_SPREAD = 0.8  # variance of the squared rounding error, relative to the squared variance
+_FINEST = 1e-9  # relative precision of a table without rounding
+_BOUND = 1e-4  # distance from a limit of the form of an end, relative to D, that counts as zero
+_STEEP = 1e-6  # relative size below which an unknown is not determined
 
 
-def _tied(kind, depth):
-    """End of fixed proportions: its depth a part of the diameter."""
+def _proportional_end(kind, depth):
+    """Return an end of fixed proportions, with its depth as a share of the diameter."""
     return lambda diameter, _: End(kind, depth * diameter)
 
 
-def _standard(name):
-    """Torispherical end of a standard form."""
+def _standard_end(name):
+    """Return a torispherical end of a standard form."""
     return lambda diameter, _: standard_end(End("torispherical"), name, diameter)
 
 
-def _free(kind):
-    """End of a depth of its own."""
+def _free_end(kind):
+    """Return an end with an independent depth."""
     return lambda _, depth: End(kind, depth)
 
 
-# name: (its End of D and depth, whether the depth is an unknown, depth to start from in D)
+# name: (End as a function of D and depth, whether depth is an unknown, start depth over D)
 ENDS = {
     "flat": (lambda *_: End("flat"), False, 0.0),
-    "hemispherical": (_tied("spherical", 0.5), False, 0.5),
-    "ellipsoidal_2_to_1": (_tied("ellipsoidal", 0.25), False, 0.25),
-    "torispherical_din_28011": (_standard("din_28011"), False, 0.19),
-    "torispherical_din_28013": (_standard("din_28013"), False, 0.25),
-    "torispherical_asme": (_standard("asme"), False, 0.17),
-    "spherical": (_free("spherical"), True, 0.15),
-    "ellipsoidal": (_free("ellipsoidal"), True, 0.2),
-    "conical": (_free("conical"), True, 0.15),
+    "hemispherical": (_proportional_end("spherical", 0.5), False, 0.5),
+    "ellipsoidal_2_to_1": (_proportional_end("ellipsoidal", 0.25), False, 0.25),
+    "torispherical_din_28011": (_standard_end("din_28011"), False, 0.19),
+    "torispherical_din_28013": (_standard_end("din_28013"), False, 0.25),
+    "torispherical_asme": (_standard_end("asme"), False, 0.17),
+    "spherical": (_free_end("spherical"), True, 0.15),
+    "ellipsoidal": (_free_end("ellipsoidal"), True, 0.2),
+    "conical": (_free_end("conical"), True, 0.15),
 }
 
 
@@ -61,15 +61,15 @@ class SolidFit:
     ----------
     kind : {"horizontal", "sphere"}
     ends : str or None
-        Of a lying tank, a name of `ENDS`.
+        Form of the ends of a lying tank, a name of `ENDS`.
     names : tuple of str
-        Of the unknowns: "diameter", "length", "zero", "end_depth", "tilt".
+        Unknowns: "diameter", "length", "zero", "end_depth", "tilt".
     values, u : (unknowns,) ndarray
-        In m (the tilt: its tangent) with standard uncertainties by rounding alone; where the
-        residuals are larger than rounding allows, by the residuals. inf: not determined.
+        Values in m (tilt: tangent) and standard uncertainties by rounding only. If the residuals
+        exceed rounding, u is scaled by the residuals. inf: not determined.
     covariance : (unknowns, unknowns) ndarray
     residuals_m3 : (rows,) ndarray
-        Table less solid.
+        Table minus solid.
     rms_m3 : float
     chi2 : float
         Sum of squares of the residuals over their standard deviations by rounding.
@@ -90,29 +90,30 @@ class SolidFit:
     tank: LyingTank | Sphere
 
     def __getitem__(self, name):
-        """(value, u) of an unknown."""
+        """Value and u of an unknown."""
         k = self.names.index(name)
         return float(self.values[k]), float(self.u[k])
 
     @property
     def below_bottom_m(self):
-        """How far the table's dips begin below the inside bottom; 0 where that is no more than u.
+        """Height of the inside bottom above the zero of the dips, m; 0 if not larger than u.
 
-        A job has no dip plate there: its dips are less than the table's by this.
+        A job has no dip plate below the bottom. Its dips are smaller than those of the table by
+        this height.
         """
         zero, u = self["zero"]
         return max(-zero, 0.0) if -zero > 3 * u else 0.0
 
     @property
     def mirrored(self):
-        """(tilt, zero) that give the same volumes: a tilt the other way, of another zero."""
+        """Tilt of opposite sign, and the zero with which it gives the same volumes."""
         tilt, tank = self["tilt"][0], self.tank
         shift = tilt * (tank.length_m / 2 - tank.dip_from_a_m) / np.hypot(1.0, tilt)
         return -tilt, self["zero"][0] - 2 * shift
 
     @property
     def variance_factor(self):
-        """chi2 over dof where that is more than rounding may leave, else 1."""
+        """chi2 over dof if it exceeds the range expected from rounding, else 1."""
         return _variance_factor(self.chi2, self.dof)
 
 
@@ -126,7 +127,7 @@ class WetRows:
 
     @classmethod
     def of(cls, former):
-        """Those of a `FormerTable`; InputError for fewer than 8."""
+        """Return the wet rows of a `FormerTable`; raise InputError for fewer than 8."""
         quantum = former.volume_quantum_m3
         sd = np.full(len(former.volume_m3), quantum / np.sqrt(12))
         if former.height_rounding_m is not None:
@@ -145,7 +146,7 @@ class WetRows:
         return cls(former.height_m[wet], former.volume_m3[wet], sd[wet])
 
     def thinned(self):
-        """At most MOST_ROWS of them, evenly."""
+        """Return at most MOST_ROWS evenly chosen rows."""
         if len(self.height) <= MOST_ROWS:
             return self
         kept = np.unique(np.linspace(0, len(self.height) - 1, MOST_ROWS).round().astype(int))
@@ -153,21 +154,35 @@ class WetRows:
 
 
 def flat_start(rows):
-    """(D, L, 0) of the flat-ended tank of the nearest volumes, D on a grid."""
-    found = []
+    """Return (D, L, 0) of the flat-ended tank with the nearest volumes, D on a grid."""
+    candidates = []
     for part in np.append(np.linspace(0.98, 2.0, 103), np.geomspace(2.05, HIGHEST_PART, 60)):
         diameter = part * rows.height[-1]
         unit = _volumes(LyingTank(diameter, diameter, 1.0), rows.height)
         length = float(unit @ rows.volume / (unit @ unit))
-        found.append((np.sum((length * unit - rows.volume) ** 2), diameter, length))
-    _, diameter, length = min(found)
+        candidates.append((np.sum((length * unit - rows.volume) ** 2), diameter, length))
+    _, diameter, length = min(candidates)
     return diameter, length, 0.0
 
 
 def fit_ends(rows, name, diameter, length, zero, dip_from_a_m, rest=(), tilt=None, is_held=False):
-    """SolidFit with ends of a kind, or None where there is none.
+    """Return the SolidFit with ends of one form, or None if there is no solution.
 
-    tilt  None: level; else an unknown that starts there, or that is held there
+    Parameters
+    ----------
+    rows : WetRows
+    name : str
+        Form of the ends, a name of `ENDS`.
+    diameter, length, zero : float
+        Start values, m.
+    dip_from_a_m : float or None
+        Position of the dip along the axis; None: half the length.
+    rest : sequence of float, optional
+        Start value of the depth of the ends.
+    tilt : float, optional
+        None for a level tank, else the start value of the tilt, or its fixed value.
+    is_held : bool, optional
+        Whether the tilt is fixed.
     """
     end_of, is_free, part = ENDS[name]
     names = ("diameter", "length", "zero")
@@ -193,7 +208,20 @@ def fit_ends(rows, name, diameter, length, zero, dip_from_a_m, rest=(), tilt=Non
 
 
 def fit_solid(rows, kind, ends, names, start, solid):
-    """SolidFit by least squares; SolutionError where the unknowns leave what a tank can be."""
+    """Return the least-squares SolidFit; raise SolutionError if the unknowns leave their range.
+
+    Parameters
+    ----------
+    rows : WetRows
+    kind : {"horizontal", "sphere"}
+    ends : str or None
+    names : tuple of str
+        Names of the unknowns.
+    start : ndarray, shape (unknowns,)
+        Start values.
+    solid : callable
+        Function of the unknowns that returns the tank.
+    """
     far, zero = 1e6 * np.ones(len(rows.height)), names.index("zero")
 
     def residuals(x):
@@ -214,6 +242,7 @@ def fit_solid(rows, kind, ends, names, start, solid):
     if np.any(at_limit):
         raise SolutionError(no_fit())
     chi2, dof = float(solved.fun @ solved.fun), len(rows.height) - len(names)
+    # Scaled unknowns of similar size make the rank decision independent of their units.
     covariance, u = _covariance(solved.jac * scale, scale, _variance_factor(chi2, dof))
     left = solved.fun * rows.sd
     return SolidFit(
@@ -224,6 +253,7 @@ def fit_solid(rows, kind, ends, names, start, solid):
 
 def _variance_factor(chi2, dof):
     factor = chi2 / dof
+    # The factor applies only if it exceeds its expectation by three standard deviations.
     return factor if factor > 1 + 3 * np.sqrt(_SPREAD / dof) else 1.0
 
 
@@ -240,20 +270,24 @@ def _limits(names, start):
 
 
 def _covariance(jacobian, scale, factor):
-    """(covariance, u) of the unknowns; inf where the rows do not determine one."""
+    """Return (covariance, u) of the unknowns; inf if the rows do not determine one of them."""
     _, values, rows = np.linalg.svd(jacobian, full_matrices=False)
     good = values > _STEEP * values[0]
     inverse = (rows[good].T / values[good] ** 2) @ rows[good]
+    # unknowns with a share in the undetermined directions
     lost = (rows[~good] ** 2).sum(axis=0) > 1e-6
     covariance = factor * inverse * np.outer(scale, scale)
     return covariance, np.where(lost, np.inf, np.sqrt(np.diag(covariance)))
 
 
 def _volumes(tank, dips_m):
-    """Volumes at dips, those below the bottom and above the top as there."""
+    """Volumes at dips.
+
+    Those of the empty tank below the bottom, and of the full tank above the top.
+    """
     return tank.volume_m3(np.clip(dips_m, 0.0, tank.top_m))
 
 
 def no_fit():
-    """Message where no solid fits."""
+    """Return the message that no solid fits."""
     return message("former_no_solid", "no tank of this kind fits the volumes of the table")

@@ -1,7 +1,7 @@
-"""Sizes of lying tanks and spheres out of their capacity table, and a job that declares them.
+"""Dimensions of lying tanks and spheres from their capacity table, and a job that declares them.
 
-A lying tank has D, L, the zero of its dips and ends that are told apart by how well they fit. One
-fit of one form is `tankcal.recalibration.solid_fit`.
+A lying tank has diameter D, length L, the zero of its dips, and ends whose form is chosen by the
+quality of the fit. `tankcal.recalibration.solid_fit` fits one form.
 """
 
 from dataclasses import dataclass
@@ -23,35 +23,35 @@ from tankcal.recalibration.solid_fit import (
 )
 from tankcal.tank.solids import Sphere
 
-TOLD_APART = 9.0  # chi-squared above the least: three standard deviations of one unknown
-TILTS = (-0.005, 0.005)  # to start from
-NEAR = 4.0  # chi-squared above the least: two standard deviations
-LARGEST_RATIO = 1.1  # of diameters that fit as well
+TOLD_APART = 9.0  # excess of chi-squared that excludes a form: three sds of one unknown
+TILTS = (-0.005, 0.005)  # start values
+NEAR = 4.0  # excess of chi-squared at the limits of a tilt: two standard deviations
+LARGEST_RATIO = 1.1  # largest ratio of diameters that fit equally well
 _HALVINGS = 6
-_SURE = 20  # standard deviations: a tilt that is linear over them
+_SURE = 20  # tilt over its standard deviation, above which the model is linear in the tilt
 
 
 @dataclass(frozen=True)
 class LyingGeometry:
-    """What a table says of a lying tank.
+    """Dimensions of a lying tank estimated from a table.
 
     Attributes
     ----------
     best : SolidFit
-        Of the ends with the fewest unknowns among those that fit as well as any.
+        Ends with the fewest unknowns among the forms that fit equally well.
     worse_by : dict
-        {name of ends: chi-squared above the least, over the variance factor of the least}, in
-        rising order: below `TOLD_APART` the rows do not tell them apart.
+        {name of ends: excess of chi-squared over the minimum, divided by its variance factor}, in
+        rising order. The rows do not exclude forms below `TOLD_APART`.
     tilted : SolidFit or None
-        The same ends with a tilt as one more unknown; None where none is found that fits better
-        than a level tank, or nothing tells its size. The zero takes up nearly all of a tilt, and
-        both of its signs fit alike (`SolidFit.mirrored`): this is the one with the nearer zero. It
-        is `best` itself where no level tank explains the rows and this one does, to their rounding.
+        Fit with these ends and a tilt. None if no tilt fits better than a level tank, or if its
+        size is not determined. The zero absorbs nearly all of a tilt, and both signs fit equally
+        (`SolidFit.mirrored`); this is the fit with the smaller zero. It equals `best` if no level
+        tank explains the rows within their rounding, and this fit does.
     tilt_gain : float
-        By how much the tilt lowers chi-squared, as of `worse_by`.
+        Reduction of chi-squared by the tilt, scaled as in `worse_by`.
     tilt_size : (float, float)
-        Sizes of a tilt, as tangents, that raise chi-squared by less than `NEAR` over its least:
-        (0, 0.003) where the tank may be level.
+        Smallest and largest size of a tilt (tangent) with an excess of chi-squared below `NEAR`:
+        (0, 0.003) if the tank may be level.
     """
 
     best: SolidFit
@@ -71,7 +71,7 @@ class LyingGeometry:
 
 
 def fit_sphere(former: FormerTable) -> SolidFit:
-    """Diameter and zero of a spherical tank out of its table.
+    """Estimate diameter and zero of a spherical tank from its table.
 
     Parameters
     ----------
@@ -80,14 +80,14 @@ def fit_sphere(former: FormerTable) -> SolidFit:
     Returns
     -------
     SolidFit
-        Its zero is what has to be added to a dip of the table.
+        Its zero is added to a dip of the table.
 
     Raises
     ------
     InputError
         For fewer than 8 rows with liquid.
     SolutionError
-        Where no sphere fits.
+        If no sphere fits.
     """
     rows = WetRows.of(former)
     middle = len(rows.height) // 2
@@ -97,14 +97,16 @@ def fit_sphere(former: FormerTable) -> SolidFit:
 
 
 def fit_lying(former: FormerTable, dip_from_a_m: float | None = None) -> LyingGeometry:
-    """Sizes of a lying tank out of its table: D, L, zero and ends, and a tilt as an offer.
+    """Estimate the dimensions of a lying tank from its table.
+
+    D, L, zero, ends, and a possible tilt.
 
     Parameters
     ----------
     former : FormerTable
     dip_from_a_m : float, optional
-        Place of the dip along the axis; None: half the length. There a tilt shows in its square
-        only; elsewhere it is nearly the same as a zero.
+        Position of the dip along the axis; None: half the length. At half the length, a tilt has
+        only a quadratic effect; elsewhere it is nearly equivalent to a zero.
 
     Returns
     -------
@@ -115,31 +117,31 @@ def fit_lying(former: FormerTable, dip_from_a_m: float | None = None) -> LyingGe
     InputError
         For fewer than 8 rows with liquid.
     SolutionError
-        Where no lying tank fits.
+        If no lying tank fits.
     """
     all_rows = WetRows.of(former)
     rows = all_rows.thinned()
     fits = _level_fits(rows, dip_from_a_m)
     best, worse = _chosen(fits)
-    if best.variance_factor > 1:  # a tilt may be what no ends explain
+    if best.variance_factor > 1:  # a tilt may explain residuals that no form of ends explains
         leaning = {
-            name: fit_ends(rows, name, *one.values[:3], dip_from_a_m, one.values[3:], TILTS[-1])
-            for name, one in fits.items()
+            name: fit_ends(rows, name, *fit.values[:3], dip_from_a_m, fit.values[3:], TILTS[-1])
+            for name, fit in fits.items()
         }
-        leaning = {name: one for name, one in leaning.items() if one is not None}
-        if any(one.variance_factor == 1 for one in leaning.values()):
+        leaning = {name: fitted for name, fitted in leaning.items() if fitted is not None}
+        if any(fitted.variance_factor == 1 for fitted in leaning.values()):
             fits = leaning
             best, worse = _chosen(fits)
     _refuse_low_rows(former, rows, [fits[name] for name, by in worse.items() if by < TOLD_APART])
-    whole = _again(all_rows, best, dip_from_a_m)
+    whole = _repeat_fit(all_rows, best, dip_from_a_m)
     if whole is None:
         raise SolutionError(no_fit())
     return LyingGeometry(whole, worse, *_tilt(rows, all_rows, best, whole, dip_from_a_m))
 
 
 def _refuse_low_rows(former, rows, fits):
-    """SolutionError where tanks of very different diameters explain the rows as well."""
-    diameters = [float(one.values[0]) for one in fits]
+    """Raise SolutionError if tanks of very different diameters fit equally well."""
+    diameters = [float(fit.values[0]) for fit in fits]
     if max(diameters) > LARGEST_RATIO * min(diameters):
         raise SolutionError(
             message(
@@ -155,7 +157,7 @@ def _refuse_low_rows(former, rows, fits):
 
 
 def _level_fits(rows, dip_from_a_m):
-    """{ends: SolidFit} of a level tank."""
+    """Return {ends: SolidFit} of level tanks."""
     flat = fit_ends(rows, "flat", *flat_start(rows), dip_from_a_m)
     if flat is None:
         raise SolutionError(no_fit())
@@ -164,53 +166,53 @@ def _level_fits(rows, dip_from_a_m):
         if name != "flat":
             shorter = max(length - 1.2 * part * diameter, 0.2 * length)
             fits[name] = fit_ends(rows, name, diameter, shorter, zero, dip_from_a_m)
-    return {name: one for name, one in fits.items() if one is not None}
+    return {name: fit for name, fit in fits.items() if fit is not None}
 
 
 def _chosen(fits):
-    """(SolidFit with the fewest unknowns of those that fit as well as any, {ends: worse by})."""
-    least = min(fits.values(), key=lambda one: one.chi2)
-    worse = {name: (one.chi2 - least.chi2) / least.variance_factor for name, one in fits.items()}
+    """Return the SolidFit with the fewest unknowns among equally good fits, and {ends: excess}."""
+    least = min(fits.values(), key=lambda fit: fit.chi2)
+    worse = {name: (fit.chi2 - least.chi2) / least.variance_factor for name, fit in fits.items()}
     same = [name for name, by in worse.items() if by < TOLD_APART]
     chosen = min(same, key=lambda name: (len(fits[name].names), worse[name]))
-    return fits[chosen], dict(sorted(worse.items(), key=lambda one: one[1]))
+    return fits[chosen], dict(sorted(worse.items(), key=lambda entry: entry[1]))
 
 
-def _again(rows, one, dip_from_a_m):
-    """The same fit to other rows; of two tilts that mirror each other that of the nearer zero."""
-    (diameter, length, zero), rest, tilt = one.values[:3], one.values[3:], None
-    if "tilt" in one.names:
-        rest, tilt = one.values[3:-1], one.values[-1]
-        if abs(one.mirrored[1]) < abs(zero):
-            tilt, zero = one.mirrored
-    return fit_ends(rows, one.ends, diameter, length, zero, dip_from_a_m, rest, tilt)
+def _repeat_fit(rows, fitted, dip_from_a_m):
+    """Repeat a fit with other rows; of two mirrored tilts, return the one with the smaller zero."""
+    (diameter, length, zero), rest, tilt = fitted.values[:3], fitted.values[3:], None
+    if "tilt" in fitted.names:
+        rest, tilt = fitted.values[3:-1], fitted.values[-1]
+        if abs(fitted.mirrored[1]) < abs(zero):
+            tilt, zero = fitted.mirrored
+    return fit_ends(rows, fitted.ends, diameter, length, zero, dip_from_a_m, rest, tilt)
 
 
 def _tilt(rows, all_rows, best, whole, dip_from_a_m):
-    """(SolidFit with a tilt or None, gain, (least, largest) size of a tilt)."""
+    """Return the SolidFit with a tilt or None, its gain, and (least, largest) size of the tilt."""
     count = len(best.names) - ("tilt" in best.names)
 
     def fit(values, tilt, is_held=False):
         sizes, rest = values[:3], values[3:count]
         return fit_ends(rows, best.ends, *sizes, dip_from_a_m, rest, tilt, is_held)
 
-    found = [best] if "tilt" in best.names else [fit(best.values, tilt) for tilt in TILTS]
-    found = [one for one in found if one is not None]
-    if not found:
+    fits = [best] if "tilt" in best.names else [fit(best.values, tilt) for tilt in TILTS]
+    fits = [fitted for fitted in fits if fitted is not None]
+    if not fits:
         return None, 0.0, (0.0, LARGEST_TILT)
-    near = min(found, key=lambda one: one.chi2)
+    near = min(fits, key=lambda fitted: fitted.chi2)
     level, is_best = fit(near.values, 0.0, True), near is best
-    if not is_best and not _is_told(near, best):
+    if not is_best and not _is_significant(near, best):
         near = best
     limit = near.chi2 + NEAR * near.variance_factor
 
     def is_near(size):
         sign = near.values[-1] if "tilt" in near.names else 1.0
-        one = fit(near.values, np.copysign(size, sign), True)
-        return one is not None and one.chi2 < limit
+        held = fit(near.values, np.copysign(size, sign), True)
+        return held is not None and held.chi2 < limit
 
-    tilted = whole if is_best else _again(all_rows, near, dip_from_a_m)
-    if "tilt" not in near.names or not (is_best or _is_told(tilted, whole)):
+    tilted = whole if is_best else _repeat_fit(all_rows, near, dip_from_a_m)
+    if "tilt" not in near.names or not (is_best or _is_significant(tilted, whole)):
         return None, 0.0, (0.0, _edge(is_near, 0.0, LARGEST_TILT))
     size, u = abs(near["tilt"][0]), near["tilt"][1]
     gain = np.inf if level is None else (level.chi2 - near.chi2) / near.variance_factor
@@ -222,14 +224,14 @@ def _tilt(rows, all_rows, best, whole, dip_from_a_m):
     return tilted, float(gain), sizes
 
 
-def _is_told(leaning, level):
-    """Whether a tilt fits better than none, and the rows determine its size."""
+def _is_significant(leaning, level):
+    """Whether a tilt fits better than a level tank, and the rows determine its size."""
     is_there = leaning is not None and leaning.chi2 <= level.chi2
     return is_there and bool(np.isfinite(leaning["tilt"][1]))
 
 
 def _edge(is_near, inside, outside):
-    """Where a size ceases to be near, by halving."""
+    """Find the size at which a tilt ceases to be near, by bisection."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (inside + outside)
         inside, outside = (middle, outside) if is_near(middle) else (inside, middle)
@@ -237,7 +239,7 @@ def _edge(is_near, inside, outside):
 
 
 def declared_sizes(fit: SolidFit) -> dict:
-    """The sections of a job.toml that hold the sizes: [horizontal] or [sphere], and [datum].
+    """Return the sections of job.toml with the dimensions: [horizontal] or [sphere], and [datum].
 
     Parameters
     ----------
@@ -246,8 +248,8 @@ def declared_sizes(fit: SolidFit) -> dict:
     Returns
     -------
     dict
-        {section: {key: value}}. A zero below the bottom (`SolidFit.below_bottom_m`) becomes the
-        bottom.
+        {section: {key: value}}. A zero below the bottom (`SolidFit.below_bottom_m`) is replaced by
+        the bottom.
     """
     datum = {"datum": {"dip_plate_z_m": _rounded(max(fit["zero"][0], 0.0))}}
     if fit.kind == "sphere":
@@ -267,18 +269,19 @@ def declared_sizes(fit: SolidFit) -> dict:
 
 
 def declared_uncertainties(fit: SolidFit, former: FormerTable) -> list[dict]:
-    """Rows of uncertainty.csv for a job with these sizes: rounding, and U of the former table.
+    """Return rows of uncertainty.csv for these dimensions: rounding, and U of the former table.
 
     Parameters
     ----------
     fit : SolidFit
     former : FormerTable
-        The relative U of its last row becomes one of the diameter, which all volumes share.
+        The relative U of its last row becomes an uncertainty of the diameter, common to all
+        volumes.
 
     Returns
     -------
     list of dict
-        With the keys input, u, unit, note; sizes in mm.
+        With the keys input, u, unit, note; dimensions in mm.
     """
     units = {"zero": "datum", "diameter": "diameter", "length": "length", "end_depth": "end_depth"}
     rows = []

@@ -1,8 +1,8 @@
-"""One adjustment of the rows of a table: rings, head, zero, seams, things in the tank.
+"""Adjustment of the rows of a table: rings, head, zero, seams, fittings.
 
-    V(h) = V_0 + W(h) - W(h_0) + sum over things of v share(h) + roof, if h is above its zone
+    V(h) = V_0 + W(h) - W(h_0) + sum over fittings of v share(h) + roof, if h is above its zone
 
-V_0 is the volume at the lowest row h_0 that is used. It is linear in all but the places of kinks.
+V_0 is the volume at the lowest row h_0 used. The model is linear except in the positions of kinks.
 """
 
 from dataclasses import dataclass, replace
@@ -15,15 +15,15 @@ from tankcal.recalibration.bulges import bulge_derivatives, bulge_volume_m3, pri
 from tankcal.recalibration.fittings import Fitting
 from tankcal.recalibration.upright_shell import Rings
 
-ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # so weak that a table decides; never singular
-BULGED_ZERO_SD_M = 0.03  # profiles hide the joints, by which a table shows its zero
+ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # weak priors, which prevent singularity
+BULGED_ZERO_SD_M = 0.03  # prior of the zero with profiles, which hide the joints
 DENSITY_SD_KG_M3 = 1e5
-MOST_ROUNDS, MOST_HALVINGS, SETTLED = 15, 6, 1e-3  # of chi2
+MOST_ROUNDS, MOST_HALVINGS, SETTLED = 15, 6, 1e-3  # iterations, halvings, final change of chi2
 
 
 @dataclass(frozen=True)
 class State:
-    """What a table is taken to be, with the values of its unknowns.
+    """Model of a table, with the values of its unknowns.
 
     Attributes
     ----------
@@ -34,24 +34,24 @@ class State:
     zero_m : float
         Dip of the bottom of the first ring.
     seams_m : ndarray, shape (n - 1,)
-        Heights of the seams above that.
+        Heights of the seams above the bottom of the first ring.
     rings_top_m : float
-        Height of the top of the last ring above that.
+        Height of the top of the last ring above the bottom of the first ring.
     thickness_m : ndarray, shape (n,)
     modulus_pa : float
     lowest_m, highest_m : float
-        Dips of the lowest and the highest row that are used.
+        Dips of the lowest and highest rows used.
     fittings : tuple of Fitting
     roof_m3, roof_zone_m : float, (float, float) or None
-        What the roof takes above its critical zone; None: no roof.
+        Effect of the roof above its critical zone; None: no roof.
     free : frozenset of str
-        Of "base", "density", "zero", "seams", "kinks": what else than radii and volumes is unknown.
+        Unknowns besides radii and volumes, among "base", "density", "zero", "seams", "kinks".
     is_first_order : bool
-        Of the head.
+        Whether the head is of first order.
     density_sd_kg_m3 : float
-        Of the density that an adjustment starts with, as an observation of it.
+        Prior standard deviation of the density.
     usual_density_kg_m3 : float or None
-        The density to which `density_sd_kg_m3` belongs; None: with which an adjustment starts.
+        Prior density; None: the start value of an adjustment.
     bulges_m : ndarray, shape (n, degrees), or None
         Profiles of the courses (`bulges`); None: straight courses.
     """
@@ -77,22 +77,22 @@ class State:
 
     @property
     def rings(self):
-        """The Rings, in dips."""
+        """The Rings, at dips."""
         heights = np.concatenate([[0.0], self.seams_m, [self.rings_top_m]])
         return Rings(self.zero_m + heights, self.thickness_m, self.modulus_pa, self.is_first_order)
 
     def volume_m3(self, dips_m):
-        """(rows,) volume below each dip."""
+        """Volume below each dip, shape (rows,), m3."""
         dips = np.append(dips_m, self.lowest_m)
         shell = self.shell_m3(dips)
         volume = self.base_m3 + shell[:-1] - shell[-1]
-        for one in self.fittings:
-            below = one.volume_below_m3(dips)
+        for fitting in self.fittings:
+            below = fitting.volume_below_m3(dips)
             volume = volume + below[:-1] - below[-1]
         return volume + self._roof_share(dips_m) * self.roof_m3
 
     def shell_m3(self, dips_m):
-        """(rows,) volume of the courses below each dip."""
+        """Volume of the courses below each dip, shape (rows,), m3."""
         volume = self.rings.volume_m3(dips_m, self.radii_m, self.density_kg_m3)
         if self.bulges_m is None:
             return volume
@@ -106,7 +106,7 @@ class State:
 
     @property
     def layout(self):
-        """{name: slice} of the unknowns; of each thing three: bottom, top, volume."""
+        """{name: slice} of the unknowns; each fitting has three: bottom, top, volume."""
         sizes = {
             "base": int("base" in self.free),
             "radii": len(self.radii_m),
@@ -125,7 +125,7 @@ class State:
 
     @property
     def unknowns(self):
-        """(u,) their values."""
+        """Values of the unknowns, shape (u,)."""
         things = [(f.bottom_m, f.top_m, f.volume_m3) for f in self.fittings]
         values = {
             "base": [self.base_m3],
@@ -142,23 +142,23 @@ class State:
         )
 
     def with_unknowns(self, unknowns):
-        """The same with other values."""
-        given = {name: unknowns[part] for name, part in self.layout.items()}
-        changes = {"radii_m": given["radii"]}
+        """Return the state with other values of the unknowns."""
+        values = {name: unknowns[part] for name, part in self.layout.items()}
+        changes = {"radii_m": values["radii"]}
         for name, key in (("base", "base_m3"), ("density", "density_kg_m3"), ("zero", "zero_m"),
                           ("roof", "roof_m3")):  # fmt: skip
-            if len(given[name]):
-                changes[key] = float(given[name][0])
-        if len(given["seams"]):
-            changes["seams_m"] = given["seams"]
+            if len(values[name]):
+                changes[key] = float(values[name][0])
+        if len(values["seams"]):
+            changes["seams_m"] = values["seams"]
         if self.bulges_m is not None:
-            changes["bulges_m"] = given["bulges"].reshape(self.bulges_m.shape)
-        things = given["fittings"].reshape(-1, 3)
-        changes["fittings"] = tuple(Fitting(*map(float, one)) for one in things)
+            changes["bulges_m"] = values["bulges"].reshape(self.bulges_m.shape)
+        things = values["fittings"].reshape(-1, 3)
+        changes["fittings"] = tuple(Fitting(*map(float, fitting)) for fitting in things)
         return replace(self, **changes)
 
     def design(self, dips_m):
-        """(rows, u) derivatives of `volume_m3` by the unknowns."""
+        """Derivatives (rows, u) of `volume_m3` by the unknowns."""
         dips = np.append(dips_m, self.lowest_m)
         by_radius, by_density, by_edge = self.rings.derivatives(
             dips, self.radii_m, self.density_kg_m3
@@ -167,7 +167,8 @@ class State:
         if self.bulges_m is not None:
             by_bulge, *more = bulge_derivatives(self.rings, dips, self.radii_m, self.bulges_m)
             by_radius, by_edge, by_zero = (
-                one + also for one, also in zip((by_radius, by_edge, by_zero), more, strict=True)
+                derivatives + also
+                for derivatives, also in zip((by_radius, by_edge, by_zero), more, strict=True)
             )
         columns = [by_radius]
         if "density" in self.free:
@@ -177,7 +178,7 @@ class State:
         if "seams" in self.free:
             columns.append(by_edge[:, 1:])
         columns += [by_bulge]
-        columns += [one.derivatives(dips) for one in self.fittings]
+        columns += [fitting.derivatives(dips) for fitting in self.fittings]
         relative = np.hstack(columns)
         parts = [relative[:-1] - relative[-1]]
         if "base" in self.free:
@@ -189,22 +190,22 @@ class State:
 
 @dataclass(frozen=True)
 class Fit:
-    """A State that was adjusted to rows.
+    """A State adjusted to rows.
 
     Attributes
     ----------
     state : State
     cofactor : ndarray, shape (u, u)
-        Covariance of its unknowns, of rounding alone.
+        Covariance of the unknowns by rounding only.
     left_m3 : ndarray, shape (rows,)
-        Table less state.
+        Table minus state.
     sd_m3 : ndarray, shape (rows,)
-        By rounding.
+        Standard deviations by rounding.
     design : ndarray, shape (rows, u)
     chi2 : float
-        Of the rows.
+        chi2 of the rows.
     bulges : (ndarray, ndarray, ndarray)
-        Of what bulges are expected to be: (k, u) derivatives, (k,) discrepancies, (k,) sds.
+        Prior of the bulges: (k, u) derivatives, (k,) discrepancies, (k,) sds.
     """
 
     state: State
@@ -217,12 +218,12 @@ class Fit:
 
     @property
     def cost(self):
-        """chi2, with that of the bulges."""
+        """chi2 of rows and bulges."""
         return self.chi2 + float(np.sum((self.bulges[1] / self.bulges[2]) ** 2))
 
     @property
     def dof(self):
-        """Rows less unknowns that were not held."""
+        """Rows minus unknowns that are not fixed."""
         return len(self.left_m3) - int(np.count_nonzero(np.diag(self.cofactor)))
 
     def sd(self, name):
@@ -237,7 +238,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     Parameters
     ----------
     state : State
-        With start values; seams and kinks are looked for about them, the zero about 0, weakly.
+        Start values. Seams and kinks have weak priors about them, the zero about 0.
     dips_m, volumes_m3, sd_m3 : (rows,) ndarray
 
     Returns
@@ -247,12 +248,13 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     Raises
     ------
     SolutionError
-        When the rows do not determine the unknowns.
+        If the rows do not determine the unknowns.
     """
     held, known, about, sds = _priors(state)
     moving = np.setdiff1d(np.arange(len(state.unknowns)), held)
     observed = np.concatenate([volumes_m3, about])
     variances = np.concatenate([sd_m3**2, sds**2])
+    # Weak priors are added as observations of the unknowns themselves.
     rows = np.eye(len(state.unknowns))[known][:, moving]
 
     def misclosure(now):
@@ -261,10 +263,11 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     now, w = state, misclosure(state)
     for _ in range(MOST_ROUNDS):
         design = np.vstack([now.design(dips_m)[:, moving], rows])
-        found = adjust(_tangent(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances)
+        adjusted = adjust(_tangent(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances)
         before, cost = now, w @ (w / variances)
         step = np.zeros(len(now.unknowns))
-        step[moving] = found.unknowns
+        step[moving] = adjusted.unknowns
+        # Gauss-Newton step, halved until the cost does not rise.
         for _ in range(MOST_HALVINGS):
             now = before.with_unknowns(before.unknowns + step)
             w = misclosure(now)
@@ -274,7 +277,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
         if abs(cost - w @ (w / variances)) < SETTLED:
             break
     cofactor = np.zeros((len(state.unknowns), len(state.unknowns)))
-    cofactor[np.ix_(moving, moving)] = found.cofactor
+    cofactor[np.ix_(moving, moving)] = adjusted.cofactor
     left = volumes_m3 - now.volume_m3(dips_m)
     chi2 = float(np.sum((left / sd_m3) ** 2))
     bulges = _expected_bulges(now)
@@ -282,7 +285,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
 
 
 def _expected_bulges(state):
-    """Derivatives, discrepancies and sds of the bulges as observations of their own."""
+    """Derivatives, discrepancies and sds of the bulges as prior observations."""
     part = np.eye(len(state.unknowns))[state.layout["bulges"]]
     if not len(part):
         return part, np.zeros(0), np.zeros(0)
@@ -290,12 +293,12 @@ def _expected_bulges(state):
 
 
 def _tangent(w, design):
-    """The linear model of a step, for `adjust`."""
+    """Linear model of a step, for `adjust`."""
     return lambda x, l: (w + design @ x - l, design, None)
 
 
 def _priors(state):
-    """Unknowns that are held; those that are weakly known, where about, and their sds."""
+    """Return fixed unknowns, and unknowns with weak priors, their values and sds."""
     layout = state.layout
     sds, held = {}, []
     density_sd = state.density_sd_kg_m3
@@ -305,9 +308,9 @@ def _priors(state):
     if state.bulges_m is not None:
         places = range(layout["bulges"].start, layout["bulges"].stop)
         sds |= dict(zip(places, prior_sds(state.bulges_m).ravel(), strict=True))
-    for k, one in enumerate(state.fittings):
+    for k, fitting in enumerate(state.fittings):
         place = layout["fittings"].start + 3 * k
-        for edge, is_held in enumerate(held_kinks(state, one)):
+        for edge, is_held in enumerate(held_kinks(state, fitting)):
             if is_held:
                 held.append(place + edge)
             else:
@@ -323,7 +326,7 @@ def _priors(state):
 
 
 def held_kinks(state, fitting):
-    """(bottom, top): whether a thing's kink is outside of the rows, and cannot be looked for."""
+    """Whether (bottom, top) kinks of a fitting lie outside the rows and are therefore fixed."""
     if "kinks" not in state.free:
         return True, True
     return fitting.bottom_m <= state.lowest_m, fitting.top_m >= state.highest_m
@@ -344,28 +347,28 @@ class Rows:
     sd_m3: np.ndarray
 
     def above(self, dip_m):
-        """Those from a dip on."""
+        """Return the rows from a dip upwards."""
         return self.of(self.dip_m >= dip_m - 1e-9)
 
     def of(self, mask):
-        """Those of a mask."""
+        """Return the rows of a mask."""
         return Rows(self.dip_m[mask], self.volume_m3[mask], self.sd_m3[mask])
 
     def thinned(self, most):
-        """At most so many of them, evenly, the first and the last among them."""
+        """Return at most `most` evenly chosen rows, including the first and the last."""
         chosen = np.zeros(len(self.dip_m), dtype=bool)
         chosen[np.unique(np.linspace(0, len(self.dip_m) - 1, most).round().astype(int))] = True
         return self.of(chosen)
 
     def adjust(self, state):
-        """The Fit of a State to them."""
+        """Return the Fit of a State to the rows."""
         lowest, highest = float(self.dip_m[0]), float(self.dip_m[-1])
         state = replace(state, lowest_m=lowest, highest_m=highest)
         return fit(state, self.dip_m, self.volume_m3, self.sd_m3)
 
 
 def tried(rows, state):
-    """The Fit of a State to Rows, or None where they do not determine it."""
+    """Return the Fit of a State to Rows, or None if the rows do not determine it."""
     try:
         return rows.adjust(state)
     except SolutionError:

@@ -1,4 +1,4 @@
-"""A job that can be run, made of what a former table says of its tank."""
+"""Build a job from the tank geometry estimated from a former table."""
 
 import datetime
 import json
@@ -11,11 +11,11 @@ from tankcal.recalibration.solid_geometry import declared_sizes, declared_uncert
 
 USUAL_TEMPERATURE_C = 20.0
 UNKNOWN_ZERO_M = 0.02
-LOWEST_THING_M = 2e-4  # height of a thing in deadwood.csv, whose dips have four decimals
-LEAST_RISE_M3 = 1e-6  # between rows of bottom.csv, whose volumes have six decimals
+LOWEST_THING_M = 2e-4  # smallest height of a fitting in deadwood.csv (dips with four decimals)
+LEAST_RISE_M3 = 1e-6  # smallest rise between rows of bottom.csv (volumes with six decimals)
 LEVEL_M = 1e-5  # last digit of the dips in bottom.csv
-EMPTY_BELOW_M = 0.001  # of a first row without volume
-SURE = 3.0  # standard uncertainties, within which a bottom is flat and a zero is at the bottom
+EMPTY_BELOW_M = 0.001  # distance of the empty level below a first row
+SURE = 3.0  # standard uncertainties within which a bottom is flat, or a zero is at the bottom
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class JobOfTable:
     texts : dict of {str: str}
         job.toml and CSV files.
     covariance_m2 : ndarray, shape (n, n), or None
-        Of the radii, for radii_cov.npz.
+        Covariance of the radii, for radii_cov.npz.
     courses : tuple of str
-        What it is of.
+        Names of the courses.
     words : tuple of Message
-        What `texts` say in words, as it stands there: to be said in the language of the job.
+        Phrases in `texts`, to be translated into the language of the job.
     """
 
     texts: dict
@@ -40,28 +40,30 @@ class JobOfTable:
     words: tuple = ()
 
 
-def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
-    """The `JobOfTable` of an `UprightGeometry`.
+def job_of_geometry(former, geometry, names, *, u_common_m, e_pa, tank_id):
+    """Return the `JobOfTable` of an `UprightGeometry`.
 
     Parameters
     ----------
     former : FormerTable
-    found : UprightGeometry
+    geometry : UprightGeometry
     names : sequence of str
-        Of the courses.
+        Names of the courses.
     u_common_m : float
-        Standard uncertainty that all radii have in common, as the former table was made.
+        Common standard uncertainty of all radii from the method of the former table.
     e_pa : float
     tank_id : str
     """
-    density = 0.0 if found.head == "without" else found.state.density_kg_m3
-    zero, bottom = _bottom(former, found)
-    heights = found.heights_m + np.eye(1, len(found.heights_m))[0] * (found.zero_m.value - zero)
+    density = 0.0 if geometry.head == "without" else geometry.state.density_kg_m3
+    zero, bottom = _bottom(former, geometry)
+    heights = geometry.heights_m + np.eye(1, len(geometry.heights_m))[0] * (
+        geometry.zero_m.value - zero
+    )
     note = message("job_read_from", "read from {name}", name=str(former.name))
     settings = _settings(
         former,
         tank_id=tank_id,
-        diameter=2 * float(found.radii_m[0]),
+        diameter=2 * float(geometry.radii_m[0]),
         height=float(np.sum(heights)),
         zero=zero,
         density=round(density, 1),
@@ -72,11 +74,11 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
     )
     texts = {
         "job.toml": settings + _roof(former),
-        **_wall(names, heights, found.thickness_m, found.radii_m),
+        **_wall(names, heights, geometry.thickness_m, geometry.radii_m),
     }
     if bottom is not None:
         texts["bottom.csv"] = _csv(("level_m", "volume_m3"), bottom, (5, 6))
-    things = _deadwood(found, zero + float(np.sum(heights)))
+    things = _deadwood(geometry, zero + float(np.sum(heights)))
     names_of_things = [
         message("job_thing", "thing-{number}", number=k) for k in range(1, len(things) + 1)
     ]
@@ -84,14 +86,14 @@ def job_of_geometry(former, found, names, *, u_common_m, e_pa, tank_id):
         rows = [(name, *thing) for name, thing in zip(names_of_things, things, strict=True)]
         heading = ("name", "bottom_m", "top_m", "volume_m3", "u_m3")
         texts["deadwood.csv"] = "\n".join(map(",".join, [heading, *rows])) + "\n"
-    if found.state.bulges_m is not None:
-        texts["uncertainty.csv"] = _profiles(found.state.bulges_m)
+    if geometry.state.bulges_m is not None:
+        texts["uncertainty.csv"] = _profiles(geometry.state.bulges_m)
     words = (note, *names_of_things)
-    return JobOfTable(texts, found.covariance_m2, tuple(names), words)
+    return JobOfTable(texts, geometry.covariance_m2, tuple(names), words)
 
 
 def job_of_record(former, radii, *, tank_id):
-    """The `JobOfTable` of `RecordedRadii`."""
+    """Return the `JobOfTable` of `RecordedRadii`."""
     job = former.record["job"]
     note = message("job_radii_of", "radii of {name}", name=str(former.name))
     settings = _settings(
@@ -113,7 +115,7 @@ def job_of_record(former, radii, *, tank_id):
 
 
 def job_of_solid(former, fit, *, tank_id):
-    """The `JobOfTable` of a `SolidFit`: a job of declared sizes."""
+    """Return the `JobOfTable` of a `SolidFit`: a job of declared dimensions."""
     diameter = fit["diameter"][0]
     tank = {
         "id": tank_id,
@@ -132,7 +134,10 @@ def job_of_solid(former, fit, *, tank_id):
             lines.append(f"{key} = {_text(value) if isinstance(value, str) else value}")
         lines.append("")
     lines += ["[survey]", 'side = "inside"', f"date = {_day(former)}"]
-    lines += [f"shell_temperature_c = {_temperature(former)}", ""]  # that the sizes are at
+    lines += [
+        f"shell_temperature_c = {_temperature(former)}",
+        "",
+    ]  # reference temperature of the dimensions
     texts = {"job.toml": "\n".join(lines)}
     rows = [
         ",".join(str(row[key]) for key in ("input", "u", "unit"))
@@ -237,36 +242,36 @@ def _csv(heading, rows, decimals):
 
 
 def _profiles(bulges_m):
-    """uncertainty.csv of the profiles that the table shows: the job has straight courses."""
+    """Return uncertainty.csv of the profiles in the table, as the job has straight courses."""
     barrel = 1.5 * np.sqrt(np.mean(np.sum(bulges_m[:, 1::2] ** 2, axis=1)))
     taper = np.sqrt(np.mean(np.sum(bulges_m[:, ::2] ** 2, axis=1)))
     rows = [f"{name},{1000 * u:.3g},mm" for name, u in (("barrel", barrel), ("taper", taper))]
     return "\n".join(["input,u,unit", *rows]) + "\n"
 
 
-def _deadwood(found, top_m):
-    """Rows of deadwood.csv: bottom, top, volume, u of each thing within the rows that were used.
+def _deadwood(geometry, top_m):
+    """Return rows of deadwood.csv: bottom, top, volume, u of each fitting within the rows used.
 
-    The volume below the lowest row that was used belongs to the bottom, and a table does not show
-    what is above its last row: the part of a thing there is left out.
+    The volume below the lowest row used belongs to the bottom. The part of a fitting above the last
+    row is not observed and is left out.
     """
     rows = []
-    for one in found.fittings:
-        low, high = max(one.bottom_m.value, found.lowest_m), min(one.top_m.value, top_m)
-        share = (high - low) / max(one.top_m.value - one.bottom_m.value, 1e-9)
+    for fitting in geometry.fittings:
+        low, high = max(fitting.bottom_m.value, geometry.lowest_m), min(fitting.top_m.value, top_m)
+        share = (high - low) / max(fitting.top_m.value - fitting.bottom_m.value, 1e-9)
         if high - low > LOWEST_THING_M:
-            volume, u = share * one.volume_m3.value, share * one.volume_m3.u
+            volume, u = share * fitting.volume_m3.value, share * fitting.volume_m3.u
             rows.append((f"{low:.4f}", f"{high:.4f}", f"{volume:.5f}", f"{u:.5f}"))
     return rows
 
 
-def _bottom(former, found):
-    """Dip of the bottom of the first ring, and what lies below the lowest row that was used.
+def _bottom(former, geometry):
+    """Return the dip of the bottom of the first ring, and the bottom below the lowest row used.
 
-    The bottom is flat where the zero may be so placed that it explains every row: then it is there,
-    and the second is None. Else they are (rows, 2) dips and volumes up to that row.
+    The bottom is flat if a zero within its uncertainty explains every row; the second result is
+    then None. Otherwise the second result is (rows, 2) dips and volumes up to the lowest row used.
     """
-    base, lowest, zero, state = found.base_m3, found.lowest_m, found.zero_m, found.state
+    base, lowest, zero, state = geometry.base_m3, geometry.lowest_m, geometry.zero_m, geometry.state
     shell = state.shell_m3(np.array([lowest]))[0]
     area = np.pi * state.radii_m[0] ** 2
     level = zero.value + (shell - base.value) / area
@@ -274,20 +279,22 @@ def _bottom(former, found):
     dips, volumes = former.height_m[below], former.volume_m3[below]
     flat = area * np.maximum(dips - level, 0.0)
     u = zero.u if np.isfinite(zero.u) else UNKNOWN_ZERO_M
-    is_near = abs(level - zero.value) <= SURE * (u + found.expected_m3 / area)
-    if is_near and np.all(np.abs(volumes - flat) < SURE * found.expected_m3):
+    is_near = abs(level - zero.value) <= SURE * (u + geometry.expected_m3 / area)
+    if is_near and np.all(np.abs(volumes - flat) < SURE * geometry.expected_m3):
         return level, None
     rows = _rising([*zip(dips, volumes, strict=True), (lowest, max(base.value, 0.0))])
-    floor = np.floor(min(zero.value, 0.0) / LEVEL_M) * LEVEL_M  # not above the shell when rounded
+    floor = (
+        np.floor(min(zero.value, 0.0) / LEVEL_M) * LEVEL_M
+    )  # rounded down, so that it does not lie above the shell
     if (rows[0][0] > floor and rows[0][1] > 0) or len(rows) == 1:
         rows.insert(0, _row_below(rows, area, floor))
     return min(zero.value, lowest), np.array(rows)
 
 
 def _rising(rows):
-    """Rows of bottom.csv, from the last one down, without those that are not below the next row.
+    """Return rows of bottom.csv, from the last one down, whose volumes rise.
 
-    Coarse rounding repeats volumes, and a job refuses a bottom whose volumes do not rise.
+    Coarse rounding repeats volumes; a job refuses a bottom whose volumes do not rise.
     """
     kept = [rows[-1]]
     for dip, volume in reversed(rows[:-1]):
@@ -297,9 +304,9 @@ def _rising(rows):
 
 
 def _row_below(rows, area_m2, floor_m):
-    """(dip, volume) below the first row: at the dip `floor_m`, or above it where the tank is empty.
+    """Return (dip, volume) below the first row: at `floor_m`, or at the empty level above it.
 
-    The two lowest rows are extended; a single row by the area of the shell.
+    The two lowest rows are extrapolated; a single row is extrapolated with the area of the shell.
     """
     (low, first), slope = rows[0], area_m2
     if len(rows) > 1:

@@ -1,4 +1,4 @@
-"""What is known of the tank that both tables are of, besides its volumes."""
+"""Facts about the tank of two tables, besides its volumes."""
 
 from dataclasses import dataclass
 
@@ -15,17 +15,17 @@ class TankFacts:
     ----------
     kind : {"vertical", "horizontal", "sphere", "mesh"} or None
     heights_m, thickness_m : (courses,) ndarray or None
-        Of its courses from the bottom up; None: not known. A plate of 0 is infinite here: its
-        head is not known.
+        Courses from the bottom up; None: unknown. A thickness of 0 means an unknown plate: its
+        expansion by the head is not computed.
     bottom_m : float
         Dip of the bottom of the first course in the new table.
     modulus_pa, expansion_per_k : float
     material_is : {"record", "default"}
-        Where the last two are from.
+        Source of the two material constants.
     dips_expand : bool
-        Whether dips grow with the shell, too.
+        Whether dips also expand with the shell.
     inside_m : (courses,) ndarray or None
-        Radii of the courses by the record of the new table.
+        Radii of the courses in the record of the new table.
     """
 
     kind: str | None = None
@@ -40,58 +40,60 @@ class TankFacts:
 
     @property
     def is_shell(self):
-        """Whether it stands upright, and its courses are known."""
+        """Whether the tank is upright and its courses are known."""
         return self.kind == "vertical" and self.heights_m is not None
 
     @property
     def has_plates(self):
-        """Whether the plates of all courses are known, which a head needs."""
+        """Whether all plate thicknesses are known, as the head requires."""
         return self.is_shell and bool(np.isfinite(self.thickness_m).all())
 
     def edges_m(self, zero_m=0.0):
-        """(courses + 1,) dips of the edges, `zero_m` being added to those of the new table."""
+        """Dips (courses + 1,) of the edges; `zero_m` is added to those of the new table."""
         return self.bottom_m + zero_m + np.concatenate([[0.0], np.cumsum(self.heights_m)])
 
 
 def facts_of(former, new, courses=None):
-    """TankFacts of two FormerTables.
+    """Return the TankFacts of two FormerTables.
 
     Parameters
     ----------
     former, new : FormerTable
-        What the record of the new one says counts first.
+        The record of the new table takes precedence.
     courses : (heights, thicknesses) or None
-        As declared, m: used where no record has them.
+        Declared courses, m, used if no record has them.
     """
     kind = new.kind or former.kind or ("vertical" if courses is not None else None)
-    given = {"kind": kind}
+    facts = {"kind": kind}
     if courses is not None:
-        given |= _shell(*courses)
-    for table in (former, new):  # the new one last: it counts
+        facts |= _shell(*courses)
+    for table in (former, new):  # the new table last, so that it takes precedence
         if table.record is not None:
-            given |= _of_record(table.record, is_new=table is new)
-    return TankFacts(**given)
+            facts |= _of_record(table.record, is_new=table is new)
+    return TankFacts(**facts)
 
 
 def _of_record(record, is_new):
     job = record["job"]
     material, table = job.get("material") or {}, job.get("table") or {}
-    found = {"dips_expand": bool(table.get("height_expansion"))}
+    facts = {"dips_expand": bool(table.get("height_expansion"))}
     if material.get("e_pa") and material.get("expansion_per_k"):
-        found |= {
+        facts |= {
             "modulus_pa": float(material["e_pa"]),
             "expansion_per_k": float(material["expansion_per_k"]),
             "material_is": "record",
         }
     courses = job.get("courses") or []
     if courses:
-        found |= _shell(*([one[key] for one in courses] for key in ("height_m", "thickness_m")))
+        facts |= _shell(
+            *([course[key] for course in courses] for key in ("height_m", "thickness_m"))
+        )
         if is_new:
-            found["bottom_m"] = -float(record["capacity"]["zero_m"])
+            facts["bottom_m"] = -float(record["capacity"]["zero_m"])
             surveyed = record.get("courses") or []
             if len(surveyed) == len(courses):
-                found["inside_m"] = np.array([one["inside_radius_m"] for one in surveyed], float)
-    return found
+                facts["inside_m"] = np.array([key["inside_radius_m"] for key in surveyed], float)
+    return facts
 
 
 def _shell(heights_m, thickness_m):

@@ -1,10 +1,10 @@
-"""The geometry of an upright tank out of its capacity table.
+"""Geometry of an upright tank from its capacity table.
 
-Rows below the highest point of the bottom, and those of a roof's critical zone, are left out; the
-others are adjusted (`table_fit.fit`). What stands in the tank is looked for as pairs of kinks
-(`fittings.find_fittings`), one after the other, until none explains more than rounding does by
-chance. Then the table is asked whether it has a head, where its zero is, and whether the seams are
-where they were declared to be.
+Rows below the highest point of the bottom, and rows in the critical zone of a roof, are excluded.
+The other rows are adjusted (`table_fit.fit`). Fittings are sought as pairs of kinks
+(`fittings.find_fittings`), in turn, until no pair explains more than rounding can by chance. The
+rows then decide whether the table includes a head, where its zero is, and whether the seams agree
+with the declared ones.
 """
 
 from dataclasses import dataclass, replace
@@ -26,20 +26,20 @@ from tankcal.recalibration.upright_search import (
 
 STEEL_PA = 206e9
 START_DENSITY_KG_M3 = 500.0
-USUAL_KG_M3 = 450.0, 450.0  # of a head that a table cannot tell: about this, with this sd
+USUAL_KG_M3 = 450.0, 450.0  # prior mean and sd of a density that the table does not determine
 DECLARED_SD_KG_M3 = 10.0
-HELD_SD_KG_M3 = 0.1  # of a density that rows must not move
-LIQUID_KG_M3 = 500.0  # a head that a table could not have shown of any liquid is undecided
-LIGHTEST_KG_M3 = 100.0  # a lower density of a head is that of no liquid
-DENSEST_KG_M3 = 2000.0  # of a liquid that is stored in such tanks; sulphuric acid has 1840
-FEWEST_ROWS = 3  # of a ring
-BY_ORDER = 1.0  # of chi2, by which the head of second order has to fit better
+HELD_SD_KG_M3 = 0.1  # standard deviation of a fixed density
+LIQUID_KG_M3 = 500.0  # density of a light liquid; a head not detectable at it is undecided
+LIGHTEST_KG_M3 = 100.0  # smallest density of a possible liquid
+DENSEST_KG_M3 = 2000.0  # largest density of a stored liquid; sulphuric acid has 1840
+FEWEST_ROWS = 3  # fewest rows of a ring
+BY_ORDER = 1.0  # smallest reduction of chi2 for which the head of second order is used
 ORDER_IS_CLEAR = 9.0
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A value that was read out of a table, and what rounding leaves uncertain of it (standard)."""
+    """A value estimated from a table, and its standard uncertainty by rounding."""
 
     value: float
     u: float
@@ -47,12 +47,12 @@ class Reading:
 
 @dataclass(frozen=True)
 class FoundFitting:
-    """A thing that the table has deducted, or added.
+    """A fitting deducted or added in a table.
 
     Attributes
     ----------
     bottom_m, top_m, volume_m3 : Reading
-        Dips; u is nan where the end is beyond the rows that were used.
+        Dips and volume; u is nan for an end outside the rows used.
     """
 
     bottom_m: Reading
@@ -62,49 +62,49 @@ class FoundFitting:
 
 @dataclass(frozen=True)
 class UprightGeometry:
-    """What a table says of its tank.
+    """Geometry of an upright tank estimated from a table.
 
     Attributes
     ----------
     name : str
-        Of the table.
+        Name of the table.
     radii_m, u_m : ndarray, shape (n,)
-        Inside, of the empty shell, at the table's temperature; u by rounding alone.
+        Inside radii of the empty shell at the table's temperature; u by rounding only.
     covariance_m2 : ndarray, shape (n, n)
-        Of the radii.
+        Covariance of the radii.
     heights_m, thickness_m : ndarray, shape (n,)
-        Of the rings that the table reaches.
+        Rings within the table.
     zero_m : Reading
-        Dip of the bottom of the first ring; u is 0 where the table is empty at its zero and begins
-        there, nan where that cannot be told because the seams are found, too.
+        Dip of the bottom of the first ring. u is 0 if the table is empty at its zero and begins
+        there; nan if unknown because the seams are estimated as well.
     seams_m : tuple of Reading
-        Dips of the seams, each looked for by itself; u is large where nothing jumps there.
+        Dips of the seams, each estimated separately; u is large if the area does not jump there.
     seams_are : {"declared", "found"}
-        Which of them the radii are for.
+        Which seams the radii refer to.
     density_kg_m3 : Reading
     head : {"with", "without", "undecided"}
     t : float
         Density over its u.
     fittings : tuple of FoundFitting
     roof_m3 : Reading or None
-        What a declared roof takes above its critical zone; negative.
+        Effect of a declared roof above its critical zone; negative.
     base_m3 : Reading
-        Volume at `lowest_m`, the lowest row that is used.
+        Volume at `lowest_m`, the lowest row used.
     lowest_m : float
     used : ndarray of bool, shape (rows,)
     left_m3 : ndarray, shape (rows,)
-        Table less what was read, at each row.
+        Table minus geometry, at each row.
     rms_m3, largest_m3, expected_m3 : float
-        Of the rows that are used; what rounding would leave.
+        Rms and largest residual of the rows used; rms expected from rounding.
     without_head : (rms, largest, radii) or None
-        Of the same with the head left out: m3, m3, (n,) m.
+        Results without a head: m3, m3, (n,) m.
     roughness : float
-        What u was multiplied by because rows have more in them than rounding; 1: nothing.
+        Factor of u because residuals exceed rounding; 1 if they do not.
     state : State
-        All of it, as a function of the dip.
+        The complete model, as a function of the dip.
     independent_u : (float, ndarray)
-        Standard deviations of density and (n,) radii if each row were rounded independently of the
-        others; u is never less (`rounding`).
+        Standard deviations of density and (n,) radii for independent rounding of each row; u is
+        never smaller (`rounding`).
     """
 
     name: str
@@ -144,18 +144,18 @@ def read_upright(
     lowest_m=None,
     seams_known=True,
 ):
-    """Radii, density of the head, zero, things in the tank: out of a table.
+    """Estimate radii, density of the head, zero and fittings from a table.
 
     Parameters
     ----------
     former : FormerTable
     heights_m, thickness_m : array_like, shape (n,)
-        Of the rings, from the bottom up; all must be reached by the table.
+        Rings from the bottom up; the table must reach all of them.
     modulus_pa : float
     known : sequence of Fitting
-        Things that are known to be in the table, in its dips: taken out first.
+        Known fittings, at dips of the table; they are removed first.
     lowest_m : float, optional
-        Dip of the highest point of the bottom; None: found.
+        Dip of the highest point of the bottom; None: estimated.
     seams_known : bool
         False: `heights_m` are start values only.
 
@@ -166,10 +166,12 @@ def read_upright(
     Raises
     ------
     SolutionError
-        When rows are too few, or do not determine the radii.
+        If there are too few rows, or they do not determine the radii.
     """
     heights, plates = np.asarray(heights_m, float), np.asarray(thickness_m, float)
-    volume = former.volume_m3 - sum((one.volume_below_m3(former.height_m) for one in known), 0.0)
+    volume = former.volume_m3 - sum(
+        (fitting.volume_below_m3(former.height_m) for fitting in known), 0.0
+    )
     rows = Rows(former.height_m, volume, sd_of_rows(former))
     zone = former.roof.critical_m if former.roof else None
     used = np.ones(len(volume), dtype=bool)
@@ -180,13 +182,13 @@ def read_upright(
         used &= ~empty
     usable = rows.of(used)
     state = _start(usable, heights, plates, modulus_pa, zone)
-    found = search(usable, state, lowest_m, _usual_density(former))
-    used &= rows.dip_m >= found.state.lowest_m - 1e-9
-    return _geometry(former, found, rows, used, seams_known)
+    solution = search(usable, state, lowest_m, _usual_density(former))
+    used &= rows.dip_m >= solution.state.lowest_m - 1e-9
+    return _geometry(former, solution, rows, used, seams_known)
 
 
 def _start(rows, heights, plates, modulus, zone):
-    """The State before anything is adjusted: radii by the mean area of each ring."""
+    """Return the initial State, with radii from the mean area of each ring."""
     edges = np.concatenate([[0.0], np.cumsum(heights)])
     radii = np.zeros(len(heights))
     for k in range(len(heights)):
@@ -220,133 +222,133 @@ def _start(rows, heights, plates, modulus, zone):
     )
 
 
-def _geometry(former, found, rows, used, seams_known):
+def _geometry(former, solution, rows, used, seams_known):
     chosen = rows.of(used)
     quantum = former.volume_quantum_m3
-    found = _with_known_zero(chosen, former, found)
-    is_bulged = found.state.bulges_m is not None
-    other = seams = None
+    solution = _with_known_zero(chosen, former, solution)
+    is_bulged = solution.state.bulges_m is not None
+    other_order = seams = None
     if not is_bulged:
-        found, other = _with_order(chosen, with_sure_fittings(chosen, found, quantum))
-        seams = found if "seams" in found.state.free else _free_seams(chosen, found)
-    if seams is not None and (not seams_known or _are_elsewhere(found, seams)):
-        found = seams = without_phantoms(chosen, seams, quantum)
-    seams_are = "found" if "seams" in found.state.free else "declared"
-    scale = scale_of_u(found, chosen, quantum)
-    layout, by_order = found.state.layout, _by_order(found, other)
-    u_density = float(np.hypot((found.sd("density") * scale[layout["density"]])[0], by_order[0]))
-    t = found.state.density_kg_m3 / u_density
-    density = Reading(found.state.density_kg_m3, u_density)
-    is_rough = is_bulged or roughness(found, chosen) > 1
+        solution, other_order = _with_order(chosen, with_sure_fittings(chosen, solution, quantum))
+        seams = solution if "seams" in solution.state.free else _free_seams(chosen, solution)
+    if seams is not None and (not seams_known or _are_elsewhere(solution, seams)):
+        solution = seams = without_phantoms(chosen, seams, quantum)
+    seams_are = "found" if "seams" in solution.state.free else "declared"
+    scale = scale_of_u(solution, chosen, quantum)
+    layout, by_order = solution.state.layout, _by_order(solution, other_order)
+    u_density = float(np.hypot((solution.sd("density") * scale[layout["density"]])[0], by_order[0]))
+    t = solution.state.density_kg_m3 / u_density
+    density = Reading(solution.state.density_kg_m3, u_density)
+    is_rough = is_bulged or roughness(solution, chosen) > 1
     head, without = _decide_head(density, former.liquid_density_kg_m3, is_rough), None
-    independent = _independent(found)
-    dry = _without_head(chosen, found)
+    independent = _independent(solution)
+    dry = _without_head(chosen, solution)
     if head != "without":
         without = (*_remainders(dry.left_m3), dry.state.radii_m)
     if head == "undecided":
-        found, other = _with_usual_density(chosen, former, found, dry), None
+        solution, other_order = _with_usual_density(chosen, former, solution, dry), None
     if head == "without":
-        found, other = dry, None
-    found = without_phantoms(chosen, found, quantum)
-    scale = scale_of_u(found, chosen, quantum)
+        solution, other_order = dry, None
+    solution = without_phantoms(chosen, solution, quantum)
+    scale = scale_of_u(solution, chosen, quantum)
     u_seams = (
         seams.sd("seams") * scale_of_u(seams, chosen, quantum)[seams.state.layout["seams"]]
         if seams
         else None
     )
     return _as_geometry(
-        former, found, rows, used,
+        former, solution, rows, used,
         scale=scale, density=density, head=head, t=t, without=without,
-        seams=_seam_readings(seams.state if seams else found.state, u_seams),
-        seams_are=seams_are, by_order=_by_order(found, other)[1], independent=independent,
+        seams=_seam_readings(seams.state if seams else solution.state, u_seams),
+        seams_are=seams_are, by_order=_by_order(solution, other_order)[1], independent=independent,
     )  # fmt: skip
 
 
-def _independent(found):
-    """(density, (n,) radii): their standard deviations if rounding were independent."""
-    return float(found.sd("density")[0]), found.sd("radii")
+def _independent(solution):
+    """Standard deviations of density and radii (n,) for independent rounding."""
+    return float(solution.sd("density")[0]), solution.sd("radii")
 
 
-def _with_order(rows, found):
-    """The Fit with the head of the order that leaves less, and that of the other one.
+def _with_order(rows, solution):
+    """Return the Fit with the order of the head that fits better, and the Fit with the other order.
 
-    The first order where both do as well; the other is None where it is clearly worse.
+    The first order is used if both fit equally. The second Fit is None if it is clearly worse.
     """
     try:
-        second = rows.adjust(replace(found.state, is_first_order=False))
+        second = rows.adjust(replace(solution.state, is_first_order=False))
     except SolutionError:
-        return found, None
-    better = found.chi2 - second.chi2
-    first, last = (second, found) if better > BY_ORDER else (found, second)
+        return solution, None
+    better = solution.chi2 - second.chi2
+    first, last = (second, solution) if better > BY_ORDER else (solution, second)
     return first, last if abs(better) < ORDER_IS_CLEAR else None
 
 
-def _by_order(found, other):
-    """(sd of density, (n,) of radii) because the order of the head is not known."""
-    if other is None:
-        return 0.0, np.zeros(len(found.state.radii_m))
-    density = abs(found.state.density_kg_m3 - other.state.density_kg_m3)
-    return density / np.sqrt(3), (found.state.radii_m - other.state.radii_m) / np.sqrt(3)
+def _by_order(solution, other_order):
+    """Contribution of the unknown order of the head to the sds of density and radii (n,)."""
+    if other_order is None:
+        return 0.0, np.zeros(len(solution.state.radii_m))
+    density = abs(solution.state.density_kg_m3 - other_order.state.density_kg_m3)
+    return density / np.sqrt(3), (solution.state.radii_m - other_order.state.radii_m) / np.sqrt(3)
 
 
-def _with_known_zero(rows, former, found):
-    """The Fit with an empty tank at dip 0, the bottom of the first ring: when nothing says no."""
+def _with_known_zero(rows, former, solution):
+    """Return the Fit of a tank empty at dip 0, the bottom of the first ring, if rows allow it."""
     if not (rows.dip_m[0] == 0 and rows.volume_m3[0] == 0) or former.volume_quantum_m3 == 0:
-        return found
-    free = found.state.free - {"zero", "base"}
+        return solution
+    free = solution.state.free - {"zero", "base"}
     try:
-        held = rows.adjust(replace(found.state, zero_m=0.0, base_m3=0.0, free=free))
+        held = rows.adjust(replace(solution.state, zero_m=0.0, base_m3=0.0, free=free))
     except SolutionError:
-        return found
-    return held if held.chi2 - found.chi2 < SAME_ZERO**2 + 2 else found
+        return solution
+    return held if held.chi2 - solution.chi2 < SAME_ZERO**2 + 2 else solution
 
 
-def _free_seams(rows, found):
-    """The Fit with each seam where it is found by itself; None where that fails."""
-    if not len(found.state.seams_m):
+def _free_seams(rows, solution):
+    """Return the Fit with separately estimated seams; None if it has no solution."""
+    if not len(solution.state.seams_m):
         return None
-    free = (found.state.free | {"seams"}) - {"zero"}
+    free = (solution.state.free | {"seams"}) - {"zero"}
     try:
-        seams = rows.adjust(replace(found.state, free=free))
+        seams = rows.adjust(replace(solution.state, free=free))
     except SolutionError:
         return None
     return seams if np.all(np.diff(seams.state.rings.edges_m) > 0) else None
 
 
-def _are_elsewhere(found, seams):
-    """Whether seams are not where they were declared: one of them clearly, or all by chi2."""
-    apart = np.abs(seams.state.seams_m - found.state.seams_m)
+def _are_elsewhere(solution, seams):
+    """Whether seams differ from the declared ones: one of them clearly, or all together by chi2."""
+    apart = np.abs(seams.state.seams_m - solution.state.seams_m)
     count = len(apart)
     return bool(np.any(apart > CRITICAL * seams.sd("seams"))) and (
-        found.chi2 - seams.chi2 > LEAST_GAIN + count
+        solution.chi2 - seams.chi2 > LEAST_GAIN + count
     )
 
 
-def _without_head(rows, found):
-    """The Fit of the same with the head left out."""
-    free = found.state.free - {"density"}
-    dry = replace(found.state, density_kg_m3=0.0, free=free)
-    found = tried(rows, dry) or tried(rows, replace(dry, free=free - {"kinks"}))
-    return found or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
+def _without_head(rows, solution):
+    """Return the Fit without a head."""
+    free = solution.state.free - {"density"}
+    dry = replace(solution.state, density_kg_m3=0.0, free=free)
+    solution = tried(rows, dry) or tried(rows, replace(dry, free=free - {"kinks"}))
+    return solution or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
 
 
 def _usual_density(former):
-    """(density, sd) of the declared head, or of the head of some liquid or none."""
+    """Return (density, sd) of the declared head, or the prior of an unknown head."""
     declared = former.liquid_density_kg_m3
     return USUAL_KG_M3 if declared is None else (declared, DECLARED_SD_KG_M3)
 
 
-def _with_usual_density(rows, former, found, dry):
-    """The Fit with the declared density, or that of some liquid or none: the table cannot tell."""
+def _with_usual_density(rows, former, solution, dry):
+    """Return the Fit with the prior density, as the table does not determine it."""
     usual, sd = _usual_density(former)
     state = replace(
-        found.state, density_kg_m3=usual, usual_density_kg_m3=usual, density_sd_kg_m3=sd
+        solution.state, density_kg_m3=usual, usual_density_kg_m3=usual, density_sd_kg_m3=sd
     )
-    again = tried(rows, state) or found
+    again = tried(rows, state) or solution
     density = again.state.density_kg_m3
     if LIGHTEST_KG_M3 <= density <= DENSEST_KG_M3:
         return again
-    # No liquid has this density: the shell is that of the nearest possible one, and u stays.
+    # The density is impossible: use the shell at the nearest possible density, and keep u.
     if density > DENSEST_KG_M3:
         nearest = tried(rows, replace(state, density_sd_kg_m3=HELD_SD_KG_M3)) or dry
     else:
@@ -356,10 +358,10 @@ def _with_usual_density(rows, former, found, dry):
 
 
 def _decide_head(density, declared_kg_m3, is_rough):
-    """Whether a table has a head: "with", "without" or "undecided".
+    """Decide whether a table includes a head: "with", "without" or "undecided".
 
-    A wall that bulges, and rows with more in them than rounding, look like a head: there a declared
-    density holds. A density that no liquid has is none.
+    A bulging wall, or rows with errors beyond rounding, resemble a head. A declared density then
+    takes precedence. An impossible density counts as no head.
     """
     if is_rough and declared_kg_m3 is not None:
         return "undecided" if declared_kg_m3 > 0 else "without"
@@ -371,23 +373,23 @@ def _decide_head(density, declared_kg_m3, is_rough):
 
 
 def is_possible(density):
-    """Whether a liquid may have the density of a Reading, within its u."""
+    """Whether the density of a Reading is possible for a liquid, within its u."""
     reach = CRITICAL * density.u
     return -reach <= density.value <= DENSEST_KG_M3 + reach
 
 
-def _remainders(left):
-    return float(np.sqrt(np.mean(left**2))), float(np.abs(left).max())
+def _remainders(residuals):
+    return float(np.sqrt(np.mean(residuals**2))), float(np.abs(residuals).max())
 
 
-def _as_geometry(former, found, rows, used, *, scale, density, head, t, without, seams,
+def _as_geometry(former, solution, rows, used, *, scale, density, head, t, without, seams,
                  seams_are, by_order, independent):  # fmt: skip
-    state, layout = found.state, found.state.layout
+    state, layout = solution.state, solution.state.layout
     radii = layout["radii"]
-    covariance = found.cofactor[radii, radii] * np.outer(scale[radii], scale[radii])
+    covariance = solution.cofactor[radii, radii] * np.outer(scale[radii], scale[radii])
     covariance = covariance + np.outer(by_order, by_order)
-    sd = {name: found.sd(name) * scale[part] for name, part in layout.items()}
-    rms, largest = _remainders(found.left_m3)
+    sd = {name: solution.sd(name) * scale[part] for name, part in layout.items()}
+    rms, largest = _remainders(solution.left_m3)
     chosen = rows.of(used)
     edges = state.rings.edges_m
     return UprightGeometry(
@@ -413,14 +415,17 @@ def _as_geometry(former, found, rows, used, *, scale, density, head, t, without,
         largest_m3=largest,
         expected_m3=float(np.sqrt(np.mean(chosen.sd_m3**2))),
         without_head=without,
-        roughness=roughness(found, chosen),
+        roughness=roughness(solution, chosen),
         state=state,
         independent_u=independent,
     )
 
 
 def _zero_reading(state, sds):
-    """Zero, with u 0 where the table is empty at its zero, nan where seams are not known."""
+    """Reading of the zero.
+
+    U is 0 if the table is empty at its zero, nan if the seams are unknown.
+    """
     if len(sds):
         return Reading(state.zero_m, float(sds[0]))
     return Reading(state.zero_m, np.nan if "base" in state.free else 0.0)
@@ -433,10 +438,12 @@ def _seam_readings(state, sds):
 
 
 def _found_fittings(state, sds):
-    found = []
-    for k, one in enumerate(state.fittings):
-        held = held_kinks(state, one)
+    fittings = []
+    for k, fitting in enumerate(state.fittings):
+        held = held_kinks(state, fitting)
         u = [np.nan if h else s for h, s in zip(held, sds[3 * k : 3 * k + 2], strict=True)]
-        volume = Reading(one.volume_m3, float(sds[3 * k + 2]))
-        found.append(FoundFitting(Reading(one.bottom_m, u[0]), Reading(one.top_m, u[1]), volume))
-    return tuple(sorted(found, key=lambda one: one.bottom_m.value))
+        volume = Reading(fitting.volume_m3, float(sds[3 * k + 2]))
+        fittings.append(
+            FoundFitting(Reading(fitting.bottom_m, u[0]), Reading(fitting.top_m, u[1]), volume)
+        )
+    return tuple(sorted(fittings, key=lambda fitting: fitting.bottom_m.value))

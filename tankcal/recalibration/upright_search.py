@@ -1,10 +1,10 @@
-"""The search for what a table of an upright tank is made of: bottom, zero, things, seams.
+"""Search for the components of an upright tank in its table: bottom, zero, fittings, seams.
 
-The first ring is followed downwards as far as its rows are those of one cut: below is the bottom.
-The zero is taken where seams jump together (`zero.find_zeros`). Things are looked for as pairs of
-kinks, one after the other, until none explains more than rounding does by chance; where they are
-many, or look like seams from a wrong zero, other zeros and moved seams are tried, and what explains
-the rows by the fewest things is believed.
+Starting from the top of the first ring, rows are followed downwards while they fit one cross
+section; the bottom is below. The zero is where the seams jump together (`zero.find_zeros`).
+Fittings are sought as pairs of kinks, in turn, until no pair explains more than rounding can by
+chance. If there are many fittings, or some may be seams of a wrong zero, other zeros and moved
+seams are tried. The model with the fewest fittings is chosen.
 """
 
 from dataclasses import replace
@@ -21,42 +21,44 @@ from tankcal.recalibration.table_fit import DENSITY_SD_KG_M3, tried
 from tankcal.recalibration.zero import FARTHEST_M, find_zeros, move_seams
 
 SEAMS_FREE = "base", "density", "seams"
-LEAST_GAIN = 25.0  # of chi2 by a thing: less is what the best of all pairs gains by chance
+LEAST_GAIN = 25.0  # smallest reduction of chi2 by a fitting; the best pair gains less by chance
 MOST_FITTINGS, FEW_FITTINGS = 12, 4
-DOUBTFUL_GAIN, CHANCES, MARGIN = 300.0, 8, 1.2  # of a thing that rounding may look like
-LEAST_SIZE = 3.0  # last digits of the table
-PRICE = 50.0  # of chi2, of a thing: what explains the rows at the lowest price is believed
+# A fitting with less gain than this is compared with simulated roundings: number and margin.
+DOUBTFUL_GAIN, CHANCES, MARGIN = 300.0, 8, 1.2
+LEAST_SIZE = 3.0  # smallest volume of a fitting, last digits of the table
+PRICE = 50.0  # penalty of a fitting, added to chi2 in the choice of a model
 SAME_COST = 1.0
-LEAST_CHI2 = 0.8  # of a degree of freedom, by which no table is under
-SAME_SLOPES = 0.03, 0.15  # of the largest kink, that are none, when kinks are paired again
-LENGTHS_M = 1.0, 3.0, np.inf  # of things, in the order in which they are looked for
-USUAL_ZEROS_M = 0.0, -0.04, 0.04  # that are tried, too, where things are many
-NEAR_M = 0.025  # that the zero may go from where it was looked for
-CUT_M, CUT_ROWS = 0.4, 9  # of the rows that have to be of one cut, so that the bottom is below
+LEAST_CHI2 = 0.8  # smallest chi2 per degree of freedom
+SAME_SLOPES = 0.03, 0.15  # sizes of ignored kinks, relative to the largest, in other pairings
+LENGTHS_M = 1.0, 3.0, np.inf  # largest heights of fittings in successive searches
+USUAL_ZEROS_M = 0.0, -0.04, 0.04  # further zeros tried if there are many fittings
+NEAR_M = 0.025  # largest distance of the zero from its start value
+CUT_M, CUT_ROWS = 0.4, 9  # height and number of rows of one cross section above the bottom
 BOTTOM_TRIES = 60
-BULGED_DEGREE, MOST_BULGED_ROWS = 4, 400  # of the volume in CUT_M; of a search for things
-SURE_OF_BULGED = 8.0  # standard uncertainties of a thing where courses bulge
-JOINT_M, DRAWN_IN_M = 0.15, 3e-3  # about a joint; of the radius
-LONGEST_BULGED_M = 1.2  # of a thing where courses bulge: a longer thing looks like their profile
-LOW_M, LOW_SHARE = 0.15, 0.2  # things lower than this take no more of the cut: that is the bottom
-TAKEN_SHARE, GIVEN_SHARE = 0.7, 0.1  # of the cut, that a thing takes or gives at most
-EDGE_M = 0.1  # below the first seam: where rows of the first ring end, the zero being unknown
-SAME_ZERO = 3.0  # standard deviations
+# Degree of the volume within CUT_M, and largest number of rows, for courses that bulge.
+BULGED_DEGREE, MOST_BULGED_ROWS = 4, 400
+SURE_OF_BULGED = 8.0  # smallest fitting where courses bulge, standard uncertainties
+JOINT_M, DRAWN_IN_M = 0.15, 3e-3  # zone about a joint, and radial deformation of plates there
+LONGEST_BULGED_M = 1.2  # highest fitting where courses bulge; a higher one resembles a profile
+LOW_M, LOW_SHARE = 0.15, 0.2  # height of low fittings and their largest share of the area
+TAKEN_SHARE, GIVEN_SHARE = 0.7, 0.1  # largest share of the area that a fitting removes or adds
+EDGE_M = 0.1  # distance of the top row of the first ring below the first seam (unknown zero)
+SAME_ZERO = 3.0  # standard deviations within which two zeros are equal
 
 
 def search(rows, state, lowest_m, usual_density):
-    """The Fit of all that is found in rows.
+    """Return the Fit of all components found in rows.
 
     Parameters
     ----------
     rows : Rows
     state : State
-        With start values.
+        Start values.
     lowest_m : float or None
-        Dip of the highest point of the bottom; None: found.
+        Dip of the highest point of the bottom; None: estimated.
     usual_density : (float, float)
-        Density of the head and its standard deviation, kg/m3, for courses that bulge: a taper of
-        the courses looks like a head.
+        Density of the head and its standard deviation, kg/m3, for bulging courses: a taper of the
+        courses resembles a head.
 
     Returns
     -------
@@ -65,48 +67,49 @@ def search(rows, state, lowest_m, usual_density):
     Raises
     ------
     SolutionError
-        When the rows do not determine the radii.
+        If the rows do not determine the radii.
     """
     edges = state.rings.edges_m
     shows_bulges = show_bulges(rows.dip_m, rows.volume_m3, rows.sd_m3, edges)
     if shows_bulges:
-        found = _search_bulged(rows, state, lowest_m, *usual_density)
-        if found is not None and not _is_straight(rows, found):
-            return found
-    found = _search_straight(rows, state, lowest_m)
-    if shows_bulges or _is_plain(found) or _is_by_rounding(found):
-        return found
-    # Many things, or things that end at joints: that is what a coarse table makes of bulges.
+        solution = _search_bulged(rows, state, lowest_m, *usual_density)
+        if solution is not None and not _is_straight(rows, solution):
+            return solution
+    solution = _search_straight(rows, state, lowest_m)
+    if shows_bulges or _is_plain(solution) or _is_by_rounding(solution):
+        return solution
+    # In a coarse table, bulges look like many fittings, or like fittings that end at joints.
     bulged = _search_bulged(rows, state, lowest_m, *usual_density)
     is_simpler = bulged is not None and (
-        len(bulged.state.fittings) < len(found.state.fittings) and _cost(bulged) < _cost(found)
+        len(bulged.state.fittings) < len(solution.state.fittings)
+        and _cost(bulged) < _cost(solution)
     )
-    return bulged if is_simpler else found
+    return bulged if is_simpler else solution
 
 
 def _search_straight(rows, state, lowest_m):
-    """The Fit of straight courses; arguments as of `search`."""
+    """Return the Fit of straight courses; the arguments are those of `search`."""
     if lowest_m is not None:
         rows = rows.above(lowest_m)
         return _with_moved_seams(rows, _with_fittings(rows, state))
     lowest = _lowest_row(rows, state)
-    found = _with_moved_seams(rows.above(lowest), _with_fittings(rows.above(lowest), state))
+    solution = _with_moved_seams(rows.above(lowest), _with_fittings(rows.above(lowest), state))
     if lowest > rows.dip_m[0]:
-        more = replace(found.state, lowest_m=float(rows.dip_m[0]))
+        more = replace(solution.state, lowest_m=float(rows.dip_m[0]))
         try:
-            whole = _with_fittings(rows, more, at_most=len(found.state.fittings) + 1)
+            whole = _with_fittings(rows, more, at_most=len(solution.state.fittings) + 1)
         except SolutionError:
-            return found
-        if _is_by_rounding(whole) and _is_enough(rows, found, whole):
+            return solution
+        if _is_by_rounding(whole) and _is_enough(rows, solution, whole):
             return whole
-    return found
+    return solution
 
 
 def _search_bulged(rows, state, lowest_m, density, density_sd):
-    """The Fit of courses that bulge, with things that the profiles do not explain; None: fails.
+    """Return the Fit of bulging courses with fittings that the profiles do not explain, or None.
 
-    Seams are where they were declared. What the profiles leave goes on from row to row, and two
-    kinks explain some of it: a thing has to explain more than that.
+    Seams are kept as declared. Residuals of the profiles are correlated from row to row, and two
+    kinks explain part of them. A fitting must explain more.
     """
     lowest = _lowest_row(rows, state, BULGED_DEGREE) if lowest_m is None else lowest_m
     start = replace(
@@ -119,9 +122,9 @@ def _search_bulged(rows, state, lowest_m, density, density_sd):
     some = rows.above(lowest).thinned(MOST_BULGED_ROWS)
     best = None
     for zero in USUAL_ZEROS_M:
-        other = _with_free_zero(some.above(zero + NEAR_M), replace(start, zero_m=zero), zero)
-        if other and (best is None or _cost(other) < _cost(best) - LEAST_GAIN):
-            best = other
+        candidate = _with_free_zero(some.above(zero + NEAR_M), replace(start, zero_m=zero), zero)
+        if candidate and (best is None or _cost(candidate) < _cost(best) - LEAST_GAIN):
+            best = candidate
     if best is None:
         return None
     about = best.state.zero_m
@@ -135,36 +138,38 @@ def _search_bulged(rows, state, lowest_m, density, density_sd):
     return best and _with_lower_rows(rows.above(lowest), best)
 
 
-def _is_straight(rows, found):
-    """Whether straight courses with the same things explain the rows as well as profiles do."""
+def _is_straight(rows, solution):
+    """Whether straight courses with the same fittings fit as well as profiles."""
     state = replace(
-        found.state,
+        solution.state,
         bulges_m=None,
         usual_density_kg_m3=None,
         density_sd_kg_m3=DENSITY_SD_KG_M3,
     )
-    rows = rows.above(found.state.lowest_m)
-    free_zero = replace(state, free=state.free | {"zero"})  # profiles absorb a wrong zero
-    tries = (tried(rows, one) for one in (state, free_zero))
-    return any(one is not None and one.chi2 < found.cost + PRICE for one in tries)
+    rows = rows.above(solution.state.lowest_m)
+    free_zero = replace(state, free=state.free | {"zero"})  # profiles absorb an error of the zero
+    tries = (tried(rows, start) for start in (state, free_zero))
+    return any(trial is not None and trial.chi2 < solution.cost + PRICE for trial in tries)
 
 
-def _without_unsure(rows, found):
-    """The Fit without the things that are not sure where courses bulge."""
-    while found.state.fittings:
-        sds = found.sd("fittings")[2::3] * roughness(found, rows)
-        sizes = np.abs([one.volume_m3 for one in found.state.fittings]) / np.maximum(sds, 1e-12)
+def _without_unsure(rows, solution):
+    """Return the Fit without insignificant fittings, where courses bulge."""
+    while solution.state.fittings:
+        sds = solution.sd("fittings")[2::3] * roughness(solution, rows)
+        sizes = np.abs([fitting.volume_m3 for fitting in solution.state.fittings]) / np.maximum(
+            sds, 1e-12
+        )
         worst = int(np.argmin(sizes))
-        rest = found.state.fittings[:worst] + found.state.fittings[worst + 1 :]
-        again = tried(rows, replace(found.state, fittings=rest))
+        rest = solution.state.fittings[:worst] + solution.state.fittings[worst + 1 :]
+        again = tried(rows, replace(solution.state, fittings=rest))
         if sizes[worst] >= SURE_OF_BULGED or again is None:
             break
-        found = again
-    return found
+        solution = again
+    return solution
 
 
 def _is_of_joint(state, thing):
-    """Whether a thing gives room, or is what plates that are drawn in at a joint look like."""
+    """Whether a fitting adds volume, or resembles plates drawn in at a joint."""
     joints = state.rings.edges_m
     ends = np.array([[thing.bottom_m], [thing.top_m]])
     girth = 2 * np.pi * float(state.radii_m[0])
@@ -173,40 +178,40 @@ def _is_of_joint(state, thing):
     return thickness <= 0 or (is_near and thickness < DRAWN_IN_M)
 
 
-def _with_moved_seams(rows, found):
-    """The Fit with seams where the rows show them, if that spares things that look like seams."""
-    if _is_plain(found) or not len(found.state.seams_m):
-        return found
-    zero = found.state.zero_m
-    edges = found.state.rings.edges_m[1:-1]
+def _with_moved_seams(rows, solution):
+    """Return the Fit with seams from the rows, if this removes fittings that resemble seams."""
+    if _is_plain(solution) or not len(solution.state.seams_m):
+        return solution
+    zero = solution.state.zero_m
+    edges = solution.state.rings.edges_m[1:-1]
     moved = move_seams(rows.dip_m, rows.volume_m3, rows.sd_m3, edges) - zero
     if np.any(np.diff(moved) <= 0):
-        return found
-    state = replace(found.state, seams_m=moved, fittings=(), free=frozenset(SEAMS_FREE))
-    other = _from_zero(rows.above(zero + NEAR_M), state, MOST_FITTINGS)
+        return solution
+    state = replace(solution.state, seams_m=moved, fittings=(), free=frozenset(SEAMS_FREE))
+    candidate = _from_zero(rows.above(zero + NEAR_M), state, MOST_FITTINGS)
     price = LEAST_GAIN * len(moved) / 2
-    is_better = other is not None and _cost(other) + price < _cost(found)
-    return _with_lower_rows(rows, other) if is_better else found
+    is_better = candidate is not None and _cost(candidate) + price < _cost(solution)
+    return _with_lower_rows(rows, candidate) if is_better else solution
 
 
-def _is_enough(rows, found, whole):
-    """Whether rows far more than their new unknowns are explained by these."""
-    return len(rows.dip_m) - len(found.left_m3) > 10 * (
-        len(whole.state.unknowns) - len(found.state.unknowns)
+def _is_enough(rows, solution, larger):
+    """Whether the reduction of chi2 is large for the number of new unknowns."""
+    return len(rows.dip_m) - len(solution.left_m3) > 10 * (
+        len(larger.state.unknowns) - len(solution.state.unknowns)
     )
 
 
-def _is_by_rounding(found):
-    """Whether nothing is left but rounding: as a whole, and at the worst row."""
-    worst = np.abs(found.left_m3 / found.sd_m3).max()
-    return found.chi2 < ROUGH**2 * max(found.dof, 1) and worst < np.sqrt(3) * 1.25
+def _is_by_rounding(solution):
+    """Whether all residuals are within rounding: as a whole, and at the worst row."""
+    worst = np.abs(solution.left_m3 / solution.sd_m3).max()
+    return solution.chi2 < ROUGH**2 * max(solution.dof, 1) and worst < np.sqrt(3) * 1.25
 
 
 def _lowest_row(rows, state, degree=2):
-    """Dip from which on rows are those of one cut: above the highest point of the bottom.
+    """Lowest dip above the highest point of the bottom: rows from there on fit one cross section.
 
-    The lowest row of the first ring above which a parabola, or a polynomial of another degree for
-    courses that bulge, leaves nothing but rounding.
+    The result is the lowest row of the first ring above which a polynomial leaves only rounding.
+    Its degree is 2, or higher for bulging courses.
     """
     first = rows.dip_m <= state.seams_m[0] - EDGE_M if len(state.seams_m) else rows.dip_m >= 0
     ring = rows.of(first)
@@ -223,14 +228,14 @@ def _lowest_row(rows, state, degree=2):
 
 
 def _halving(tries):
-    """At most BOTTOM_TRIES of the rows, rising; closer together at the bottom."""
+    """At most BOTTOM_TRIES of the rows, rising, closer together near the bottom."""
     last = len(tries) - 1
     places = np.round(last * np.linspace(0, 1, BOTTOM_TRIES) ** 1.5).astype(int)
     return tries[np.unique(places)]
 
 
 def _is_one_cut(ring, degree):
-    """Whether a polynomial leaves no more than rounding of rows."""
+    """Whether a polynomial fits rows within rounding."""
     if len(ring.dip_m) < degree + 3:
         return False
     x = (ring.dip_m - ring.dip_m[0]) / (ring.dip_m[-1] - ring.dip_m[0])
@@ -239,7 +244,7 @@ def _is_one_cut(ring, degree):
     left = value - basis @ np.linalg.lstsq(basis, value, rcond=None)[0]
     dof = len(x) - degree - 1
     is_rounding = np.abs(left).max() < np.sqrt(3) * 1.25
-    lower = left[: max(len(left) // 4, 2)]  # a bottom shows here first
+    lower = left[: max(len(left) // 4, 2)]  # a bottom appears in the lowest rows first
     return (
         is_rounding
         and left @ left < dof + 4 * np.sqrt(dof)
@@ -248,21 +253,21 @@ def _is_one_cut(ring, degree):
 
 
 def _with_fittings(rows, state, at_most=MOST_FITTINGS):
-    """The Fit with the things that the rows show, from the zero that needs the fewest of them.
+    """Return the Fit with the fittings in the rows, for the zero that needs the fewest of them.
 
-    A zero that is far off lets seams look like things, so that others are tried where things are
-    many, or do not explain the rows.
+    With a wrong zero, seams resemble fittings. Other zeros are therefore tried if there are many
+    fittings, or if the fittings do not explain the rows.
     """
     zeros = find_zeros(rows.dip_m, rows.volume_m3, rows.sd_m3, state.seams_m)
     best, tried = None, 0
     for zero in (state.zero_m,) if state.fittings else (zeros[0], *USUAL_ZEROS_M, *zeros[1:]):
         most = at_most if best is None else min(at_most, _most_fittings(best))
-        other = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), most)
-        if other and (best is None or _cost(other) < _cost(best) - SAME_COST):
-            best = other
+        candidate = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), most)
+        if candidate and (best is None or _cost(candidate) < _cost(best) - SAME_COST):
+            best = candidate
         if best and _is_plain(best) and _is_by_rounding(best):
             break
-        tried += other is None or len(other.state.fittings) >= at_most
+        tried += candidate is None or len(candidate.state.fittings) >= at_most
         if tried > 1:
             break
     if best is None:
@@ -270,83 +275,88 @@ def _with_fittings(rows, state, at_most=MOST_FITTINGS):
             message("former_undetermined", "the rows of the table do not determine the radii")
         )
     if len(best.state.fittings) > FEW_FITTINGS and not _is_by_rounding(best):
-        bare = replace(best.state, fittings=())  # things without end explain what is not their own
+        bare = replace(
+            best.state, fittings=()
+        )  # fittings of unlimited height also explain other effects
         best = _with_free_zero(rows.above(best.state.lowest_m), bare, bare.zero_m) or best
     return _with_lower_rows(rows, best)
 
 
-def _with_lower_rows(rows, found):
-    """The Fit with rows that were left out because the first ring might have begun among them."""
-    more = len(rows.dip_m) - len(found.left_m3)
+def _with_lower_rows(rows, solution):
+    """Return the Fit with rows that were excluded because the first ring might begin among them."""
+    more = len(rows.dip_m) - len(solution.left_m3)
     for lowest in rows.dip_m[:more]:
         chosen = rows.above(lowest)
-        again = tried(chosen, replace(found.state, base_m3=float(chosen.volume_m3[0])))
+        again = tried(chosen, replace(solution.state, base_m3=float(chosen.volume_m3[0])))
         if again and _is_possible(again):
-            gain = again.chi2 - found.chi2
-            if gain < len(chosen.dip_m) - len(found.left_m3) + SAME_ZERO**2:
+            gain = again.chi2 - solution.chi2
+            if gain < len(chosen.dip_m) - len(solution.left_m3) + SAME_ZERO**2:
                 return again
-    return found
+    return solution
 
 
 def _most_fittings(best):
-    """How many things another Fit may have and still be the cheaper one."""
+    """Largest number of fittings with which another Fit may cost less."""
     return max(int((_cost(best) - LEAST_CHI2 * best.dof) / PRICE), 0)
 
 
-def _is_plain(found):
-    """Whether its things are few, and none of them what seams look like from a wrong zero."""
-    seams = found.state.rings.edges_m[1:-1]
-    return len(found.state.fittings) <= FEW_FITTINGS and all(
-        one.volume_m3 < 0
-        and one.top_m - one.bottom_m < LENGTHS_M[0]
-        and not np.any(np.abs(seams - one.bottom_m) < NEAR_M)
-        and not np.any(np.abs(seams - one.top_m) < NEAR_M)
-        for one in found.state.fittings
+def _is_plain(solution):
+    """Whether there are few fittings, and none resembles a seam of a wrong zero."""
+    seams = solution.state.rings.edges_m[1:-1]
+    return len(solution.state.fittings) <= FEW_FITTINGS and all(
+        fitting.volume_m3 < 0
+        and fitting.top_m - fitting.bottom_m < LENGTHS_M[0]
+        and not np.any(np.abs(seams - fitting.bottom_m) < NEAR_M)
+        and not np.any(np.abs(seams - fitting.top_m) < NEAR_M)
+        for fitting in solution.state.fittings
     )
 
 
-def _cost(found):
-    return found.cost + PRICE * len(found.state.fittings)
+def _cost(solution):
+    return solution.cost + PRICE * len(solution.state.fittings)
 
 
 def _from_zero(rows, start, at_most):
-    """The Fit with things, the zero free about where it starts; None where rows do not do.
+    """Return the Fit with fittings and the zero free about its start value, or None.
 
-    Short things first: two kinks of two things, one above the other, look like one thing.
+    Low fittings are sought first: two kinks of two fittings, one above the other, resemble one
+    fitting.
     """
     about = start.zero_m
-    found = _with_free_zero(rows, start, about)
-    for longest in LENGTHS_M if found else ():
-        while len(found.state.fittings) < at_most and found.dof > 6:
-            again = _with_one_more(rows, found, longest, about)
+    solution = _with_free_zero(rows, start, about)
+    for longest in LENGTHS_M if solution else ():
+        while len(solution.state.fittings) < at_most and solution.dof > 6:
+            again = _with_one_more(rows, solution, longest, about)
             if again is None:
                 break
-            found = again
-    return _tidied(rows, found, about) if found else None
+            solution = again
+    return _tidied(rows, solution, about) if solution else None
 
 
-def _with_one_more(rows, found, longest, about, rough=False):
-    """The Fit with the thing that explains most; None where none explains enough.
+def _with_one_more(rows, solution, longest, about, rough=False):
+    """Return the Fit with the fitting that explains most; None if no fitting explains enough.
 
-    rough  whether more than rounding is left over: enough is then measured by what is left
+    rough: whether residuals exceed rounding; the required gain is then relative to the residuals.
     """
-    design, left, sds = found.bulges  # observations that no thing changes: as at the lowest row
+    design, left, sds = (
+        solution.bulges
+    )  # prior observations do not depend on a fitting: place them at the lowest row
     candidates = find_fittings(
         np.append(np.full(len(sds), rows.dip_m[0]), rows.dip_m),
-        np.append(left, found.left_m3),
-        np.vstack([design, found.design]),
+        np.append(left, solution.left_m3),
+        np.vstack([design, solution.design]),
         np.append(sds, rows.sd_m3),
         longest,
     )
     for thing, gain in candidates:
         if gain < LEAST_GAIN:
             break
-        more = replace(found.state, fittings=(*found.state.fittings, thing))
+        more = replace(solution.state, fittings=(*solution.state.fittings, thing))
         again = _with_free_zero(rows, more, about)
         factor = roughness(again, rows) ** 2 if rough and again else 1.0
         if (
             again
-            and found.cost - again.cost > LEAST_GAIN * factor
+            and solution.cost - again.cost > LEAST_GAIN * factor
             and _is_large(rows, again.state.fittings[-1])
             and not (rough and _is_of_joint(again.state, again.state.fittings[-1]))
         ):
@@ -355,109 +365,111 @@ def _with_one_more(rows, found, longest, about, rough=False):
 
 
 def _is_large(rows, thing):
-    """Whether a thing is larger than what two rounded digits explain."""
+    """Whether a fitting is larger than the effect of two rounded digits."""
     return abs(thing.volume_m3) > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
 
 
-def _tidied(rows, found, about):
-    """The Fit with fewer things, where fewer explain the rows as well."""
-    if len(found.state.fittings) > 1:
+def _tidied(rows, solution, about):
+    """Return the Fit with fewer fittings, if fewer fit equally well."""
+    if len(solution.state.fittings) > 1:
         near = 1.6 * float(np.median(np.diff(rows.dip_m)))
         for share in SAME_SLOPES:
-            pairs = in_other_pairs(found.state.fittings, near, share)
-            found = _cheaper(rows, found, pairs, about)
-    for one in sorted(found.state.fittings, key=lambda one: abs(one.volume_m3)):
-        rest = tuple(f for f in found.state.fittings if f.volume_m3 != one.volume_m3)
-        found = _cheaper(rows, found, rest, about)
-    return found
+            pairs = in_other_pairs(solution.state.fittings, near, share)
+            solution = _cheaper(rows, solution, pairs, about)
+    for smallest in sorted(solution.state.fittings, key=lambda fitting: abs(fitting.volume_m3)):
+        rest = tuple(f for f in solution.state.fittings if f.volume_m3 != smallest.volume_m3)
+        solution = _cheaper(rows, solution, rest, about)
+    return solution
 
 
-def with_sure_fittings(rows, found, quantum_m3):
-    """The Fit without things whose volume is no more than its uncertainty, the least sure first."""
-    found = without_phantoms(rows, found, quantum_m3)
-    while found.state.fittings:
-        things = found.state.fittings
-        sizes = _sizes(rows, found, quantum_m3)
+def with_sure_fittings(rows, solution, quantum_m3):
+    """Return the Fit without fittings whose volume does not exceed its uncertainty."""
+    solution = without_phantoms(rows, solution, quantum_m3)
+    while solution.state.fittings:
+        things = solution.state.fittings
+        sizes = _sizes(rows, solution, quantum_m3)
         worst = int(np.argmin(sizes))
         rest = things[:worst] + things[worst + 1 :]
-        again = tried(rows, replace(found.state, fittings=rest))
-        rise = np.inf if again is None else again.chi2 - found.chi2
+        again = tried(rows, replace(solution.state, fittings=rest))
+        rise = np.inf if again is None else again.chi2 - solution.chi2
         limit = 2 * LEAST_GAIN if sizes[worst] < CRITICAL else LEAST_GAIN
         if limit < rise < DOUBTFUL_GAIN and quantum_m3 > 0:
             limit = MARGIN * _gain_by_chance(again, rows, quantum_m3)
         if rise > limit:
             break
-        found = again
-    return found
+        solution = again
+    return solution
 
 
-def without_phantoms(rows, found, quantum_m3):
-    """The Fit without things whose u is beyond their volume.
+def without_phantoms(rows, solution, quantum_m3):
+    """Return the Fit without fittings whose u exceeds their volume.
 
-    They go even where they explain rows: what these have more in them is told as such, not as a
-    thing of any size. Seams that are free leave such things, where they take over a kink.
+    They are removed even if they explain residuals, which are then reported as excess residuals.
+    Free seams can leave such fittings when they replace a kink.
     """
-    while found.state.fittings:
-        sizes = _sizes(rows, found, quantum_m3)
+    while solution.state.fittings:
+        sizes = _sizes(rows, solution, quantum_m3)
         worst = int(np.argmin(sizes))
         if sizes[worst] >= 1:
             break
-        things = found.state.fittings
-        bare = replace(found.state, fittings=things[:worst] + things[worst + 1 :])
+        things = solution.state.fittings
+        bare = replace(solution.state, fittings=things[:worst] + things[worst + 1 :])
         held = replace(bare, free=bare.free - {"kinks", "zero"})
         again = tried(rows, bare) or tried(rows, held)
         if again is None:
             break
-        found = again
-    return found
+        solution = again
+    return solution
 
 
-def _sizes(rows, found, quantum_m3):
-    """(things,) volumes over their u; 0 where that is not known."""
-    scale = scale_of_u(found, rows, quantum_m3)[found.state.layout["fittings"]]
-    sds = (found.sd("fittings") * scale)[2::3]
-    sizes = np.abs([one.volume_m3 for one in found.state.fittings]) / sds
+def _sizes(rows, solution, quantum_m3):
+    """Volumes of fittings over their u, shape (fittings,); 0 if u is unknown."""
+    scale = scale_of_u(solution, rows, quantum_m3)[solution.state.layout["fittings"]]
+    sds = (solution.sd("fittings") * scale)[2::3]
+    sizes = np.abs([fitting.volume_m3 for fitting in solution.state.fittings]) / sds
     return np.nan_to_num(sizes, nan=0.0)
 
 
-def _gain_by_chance(found, rows, quantum):
-    """What a thing gains of chi2 because rounding goes on from row to row: the largest of draws."""
-    q = np.linalg.qr(found.design / rows.sd_m3[:, None])[0]
+def _gain_by_chance(solution, rows, quantum):
+    """Largest reduction of chi2 by a fitting in simulations of correlated rounding."""
+    q = np.linalg.qr(solution.design / rows.sd_m3[:, None])[0]
     gains = []
-    for error in rounded_again(found, rows, quantum, CHANCES):
+    for error in rounded_again(solution, rows, quantum, CHANCES):
         left = error / rows.sd_m3
         left = (left - q @ (q.T @ left)) * rows.sd_m3
-        best = find_fittings(rows.dip_m, left, found.design, rows.sd_m3, most=1)
+        best = find_fittings(rows.dip_m, left, solution.design, rows.sd_m3, most=1)
         gains.append(best[0][1] if best else 0.0)
     return max(gains)
 
 
-def _cheaper(rows, found, fittings, about):
-    if len(fittings) > len(found.state.fittings):
-        return found
-    other = _with_free_zero(rows, replace(found.state, fittings=fittings), about)
-    return other if other and _cost(other) < _cost(found) else found
+def _cheaper(rows, solution, fittings, about):
+    if len(fittings) > len(solution.state.fittings):
+        return solution
+    candidate = _with_free_zero(rows, replace(solution.state, fittings=fittings), about)
+    return candidate if candidate and _cost(candidate) < _cost(solution) else solution
 
 
-def _is_possible(found):
-    state = found.state
+def _is_possible(solution):
+    state = solution.state
     cut = np.pi * state.radii_m[0] ** 2
     largest = LOW_SHARE * cut
     return abs(state.zero_m) <= FARTHEST_M and all(
-        one.bottom_m < one.top_m
-        and -TAKEN_SHARE * cut < one.volume_m3 / (one.top_m - one.bottom_m) < GIVEN_SHARE * cut
+        fitting.bottom_m < fitting.top_m
+        and -TAKEN_SHARE * cut
+        < fitting.volume_m3 / (fitting.top_m - fitting.bottom_m)
+        < GIVEN_SHARE * cut
         and (
-            one.bottom_m > state.lowest_m + LOW_M
-            or abs(one.volume_m3) < largest * (one.top_m - one.bottom_m)
+            fitting.bottom_m > state.lowest_m + LOW_M
+            or abs(fitting.volume_m3) < largest * (fitting.top_m - fitting.bottom_m)
         )
-        for one in state.fittings
+        for fitting in state.fittings
     )
 
 
 def _with_free_zero(rows, state, about):
-    """The Fit with the zero free where it stays near, and with things where they are found to be.
+    """Return the Fit with a free zero if it stays near, and with fittings at estimated positions.
 
-    Where that fails, the zero is held, or things where they were looked for; None: all fails.
+    If that fails, the zero is fixed, or the fittings keep their start positions; None if all fail.
     """
     things = {"kinks"} if state.fittings else set()
     zero = {"zero"} if len(state.seams_m) and "seams" not in state.free else set()

@@ -1,13 +1,13 @@
-"""The shell of an upright tank as a table has it: rings, and the head of the liquid in them.
+"""Shell of an upright tank in a table: rings, and their expansion by the head of the liquid.
 
 Liquid of density rho up to the dip h widens a ring of unloaded inside radius r and plate t, at the
-dip z, by K rho (h - z), K = g r^2 / (E t). Between the bottom of the first ring and h are
+dip z, by K rho (h - z), K = g r^2 / (E t). The volume between the bottom of the first ring and h is
 
     W(h) = sum over rings of pi [r^2 u + r K rho u^2 + K^2 rho^2 u^3 / 3]
 
-between u = h - end and h - bottom, with end the ring's top or h, whichever is lower. The last
-term is 1e-4 of the head's volume; the head of the first order leaves it out, and W is then
-quadratic within a ring.
+between u = h - end and h - bottom, where end is the lower of h and the top of the ring. The last
+term is 1e-4 of the effect of the head. The head of the first order omits it; W is then quadratic
+within a ring.
 """
 
 from dataclasses import dataclass
@@ -19,17 +19,17 @@ from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 
 @dataclass(frozen=True)
 class Rings:
-    """Rings of plates, one upon the other.
+    """Rings of plates, one above the other.
 
     Attributes
     ----------
     edges_m : ndarray, shape (n + 1,)
-        Dips of the bottom of the first ring, of the seams, and of the top of the last, which is
-        taken to go on.
+        Dips of the bottom of the first ring, of the seams, and of the top of the last ring, which
+        extends upwards without limit.
     thickness_m : ndarray, shape (n,)
     modulus_pa : float
     is_first_order : bool
-        Whether the head is that of the first order.
+        Whether the head is of first order.
     """
 
     edges_m: np.ndarray
@@ -38,20 +38,20 @@ class Rings:
     is_first_order: bool = True
 
     def compliance_m(self, radii_m):
-        """(n,) K: by how much a ring widens, m for each kg/m2 of liquid above."""
+        """Compliance K (n,): widening of a ring, m, per kg/m2 of liquid above."""
         return STANDARD_GRAVITY * radii_m**2 / (self.modulus_pa * self.thickness_m)
 
     def volume_m3(self, dips_m, radii_m, density_kg_m3):
-        """(rows,) W(h); 0 below the first ring."""
+        """Volume W(h), shape (rows,), m3; 0 below the first ring."""
         first, second, third = self._powers(dips_m)
         soft = self.compliance_m(radii_m) * density_kg_m3
         linear = first @ radii_m**2 + second @ (radii_m * soft)
         return np.pi * (linear + third @ (soft**2 / 3))
 
     def derivatives(self, dips_m, radii_m, density_kg_m3):
-        """Derivatives of W by the radii (rows, n), the density (rows,), the edges (rows, n).
+        """Derivatives of W by the radii (rows, n), the density (rows,), and the edges (rows, n).
 
-        That by the top of the last ring, which is none, is left out.
+        The top of the last ring is not an edge in this sense and is left out.
         """
         first, second, third = self._powers(dips_m)
         compliance = self.compliance_m(radii_m)
@@ -65,11 +65,15 @@ class Rings:
         head = np.maximum(dips_m[:, None] - self.edges_m[:-1], 0.0)
         above = self._cut_m2(radii_m, soft, head)
         below = np.zeros_like(above)
+        # A higher edge exchanges the cross section above it for the one below.
         below[:, 1:] = self._cut_m2(radii_m[:-1], soft[:-1], head[:, 1:])
         return by_radius, by_density, (below - above) * (head > 0)
 
     def area_m2(self, dips_m, radii_m, density_kg_m3):
-        """(rows,) dW/dh: the free surface, and the wall below that gives way."""
+        """Derivative dW/dh, shape (rows,), m2.
+
+        The free surface plus the widening of the wall below.
+        """
         high = np.maximum(np.asarray(dips_m)[:, None] - self.edges_m[:-1], 0.0)
         low = self._low(dips_m)
         soft = self.compliance_m(radii_m) * density_kg_m3
@@ -80,7 +84,7 @@ class Rings:
         return np.pi * (radii_m[place] ** 2 + growth)
 
     def _cut_m2(self, radii_m, soft, head):
-        """(rows, n) area of the cut of rings where the head above is so high."""
+        """Area (rows, n) of the cross section of rings under a head."""
         square = 0.0 if self.is_first_order else (soft * head) ** 2
         return np.pi * (radii_m**2 + 2 * radii_m * soft * head + square)
 
@@ -90,7 +94,7 @@ class Rings:
         return low
 
     def _powers(self, dips_m):
-        """(rows, n) integrals of 1, 2 u and 3 u^2 over the wet part of each ring."""
+        """Integrals (rows, n) of 1, 2 u and 3 u^2 over the wet part of each ring."""
         high = np.maximum(np.asarray(dips_m)[:, None] - self.edges_m[:-1], 0.0)
         low = self._low(dips_m)
         third = np.zeros_like(high) if self.is_first_order else high**3 - low**3

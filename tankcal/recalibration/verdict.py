@@ -1,10 +1,10 @@
-"""Keep, recompute or recalibrate: what a rule and the agreement of two tables say.
+"""Verdict of a comparison by a rule and by agreement: keep, recompute or recalibrate.
 
-recalibrate  a number is beyond the limit of the rule, |E_n| is above 1, the former table is older
-             than the rule lets it become, or all volumes differ as by a zero that nobody declared
-             and that is more than the rule lets a reference height differ
-recompute    the tank itself agrees; zero, temperature, head or roof are not those of the new table
-keep         nothing differs
+recalibrate  a value exceeds the limit of the rule, |E_n| exceeds 1, or the former table is older
+             than the rule allows. Also if all volumes differ by an undeclared zero larger than the
+             limit of the rule for the reference height.
+recompute    the tank agrees; zero, temperature, head or roof differ from those of the new table
+keep         no difference
 """
 
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ from tankcal.tank.capacity import Quantity
 from tankcal.tank.rules.deviation import StatedVolume, judge_volume
 
 DAYS_OF_YEAR = 365.25
-USUAL_LIMIT_M = 5e-3  # of a zero that nobody declared, where a rule has no limit
-ON_BASIS = ("zero", "temperature", "head", "roof")  # what a new computation mends
+USUAL_LIMIT_M = 5e-3  # limit of an undeclared zero for rules without a limit
+ON_BASIS = ("zero", "temperature", "head", "roof")  # differences corrected by recomputation
 FAILED = ("fails", "guard_band")
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """The verdict, whether all of its values were read in the text itself, and its reasons."""
+    """The verdict, its reasons, and whether all its limits were verified in the rule's text."""
 
     code: str | None
     verified: bool
@@ -33,14 +33,14 @@ class Verdict:
 
 @dataclass(frozen=True)
 class WorstError:
-    """The row or delivery with the largest |E_n| of those that are judged.
+    """The judged row or delivery with the largest |E_n|.
 
     Attributes
     ----------
     E_n, at_half : float
-        With the declared c, or 0; with c = 0.5.
+        With the declared c, or c = 0; with c = 0.5.
     low_m : float or None
-        Of a delivery.
+        Lower dip of a delivery.
     high_m : float
     d_m3, U_new_m3, U_former_m3, c_limit : float
     """
@@ -56,35 +56,45 @@ class WorstError:
 
     @property
     def place(self):
-        """{name: value} of where it is, for a Reason; of a row without low_m."""
+        """{name: value} of its position, for a Reason; without low_m for a row."""
         low = {} if self.low_m is None else {"low_m": self.low_m}
         return low | {"high_m": self.high_m, "d_m3": self.d_m3}
 
 
 def tank_of_rules(facts, former, new):
-    """The kind of tank in the words of the rules."""
+    """Kind of tank in the terms of the rules."""
     if facts.kind == "vertical":
         has_roof = former.roof is not None or new.roof is not None
         return "vertical_floating_roof" if has_roof else "vertical_fixed_roof"
     return facts.kind if facts.kind in ("horizontal", "sphere") else "other"
 
 
-# ---- the numbers of a rule
+# ---- limits of a rule
 
 
 def legal_numbers(rule, tank, former, new, basis, former_U, new_U):
-    """The `LegalNumber` of each limit of a rule that is for a kind of tank."""
-    found = [
-        _deviation(one, basis, former_U, new_U)
-        for one in rule.deviation
-        if is_for(one, tank) and basis.for_use.any()
+    """Return the `LegalNumber` of each limit of a rule for a kind of tank.
+
+    Parameters
+    ----------
+    rule : Rule
+    tank : str
+        Kind of tank in the terms of the rules.
+    former, new : FormerTable
+    basis : OneBasis
+    former_U, new_U : TableUncertainty
+    """
+    numbers = [
+        _deviation(limit, basis, former_U, new_U)
+        for limit in rule.deviation
+        if is_for(limit, tank) and basis.for_use.any()
     ]
-    heights = [one for one in rule.reference_height if is_for(one, tank)]
-    return [*found, *(_reference_height(one, former, new) for one in heights)]
+    heights = [limit for limit in rule.reference_height if is_for(limit, tank)]
+    return [*numbers, *(_reference_height(height, former, new) for height in heights)]
 
 
 def is_for(limit, tank):
-    """Whether a limit is for a kind of tank."""
+    """Whether a limit applies to a kind of tank."""
     return not limit.tanks or tank in limit.tanks
 
 
@@ -99,8 +109,8 @@ def _deviation(limit, basis, former_U, new_U):
         else new_U.deliveries(np.array([low]), np.array([high]))[0]
     )
     known = 0.0 if np.isnan(U) else float(U)
-    dips = [float(basis.height_m[one]) for one in (low, high) if one is not None]
-    found = judge_volume(
+    dips = [float(basis.height_m[dip]) for dip in (low, high) if dip is not None]
+    judged = judge_volume(
         limit,
         StatedVolume(stated, dips[-1], dips[0] if low is not None else None),
         Quantity(value, known / new_U.k, np.inf, new_U.k, known),
@@ -121,14 +131,14 @@ def _deviation(limit, basis, former_U, new_U):
         value=float(numbers[0]),
         as_printed=float(numbers[1]),
         at_m=dips,
-        verdict="not_judged" if unknown else found.code,
+        verdict="not_judged" if unknown else judged.code,
         clause=limit.clause,
         verified=limit.verified,
     )
 
 
 def _rows_of(limit, basis, use):
-    """(low or None, high, code) rows that a limit is judged at."""
+    """Rows (low or None, high, code) at which a limit is judged."""
     if limit.of == "capacity":
         return None, use[-1], "top"
     if limit.of == "deliveries":
@@ -166,27 +176,31 @@ def _reference_height(limit, former, new):
 
 
 def ages_of(rule, tank, former, new):
-    """The `TableAge` of each period of a rule that is for a kind of tank."""
+    """Return the `TableAge` of each period of a rule for a kind of tank."""
     years = _years_between(former.date, new.date)
     return [
         TableAge(
-            name=one.name,
-            of=one.of,
-            years=one.years,
+            name=period.name,
+            of=period.of,
+            years=period.years,
             age_years=years,
-            verdict="not_judged" if years is None else "fails" if years > one.years else "conforms",
-            clause=one.clause,
-            verified=one.verified,
+            verdict="not_judged"
+            if years is None
+            else "fails"
+            if years > period.years
+            else "conforms",
+            clause=period.clause,
+            verified=period.verified,
         )
-        for one in rule.periods
-        if is_for(one, tank)
+        for period in rule.periods
+        if is_for(period, tank)
     ]
 
 
 def _years_between(before, after):
-    """Years between two dates as texts; None where one is not known, or the order is wrong."""
+    """Years between two dates given as text; None if one is unknown, or the order is wrong."""
     try:
-        first, last = (date.fromisoformat(str(one)[:10]) for one in (before, after))
+        first, last = (date.fromisoformat(str(text)[:10]) for text in (before, after))
     except ValueError:
         return None
     years = (last - first).days / DAYS_OF_YEAR
@@ -197,13 +211,13 @@ def _years_between(before, after):
 
 
 def zero_limit_of(rule, tank):
-    """Largest zero (m) that may be taken for one without being declared: of the rule, or usual."""
-    return min((one.limit_m for one in rule.reference_height if is_for(one, tank)),
+    """Largest undeclared zero, m, by the rule or by default."""
+    return min((limit.limit_m for limit in rule.reference_height if is_for(limit, tank)),
                default=USUAL_LIMIT_M)  # fmt: skip
 
 
 def decide(legal, ages, basis, worst, c, zero_limit_m):
-    """The Verdict.
+    """Return the Verdict.
 
     Parameters
     ----------
@@ -211,11 +225,11 @@ def decide(legal, ages, basis, worst, c, zero_limit_m):
     ages : sequence of TableAge
     basis : OneBasis
     worst : WorstError or None
-        None: a U is not known.
+        None: a U is unknown.
     c : float or None
         Declared correlation.
     zero_limit_m : float
-        A zero that is fitted, not declared, may be no larger: else the bottom may have changed.
+        Largest zero that may be fitted without declaration; a larger one may be a changed bottom.
     """
     steps, zero = basis.steps, basis.zero
     grave = [*_broken(legal), *_differing(worst, c)]
@@ -223,7 +237,7 @@ def decide(legal, ages, basis, worst, c, zero_limit_m):
         volumes = {"d_m3": zero.volume_m3, "zero_mm": 1000 * zero.height_m}
         grave.append(Reason("zero_not_explained", volumes | {"most_mm": 1000 * zero_limit_m}))
     grave += _too_old(ages)
-    judged = [one for one in (*legal, *ages) if one.verdict != "not_judged"]
+    judged = [item for item in (*legal, *ages) if item.verdict != "not_judged"]
     differing = [name for name in ON_BASIS if steps[name].state == "done"]
     undone = {
         name: list(step.lacking)
@@ -235,44 +249,49 @@ def decide(legal, ages, basis, worst, c, zero_limit_m):
         mild.append(Reason("basis_differs", {"steps": differing}))
     mild += [Reason("step_not_done", {"step": n, "lacking": what}) for n, what in undone.items()]
     mild += _agreeing(worst, c)
-    kept = [one.code for one in legal if one.verdict == "conforms"]
+    kept = [number.code for number in legal if number.verdict == "conforms"]
     if kept:
         mild.append(Reason("limits_kept", {"limits": kept}))
     mild += [
-        Reason("limit_not_judged", {"limit": one.code})
-        for one in legal
-        if one.verdict == "not_judged"
+        Reason("limit_not_judged", {"limit": number.code})
+        for number in legal
+        if number.verdict == "not_judged"
     ]
     mild += [
-        Reason("age_not_judged", {"of": one.of, "years": one.years})
-        for one in ages
-        if one.verdict == "not_judged"
+        Reason("age_not_judged", {"of": age.of, "years": age.years})
+        for age in ages
+        if age.verdict == "not_judged"
     ]
     code = "recalibrate" if grave else "recompute" if differing else "keep"
-    if not (grave or worst or any(one in legal for one in judged)):
+    if not (grave or worst or any(item in legal for item in judged)):
         code, grave = None, [Reason("nothing_to_judge", {})]
-    return Verdict(code, all(one.verified for one in judged), (*grave, *mild))
+    return Verdict(code, all(item.verified for item in judged), (*grave, *mild))
 
 
 def _broken(legal):
     return [
         Reason(
-            "limit_exceeded" if one.verdict == "fails" else "in_guard_band",
-            {"limit": one.code, "value": one.value, "most": one.limit, "unit": one.unit},
+            "limit_exceeded" if number.verdict == "fails" else "in_guard_band",
+            {
+                "limit": number.code,
+                "value": number.value,
+                "most": number.limit,
+                "unit": number.unit,
+            },
         )
-        for one in legal
-        if one.verdict in FAILED
+        for number in legal
+        if number.verdict in FAILED
     ]
 
 
 def _too_old(ages):
     return [
         Reason(
-            "age_of_bottom_course_exceeded" if one.of == "bottom_course" else "age_exceeded",
-            {"age": one.age_years, "years": one.years},
+            "age_of_bottom_course_exceeded" if age.of == "bottom_course" else "age_exceeded",
+            {"age": age.age_years, "years": age.years},
         )
-        for one in ages
-        if one.verdict == "fails"
+        for age in ages
+        if age.verdict == "fails"
     ]
 
 
@@ -283,15 +302,15 @@ def _differing(worst, c):
 
 
 def _agreeing(worst, c):
-    found = []
+    reasons = []
     if worst is None:
         return [Reason("E_n_not_known", {})]
     if abs(worst.E_n) <= 1:
-        found.append(Reason("tank_agrees", {"E_n": worst.E_n, "c": c or 0.0, **worst.place}))
+        reasons.append(Reason("tank_agrees", {"E_n": worst.E_n, "c": c or 0.0, **worst.place}))
     if c is None:
         limit = None if np.isnan(worst.c_limit) else worst.c_limit
-        found.append(Reason("c_not_declared", {"c_limit": limit}))
-    return found
+        reasons.append(Reason("c_not_declared", {"c_limit": limit}))
+    return reasons
 
 
 def _finite(value):

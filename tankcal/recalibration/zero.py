@@ -1,23 +1,23 @@
-"""Where a table's zero is: all seams move with it.
+"""Zero of a table from its seams, which all move with it.
 
-About each seam two parabolas that meet at a dip s are adjusted to the rows, for each s. Each seam
-so has a vote on the zero, s less its height above the bottom. A vote counts for so much at most: a
-thing in the tank near one seam must not decide for all.
+Two parabolas that meet at a dip s are adjusted to the rows about each seam, for each s. This gives
+chi2 of each seam as a function of the zero, s minus the height of the seam above the bottom. The
+contribution of each seam is capped, so that a fitting near one seam does not decide.
 """
 
 import numpy as np
 
 FARTHEST_M, STEP_M = 0.35, 0.01
-MOVED_M = 0.15  # that a seam is looked for from where it was declared
-WINDOW_M = 0.5  # of rows about a seam, beyond the farthest zero
-LARGEST_VOTE = 25.0  # of chi2
-FEWEST_ROWS = 7  # of a window
-MOST_ROWS = 200  # of a window that are looked at
-APART_M = 0.03  # of candidates
+MOVED_M = 0.15  # largest distance of a seam from its declared position
+WINDOW_M = 0.5  # half width of the window about a seam, beyond the farthest zero
+LARGEST_VOTE = 25.0  # cap on the chi2 of a seam
+FEWEST_ROWS = 7  # fewest rows of a window
+MOST_ROWS = 200  # largest number of rows used in a window
+APART_M = 0.03  # smallest distance of candidates
 
 
 def find_zeros(dips_m, volumes_m3, sd_m3, seams_m, most=3):
-    """Dips where the first ring may begin, the likeliest first; (0.0,) where nothing tells.
+    """Dips of possible bottoms of the first ring, most likely first; (0.0,) if undetermined.
 
     Parameters
     ----------
@@ -25,6 +25,7 @@ def find_zeros(dips_m, volumes_m3, sd_m3, seams_m, most=3):
     seams_m : (n,) ndarray
         Heights above the bottom of the first ring.
     most : int
+        Largest number of candidates.
 
     Returns
     -------
@@ -36,24 +37,24 @@ def find_zeros(dips_m, volumes_m3, sd_m3, seams_m, most=3):
         votes += _vote(dips_m, volumes_m3, sd_m3, seam + zeros)
     if np.ptp(votes) < 1.0:
         return (0.0,)
-    votes = votes + 0.5 * (zeros / FARTHEST_M) ** 2  # of equals the one near 0
-    found = []
+    votes = votes + 0.5 * (zeros / FARTHEST_M) ** 2  # of equal candidates, prefer the one near 0
+    candidates = []
     for place in np.argsort(votes):
-        if all(abs(zeros[place] - zero) >= APART_M for zero in found):
-            found.append(float(zeros[place]))
-        if len(found) == most:
+        if all(abs(zeros[place] - zero) >= APART_M for zero in candidates):
+            candidates.append(float(zeros[place]))
+        if len(candidates) == most:
             break
-    return tuple(found)
+    return tuple(candidates)
 
 
 def move_seams(dips_m, volumes_m3, sd_m3, seams_m):
-    """(n,) dips of seams, each where the rows about it show a kink by themselves.
+    """Dips (n,) of seams, each estimated separately from the rows about it.
 
     Parameters
     ----------
     dips_m, volumes_m3, sd_m3 : (rows,) ndarray
     seams_m : (n,) ndarray
-        Dips that they were declared to be at.
+        Declared dips.
     """
     shifts = np.arange(-round(MOVED_M / STEP_M), round(MOVED_M / STEP_M) + 1) * STEP_M
     shifts = shifts[np.argsort(np.abs(shifts), kind="stable")]
@@ -62,7 +63,7 @@ def move_seams(dips_m, volumes_m3, sd_m3, seams_m):
 
 
 def _vote(dips, volumes, sds, seams):
-    """(zeros,) chi2 of the rows about one seam, capped and scaled to what it leaves at best."""
+    """chi2 (zeros,) of the rows about one seam, capped, and scaled by its minimum."""
     reach = FARTHEST_M + WINDOW_M
     near = np.flatnonzero(np.abs(dips - seams.mean()) <= reach)
     if len(near) < FEWEST_ROWS:

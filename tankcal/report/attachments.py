@@ -127,7 +127,7 @@ def contents(blocks, folder):
 
 
 class Packed:
-    """Compressed files of a run; each file is compressed once for all papers."""
+    """Compressed files of a run; each file is compressed once for all PDFs."""
 
     def __init__(self):
         self._streams, self._lock = {}, Lock()

@@ -2,6 +2,7 @@
 
 import shutil
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from tankcal.gum.monte_carlo import Goal
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.simulation import simulate_table
 from tankcal.pipeline.simulation.curvature import VARIED, curvature, vary_input
+from tankcal.pipeline.simulation.model import Model
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.budgets import budget
 from tankcal.uncertainty import declared_source
@@ -268,6 +270,33 @@ def test_curvature_by_temperature_and_expansion(tmp_path):
     assert set(found.pairs) == set(exact)
     for pair, column in zip(found.pairs, found.values.T, strict=True):
         assert column == pytest.approx(exact[pair], rel=2e-3), pair
+
+
+@pytest.mark.slow
+def test_mixed_curvature_is_that_of_the_tank_with_two_inputs_moved(tmp_path):
+    """Second method: the mixed second difference of tanks with both inputs moved, in the middle."""
+    rows = [("diameter", 20.0, "mm"), ("length", 50.0, "mm"), ("tilt", 2.0, "mm/m")]
+    result = run(tmp_path / "job", kind="horizontal", settings=LYING, uncertainty=rows)
+    none = np.zeros((0, len(result.table.height_m)))
+    survey = result.wall or result.scan or result.circles
+    model = Model(result.job, survey, result.body, result.zero_m, result.table, none)
+    u = {one.name: one.u for one in result.body.declared}
+    middle = slice(len(model.levels) // 4, 3 * len(model.levels) // 4)
+    levels = model.levels[middle]
+    mixed = [pair for pair in model.curved.pairs if pair[0] != pair[1] and {*pair} <= {*VARIED}]
+    assert len(mixed) >= 3
+    for pair in mixed:
+        by_model = by_tank = 0.0
+        for signs in product((1, -1), repeat=2):
+            draw, job = np.zeros((1, len(model.inputs.distributions))), result.job
+            for name, sign in zip(pair, signs, strict=True):
+                draw[0, model.inputs.place[name]] = sign
+                job = vary_input(job, name, sign * u[name])
+            weight = signs[0] * signs[1] / 4
+            by_model = by_model + weight * model.quadratic(draw)[0, middle]
+            by_tank = by_tank + weight * body_of(job, survey, uncertain=False).volume_m3(levels)
+        size = np.abs(by_tank).max()
+        assert by_model == pytest.approx(by_tank, abs=0.02 * size), pair
 
 
 @pytest.mark.slow

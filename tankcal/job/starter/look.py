@@ -5,7 +5,7 @@ _FONT = {"font_name": "Arial", "font_size": 10}
 _EXAMPLE = {"italic": True, "font_color": GREY}
 # The text format keeps the name 1-2 from becoming a date.
 _NUMBERS = {"text": "@", "date": "yyyy-mm-dd"}
-A4 = 9  # code of the paper size
+A4 = 9  # code of the page size
 LETTERS_TO_LINE = 1.45  # letters of the small font in one unit of column width
 LINE_PT = 12.0  # height of a line
 

@@ -164,8 +164,10 @@ class Model:
         hessians = np.zeros((max(len(pairs), 1), count, count))
         for hessian, (first_input, second_input) in zip(hessians, pairs, strict=False):
             i, j = self.inputs.place[first_input], self.inputs.place[second_input]
-            hessian[i, j] += 0.25
-            hessian[j, i] += 0.25
+            # Taylor: f_aa d_a^2 / 2, but f_ab d_a d_b, since f_ab and f_ba both contribute
+            half = 0.25 if first_input == second_input else 0.5
+            hessian[i, j] += half
+            hessian[j, i] += half
         second = self.curved.values if pairs else np.zeros((self.rows, 1))
         return QuadraticRows(
             self._both(self.table.volume_m3),

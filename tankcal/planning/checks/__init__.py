@@ -1,1 +1,1 @@
-"""What cannot be meant in a plan: as it is given, where it stands, what it sees."""
+"""Checks of a plan: its input, the positions of its items, and the visibility of its targets."""

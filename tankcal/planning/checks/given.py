@@ -1,4 +1,4 @@
-"""What is given in a plan and cannot be meant: names, keys that belong together, accuracies."""
+"""Checks of the input of a plan: names, combinations of keys, standard deviations."""
 
 from tankcal.job.checking import is_not_given, refuse_repeated
 from tankcal.job.tables import nearest
@@ -9,7 +9,7 @@ from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.obstacles import check_obstacles
 from tankcal.planning.units import warn_of_units
 
-UNFIT = {  # kinds of instruments that cannot be meant
+UNFIT = {  # kinds of instruments that a section cannot use
     "setup_rings": ("tape", "level", "stadia"),
     "tapes": ("total_station", "theodolite", "level", "stadia"),
 }
@@ -23,27 +23,27 @@ _NAMED = {
 
 
 def check_given(values, registers, given, raw, log):
-    """Names that must be defined, keys that belong together, accuracies that are not all zero."""
+    """Check that names are defined, combinations of keys are valid, and not all sds are zero."""
     for section, key, register in (
         ("photo_rings", "camera", "cameras"),
         ("setup_rings", "instrument", "instruments"),
         ("tapes", "instrument", "instruments"),
     ):
         known = registers[register]
-        for one in given.repeated[section]:
-            if one[key] is not None and one[key] not in known:
-                hint = nearest(one[key], known)
-                one.tell(log.problem, key, no_such_name(one[key], f"{register}.toml", hint))
+        for entry in given.repeated[section]:
+            if entry[key] is not None and entry[key] not in known:
+                hint = nearest(entry[key], known)
+                entry.tell(log.problem, key, no_such_name(entry[key], f"{register}.toml", hint))
     _check_kinds(registers["instruments"], given, log)
     _check_pattern(given.single["pattern"], log)
     for section in ("photo_rings", "setup_rings"):
-        for one in given.repeated[section]:
-            if len(one.filled & {"distance_m", "radius_m"}) != 1:
+        for ring in given.repeated[section]:
+            if len(ring.filled & {"distance_m", "radius_m"}) != 1:
                 expected = message(
                     "plan_one_radius",
                     "expected one of distance_m (from the wall) and radius_m (from the axis)",
                 )
-                one.tell(log.problem, "distance_m", expected)
+                ring.tell(log.problem, "distance_m", expected)
     check_obstacles(given, log)
     _check_tapes(given, log)
     _check_tables(given, log)
@@ -52,10 +52,10 @@ def check_given(values, registers, given, raw, log):
 
 
 def _check_kinds(instruments, given, log):
-    """A tape is no instrument of a set-up, nor a total station a tape."""
+    """Check that set-ups use total stations and tapes use tapes."""
     for section, unfit in UNFIT.items():
-        for one in given.repeated[section]:
-            kind = (instruments.get(one["instrument"]) or {}).get("kind")
+        for entry in given.repeated[section]:
+            kind = (instruments.get(entry["instrument"]) or {}).get("kind")
             if kind in unfit:
                 fit = message("plan_total_station", "a total station or a theodolite")
                 if section == "tapes":
@@ -63,15 +63,15 @@ def _check_kinds(instruments, given, log):
                 expected = message(
                     "plan_unfit_instrument",
                     "{instrument} is a {named}; expected {fit}",
-                    instrument=one["instrument"],
+                    instrument=entry["instrument"],
                     named=_NAMED[kind],
                     fit=fit,
                 )
-                one.tell(log.problem, "instrument", expected)
+                entry.tell(log.problem, "instrument", expected)
 
 
 def _check_pattern(pattern, log):
-    """Lines enough for a section, heights or levels, and a form that is larger than its part."""
+    """Check a pattern: enough lines for a section, heights or levels, common form within form."""
     lines = pattern["generatrices"]
     if lines in range(FEWEST_POINTS):
         expected = message(
@@ -93,20 +93,22 @@ def _check_pattern(pattern, log):
 
 def _check_tapes(given, log):
     seen = set()
-    for one in given.repeated["tapes"]:
-        if one["name"] in seen:
-            one.tell(
+    for entry in given.repeated["tapes"]:
+        if entry["name"] in seen:
+            entry.tell(
                 log.problem,
                 "name",
                 message(
-                    "plan_tape_twice", "found {found!r} again; expected it once", found=one["name"]
+                    "plan_tape_twice",
+                    "found {found!r} again; expected it once",
+                    found=entry["name"],
                 ),
             )
-        seen.add(one["name"])
+        seen.add(entry["name"])
 
 
 def _check_tables(given, log):
-    """Ties between two points, control points that stand there once, in one frame."""
+    """Check that ties connect two points, and that control points are unique and in one frame."""
     for table in given.ties.values():
         if table is None:
             continue
@@ -131,38 +133,38 @@ def _check_tables(given, log):
 
 
 def _check_accuracies(values, given, raw, log):
-    """Each ring says how well it measures; not everything may be exact."""
+    """Check that each ring states its precision, and that not all readings are exact."""
     has_common = values is None or not is_not_given(raw, "adjustment", "image_sd_um")
-    for one in given.repeated["photo_rings"]:
-        if "s_um" not in one.filled and not has_common:
+    for entry in given.repeated["photo_rings"]:
+        if "s_um" not in entry.filled and not has_common:
             expected = message(
                 "plan_image_sd_missing", "missing; expected s_um here, or adjustment.image_sd_um"
             )
-            one.tell(log.problem, "s_um", expected)
-        elif one["s_um"] == 0:
+            entry.tell(log.problem, "s_um", expected)
+        elif entry["s_um"] == 0:
             expected = message(
                 "plan_exact_image",
                 "found 0; an image point cannot be exact: expected micrometres above 0",
             )
-            one.tell(log.problem, "s_um", expected)
+            entry.tell(log.problem, "s_um", expected)
     keys = ("s_direction_arcsec", "s_zenith_arcsec", "s_mm")
-    for one in given.repeated["setup_rings"]:
-        if not one.filled & {*keys}:
+    for ring in given.repeated["setup_rings"]:
+        if not ring.filled & {*keys}:
             expected = message(
                 "plan_measures_nothing",
                 "measures nothing; expected at least one of {keys}",
                 keys=", ".join(keys),
             )
-            log.problem(PLAN_FILE, expected, one.row, one.name)
-        elif not any(one[key] or one.is_refused(key) for key in keys):
+            log.problem(PLAN_FILE, expected, ring.row, ring.name)
+        elif not any(ring[key] or ring.is_refused(key) for key in keys):
             expected = message(
                 "plan_ring_exact",
                 "an accuracy of zero for everything: expected standard deviations above 0",
             )
-            log.problem(PLAN_FILE, expected, one.row, one.name)
-        if "s_mm" in one.filled and "s_zenith_arcsec" not in one.filled:
+            log.problem(PLAN_FILE, expected, ring.row, ring.name)
+        if "s_mm" in ring.filled and "s_zenith_arcsec" not in ring.filled:
             expected = message(
                 "plan_zenith_missing",
                 "missing; expected zenith angles together with slope distances (s_mm)",
             )
-            one.tell(log.problem, "s_zenith_arcsec", expected)
+            ring.tell(log.problem, "s_zenith_arcsec", expected)

@@ -1,4 +1,4 @@
-"""Where a plan puts things and they cannot be: stations in the wall, targets above the shell."""
+"""Checks of the positions in a plan: stations off the wall, targets within the shell, free ties."""
 
 import numpy as np
 
@@ -14,15 +14,15 @@ from tankcal.planning.places import joints_m
 from tankcal.planning.units import warn_of_places
 from tankcal.planning.visibility import GRAZE_M
 
-# Ties and control: names that are there, lines that nothing cuts, control at its place.
+# Ties and control points: defined names, unobstructed lines, consistent positions.
 
-THINNER_M = 0.02  # by which the tank is taken thinner, so that what lies on the wall passes
-OFF_M = 0.5  # between control and the place that the plan gives the same point
-OUT_OF_PLUMB_M = 0.5  # between the ends of a plumb line, in plan
+THINNER_M = 0.02  # reduction of the tank radius, so that points on the wall are accepted
+OFF_M = 0.5  # largest distance of a control point from its position in the plan
+OUT_OF_PLUMB_M = 0.5  # largest horizontal distance between the ends of a plumb line
 
 
 def check_tied(plan, given, log):
-    """Every end of a tie is a point, no tape runs through the tank, control is where it stands."""
+    """Check the ends of ties, tapes through the tank, and positions of control points."""
     points = plan.points
     for table in given.ties.values():
         for end in ("from", "to") if table is not None else ():
@@ -42,7 +42,7 @@ def check_tied(plan, given, log):
 
 
 def _rows(plan, table):
-    """(row, names of both ends, (2, 3) their places) of a table, where both are points."""
+    """Yield (row, end names, end positions (2, 3)) of a table for ties between known points."""
     points = plan.points
     rows = () if table is None else zip(table.rows, table.of("from"), table.of("to"), strict=True)
     for row, *ends in rows:
@@ -61,8 +61,8 @@ def _check_distances(plan, given, log):
 
 
 def _through(plan, ends, xyz):
-    """Why no tape can be stretched between two places (2, 3); "" where one can."""
-    shell, (one, other) = plan.shell, ends
+    """Return the reason why no tape can connect two positions (2, 3); "" if it can."""
+    shell, (start, end) = plan.shell, ends
     if shell.outside:
         plates = [plate_m(course, True) for course in plan.job.courses]
         radius = shell.radius_m + min(plates) - plates[0] - THINNER_M
@@ -71,8 +71,8 @@ def _through(plan, ends, xyz):
             return message(
                 "plan_line_through_tank",
                 "the line from {one} to {other} runs through the tank; expected it outside",
-                one=one,
-                other=other,
+                one=start,
+                other=end,
             )
         return ""
     away = np.hypot(*(xyz[:, :2] - shell.axis_m).T)
@@ -87,15 +87,15 @@ def _through(plan, ends, xyz):
 
 
 def _check_plumb_lines(plan, given, log):
-    for row, (one, other), xyz in _rows(plan, given.ties["plumb_lines"]):
+    for row, (start, end), xyz in _rows(plan, given.ties["plumb_lines"]):
         off = np.hypot(*(xyz[1, :2] - xyz[0, :2]))
         if off > OUT_OF_PLUMB_M:
             expected = message(
                 "plan_out_of_plumb",
                 "{one} and {other} are {off:.3f} m apart in plan; a plumb line hangs: "
                 "expected at most {most:g} m",
-                one=one,
-                other=other,
+                one=start,
+                other=end,
                 off=off,
                 most=OUT_OF_PLUMB_M,
             )
@@ -103,16 +103,19 @@ def _check_plumb_lines(plan, given, log):
 
 
 def _check_control(plan, control, log):
-    """Control that the plan places itself is there; what only control places has all of x, y, z."""
-    points, setups = plan.points, [one.name for one in plan.setups]
-    own = {name: points[name] for name in (*plan.targets.names, *plan.facing, *setups)}
-    acting = {one.name for one in plan.known}
-    given = np.column_stack([control.numbers(f"{axis}_m") for axis in "xyz"])
-    for row, name, xyz in zip(control.rows, control.of("point"), given, strict=True):
-        if name in own:
-            off = np.nan_to_num(xyz - own[name])
+    """Check control against positions in the plan.
+
+    Points placed by control only need x, y and z.
+    """
+    points, setups = plan.points, [setup.name for setup in plan.setups]
+    placed = {name: points[name] for name in (*plan.targets.names, *plan.facing, *setups)}
+    acting = {control_point.name for control_point in plan.known}
+    stated = np.column_stack([control.numbers(f"{axis}_m") for axis in "xyz"])
+    for row, name, xyz in zip(control.rows, control.of("point"), stated, strict=True):
+        if name in placed:
+            off = np.nan_to_num(xyz - placed[name])
             if np.linalg.norm(off) > OFF_M:
-                where = ", ".join(f"{value:.3f}" for value in own[name])
+                where = ", ".join(f"{value:.3f}" for value in placed[name])
                 expected = message(
                     "plan_control_off",
                     "{point} is given {off:.3f} m from its place in the plan ({where}); "
@@ -133,14 +136,14 @@ def _check_control(plan, control, log):
             log.problem(control.file, expected, row, "point")
 
 
-# Targets above the shell, on one another, on welds.
+# Targets above the shell, coinciding targets, targets on welds.
 
-SHOWN = 5  # lines and rows in a message
+SHOWN = 5  # largest number of lines or rows listed in a message
 ROUNDING_M = 1e-6
 
 
 def check_targets(plan, pattern, log):
-    """Rows within the shell, lines and rows apart from one another and from welds."""
+    """Check that rows lie within the shell, and that no lines, rows or welds touch."""
     heights = plan.targets.height_m
     top = plan.shell.high_m - plan.shell.low_m
     for height in np.unique(heights[(heights > top) | (heights < 0)]):
@@ -160,7 +163,7 @@ def check_targets(plan, pattern, log):
 
 
 def _check_lines(plan, pattern, log):
-    """Lines that touch, and lines beside a weld that were moved onto another one."""
+    """Report lines that touch, and lines moved off one weld onto another."""
     targets, radius = plan.targets, plan.shell.radius_m
     first = [name == targets.section[0] for name in targets.section]
     names = [name for name, is_first in zip(targets.generatrix, first, strict=True) if is_first]
@@ -170,9 +173,9 @@ def _check_lines(plan, pattern, log):
     gap = np.diff(azimuth[order], append=azimuth[order[0]] + 2 * np.pi) * radius
     after = np.roll(order, -1)
     touching = [
-        message("plan_two_lines", "{one} and {other}", one=names[one], other=names[other])
-        for one, other, off in zip(order, after, gap, strict=True)
-        if off < TOUCH_M and one != other
+        message("plan_two_lines", "{one} and {other}", one=names[line], other=names[next_line])
+        for line, next_line, off in zip(order, after, gap, strict=True)
+        if off < TOUCH_M and line != next_line
     ]
     clearance = 1000 * targets.clearance_m
     if touching:
@@ -203,7 +206,7 @@ def _check_lines(plan, pattern, log):
 
 
 def _check_rows(plan, pattern, log):
-    """Rows that touch; rows that were asked for on a horizontal weld, which may be meant."""
+    """Report rows that touch; warn of requested rows on a horizontal weld."""
     if not pattern["heights_m"]:
         return
     rows = np.sort(pattern["heights_m"])
@@ -238,15 +241,15 @@ def _check_rows(plan, pattern, log):
 
 
 def _first(names):
-    """The first names in a row, and how many more there are."""
+    """Return the first names of a sequence and the number of the remaining names."""
     return message("plan_first", "{names}", names=list_some(names, SHOWN))
 
 
-NEAR_M = 0.05  # of the wall: a station nearer than this stands in it
+NEAR_M = 0.05  # smallest distance of a station from the wall
 
 
 def check_plan(plan, given, raw, log):
-    """Places that cannot be: stations in the wall, targets above the shell, ties through it."""
+    """Check all positions: stations in the wall, targets above the shell, obstructed ties."""
     if not plan.photos and not plan.setups:
         log.problem(
             PLAN_FILE,
@@ -263,9 +266,9 @@ def check_plan(plan, given, raw, log):
 
 
 def _check_fixed_photo(plan, raw, log):
-    """The photograph that holds the datum is one of the plan, and given with that datum only."""
+    """Check that the photograph that holds the datum exists, and is stated only with that datum."""
     settings = plan.job.measurements.settings
-    name, names = settings.fixed_photo, [one.name for one in plan.photos]
+    name, names = settings.fixed_photo, [photo.name for photo in plan.photos]
     if settings.datum != "fixed_photo":
         if name is not None:
             expected = message(
@@ -299,30 +302,30 @@ def _check_fixed_photo(plan, raw, log):
 
 
 def refuse_misplaced(plan, name):
-    """Raise InputError where the station or set-up `name` of a plan cannot stand."""
-    stands = [one for one in (*plan.photos, *plan.setups) if _station(one) == name]
+    """Raise InputError if the station or set-up `name` of a plan has an impossible position."""
+    stands = [stand for stand in (*plan.photos, *plan.setups) if _station(stand) == name]
     log = Log()
     _check_stations(plan, stands, log)
     log.stop_if_problems()
 
 
 def _check_stations(plan, stands, log):
-    """A station on the wrong side of the wall, in it, in an obstacle; one line a ring.
+    """Report stations in the wall, on its wrong side or in an obstacle; one message per ring.
 
-    stands  photographs and set-ups
+    stands: photographs and set-ups.
     """
-    told = set()
-    for one in stands:
-        why = _misplaced(plan, one.xyz_m)
-        if why and one.place not in told:
-            told.add(one.place)
-            file, row, name = one.place
-            log.problem(file, misplaced(_station(one), why), row, name)
+    reported = set()
+    for stand in stands:
+        why = _misplaced(plan, stand.xyz_m)
+        if why and stand.place not in reported:
+            reported.add(stand.place)
+            file, row, name = stand.place
+            log.problem(file, misplaced(_station(stand), why), row, name)
 
 
-def _station(one):
-    """The name of the place of a photograph or a set-up."""
-    return getattr(one, "station", one.name)
+def _station(stand):
+    """Name of the position of a photograph or set-up."""
+    return getattr(stand, "station", stand.name)
 
 
 def _misplaced(plan, xyz):

@@ -1,23 +1,23 @@
-"""Photographs and set-ups that see too little."""
+"""Check that photographs and set-ups see enough points."""
 
 from tankcal.job.tables import Log
 from tankcal.messages import message
 
-FEWEST = 3  # points that a photograph has to see
+FEWEST = 3  # fewest points on a photograph
 
 
 def refuse_blind(plan, seen):
-    """Raise InputError for photographs and set-ups that see too little, a line for each ring.
+    """Raise InputError for photographs and set-ups that see too few points.
 
-    seen  visibility.Visibility
+    One message per ring.
     """
     log, blind = Log(), {}
     for k, photo in enumerate(plan.photos):
         count, targets = (int(seen.on_photo[k, :n].sum()) for n in (None, len(plan.targets.names)))
         if count < FEWEST or not targets:
-            found = _seen(count, targets)
+            text = _seen(count, targets)
             blind.setdefault(photo.place, []).append(
-                (message("plan_a_photograph", "photograph {photo}", photo=photo.name), found)
+                (message("plan_a_photograph", "photograph {photo}", photo=photo.name), text)
             )
     for k, setup in enumerate(plan.setups):
         if not seen.on_setup[k].any():
@@ -25,7 +25,7 @@ def refuse_blind(plan, seen):
                 (message("plan_a_setup", "set-up {setup}", setup=setup.name), "nothing")
             )
     for (file, row, name), ones in blind.items():
-        who, found = ones[0]
+        who, text = ones[0]
         more = (
             message("plan_more_of_ring", ", and {more} more of this ring", more=len(ones) - 1)
             if len(ones) > 1
@@ -39,7 +39,7 @@ def refuse_blind(plan, seen):
                 "flat an angle (limits.incidence_deg) or hidden; expected it to see 3 points or "
                 "more, targets among them",
                 who=who,
-                found=found,
+                found=text,
                 more=more,
             ),
             row,

@@ -1,1 +1,1 @@
-"""Plans of walls that are strapped, read from reference lines or hit: the job, foreseen."""
+"""Plans of bare walls (strapping, lines, hits, tangents, liquid) and their predictions."""

@@ -1,4 +1,4 @@
-"""What the sections of a plan of the bare wall say that cannot be meant."""
+"""Checks of the sections of plan.toml for a bare wall."""
 
 import math
 
@@ -17,32 +17,40 @@ from tankcal.planning.wall.model import USUAL_AT, even_radius_m, evenness_of_lim
 
 CLEAR_M, MOST_SECTIONS = 0.5, 50
 LIMBS = ("left", "right")
-UNEVEN = 0.15  # of limbs: nearer to each other than that, they are the same place, about
-SELDOM_MIN = 30.0  # between readings of control targets
-FEWEST_AZIMUTHS = 3  # that a circle goes through
+UNEVEN = 0.15  # smallest evenness of limbs (`evenness_of_limbs`); below it, limbs coincide
+SELDOM_MIN = 30.0  # longest interval between readings of control targets, minutes
+FEWEST_AZIMUTHS = 3  # fewest azimuths that determine a circle
 OF_POINTS = ("pattern", "photo_rings", "setup_rings", "tapes")
 
 
 def check_sections(given, courses, nominal_m, raw, log):
-    """What the sections of a plan say that cannot be meant.
+    """Check the sections of a plan of a bare wall.
 
-    courses  names, None: unreadable       nominal_m  radius of the tank, None: unreadable
-    raw      RawJob of the plan
+    Parameters
+    ----------
+    given : Given
+    courses : sequence of str or None
+        Names of the courses; None if unreadable.
+    nominal_m : float or None
+        Nominal radius of the tank; None if unreadable.
+    raw : RawJob
+        Content of the plan's folder.
+    log : Log
     """
     for name in OF_POINTS:
         entries = given.repeated[name] if name in given.repeated else [given.single[name]]
-        for one in entries:
-            if one.filled:
+        for section in entries:
+            if section.filled:
                 expected = message(
                     "plan_points_and_wall",
                     "given together with straps, lines, hits, tangents or runs of liquid; expected"
                     " only one of them: a plan is of targets or of the bare wall",
                 )
-                log.problem(PLAN_FILE, expected, one.row, one.name)
-    for one in (*given.repeated["straps"], *given.repeated["hits"]):
-        for course in one["courses"] or ():
+                log.problem(PLAN_FILE, expected, section.row, section.name)
+    for entry in (*given.repeated["straps"], *given.repeated["hits"]):
+        for course in entry["courses"] or ():
             if courses and course not in courses:
-                one.tell(log.problem, "courses", no_such_name(course, "courses.csv"))
+                entry.tell(log.problem, "courses", no_such_name(course, "courses.csv"))
     _check_rings(given, nominal_m, log)
     if courses:
         _check_hits(given.repeated["hits"], courses, log)
@@ -56,13 +64,13 @@ def check_sections(given, courses, nominal_m, raw, log):
 
 
 def _check_rings(given, nominal_m, log):
-    """Not too many sections; set-ups that stand clear of the wall."""
+    """Check the number of sections, and that set-ups stand clear of the wall."""
     for name in ("straps", "hits"):
         if len(given.repeated[name]) > MOST_SECTIONS:
             expected = too_many_sections(len(given.repeated[name]), MOST_SECTIONS)
             log.problem(PLAN_FILE, expected, None, name)
-    for one in given.repeated["hits"]:
-        radius = one["radius_m"]
+    for entry in given.repeated["hits"]:
+        radius = entry["radius_m"]
         if None not in (radius, nominal_m) and abs(radius - nominal_m) < CLEAR_M:
             expected = message(
                 "plan_setup_at_wall",
@@ -72,13 +80,13 @@ def _check_rings(given, nominal_m, log):
                 clear=CLEAR_M,
                 nominal=nominal_m,
             )
-            one.tell(log.problem, "radius_m", expected)
+            entry.tell(log.problem, "radius_m", expected)
 
 
 def _check_hits(rings, courses, log):
-    """Enough hits for the sections of each course, and not more than can be used."""
+    """Check that each course has enough hits for its sections, and not too many."""
     if any(None in (ring["setups"], ring["hits"]) for ring in rings):
-        return  # told already
+        return  # reported already
     total = 0
     few = []  # rings
     for course in courses:
@@ -123,7 +131,7 @@ def _check_lines_and_ties(given, log):
 
 
 def _need(entry, keys, log):
-    """Numbers without which a section says nothing."""
+    """Report missing numbers that a section needs."""
     for key in keys:
         if key not in entry.filled:
             expected = message("plan_number_missing", "missing; expected a number above 0")
@@ -150,7 +158,7 @@ def _check_control(given, log):
 
 
 def _check_tangents(given, nominal_m, log):
-    """A traverse whose stations see each other past the tank, and no other sights beside it."""
+    """Check that neighbouring stations see each other, and that no other sights exist."""
     ring, traverse = given.single["tangents"], given.single["traverse"]
     if traverse.filled and not ring.filled:
         expected = message(
@@ -177,14 +185,14 @@ def _check_tangents(given, nominal_m, log):
     elif "bar" in traverse.filled:
         _need(traverse, ("s_bar_arcsec",), log)
     for name in ("lines", "hits"):
-        other = given.single.get(name) or next(iter(given.repeated.get(name, ())), None)
-        if other is not None and other.filled:
+        other_section = given.single.get(name) or next(iter(given.repeated.get(name, ())), None)
+        if other_section is not None and other_section.filled:
             expected = message(
                 "plan_tangents_beside",
                 "given together with [tangents]; expected only one of them: tankcal does not join"
                 " them yet",
             )
-            log.problem(PLAN_FILE, expected, other.row, name)
+            log.problem(PLAN_FILE, expected, other_section.row, name)
     count, radius = ring["stations"], ring["radius_m"]
     if count is not None and count < FEWEST_SETUPS:
         expected = message(
@@ -224,15 +232,15 @@ def _check_tangents(given, nominal_m, log):
 
 
 def least_ring_m(stations, nominal_m):
-    """Radius of a ring whose stations see each other past the wall."""
+    """Smallest radius of a ring of stations that see each other past the wall, m."""
     return float(nominal_m / np.cos(np.pi / stations) + CLEAR_M)
 
 
 def _check_totals(given, courses, log):
-    """Not more readings of a kind than can be used."""
+    """Check that no kind has too many readings."""
     straps = sum(
-        len(one["courses"] or courses) * len(percents_of(one)) * int(one["readings"] or 1)
-        for one in given.repeated["straps"]
+        len(entry["courses"] or courses) * len(percents_of(entry)) * int(entry["readings"] or 1)
+        for entry in given.repeated["straps"]
     )
     if straps > MOST_STRAPS:
         log.problem(PLAN_FILE, too_many_straps(straps), None, "straps")
@@ -248,5 +256,5 @@ def _check_totals(given, courses, log):
 
 
 def percents_of(entry):
-    """Heights of a section in each course, percent of it, from the bottom up."""
+    """Heights of the readings in each course, percent of its height, from the bottom up."""
     return tuple(sorted(set(entry["at_percent"] or USUAL_AT)))

@@ -1,6 +1,4 @@
-"""The sections of plan.toml that say how a wall will be strapped, read from lines, hit, sighted by
-its limbs, or measured by metered liquid.
-"""
+"""Sections of plan.toml for bare walls: strapping, reference lines, hits, tangents, liquid."""
 
 from tankcal.job.contract.hits import RANGING
 from tankcal.job.fields import Field
@@ -78,7 +76,7 @@ HITS = (
 )
 TIES = (
     count("targets", message("plan_note_ties", "how many targets neighbours share"), True, 20),
-    *(one for one in RANGING if one.name in ("s_mm", "s_arcsec")),
+    *(field for field in RANGING if field.name in ("s_mm", "s_arcsec")),
 )
 CONTROL_TARGETS = (
     count("targets", "of each set-up; blank: 2", high=20),
@@ -197,6 +195,6 @@ SINGLE = {
     "wall": WALL,
 }
 REPEATED = {"straps": STRAPS, "hits": HITS, "runs": RUNS}
-OF_WALL = ("straps", "lines", "hits", "tangents")  # what is read of an upright wall
+OF_WALL = ("straps", "lines", "hits", "tangents")  # sections that measure an upright wall
 MEASURING = (*OF_WALL, "runs")
-TABLES = ("obstructions", "thickness", "tape_checks")  # of a job, beside those of any plan
+TABLES = ("obstructions", "thickness", "tape_checks")  # tables of a job that these plans may have

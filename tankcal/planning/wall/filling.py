@@ -1,7 +1,7 @@
-"""Runs of metered liquid in a plan: what is said of them, and the rows of liquid.csv that they are.
+"""Planned runs of metered liquid: checks, and their rows of liquid.csv.
 
-What the meter will show does not stand in these rows as the tank of the plan would have it:
-`nominal_filling` says that.
+The volumes in these rows are approximate; `nominal_filling` replaces them by the volumes that a
+meter would show.
 """
 
 import numpy as np
@@ -12,16 +12,13 @@ from tankcal.planning.fields import too_many_sections
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.wall.model import PlannedRun
 
-LEAST_STEP_M = 0.001  # between two dips
-LEAST_BATCH_M3 = 1e-3  # stands for one that the sizes of a drawing do not give
+LEAST_STEP_M = 0.001  # smallest step between two dips
+LEAST_BATCH_M3 = 1e-3  # replaces a batch volume that is zero or unknown
 MOST_RUNS = 50
 
 
 def check_runs(given, is_run_declared, log):
-    """What [[runs]] and [filling] say that cannot be meant.
-
-    is_run_declared  whether [liquid] has a run_ppm
-    """
+    """Check [[runs]] and [filling]; is_run_declared: whether [liquid] has a run_ppm."""
     runs, filling = given.repeated["runs"], given.single["filling"]
     if filling.filled and not runs:
         expected = message(
@@ -31,8 +28,8 @@ def check_runs(given, is_run_declared, log):
         log.problem(PLAN_FILE, expected, filling.row, "filling")
     if len(runs) > MOST_RUNS:
         log.problem(PLAN_FILE, too_many_sections(len(runs), MOST_RUNS), None, "runs")
-    for one in runs:
-        _check_steps(one, log)
+    for entry in runs:
+        _check_steps(entry, log)
     _check_run_effect(given, is_run_declared, log)
     rows = sum(len(run.dips_m) + 1 for run in map(_planned, runs) if run is not None)
     if rows > MOST_ROWS:
@@ -45,27 +42,27 @@ def check_runs(given, is_run_declared, log):
         log.problem(PLAN_FILE, expected, None, "runs")
 
 
-def _check_steps(one, log):
+def _check_steps(run, log):
     first, last, step, steps = (
-        one[key] for key in ("first_dip_m", "last_dip_m", "step_m", "steps")
+        run[key] for key in ("first_dip_m", "last_dip_m", "step_m", "steps")
     )
-    if {"step_m", "steps"} <= one.filled or not {"step_m", "steps"} & one.filled:
+    if {"step_m", "steps"} <= run.filled or not {"step_m", "steps"} & run.filled:
         expected = message(
             "plan_step_or_steps",
             "expected one of them: step_m, the way from dip to dip, or steps, how many",
         )
-        one.tell(log.problem, "step_m", expected)
+        run.tell(log.problem, "step_m", expected)
         return
     if None in (first, last):
-        return  # told already
-    if abs(last - first) < LEAST_STEP_M and not one["from_empty"]:
+        return  # reported already
+    if abs(last - first) < LEAST_STEP_M and not run["from_empty"]:
         expected = message(
             "plan_run_stands",
             "found {last:g}, which is the first dip; expected a dip above it, or below it where"
             " liquid is drawn off",
             last=last,
         )
-        one.tell(log.problem, "last_dip_m", expected)
+        run.tell(log.problem, "last_dip_m", expected)
         return
     way = abs(last - first) / steps if steps else step
     if way is not None and way < LEAST_STEP_M and last != first:
@@ -75,11 +72,11 @@ def _check_steps(one, log):
             step=1000 * way,
             least=1000 * LEAST_STEP_M,
         )
-        one.tell(log.problem, "steps" if steps else "step_m", expected)
+        run.tell(log.problem, "steps" if steps else "step_m", expected)
 
 
 def _check_run_effect(given, is_declared, log):
-    """The run effect is declared, or expected of two runs or more."""
+    """Check that the run effect is declared, or that at least two runs determine it."""
     runs, filling = given.repeated["runs"], given.single["filling"]
     expected_ppm = filling["expected_run_ppm"]
     if expected_ppm is not None and is_declared:
@@ -100,12 +97,12 @@ def _check_run_effect(given, is_declared, log):
 
 
 def runs_of(entries, celsius):
-    """A tuple of `PlannedRun`s of sound [[runs]]; celsius: temperature of the table."""
-    return tuple(_planned(one, celsius) for one in entries)
+    """Return the `PlannedRun`s of valid [[runs]], a tuple; celsius: temperature of the table."""
+    return tuple(_planned(entry, celsius) for entry in entries)
 
 
 def _planned(entry, celsius=None):
-    """The PlannedRun of an Entry; None: it is refused."""
+    """Return the PlannedRun of an Entry; None if the entry is invalid."""
     first, last = entry["first_dip_m"], entry["last_dip_m"]
     step, steps = entry["step_m"], entry["steps"]
     if None in (first, last) or step is steps:
@@ -121,21 +118,21 @@ def _planned(entry, celsius=None):
 
 
 def _dips(first, last, step, steps):
-    """Dips by the way from one to the next, or by their number; the last step may be shorter."""
+    """Return dips by their step or by their number; the last step may be shorter."""
     if steps:
-        found = np.linspace(first, last, int(steps) + 1)
+        dips = np.linspace(first, last, int(steps) + 1)
     else:
         whole = int(min((abs(last - first) + 1e-9) // max(step, LEAST_STEP_M), MOST_ROWS))
-        found = first + np.sign(last - first) * step * np.arange(whole + 1)
-        if abs(last - found[-1]) >= LEAST_STEP_M:
-            found = np.append(found, last)
-    return tuple(np.round(found, 4).tolist())
+        dips = first + np.sign(last - first) * step * np.arange(whole + 1)
+        if abs(last - dips[-1]) >= LEAST_STEP_M:
+            dips = np.append(dips, last)
+    return tuple(np.round(dips, 4).tolist())
 
 
 def rows_of_runs(runs, holds):
-    """Rows of liquid.csv, {column: value} each.
+    """Return the rows of liquid.csv, {column: value} each.
 
-    holds  function of a dip, m, that gives m3, roughly
+    holds: function of a dip, m, that returns the approximate volume, m3.
     """
     for number, run in enumerate(runs, 1):
         common = {"run": str(number), "meter": run.meter}

@@ -1,4 +1,4 @@
-"""Changes of the runs of liquid of a WallPlan: a step more, smaller ones, better dips or meters."""
+"""Changes of the runs of a WallPlan: more or smaller steps, better dips, better meters."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -9,14 +9,14 @@ from tankcal.job.checks.liquid import MOST_ROWS
 from tankcal.planning.wall.filling import LEAST_STEP_M
 
 TOP, HALF, EMPTY = "top", "half", "empty"
-SAME_M = 1e-6
+SAME_M = 1e-6  # largest difference of equal dips
 
 
 def changes_of_runs(plan, made, certified):
-    """(action, item, name, how) of every change of the runs of a WallPlan.
+    """Return (action, item, name, function) of every change of the runs of a WallPlan.
 
-    made       function {part of the design: value} -> how
-    certified  function (name, {key: value}, register) -> how
+    made is a function {part of the design: value} -> function; certified is a function (name, {key:
+    value}, register) -> function.
     """
     runs, top = plan.design.runs, top_m(plan)
     for number, run in enumerate(runs, 1):
@@ -47,10 +47,10 @@ def changes_of_runs(plan, made, certified):
 
 
 def top_m(plan):
-    """Highest dip that the tank has by its drawing, from the table's zero, m; None: not known."""
+    """Highest dip of the tank by its drawing, from the table's zero, m; None if unknown."""
     job = plan.job
     if job.courses:
-        return sum(one.height_m for one in job.courses) - job.datum.plate_level_m
+        return sum(course.height_m for course in job.courses) - job.datum.plate_level_m
     size = job.sphere.diameter_m if job.sphere is not None else job.horizontal.height_m
     return size - (job.datum.dip_plate_z_m or 0.0)
 
@@ -60,17 +60,17 @@ def _is_surveyed(design):
 
 
 def _rows(runs):
-    return sum(len(one.dips_m) + 1 for one in runs)
+    return sum(len(run.dips_m) + 1 for run in runs)
 
 
 def _with(runs, number, run=None):
-    """Runs with another one in a place; None: without it."""
-    found = [run if place == number else one for place, one in enumerate(runs, 1)]
-    return tuple(one for one in found if one is not None)
+    """Return the runs with one run replaced, or removed if `run` is None."""
+    changed = [run if place == number else old_run for place, old_run in enumerate(runs, 1)]
+    return tuple(old_run for old_run in changed if old_run is not None)
 
 
 def _ends(dips, top):
-    """(action, dips) of a step more at the end of a run, as high as the last, and of one less."""
+    """Yield (action, dips) with a last step repeated at the end of a run, or one removed."""
     if len(dips) > 1:
         way = dips[-1] - dips[-2]
         longer = dips[-1] + way
@@ -81,7 +81,7 @@ def _ends(dips, top):
 
 
 def _to_top(dips, top):
-    """Dips on to the full tank, in steps as the last; None: they are there, or go down."""
+    """Extend dips to the full tank in steps of the last size; None if full already or falling."""
     if top is None or len(dips) < 2 or dips[-1] < dips[-2] or top - dips[-1] < LEAST_STEP_M:
         return None
     way = dips[-1] - dips[-2]
@@ -90,20 +90,20 @@ def _to_top(dips, top):
 
 
 def _halves(dips):
-    """Dips with one more in the middle of every step."""
-    found = [dips[0]]
+    """Return dips with another dip in the middle of every step."""
+    halved = [dips[0]]
     for low, high in pairwise(dips):
         middle = round((low + high) / 2, 4)
         if abs(high - low) >= 2 * LEAST_STEP_M:
-            found.append(middle)
-        found.append(high)
-    return tuple(found)
+            halved.append(middle)
+        halved.append(high)
+    return tuple(halved)
 
 
 def _every_second(dips):
-    """Every second dip, and the last."""
-    found = dips[::2]
-    return found if found[-1] == dips[-1] else (*found, dips[-1])
+    """Return every second dip and the last dip."""
+    kept = dips[::2]
+    return kept if kept[-1] == dips[-1] else (*kept, dips[-1])
 
 
 def _finer(plan):
@@ -113,7 +113,7 @@ def _finer(plan):
     def finer(run):
         sd = run.sd_m
         if sd is None:
-            number = next(k for k, one in enumerate(plan.design.runs, 1) if one is run)
+            number = next(k for k, planned in enumerate(plan.design.runs, 1) if planned is run)
             sd = float(usual[rows[str(number)][-1]])
         return replace(run, sd_m=sd / 2)
 
@@ -121,7 +121,7 @@ def _finer(plan):
 
 
 def _meters(plan, certified):
-    """Meters whose factor, or whose batches, would be twice as well known."""
+    """Yield changes that halve the uncertainty of a meter factor or of its batches."""
     for name, entry in plan.given.registers["meters"].entries.items():
         given = {key: value.raw for key, value in entry.items()}
         u = given.get("u_factor_ppm")

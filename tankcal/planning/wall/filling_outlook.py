@@ -1,4 +1,4 @@
-"""What runs of liquid would add to a geometry: U of rows and differences, causes, reliability."""
+"""Predicted effect of runs of liquid: U of rows and differences, causes, reliability."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,28 +13,29 @@ from tankcal.pipeline.liquid_body import join_body
 from tankcal.planning.given import PLAN_FILE
 from tankcal.uncertainty import combine
 
-LEAST_SHARE = 0.01  # of the u of a cause: liquid that tells less of it tells nothing
+LEAST_SHARE = 0.01  # smallest relative reduction of the u of a cause that is listed
 UNCONTROLLED = 1e-4  # redundancy
-SAME_M = 1e-6
-OF_INSTRUMENTS = "instrument"  # kinds of causes that a note names the instrument of
+SAME_M = 1e-6  # largest difference of equal dips
+OF_INSTRUMENTS = "instrument"  # part of the kinds of causes whose note names the instrument
 
 
 @dataclass(frozen=True)
 class DipOutlook:
-    """What is foreseen of the volume below a dip.
+    """Predicted volume below a dip.
 
     Attributes
     ----------
     dip_m : float
         From the table's zero, m.
     volume_m3 : float
-        Below it.
+        Volume below the dip, m3.
     U_geometry_m3 : float
-        Expanded uncertainty by geometry alone, as it is surveyed or declared, m3.
+        Expanded uncertainty by geometry only, surveyed or declared, m3.
     U_liquid_m3 : float or None
-        By liquid alone; None: beyond its dips, or liquid alone does not tell the tank.
+        Expanded uncertainty by liquid only, m3. None outside its dips, or if liquid only does not
+        determine the tank.
     U_m3 : float
-        By both.
+        Expanded uncertainty by both, m3.
     """
 
     dip_m: float
@@ -46,18 +47,18 @@ class DipOutlook:
 
 @dataclass(frozen=True)
 class DifferenceOutlook:
-    """What is foreseen of the volume between two dips: a delivery.
+    """Predicted volume between two dips (a delivery).
 
     Attributes
     ----------
     low_m, high_m : float
-        Its dips, m.
+        Dips, m.
     volume_m3 : float
-        Between them.
+        Volume between the dips, m3.
     U_geometry_m3 : float
-        As of `DipOutlook`.
+        As in `DipOutlook`.
     U_m3 : float
-        By geometry and liquid.
+        Expanded uncertainty by geometry and liquid, m3.
     """
 
     low_m: float
@@ -69,20 +70,20 @@ class DifferenceOutlook:
 
 @dataclass(frozen=True)
 class CauseOutlook:
-    """A cause that liquid tells something of, or a meter.
+    """A meter, or a cause whose uncertainty liquid reduces.
 
     Attributes
     ----------
     kind : str
         As in the budget of a table.
     name : str
-        Of the meter or the instrument; "": it is of all.
+        Name of the meter or instrument; "" if the cause is common to all.
     unit : str
-        Of both.
+        Unit of both uncertainties.
     u_before : float
-        Standard uncertainty.
+        Standard uncertainty without liquid.
     u_after : float
-        The same with liquid.
+        Standard uncertainty with liquid.
     """
 
     kind: str
@@ -94,21 +95,20 @@ class CauseOutlook:
 
 @dataclass(frozen=True)
 class LiquidReadings:
-    """How well batches, or dips, control one another.
+    """Reliability of batches or dips.
 
     Attributes
     ----------
     kind : str
         "batches" or "dips".
     count : int
-        How many.
+        Number of readings.
     uncontrolled : int
-        Of these, those that nothing else controls.
+        Number of readings that no other reading controls.
     redundancy : float
-        Mean part of an error that shows.
+        Mean redundancy number.
     detectable : float or None
-        Largest of the smallest errors that the test finds, m3 of batches, m of dips; None: all are
-        uncontrolled.
+        Largest minimal detectable error, m3 for batches, m for dips; None if all are uncontrolled.
     """
 
     kind: str
@@ -120,25 +120,25 @@ class LiquidReadings:
 
 @dataclass(frozen=True)
 class FillingOutlook:
-    """What runs of liquid would give, before anybody fills the tank.
+    """Predicted results of runs of liquid.
 
     Attributes
     ----------
     runs, batches : int
-        How many.
+        Numbers of runs and batches.
     dips : tuple of DipOutlook
     differences : tuple of DifferenceOutlook
-        Between neighbouring ones of these dips.
+        Between neighbouring dips of `dips`.
     causes : tuple of CauseOutlook
     readings : tuple of LiquidReadings
     redundancy : int
-        Steps less what only they tell: degrees of freedom of their test together.
+        Degrees of freedom of the overall test: steps minus unknowns that only the steps determine.
     detectable_radius_m : float or None
-        Smallest offset of all radii of the geometry that liquid would show, m.
+        Smallest detectable common offset of all radii of the geometry, m.
     run_sd : float
-        Run effect, relative.
+        Relative standard deviation of the run effect.
     run_dof : float or None
-        Its degrees of freedom; None: it is declared.
+        Its degrees of freedom; None if it is declared.
     """
 
     runs: int
@@ -153,25 +153,25 @@ class FillingOutlook:
     run_dof: float | None
 
 
-def outlook_of_filling(plan, measured, result, made):
-    """`FillingOutlook` of a WallPlan.
+def outlook_of_filling(plan, measured, result, table):
+    """Return the `FillingOutlook` of a WallPlan.
 
     Parameters
     ----------
     plan : WallPlan
     measured : Measured
     result : LiquidResult
-    made : ComputedTable
+    table : ComputedTable
     """
-    dips = _dips_of(plan, made)
+    dips = _dips_of(plan, table)
     bodies = _bodies(measured)
-    rows = _rows(plan, bodies, dips, made)
+    rows = _rows(plan, bodies, dips, table)
     dof = result.run_dof
     return FillingOutlook(
         runs=len(plan.design.runs),
         batches=len(result.steps.row),
         dips=rows,
-        differences=_differences(bodies, dips, made),
+        differences=_differences(bodies, dips, table),
         causes=_causes(measured.joint),
         readings=_readings(result),
         redundancy=result.dof,
@@ -181,17 +181,17 @@ def outlook_of_filling(plan, measured, result, made):
     )
 
 
-def _dips_of(plan, made):
-    """Dips that are listed: those that the plan names, else those of the runs and the full tank."""
+def _dips_of(plan, table):
+    """Return the listed dips: those of the plan, or else those of the runs and the full tank."""
     if plan.dips_m:
         return np.array(plan.dips_m)
-    filled = np.clip(filled_range_m(plan.job.liquid), made.table.height_m[0], made.top_m)
-    return np.unique(np.round([*filled, made.top_m], 4))
+    filled = np.clip(filled_range_m(plan.job.liquid), table.table.height_m[0], table.top_m)
+    return np.unique(np.round([*filled, table.top_m], 4))
 
 
-def refuse_other_dips(dips_m, made):
-    """Raise InputError for dips that a `ComputedTable` does not have."""
-    low, top = float(made.table.height_m[0]), made.top_m
+def refuse_other_dips(dips_m, table):
+    """Raise InputError for dips outside a `ComputedTable`."""
+    low, top = float(table.table.height_m[0]), table.top_m
     beyond = [dip for dip in dips_m if not low - SAME_M <= dip <= top + SAME_M]
     if beyond:
         expected = message(
@@ -205,7 +205,10 @@ def refuse_other_dips(dips_m, made):
 
 
 def _bodies(measured):
-    """{"geometry", "liquid", "joint": Body}; None: liquid alone does not tell the tank."""
+    """Return {"geometry", "liquid", "joint": Body}.
+
+    None if liquid only does not determine the tank.
+    """
     joint = measured.joint.known
     return {
         "geometry": joint.geometry.moved_to({}).body(),
@@ -214,41 +217,41 @@ def _bodies(measured):
     }
 
 
-def _expanded(body, levels, made, weights=None):
-    """(n,) U of volumes at levels, or of sums of them with weights."""
+def _expanded(body, levels, table, weights=None):
+    """U (n,) of volumes at levels, or of their weighted sums."""
     levels = np.clip(levels, body.lowest_m, body.highest_m)
     sources = body.sources(levels)
     if weights is not None:
-        sources = [one.weighted(weights) for one in sources]
+        sources = [source.weighted(weights) for source in sources]
     return combine(sources, len(levels if weights is None else weights)).expanded(
-        made.table.probability
+        table.table.probability
     )
 
 
-def _rows(plan, bodies, dips, made):
-    levels = dips + made.zero_m
+def _rows(plan, bodies, dips, table):
+    levels = dips + table.zero_m
     low, high = filled_range_m(plan.job.liquid)
     inside = (dips >= low - SAME_M) & (dips <= high + SAME_M)
-    found = {
-        name: np.full(len(dips), np.nan) if body is None else _expanded(body, levels, made)
+    U_of = {
+        name: np.full(len(dips), np.nan) if body is None else _expanded(body, levels, table)
         for name, body in bodies.items()
     }
-    liquid = np.where(inside, found["liquid"], np.nan)
+    liquid = np.where(inside, U_of["liquid"], np.nan)
     volumes = bodies["joint"].volume_m3(np.clip(levels, None, bodies["joint"].highest_m))
-    columns = (dips, volumes, found["geometry"], liquid, found["joint"])
+    columns = (dips, volumes, U_of["geometry"], liquid, U_of["joint"])
     return tuple(
         DipOutlook(float(dip), float(volume), float(by_geometry), _or_none(alone), float(U))
         for dip, volume, by_geometry, alone, U in zip(*columns, strict=True)
     )
 
 
-def _differences(bodies, dips, made):
+def _differences(bodies, dips, table):
     if len(dips) < 2:
         return ()
-    levels, over = dips + made.zero_m, np.diff(np.eye(len(dips)), axis=0)
+    levels, over = dips + table.zero_m, np.diff(np.eye(len(dips)), axis=0)
     joint, geometry = bodies["joint"], bodies["geometry"]
     volumes = over @ joint.volume_m3(np.clip(levels, None, joint.highest_m))
-    before, expanded = (_expanded(body, levels, made, over) for body in (geometry, joint))
+    before, expanded = (_expanded(body, levels, table, over) for body in (geometry, joint))
     columns = (pairwise(dips), volumes, before, expanded)
     return tuple(
         DifferenceOutlook(float(low), float(high), float(volume), float(by_geometry), float(U))
@@ -260,50 +263,58 @@ def _or_none(number):
     return float(number) if np.isfinite(number) else None
 
 
-def _causes(found):
-    """Meters, and all other causes of one number that liquid tells something of."""
-    adjusted, fill = found.adjusted, found.fill
-    metering = found.known.geometry.job.liquid
-    told = []
+def _causes(result):
+    """Return the meters, and other scalar causes whose uncertainty liquid reduces."""
+    adjusted, fill = result.adjusted, result.fill
+    metering = result.known.geometry.job.liquid
+    outlooks = []
     columns = dict(zip(fill.meters, _columns(adjusted, "meter_factor", len(fill.meters)),
                        strict=True))  # fmt: skip
     for name in fill.meters:
         u = 1e6 * metering.meters[name].u_factor
-        told.append(
+        outlooks.append(
             CauseOutlook("meter_factor", name, "ppm", u, u * _left(adjusted, columns[name]))
         )
-    of_geometry = [one for one in found.known.sources if not one.parts]
-    of_liquid = [one for one in found.known.liquid if one.kind != "meter_factor"]
-    for one in (*of_geometry, *of_liquid):
-        if one.u and one.unit and one.columns_m3.shape[1] == 1:
-            left = _left(adjusted, one.columns_m3[:, 0])
+    of_geometry = [source for source in result.known.sources if not source.parts]
+    of_liquid = [cause for cause in result.known.liquid if cause.kind != "meter_factor"]
+    for cause in (*of_geometry, *of_liquid):
+        if cause.u and cause.unit and cause.columns_m3.shape[1] == 1:
+            left = _left(adjusted, cause.columns_m3[:, 0])
             if left < 1 - LEAST_SHARE:
-                name, u = one.note if one.kind.startswith(OF_INSTRUMENTS) else "", float(one.u)
-                told.append(CauseOutlook(one.kind, name, one.unit, u, u * left))
-    return tuple(told)
+                name, u = (
+                    cause.note if cause.kind.startswith(OF_INSTRUMENTS) else "",
+                    float(cause.u),
+                )
+                outlooks.append(CauseOutlook(cause.kind, name, cause.unit, u, u * left))
+    return tuple(outlooks)
 
 
 def _columns(adjusted, kind, count):
-    for one in adjusted.effects:
-        if one.kind == kind:
-            return one.columns.T
+    for effect in adjusted.effects:
+        if effect.kind == kind:
+            return effect.columns.T
     return [None] * count
 
 
 def _left(adjusted, column):
-    """Which part of its u a cause keeps; column (n,): what one u of it adds to the misclosures."""
+    """Ratio of the u of a cause after to before.
+
+    Column (n,): effect of one u on the misclosures.
+    """
     if column is None:
         return 1.0
     return float(np.sqrt(max(1.0 - column @ adjusted.weight @ column, 0.0)))
 
 
 def _readings(result):
-    delta, found = noncentrality(), []
-    for kind, one in (("batches", result.steps), ("dips", result.dips)):
-        shows = one.redundancy > UNCONTROLLED
+    delta, outlooks = noncentrality(), []
+    for kind, readings in (("batches", result.steps), ("dips", result.dips)):
+        shows = readings.redundancy > UNCONTROLLED
         detectable = None
         if shows.any():
-            detectable = float(np.max(delta * one.sd[shows] / np.sqrt(one.redundancy[shows])))
-        mean = float(np.mean(one.redundancy)) if len(shows) else 0.0
-        found.append(LiquidReadings(kind, len(shows), int(np.sum(~shows)), mean, detectable))
-    return tuple(found)
+            detectable = float(
+                np.max(delta * readings.sd[shows] / np.sqrt(readings.redundancy[shows]))
+            )
+        mean = float(np.mean(readings.redundancy)) if len(shows) else 0.0
+        outlooks.append(LiquidReadings(kind, len(shows), int(np.sum(~shows)), mean, detectable))
+    return tuple(outlooks)

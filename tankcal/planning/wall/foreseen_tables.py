@@ -1,6 +1,6 @@
-"""The tables that a crew will fill in, from a `Design`: a row for each reading.
+"""Tables of a planned survey, generated from a `Design`: one row per reading.
 
-What is read does not stand in them as a nominal tank would have it: `nominal_readings` says that.
+Values in these rows are placeholders; `nominal_readings` replaces them by nominal readings.
 """
 
 import datetime
@@ -18,22 +18,34 @@ from tankcal.planning.obstacles import find_hidden
 from tankcal.planning.wall.filling import rows_of_runs
 from tankcal.survey.stadia import angle_of_distance_rad
 
-OFF_WALL_M = 0.2  # of a reference line
-USUAL_BAR_M = 2.0  # where nobody describes it, which the job tells
-STEEPEST = np.radians(55.0)  # incidence in plan, of a set-up that says nothing of what it sees
-TIE_HEIGHTS_M = (0.4, 1.4, 2.4)  # above the instrument's foot: of targets that set-ups share
-FIRST_ROUND = datetime.datetime(2000, 1, 1)  # of control targets: only what lies between counts
+OFF_WALL_M = 0.2  # distance of a reference line from the wall
+USUAL_BAR_M = 2.0  # length of an undescribed stadia; the job reports the missing description
+STEEPEST = np.radians(55.0)  # default largest horizontal angle of incidence from a set-up
+TIE_HEIGHTS_M = (0.4, 1.4, 2.4)  # heights of tie targets above the foot of the instrument
+FIRST_ROUND = datetime.datetime(2000, 1, 1)  # arbitrary origin of times; only intervals matter
 CONTROL_SIGHT = {"zenith_deg": 88.0, "distance_m": 10.0}
 
 
 class Foreseen:
     """Tables of a design on a tank.
 
-    design  Design              courses  ((name, height_m), ...) from the bottom up
-    radius_m  nominal           bottom_m  z of the bottom     zero_m  of the table above it
-    holds     function of a dip that gives m3, roughly; None: nothing is filled in
-    obstacles  Box and Pillar: sights that they cut are left out
-    bars      {name: length, m} of stadias
+    Attributes
+    ----------
+    design : Design
+    courses : tuple
+        ((name, height_m), ...) from the bottom up.
+    radius_m : float
+        Nominal radius.
+    bottom_m : float
+        z of the bottom.
+    zero_m : float
+        Height of the table's zero above the bottom.
+    holds : callable or None
+        Function of a dip that returns the approximate volume, m3; None without liquid.
+    obstacles : tuple of Box or Pillar
+        Sights that they cut are left out.
+    bars : dict
+        {name: length, m} of stadias.
     """
 
     def __init__(
@@ -48,29 +60,29 @@ class Foreseen:
             foot += height
 
     def tables(self):
-        """{name: Table}, of decimal points."""
-        found = {}
+        """Return {name: Table}, with decimal points."""
+        tables = {}
         if self.design.straps:
-            found["circumferences"] = self._straps(), MOST_STRAPS
+            tables["circumferences"] = self._straps(), MOST_STRAPS
         if self.design.lines is not None:
-            found["lines"] = self._lines(), MOST_OFFSETS
-            found["offsets"] = self._offsets(), MOST_OFFSETS
+            tables["lines"] = self._lines(), MOST_OFFSETS
+            tables["offsets"] = self._offsets(), MOST_OFFSETS
         if self.design.hits:
-            found["wall_hits"] = self._hits(), MOST_HITS
-            found["setups"] = self._setups(), MOST_HITS
-            found["control"] = self._stations(), MOST_HITS
-            found["control_readings"] = self._control_readings(), MOST_HITS
+            tables["wall_hits"] = self._hits(), MOST_HITS
+            tables["setups"] = self._setups(), MOST_HITS
+            tables["control"] = self._stations(), MOST_HITS
+            tables["control_readings"] = self._control_readings(), MOST_HITS
             if self.design.ties is not None:
-                found |= {name: (rows, MOST_HITS) for name, rows in self._ties().items()}
+                tables |= {name: (rows, MOST_HITS) for name, rows in self._ties().items()}
         if self.design.tangents is not None:
-            found["tangents"] = self._tangents(), MOST_TANGENTS
-            found |= {name: (rows, MOST_TANGENTS) for name, rows in self._traverse().items()}
+            tables["tangents"] = self._tangents(), MOST_TANGENTS
+            tables |= {name: (rows, MOST_TANGENTS) for name, rows in self._traverse().items()}
         if self.design.runs:
-            found["liquid"] = rows_of_runs(self.design.runs, self.holds), MOST_ROWS
-        return {name: _table(name, islice(rows, most + 1)) for name, (rows, most) in found.items()}
+            tables["liquid"] = rows_of_runs(self.design.runs, self.holds), MOST_ROWS
+        return {name: _table(name, islice(rows, most + 1)) for name, (rows, most) in tables.items()}
 
     def _height(self, course, percent):
-        """Above the bottom; nan: of no course."""
+        """Height above the bottom of a percentage of a course; nan for an unknown course."""
         foot, height = self.foot.get(course, (np.nan, np.nan))
         return foot + percent / 100 * height
 
@@ -79,26 +91,26 @@ class Foreseen:
 
     def _straps(self):
         around = 2 * np.pi * self.radius_m
-        for one in self.design.straps:
+        for strap in self.design.straps:
             row = {
-                "circumference": one.name,
-                "course": one.course,
-                "level_m": self._level(one.course, one.at_percent),
+                "circumference": strap.name,
+                "course": strap.course,
+                "level_m": self._level(strap.course, strap.at_percent),
                 "reading_m": around,
-                "s_mm": one.sd_mm,
-            } | dict(one.more)
-            for _ in range(one.readings):
+                "s_mm": strap.sd_mm,
+            } | dict(strap.more)
+            for _ in range(strap.readings):
                 yield row
 
-    def _sees(self, place, there):
-        """Whether no obstacle is between two places (3,)."""
-        there = np.array([there])
-        return not any(find_hidden(one, place, there)[0] for one in self.obstacles)
+    def _sees(self, place, target):
+        """Whether no obstacle lies between two positions (3,)."""
+        target = np.array([target])
+        return not any(find_hidden(obstacle, place, target)[0] for obstacle in self.obstacles)
 
     def _lines_in_sight(self):
-        """(name, azimuth in degrees, [(course, percent) that is seen along it]) of each line.
+        """Yield (name, azimuth in degrees, [visible (course, percent)]) of each line.
 
-        A line that does not see the reference level tells nothing.
+        A line without sight to the reference level gives no information and is left out.
         """
         lines, (reference, levels) = self.design.lines, self._levels_of_lines()
         off = self.radius_m + (-OFF_WALL_M if lines.side == "inside" else OFF_WALL_M)
@@ -106,7 +118,11 @@ class Foreseen:
             azimuth = (lines.first_deg + 360 * number / lines.count) % 360
             x, y = off * np.sin(np.radians(azimuth)), off * np.cos(np.radians(azimuth))
             foot = np.array([x, y, self.bottom_m])
-            seen = [one for one in levels if self._sees(foot, [x, y, foot[2] + self._height(*one)])]
+            seen = [
+                level
+                for level in levels
+                if self._sees(foot, [x, y, foot[2] + self._height(*level)])
+            ]
             if reference in seen:
                 yield str(number + 1), azimuth, seen
 
@@ -121,15 +137,18 @@ class Foreseen:
             }
 
     def _levels_of_lines(self):
-        """The reference level of the lines, and all (course, percent) from the bottom up.
+        """Return the reference level of the lines, and all (course, percent) from the bottom up.
 
-        The reference is that of the first strap that lies on one: then U is the least.
+        The reference level is that of the first strap on a level of the lines; this makes U
+        smallest.
         """
         lines = self.design.lines
         levels = [(course, percent) for course in self.foot for percent in lines.at_percent]
-        strapped = [(one.course, one.at_percent) for one in self.design.straps]
+        strapped = [(strap.course, strap.at_percent) for strap in self.design.straps]
         of_course = [level for level in levels if level[0] in {name for name, _ in strapped}]
-        return next((one for one in strapped if one in levels), (of_course or levels)[0]), levels
+        return next(
+            (level for level in strapped if level in levels), (of_course or levels)[0]
+        ), levels
 
     def _offsets(self):
         lines, (reference, _) = self.design.lines, self._levels_of_lines()
@@ -149,7 +168,7 @@ class Foreseen:
                         yield row
 
     def _rings(self):
-        """(ring, name of a set-up, azimuth of its place) of all."""
+        """Yield (ring, name of set-up, azimuth of set-up) of all set-ups."""
         for number, ring in enumerate(self.design.hits, 1):
             for k in range(ring.setups):
                 turn = np.radians(ring.start_deg) + 2 * np.pi * k / ring.setups
@@ -180,12 +199,12 @@ class Foreseen:
                 for percent in ring.at_percent:
                     z = self.bottom_m + self._height(course, percent)
                     for aim in aims:
-                        there = [self.radius_m * np.sin(aim), self.radius_m * np.cos(aim), z]
-                        if self._sees(station, there):
-                            yield {"setup": name, "course": course} | _sight(station, there)
+                        aimed = [self.radius_m * np.sin(aim), self.radius_m * np.cos(aim), z]
+                        if self._sees(station, aimed):
+                            yield {"setup": name, "course": course} | _sight(station, aimed)
 
     def _control_readings(self):
-        """All control targets of a set-up, round by round; where they stand the crew will see."""
+        """Return the readings of all control targets of a set-up at placeholder positions."""
         control = self.design.control
         for ring, name, turn in self._rings():
             for minutes in control.times_min(ring):
@@ -196,7 +215,7 @@ class Foreseen:
                     yield target | CONTROL_SIGHT | {"direction_deg": aim % 360, "time": time[:16]}
 
     def _azimuths(self, ring, turn):
-        """(hits,) about the axis: even over the whole turn, or over what a set-up sees of it."""
+        """Azimuths (hits,) about the axis, evenly over the full turn or the visible part of it."""
         inside, spread = ring.radius_m < self.radius_m, ring.spread_deg
         if inside and (spread is None or spread >= 360):
             step = 2 * np.pi / ring.hits
@@ -207,27 +226,27 @@ class Foreseen:
         return turn + wide * (np.arange(ring.hits) / (ring.hits - 1) - 0.5)
 
     def _in_sight(self, ring):
-        """Half the azimuths that a set-up round the tank sees under no more than STEEPEST."""
+        """Half the range of azimuths visible from an outside set-up under at most STEEPEST."""
         part = self.radius_m / ring.radius_m
         return STEEPEST - np.arcsin(part * np.sin(STEEPEST))
 
     def _stands(self):
-        """(name, place (3,) of the instrument) of the stations of a traverse."""
+        """Yield (name, instrument position (3,)) of the stations of a traverse."""
         ring = self.design.tangents
         for k in range(ring.stations):
             turn = np.radians(ring.start_deg) + 2 * np.pi * k / ring.stations
-            there = self._place(ring, turn).round(4)
-            yield str(k + 1), np.append(there, self.bottom_m + ring.height_m)
+            position = self._place(ring, turn).round(4)
+            yield str(k + 1), np.append(position, self.bottom_m + ring.height_m)
 
     def _tangents(self):
-        """Both limbs of each level, station by station, each as often as it is read."""
+        """Return readings of both limbs at each level, by station, with repetitions."""
         ring = self.design.tangents
-        for name, there in self._stands():
+        for name, station in self._stands():
             for course in self.foot:
                 for percent in ring.at_percent:
                     z = self.bottom_m + self._height(course, percent)
                     for side in ("left", "right"):
-                        if not self._sees(there, self._limb(there, z, side)):
+                        if not self._sees(station, self._limb(station, z, side)):
                             continue
                         row = {
                             "setup": name,
@@ -235,42 +254,42 @@ class Foreseen:
                             "level_m": self._level(course, percent),
                             "side": side,
                         }
-                        row |= tangent_sight(there, z, self.radius_m, side == "right")
+                        row |= tangent_sight(station, z, self.radius_m, side == "right")
                         row["s_arcsec"] = ring.sd_arcsec
                         for _ in range(ring.readings):
                             yield row
 
-    def _limb(self, there, z, side):
-        """(3,) place that a sight from a station touches at a height."""
-        azimuth, length = limb_of_circle(there[:2], self.radius_m, is_right=side == "right")
-        x, y = there[:2] + length * np.array([np.sin(azimuth), np.cos(azimuth)])
+    def _limb(self, station, z, side):
+        """Point (3,) where a sight from a station touches the wall at a height."""
+        azimuth, length = limb_of_circle(station[:2], self.radius_m, is_right=side == "right")
+        x, y = station[:2] + length * np.array([np.sin(azimuth), np.cos(azimuth)])
         return np.array([x, y, z])
 
     def stands(self):
-        """(name, place (3,) of the instrument) of each set-up of hits, each station of tangents."""
+        """Return (name, instrument position (3,)) of set-ups of hits and stations of tangents."""
         for ring, name, turn in self._rings():
             yield name, np.append(self._place(ring, turn), self.bottom_m + ring.height_m)
         if self.design.tangents is not None:
             yield from self._stands()
 
     def lines_cut(self):
-        """(name, name of the next) stations of a traverse that obstacles stand between."""
+        """Return pairs of neighbouring traverse stations with an obstacle between them."""
         stands = [] if self.design.tangents is None else list(self._stands())
-        for k, (name, there) in enumerate(stands):
+        for k, (name, station) in enumerate(stands):
             after, beside = stands[(k + 1) % len(stands)]
-            if not self._sees(there, beside):
+            if not self._sees(station, beside):
                 yield name, after
 
     def _traverse(self):
-        """{table: rows} of the set-ups, their stations, and the readings between neighbours."""
+        """Return {table: rows} of set-ups, their stations, and readings between neighbours."""
         ring, stands = self.design.tangents, list(self._stands())
         s_mm, s_arcsec = ring.traverse
         kinds = _kinds_of_sights(s_mm, s_arcsec)
         kinds = kinds if s_mm is not None else kinds[:-1]
-        found = {"setups": [], "control": [], **{table: [] for table, _, _ in kinds}}
-        found |= {} if ring.bar is None else {"stadia": []}
-        for k, (name, there) in enumerate(stands):
-            found["setups"].append(
+        rows = {"setups": [], "control": [], **{table: [] for table, _, _ in kinds}}
+        rows |= {} if ring.bar is None else {"stadia": []}
+        for k, (name, station) in enumerate(stands):
+            rows["setups"].append(
                 {
                     "setup": name,
                     "station": f"S{name}",
@@ -278,46 +297,48 @@ class Foreseen:
                     "instrument_height_m": ring.height_m,
                 }
             )
-            x, y, _ = there
-            found["control"].append({"point": f"S{name}", "x_m": x, "y_m": y, "z_m": self.bottom_m})
+            x, y, _ = station
+            rows["control"].append({"point": f"S{name}", "x_m": x, "y_m": y, "z_m": self.bottom_m})
             for beside in ((k - 1) % len(stands), (k + 1) % len(stands)):
-                read = _sight(there, stands[beside][1])
+                read = _sight(station, stands[beside][1])
                 row = {"setup": name, "to": f"S{stands[beside][0]}"}
                 for table, key, sd in kinds:
                     high = {"target_height_m": ring.height_m}
-                    found[table].append(row | {key: read[key]} | sd | high)
+                    rows[table].append(row | {key: read[key]} | sd | high)
                 if ring.bar is not None:
-                    found["stadia"].append(row | self._bar_sight(there, stands[beside][1]))
-        return found
+                    rows["stadia"].append(row | self._bar_sight(station, stands[beside][1]))
+        return rows
 
-    def _bar_sight(self, there, beside):
-        """{column: value} of the angle to the ends of the bar over the next station."""
+    def _bar_sight(self, station, beside):
+        """Return {column: value} of the angle between the ends of the bar over the next station."""
         name, sd = self.design.tangents.bar
         usual = next(iter(self.bars.values()), USUAL_BAR_M)
-        angle = angle_of_distance_rad(np.hypot(*(beside - there)[:2]), self.bars.get(name, usual))
+        angle = angle_of_distance_rad(np.hypot(*(beside - station)[:2]), self.bars.get(name, usual))
         return {"bar": name, "angle_deg": float(np.degrees(angle)), "s_arcsec": sd}
 
     def _ties(self):
-        """Readings of targets that stand between neighbouring set-ups of a ring."""
+        """Return readings of the targets between neighbouring set-ups of a ring."""
         targets, s_mm, s_arcsec = self.design.ties
-        found = {"directions": [], "zenith_angles": [], "slope_distances": []}
+        rows = {"directions": [], "zenith_angles": [], "slope_distances": []}
         rings = list(self._rings())
         for number, ring in enumerate(self.design.hits, 1):
-            mine = [one for one in rings if one[0] is ring and one[1].startswith(f"{number}-")]
-            for k, (_, name, turn) in enumerate(mine):
+            of_ring = [
+                setup for setup in rings if setup[0] is ring and setup[1].startswith(f"{number}-")
+            ]
+            for k, (_, name, turn) in enumerate(of_ring):
                 station = np.append(self._place(ring, turn).round(4), self.bottom_m + ring.height_m)
-                gaps = dict.fromkeys([k, (k - 1) % len(mine)]) if len(mine) > 1 else ()
+                gaps = dict.fromkeys([k, (k - 1) % len(of_ring)]) if len(of_ring) > 1 else ()
                 for gap in gaps:
                     for target in range(targets):
-                        there = self._target(ring, mine[gap][2], target)
-                        read = _sight(station, there)
+                        position = self._target(ring, of_ring[gap][2], target)
+                        read = _sight(station, position)
                         row = {"setup": name, "to": f"T{number}-{gap + 1}-{target + 1}"}
                         for table, key, sd in _kinds_of_sights(s_mm, s_arcsec):
-                            found[table].append(row | {key: read[key]} | sd)
-        return found
+                            rows[table].append(row | {key: read[key]} | sd)
+        return rows
 
     def _target(self, ring, turn, number):
-        """(3,) place of a target half-way to the next set-up, in turn nearer and further."""
+        """Position (3,) of a target half-way to the next set-up, alternately nearer and farther."""
         azimuth = turn + np.pi / ring.setups
         away = max(ring.radius_m, 1.0) + (0.5 if number % 2 else -0.3) * (1 + number // 2)
         z = self.bottom_m + TIE_HEIGHTS_M[number % 3]
@@ -325,9 +346,9 @@ class Foreseen:
 
 
 def tangent_sight(station, z, radius_m, is_right):
-    """{column: value} of the sight from a station to a limb of a circle about the origin.
+    """Return {column: value} of a sight from a station to a limb of a circle about the origin.
 
-    A circle's zero is +y; z  of the level that is touched
+    The zero of the horizontal circle is +y; z is the height of the limb.
     """
     azimuth, length = limb_of_circle(station[:2], radius_m, is_right=is_right)
     return {
@@ -337,20 +358,20 @@ def tangent_sight(station, z, radius_m, is_right):
 
 
 def limb_of_circle(station_m, radius_m, *, is_right):
-    """Azimuth of a sight from a station (2,) to a limb of a circle about the origin, its length."""
+    """Azimuth and length of a sight from a station (2,) to a limb of a circle about the origin."""
     away = np.hypot(*station_m)
     turn = np.arcsin(radius_m / away) * (1 if is_right else -1)
     return azimuth_of_axis(station_m) + turn, np.sqrt(away**2 - radius_m**2)
 
 
 def azimuth_of_axis(station_m):
-    """Of the origin, from a station (2,)."""
+    """Azimuth of the origin from a station (2,)."""
     x, y = station_m
     return np.arctan2(-x, -y)
 
 
 def _kinds_of_sights(s_mm, s_arcsec):
-    """(table, column, {column of its standard deviation: that}) of readings between stations."""
+    """Yield (table, column, {sd column: sd}) of readings between stations."""
     return (
         ("directions", "direction_deg", {"s_arcsec": s_arcsec}),
         ("zenith_angles", "zenith_deg", {"s_arcsec": s_arcsec}),
@@ -358,9 +379,9 @@ def _kinds_of_sights(s_mm, s_arcsec):
     )
 
 
-def _sight(station, there):
-    """{column: value} of the sight from a station to a place, a circle's zero being +y."""
-    away = np.asarray(there) - station
+def _sight(station, target):
+    """Return {column: value} of a sight from a station to a position; circle zero +y."""
+    away = np.asarray(target) - station
     distance = float(np.linalg.norm(away))
     return {
         "direction_deg": float(np.degrees(np.arctan2(away[0], away[1])) % 360),

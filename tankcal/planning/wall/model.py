@@ -1,6 +1,4 @@
-"""A wall to be strapped, read from reference lines, hit, sighted by its limbs or filled by meter:
-how, and the job that it will be.
-"""
+"""Data model of a planned survey of a bare wall: strapping, lines, hits, tangents, liquid."""
 
 from dataclasses import dataclass, field, replace
 
@@ -11,15 +9,16 @@ from tankcal.job.model import Job
 from tankcal.job.tables import RawJob, Value
 from tankcal.planning.model import Limits
 
-USUAL_AT = (20.0, 80.0)  # percent of a course's height: where its rows are read
-SECONDS_PER_HIT = 10.0  # aim, range and store
+USUAL_AT = (20.0, 80.0)  # default heights of readings, percent of the height of a course
+SECONDS_PER_HIT = 10.0  # default time to aim, range and store
 
 
 @dataclass(frozen=True)
 class PlannedStrap:
-    """A circumference of a course, read some times.
+    """A strapped circumference of a course.
 
-    at_percent  of the course's height      more  {column of circumferences.csv: value}
+    at_percent is its height in percent of the height of the course; more holds {column: value} of
+    circumferences.csv.
     """
 
     course: str
@@ -30,13 +29,13 @@ class PlannedStrap:
 
     @property
     def name(self):
-        """COURSE-PERCENT."""
+        """Name, "COURSE-PERCENT"."""
         return f"{self.course}-{self.at_percent:g}"
 
 
 @dataclass(frozen=True)
 class PlannedLines:
-    """Reference lines, evenly round the tank; each course is read at the same parts of it."""
+    """Reference lines, evenly round the tank, read at given percentages of course heights."""
 
     count: int
     at_percent: tuple
@@ -52,8 +51,8 @@ class PlannedLines:
 class PlannedHits:
     """A ring of set-ups, each of which hits the bare wall at some heights of some courses.
 
-    spread_deg  of the wall that each sees, as azimuths about the axis; None: all that it can
-    height_m    of the instrument above the bottom of the shell
+    spread_deg is the range of azimuths about the axis seen from a set-up; None: the whole visible
+    range. height_m is the height of the instrument above the bottom of the shell.
     """
 
     setups: int
@@ -69,10 +68,10 @@ class PlannedHits:
 
 @dataclass(frozen=True)
 class PlannedControl:
-    """Targets that each set-up of hits reads at its start, again and again, and at its end.
+    """Control targets read at the start, at intervals, and at the end of each set-up of hits.
 
-    every_min  minutes between two readings of a target, at most
-    minutes    that the hits of a set-up take; None: SECONDS_PER_HIT each
+    every_min is the longest interval between readings, minutes; minutes is the duration of the hits
+    of a set-up, None: SECONDS_PER_HIT each.
     """
 
     targets: int = 2
@@ -80,7 +79,7 @@ class PlannedControl:
     minutes: float | None = None
 
     def times_min(self, ring):
-        """(rounds,) minutes after the first hit when a set-up of a `PlannedHits` reads them."""
+        """Times (rounds,) of the readings in a set-up, minutes after its first hit."""
         hits = ring.hits * len(ring.at_percent) * len(ring.courses)
         minutes = self.minutes or np.ceil(hits * SECONDS_PER_HIT / 60)
         return np.linspace(0.0, minutes, int(np.ceil(minutes / self.every_min)) + 1)
@@ -88,14 +87,23 @@ class PlannedControl:
 
 @dataclass(frozen=True)
 class PlannedTangents:
-    """A traverse round the tank, from whose stations both limbs are sighted at the same parts of
-    each course.
+    """A traverse round the tank with sights to both limbs at given heights of each course.
 
-    radius_m   of its ring about the axis      height_m  of the instrument above the bottom
-    sd_arcsec  of a sight to a limb            readings  how often each limb is sighted
-    traverse   (s_mm of a distance, s_arcsec of an angle) between neighbouring stations; s_mm None:
-               no distances
-    bar        (its name, s_arcsec of an angle to its ends) of a stadia over either one; None: none
+    Attributes
+    ----------
+    radius_m : float
+        Radius of the ring of stations about the axis.
+    height_m : float
+        Height of the instrument above the bottom.
+    sd_arcsec : float
+        Standard deviation of a sight to a limb.
+    readings : int
+        Number of sights to each limb.
+    traverse : tuple
+        (s_mm of a distance, s_arcsec of an angle) between neighbouring stations; s_mm None: no
+        distances.
+    bar : tuple or None
+        (name, s_arcsec of an angle to its ends) of a stadia over each neighbouring station.
     """
 
     stations: int
@@ -112,12 +120,18 @@ class PlannedTangents:
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """A run of metered liquid, from dip to dip.
+    """A run of metered liquid from dip to dip.
 
-    dips_m      one after the other; falling ones: liquid is drawn off
-    from_empty  whether it begins in the empty, dry tank, before the first dip
-    sd_m        of a dip; None: that of the job's [liquid]
-    celsius     of liquid and shell; None: temperatures are not read
+    Attributes
+    ----------
+    dips_m : tuple of float
+        Successive dips; falling dips mean withdrawal.
+    from_empty : bool
+        Whether the run begins with the empty, dry tank, before the first dip.
+    sd_m : float or None
+        Standard deviation of a dip; None: from [liquid] of the job.
+    celsius : float or None
+        Temperature of liquid and shell; None: not read.
     """
 
     dips_m: tuple
@@ -128,15 +142,15 @@ class PlannedRun:
 
     @property
     def batches(self):
-        """How many volumes are read."""
+        """Number of metered volumes."""
         return len(self.dips_m) - (0 if self.from_empty else 1)
 
 
 def evenness_of_limbs(stations, radius_m, nominal_m):
-    """How evenly the places that sights of a ring touch lie round the wall.
+    """Evenness of the limbs of a ring of stations round the wall.
 
-    The limbs of a station lie acos(nominal / radius) to both sides of it: 0.5, those of one side
-    are half-way between those of the other; 0, they fall on the same places.
+    The limbs of a station lie acos(nominal / radius) to both sides of it. The result is 0.5 if left
+    limbs lie half-way between right limbs, and 0 if they coincide.
 
     Examples
     --------
@@ -148,25 +162,25 @@ def evenness_of_limbs(stations, radius_m, nominal_m):
 
 
 def even_radius_m(stations, radius_m, nominal_m, least_m):
-    """Radius of a ring whose limbs lie evenly, as near to another as can be; None: there is none.
+    """Radius of a ring with evenly distributed limbs nearest to radius_m; None if there is none.
 
-    least_m  that it must have
+    least_m: smallest permitted radius.
     """
     half = (np.arange(stations // 2 + 1) + 0.5) * np.pi / stations
-    found = nominal_m / np.cos(half[half < np.pi / 2 - 1e-9])
-    found = found[found >= least_m]
-    if not len(found):
+    radii = nominal_m / np.cos(half[half < np.pi / 2 - 1e-9])
+    radii = radii[radii >= least_m]
+    if not len(radii):
         return None
-    return float(found[np.argmin(np.abs(np.log(found / radius_m)))])
+    return float(radii[np.argmin(np.abs(np.log(radii / radius_m)))])
 
 
 @dataclass(frozen=True)
 class Design:
-    """What will be measured.
+    """Planned measurements of a bare wall.
 
-    ties     (targets that neighbouring set-ups share, s_mm, s_arcsec); None: the wall alone ties
-    control  targets that show whether a set-up moved
-    runs     of metered liquid
+    ties is (number of targets shared by neighbouring set-ups, s_mm, s_arcsec), or None if only the
+    wall connects the set-ups. control are targets that show movements of a set-up; runs are runs of
+    metered liquid.
     """
 
     straps: tuple[PlannedStrap, ...] = ()
@@ -179,42 +193,42 @@ class Design:
 
     @property
     def is_metered_alone(self):
-        """Whether liquid is all that measures the tank."""
+        """Whether the tank is measured by liquid only."""
         others = (self.straps, self.hits, self.lines, self.tangents)
         return bool(self.runs) and not any(others)
 
     @property
     def is_smoothed(self):
-        """Whether its readings show the wall smoother than it is: `pipeline.wall.is_smoothed`."""
+        """Whether the readings show the wall smoother than it is: `pipeline.wall.is_smoothed`."""
         untied = self.ties is None and sum(ring.setups for ring in self.hits) > 1
         return self.tangents is not None or untied
 
 
 @dataclass(frozen=True)
 class WallPlan:
-    """A survey of a wall by tape, reference lines, bare hits or tangents, before it is made.
+    """A planned survey of a bare wall.
 
     Attributes
     ----------
     job : Job
-        With the readings that a tank of the nominal sizes would give.
+        Job with the readings of a tank of nominal size.
     design : Design
     limits : Limits
     amplitudes : Amplitudes
-        How far the wall departs from a cylinder, as it is expected.
+        Expected deviations of the wall from a cylinder.
     costs : dict
-        {item: cost of one}: "strap", "line", "setup", "base", "reading", "run", "batch".
+        {item: unit cost}: "strap", "line", "setup", "base", "reading", "run", "batch".
     dips_m : tuple of float
-        Whose volumes and differences are listed; (): those of the runs, and of the full tank.
+        Dips listed with their volumes and differences; (): those of the runs and the full tank.
     expected_run : float or None
-        Relative standard deviation of the run effect that runs are to show.
+        Relative standard deviation of the run effect that the runs are to estimate.
     holds : callable or None
-        Function of a dip, m, that gives m3, roughly: of a tank that will be filled.
+        Function of a dip, m, that returns the approximate volume, m3, of a tank to be filled.
     obstacles : tuple of Box or Pillar
-        That cut lines of sight.
+        Obstacles to lines of sight.
     folder : str
     given : RawJob
-        What stands in the folder, as it was read.
+        Content of the folder as read.
     warnings : tuple of Problem
     """
 
@@ -232,8 +246,8 @@ class WallPlan:
     warnings: tuple = ()
 
     def with_instrument(self, name, values, of="instruments"):
-        """`given` with other values of an instrument, or of a meter: {key: value}."""
+        """Return `given` with new values {key: value} of an instrument or meter."""
         register = self.given.registers[of]
-        entry = register.entries[name] | {key: Value(one) for key, one in values.items()}
+        entry = register.entries[name] | {key: Value(value) for key, value in values.items()}
         register = replace(register, entries=register.entries | {name: entry})
         return replace(self.given, registers=self.given.registers | {of: register})

@@ -1,7 +1,7 @@
-"""What a meter would show while a tank of the plan's sizes is filled: steps that close.
+"""Nominal meter readings: volumes that a meter shows while a tank of nominal size is filled.
 
-The reduction is that of the job, turned round: against its own geometry no step has a misclosure.
-Where the runs are to show the run effect, they differ by what is expected of it.
+The reduction of the job is inverted: with its own geometry, no step has a misclosure. If the runs
+are to estimate the run effect, they differ by its expected size.
 """
 
 from dataclasses import replace
@@ -16,16 +16,16 @@ from tankcal.tank.liquid.reduction import load_densities
 
 
 def with_nominal_batches(job, survey, expected_run=None):
-    """The job with the volumes that a meter shows of its own geometry.
+    """Return the job with the metered volumes that follow from its own geometry.
 
     Parameters
     ----------
     job : Job
-        Whose runs have volumes of about the right size.
+        Job whose runs have volumes of approximately the right size.
     survey : Wall, StrappedWall, NominalWall or None
-        What its readings say of the tank.
+        Wall by its readings.
     expected_run : float, optional
-        Relative standard deviation of the run effect, where the runs are to show it.
+        Relative standard deviation of the run effect, if the runs are to estimate it.
     """
     metering, fill = job.liquid, fill_of(job.liquid)
     rows = fill.dip_row
@@ -41,23 +41,26 @@ def with_nominal_batches(job, survey, expected_run=None):
 
 
 def _metered(job, fill, share):
-    """The job with the batch of each step multiplied by a share; a step has one batch here."""
+    """Return the job with the batch of each step multiplied by a share.
+
+    Here a step has one batch.
+    """
     volume = job.liquid.volume_m3.copy()
     volume[fill.dip_row[fill.end]] *= share
     return replace(job, liquid=replace(job.liquid, volume_m3=volume))
 
 
 def _expected_runs(job, survey, sd):
-    """(runs,) effects whose differences are those that are expected of an sd.
+    """Run effects (runs,) whose differences have the size expected for a standard deviation sd.
 
-    The differences that the runs show, d ~ N(0, theta + s), are each of their standard deviation
-    (`tank.liquid.run_effect`); all runs together, which move as the meter does, by nothing.
+    The observed differences d ~ N(0, theta + s) each have the size of their standard deviation
+    (`tank.liquid.run_effect`). The common effect of all runs, which acts like the meter, is 0.
     """
     without = replace(job, liquid=replace(job.liquid, run_sd=0.0))
-    found = adjust_liquid(geometry_beside(without, survey))
-    by_run = found.readings.run_m3
-    told, turn = np.linalg.eigh(by_run.T @ found.adjusted.weight @ by_run)
-    shows = told > 1e-9 * told[-1]
-    differences = np.where(shows, np.sqrt(sd**2 + 1 / np.where(shows, told, 1.0)), 0.0)
+    result = adjust_liquid(geometry_beside(without, survey))
+    by_run = result.readings.run_m3
+    eigen, turn = np.linalg.eigh(by_run.T @ result.adjusted.weight @ by_run)
+    shows = eigen > 1e-9 * eigen[-1]
+    differences = np.where(shows, np.sqrt(sd**2 + 1 / np.where(shows, eigen, 1.0)), 0.0)
     differences[0] = 0.0
     return turn @ differences

@@ -1,8 +1,7 @@
-"""What a tank would read: a job whose readings agree with one another, or are off by what they may.
+"""Nominal readings of a tank: readings that agree with each other, or have simulated errors.
 
-The wall is a round one of the nominal inside radius, or any other (`tank_walls`); plates and paint
-lie round it. The reductions are those of the job, turned round, so that nothing is left of a
-reading when they have been made.
+The wall is round with the nominal inside radius, or any other wall of `tank_walls`, with plates and
+paint around it. The reductions of the job are inverted, so that they leave no residuals.
 """
 
 from dataclasses import replace
@@ -20,16 +19,20 @@ from tankcal.survey.readings import read_distance_m
 from tankcal.survey.sighting import bias_by_incidence, rays
 from tankcal.survey.strapping import reduce_straps
 
-CLOSE_M, ROUNDS = 1e-12, 20
-MILLIMETRES = 3  # decimals of heights of hits that are one level
+CLOSE_M, ROUNDS = 1e-12, 20  # convergence limit and largest number of iterations
+MILLIMETRES = 3  # decimals to which heights of hits are rounded to form levels
 
 
 def with_nominal_readings(job, amplitudes, expected_run=None):
-    """The job with the readings of circumferences, offsets, hits, tangents and meters that its
-    sizes give.
+    """Return the job with nominal readings of tapes, offsets, hits, tangents and meters.
 
-    amplitudes    of the wall, for the area term of a shape that nobody declared, and for its hull
-    expected_run  relative sd of the run effect, where runs of liquid are to show it
+    Parameters
+    ----------
+    job : Job
+    amplitudes : Amplitudes
+        Amplitudes of the wall, for the area term of an undeclared shape and for the hull.
+    expected_run : float, optional
+        Relative sd of the run effect, if runs of liquid are to estimate it.
     """
     if job.tank.kind == "vertical":
         if job.tangents is not None:
@@ -42,7 +45,7 @@ def with_nominal_readings(job, amplitudes, expected_run=None):
 
 
 def _expected(job, amplitudes):
-    """`Amplitudes` as well known as its readings will tell them: as its tangents are reduced."""
+    """Return `Amplitudes` with the precision of the readings, to reduce the tangents."""
     return expect_amplitudes(find_survey(job, lambda text: None, amplitudes).survey.field)
 
 
@@ -56,9 +59,9 @@ def _nominal(job, amplitudes):
 
 
 def with_readings(job, wall, errors=EXACT):
-    """The job with the circumferences, offsets, hits and limbs that a wall of its tank reads.
+    """Return the job with the circumferences, offsets, hits and limbs of a wall of its tank.
 
-    wall    RoundWall or DrawnWall      errors  Errors of the readings
+    wall is a RoundWall or DrawnWall; errors are the Errors of the readings.
     """
     return replace(
         job,
@@ -70,66 +73,73 @@ def with_readings(job, wall, errors=EXACT):
 
 
 def levels_read(job):
-    """{(course, level above the table's zero, m)} of all that is read of a wall."""
-    found = set()
-    for given in (job.strapping and job.strapping.straps, job.lines and job.lines.offsets):
-        found |= {(one.course, one.level_m) for one in given or ()}
+    """Return {(course, level above the table's zero, m)} of all readings of the wall."""
+    levels = set()
+    for readings in (job.strapping and job.strapping.straps, job.lines and job.lines.offsets):
+        levels |= {(reading.course, reading.level_m) for reading in readings or ()}
     if job.tangents is not None:
-        found |= set(zip(job.tangents.course, job.tangents.level_m.tolist(), strict=True))
-    return found | (set() if job.hits is None else set(_levels_of_hits(job)))
+        levels |= set(zip(job.tangents.course, job.tangents.level_m.tolist(), strict=True))
+    return levels | (set() if job.hits is None else set(_levels_of_hits(job)))
 
 
 def _strapped(job, wall, errors):
-    """Readings whose reduction gives the wall's perimeters, found by going back to them."""
-    given, diameter = job.strapping, job.tank.nominal_diameter_m
+    """Return tape readings whose reduction gives the perimeters of the wall, by iteration."""
+    strapping, diameter = job.strapping, job.tank.nominal_diameter_m
     shell_c = job.survey.shell_temperature_c
-    girth = np.array([wall.girth_m(one.course, one.level_m) for one in given.straps])
-    reduced = reduce_straps(given, shell_c, diameter)
-    girth += errors.own([one.sd_m for one in reduced])
-    girth += [sum(errors.of_cause(e.kind, e.name) * e.by_m for e in one.effects) for one in reduced]
+    girth = np.array([wall.girth_m(strap.course, strap.level_m) for strap in strapping.straps])
+    reduced = reduce_straps(strapping, shell_c, diameter)
+    girth += errors.own([strap.sd_m for strap in reduced])
+    girth += [
+        sum(errors.of_cause(e.kind, e.name) * e.by_m for e in strap.effects) for strap in reduced
+    ]
     for _ in range(ROUNDS):
-        reduced = reduce_straps(given, shell_c, diameter)
-        short = girth - [one.circumference_m for one in reduced]
-        straps = zip(given.straps, short, strict=True)
-        given = replace(
-            given,
-            straps=tuple(replace(one, reading_m=one.reading_m + float(by)) for one, by in straps),
+        reduced = reduce_straps(strapping, shell_c, diameter)
+        short = girth - [strap.circumference_m for strap in reduced]
+        straps = zip(strapping.straps, short, strict=True)
+        strapping = replace(
+            strapping,
+            straps=tuple(
+                replace(strap, reading_m=strap.reading_m + float(by)) for strap, by in straps
+            ),
         )
         if np.abs(short).max() < CLOSE_M:
             break
-    return given
+    return strapping
 
 
 def _plumbed(job, wall, errors):
-    """Offsets from upright lines: outside they fall where the wall stands out, inside they rise."""
-    given, first = job.lines, job.courses[0].name
+    """Return offsets from vertical lines.
+
+    A larger radius lowers them outside and raises them inside.
+    """
+    lines, first = job.lines, job.courses[0].name
     constant = wall.nominal_m + plates_of(job)[first]
-    found = []
-    for one, off in zip(
-        given.offsets, errors.own([one.sd_m for one in given.offsets]), strict=True
+    offsets = []
+    for reading, off in zip(
+        lines.offsets, errors.own([offset.sd_m for offset in lines.offsets]), strict=True
     ):
-        line, plummet = given.of(one)
-        place = one.course, one.level_m, line.azimuth_rad
+        line, plummet = lines.of(reading)
+        place = reading.course, reading.level_m, line.azimuth_rad
         radius = float(wall.radius_m(*place, inside=line.inside))
         away = radius - wall.nominal_m if line.inside else constant - radius
-        leans = given.by_collimation_m(one) * errors.collimation_rad(plummet)
+        leans = lines.by_collimation_m(reading) * errors.collimation_rad(plummet)
         away += OFF_WALL_M + (leans if line.inside else -leans)
         away /= (1 + plummet.correction) * (1 + errors.scale(plummet))
-        found.append(replace(one, offset_m=away + float(off)))
-    return replace(given, offsets=tuple(found))
+        offsets.append(replace(reading, offset_m=away + float(off)))
+    return replace(lines, offsets=tuple(offsets))
 
 
 def _stations_of_hits(hits):
-    """(n, 3) where the instrument of each hit stands."""
+    """Instrument positions (n, 3) of the hits."""
     places = {
-        name: hits.stations.get(one.station, np.zeros(3)) + [0.0, 0.0, one.height_m]
-        for name, one in hits.setups.items()
+        name: hits.stations.get(setup.station, np.zeros(3)) + [0.0, 0.0, setup.height_m]
+        for name, setup in hits.setups.items()
     }
     return np.array([places[name] for name in hits.setup])
 
 
 def _levels_of_hits(job):
-    """(course, level above the table's zero, m) of each hit, as it is aimed."""
+    """Return (course, level above the table's zero, m) of each hit as aimed."""
     hits, datum = job.hits, job.datum
     rise = hits.distance_m * np.cos(hits.zenith_rad)
     z = _stations_of_hits(hits)[:, 2] + rise - datum.bottom_z_m - datum.plate_level_m
@@ -137,22 +147,24 @@ def _levels_of_hits(job):
 
 
 def _hit(job, wall, errors):
-    """Hits along their own sights, as far as the wall: its inside, or its outside."""
+    """Return hits along their own sights, up to the inside or outside of the wall."""
     hits, levels = job.hits, _levels_of_hits(job)
     station, ray = _stations_of_hits(hits)[:, :2], rays(hits.direction_rad, hits.zenith_rad)[0]
     inside, ray = np.hypot(*station.T) < wall.nominal_m, ray[:, :2]
     distance, cosine = np.empty(len(hits)), np.empty(len(hits))
     kinds = list(zip(levels, inside.tolist(), strict=True))
     for level, within in dict.fromkeys(kinds):
-        mine = np.array([one == (level, within) for one in kinds])
-        distance[mine], cosine[mine] = _met(wall, station[mine], ray[mine], level, inside=within)
+        of_kind = np.array([kind == (level, within) for kind in kinds])
+        distance[of_kind], cosine[of_kind] = _met(
+            wall, station[of_kind], ray[of_kind], level, inside=within
+        )
     known = [hits.instruments[name] for name in hits.instrument]
-    bias = [errors.of_cause("incidence", one.name) * one.u_incidence_m for one in known]
-    distance *= 1 + np.array([errors.scale(one) for one in known])
-    distance += np.array([errors.offset_m(one) for one in known])
+    bias = [errors.of_cause("incidence", tool.name) * tool.u_incidence_m for tool in known]
+    distance *= 1 + np.array([errors.scale(tool) for tool in known])
+    distance += np.array([errors.offset_m(tool) for tool in known])
     distance += np.array(bias) * bias_by_incidence(cosine)
-    distance /= 1 + np.array([one.correction for one in known])
-    distance -= np.array([one.correction_m for one in known])
+    distance /= 1 + np.array([tool.correction for tool in known])
+    distance -= np.array([tool.correction_m for tool in known])
     return replace(
         hits,
         distance_m=distance + errors.own(hits.sd_m),
@@ -162,7 +174,7 @@ def _hit(job, wall, errors):
 
 
 def _met(wall, station_m, ray, level, *, inside):
-    """How far along rays (n, 2), in plan, a level of the wall is, and the cosine of incidence."""
+    """Distance along horizontal rays (n, 2) to a level of the wall, and cosine of incidence."""
     square, along = np.sum(ray**2, axis=1), np.sum(station_m * ray, axis=1)
     beyond = along**2 - square * (np.sum(station_m**2, axis=1) - wall.nominal_m**2)
     root = np.sqrt(np.maximum(beyond, 0.0))
@@ -179,7 +191,7 @@ def _met(wall, station_m, ray, level, *, inside):
 
 
 def _sighted(job, wall, errors):
-    """Sights past the outside of each course, at the height that is aimed at."""
+    """Return sights past the outside of each course at the aimed height."""
     tangents, datum = job.tangents, job.datum
     zero = datum.bottom_z_m + datum.plate_level_m
     stations, sights = place_stations(job), []
@@ -199,16 +211,16 @@ def _sighted(job, wall, errors):
 
 
 def _ranger(job):
-    """Function Readings -> Readings: true distances as their instruments read them."""
-    tools = {one.name: one for one in job.measurements.instruments}
-    used = {one.name: one.instrument for one in job.measurements.setups}
+    """Return a function Readings -> Readings: true distances to instrument readings."""
+    tools = {tool.name: tool for tool in job.measurements.instruments}
+    used = {setup.name: setup.instrument for setup in job.measurements.setups}
 
     def read(readings):
         if readings.table != "slope_distances":
             return readings
         value = [
-            one if used[name] is None else read_distance_m(one, tools[used[name]])
-            for name, one in zip(readings.setup, readings.value, strict=True)
+            value if used[name] is None else read_distance_m(value, tools[used[name]])
+            for name, value in zip(readings.setup, readings.value, strict=True)
         ]
         return replace(readings, value=np.array(value))
 
@@ -216,10 +228,10 @@ def _ranger(job):
 
 
 def place_stations(job):
-    """{set-up of tangents: (3,) place of its instrument} as its plan has them."""
+    """Return {set-up of tangents: instrument position (3,)} of a job's plan."""
     known = job.measurements.control
     places = dict(zip(known.point, known.xyz_m, strict=True))
     return {
-        name: places[one.station] + [0, 0, one.height_m]
-        for name, one in job.tangents.setups.items()
+        name: places[setup.station] + [0, 0, setup.height_m]
+        for name, setup in job.tangents.setups.items()
     }

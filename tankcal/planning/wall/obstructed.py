@@ -1,4 +1,4 @@
-"""What obstacles do to a survey of the bare wall: sights that they hide are left out of it."""
+"""Effect of obstacles on a survey of the bare wall: hidden sights are left out."""
 
 from copy import copy
 
@@ -8,7 +8,7 @@ from tankcal.messages import list_some, message
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.obstacles import in_an_obstacle, line_cut, misplaced
 
-SHOWN = 5  # obstacles in a message
+SHOWN = 5  # largest number of obstacles listed in a message
 SIGHTS = {  # tables of sights that obstacles hide, and the sections that make them
     "offsets": ("lines", message("plan_sights_offsets", "offsets")),
     "wall_hits": ("hits", message("plan_sights_hits", "hits")),
@@ -17,10 +17,9 @@ SIGHTS = {  # tables of sights that obstacles hide, and the sections that make t
 
 
 def refuse_cut(foreseen, rows):
-    """Raise InputError for stations in an obstacle, lines between them that one cuts, and for
-    obstacles that leave nothing in sight.
+    """Raise InputError for stations in obstacles, cut lines between stations, and no sights left.
 
-    foreseen  Foreseen      rows  {section: row of plan.toml}
+    foreseen: Foreseen; rows: {section: row of plan.toml}.
     """
     log = Log()
     section = "hits" if foreseen.design.hits else "tangents"
@@ -46,11 +45,11 @@ def refuse_cut(foreseen, rows):
 
 
 def warnings_of_obstacles(foreseen, rows):
-    """A tuple of Problem: how many sights are left out, and obstacles that hide none.
+    """Warn of the number of sights left out, and of obstacles that hide none; a tuple of Problem.
 
-    foreseen, rows  as of `refuse_cut`
+    Parameters are those of `refuse_cut`.
     """
-    every, found = _sights(foreseen, ()), []
+    every, problems = _sights(foreseen, ()), []
     for name, count in _sights(foreseen, foreseen.obstacles).items():
         section, sights = SIGHTS[name]
         if count < every[name]:
@@ -61,8 +60,10 @@ def warnings_of_obstacles(foreseen, rows):
                 all=every[name],
                 sights=sights,
             )
-            found.append(Problem(PLAN_FILE, text, rows.get(section), section))
-    idle = [one.name for one in foreseen.obstacles if _sights(foreseen, (one,)) == every]
+            problems.append(Problem(PLAN_FILE, text, rows.get(section), section))
+    idle = [
+        obstacle.name for obstacle in foreseen.obstacles if _sights(foreseen, (obstacle,)) == every
+    ]
     if idle:
         text = message(
             "plan_obstacles_idle",
@@ -70,12 +71,12 @@ def warnings_of_obstacles(foreseen, rows):
             " survey, in metres, the axis of the tank at x = 0, y = 0?",
             obstacles=list_some(idle, SHOWN),
         )
-        found.append(Problem(PLAN_FILE, text, rows.get("obstacles"), "obstacles"))
-    return tuple(found)
+        problems.append(Problem(PLAN_FILE, text, rows.get("obstacles"), "obstacles"))
+    return tuple(problems)
 
 
 def _sights(foreseen, obstacles):
-    """{table: how many sights it has} with some obstacles."""
-    other = copy(foreseen)
-    other.obstacles = obstacles
-    return {name: len(one.rows) for name, one in other.tables().items() if name in SIGHTS}
+    """Return {table: number of sights} with given obstacles."""
+    without = copy(foreseen)
+    without.obstacles = obstacles
+    return {name: len(table.rows) for name, table in without.tables().items() if name in SIGHTS}

@@ -1,4 +1,4 @@
-"""A plan of a wall answered: its job computed with the readings foreseen, and what U will be."""
+"""Predict a plan of a bare wall: compute its job with nominal readings."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -31,7 +31,7 @@ from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.telling import told_of_plan
 from tankcal.quadrature import panels
 
-OF_READINGS = (  # warnings that only true readings can give, or a drawing, which no plan knows
+OF_READINGS = (  # warnings that need real readings or a drawing; not predicted
     *("size_told_by_distances", "size_told_by_one_course"),
     *("reading_copied", "line_copied", "no_control_readings"),
     *("repeats_apart", "strap_apart", "strapped_course_apart", "courses_exchanged"),
@@ -43,16 +43,16 @@ OF_READINGS = (  # warnings that only true readings can give, or a drawing, whic
 
 @dataclass(frozen=True)
 class CourseOutlook:
-    """What is foreseen of one course.
+    """Prediction for one course.
 
     Attributes
     ----------
     name : str
-        The course.
+        Name of the course.
     straps, offsets, hits, tangents : int
-        Readings of it.
+        Numbers of readings.
     radius_sd_m : float
-        Standard deviation of its mean radius by the readings and by what they do not see, m.
+        Standard deviation of the mean radius, m, including the part that the readings do not show.
     """
 
     name: str
@@ -65,18 +65,18 @@ class CourseOutlook:
 
 @dataclass(frozen=True)
 class ReadingsOutlook:
-    """How well readings of one kind control one another.
+    """Reliability of the readings of one kind.
 
     Attributes
     ----------
     kind : str
         "straps", "offsets" or "tangents".
     count : int
-        Readings.
+        Number of readings.
     uncontrolled : int
-        Of these, those that no other reading controls.
+        Number of readings that no other reading controls.
     mdb_m : float
-        Largest of the smallest blunders of a radius that the tests of the others find, m.
+        Largest minimal detectable blunder of a radius, m.
     """
 
     kind: str
@@ -87,18 +87,18 @@ class ReadingsOutlook:
 
 @dataclass(frozen=True)
 class WallTable:
-    """The job with its points, its wall, and the table.
+    """Predicted job with its points, wall and table.
 
     Attributes
     ----------
     job : Job
     wall : Wall, StrappedWall, NominalWall or None
-        None: declared sizes alone describe the tank.
+        None: declared sizes only describe the tank.
     made : ComputedTable
     sighting : Sighting or Touching or None
-        As `check_table` takes it.
+        As `check_table` expects it.
     measured : Measured or None
-        What runs of liquid would make of the tank.
+        Result of the runs of liquid.
     """
 
     job: Job
@@ -109,7 +109,7 @@ class WallTable:
 
     @cached_property
     def liquid(self) -> LiquidResult | None:
-        """What runs of liquid would say, beside the rows of the table."""
+        """Predicted results of the runs of liquid other than table rows."""
         return self.measured and self.measured.result(self.made.levels_m)
 
     @cached_property
@@ -120,7 +120,7 @@ class WallTable:
 
 @dataclass(frozen=True)
 class WallPrediction(OfTable):
-    """What a survey of a wall by tape, lines, hits or tangents would give, before it is made.
+    """Predicted results of a planned survey of a bare wall.
 
     Attributes
     ----------
@@ -138,12 +138,12 @@ class WallPrediction(OfTable):
 
     @cached_property
     def reliability(self):
-        """A tuple of ReadingsOutlook, of straps, offsets and tangents."""
+        """A tuple of ReadingsOutlook of straps, offsets and tangents."""
         return readings_of(self.tabled)
 
     @cached_property
     def filling(self) -> FillingOutlook | None:
-        """What runs of liquid would add to the geometry; None: there are none."""
+        """Predicted effect of the runs of liquid; None without runs."""
         tabled = self.tabled
         if tabled.measured is None:
             return None
@@ -151,18 +151,20 @@ class WallPrediction(OfTable):
 
     @cached_property
     def warnings(self):
-        """A tuple of Problem: what the run of such a survey will warn of."""
+        """Warnings of the planned survey, a tuple of Problem."""
         tabled = self.tabled
         of_run = (
             *check_table(tabled.job, tabled.wall, tabled.made, tabled.sighting),
             *check_liquid_result(tabled.job, tabled.liquid),
         )
-        found = (
+        problems = (
             *self.plan.warnings,
             *self.plan.job.warnings,
             *told_of_plan(of_run, self.plan.design),
         )
-        return tuple(one for one in dict.fromkeys(found) if _code(one) not in OF_READINGS)
+        return tuple(
+            problem for problem in dict.fromkeys(problems) if _code(problem) not in OF_READINGS
+        )
 
 
 def _code(problem):
@@ -170,53 +172,53 @@ def _code(problem):
 
 
 def predict_wall(plan):
-    """`WallPrediction` of a WallPlan.
+    """Return the `WallPrediction` of a WallPlan.
 
-    Its job is computed with amplitudes of the wall as they are assumed, as well known as its
-    readings would tell those of a wall of just these sizes.
+    Its job is computed with assumed amplitudes of the wall, as precise as the readings would
+    estimate them on a wall of just these amplitudes.
 
     Raises
     ------
     InputError
-        For readings that tell too little of a course.
+        If a course has too few readings.
     SolutionError
-        When they do not determine the wall.
+        If the readings do not determine the wall.
     """
     try:
         tabled = foresee_table(plan.job, plan.amplitudes)
     except InputError as error:
         raise InputError(told_of_plan(error.problems, plan.design)) from error
-    tall = sum(one.height_m for one in plan.job.courses) or tabled.made.top_m
+    tall = sum(course.height_m for course in plan.job.courses) or tabled.made.top_m
     refuse_without_delivery(plan, tabled, tall)
     refuse_other_dips(plan.dips_m, tabled.made)
     return WallPrediction(plan, tabled)
 
 
 def foresee_table(job, amplitudes):
-    """`WallTable` of a job with the readings that its nominal sizes give.
+    """Return the `WallTable` of a job with nominal readings.
 
-    amplitudes  of the wall, as they are assumed
+    Amplitudes: assumed ones of the wall.
     """
-    found = find_survey(job, lambda text: None, amplitudes)
-    if found.survey is None or isinstance(found.survey, NominalWall):
-        return _tabled(found, found.survey)  # nothing is read that could tell amplitudes
-    field = found.survey.field
+    surveyed = find_survey(job, lambda text: None, amplitudes)
+    if surveyed.survey is None or isinstance(surveyed.survey, NominalWall):
+        return _tabled(surveyed, surveyed.survey)  # no readings that could estimate amplitudes
+    field = surveyed.survey.field
     expected = expect_amplitudes(field)
-    if found.touching is not None:  # but how far a hull stands out
-        found = find_survey(job, lambda text: None, expected)
-        field = found.survey.field
-    return _tabled(found, replace(found.survey, field=replace(field, amplitudes=expected)))
+    if surveyed.touching is not None:  # tangents estimate only the excess of the hull
+        surveyed = find_survey(job, lambda text: None, expected)
+        field = surveyed.survey.field
+    return _tabled(surveyed, replace(surveyed.survey, field=replace(field, amplitudes=expected)))
 
 
-def _tabled(found, wall):
-    """`WallTable` of a `Surveyed` whose wall is known as well as it will be."""
-    measured = measure_by_liquid(found.job, wall)
-    made = compute_table(found.job, wall, body=measured and measured.body)
-    return WallTable(found.job, wall, made, found.sighting or found.touching, measured)
+def _tabled(surveyed, wall):
+    """Return the `WallTable` of a `Surveyed` with a wall of the predicted precision."""
+    measured = measure_by_liquid(surveyed.job, wall)
+    table = compute_table(surveyed.job, wall, body=measured and measured.body)
+    return WallTable(surveyed.job, wall, table, surveyed.sighting or surveyed.touching, measured)
 
 
 def courses_of(tabled):
-    """A CourseOutlook of each course; () where nothing but liquid measures them."""
+    """Return the CourseOutlook of each course; () if only liquid measures them."""
     if tabled.wall is None or isinstance(tabled.wall, NominalWall):
         return ()
     job, field = tabled.job, tabled.wall.field
@@ -227,12 +229,12 @@ def courses_of(tabled):
     wall = tabled.wall
     noise = field.noise_m2 if isinstance(wall, StrappedWall) else noise_of_wall(wall)
     sds = np.sqrt(np.diag(covariance) + np.einsum("ij,jk,ik->i", weights, noise, weights))
-    names = [one.name for one in job.courses]
+    names = [course.name for course in job.courses]
     counts = {kind: dict.fromkeys(names, 0) for kind in ("straps", "offsets", "hits", "tangents")}
-    for one in () if job.strapping is None else job.strapping.straps:
-        counts["straps"][one.course] += 1
-    for one in () if job.lines is None else job.lines.offsets:
-        counts["offsets"][one.course] += 1
+    for reading in () if job.strapping is None else job.strapping.straps:
+        counts["straps"][reading.course] += 1
+    for reading in () if job.lines is None else job.lines.offsets:
+        counts["offsets"][reading.course] += 1
     for course in () if job.hits is None else job.hits.course:
         counts["hits"][course] += 1
     for course in () if job.tangents is None else job.tangents.course:
@@ -244,16 +246,16 @@ def courses_of(tabled):
 
 
 def readings_of(tabled):
-    """A ReadingsOutlook of the straps, of the offsets and of the tangents that a wall has."""
+    """Return the ReadingsOutlook of straps, offsets and tangents, if any."""
     wall = tabled.wall
     if not isinstance(wall, ReadWall):
         wall = wall and wall.read
     kinds = () if wall is None or isinstance(wall, NominalWall) else ("straps", "offsets")
-    found = [(kind, wall.tests_of(kind)[1]) for kind in kinds]
+    tested = [(kind, wall.tests_of(kind)[1]) for kind in kinds]
     if tabled.job.tangents is not None:
         tests = judge_tangents(tabled.job, tabled.wall, tabled.sighting)
-        found.append(("tangents", tests.mdb_m[~tabled.job.tangents.check]))
-    return tuple(_outlook(kind, mdb) for kind, mdb in found if len(mdb))
+        tested.append(("tangents", tests.mdb_m[~tabled.job.tangents.check]))
+    return tuple(_outlook(kind, mdb) for kind, mdb in tested if len(mdb))
 
 
 def _outlook(kind, mdb_m):

@@ -1,4 +1,4 @@
-"""From the sections of a plan to a WallPlan: a design, its tables, and the job that reads them."""
+"""Build a WallPlan from the sections of a plan: design, tables, and the job that reads them."""
 
 from dataclasses import replace
 
@@ -27,33 +27,32 @@ from tankcal.planning.wall.nominal_readings import with_nominal_readings
 from tankcal.planning.wall.obstructed import refuse_cut, warnings_of_obstacles
 from tankcal.planning.wall.telling import told_of_plan
 
-USUAL_HEIGHT_M = 1.6  # of an instrument above the bottom
+USUAL_HEIGHT_M = 1.6  # default height of an instrument above the bottom
 
 
-def is_wall_plan(own):
-    """Does a plan say how its wall is strapped, read from lines, hit, sighted by its limbs, or
-    filled by meter?
+def is_wall_plan(sections):
+    """Return whether a plan measures the bare wall or uses metered liquid.
 
-    own  {section: what stands there}
+    sections: {section: content}.
     """
-    return any(name in own for name in MEASURING)
+    return any(name in sections for name in MEASURING)
 
 
 def design_of(given, courses, celsius=None):
-    """The `Design` of sound sections on a tank of these courses.
+    """Return the `Design` of valid sections for the given courses.
 
-    celsius  temperature of the table
+    celsius: temperature of the table.
     """
     straps = (
-        PlannedStrap(course, percent, one["s_mm"], int(one["readings"] or 1), _more(one))
-        for one in given.repeated["straps"]
-        for course in one["courses"] or courses
-        for percent in percents_of(one)
+        PlannedStrap(course, percent, entry["s_mm"], int(entry["readings"] or 1), _more(entry))
+        for entry in given.repeated["straps"]
+        for course in entry["courses"] or courses
+        for percent in percents_of(entry)
     )
     return Design(
         straps=tuple(straps),
         lines=_lines(given.single["lines"]),
-        hits=tuple(_hits(one, courses) for one in given.repeated["hits"]),
+        hits=tuple(_hits(entry, courses) for entry in given.repeated["hits"]),
         ties=_ties(given.single["setup_ties"]),
         control=_control(given.single["control_targets"]),
         tangents=_tangents(given.single["tangents"], given.single["traverse"]),
@@ -102,11 +101,11 @@ def _ties(entry):
 
 
 def _control(entry):
-    given = {"targets": entry["targets"], "every_min": entry["every_min"]}
-    given = {key: value for key, value in given.items() if value is not None}
-    if "targets" in given:
-        given["targets"] = int(given["targets"])
-    return PlannedControl(**given, minutes=entry["minutes"])
+    values = {"targets": entry["targets"], "every_min": entry["every_min"]}
+    values = {key: value for key, value in values.items() if value is not None}
+    if "targets" in values:
+        values["targets"] = int(values["targets"])
+    return PlannedControl(**values, minutes=entry["minutes"])
 
 
 def _tangents(entry, traverse):
@@ -132,9 +131,10 @@ def _bar(traverse):
 
 
 def wall_plan_of(raw, values, tables, given, limits, folder):
-    """The WallPlan of sound sections, its job being read as any job is.
+    """Return the WallPlan of valid sections; its job is read like any other job.
 
-    Raises InputError: what the job says of its tables is told of the section that makes them.
+    Raises InputError. Problems of generated tables are reported for the sections that generate
+    them.
     """
     table, holds = tables["courses"], volume_by_sizes(values, raw)
     courses = ()
@@ -175,13 +175,13 @@ def wall_plan_of(raw, values, tables, given, limits, folder):
 
 
 def _rows_of(given):
-    """{section: row of plan.toml where it begins}."""
-    rows = {name: one.row for name, one in given.single.items()}
-    return rows | {name: found[0].row for name, found in given.repeated.items() if found}
+    """Return {section: first row in plan.toml}."""
+    rows = {name: entry.row for name, entry in given.single.items()}
+    return rows | {name: entries[0].row for name, entries in given.repeated.items() if entries}
 
 
 def changed(plan, design=None, raw=None):
-    """The WallPlan with another Design, or with other instruments."""
+    """Return the WallPlan with another Design or other instruments."""
     design, raw = design or plan.design, raw or plan.given
     expected = plan.amplitudes, plan.expected_run
     job = job_of_design(raw, design, _tank_of(plan), expected)
@@ -189,27 +189,27 @@ def changed(plan, design=None, raw=None):
 
 
 def tables_of(plan):
-    """{name: Table} of what will be read, whatever stands as its value."""
+    """Return {name: Table} of all readings; their values are not defined."""
     bars = lengths_of_bars(plan.given)
     return Foreseen(plan.design, *_tank_of(plan), bars=bars).tables()
 
 
 def lengths_of_bars(raw):
-    """{name: length, m} of the stadias of a RawJob whose instruments.toml tells it."""
+    """Return {name: length, m} of the stadias in instruments.toml of a RawJob."""
     register = raw.registers.get("instruments")
-    found = {}
+    lengths = {}
     for name, entry in {} if register is None else register.entries.items():
-        given = {key: one.raw for key, one in entry.items()}
-        length = given.get("length_m")
-        if is_bar(str(given.get("kind"))) and isinstance(length, int | float) and length > 0:
-            found[name] = float(length)
-    return found
+        values = {key: value.raw for key, value in entry.items()}
+        length = values.get("length_m")
+        if is_bar(str(values.get("kind"))) and isinstance(length, int | float) and length > 0:
+            lengths[name] = float(length)
+    return lengths
 
 
 def _tank_of(plan):
-    """Of a WallPlan, as `Foreseen` takes it."""
+    """Return the arguments of `Foreseen` that describe the tank of a WallPlan."""
     job = plan.job
-    courses = tuple((one.name, one.height_m) for one in job.courses)
+    courses = tuple((course.name, course.height_m) for course in job.courses)
     datum, diameter = job.datum, job.tank.nominal_diameter_m
     radius, bottom = diameter and diameter / 2, datum.bottom_z_m
     zero = 0.0 if bottom is None else datum.plate_level_m
@@ -217,19 +217,26 @@ def _tank_of(plan):
 
 
 def job_of_design(raw, design, tank, expected, rows=None):
-    """The Job of a RawJob and the tables that a `Design` makes, with the readings foreseen.
+    """Return the Job of a RawJob and of the tables of a `Design`, with nominal readings.
 
-    tank      courses, radius, z of the bottom, zero of the table above it, what it holds, what
-              stands in the way: as `Foreseen` takes them
-    expected  amplitudes of the wall, and the run effect, as `with_nominal_readings` takes them
-    rows      {section: row of plan.toml}, for what is told
+    Parameters
+    ----------
+    raw : RawJob
+    design : Design
+    tank : tuple
+        Courses, radius, z of the bottom, zero of the table, content function and obstacles, as for
+        `Foreseen`.
+    expected : tuple
+        Amplitudes of the wall and run effect, as for `with_nominal_readings`.
+    rows : dict, optional
+        {section: row of plan.toml}, for messages.
     """
-    made = Foreseen(design, *tank, bars=lengths_of_bars(raw)).tables()
+    tables = Foreseen(design, *tank, bars=lengths_of_bars(raw)).tables()
     settings = dict(raw.settings)
     datum = datum_of(design)
     if datum is not None:
         settings["adjustment"] = {"datum": Value(datum)} | settings.get("adjustment", {})
-    whole = replace(raw, tables=raw.tables | made, settings=settings)
+    whole = replace(raw, tables=raw.tables | tables, settings=settings)
     try:
         job = job_of(whole, Log())
     except InputError as error:
@@ -239,7 +246,7 @@ def job_of_design(raw, design, tank, expected, rows=None):
 
 
 def datum_of(design):
-    """`adjustment.datum` of the network of a `Design`, where a plan does not say it; None: none."""
+    """Default of `adjustment.datum` for the network of a `Design`; None without a network."""
     if design.tangents is not None:
         return "minimal"
     return None if design.ties is None else "inner"

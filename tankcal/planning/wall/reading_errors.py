@@ -1,4 +1,7 @@
-"""By how much readings are off: each for itself, and all that share a cause by the same."""
+"""Simulated errors.
+
+Independent errors of readings, and common errors of readings with one cause.
+"""
 
 from dataclasses import replace
 
@@ -7,51 +10,51 @@ import numpy as np
 from tankcal.planning.simulations import blunders_in_sds
 from tankcal.survey.observations import KINDS
 
-UNKNOWN_OFFSET_M = 2e-3  # of an instrument of whose offset nothing is known beforehand
-UNKNOWN_COLLIMATION_RAD = np.radians(10 / 3600)  # of a plummet that both faces tell
+UNKNOWN_OFFSET_M = 2e-3  # sd of the offset of an instrument without a prior
+UNKNOWN_COLLIMATION_RAD = np.radians(10 / 3600)  # sd for a plummet read in both faces
 
 
 class Errors:
-    """Errors of one survey.
+    """Errors of one simulated survey.
 
-    rng       of numpy
-    blunders  share of the readings that are off by `simulations.BLUNDER_SDS`
+    rng is a numpy generator; blunders is the share of readings with an error of
+    `simulations.BLUNDER_SDS` standard deviations.
     """
 
     def __init__(self, rng, blunders=0.0):
         self._rng, self._blunders, self._causes = rng, blunders, {}
 
     def own(self, sd):
-        """(n,) errors of readings whose standard deviations are (n,)."""
+        """Independent errors (n,) of readings with standard deviations (n,)."""
         sd = np.asarray(sd, dtype=float)
-        found = self._rng.standard_normal(sd.shape)
+        errors = self._rng.standard_normal(sd.shape)
         if self._blunders:
-            found += blunders_in_sds(self._rng, self._blunders, len(sd))
-        return found * sd
+            errors += blunders_in_sds(self._rng, self._blunders, len(sd))
+        return errors * sd
 
     def of_cause(self, kind, name):
-        """By how many of its standard uncertainties a cause is off in this survey."""
+        """Error of a cause in this survey, in its standard uncertainties."""
         if (kind, name) not in self._causes:
             self._causes[kind, name] = float(self._rng.standard_normal())
         return self._causes[kind, name]
 
     def scale(self, tool):
-        """By how much an instrument's scale is off, relative."""
+        """Relative error of the scale of an instrument."""
         return self.of_cause("instrument_scale", tool.name) * _known(tool.u_scale, 0.0)
 
     def offset_m(self, tool):
-        """By how much its offset is."""
+        """Error of the offset of an instrument, m."""
         u = _known(tool.u_offset_m, UNKNOWN_OFFSET_M)
         return self.of_cause("instrument_offset", tool.name) * u
 
     def collimation_rad(self, plummet):
-        """By how much a plummet leans."""
+        """Collimation error of a plummet, rad."""
         u = _known(plummet.u_collimation_rad, UNKNOWN_COLLIMATION_RAD)
         return self.of_cause("collimation", plummet.name) * u
 
 
 class _Exact(Errors):
-    """No errors."""
+    """Errors that are all zero."""
 
     def __init__(self):
         super().__init__(None)
@@ -67,18 +70,18 @@ EXACT = _Exact()
 
 
 def with_network_errors(measurements, errors):
-    """The Measurements with errors of their readings, and of the instruments of distances."""
-    tools = {one.name: one for one in measurements.instruments}
-    used = {one.name: one.instrument for one in measurements.setups}
+    """Return Measurements with errors of the readings and of the distance instruments."""
+    tools = {tool.name: tool for tool in measurements.instruments}
+    used = {setup.name: setup.instrument for setup in measurements.setups}
 
-    def read(given):
-        value = given.value
-        if KINDS[given.table].has("instrument"):
-            names = [used[name] for name in given.setup] or given.instrument
+    def read(readings):
+        value = readings.value
+        if KINDS[readings.table].has("instrument"):
+            names = [used[name] for name in readings.setup] or readings.instrument
             known = [tools.get(name) for name in names]
-            value = value * [1.0 if one is None else 1 + errors.scale(one) for one in known]
-            value = value + [0.0 if one is None else errors.offset_m(one) for one in known]
-        return replace(given, value=value + errors.own(given.sd))
+            value = value * [1.0 if tool is None else 1 + errors.scale(tool) for tool in known]
+            value = value + [0.0 if tool is None else errors.offset_m(tool) for tool in known]
+        return replace(readings, value=value + errors.own(readings.sd))
 
     return replace(measurements, readings=tuple(map(read, measurements.readings)))
 

@@ -1,11 +1,10 @@
-"""A plan of the bare wall made many times: walls drawn, read, computed; do they err as predicted?
+"""Simulate surveys of a planned bare wall and compare their errors with the prediction.
 
-Every run draws a wall of the components that are assumed of walls, in sizes as unsure as the
-readings leave them, and what the plan's readings of it are: from its outline, each off by its own,
-and all of an instrument by its scale, offset, collimation or tension together. The job is computed
-as any other: it learns the sizes from its readings and looks for blunders. What the plan declares
-beside the survey (plates, temperature, the zero) is not drawn, nor counted in the u that is
-compared.
+Every run draws a wall from the assumed components of walls, with sizes as uncertain as the readings
+leave them. It then draws the planned readings: each has its own error, and readings of an
+instrument share its scale, offset, collimation or tension. The job estimates the sizes and rejects
+outliers like any other job. Other inputs (plates, temperature, the zero) are neither drawn nor
+included in the compared u.
 """
 
 from dataclasses import dataclass, replace
@@ -27,15 +26,28 @@ from tankcal.uncertainty import combine
 
 @dataclass(frozen=True)
 class SimulatedWall:
-    """What many simulated surveys of a plan of the bare wall gave.
+    """Results of many simulated surveys of a planned bare wall.
 
-    runs         those that had a solution      failed  messages of the others
-    errors_m3    (runs,) volume of the full tank less the true one
-    U_m3         (runs,) its U by the survey, as each job states it
-    predicted_u_m3, predicted_U_m3  the same as the plan foretells it
-    within       (runs,) share of the rows of the table within U of the true volume
-    set_aside    (runs,) readings that the search for blunders took out
-    seed         of the draws                   blunders     share of readings that were off
+    Attributes
+    ----------
+    runs : int
+        Number of surveys with a solution.
+    failed : sequence
+        Messages of the surveys without a solution.
+    errors_m3 : ndarray, shape (runs,)
+        Volume of the full tank minus its true volume.
+    U_m3 : ndarray, shape (runs,)
+        U by the survey as each job states it.
+    predicted_u_m3, predicted_U_m3 : float
+        Predicted u and U by the survey.
+    within : ndarray, shape (runs,)
+        Share of the rows of the table within U of the true volume.
+    set_aside : ndarray, shape (runs,)
+        Numbers of rejected readings.
+    seed : int
+        Seed of the draws.
+    blunders : float
+        Share of readings with a blunder.
     """
 
     seed: int
@@ -51,13 +63,15 @@ class SimulatedWall:
 
     @property
     def volume_ratio(self):
-        """Rms error of the full tank's volume over its predicted u."""
+        """Rms error of the volume of the full tank over its predicted u."""
         return float(np.sqrt(np.mean(self.errors_m3**2)) / self.predicted_u_m3)
 
     @property
     def volume_ratio_sd(self):
-        """How well so many surveys tell that: by the scatter of the squared errors, whose tails are
-        longer than those of normal errors where the sizes of the wall are unsure.
+        """Standard deviation of volume_ratio, from the scatter of the squared errors.
+
+        The squared errors have longer tails than those of normal errors if the sizes of the wall
+        are uncertain.
         """
         squares = self.errors_m3**2
         return float(
@@ -66,12 +80,12 @@ class SimulatedWall:
 
     @property
     def U_ratios(self):
-        """Lowest tenth, median and highest tenth of the U of surveys over the predicted one."""
+        """Lowest decile, median and highest decile of the U of the surveys over the predicted U."""
         return tuple(np.quantile(self.U_m3 / self.predicted_U_m3, [0.1, 0.5, 0.9]).tolist())
 
     @property
     def covered(self):
-        """Share of the full tanks whose true volume is within the U of their job."""
+        """Share of the surveys whose U covers the true volume of the full tank."""
         return float(np.mean(np.abs(self.errors_m3) <= self.U_m3))
 
 
@@ -84,7 +98,7 @@ def simulate_walls(prediction: WallPrediction, runs=500, seed=1, blunders=0.0, p
     runs, seed : int, optional
         Number of surveys, and seed of their walls and errors.
     blunders : float, optional
-        Share of readings that are off by `simulations.BLUNDER_SDS` of their standard deviations.
+        Share of readings with an error of `simulations.BLUNDER_SDS` standard deviations.
     progress : callable, optional
         progress(text, done, total).
 
@@ -95,25 +109,25 @@ def simulate_walls(prediction: WallPrediction, runs=500, seed=1, blunders=0.0, p
     Raises
     ------
     SolutionError
-        When fewer than two of the surveys have a solution.
+        If fewer than two surveys have a solution.
     """
-    rng, failed, found = np.random.default_rng(seed), [], []
+    rng, failed, results = np.random.default_rng(seed), [], []
     for run in range(1, runs + 1):
         if progress:
             progress(SIMULATING, run, runs)
         wall, job = _drawn(prediction, rng, blunders)
         try:
-            found.append(compare_survey(prediction, wall, job))
+            results.append(compare_survey(prediction, wall, job))
         except TankcalError as error:
             failed.append(error.texts[0])
     refuse_failed(failed, runs)
-    errors, expanded, within, aside = (np.array(one) for one in zip(*found, strict=True))
+    errors, expanded, within, aside = (np.array(values) for values in zip(*results, strict=True))
     table = prediction.table
     known = by_survey(prediction.plan.job, table)
     return SimulatedWall(
         seed=seed,
         blunders=blunders,
-        runs=len(found),
+        runs=len(results),
         failed=tuple(failed),
         errors_m3=errors,
         U_m3=expanded,
@@ -125,7 +139,7 @@ def simulate_walls(prediction: WallPrediction, runs=500, seed=1, blunders=0.0, p
 
 
 def _drawn(prediction, rng, blunders):
-    """A `DrawnWall`, and the Job of a survey of it."""
+    """Return a `DrawnWall`, and the Job of a survey of it."""
     job, errors = prediction.plan.job, Errors(rng, blunders)
     sizes = _drawn_sizes(job, prediction.tabled.wall.field.amplitudes, rng)
     wall = DrawnWall(job, sizes, levels_read(job), rng)
@@ -135,49 +149,50 @@ def _drawn(prediction, rng, blunders):
 
 
 def _drawn_sizes(job, known, rng):
-    """(components,) variances as unsure as `Amplitudes` are; round the wall as large as the job
-    says of its shape, where it does.
+    """Variances (components,) drawn with the uncertainty of the `Amplitudes`.
+
+    A shape declared in the job determines the size of the ovality.
     """
     sizes = np.exp(rng.multivariate_normal(np.log(known.likely_m2), known.log_covariance))
     shape_m = None if job.strapping is None else job.strapping.shape_sd_m
     if shape_m is not None:
-        shapes = np.array([one.shape for one in COMPONENTS])
+        shapes = np.array([component.shape for component in COMPONENTS])
         drawn = np.sum(sizes[np.isin(shapes, ROUND_SHAPES)])
         sizes[shapes != "mean"] *= shape_m**2 / drawn
     return sizes
 
 
 def compare_survey(prediction, wall, job):
-    """Error and U of the full tank, share of rows within theirs, readings that were rejected.
+    """Return error and U of the full tank, share of rows within U, and number of rejected readings.
 
-    wall  what was read (`tank_walls.DrawnWall`, or another that says what it holds)
-    job   Job with these readings
+    wall is the simulated wall (`tank_walls.DrawnWall` or another with a known volume); job is the
+    Job with its readings.
     """
-    found = find_survey(job, lambda text: None)
-    table = compute_table(found.job, found.survey).table
+    surveyed = find_survey(job, lambda text: None)
+    table = compute_table(surveyed.job, surveyed.survey).table
     dips = prediction.table.height_m
     true = prediction.table.volume_m3 + wall.more_m3(dips)
     errors = np.interp(dips, table.height_m, table.volume_m3) - true
     expanded = by_survey(job, table).expanded(table.probability)
     expanded = np.interp(dips, table.height_m, expanded)
     within = np.mean(np.abs(errors) <= expanded)
-    return errors[-1], expanded[-1], within, _set_aside(found)
+    return errors[-1], expanded[-1], within, _set_aside(surveyed)
 
 
 def by_survey(job, table):
-    """`Combined` rows of a table by what the survey alone leaves uncertain."""
-    declared = {one.name for one in job.inputs}
-    sources = [one for one in table.sources if one.kind not in declared]
+    """Return Combined rows of a table, with the uncertainty of the survey only."""
+    declared = {quantity.name for quantity in job.inputs}
+    sources = [source for source in table.sources if source.kind not in declared]
     return combine(sources, len(table.height_m))
 
 
-def _set_aside(found):
-    """How many readings of a `Surveyed` were taken out."""
-    survey = found.survey
+def _set_aside(surveyed):
+    """Number of rejected readings of a `Surveyed`."""
+    survey = surveyed.survey
     read = survey if isinstance(survey, ReadWall) else survey.read
-    count = 0 if found.adjustment is None else len(found.adjustment.removed)
+    count = 0 if surveyed.adjustment is None else len(surveyed.adjustment.removed)
     if read is not None:
         count += int(np.sum(~read.tested.accepted))
     if not isinstance(survey, ReadWall):
-        count += len(found.job.points.names) - len(survey.accepted)
+        count += len(surveyed.job.points.names) - len(survey.accepted)
     return count

@@ -1,11 +1,11 @@
-"""What is said of tables that a design makes, told of the section of plan.toml that makes them."""
+"""Report problems of generated tables for the sections of plan.toml that generate them."""
 
 from dataclasses import replace
 
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.planning.given import PLAN_FILE
 
-MADE = {  # tables that a design makes, and the section that they are told of
+MADE = {  # tables that a design generates, and the section that messages name
     "circumferences.csv": "straps",
     "lines.csv": "lines",
     "offsets.csv": "lines",
@@ -19,7 +19,7 @@ MADE = {  # tables that a design makes, and the section that they are told of
     "tangents.csv": "tangents",
     "liquid.csv": "runs",
 }
-OF_TRAVERSE = {  # where limbs are sighted from its stations
+OF_TRAVERSE = {  # sections of tables if limbs are sighted from traverse stations
     "setups.csv": "tangents",
     "control.csv": "tangents",
     "directions.csv": "traverse",
@@ -30,19 +30,19 @@ OF_TRAVERSE = {  # where limbs are sighted from its stations
 
 
 def told_of_plan(problems, design, rows=None):
-    """A tuple of Problems in words of the plan, each once.
+    """Return problems in terms of the plan, a tuple of Problem without duplicates.
 
-    design  Design that made the tables        rows  {section: row of plan.toml}
+    design: Design that generated the tables; rows: {section: row of plan.toml}.
     """
-    made = MADE if design.tangents is None else MADE | OF_TRAVERSE
-    found = []
+    section_of = MADE if design.tangents is None else MADE | OF_TRAVERSE
+    problems_of_plan = []
     for problem in problems:
-        one = problem
-        if one.file in made:
-            section = made[one.file]
+        translated = problem
+        if translated.file in section_of:
+            section = section_of[translated.file]
             row = (rows or {}).get(section)
-            one = replace(one, file=PLAN_FILE, row=row, column=section, cell=None)
-        elif one.file == SETTINGS_FILE:
-            one = replace(one, file=PLAN_FILE)
-        found.append(one)
-    return tuple(dict.fromkeys(found))
+            translated = replace(translated, file=PLAN_FILE, row=row, column=section, cell=None)
+        elif translated.file == SETTINGS_FILE:
+            translated = replace(translated, file=PLAN_FILE)
+        problems_of_plan.append(translated)
+    return tuple(dict.fromkeys(problems_of_plan))
