@@ -1,5 +1,5 @@
-"""Many jobs: what is asked of each, by workers of dask or in this process (docs/batch.md).
+"""Computation of many jobs, by dask workers or in this process (docs/batch.md).
 
-`running.run_batch` is the whole; each job has a folder of its own under DIR/jobs with an
-`outcome.json`, by which a batch that was ended in the middle goes on.
+`running.run_batch` runs a whole batch. The folder of each job, DIR/jobs/NAME, contains
+`outcome.json`, from which an interrupted batch continues.
 """

@@ -1,4 +1,4 @@
-"""What is asked of each job of a batch."""
+"""Steps and options of the jobs of a batch."""
 
 import os
 from dataclasses import dataclass, replace
@@ -19,24 +19,24 @@ FOLDERS = {
 
 @dataclass(frozen=True)
 class Asked:
-    """What is to be done with each job, and how.
+    """Steps to run for each job, and their options.
 
     Attributes
     ----------
     do : tuple of str
         Some of STEPS, in their order.
     papers : bool
-        False: of `run` record and CSV files only.
+        False: `run` writes the record and the CSV files only.
     language : str or None
-        Of what `report`, `compare` and `inspect` write; None: that of the job.
+        Language of the output of `report`, `compare` and `inspect`. None: language of the job.
     letterhead : str or None
-        Path of its file, for the papers.
+        Path of the letterhead file for the reports.
     former : str or None
-        A former table, or a folder of them called by the names of the jobs.
+        A former table, or a folder of former tables named after the jobs.
     compare_by, inspect_by : str or None
-        Rules, by name or file.
+        Names or files of the rules.
     profile : str or None
-        Of `export`, by name or file.
+        Name or file of the profile for `export`.
     """
 
     do: tuple[str, ...] = ("run",)
@@ -49,13 +49,15 @@ class Asked:
     profile: str | None = None
 
     def with_own(self, own):
-        """The same with what one job of a list has by itself, {name: text}; blanks count not."""
+        """Return a copy with the options of one job, {name: text}; blank texts are ignored."""
         return replace(self, **{name: text for name, text in own.items() if text})
 
     def absolute(self):
-        """The same with the files that are there by their absolute paths, for other processes."""
+        """Return a copy with absolute paths of existing files, for use in other processes."""
         named = {name: getattr(self, name) for name in FILES}
-        there = {name: os.path.abspath(one) for name, one in named.items() if one and exists(one)}
+        there = {
+            name: os.path.abspath(path) for name, path in named.items() if path and exists(path)
+        }
         return replace(self, **there)
 
 
@@ -64,7 +66,9 @@ OWN = ("former", "compare_by", "inspect_by", "profile", "language")  # columns o
 
 
 def parse_steps(text):
-    """The steps that a text such as "run,export" names, in their order; InputError for others.
+    """Return the steps named in a text such as "run,export", in the order of STEPS.
+
+    Raises InputError for unknown names.
 
     Examples
     --------
@@ -72,29 +76,29 @@ def parse_steps(text):
     >>> parse_steps("export, run")
     ('run', 'export')
     """
-    named = [one.strip() for one in text.split(",") if one.strip()]
-    unknown = [one for one in named if one not in STEPS]
+    named = [part.strip() for part in text.split(",") if part.strip()]
+    unknown = [name for name in named if name not in STEPS]
     if unknown or not named:
         expected = message(
             "batch_steps",
-            "found {text!r}; expected one or some of {steps}, with commas between",
+            "found {text!r}; expected one or more of {steps}, separated by commas",
             text=text[:60],
             steps=[*STEPS],
         )
         raise InputError(Problem("--do", expected))
-    return tuple(one for one in STEPS if one in named)
+    return tuple(step for step in STEPS if step in named)
 
 
 def refuse_incomplete(asked, jobs):
-    """Raise InputError where a step lacks what it needs of every job: a former table, a profile."""
+    """Raise InputError if a job lacks the former table or the profile that a step requires."""
     former = message(
         "batch_needs_former",
-        "missing; compare needs a former table: a file, a folder of them, or a column former in "
-        "the list of jobs",
+        "missing; compare requires a former table: a file, a folder of tables, or a column "
+        "former in the list of jobs",
     )
     profile = message(
         "batch_needs_profile",
-        "missing; export needs one of those that tankcal export --list shows, or a .toml file",
+        "missing; export requires a profile that tankcal export --list shows, or a .toml file",
     )
     needed = (
         ("compare", "former", "--former", former),
@@ -110,7 +114,7 @@ def refuse_incomplete(asked, jobs):
 
 
 def refuse_unreadable(asked):
-    """Raise InputError for letterhead, rules and profile that no job could use."""
+    """Raise InputError for an invalid letterhead, rule or profile."""
     problems = []
     for use in (_use_letterhead, _use_profile, _use_rules):
         try:
@@ -122,6 +126,7 @@ def refuse_unreadable(asked):
 
 
 def _use_letterhead(asked):
+    """Check the letterhead."""
     if asked.letterhead is not None:
         from tankcal.report.letterhead import load
 
@@ -129,6 +134,7 @@ def _use_letterhead(asked):
 
 
 def _use_profile(asked):
+    """Check the profile."""
     if asked.profile is not None and "export" in asked.do:
         from tankcal.exports.profiles import find_profile
 
@@ -136,6 +142,7 @@ def _use_profile(asked):
 
 
 def _use_rules(asked):
+    """Check the rules."""
     from tankcal.job.tables import Log
 
     log = Log()

@@ -1,4 +1,4 @@
-"""What a worker does with one job: the steps that are not settled, each all or nothing."""
+"""Steps of one job, run by a worker; each step writes all of its files or none."""
 
 import errno
 import os
@@ -23,14 +23,14 @@ from tankcal.batch.outcomes import (
 from tankcal.errors import InputError, Problem, TankcalError, problem_of, reason_of
 from tankcal.messages import message
 
-IN_THE_WAY = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR)  # of one job, not of the batch
+IN_THE_WAY = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR)  # errors of one job, not of the batch
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 STATUS_OF_EXIT = {2: "refused", 3: "unsound"}
 
 
 @dataclass(frozen=True)
 class Task:
-    """A job on its way to a worker.
+    """A job submitted to a worker.
 
     Attributes
     ----------
@@ -38,9 +38,9 @@ class Task:
     keys : dict
         {step: SHA-256} of all its steps.
     out : str
-        Absolute path of the batch's folder.
+        Absolute path of the folder of the batch.
     run : str
-        Of the journal.
+        Identifier of the batch run in the journal.
     """
 
     job: BatchJob
@@ -50,77 +50,86 @@ class Task:
 
 
 def do_job(task):
-    """Do what is not settled yet of a job.
+    """Run the steps of a job that have no current result.
 
     Returns
     -------
     status : str
     problems : list of dict
-        The first of them.
+        The first problem, or an empty list.
     count : int
-        Of all problems.
+        Number of problems.
 
     Raises
     ------
     InputError
-        Where this machine does not see the batch's folder, or that takes no more: what stops the
-        batch, for no other job would get further.
+        This machine does not find the folder of the batch, or cannot write to it. This stops the
+        batch, because every other job would fail in the same way.
     """
     _check_folder(task)
     try:
         return _do_steps(task)
     except OSError as error:
         if error.errno in IN_THE_WAY:
-            return _in_the_way(task, error)
+            return _report_obstacle(task, error)
         text = message(
             "batch_no_room",
-            "nothing more can be written there ({reason}); expected room for the results: then the "
-            "same command goes on",
+            "no more data can be written there ({reason}); expected space for the results: make "
+            "space and repeat the command to continue",
             reason=reason_of(error),
         )
         raise InputError(Problem(task.out, text)) from error
 
 
-def _in_the_way(task, error):
-    """What `do_job` gives where something else lies in the place of a job's folder or outcome."""
+def _report_obstacle(task, error):
+    """Return the result of `do_job` if another object occupies the path of a folder or outcome."""
     path = error.filename2 or error.filename or folder_of(task.out, task.job.name)
-    text = message("batch_in_the_way", "is no file or folder of a batch ({reason}); expected it "
-                   "taken away", reason=reason_of(error))  # fmt: skip
+    text = message(
+        "batch_in_the_way",
+        "is not a file or folder of a batch ({reason}); expected a free path: move it away",
+        reason=reason_of(error),
+    )
     return "failed", [problem_of(Problem(os.path.relpath(path, task.out), text))], 1
 
 
 def _do_steps(task):
-    """What `do_job` gives."""
+    """Return the result of `do_job`."""
     name, steps = task.job.name, task.job.asked.do
-    found = load_outcome(task.out, name) or Outcome(name, task.job.source)
-    if not found.is_settled_for(task.keys):  # or its worker died before it could say so
+    outcome = load_outcome(task.out, name) or Outcome(name, task.job.source)
+    if not outcome.is_settled_for(task.keys):  # settled if a worker died before its answer
         journal, clock = Journal(task.out, task.run), Clock()
         journal.note("begun", name)
-        found = _after_steps(replace(found, source=task.job.source), task, clock)
-        journal.note("ended", name, status=found.status(steps), cpu_s=clock.seconds())
-    done, status = [found.steps[one] for one in steps if one in found.steps], found.status(steps)
-    problems = [one for step in done for one in step.problems]
+        outcome = _after_steps(replace(outcome, source=task.job.source), task, clock)
+        journal.note("ended", name, status=outcome.status(steps), cpu_s=clock.seconds())
+    done, status = (
+        [outcome.steps[step] for step in steps if step in outcome.steps],
+        outcome.status(steps),
+    )
+    problems = [problem for step in done for problem in step.problems]
     return status, problems[:1], sum(step.problem_count for step in done)
 
 
-def _after_steps(found, task, clock):
-    """The `Outcome` after the steps that were not settled, written after each."""
+def _after_steps(outcome, task, clock):
+    """Run the steps without current result; save and return the `Outcome` after each step."""
     for step in task.job.asked.do:
-        if not found.is_settled(step, task.keys[step]):
-            found = replace(found, steps={**found.steps, step: _outcome_of(step, task, clock)})
-            save_outcome(task.out, found)
-        if step == "run" and found.steps[step].status != "done":
+        if not outcome.is_settled(step, task.keys[step]):
+            outcome = replace(
+                outcome, steps={**outcome.steps, step: _outcome_of(step, task, clock)}
+            )
+            save_outcome(task.out, outcome)
+        if step == "run" and outcome.steps[step].status != "done":
             break
-    return found
+    return outcome
 
 
 def _check_folder(task):
+    """Raise InputError if this machine does not find the folder of the batch."""
     if not os.path.exists(os.path.join(task.out, JOURNAL)):
         import socket
 
         text = message(
             "batch_folder_not_seen",
-            "the worker on {machine} does not find it as {path}; expected the folder of the batch "
+            "not found as {path} by the worker on {machine}; expected the folder of the batch "
             "under the same path on all machines of the cluster",
             machine=socket.gethostname(),
             path=task.out,
@@ -129,7 +138,7 @@ def _check_folder(task):
 
 
 def _outcome_of(step, task, clock):
-    """The `StepOutcome` of doing a step; of whatever goes wrong, what is said of it."""
+    """Run a step and return its `StepOutcome`, also for a step that fails."""
     key, name = task.keys[step], task.job.name
     try:
         with clock.step(step):
@@ -137,42 +146,48 @@ def _outcome_of(step, task, clock):
         with clock.step("row"):
             values, warnings = reading.values_of(step, folder_of(task.out, name) / FOLDERS[step])
         if keys_of(task.job, former_or_none(task.job))[step] != key:
-            text = message("batch_changed", "its files changed while it was computed; expected the "
-                           "next batch to compute it again")  # fmt: skip
-            return _unfinished(key, "failed", [Problem(name, text)])
+            text = message(
+                "batch_changed",
+                "input files changed during the computation; the next batch computes the job again",
+            )
+            return _make_failure(key, "failed", [Problem(name, text)])
     except TankcalError as error:
         status = STATUS_OF_EXIT.get(error.exit_status, "failed")
         problems = getattr(error, "problems", None)
-        return _unfinished(key, status, problems or [Problem(name, one) for one in error.texts])
+        return _make_failure(key, status, problems or [Problem(name, text) for text in error.texts])
     except MemoryError:
-        text = message("batch_no_memory", "more memory was needed than there is")
-        return _unfinished(key, "failed", [Problem(name, text)])
+        text = message("batch_no_memory", "not enough memory")
+        return _make_failure(key, "failed", [Problem(name, text)])
     except OSError as error:
         if error.errno in NO_ROOM:
             raise
         place = os.path.basename(str(error.filename or "")) or name
-        return _unfinished(key, "failed", [Problem(place, reason_of(error))])
-    except Exception as error:  # a mistake of tankcal: it must not stop the other jobs
-        text = message("batch_mistake", "a mistake of tankcal, please report it with the job "
-                       "({name}: {error})", name=type(error).__name__,
-                       error=" ".join(str(error).split())[:300])  # fmt: skip
-        return _unfinished(key, "failed", [Problem(name, text)])
+        return _make_failure(key, "failed", [Problem(place, reason_of(error))])
+    except Exception as error:  # an internal error must not stop the other jobs
+        text = message(
+            "batch_mistake",
+            "internal error of tankcal; please report it with the job ({name}: {error})",
+            name=type(error).__name__,
+            error=" ".join(str(error).split())[:300],
+        )
+        return _make_failure(key, "failed", [Problem(name, text)])
     return StepOutcome(
         key,
         "done",
-        files=sorted(Path(one).name for one in written),
+        files=sorted(Path(path).name for path in written),
         values=values,
         warnings=warnings[:MOST_TOLD],
         warning_count=len(warnings),
     )
 
 
-def _unfinished(key, status, problems):
-    told = [problem_of(one) for one in problems[:MOST_TOLD]]
-    return StepOutcome(key, status, problems=told, problem_count=len(problems))
+def _make_failure(key, status, problems):
+    """Return the `StepOutcome` of a step with problems."""
+    plain_problems = [problem_of(problem) for problem in problems[:MOST_TOLD]]
+    return StepOutcome(key, status, problems=plain_problems, problem_count=len(problems))
 
 
-# ---- the steps: each writes its folder, all or nothing, and gives the paths
+# ---- steps: each writes its folder, all or nothing, and returns the paths
 
 
 def _run(task, clock):
@@ -207,9 +222,9 @@ def _compare(task, clock):
     from tankcal.report.comparison import write_comparison
 
     record, asked = _record(task), task.job.asked
-    found = compare_files(Asked(former_of(task.job), record, rule=asked.compare_by))
+    comparison = compare_files(Asked(former_of(task.job), record, rule=asked.compare_by))
     return write_comparison(
-        plain_of_comparison(found), _place(task, "compare"), _language(task, record), None,
+        plain_of_comparison(comparison), _place(task, "compare"), _language(task, record), None,
         _letterhead(asked),
     )  # fmt: skip
 
@@ -221,8 +236,8 @@ def _inspect(task, clock):
 
     asked = task.job.asked
     source, rule, levelled = reading.source_of_inspection(task.job, _place(task, "run"))
-    found = inspect_files(Asked(source, rule=asked.inspect_by or rule, **levelled))
-    plain = plain_of_inspection(found)
+    inspection = inspect_files(Asked(source, rule=asked.inspect_by or rule, **levelled))
+    plain = plain_of_inspection(inspection)
     language = asked.language or reading.language_of(source)
     return write_inspection(plain, _place(task, "inspect"), language, None, _letterhead(asked))
 
@@ -245,20 +260,23 @@ _DOING = {
 
 
 def _place(task, step):
+    """Return the folder of a step."""
     return folder_of(task.out, task.job.name) / FOLDERS[step]
 
 
 def _record(task):
-    """The saved file that a step is done with: of this batch's run, or the job's own."""
-    made = _place(task, "run") / RECORD
-    return made if "run" in task.job.asked.do else Path(task.job.source)
+    """Return the input file of a step: the record of this batch, or of the job."""
+    record = _place(task, "run") / RECORD
+    return record if "run" in task.job.asked.do else Path(task.job.source)
 
 
 def _language(task, record):
+    """Return the language of the output of a step."""
     return task.job.asked.language or reading.language_of(record)
 
 
 def _letterhead(asked):
+    """Return the letterhead, or None."""
     if asked.letterhead is None:
         return None
     from tankcal.report.letterhead import load
@@ -267,7 +285,7 @@ def _letterhead(asked):
 
 
 class Clock:
-    """Seconds of processor of this process and its ended children, by the part of a job."""
+    """Processor time of this process and its ended child processes, by part of a job."""
 
     PARTS = {  # noqa: RUF012
         "writing_record": "record",
@@ -280,7 +298,7 @@ class Clock:
 
     @contextmanager
     def step(self, part):
-        """What is spent until the end of the block is of this part."""
+        """Add the processor time of the block to this part."""
         before = self._to(part)
         try:
             yield
@@ -288,15 +306,16 @@ class Clock:
             self._to(before)
 
     def progress(self, text, done, total):
-        """As `outputs.write` tells how far it is."""
+        """Take the progress messages of `outputs.write`."""
         self._to(self.PARTS.get(getattr(text, "code", None), self._part))
 
     def seconds(self):
-        """{part: seconds}."""
+        """Return {part: seconds}."""
         self._to(None)
         return {part: round(spent, 3) for part, spent in self._spent.items() if part}
 
     def _to(self, part):
+        """Start timing a part; return the previous part."""
         now, before = _processor_s(), self._part
         self._spent[before] = self._spent.get(before, 0.0) + now - self._since
         self._part, self._since = part, now
@@ -304,5 +323,5 @@ class Clock:
 
 
 def _processor_s():
-    found = os.times()
-    return found.user + found.system + found.children_user + found.children_system
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system

@@ -1,7 +1,7 @@
-"""From what the command line names to jobs: folders, workbooks, patterns, lists; their names.
+"""Search for the jobs named on the command line: folders, workbooks, patterns and lists.
 
-A job's name is that of its folder or workbook; jobs of one name have a piece of the SHA-256 of
-their paths behind it. A job that the batch's folder has already keeps its name.
+The name of a job is the name of its folder or workbook. Jobs with equal names have a part of the
+SHA-256 of their path appended. A job already contained in the folder of the batch keeps its name.
 """
 
 import csv
@@ -39,22 +39,22 @@ SAVED = (RECORD, "comparison.json", "inspection.json")
 BOOK = ".xlsx"
 OUTCOME, OF_BATCH = "outcome.json", ("report", "export")
 PATTERN = re.compile(r"[*?\[]")
-HEADINGS = ("job", "name", *OWN)  # of a list of jobs; the first is needed
-DIGITS = 6  # of a digest behind a name
+HEADINGS = ("job", "name", *OWN)  # headings of a list of jobs; only the first is required
+DIGITS = 6  # hexadecimal digits of a digest appended to a name
 MOST_LIST_BYTES = 100_000_000
 
 
 @dataclass(frozen=True)
 class Found:
-    """A job as it was named.
+    """A job as named by the user.
 
     Attributes
     ----------
     source : Path
-        A job folder, a workbook, or a saved file such as record.json; maybe nothing at all, which
-        is told when it is read.
+        Job folder, workbook, or saved file such as record.json. It may not exist; this is reported
+        when it is read.
     own : dict
-        What it has by itself: name, and those of `asked.OWN`.
+        Name and options of this job only, see `asked.OWN`.
     """
 
     source: Path
@@ -68,9 +68,9 @@ class BatchJob:
     Attributes
     ----------
     name : str
-        Of its folder.
+        Name of its folder, unique in the batch.
     label : str
-        Its own name, which others may have, too.
+        Name of the job, which other jobs may also have.
     source : str
         Absolute path.
     asked : Asked
@@ -83,7 +83,7 @@ class BatchJob:
 
 
 def find_jobs(arguments, asked, out=None, known=None):
-    """The jobs that arguments name, in the order of their names.
+    """Return the jobs named by arguments, sorted by name.
 
     Parameters
     ----------
@@ -92,9 +92,9 @@ def find_jobs(arguments, asked, out=None, known=None):
         (`@jobs.txt`, `jobs.csv`).
     asked : Asked
     out : str, optional
-        Absolute path of the batch's folder, where no job is looked for.
+        Absolute path of the folder of the batch, which is not searched.
     known : dict, optional
-        {absolute path: name} of jobs that the batch's folder has.
+        {absolute path: name} of the jobs in the folder of the batch.
 
     Returns
     -------
@@ -103,58 +103,60 @@ def find_jobs(arguments, asked, out=None, known=None):
     Raises
     ------
     InputError
-        For lists that cannot be read, and arguments that name no job.
+        A list cannot be read, or an argument names no job.
     """
-    log, found = Log(), {}
-    wants = _Wanted(_wanted(asked.do), out)
+    log, jobs = Log(), {}
+    wants = _Wanted(_kind_of_input(asked.do), out)
     for argument in arguments:
-        for one in _named(argument, wants, log):
-            found.setdefault(os.path.abspath(one.source), one)  # a link is a job of its own
+        for job in _find_named(argument, wants, log):
+            jobs.setdefault(os.path.abspath(job.source), job)  # a link is a separate job
     log.stop_if_problems()
-    return _with_names(found, asked, known or {})
+    return _assign_names(jobs, asked, known or {})
 
 
 @dataclass(frozen=True)
 class _Wanted:
-    """What is looked for ("jobs", "records" or "either"), and the folder where it is not."""
+    """Kind of objects to search for ("jobs", "records" or "either") and the folder to skip."""
 
     kind: str
     out: str | None
 
 
-def _wanted(do):
-    """What the steps are done with: "jobs", "records", or "either" with the job first."""
+def _kind_of_input(do):
+    """Return the input of the steps: "jobs", "records", or "either" with jobs preferred."""
     if "run" in do:
         return "jobs"
     return "either" if do == ("inspect",) else "records"
 
 
-def _named(argument, wants, log):
-    """The `Found`s of an argument."""
+def _find_named(argument, wants, log):
+    """Return the `Found` objects of an argument."""
     path = Path(argument.removeprefix("@"))
     if argument.startswith("@") or (path.suffix.lower() == ".csv" and path.is_file()):
-        return _listed(path, wants, log)
+        return _find_listed(path, wants, log)
     if PATTERN.search(argument) and not os.path.lexists(argument):
         names = sorted(glob.glob(argument, recursive=True))
         if not names:
-            text = message("batch_no_match", "names nothing that there is; expected jobs")
+            text = message("batch_no_match", "no file or folder matches; expected jobs")
             log.problem(argument, text)
-        return [one for name in names for one in _in_path(Path(name), wants, log, strict=False)]
-    return _in_path(path, wants, log)
+        return [
+            job for name in names for job in _find_in_path(Path(name), wants, log, strict=False)
+        ]
+    return _find_in_path(path, wants, log)
 
 
-def _in_path(path, wants, log, strict=True):
-    """The jobs of one path: itself, or those in a folder.
+def _find_in_path(path, wants, log, strict=True):
+    """Return the jobs of a path: the path itself, or the jobs in a folder.
 
-    strict  whether a folder without any is told
+    strict  whether a folder without jobs is a problem
     """
-    own = _of_itself(path, wants)
-    if own is not None:
-        return [Found(own, {})]
+    job_path = _job_of_path(path, wants)
+    if job_path is not None:
+        return [Found(job_path, {})]
     if not path.is_dir():
         return [Found(path, {})] if strict or path.suffix.lower() == BOOK else []
     try:
-        inside = _in_folder(path, wants)
+        inside = _find_in_folder(path, wants)
     except OSError as error:
         text = message("batch_folder_unreadable", "the folder cannot be read ({reason})",
                        reason=reason_of(error))  # fmt: skip
@@ -163,23 +165,25 @@ def _in_path(path, wants, log, strict=True):
     if not inside and strict:
         results = None if wants.kind == "records" else results_given_as_job(path)
         log.problem(str(path), results or _nothing_inside(wants.kind))
-    return [Found(one, {}) for one in inside]
+    return [Found(source, {}) for source in inside]
 
 
 def _nothing_inside(kind):
+    """Return the message for a folder without jobs or results."""
     if kind == "records":
         return message(
             "batch_no_records",
-            "holds no results; expected folders with record.json, such as those of tankcal run",
+            "contains no results; expected folders with record.json, such as results of tankcal "
+            "run",
         )
     return message(
         "batch_no_jobs",
-        "holds no job; expected job folders with job.toml, or job workbooks (.xlsx)",
+        "contains no job; expected job folders with job.toml, or job workbooks (.xlsx)",
     )
 
 
-def _of_itself(path, wants):
-    """The job that a path itself is; None where it is none."""
+def _job_of_path(path, wants):
+    """Return the job that a path is, or None."""
     if path.name == SETTINGS_FILE and path.is_file():
         path = path.parent
     if (path / SETTINGS_FILE).is_file():
@@ -195,9 +199,9 @@ def _of_itself(path, wants):
     )
 
 
-def _in_folder(folder, wants):
-    """Jobs below a folder, sorted; hidden folders, and what lies in jobs, are passed over."""
-    found = []
+def _find_in_folder(folder, wants):
+    """Return the sorted jobs below a folder, without hidden folders and contents of jobs."""
+    sources = []
 
     def fail(error):
         raise error
@@ -207,27 +211,29 @@ def _in_folder(folder, wants):
         if os.path.abspath(place) == wants.out:
             folders.clear()
             continue
-        of_batch = OUTCOME in names  # a job in the folder of another batch: its papers are no job
+        of_batch = OUTCOME in names  # a job of another batch: its reports are not jobs
         folders[:] = sorted(
-            one for one in folders if one[0] != "." and not (of_batch and one in OF_BATCH)
+            folder_name
+            for folder_name in folders
+            if folder_name[0] != "." and not (of_batch and folder_name in OF_BATCH)
         )
         saved = [name for name in SAVED if name in names]
         if wants.kind == "records":
-            found += [place / name for name in saved]
+            sources += [place / name for name in saved]
         elif SETTINGS_FILE in names:
-            found.append(place)
+            sources.append(place)
             folders.clear()
         elif saved:
-            found += [place / saved[0]] if wants.kind == "either" else []
+            sources += [place / saved[0]] if wants.kind == "either" else []
             folders.clear()
         else:
-            books = (place / one for one in sorted(names) if one[0] not in ".~")
-            found += [one for one in books if one.suffix.lower() == BOOK and _is_job(one)]
-    return sorted(found)
+            books = (place / name for name in sorted(names) if name[0] not in ".~")
+            sources += [book for book in books if book.suffix.lower() == BOOK and _is_job(book)]
+    return sorted(sources)
 
 
 def _is_job(book):
-    """Whether a workbook has the sheet of a job; one that cannot be looked into is told later."""
+    """Return whether a workbook has the sheet of a job; True also for an unreadable workbook."""
     try:
         with zipfile.ZipFile(book) as file:
             sheets = file.read("xl/workbook.xml")
@@ -239,36 +245,40 @@ def _is_job(book):
 # ---- lists
 
 
-def _listed(path, wants, log):
-    """The jobs of a list: a line each, or a CSV file with a column job; paths from its folder."""
+def _find_listed(path, wants, log):
+    """Return the jobs of a list: one per line, or a CSV file with a column job."""
     data, is_csv = read_bytes(path, log, MOST_LIST_BYTES), path.suffix.lower() == ".csv"
     text = None if data is None else decode(path.name, data, log)
     if text is None:
         return []
-    told = len(log.problems)
+    problems_before = len(log.problems)
     rows = list(_rows(path, text, log)) if is_csv else _plain_rows(text.splitlines())
-    found = []
-    for own in rows:
-        job = own.pop("job")
-        for name in OWN:  # files from the list's folder; else names, such as of a shipped rule
-            beside = path.parent / own.get(name, "")
-            if own.get(name) and (name == "former" or beside.is_file()):
-                own[name] = os.path.abspath(beside)
+    jobs = []
+    for cells in rows:
+        job = cells.pop("job")
+        for name in OWN:  # files relative to the list, else names, such as a shipped rule
+            beside = path.parent / cells.get(name, "")
+            if cells.get(name) and (name == "former" or beside.is_file()):
+                cells[name] = os.path.abspath(beside)
         source = path.parent / job
-        inside = _in_path(source, wants, log, strict=False) or [Found(source, {})]
-        found += [Found(one.source, own) for one in inside]
-    if not found and len(log.problems) == told:
-        log.problem(path.name, message("batch_empty_list", "a list without jobs"))
-    return found
+        inside = _find_in_path(source, wants, log, strict=False) or [Found(source, {})]
+        jobs += [Found(job_found.source, cells) for job_found in inside]
+    if not jobs and len(log.problems) == problems_before:
+        log.problem(
+            path.name,
+            message("batch_empty_list", "the list contains no jobs; expected one job per row"),
+        )
+    return jobs
 
 
 def _plain_rows(lines):
+    """Return the rows of a list with one job per line."""
     stripped = (line.strip() for line in lines)
-    return [{"job": one} for one in stripped if one and not one.startswith("#")]
+    return [{"job": text} for text in stripped if text and not text.startswith("#")]
 
 
 def _rows(path, text, log):
-    """A dict for each row of a CSV list; [] after telling `log` what is wrong with it."""
+    """Return a dict for each row of a CSV list; [] after adding a problem to `log`."""
     mark = separator_of_text(text, ",")
     lines = [(row, line) for row, line in enumerate(split_lines(text), 1) if is_row(line)]
     table = []
@@ -276,17 +286,20 @@ def _rows(path, text, log):
         try:
             table.append((row, split_cells(line, mark)))
         except csv.Error as error:
-            log.problem(path.name, message("batch_no_csv", "no CSV ({reason})", reason=str(error)),
-                        row)  # fmt: skip
+            log.problem(
+                path.name,
+                message("batch_no_csv", "not valid CSV ({reason})", reason=str(error)),
+                row,
+            )
             return []
     if not table:
         return []
     row, headings = table[0]
-    wrong = [one for one in headings if one not in HEADINGS]
+    wrong = [heading for heading in headings if heading not in HEADINGS]
     if wrong or HEADINGS[0] not in headings or len(set(headings)) < len(headings):
         text = message(
             "batch_headings",
-            "found the headings {found}; expected job, and maybe {others}, each once",
+            "found the headings {found}; expected job, and optionally {others}, each once",
             found=headings[:10],
             others=[*HEADINGS[1:]],
         )
@@ -296,17 +309,18 @@ def _rows(path, text, log):
 
 
 def _dicts(path, headings, table, log):
+    """Return {heading: cell} of each valid row."""
     for row, cells in table:
         if not any(cells):
             continue
         if len(cells) > len(headings):
-            text = message("batch_long_row", "{found} cells; expected at most {most}",
+            text = message("batch_long_row", "found {found} cells; expected at most {most}",
                            found=len(cells), most=len(headings))  # fmt: skip
             log.problem(path.name, text, row)
             continue
-        own = dict(zip(headings, cells, strict=False))
-        if own.get("job"):
-            yield own
+        row_cells = dict(zip(headings, cells, strict=False))
+        if row_cells.get("job"):
+            yield row_cells
         else:
             log.problem(
                 path.name, message("batch_no_job_cell", "blank; expected a job"), row, "job"
@@ -316,37 +330,42 @@ def _dicts(path, headings, table, log):
 # ---- names
 
 
-def _with_names(found, asked, known):
-    """`BatchJob`s, each with a name that no other one has."""
-    labels = {source: _label(one) for source, one in found.items()}
+def _assign_names(jobs_found, asked, known):
+    """Return a `BatchJob` with a unique name for each job."""
+    labels = {source: _label(job) for source, job in jobs_found.items()}
     taken = {name.casefold(): source for source, name in known.items() if os.path.exists(source)}
     counts = Counter(label.casefold() for label in labels.values())
     jobs = []
-    for source, one in found.items():
+    for source, job in jobs_found.items():
         label = labels[source]
         owner = taken.get(label.casefold(), source)
         name = known.get(source, label)
         if source not in known and (counts[label.casefold()] > 1 or owner != source):
             name = f"{label}~{sha256(source.encode(errors='replace')).hexdigest()[:DIGITS]}"
-        own = {key: value for key, value in one.own.items() if key in OWN}
-        jobs.append(BatchJob(name, label, source, asked.with_own(own)))
+        own_choices = {key: value for key, value in job.own.items() if key in OWN}
+        jobs.append(BatchJob(name, label, source, asked.with_own(own_choices)))
     _refuse_doubles(jobs)
     return sorted(jobs, key=lambda job: job.name)
 
 
 def _refuse_doubles(jobs):
+    """Raise InputError if two jobs have the same name."""
     names = Counter(job.name.casefold() for job in jobs)
     double = sorted({job.name for job in jobs if names[job.name.casefold()] > 1})
     if double:
-        text = message("batch_double_names", "two jobs are called {names}", names=double[:5])
+        text = message(
+            "batch_double_names",
+            "two jobs have the name {names}; expected different names",
+            names=double[:5],
+        )
         raise InputError(Problem("JOBS", text))
 
 
-def _label(one):
-    """The name of a job by itself: as its list says, or of its folder or workbook."""
-    if one.own.get("name"):
-        return file_name(one.own["name"], "job")
-    path = Path(os.path.abspath(one.source))
+def _label(job):
+    """Return the name of a job: from its list, or from its folder or workbook."""
+    if job.own.get("name"):
+        return file_name(job.own["name"], "job")
+    path = Path(os.path.abspath(job.source))
     if path.name == WORKBOOK_FILE:
         path = path.parent
     if path.name not in SAVED:

@@ -1,7 +1,7 @@
-"""What a step of a job depends on, as one SHA-256: its inputs, the version, what is asked.
+"""SHA-256 of all data that affect a step of a job: inputs, version and options.
 
-Of a job all files below its folder count that a job could read, of a workbook those beside it that
-it names. Too much is harmless (the job is done once more), too little would not be.
+For a job folder, all files that the job could read count; for a workbook, the files beside it that
+it names. An unnecessary file only repeats a computation; a missing file would hide a change.
 """
 
 import json
@@ -19,13 +19,13 @@ from tankcal.job.tables import COVARIANCE_FILE, SETTINGS_FILE
 from tankcal.record import long_tables
 from tankcal.record.manifest import digest_of
 
-NEVER_READ = (  # endings of what lies beside jobs
+NEVER_READ = (  # endings of files that no job reads
     *(".jpg", ".jpeg", ".png", ".tif", ".tiff", ".gif", ".bmp", ".dng", ".raw", ".heic"),
     *(".mp4", ".mov", ".avi", ".pdf", ".doc", ".docx", ".odt", ".zip", ".html"),
 )
 RESULTS = frozenset(("record.json", "comparison.json", "inspection.json", SETTINGS_FILE))
-MOST_UNPACKED_BYTES = 300_000_000  # of a workbook that is looked through for names
-OF_STEP = {  # attributes of `Asked` that bear on a step; of files their content
+MOST_UNPACKED_BYTES = 300_000_000  # largest unpacked workbook to search for names
+OF_STEP = {  # attributes of `Asked` that affect a step
     "run": ("papers",),
     "report": ("language",),
     "compare": ("language",),
@@ -42,7 +42,7 @@ FILES_OF_STEP = {
 
 
 def keys_of(job, former=None):
-    """{step: SHA-256} of all that bears on each step of a job.
+    """Return {step: SHA-256} of all data that affect each step of a job.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def keys_of(job, former=None):
     Raises
     ------
     OSError
-        Where an input cannot be read.
+        An input cannot be read.
     """
     inputs, asked = inputs_of(job.source), job.asked
     keys = {}
@@ -63,7 +63,7 @@ def keys_of(job, former=None):
             "step": step,
             "inputs": inputs,
             **{name: getattr(asked, name) for name in OF_STEP[step]},
-            **{name: _content(getattr(asked, name)) for name in FILES_OF_STEP[step]},
+            **{name: _digest_content(getattr(asked, name)) for name in FILES_OF_STEP[step]},
         }
         if step == "run" and not asked.papers:
             bears.pop("letterhead")
@@ -75,7 +75,7 @@ def keys_of(job, former=None):
 
 
 def inputs_of(source):
-    """[[name, SHA-256]] of the files that a job is read from; [] where there are none."""
+    """Return [[name, SHA-256]] of the input files of a job; [] if there are none."""
     path = Path(source)
     if path.is_dir():
         return [[name, _digest(path / name)] for name in _files_below(str(path))]
@@ -83,53 +83,53 @@ def inputs_of(source):
         return []
     names = [path.name]
     if path.suffix.lower() == BOOK:
-        names += _named_in_book(path)
+        names += _files_of_workbook(path)
     elif path.suffix.lower() == ".toml":
-        names += _named_in_former(path)
+        names += _files_of_former(path)
     elif path.name == "record.json":
         beside = (COVARIANCE_FILE, long_tables.FILE)
-        names += [one for one in beside if path.with_name(one).is_file()]
+        names += [file for file in beside if path.with_name(file).is_file()]
     return [[name, _digest(path.parent / name)] for name in names]
 
 
 def _files_below(folder):
-    """Names of the files below a folder that a job there could read, sorted."""
-    found = []
+    """Return the sorted names of the files below a folder that a job in it could read."""
+    paths = []
     for place, folders, names in os.walk(folder):
         if place != folder and not RESULTS.isdisjoint(names):
             folders.clear()
             continue
-        folders[:] = [one for one in folders if not one.startswith(".")]
+        folders[:] = [folder_name for folder_name in folders if not folder_name.startswith(".")]
         for name in names:
             if name[0] in ".~" or os.path.splitext(name)[1].lower() in NEVER_READ:
                 continue
             path = os.path.join(place, name)
             if os.path.isfile(path):
-                found.append(os.path.relpath(path, folder).replace(os.sep, "/"))
-    return sorted(found)
+                paths.append(os.path.relpath(path, folder).replace(os.sep, "/"))
+    return sorted(paths)
 
 
-_files_beside = lru_cache(maxsize=64)(_files_below)  # of folders with many workbooks
+_files_beside = lru_cache(maxsize=64)(_files_below)  # cached for folders with many workbooks
 
 
-def _named_in_book(path):
-    """Files beside a workbook that it names, and the tables of an inspection; sorted."""
-    beside = [one for one in _files_beside(str(path.parent)) if not one.lower().endswith(BOOK)]
+def _files_of_workbook(path):
+    """Return the sorted files named in a workbook, and the tables of an inspection beside it."""
+    beside = [name for name in _files_beside(str(path.parent)) if not name.lower().endswith(BOOK)]
     if not beside:
         return []
     try:
         with zipfile.ZipFile(path) as book:
-            parts = [one.filename for one in book.infolist() if one.filename.endswith(".xml")]
-            if sum(one.file_size for one in book.infolist()) > MOST_UNPACKED_BYTES:
+            parts = [part.filename for part in book.infolist() if part.filename.endswith(".xml")]
+            if sum(part.file_size for part in book.infolist()) > MOST_UNPACKED_BYTES:
                 return []
-            text = unescape(" ".join(book.read(one).decode(errors="replace") for one in parts))
+            text = unescape(" ".join(book.read(part).decode(errors="replace") for part in parts))
     except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError, RuntimeError):
         return []
-    return [one for one in beside if one in text or one in OF_INSPECTIONS]
+    return [name for name in beside if name in text or name in OF_INSPECTIONS]
 
 
-def _named_in_former(path):
-    """The table that a former.toml names, where it lies beside it."""
+def _files_of_former(path):
+    """Return the table named in a former.toml, if it is beside this file."""
     from tankcal.recalibration.inputs import rows_file
 
     try:
@@ -139,15 +139,16 @@ def _named_in_former(path):
         return []
 
 
-def _content(named):
-    """A file by its content, another name as it is."""
+def _digest_content(named):
+    """Return the digest of a file; any other text is returned unchanged."""
     path = None if named is None else Path(named)
     return named if path is None or not path.is_file() else _digest(path)
 
 
 def _digest(path):
-    found = os.stat(path)
-    return _digest_as_of(str(path), found.st_size, found.st_mtime_ns)
+    """Return the SHA-256 of a file, cached by size and modification time."""
+    status = os.stat(path)
+    return _digest_as_of(str(path), status.st_size, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=4096)

@@ -1,4 +1,4 @@
-"""The former table of each job."""
+"""Former tables of the jobs of a batch."""
 
 import os
 from functools import lru_cache
@@ -14,12 +14,12 @@ ENDINGS = (".toml", ".csv", ".xlsx", ".pdf", ".json")
 
 @lru_cache(maxsize=4)
 def _names_in(folder):
-    """{source: name} of the jobs of a former batch."""
+    """Return {source: name} of the jobs of a former batch."""
     return known_names(folder)
 
 
 def former_or_none(job):
-    """The same; None, too, where a folder of tables has none of its name."""
+    """Return the former table of a job; None if there is no table, or no comparison."""
     try:
         return former_of(job)
     except InputError:
@@ -27,12 +27,12 @@ def former_or_none(job):
 
 
 def former_of(job):
-    """Path of the former table that a job is compared with; None where it is not compared.
+    """Return the path of the former table of a job; None if the job is not compared.
 
     Raises
     ------
     InputError
-        Where a folder of tables has none of its name.
+        A folder of former tables contains no table of this job.
     """
     asked = job.asked
     if "compare" not in asked.do or asked.former is None:
@@ -43,16 +43,16 @@ def former_of(job):
     if (folder / RECORD).is_file():
         return folder / RECORD
     names = (_names_in(str(folder)).get(job.source), job.name, job.label)
-    for name in dict.fromkeys(one for one in names if one):
+    for name in dict.fromkeys(label for label in names if label):
         places = [folder / name, folder / "jobs" / name / "results", folder / name / "results"]
         tables = [folder / f"{name}{ending}" for ending in ENDINGS]
-        for path in (*(one / RECORD for one in places), *tables):
+        for path in (*(place / RECORD for place in places), *tables):
             if path.is_file():
                 return path
     text = message(
         "batch_no_former",
-        "no former table of {name} there; expected {name} with one of the endings {endings}, or a "
-        "folder {name} with record.json",
+        "contains no former table of {name}; expected {name} with one of the endings "
+        "{endings}, or a folder {name} with record.json",
         name=job.label,
         endings=[*ENDINGS],
     )

@@ -1,9 +1,9 @@
-"""The folder of a batch: who may write to it, its journal, what an ended batch left behind.
+"""The folder of a batch: write lock, journal, and recovery after an interruption.
 
-DIR/batch.lock      held by the batch that runs; one that was killed holds nothing
-DIR/journal.jsonl   a line each time that a job is begun or ended, with the time of the clock
+DIR/batch.lock      locked by the running batch; a killed process holds no lock
+DIR/journal.jsonl   one line for the start and the end of each job, with the time
 DIR/jobs/NAME/      the results of a job, and its outcome.json
-DIR/summary.*       of all jobs
+DIR/summary.*       summary of all jobs
 """
 
 import json
@@ -26,12 +26,12 @@ FILES = (LOCK, JOURNAL, JOBS, *SUMMARY)
 
 @contextmanager
 def opened_folder(out):
-    """The folder of a batch, made when missing, for this process alone; gives its `Journal`.
+    """Lock the folder of a batch for this process, create it if missing, and yield its `Journal`.
 
     Raises
     ------
     InputError
-        For a folder that holds anything else, or that another batch is writing to.
+        The folder contains other files, or another batch is writing to it.
     """
     out = Path(out)
     folders.refuse_foreign(out, FILES)
@@ -56,24 +56,25 @@ def opened_folder(out):
 
 
 def _clear(jobs):
-    """Put right what an ended batch was writing."""
-    for place in (jobs, *(one for one in jobs.iterdir() if one.is_dir())):
+    """Complete or remove the files that an interrupted batch was writing."""
+    for place in (jobs, *(folder for folder in jobs.iterdir() if folder.is_dir())):
         folders.recover(place)
         for left in place.glob(".*.tmp"):
             left.unlink(missing_ok=True)
 
 
 class Journal:
-    """Lines about the jobs of a batch, by its process and its workers.
+    """Journal of the jobs of a batch, written by its process and its workers.
 
-    out  folder of the batch        run  of the batch that writes now
+    out  folder of the batch
+    run  identifier of the current batch run
     """
 
     def __init__(self, out, run):
         self.out, self.run = Path(out), run
 
     def note(self, event, job, **more):
-        """Add one line, in one piece: workers write to the same file."""
+        """Append one line with a single write, because workers write to the same file."""
         line = {
             "at": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
             "run": self.run,
@@ -90,7 +91,7 @@ class Journal:
             os.close(file)
 
     def deaths(self, job):
-        """How many times this batch began a job and did not end it."""
+        """Return how many times this batch started a job without ending it."""
         begun = ended = 0
         for line in self._lines():
             if line.get("run") == self.run and line.get("job") == job:
@@ -99,14 +100,15 @@ class Journal:
         return begun - ended
 
     def _lines(self):
+        """Yield the entries of the journal; incomplete lines are skipped."""
         try:
             with open(self.out / JOURNAL, encoding="utf-8", errors="replace") as file:
                 for line in file:
                     try:
-                        found = json.loads(line)
+                        entry = json.loads(line)
                     except ValueError:  # cut off by a kill
                         continue
-                    if isinstance(found, dict):
-                        yield found
+                    if isinstance(entry, dict):
+                        yield entry
         except OSError:
             return

@@ -1,7 +1,7 @@
-"""Whether what an earlier batch kept is whole: outcomes and the rows of its summary.
+"""Validation of files kept by an earlier batch: outcomes and rows of the summary.
 
-Both lie where anybody can edit them. What is not as a batch writes it counts as if it were not
-there: the job is done again, and no change is told.
+Users can edit both. Invalid data are treated as missing: the job is computed again, and no change
+is reported.
 """
 
 from functools import cache
@@ -13,27 +13,27 @@ from tankcal.text.words import load_words
 TEXTS = ("tank", "kind", "date", "rule", *OF_RULE)
 NUMBERS = ("height_m", "volume_m3", "U_m3", "former_m3", "of_tank_m3")
 PLACES = ("book", "column", "cell")
-PASSED = "global_test"  # the verdict that is true or false
+PASSED = "global_test"  # the only Boolean verdict
 
 
 def is_step(step):
-    """Whether the attributes of a `StepOutcome` are of the kinds that they should be."""
+    """Return whether the attributes of a `StepOutcome` have valid types."""
     return (
         isinstance(step.key, str)
         and isinstance(step.status, str)
         and step.status in codes("statuses")
         and isinstance(step.files, list)
-        and all(isinstance(one, str) for one in step.files)
+        and all(isinstance(name, str) for name in step.files)
         and isinstance(step.values, dict)
         and are_values(step.values)
-        and all(isinstance(one, list) for one in (step.problems, step.warnings))
+        and all(isinstance(rows, list) for rows in (step.problems, step.warnings))
         and all(map(is_problem, (*step.problems, *step.warnings)))
         and all(map(_is_count, (step.problem_count, step.warning_count)))
     )
 
 
 def is_row(row):
-    """Whether a row of a summary can be compared with another one."""
+    """Return whether a row of a summary can be compared with another row."""
     return (
         isinstance(row, dict)
         and isinstance(row.get("name"), str)
@@ -44,7 +44,7 @@ def is_row(row):
 
 
 def are_values(values):
-    """Whether the numbers, texts and verdicts among values are such."""
+    """Return whether the numbers, texts and verdicts among values are valid."""
     return (
         all(_is_number(values.get(name)) for name in NUMBERS)
         and all(_is_text(values.get(name)) for name in TEXTS if name != PASSED)
@@ -58,7 +58,7 @@ def are_values(values):
 
 
 def is_problem(plain):
-    """Whether plain data is what `errors.problem_of` gives."""
+    """Return whether plain data have the form of `errors.problem_of`."""
     return (
         isinstance(plain, dict)
         and isinstance(plain.get("file"), str)
@@ -98,5 +98,5 @@ def _is_count(value):
 
 @cache
 def codes(words):
-    """The codes that the summary has words for: of "statuses", of a verdict."""
+    """Return the codes of the summary with words: of "statuses" or of a verdict."""
     return frozenset(load_words("en")["batch"][words])

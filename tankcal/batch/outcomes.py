@@ -1,7 +1,7 @@
-"""What became of a job: `outcome.json` in its folder, written step by step, and its small row.
+"""Outcome of a job: `outcome.json` in its folder, written after each step, and its summary row.
 
-Nothing in it is a time of the clock or depends on who did it: it has the same bytes however many
-workers there are. It is what a batch that was ended goes on by.
+It contains no time and no worker, so its bytes do not depend on the number of workers. An
+interrupted batch continues from these files.
 """
 
 import json
@@ -16,29 +16,29 @@ from tankcal.record import manifest
 from tankcal.report.batch.paper import STATUSES
 
 JOBS, FILE, FORMAT = "jobs", "outcome.json", "tankcal-outcome/1"
-FINAL = ("done", "unsound", "refused")  # what the same input would give again
-MOST_TOLD = 20  # problems and warnings of a step that are kept
+FINAL = ("done", "unsound", "refused")  # statuses that the same input would give again
+MOST_TOLD = 20  # largest number of saved problems and warnings of a step
 
 
 @dataclass(frozen=True)
 class StepOutcome:
-    """What became of one step.
+    """Outcome of one step.
 
     Attributes
     ----------
     key : str
-        SHA-256 of all that it depends on.
+        SHA-256 of all data that affect the step.
     status : str
-        One of STATUSES: refused for its input, without sound solution, or failed for another
-        reason, which is tried again by the next batch.
+        One of STATUSES: refused for its input, without valid solution, or failed for another
+        reason. A failed step is repeated by the next batch.
     files : list of str
-        What it wrote, below the job's folder.
+        Written files, below the folder of the job.
     values : dict
-        What the summary says of it.
+        Values for the summary.
     problems, warnings : list of dict
-        As `errors.problem_of` gives them, the first MOST_TOLD.
+        The first MOST_TOLD, in the form of `errors.problem_of`.
     problem_count, warning_count : int
-        Of all.
+        Number of all problems and warnings.
     """
 
     key: str
@@ -53,56 +53,62 @@ class StepOutcome:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job: its name, where it came from, {step: StepOutcome}."""
+    """Outcome of a job: name, source, {step: StepOutcome}."""
 
     name: str
     source: str
     steps: dict = field(default_factory=dict)
 
     def is_settled(self, step, key):
-        """Whether a step was done with this key, and would give the same again."""
+        """Return whether a step has a final result for this key."""
         known = self.steps.get(step)
         return known is not None and known.key == key and known.status in FINAL
 
     def status(self, steps):
-        """The worst of some steps; one that was not come to counts for nothing."""
-        found = [self.steps[one].status for one in steps if one in self.steps]
-        return max(found, key=STATUSES.index, default="failed")
+        """Return the worst status of some steps; steps not reached are ignored."""
+        statuses = [self.steps[step].status for step in steps if step in self.steps]
+        return max(statuses, key=STATUSES.index, default="failed")
 
     def is_settled_for(self, keys):
-        """Whether nothing is left to do of {step: key}."""
+        """Return whether all steps of {step: key} have current results."""
         for step, key in keys.items():
             if not self.is_settled(step, key):
                 return False
             if step == "run" and self.steps[step].status != "done":
-                return True  # the others would have nothing to be done with
+                return True  # the other steps need the results of the run
         return True
 
 
 def folder_of(out, name):
-    """The folder of a job in that of its batch."""
+    """Return the folder of a job in the folder of its batch."""
     return Path(out) / JOBS / name
 
 
 def load_outcome(out, name):
-    """The `Outcome` in a job's folder; None where there is none that can be read."""
+    """Return the `Outcome` in the folder of a job; None if it is missing or invalid."""
     folder = folder_of(out, name)
     try:
         saved = json.loads((folder / FILE).read_bytes())
         if saved.get("format") != FORMAT:
             return None
-        steps = {step: StepOutcome(**one) for step, one in saved["steps"].items() if step in STEPS}
+        steps = {
+            step: StepOutcome(**values) for step, values in saved["steps"].items() if step in STEPS
+        }
         if not (isinstance(saved["name"], str) and isinstance(saved["source"], str)):
             return None
-        whole = {step: one for step, one in steps.items() if is_step(one)}
-        there = {step: one for step, one in whole.items() if _has_its_files(folder, step, one)}
+        whole = {step: outcome for step, outcome in steps.items() if is_step(outcome)}
+        there = {
+            step: outcome
+            for step, outcome in whole.items()
+            if _has_its_files(folder, step, outcome)
+        }
         return Outcome(saved["name"], saved["source"], there)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
 
 
 def _has_its_files(folder, step, outcome):
-    """Whether all that a step wrote is still there, as SHA256SUMS lists it."""
+    """Return whether all files of a step still exist with the digests of SHA256SUMS."""
     if not outcome.files:
         return True
     place = folder / FOLDERS[step]
@@ -118,8 +124,8 @@ def _has_its_files(folder, step, outcome):
 
 
 def save_outcome(out, outcome):
-    """Write it to its folder, all or nothing."""
-    steps = {one: asdict(outcome.steps[one]) for one in STEPS if one in outcome.steps}
+    """Write an outcome to the folder of its job, all or nothing."""
+    steps = {step: asdict(outcome.steps[step]) for step in STEPS if step in outcome.steps}
     saved = {"format": FORMAT, "name": outcome.name, "source": outcome.source, "steps": steps}
     folder = folder_of(out, outcome.name)
     folder.mkdir(parents=True, exist_ok=True)
@@ -127,7 +133,7 @@ def save_outcome(out, outcome):
 
 
 def write_whole(path, text):
-    """Write a text file by way of another one that takes its place; it is on the disk then."""
+    """Write a text file to the disk by replacing it with a complete temporary file."""
     waiting = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with waiting.open("w", encoding="utf-8", errors="replace", newline="\n") as file:
@@ -140,13 +146,13 @@ def write_whole(path, text):
 
 
 def known_names(out):
-    """{source: name} of the jobs that a batch's folder has."""
+    """Return {source: name} of the jobs in the folder of a batch."""
     names = {}
     try:
-        found = sorted(one.name for one in (Path(out) / JOBS).iterdir())
+        folder_names = sorted(folder.name for folder in (Path(out) / JOBS).iterdir())
     except OSError:
         return names
-    for name in found:
+    for name in folder_names:
         outcome = load_outcome(out, name)
         if outcome is not None and outcome.name == name:
             names[outcome.source] = name

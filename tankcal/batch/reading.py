@@ -1,4 +1,4 @@
-"""What the summary says of the files that a step wrote, and what an inspection is done with."""
+"""Summary values of the files written by a step, and the input of inspections."""
 
 import json
 from collections import Counter
@@ -11,12 +11,12 @@ from tankcal.record.inspection import VERDICTS
 
 
 def values_of(step, folder):
-    """({name: value} of the summary, warnings as plain data) of the folder that a step wrote."""
+    """Return ({name: value} for the summary, warnings as plain data) from the folder of a step."""
     saved = next((folder / name for name in SAVED if (folder / name).is_file()), None)
     if saved is None:
         return {}, []
-    found = json.loads(saved.read_bytes())
-    return _READERS[saved.name](found), found["warnings"]
+    results = json.loads(saved.read_bytes())
+    return _READERS[saved.name](results), results["warnings"]
 
 
 def _of_record(record):
@@ -39,30 +39,30 @@ def _of_record(record):
     return values
 
 
-def _of_comparison(found):
-    last = found["waterfall"][-1] if found["waterfall"] else None
+def _read_comparison(comparison):
+    last = comparison["waterfall"][-1] if comparison["waterfall"] else None
     return {
-        "comparison_verdict": found["verdict"] or "none",
+        "comparison_verdict": comparison["verdict"] or "none",
         "former_m3": last and last["former_m3"],
         "of_tank_m3": last and last["tank_m3"],
     }
 
 
-def _of_inspection(found):
-    counts = Counter(one["verdict"] for one in found["checks"])
-    worst = next((one for one in VERDICTS if counts[one]), None)
-    return {"tank": found["tank"]["id"], "inspection_verdict": worst}
+def _read_inspection(inspection):
+    counts = Counter(check["verdict"] for check in inspection["checks"])
+    worst = next((verdict for verdict in VERDICTS if counts[verdict]), None)
+    return {"tank": inspection["tank"]["id"], "inspection_verdict": worst}
 
 
-_READERS = dict(zip(SAVED, (_of_record, _of_comparison, _of_inspection), strict=True))
+_READERS = dict(zip(SAVED, (_of_record, _read_comparison, _read_inspection), strict=True))
 
 
 def source_of_inspection(job, results):
-    """What a job is inspected by: (source, rule or None, {settlement, edges}).
+    """Return the input of the inspection of a job: (source, rule or None, {settlement, edges}).
 
-    What this batch has computed of it is not computed again: the record of `results` serves, with
-    the tables of levelling and the rule that lie beside the job. But of clouds: their welds are in
-    no record.
+    An inspection uses the record computed by this batch in the folder `results`, with the levelling
+    tables and the rule beside the job. For clouds it uses the job, because a record contains no
+    welds.
     """
     record = results / RECORD
     if "run" not in job.asked.do:
@@ -82,7 +82,7 @@ def source_of_inspection(job, results):
 
 
 def language_of(source):
-    """The language that the job of a record, or a job, asks for; None where none can be read."""
+    """Return the language of a job, or of the job of a record; None if it cannot be read."""
     path = Path(source)
     if path.name in SAVED:
         try:

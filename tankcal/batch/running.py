@@ -1,7 +1,7 @@
-"""A batch as a whole: what is left to do is done, by workers of dask or in this process.
+"""A batch: compute all jobs without current results, by dask workers or in this process.
 
-Only a few jobs at a time are with the scheduler, and of each comes back one small row: however many
-jobs there are, neither the scheduler nor this process holds their results.
+Only a few jobs at a time are submitted to the scheduler, and each returns one small row. Neither
+the scheduler nor this process therefore holds the results of many jobs.
 """
 
 import contextlib
@@ -29,20 +29,26 @@ from tankcal.errors import Problem, problem_of, reason_of
 from tankcal.messages import message
 from tankcal.pipeline.cluster import Watch, count_cores, failures_told, is_installed, open_client
 
-TRIES = 3  # of a job whose worker dies while it is computed
-MOST_DEATHS = 12  # of workers that a job was given to, begun or not
-AHEAD = 2  # jobs of each worker that are with the scheduler
-LOOK_S = 1.0  # between looks at whether there are workers at all
+TRIES = 3  # attempts for a job whose worker dies during the computation
+MOST_DEATHS = 12  # dead workers with this job in their queue, computed or not
+AHEAD = 2  # submitted jobs per worker
+LOOK_S = 1.0  # seconds between checks for workers
 WORKER_BYTES = 2 << 30
 ALLOWED_FAILURES = "distributed.scheduler.allowed-failures"
 
 
 @dataclass(frozen=True)
 class Telling:
-    """Who is told how far a batch is.
+    """Callbacks for the progress of a batch.
 
-    step(text), part(text, done, total)     as of `tankcal.run`
-    ended(name, status, problems, count)    each job that is not done
+    Attributes
+    ----------
+    step : callable
+        step(text), as in `tankcal.run`.
+    part : callable
+        part(text, done, total), as in `tankcal.run`.
+    ended : callable
+        ended(name, status, problems, count), for each job that is not done.
     """
 
     step: object = lambda text: None
@@ -52,18 +58,18 @@ class Telling:
 
 @dataclass
 class Batch:
-    """What became of a batch.
+    """Result of a batch.
 
     Attributes
     ----------
     counts : Counter
-        Jobs by status.
+        Number of jobs by status.
     total, skipped : int
-        Jobs; those of them that were settled before.
+        Number of jobs, and of jobs with current results from an earlier batch.
     rows : list of dict
-        Of the summary.
+        Rows of the summary.
     files : list of Path
-        Of the summary.
+        Files of the summary.
     """
 
     counts: Counter = field(default_factory=Counter)
@@ -74,7 +80,7 @@ class Batch:
 
     @property
     def exit_status(self):
-        """0: all done; 2: some were refused or failed; 3: some have no sound solution."""
+        """Exit status 0: all done; 2: some refused or failed; 3: some without valid solution."""
         if self.counts["refused"] or self.counts["failed"]:
             return 2
         return 3 if self.counts["unsound"] else 0
@@ -82,22 +88,22 @@ class Batch:
 
 def run_batch(arguments, asked, out, *, workers="local", worker_bytes=WORKER_BYTES,
               language="en", telling=None):  # fmt: skip
-    """Do what is asked with each job that is not settled, and write the summary of all.
+    """Run the steps of each job without current result, and write the summary of all jobs.
 
     Parameters
     ----------
     arguments : sequence of str
-        As of `finding.find_jobs`.
+        See `finding.find_jobs`.
     asked : asked.Asked
     out : path
         Folder of the batch.
     workers : "local", int or str
-        A worker for each core, so many (0: none, this process does it), or the address of a
-        scheduler of dask.
+        One worker per core, a number of workers (0: this process), or the address of a dask
+        scheduler.
     worker_bytes : int
-        Of memory that a worker of this machine may take.
+        Memory limit of a worker on this machine.
     language : str
-        Of the summary.
+        Language of the summary.
     telling : Telling, optional
 
     Returns
@@ -107,10 +113,10 @@ def run_batch(arguments, asked, out, *, workers="local", worker_bytes=WORKER_BYT
     Raises
     ------
     InputError
-        For arguments that name no job, options that no job could be done with, a folder of somebody
-        else or of a batch that runs; a cluster that does not answer. What was done stays.
+        Arguments that name no job, invalid options, a folder with other files or in use by a
+        running batch, or a cluster that does not answer. Finished results are kept.
     OSError
-        Where the folder takes no more. What was done stays.
+        The folder cannot be written to. Finished results are kept.
     """
     telling, out = telling or Telling(), os.path.abspath(out)
     asking.refuse_unreadable(asked)
@@ -119,23 +125,25 @@ def run_batch(arguments, asked, out, *, workers="local", worker_bytes=WORKER_BYT
     asking.refuse_incomplete(asked, jobs)
     with opened_folder(out) as journal:
         batch = Batch(total=len(jobs))
-        waiting = list(_unsettled(jobs, journal, batch, telling))
+        waiting = list(_select_tasks(jobs, journal, batch, telling))
         if waiting:
-            _do(waiting, journal, batch, telling, _workers_for(workers, waiting), worker_bytes)
+            _run_tasks(
+                waiting, journal, batch, telling, _workers_for(workers, waiting), worker_bytes
+            )
         batch.rows, batch.files = write_summary(out, jobs, language)
         return batch
 
 
 def _workers_for(workers, waiting):
-    """Number of workers of this machine, 0: none; or an address."""
+    """Return the number of workers on this machine (0: none), or an address."""
     if workers == "local":
         return min(count_cores(), len(waiting)) if is_installed() and len(waiting) > 1 else 0
     return workers
 
 
-def _unsettled(jobs, journal, batch, telling):
-    """A `Task` of each job with something left to do; the others are counted as they were."""
-    looking = message("batch_comparing", "looking at what is done already")
+def _select_tasks(jobs, journal, batch, telling):
+    """Yield a `Task` for each job with steps to run; count the other jobs."""
+    looking = message("batch_comparing", "checking for finished jobs")
     for number, job in enumerate(jobs):
         telling.part(looking, number, len(jobs))
         task = Task(job, {}, str(journal.out), journal.run)
@@ -144,9 +152,9 @@ def _unsettled(jobs, journal, batch, telling):
         except OSError as error:
             text = message("batch_input_unreadable", "cannot be read ({reason})",
                            reason=reason_of(error))  # fmt: skip
-            found = fail_job(task, Problem(str(error.filename or job.source), text))
-            batch.counts[found[0]] += 1
-            telling.ended(job.name, *found)
+            failure = fail_job(task, Problem(str(error.filename or job.source), text))
+            batch.counts[failure[0]] += 1
+            telling.ended(job.name, *failure)
             continue
         known = load_outcome(journal.out, job.name)
         if known is not None and known.is_settled_for(task.keys):
@@ -160,13 +168,14 @@ def _unsettled(jobs, journal, batch, telling):
 
 
 def _tell_known(outcome, job, status, telling):
-    steps = [outcome.steps[one] for one in job.asked.do if one in outcome.steps]
-    problems = [one for step in steps for one in step.problems]
-    telling.ended(job.name, status, problems[:1], sum(one.problem_count for one in steps))
+    """Report a job that an earlier batch did not complete."""
+    steps = [outcome.steps[step] for step in job.asked.do if step in outcome.steps]
+    problems = [problem for step in steps for problem in step.problems]
+    telling.ended(job.name, status, problems[:1], sum(step.problem_count for step in steps))
 
 
-def _do(waiting, journal, batch, telling, workers, worker_bytes):
-    """All tasks, one after the other or by workers."""
+def _run_tasks(waiting, journal, batch, telling, workers, worker_bytes):
+    """Run all tasks, one after the other or by workers."""
     text = message("batch_doing", "jobs done")
 
     def ended(task, status, problems, count):
@@ -180,13 +189,13 @@ def _do(waiting, journal, batch, telling, workers, worker_bytes):
         for task in waiting:
             ended(task, *do_job(task))
         return
-    settings = {ALLOWED_FAILURES: 0}  # how many times it is tried is decided here
+    settings = {ALLOWED_FAILURES: 0}  # TRIES limits the attempts instead
     with open_client(workers, worker_bytes=worker_bytes, settings=settings) as client:
         _ByWorkers(client, journal, ended).do(waiting)
 
 
 class _ByWorkers:
-    """Tasks by workers: a few with the scheduler, the next one when one has ended."""
+    """Execution of tasks by workers: a few are submitted at a time."""
 
     def __init__(self, client, journal, ended):
         self._client, self._journal, self._tell_ended = client, journal, ended
@@ -194,7 +203,7 @@ class _ByWorkers:
         self._deaths = Counter()
 
     def do(self, waiting):
-        """All of them; raises what stops a batch as a whole."""
+        """Run all tasks; raise errors that stop the whole batch."""
         left = iter(waiting)
         try:
             self._fill(left)
@@ -202,12 +211,12 @@ class _ByWorkers:
                 try:
                     future = self._ended.get(timeout=LOOK_S)
                 except queue.Empty:
-                    self._fill(left)  # there may be more workers now, or none
+                    self._fill(left)  # the number of workers may have changed
                 else:
                     self._take(future)
                     self._submit_some(left, 1)
         finally:
-            with contextlib.suppress(Exception):  # of a scheduler that is gone
+            with contextlib.suppress(Exception):  # the scheduler may have ended
                 self._client.cancel(list(self._running))
 
     def _fill(self, left):
@@ -221,14 +230,14 @@ class _ByWorkers:
                 self._submit(task)
 
     def _submit(self, task):
-        key = f"tankcal_job-{uuid.uuid4().hex}"  # one group for the scheduler, whatever the job
+        key = f"tankcal_job-{uuid.uuid4().hex}"  # one task group for all jobs
         with failures_told():
             future = self._client.submit(do_job, task, key=key, pure=False)
         self._running[future] = task
         future.add_done_callback(self._ended.put)
 
     def _take(self, future):
-        """The row of a task that has ended; one whose worker died is given to another."""
+        """Report a finished task; submit it again if its worker died."""
         from distributed.scheduler import KilledWorker
 
         task = self._running.pop(future)
@@ -236,23 +245,23 @@ class _ByWorkers:
             error = future.exception()
             if error is not None and not isinstance(error, KilledWorker):
                 raise error
-            found = None if error else future.result()
+            result = None if error else future.result()
             future.release()
-        if found is not None:
-            self._tell_ended(task, *found)
+        if result is not None:
+            self._tell_ended(task, *result)
         elif self._is_tried_again(task):
             self._submit(task)
         else:
             text = message(
                 "batch_killer",
-                "its worker ended {count} times while it was computed: out of memory? "
-                "--worker-memory gives more",
+                "its worker ended {count} times during the computation (out of memory? Use a "
+                "larger --worker-memory)",
                 count=TRIES,
             )
             self._tell_ended(task, *fail_job(task, Problem(task.job.name, text)))
 
     def _is_tried_again(self, task):
-        """Whether a job may have been beside the one that ended a worker, or that by chance."""
+        """Return whether a job may have been on a dead worker without causing its death."""
         self._deaths[task.job.name] += 1
         return (
             self._journal.deaths(task.job.name) < TRIES
@@ -261,12 +270,14 @@ class _ByWorkers:
 
 
 def fail_job(task, problem):
-    """Note in a job's outcome why it could not be done; what is given as of `do_job`."""
+    """Save in the outcome of a job why it failed; return a result in the form of `do_job`."""
     plain = problem_of(problem)
     known = load_outcome(task.out, task.job.name) or Outcome(task.job.name, task.job.source)
     step = next(
-        one for one in task.job.asked.do if not known.is_settled(one, task.keys.get(one, ""))
+        unsettled
+        for unsettled in task.job.asked.do
+        if not known.is_settled(unsettled, task.keys.get(unsettled, ""))
     )
-    made = StepOutcome(task.keys.get(step, ""), "failed", problems=[plain], problem_count=1)
-    save_outcome(task.out, replace(known, steps={**known.steps, step: made}))
+    outcome = StepOutcome(task.keys.get(step, ""), "failed", problems=[plain], problem_count=1)
+    save_outcome(task.out, replace(known, steps={**known.steps, step: outcome}))
     return "failed", [plain], 1

@@ -1,7 +1,7 @@
-"""The summary of a batch: a row of each job, what changed since the last one; its files.
+"""Summary of a batch: one row per job with the changes since the last batch, and its files.
 
-No time of the clock is in it, nor who did what: the same jobs give the same bytes, whatever the
-number of workers and however often the batch was ended and went on.
+It contains no time and no worker: the same jobs give the same bytes for any number of workers and
+interruptions.
 """
 
 import json
@@ -19,11 +19,11 @@ VALUES = (
     *("rule_verdict", "comparison_verdict", "inspection_verdict"),
 )
 VERDICTS = ("global_test", "rule_verdict", "comparison_verdict", "inspection_verdict")
-PAPERS = (  # of each job the first of these is the one that the summary leads to
+PAPERS = (  # in order of priority: the summary links to the first
     *("certificate.pdf", "report.pdf", "comparison.pdf", "inspection.pdf", "capacity.xlsx"),
     *("capacity.csv", "record.json"),
 )
-MOST_TOLD = 1  # problem or warning of a job
+MOST_TOLD = 1  # problems and warnings of a job in the summary
 
 
 def write_summary(out, jobs, language):
@@ -49,7 +49,7 @@ def write_summary(out, jobs, language):
         rows.append(row)
     names = {row["name"] for row in rows}
     steps = dict.fromkeys(step for job in jobs for step in job.asked.do)
-    found = {
+    summary = {
         "format": "tankcal-batch/1",
         "tankcal": tankcal.__version__,
         "do": [*steps],
@@ -57,14 +57,14 @@ def write_summary(out, jobs, language):
         "gone": sorted(set(former or ()) - names),
     }
     with tempfile.TemporaryDirectory(prefix=".tankcal-", dir=out / JOBS) as folder:
-        files = summary_files(found, language, Path(folder))
+        files = summary_files(summary, language, Path(folder))
         for name in files:
             (Path(folder) / name).replace(out / name)
     return rows, [out / name for name in files]
 
 
 def _former_rows(path):
-    """{name: row} of the last summary; None where there is none that can be read."""
+    """Return {name: row} of the last summary; None if it is missing or invalid."""
     try:
         rows = json.loads(path.read_bytes())["rows"]
         return {row["name"]: row for row in rows} if all(map(is_row, rows)) else None
@@ -73,7 +73,7 @@ def _former_rows(path):
 
 
 def _row(out, job):
-    """What the summary says of one job: by its outcome alone."""
+    """Return the summary row of a job, from its outcome only."""
     outcome, steps = load_outcome(out, job.name), job.asked.do
     row = {"name": job.name, "source": job.source, "status": "failed", **dict.fromkeys(VALUES)}
     problems, warnings, papers, counts = [], [], [], [0, 0]
@@ -86,32 +86,32 @@ def _row(out, job):
         warnings += done.warnings[:MOST_TOLD]
         counts[0] += done.problem_count
         counts[1] += done.warning_count
-        papers += [f"{JOBS}/{job.name}/{FOLDERS[step]}/{one}" for one in done.files]
+        papers += [f"{JOBS}/{job.name}/{FOLDERS[step]}/{name}" for name in done.files]
     if outcome is not None:
         row["status"] = outcome.status(steps)
-    best = [one for name in PAPERS for one in papers if one.endswith(f"/{name}")]
+    best = [paper for name in PAPERS for paper in papers if paper.endswith(f"/{name}")]
     return row | {
         "problems": problems[:MOST_TOLD],
         "problem_count": counts[0],
         "warnings": warnings[:MOST_TOLD],
         "warning_count": counts[1],
-        "papers": [*best, *(one for one in papers if one not in best)][:1],
+        "papers": [*best, *(paper for paper in papers if paper not in best)][:1],
     }
 
 
 def changes_of(row, former):
-    """What is otherwise than in the row of the last batch.
+    """Return the differences from the row of the last batch.
 
     Parameters
     ----------
     row, former : dict
-        former None: the job was not there.
+        former None: the last batch did not contain the job.
 
     Returns
     -------
     list of dict
         {"code", ...}: "first"; "status" and verdicts with "old" and "new"; "height_m"; "volume_m3"
-        with "by_m3" and "U_m3", the larger of both U.
+        with "by_m3" and "U_m3", the larger of the two U.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def changes_of(row, former):
             changes.append({"code": key, "old": old, "new": new})
     if former.get("height_m") != row.get("height_m"):
         changes.append({"code": "height_m"})
-    volumes = [one.get("volume_m3") for one in (former, row)]
+    volumes = [summary_row.get("volume_m3") for summary_row in (former, row)]
     if None not in volumes and volumes[0] != volumes[1]:
         most = max(former.get("U_m3") or 0.0, row.get("U_m3") or 0.0)
         changes.append({"code": "volume_m3", "by_m3": volumes[1] - volumes[0], "U_m3": most})

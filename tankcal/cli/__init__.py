@@ -1,4 +1,4 @@
-"""The command line: arguments, progress, exit status. It computes nothing."""
+"""Command line: arguments, progress and exit status, without computation."""
 
 import argparse
 import os
@@ -33,43 +33,43 @@ from tankcal.errors import Problem, TankcalError, reason_of
 from tankcal.messages import message, printable_lines
 
 DESCRIPTION = """\
-tankcal calibrates storage tanks: from surveyed points of the wall to the capacity
-table, with its uncertainty, as Excel workbook, PDF certificate and notebook."""
+tankcal calibrates storage tanks: from a survey of the wall to the capacity table with
+its uncertainty, as Excel workbook, PDF certificate and notebook."""
 
 EPILOG = """\
 a new tank, step by step:
-  tankcal new my-tank           write an empty job: the folder my-tank with job.toml, points.csv,
+  tankcal new my-tank           create an empty job: the folder my-tank with job.toml, points.csv,
                                 courses.csv
-  tankcal new my-tank --workbook   or, for those who prefer Excel, with one workbook, job.xlsx
-  (fill in the blanks, in the CSV files or in the workbook)
-  tankcal run my-tank           compute it; the results are in my-tank/results
-  tankcal notebook my-tank      fill it in, check and compute it in a notebook (JupyterLab)
-  tankcal app my-tank           the same as a page without code
-  tankcal report my-tank/results --language es   the papers again, in Spanish
-  tankcal lint table.csv        look for mistakes in any capacity table
-  tankcal read-table old.csv --courses courses.csv   radii and head out of a former table
+  tankcal new my-tank --workbook   or with one Excel workbook, job.xlsx
+  (enter the measurements in the CSV files or in the workbook)
+  tankcal run my-tank           compute the job; the results are in my-tank/results
+  tankcal notebook my-tank      edit, check and compute the job in a notebook (JupyterLab)
+  tankcal app my-tank           the same in a web page without code
+  tankcal report my-tank/results --language es   write the reports again, in Spanish
+  tankcal lint table.csv        check any capacity table for errors
+  tankcal read-table old.csv --courses courses.csv   radii and head from a former table
   tankcal compare old.csv my-tank/results        has the tank changed since its former table?
   tankcal history archive --tank TK-1            its tables, radii and verdicts over the years
-  tankcal verify my-tank/results                 do the files of a run belong together?
-  tankcal export my-tank/results --profile NAME   the table as a gauging system takes it
-  tankcal inspect my-tank                      plumb, roundness and settlement by the same survey
-  tankcal batch site --out site-results        the same with many jobs, on all cores
+  tankcal verify my-tank/results                 do the files of a run agree?
+  tankcal export my-tank/results --profile NAME   the table for a gauging system
+  tankcal inspect my-tank                      plumb, roundness and settlement from the same survey
+  tankcal batch site --out site-results        compute many jobs, on all cores
 
 photographs, distances, angles and levels instead of surveyed points:
-  tankcal new my-tank --survey photos          (or total-station) write such a job
-  tankcal run my-tank --only adjustment        adjust the survey; no tank is needed
+  tankcal new my-tank --survey photos          (or total-station) create such a job
+  tankcal run my-tank --only adjustment        adjust the survey; no tank is required
   tankcal import book.gsi --out my-tank        read the field book of a total station
-  tankcal plan my-plan                         what a survey will be worth, before it is made
+  tankcal plan my-plan                         predict the uncertainty of a survey
 
-exit status: 0 done; 2 the input must be mended (one line per problem: file, row, column, what was
-expected; earlier results stay as they were); 3 the survey has no sound solution; 130 stopped by
-Ctrl-C, 143 by SIGTERM, 129 by closing the terminal.
+exit status: 0 done; 2 the input must be corrected (one line per problem: file, row, column,
+expected value; earlier results remain unchanged); 3 the survey has no valid solution; 130 stopped
+by Ctrl-C, 143 by SIGTERM, 129 by closing the terminal.
 
 the job format: docs/job-format.md; axes, signs and units: docs/conventions.md"""
 
 
 def main(arguments=None):
-    """Run the command line; returns the exit status."""
+    """Run the command line and return the exit status."""
     _print_in_any_encoding()
     speak()
     with argparse_in(words_of_run()):
@@ -87,7 +87,7 @@ def main(arguments=None):
         for text in error.texts:
             complain(text)
         return error.exit_status
-    except BrokenPipeError:  # the reader of our output went away: nothing to say to nobody
+    except BrokenPipeError:  # the reader of the output ended, such as `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except BaseException as error:
@@ -95,20 +95,22 @@ def main(arguments=None):
 
 
 def _status_of(error):
-    """Exit status of a command that a signal, the memory or the disk ended; prints one line.
+    """Return the exit status after a signal or a lack of memory or disk space; print one line.
 
-    Raises any other error again.
+    Any other error is raised again.
     """
     status = stopped_status(error)
     if status is not None:
-        complain(message("stopped", "stopped; results are as they were, or whole new ones"))
+        complain(
+            message("stopped", "stopped; earlier results are unchanged, or completely replaced")
+        )
         return status
     if is_of_memory(error):
         complain(
             message(
                 "out_of_memory",
-                "not enough memory; earlier results are as they were. Close other programs, raise "
-                "the limit of memory, or compute on a larger machine",
+                "not enough memory; earlier results are unchanged. Close other programs, raise "
+                "the memory limit, or compute on a machine with more memory",
             )
         )
         return 2
@@ -119,17 +121,17 @@ def _status_of(error):
 
 
 def _print_in_any_encoding():
-    """Spell out the letters that the terminal or file lacks: cp1252 on Windows, ASCII."""
+    """Escape characters that the terminal or file cannot encode: cp1252 on Windows, ASCII."""
     for stream in (sys.stdout, sys.stderr):
         if getattr(stream, "errors", None) == "strict":
             stream.reconfigure(errors="backslashreplace")
 
 
 def _options(arguments):
-    """Parsed arguments; names that come after options are names, too."""
+    """Return the parsed arguments; names after options are also names."""
     parser = _parser()
     options, rest = parser.parse_known_args(arguments)
-    if rest and (not hasattr(options, "names") or any(one.startswith("-") for one in rest)):
+    if rest and (not hasattr(options, "names") or any(word.startswith("-") for word in rest)):
         parser.error(argparse._("unrecognized arguments: %s") % " ".join(rest))
     if rest:
         options.names = [*options.names, *rest]
@@ -143,7 +145,7 @@ class _Parser(argparse.ArgumentParser):
         super()._print_message(printable_lines(message), file)
 
     def _check_value(self, action, value):
-        """Refuse a word that is no choice; a misspelt choice is named in place of the list."""
+        """Refuse an invalid choice; suggest a similar choice in place of the list."""
         spelt = None
         if action.choices and value not in action.choices:
             from tankcal.job.tables import meant, shown  # half a second
@@ -157,7 +159,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Version(argparse.Action):
-    """Prints the version, which is looked for only then."""
+    """Print the version, which is determined only on request."""
 
     def __call__(self, parser, *_):
         print(f"tankcal {tankcal.__version__}")
@@ -165,14 +167,14 @@ class _Version(argparse.Action):
 
 
 def _parser():
-    """The whole parser, in the language that is spoken."""
+    """Return the complete parser in the current language."""
     parser, translate = _parser_in_english()
     translate(parser)
     return parser
 
 
 def _parser_in_english():
-    """(the whole parser, what puts it into the language that is spoken)."""
+    """Return (the complete parser, a function that translates it to the current language)."""
     parser = _Parser(
         prog="tankcal",
         description=DESCRIPTION,
@@ -194,6 +196,6 @@ def _parser_in_english():
 
 
 def _translate(parser):
-    """Put a parser into the language that is spoken."""
+    """Translate a parser to the current language."""
     if words_of_run():
         put_in_words(parser, words_of_run())

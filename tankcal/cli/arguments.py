@@ -1,4 +1,4 @@
-"""Numbers and languages on the command line."""
+"""Types of command-line arguments: numbers and languages."""
 
 import argparse
 
@@ -12,17 +12,18 @@ LEAST_WORKER_GB = 0.5
 
 
 def add_language(parser):
-    """--language, of what a command without a job prints."""
+    """Add the option --language of a command without a job."""
     parser.add_argument(
         "--language",
         metavar="CODE",
         choices=LANGUAGES,
-        help=f"of what is printed and written: {', '.join(LANGUAGES)} (default: that of the input "
-        "where it asks for one, else that of the environment)",
+        help=f"language of all output: {', '.join(LANGUAGES)} (default: language of the input, "
+        "else of the environment)",
     )
 
 
 def positive(text):
+    """Return a positive number."""
     value = _number(text)
     if not 0 < value < float("inf"):
         raise refuse_argument(
@@ -32,6 +33,7 @@ def positive(text):
 
 
 def yield_mpa(text):
+    """Return a yield strength in megapascals, at most MOST_YIELD_MPA."""
     from tankcal.job.plausibility import MOST_YIELD_MPA
 
     value = positive(text)
@@ -48,6 +50,7 @@ def yield_mpa(text):
 
 
 def share(text):
+    """Return a number between 0 and 1."""
     value = _number(text)
     if not 0 < value < 1:
         raise refuse_argument(
@@ -57,6 +60,7 @@ def share(text):
 
 
 def parse_list(text):
+    """Return a whole number from 2 to 1000000."""
     value = _number(text)
     if not (2 <= value <= 1e6 and value == int(value)):
         raise refuse_argument(
@@ -70,6 +74,7 @@ def parse_list(text):
 
 
 def parse_count(text):
+    """Return a whole number."""
     if not WHOLE_NUMBER.fullmatch(text):
         raise refuse_argument(
             message("option_whole", "found {text!r}; expected a whole number", text=text)
@@ -78,7 +83,7 @@ def parse_count(text):
 
 
 def parse_workers(text):
-    """Number of workers on this machine."""
+    """Return a number of workers on this machine."""
     workers = parse_count(text)
     if workers > MOST_WORKERS:
         raise refuse_argument(
@@ -93,13 +98,13 @@ def parse_workers(text):
 
 
 def parse_worker_memory(text):
-    """Gigabytes of memory of a worker."""
+    """Return the memory of a worker in gigabytes."""
     value = positive(text)
     if value < LEAST_WORKER_GB:
         raise refuse_argument(
             message(
                 "option_worker_memory",
-                "found {text!r}; expected at least {least} gigabytes; jobs with papers need 1",
+                "found {text!r}; expected at least {least} gigabytes; jobs with reports need 1",
                 text=text,
                 least=LEAST_WORKER_GB,
             )
@@ -108,7 +113,7 @@ def parse_worker_memory(text):
 
 
 def parse_cluster(text):
-    """Who reads clouds: "auto", "local", a number of workers, or the address of a scheduler."""
+    """Return the workers for clouds: "auto", "local", a number, or the address of a scheduler."""
     if WHOLE_NUMBER.fullmatch(text):
         return parse_workers(text)
     if text not in ("auto", "local") and ":" not in text:
@@ -124,8 +129,8 @@ def parse_cluster(text):
 
 
 def parse_dips(text):
-    """Dips in metres with commas between, not below 0."""
-    values = [_number(one) for one in text.split(",")]
+    """Return dips in metres, separated by commas, not negative."""
+    values = [_number(part) for part in text.split(",")]
     if not all(0 <= value < float("inf") for value in values):
         raise refuse_argument(
             message(
@@ -138,10 +143,10 @@ def parse_dips(text):
 
 
 def refuse_argument(text):
-    """The error of an argument, in the language that is spoken."""
+    """Return the error of an argument in the current language."""
     return argparse.ArgumentTypeError(say_in_language(text))
 
 
 def _number(text):
-    """Its value; nan for what a table refuses, too, such as 1_000 or full-width digits."""
+    """Return a number; nan for forms that tables refuse, such as 1_000 or full-width digits."""
     return float(text) if NUMBER.fullmatch(text) else float("nan")

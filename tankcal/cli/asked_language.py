@@ -1,4 +1,4 @@
-"""The language that a job asks for, found before all else, so that its problems are told in it."""
+"""Language of a job, determined before loading so that problems are reported in it."""
 
 from pathlib import Path
 
@@ -16,36 +16,36 @@ from tankcal.text.words import load_words
 
 
 def asked_language(path):
-    """The language of a job as `load` takes it, or None where none can be read.
+    """Return the language of a job for `load`, or None if it cannot be read.
 
-    Nothing is told: what is wrong with the job, `load` says.
+    No problem is reported here; `load` reports the problems of the job.
     """
     path, log = Path(path), Log()
     try:
         if (path / WORKBOOK_FILE).is_file() and not (path / SETTINGS_FILE).is_file():
             path /= WORKBOOK_FILE
         if path.suffix.lower() == ".xlsx":
-            given = _in_workbook(path, log)
+            code = _read_workbook(path, log)
         else:
-            given = _in_settings(path / SETTINGS_FILE if path.is_dir() else path, log)
+            code = _read_settings(path / SETTINGS_FILE if path.is_dir() else path, log)
     except (OSError, ValueError):
         return None
-    return nearest_language(given)
+    return nearest_language(code)
 
 
 def asked_of_plan(path):
-    """The same of a plan as `load_plan` takes it."""
+    """Return the language of a plan for `load_plan`, or None."""
     from tankcal.planning.given import PLAN_FILE
 
     path = Path(path)
     try:
-        return nearest_language(_in_settings(path / PLAN_FILE if path.is_dir() else path, Log()))
+        return nearest_language(_read_settings(path / PLAN_FILE if path.is_dir() else path, Log()))
     except (OSError, ValueError):
         return None
 
 
 def asked_of_record(path):
-    """The language of the job that a record, or the one in a folder of results, was made of."""
+    """Return the language of the job of a record, or of the record in a folder of results."""
     from tankcal.inspection.basis import RECORD
 
     path = Path(path)
@@ -56,14 +56,16 @@ def asked_of_record(path):
         return None
 
 
-def _in_settings(path, log):
+def _read_settings(path, log):
+    """Return the language in job.toml or plan.toml."""
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     parsed = None if data is None else parsed_toml(path.name, data, log)
     section = {} if parsed is None else parsed[0].get("table")
     return section.get("language") if isinstance(section, dict) else None
 
 
-def _in_workbook(path, log):
+def _read_workbook(path, log):
+    """Return the language in a job workbook."""
     from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
     from tankcal.job.grids import table_rows
     from tankcal.job.sheets import KEY, SECTION, VALUE
@@ -78,17 +80,17 @@ def _in_workbook(path, log):
     for sheet in sheets:
         rows, _ = table_rows(sheet.title, sheet.grid, log)
         headings = rows[0][1] if rows else []
-        if {SECTION, KEY, VALUE} <= {one for one in headings if isinstance(one, str)}:
-            place = [headings.index(one) for one in (SECTION, KEY, VALUE)]
+        if {SECTION, KEY, VALUE} <= {heading for heading in headings if isinstance(heading, str)}:
+            place = [headings.index(heading) for heading in (SECTION, KEY, VALUE)]
             for _, cells in rows[1:]:
                 section, key, value = (cells[position] for position in place)
                 if (section, key) == ("table", "language"):
-                    return value if nearest_language(value) else _of_form(cells)
+                    return value if nearest_language(value) else _language_of_form(cells)
     return None
 
 
-def _of_form(cells):
-    """The language that a form explains the key in."""
+def _language_of_form(cells):
+    """Return the language of the explanations of a form."""
     for language in LANGUAGES:
         notes = load_words(language)["input"].get("notes", {})
         if language != DEFAULT and notes["keys"]["table.language"] in cells:

@@ -1,4 +1,4 @@
-"""`tankcal batch`: many jobs, by workers of dask or one after the other."""
+"""`tankcal batch`: computation of many jobs, by dask workers or one after the other."""
 
 import shlex
 import sys
@@ -24,34 +24,36 @@ GIGABYTE = 1 << 30
 
 
 def add(commands):
-    """The parser of `tankcal batch`."""
+    """Add the parser of `tankcal batch`."""
     batch = commands.add_parser(
         "batch",
         help="compute many jobs, on all cores or a cluster",
-        description="Do with each of many jobs what is asked (run, report, compare, inspect, "
-        "export), each in a folder of its own under DIR/jobs, and write a summary of all: "
-        "summary.html, summary.xlsx, summary.csv and summary.json. The same command again does "
-        "only what is new or changed, and goes on where it was ended. docs/batch.md says how.",
-        epilog="exit status: 0 all done; 2 some jobs were refused or failed (one line each), or "
-        "nothing could be begun; 3 all others are done, but some have no sound solution; 130 "
-        "stopped by Ctrl-C: the same command goes on.",
+        description="Carry out the chosen steps (run, report, compare, inspect, export) for each "
+        "of many jobs. The results of each job are in its folder under DIR/jobs; summary.html, "
+        "summary.xlsx, summary.csv and summary.json summarise all jobs. The same command again "
+        "computes new and changed jobs only, and continues a batch that was interrupted. See "
+        "docs/batch.md.",
+        epilog="exit status: 0 all jobs done; 2 some jobs were refused or failed (one line each), "
+        "or the batch could not start; 3 all other jobs are done, but some surveys have no "
+        "valid solution; 130 stopped by Ctrl-C: the same command continues the batch.",
     )
     batch.add_argument(
         "names",
         metavar="JOBS",
         nargs="+",
-        help="job folders, workbooks, folders of these, patterns such as 'site/*', or a list: "
-        "@jobs.txt (one a line) or jobs.csv (columns job, name, former, compare_by, inspect_by, "
-        "profile, language); without run: folders of results, too",
+        help="job folders, workbooks, folders that contain these, patterns such as 'site/*', or a "
+        "list: @jobs.txt (one job per line) or jobs.csv (columns job, name, former, "
+        "compare_by, inspect_by, profile, language); without the step run also folders of "
+        "results",
     )
     batch.add_argument(
-        "--out", metavar="DIR", required=True, help="the folder of the batch, made when missing"
+        "--out", metavar="DIR", required=True, help="the folder of the batch; created if missing"
     )
     batch.add_argument(
         "--do",
         metavar="STEPS",
         default="run",
-        help="run, report, compare, inspect, export, or some of these with commas between "
+        help="one or more of run, report, compare, inspect and export, separated by commas "
         "(default: run)",
     )
     who = batch.add_mutually_exclusive_group()
@@ -59,32 +61,43 @@ def add(commands):
         "--workers",
         metavar="N",
         type=parse_workers,
-        help="workers on this machine (default: one for each core; 0: none, one job after the "
-        "other)",
+        help="number of workers on this machine (default: one per core; 0: no workers, one job "
+        "after the other)",
     )
     who.add_argument(
-        "--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://192.168.1.20:8786"
+        "--cluster",
+        metavar="ADDRESS",
+        help="address of a dask scheduler, such as tcp://192.168.1.20:8786",
     )
     batch.add_argument(
         "--worker-memory",
         metavar="GB",
         type=parse_worker_memory,
         default=2.0,
-        help="memory that a worker on this machine may take, in gigabytes (default: 2); one that "
-        "takes more is ended, and its job tried again",
+        help="memory limit of each worker on this machine, in gigabytes (default: 2); a worker "
+        "that exceeds it is ended, and its job is tried again",
     )
-    batch.add_argument("--former", metavar="PATH", help="of compare: a former table, or a folder "
-                       "of them called by the names of the jobs")  # fmt: skip
-    batch.add_argument("--compare-by", metavar="RULE", help="of compare: a rule by its name, or a "
-                       ".toml file")  # fmt: skip
-    batch.add_argument("--inspect-by", metavar="RULE", help="of inspect: a rule by its name, or a "
-                       ".toml file")  # fmt: skip
-    batch.add_argument("--profile", metavar="NAME", help="of export: one of tankcal export --list, "
-                       "or a .toml file")  # fmt: skip
+    batch.add_argument(
+        "--former",
+        metavar="PATH",
+        help="for compare: a former table, or a folder with one former table per job, named after "
+        "the jobs",
+    )
+    batch.add_argument(
+        "--compare-by", metavar="RULE", help="for compare: the name of a rule, or a .toml file"
+    )
+    batch.add_argument(
+        "--inspect-by", metavar="RULE", help="for inspect: the name of a rule, or a .toml file"
+    )
+    batch.add_argument(
+        "--profile",
+        metavar="NAME",
+        help="for export: a profile that tankcal export --list shows, or a .toml file",
+    )
     of_papers = batch.add_mutually_exclusive_group()
     add_letterhead(of_papers)
     of_papers.add_argument(
-        "--no-papers", action="store_true", help="of run: write record and CSV files only"
+        "--no-papers", action="store_true", help="for run: write the record and the CSV files only"
     )
     add_language(batch)
     batch.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -106,23 +119,28 @@ def _batch(options):
             for name in ("language", "letterhead", "former", "compare_by", "inspect_by", "profile")
         },
     )
-    told = _Told(options.quiet or options.machine, options.machine)
+    progress = _BatchProgress(options.quiet or options.machine, options.machine)
     workers = options.cluster or (options.workers if options.workers is not None else "local")
     try:
         batch = run_batch(
             options.names, asked.absolute(), options.out, workers=workers,
             worker_bytes=int(options.worker_memory * GIGABYTE), language=language_of_run(),
-            telling=told,
+            telling=progress,
         )  # fmt: skip
     except KeyboardInterrupt as stop:
-        told.show.end()
-        complain(message("batch_stopped", "stopped; what was done is kept, and this goes on: "
-                         "{command}", command=_command()))  # fmt: skip
+        progress.show.end()
+        complain(
+            message(
+                "batch_stopped",
+                "stopped; finished jobs are kept; continue with: {command}",
+                command=_command(),
+            )
+        )
         return stopped_status(stop)
     except TankcalError:
-        told.show.end()
+        progress.show.end()
         raise
-    told.show.end()
+    progress.show.end()
     if options.machine:
         print_json(
             exit_status=batch.exit_status, out=options.out, jobs=batch.total,
@@ -134,8 +152,8 @@ def _batch(options):
     return batch.exit_status
 
 
-class _Told:
-    """Progress, and one line for each job that is not done."""
+class _BatchProgress:
+    """Progress of a batch, with one line for each job that is not done."""
 
     def __init__(self, quiet, machine):
         self.show, self._machine = Progress(quiet), machine
@@ -153,12 +171,13 @@ class _Told:
 
 
 def _tell(batch, out):
+    """Print the result of a batch."""
     counts = batch.counts
     say(
         message(
             "batch_done",
-            "{total} jobs: {done} done, {unsound} without sound solution, {refused} refused, "
-            "{failed} failed; {skipped} were settled before",
+            "{total} jobs: {done} done, {unsound} without a valid solution, {refused} refused, "
+            "{failed} failed; {skipped} unchanged since the last batch",
             total=batch.total,
             skipped=batch.skipped,
             **{status: counts[status] for status in ("done", "unsound", "refused", "failed")},
@@ -168,5 +187,5 @@ def _tell(batch, out):
 
 
 def _command():
-    """What was typed, to be typed again."""
+    """Return the command line for repetition."""
     return " ".join(["tankcal", *map(shlex.quote, sys.argv[1:])])

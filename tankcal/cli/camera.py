@@ -1,4 +1,4 @@
-"""`tankcal camera`: which parameters belong, comparison and influence of calibrations, and more."""
+"""`tankcal camera`: parameters, calibrations, targets and file formats of cameras."""
 
 from tankcal.cli import camera_runs as runs
 from tankcal.cli.arguments import add_language, parse_count, positive, refuse_argument, share
@@ -6,12 +6,12 @@ from tankcal.messages import message
 
 
 def add(commands):
-    """The parsers of `tankcal camera …`."""
+    """Add the parsers of `tankcal camera …`."""
     camera = commands.add_parser(
         "camera",
         help="cameras: their parameters, calibrations, targets and file formats",
-        description="Examine, compare and convert cameras and their calibrations, and read targets "
-        "from photographs. docs/camera.md says what is computed and how to read it.",
+        description="Examine, compare and convert cameras and their calibrations, and measure "
+        "targets in photographs. docs/camera.md describes the methods and the results.",
     )
     camera.set_defaults(command=None, shown=camera)
     kinds = camera.add_subparsers(metavar="WHAT")
@@ -20,216 +20,249 @@ def add(commands):
 
 
 def _parameters(kinds):
-    one = kinds.add_parser(
+    parser = kinds.add_parser(
         "parameters",
-        help="which additional parameters belong in the model",
-        description="Standard deviations, correlations, F tests, principal components, effect at "
-        "the edge of the frame, and what dropping a parameter does to points and volume. A "
-        "record.json serves for all but the last.",
+        help="which additional parameters are significant",
+        description="Report standard deviations, correlations, F tests, principal components and "
+        "the effect at the edge of the frame of the additional parameters. For a job, also report "
+        "the changes of points and volume without each parameter.",
     )
-    one.add_argument("source", metavar="JOB", help="a job, or the record.json of one")
-    one.add_argument("--camera", metavar="NAME", help="this camera only (default: all)")
-    one.add_argument("--photo", metavar="NAME", help="the parameters of this photo only")
-    one.add_argument("--alpha", type=share, default=0.05, help="level of the tests (default 0.05)")
-    one.add_argument(
+    parser.add_argument("source", metavar="JOB", help="a job, or a record.json")
+    parser.add_argument("--camera", metavar="NAME", help="this camera only (default: all)")
+    parser.add_argument("--photo", metavar="NAME", help="the parameters of this photo only")
+    parser.add_argument(
+        "--alpha", type=share, default=0.05, help="level of the tests (default 0.05)"
+    )
+    parser.add_argument(
         "--matrix",
         choices=("correlation", "covariance"),
         default="correlation",
-        help="that the principal components are taken of (default: correlation)",
+        help="matrix of the principal components (default: correlation)",
     )
-    one.add_argument(
+    parser.add_argument(
         "--limit-px",
         metavar="PX",
         type=positive,
-        help="image accuracy that effects are compared with (default: that of the residuals)",
+        help="image accuracy for the assessment of effects (default: from the residuals)",
     )
-    one.add_argument("--limit-um", metavar="UM", type=positive, help="the same in micrometres")
-    one.add_argument(
+    parser.add_argument(
+        "--limit-um", metavar="UM", type=positive, help="image accuracy in micrometres"
+    )
+    parser.add_argument(
         "--no-trials",
         action="store_true",
-        help="do not adjust the survey again without each parameter",
+        help="do not repeat the adjustment without each parameter",
     )
-    _add_outputs(one)
-    one.set_defaults(command=runs.parameters)
+    _add_outputs(parser)
+    parser.set_defaults(command=runs.parameters)
 
 
 def _compare(kinds):
-    one = kinds.add_parser(
+    parser = kinds.add_parser(
         "compare",
-        help="are two calibrations of a camera the same?",
-        description="All pairs of the calibrations in a cameras.toml: figure in pixels, verdict by "
-        "a threshold, and where in the frame they differ.",
+        help="test whether calibrations of a camera agree",
+        description="Compare all pairs of calibrations in a cameras.toml: difference in pixels, "
+        "verdict by a threshold, and distribution of the differences over the frame.",
     )
-    one.add_argument("cameras", metavar="CAMERAS.toml")
-    one.add_argument(
+    parser.add_argument("cameras", metavar="CAMERAS.toml")
+    parser.add_argument(
         "names",
         metavar="NAME",
         nargs="*",
-        help="only these, in this order (default: all, in the order of the file)",
+        help="calibrations to compare, in this order (default: all, in the order of the file)",
     )
-    one.add_argument(
+    parser.add_argument(
         "--method",
         choices=("mis", "zrot", "rot", "spr"),
         default="zrot",
         help="mis: same principal distance and orientation; zrot: scaled to the same principal "
         "distance (default); rot: rotated onto each other; spr: resection on points of a terrain",
     )
-    one.add_argument("--grid", metavar="COLUMNSxROWS,START,START,STEP", help="of image points, px")
-    one.add_argument(
-        "--terrain", metavar="I|II|LOW,RANGE", help="of spr: heights in m (default: I)"
+    parser.add_argument(
+        "--grid", metavar="COLUMNSxROWS,START,START,STEP", help="grid of image points, px"
     )
-    one.add_argument(
-        "--pixel-um", type=positive, help="of film: pixels that the figures are counted in"
+    parser.add_argument(
+        "--terrain", metavar="I|II|LOW,RANGE", help="for spr: heights in m (default: I)"
     )
-    one.add_argument("--seed", type=parse_count, default=1, help="of the terrain (default 1)")
-    one.add_argument(
-        "--threshold", metavar="PX", type=positive, default=0.5, help="default 0.5; 0.33 is usual"
+    parser.add_argument(
+        "--pixel-um", type=positive, help="for film: pixel size for differences in pixels"
     )
-    one.add_argument(
-        "--as-published", action="store_true", help="with the conventions of Pessoa 2017, named"
+    parser.add_argument(
+        "--seed", type=parse_count, default=1, help="seed of the terrain (default 1)"
     )
-    _add_outputs(one)
-    one.set_defaults(command=runs.compare)
+    parser.add_argument(
+        "--threshold",
+        metavar="PX",
+        type=positive,
+        default=0.5,
+        help="largest difference between calibrations that agree (default 0.5; 0.33 is usual)",
+    )
+    parser.add_argument(
+        "--as-published",
+        action="store_true",
+        help="use the conventions of Pessoa 2017, and name them",
+    )
+    _add_outputs(parser)
+    parser.set_defaults(command=runs.compare)
 
 
 def _influence(kinds):
-    one = kinds.add_parser(
+    parser = kinds.add_parser(
         "influence",
-        help="what does a wrong calibration do?",
-        description="The same survey adjusted with each of several calibrations, fixed, "
-        "weighted and free: orientation, residuals, points, check points and volume, all pairs.",
+        help="determine the effect of a wrong calibration",
+        description="Adjust one survey with each of several calibrations, fixed, weighted and "
+        "free. Compare orientation, residuals, points, check points and volume of all pairs.",
     )
-    one.add_argument("job", metavar="JOB", help="a job folder, its job.toml, or a job workbook")
-    one.add_argument("--cameras", metavar="CAMERAS.toml", required=True)
-    one.add_argument("--camera", metavar="NAME", help="of the job, where it has several")
-    one.add_argument(
+    parser.add_argument("job", metavar="JOB", help="a job folder, its job.toml, or a job workbook")
+    parser.add_argument("--cameras", metavar="CAMERAS.toml", required=True)
+    parser.add_argument(
+        "--camera", metavar="NAME", help="camera of the job, if the job has several"
+    )
+    parser.add_argument(
         "--states",
         type=_states,
         default=("fixed", "weighted", "free"),
-        help="some of fixed,weighted,free (default: all)",
+        help="one or more of fixed,weighted,free (default: all)",
     )
-    _add_outputs(one)
-    one.set_defaults(command=runs.influence)
+    _add_outputs(parser)
+    parser.set_defaults(command=runs.influence)
 
 
 def _check(kinds):
-    one = kinds.add_parser(
+    parser = kinds.add_parser(
         "check",
-        help="is the product good enough?",
-        description="Differences at check points: bias, precision, RMSE before and after removing "
-        "a significant bias, class by a table of limits.",
+        help="test a product at check points",
+        description="Evaluate differences at check points: bias, precision, RMSE before and after "
+        "removal of a significant bias, and class by a table of limits.",
     )
-    one.add_argument(
+    parser.add_argument(
         "source",
         metavar="FILE",
         help="a record.json, a job, or a CSV with point, dx_m, dy_m, dz_m",
     )
-    one.add_argument(
-        "--separator", choices=(",", ";"), default=",", help="of the CSV (default: the comma)"
+    parser.add_argument(
+        "--separator",
+        choices=(",", ";"),
+        default=",",
+        help="separator of the CSV file (default: the comma)",
     )
-    one.add_argument(
-        "--decimal", choices=(".", ","), default=".", help="mark of the CSV (default: the point)"
+    parser.add_argument(
+        "--decimal",
+        choices=(".", ","),
+        default=".",
+        help="decimal mark of the CSV file (default: the point)",
     )
-    one.add_argument("--limits", metavar="FILE.toml", help="another table of limits")
-    one.add_argument(
-        "--scale", metavar="N", type=positive, help="only this scale, 1:N (default: all)"
+    parser.add_argument("--limits", metavar="FILE.toml", help="another table of limits")
+    parser.add_argument(
+        "--scale", metavar="N", type=positive, help="this scale only, 1:N (default: all)"
     )
-    one.add_argument("--alpha", type=share, default=0.05, help="level of the tests (default 0.05)")
-    _add_outputs(one)
-    one.set_defaults(command=runs.check)
+    parser.add_argument(
+        "--alpha", type=share, default=0.05, help="level of the tests (default 0.05)"
+    )
+    _add_outputs(parser)
+    parser.set_defaults(command=runs.check)
 
 
 def _convert(kinds):
-    one = kinds.add_parser(
+    parser = kinds.add_parser(
         "convert",
-        help="cameras of other programs, both ways",
-        description="Cameras of OpenCV, COLMAP, Metashape, Pix4D, AICON, a cameras.toml or a "
-        "record.json into each other; where the forms differ the error over the frame is printed.",
+        help="convert cameras from and to other programs",
+        description="Convert cameras between OpenCV, COLMAP, Metashape, Pix4D, AICON and "
+        "cameras.toml; a record.json can also be read. If the camera models differ, the largest "
+        "difference within the frame is printed.",
     )
-    one.add_argument("file", metavar="FILE")
-    one.add_argument(
+    parser.add_argument("file", metavar="FILE")
+    parser.add_argument(
         "--to",
         required=True,
         metavar="FORM",
         help="cameras.toml, opencv, opencv-json, colmap, metashape, pix4d or aicon",
     )
-    one.add_argument(
-        "--from", dest="kind", metavar="FORM", help="one of the same, where the file does not tell"
+    parser.add_argument(
+        "--from",
+        dest="kind",
+        metavar="FORM",
+        help="form of the file, if its content does not show it",
     )
-    one.add_argument(
+    parser.add_argument(
         "--pixel-um",
         type=positive,
-        help="height of a pixel, where the file has none and the form that is read or written"
-        " counts in pixels",
+        help="height of a pixel, if the file does not contain it and a form in pixels is read or "
+        "written",
     )
-    one.add_argument(
+    parser.add_argument(
         "--size-px",
         type=parse_count,
         nargs=2,
         metavar=("COLUMNS", "LINES"),
-        help="where the file has none",
+        help="image size, if the file does not contain it",
     )
-    one.add_argument(
+    parser.add_argument(
         "--radius-mm", type=positive, default=0.0, help="R0 of the balanced form aicon (default 0)"
     )
-    one.add_argument("--name", help="only this camera of the file")
-    one.add_argument(
+    parser.add_argument("--name", help="this camera of the file only")
+    parser.add_argument(
         "--as",
         dest="form",
         choices=("silva", "pessoa", "dbat", "plain"),
-        help="first into the convention and affinity of a publication",
+        help="convert first to the convention and affinity of a publication",
     )
-    one.add_argument("--out", metavar="FILE", help="where to write (default: the terminal)")
-    add_language(one)
-    one.set_defaults(command=runs.convert)
+    parser.add_argument("--out", metavar="FILE", help="output file (default: the terminal)")
+    add_language(parser)
+    parser.set_defaults(command=runs.convert)
 
 
 def _read(kinds):
-    one = kinds.add_parser(
+    parser = kinds.add_parser(
         "read",
-        help="coded targets and white circles from photographs into image_points.csv",
-        description="Reads ArUco and AprilTag targets, or white circular ones, and writes "
-        "image_points.csv beside a list of what was refused. Needs the extra tankcal[images].",
+        help="measure coded targets and white circles in photographs",
+        description="Measure ArUco and AprilTag targets, or white circular targets, and write "
+        "image_points.csv and a list of rejected candidates. Requires the extra "
+        "tankcal[images].",
     )
-    one.add_argument("photos", metavar="PHOTO", nargs="+")
-    one.add_argument("--out", metavar="FILE", default="image_points.csv")
-    one.add_argument("--names", metavar="FILE", help="CSV of id and point; other ids are refused")
-    one.add_argument(
+    parser.add_argument("photos", metavar="PHOTO", nargs="+")
+    parser.add_argument("--out", metavar="FILE", default="image_points.csv")
+    parser.add_argument(
+        "--names", metavar="FILE", help="CSV file with id and point; other ids are rejected"
+    )
+    parser.add_argument(
         "--places",
         metavar="FILE",
-        help="of circles: CSV of photo, point, column_px, line_px, about where each is",
+        help="for circles: CSV file with photo, point, column_px, line_px: approximate places",
     )
-    one.add_argument(
-        "--dictionary", default="DICT_5X5_100", help="of the codes (default: DICT_5X5_100)"
+    parser.add_argument(
+        "--dictionary",
+        default="DICT_5X5_100",
+        help="dictionary of the codes (default: DICT_5X5_100)",
     )
-    one.add_argument(
+    parser.add_argument(
         "--what",
         choices=("corners", "centres", "circles"),
         default="corners",
         help="corners NAME-1 to NAME-4 of coded targets (default), their centres, or circles",
     )
     for name, value, text in (
-        ("reach-px", 15.0, "of circles: how far from its place (default 15)"),
-        ("smallest-px", None, "least side or diameter (default: 2.5 a cell; 6)"),
-        ("largest-px", None, "of circles: largest diameter (default: a tenth of the photo)"),
+        ("reach-px", 15.0, "for circles: largest distance from the approximate place (default 15)"),
+        ("smallest-px", None, "smallest side or diameter (default: 2.5 px per cell; 6 px)"),
+        ("largest-px", None, "for circles: largest diameter (default: a tenth of the photo)"),
     ):
-        one.add_argument(f"--{name}", metavar="PX", type=positive, default=value, help=text)
-    one.add_argument(
+        parser.add_argument(f"--{name}", metavar="PX", type=positive, default=value, help=text)
+    parser.add_argument(
         "--bit-errors",
         type=parse_count,
         default=0,
-        help="cells of a code that may be wrong (default 0)",
+        help="largest number of wrong cells in a code (default 0)",
     )
-    one.add_argument(
+    parser.add_argument(
         "--encoding",
         choices=("by_file", "linear", "srgb"),
         default="by_file",
-        help="how grey values stand for light (default: sRGB in JPEG, else as stored)",
+        help="relation of grey values and light (default: sRGB in JPEG, else as stored)",
     )
-    one.add_argument("--replace", action="store_true", help="overwrite an earlier list")
-    one.add_argument("--quiet", action="store_true", help="no progress, only problems")
-    add_language(one)
-    one.set_defaults(command=runs.read)
+    parser.add_argument("--replace", action="store_true", help="overwrite an earlier list")
+    parser.add_argument("--quiet", action="store_true", help="no progress, only problems")
+    add_language(parser)
+    parser.set_defaults(command=runs.read)
 
 
 def _add_outputs(parser):
@@ -244,7 +277,9 @@ def _states(text):
     if not set(states) <= {"fixed", "weighted", "free"}:
         raise refuse_argument(
             message(
-                "option_states", "found {text!r}; expected some of fixed,weighted,free", text=text
+                "option_states",
+                "found {text!r}; expected one or more of fixed,weighted,free",
+                text=text,
             )
         )
     return states

@@ -1,4 +1,4 @@
-"""What `tankcal camera …` does: read, analyse, show, write. It computes nothing."""
+"""Commands of `tankcal camera …`: input, analysis, output. They compute nothing themselves."""
 
 import json
 from dataclasses import replace
@@ -21,7 +21,7 @@ FIRST_WORDS = 200  # bytes
 
 
 def parameters(options):
-    """Which additional parameters belong in the model."""
+    """Test which additional parameters are significant."""
     prepare_for_small_work()
     from tankcal.calibration.interiors import sets_to_be
     from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
@@ -35,18 +35,20 @@ def parameters(options):
     of = {"camera": options.camera, "photo": options.photo}
     job, record = None, _record_of(options.source)
     if record is not None:
-        found = analyse_record(record, choices, **of)
+        analyses = analyse_record(record, choices, **of)
     else:
         job = _load(options.source, show, options.language)
         if job.measurements is not None:
             _refuse_several(options, sets_to_be(job.measurements, **of))
-        found = analyse_job(job, choices, **of, dropping=not options.no_trials, progress=show.part)
+        analyses = analyse_job(
+            job, choices, **of, dropping=not options.no_trials, progress=show.part
+        )
     paths = [] if job is not None else [options.source]
-    _finish([as_json(one) for one in found], options, show, paths, job, record)
+    _finish([as_json(analysis) for analysis in analyses], options, show, paths, job, record)
 
 
 def compare(options):
-    """All pairs of calibrations."""
+    """Compare all pairs of calibrations."""
     prepare_for_small_work()
     from tankcal.calibration.stability.comparison import compare as compared
     from tankcal.calibration.stability.grids import parse
@@ -59,7 +61,7 @@ def compare(options):
     pixel_um = options.pixel_um
     cameras = read_cameras(options.cameras, warnings.append, in_pixels=pixel_um is None)
     name = Path(options.cameras).name
-    found = compared(
+    comparison = compared(
         choose(with_pixels(cameras, pixel_um), options.names, name),
         options.method,
         grid=None if options.grid is None else parse(options.grid),
@@ -70,11 +72,11 @@ def compare(options):
         file=name,
     )
     warn(warnings)
-    _finish([as_json(found)], options, show, [options.cameras], printed=summary(found))
+    _finish([as_json(comparison)], options, show, [options.cameras], printed=summary(comparison))
 
 
 def influence(options):
-    """The same survey with each of several calibrations."""
+    """Compare the adjustments of one survey with several calibrations."""
     prepare_for_small_work()
     from tankcal.calibration.influence.runs import influence as influence_of
     from tankcal.job.calibrations import read_cameras
@@ -84,7 +86,7 @@ def influence(options):
     warnings = []
     calibrations = read_cameras(options.cameras, warnings.append, in_pixels=False)
     job = _load(options.job, show, options.language)
-    found = influence_of(
+    effects = influence_of(
         job,
         calibrations,
         states=options.states,
@@ -93,11 +95,11 @@ def influence(options):
         file=Path(options.cameras).name,
     )
     warn(warnings)
-    _finish([as_json(found)], options, show, [options.cameras], job)
+    _finish([as_json(effects)], options, show, [options.cameras], job)
 
 
 def check(options):
-    """Differences at check points against a table of limits."""
+    """Evaluate differences at check points with a table of limits."""
     prepare_for_small_work()
     from tankcal.calibration.product import limits
     from tankcal.calibration.product.check import check_product
@@ -117,14 +119,16 @@ def check(options):
         job = _load(options.source, show, options.language)
         differences = differences_of(tankcal.adjust_job(job, show.step))
     axes, values = differences.of_known_axes()
-    found = check_product(values, axes, names=differences.names, limits=table, alpha=options.alpha)
+    checked = check_product(
+        values, axes, names=differences.names, limits=table, alpha=options.alpha
+    )
     paths = [] if job is not None else [options.source]
     paths += [options.limits] if options.limits else []
-    _finish([as_json(found)], options, show, paths, job, record)
+    _finish([as_json(checked)], options, show, paths, job, record)
 
 
 def convert(options):
-    """A camera of one program, or of a publication, as another has it."""
+    """Convert cameras to the form of another program or publication."""
     import numpy as np
 
     from tankcal.camera.formats.writing import write_camera
@@ -132,17 +136,20 @@ def convert(options):
     speak(options.language)
     cameras, covariances = _cameras_of(options)
     if options.name is not None:
-        cameras, covariances = _only(options, cameras, covariances)
+        cameras, covariances = _select_camera(options, cameras, covariances)
     for name, camera in cameras:
         _tell_error(message("convert_as_read", "{name}, as read", name=name), camera)
     if options.form is not None:
-        cameras, covariances = _in_form(options.form, cameras, covariances)
+        cameras, covariances = _convert_to_form(options.form, cameras, covariances)
         for name, camera in cameras:
             what = message(
                 "convert_in_form", "{name}, in the form of {form}", name=name, form=options.form
             )
             _tell_error(what, camera)
-    sds = [None if one is None else np.sqrt(np.maximum(np.diag(one), 0.0)) for one in covariances]
+    sds = [
+        None if covariance is None else np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        for covariance in covariances
+    ]
     file = Path(options.file).name
     written = write_camera(options.to, cameras, sds, options.radius_mm, file)
     if options.to != "cameras.toml":
@@ -155,21 +162,19 @@ def convert(options):
     _write_new(Path(options.out), written.text)
 
 
-def _in_form(form, cameras, covariances):
-    """[(name, FramedCamera)] in the form of a publication, and their covariances or None."""
+def _convert_to_form(form, cameras, covariances):
+    """Return [(name, FramedCamera)] in the form of a publication, and covariances or None."""
     from tankcal.camera.formats.published import camera_in_form
 
-    found = [
+    converted = [
         (name, *camera_in_form(camera, form, covariance))
         for (name, camera), covariance in zip(cameras, covariances, strict=True)
     ]
-    return [(name, camera) for name, camera, _ in found], [after for *_, after in found]
+    return [(name, camera) for name, camera, _ in converted], [after for *_, after in converted]
 
 
 def _cameras_of(options):
-    """[(name, FramedCamera)] of a cameras.toml, a record or a file of another program, and the
-    covariance (13, 13) of each, or None.
-    """
+    """Return [(name, FramedCamera)] of a file, and the covariance (13, 13) of each, or None."""
     from tankcal.calibration.interiors import framed_in
     from tankcal.camera.formats.reading import read_camera
 
@@ -178,25 +183,25 @@ def _cameras_of(options):
         return framed_in(_record_of(options.file), pixel_mm)
     is_register = options.kind is None and Path(options.file).suffix.lower() == ".toml"
     if is_register or options.kind == "cameras.toml":
-        return _registered(options.file, options.pixel_um)
+        return _read_cameras_toml(options.file, options.pixel_um)
     size_px = None if options.size_px is None else tuple(options.size_px)
     cameras = read_camera(options.file, options.kind, options.pixel_um, size_px)
     return cameras, [None] * len(cameras)
 
 
-def _registered(path, pixel_um):
-    """[(name, FramedCamera)] of a cameras.toml, and covariances of their standard deviations."""
+def _read_cameras_toml(path, pixel_um):
+    """Return [(name, FramedCamera)] of a cameras.toml, and covariances from standard deviations."""
     import numpy as np
 
     from tankcal.job.calibrations import read_cameras, with_pixels
 
     setups = with_pixels(read_cameras(path, in_pixels=False), pixel_um)
-    cameras = [(one.camera.name, _framed(one)) for one in setups]
-    return cameras, [np.diag(one.camera.sd**2) for one in setups]
+    cameras = [(setup.camera.name, _make_framed_camera(setup)) for setup in setups]
+    return cameras, [np.diag(setup.camera.sd**2) for setup in setups]
 
 
-def _framed(setup):
-    """FramedCamera of a CameraSetup."""
+def _make_framed_camera(setup):
+    """Return the FramedCamera of a CameraSetup."""
     from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
 
     values, form = setup.camera.values, setup.camera.form
@@ -205,8 +210,8 @@ def _framed(setup):
     return make_framed_camera(values, form, setup.pixel_mm, setup.format_px)
 
 
-def _only(options, cameras, covariances):
-    """The camera of that name alone."""
+def _select_camera(options, cameras, covariances):
+    """Return the camera with the requested name only."""
     names = [name for name, _ in cameras]
     if options.name not in names:
         expected = message(
@@ -221,6 +226,7 @@ def _only(options, cameras, covariances):
 
 
 def _tell_error(what, camera):
+    """Warn of the largest difference of a fitted camera within the frame."""
     if camera.error_px > 1e-9:
         away = message("convert_px", "{error:.2g} px", error=camera.error_px)
         if camera.film_mm is not None:
@@ -235,6 +241,7 @@ def _tell_error(what, camera):
 
 
 def _write_new(target, text):
+    """Write a new file; raise InputError if it exists."""
     try:
         with target.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -249,7 +256,7 @@ def _write_new(target, text):
 
 
 def read(options):
-    """Targets from photographs into image_points.csv."""
+    """Measure targets in photographs and write image_points.csv."""
     prepare_for_small_work()
     from tankcal.calibration.targets import Wanted, read_photographs
 
@@ -266,23 +273,23 @@ def read(options):
         bit_errors=options.bit_errors,
         encoding=options.encoding,
     )
-    found = read_photographs(options.photos, options.out, wanted, options.replace, show.part)
+    result = read_photographs(options.photos, options.out, wanted, options.replace, show.part)
     show.end()
-    warn(found.warnings)
-    refused = sum(found.refused.values())
-    reasons = ", ".join(f"{code} {count}" for code, count in sorted(found.refused.items()))
+    warn(result.warnings)
+    refused = sum(result.refused.values())
+    reasons = ", ".join(f"{code} {count}" for code, count in sorted(result.refused.items()))
     say(
         message(
             "targets_read",
             "{targets}, {points} in {photos}; refused: {refused}{reasons}",
-            targets=_targets(found.targets),
-            points=_image_points(found.points),
-            photos=_photos(len(found.photos)),
+            targets=_targets(result.targets),
+            points=_image_points(result.points),
+            photos=_photos(len(result.photos)),
             refused=refused,
             reasons=f" ({reasons})" if refused else "",
         )
     )
-    print(f"  {printable(found.path)}\n  {printable(found.refused_path)}")
+    print(f"  {printable(result.path)}\n  {printable(result.refused_path)}")
 
 
 def _targets(count):
@@ -308,7 +315,7 @@ def _photos(count):
 
 
 def _start(options):
-    """Progress; a folder for the results that is not ours is refused before any work."""
+    """Return the Progress; refuse a folder with other files before any computation."""
     from tankcal.report import camera as camera_papers
 
     if options.out is not None:
@@ -318,7 +325,7 @@ def _start(options):
 
 
 def _load(source, show, language):
-    """The job, with its tank where it has one."""
+    """Return the job, with its tank if it has one."""
     from tankcal.cli.asked_language import asked_language
 
     language = language or asked_language(source)
@@ -330,7 +337,7 @@ def _load(source, show, language):
 
 
 def _record_of(source):
-    """The record when `source` is one, else None."""
+    """Return the record if `source` is a record, else None."""
     if Path(source).suffix.lower() != ".json":
         return None
     from tankcal.record import load
@@ -339,7 +346,7 @@ def _record_of(source):
 
 
 def _is_record(source):
-    """Whether a JSON file is a record rather than another program's: its first words tell."""
+    """Return whether a JSON file is a record, from its first bytes."""
     if Path(source).suffix.lower() != ".json" or not Path(source).is_file():
         return False
     with Path(source).open("rb") as file:
@@ -347,7 +354,7 @@ def _is_record(source):
 
 
 def _finish(results, options, show, paths, job=None, record=None, printed=None):
-    """Print tables or JSON; write the papers where they are asked for."""
+    """Print tables or JSON, and write reports on request."""
     from tankcal.report import camera as camera_papers
 
     language = options.language or _language_of(job, record) or language_of_run()
@@ -371,7 +378,7 @@ def _finish(results, options, show, paths, job=None, record=None, printed=None):
 
 
 def _language_of(job, record):
-    """The language that a job, or a record, asks for; None where there is neither."""
+    """Return the language of a job or a record, or None."""
     from tankcal.text.words import language_of
 
     if record is not None:
@@ -380,11 +387,12 @@ def _language_of(job, record):
 
 
 def _refuse_several(options, count):
+    """Raise InputError for --out with several sets of parameters."""
     if options.out is not None and count > 1:
         several = message(
             "camera_several_sets",
-            "there are {count} sets of parameters; expected --camera or --photo, to choose "
-            "the one to write",
+            "there are {count} sets of parameters; expected --camera or --photo, to select the "
+            "set to write",
             count=count,
         )
         raise InputError(Problem("--out", several))

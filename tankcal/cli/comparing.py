@@ -1,4 +1,4 @@
-"""`tankcal compare`: a former table and a new one of the same tank."""
+"""`tankcal compare`: comparison of a former and a new table of one tank."""
 
 from tankcal.cli.arguments import add_language
 from tankcal.cli.machine import add_json, print_saved
@@ -18,35 +18,41 @@ MOST_WARNINGS = 10  # that are shown
 
 
 def add(commands):
-    """The parser of `tankcal compare`."""
+    """Add the parser of `tankcal compare`."""
     compare = commands.add_parser(
         "compare",
         help="compare a former table with a new one of the same tank",
-        description="Bring two capacity tables of a tank to one basis (zero, temperature, head, "
-        "roof, rounding), say what differs in rows, deliveries and radii of the courses, and judge "
-        "it by a rule: keep, recompute or recalibrate. docs/compare.md says how.",
-        epilog="exit status: 0 done, whatever the verdict; 2 the input must be mended.",
+        description="Reduce two capacity tables of a tank to one basis (zero, temperature, head, "
+        "roof, rounding). Report differences of rows, deliveries and course radii, with a verdict "
+        "by a rule: keep, recompute or recalibrate. See docs/compare.md.",
+        epilog="exit status: 0 done, whatever the verdict; 2 the input must be corrected.",
     )
     table = "a CSV file, an Excel workbook (.xlsx), a PDF with a text table, a former.toml, a "
     table += "record.json or a folder of results"
     compare.add_argument("old", metavar="OLD", help=f"the former table: {table}")
-    compare.add_argument("new", metavar="NEW", help="the new table: any of these")
+    compare.add_argument("new", metavar="NEW", help="the new table, in any of these forms")
     compare.add_argument(
-        "--former", metavar="FILE.toml", help="what is known of the former table beside its rows"
+        "--former",
+        metavar="FILE.toml",
+        help="facts about the former table that its rows do not contain",
     )
     compare.add_argument(
-        "--new-former", metavar="FILE.toml", help="the same of the new table, where it is no record"
+        "--new-former", metavar="FILE.toml", help="facts about the new table, if it is not a record"
     )
     compare.add_argument(
-        "--courses", metavar="FILE", help="courses.csv of an upright tank (default: of the record)"
+        "--courses",
+        metavar="FILE",
+        help="courses.csv of a vertical tank (default: courses of the record)",
     )
     compare.add_argument(
         "--rule",
         metavar="RULE",
-        help="a rule by its name, or a .toml file (default: france_2020_recalibration)",
+        help="the name of a rule, or a .toml file (default: france_2020_recalibration)",
     )
     compare.add_argument(
-        "--out", metavar="DIR", help="write comparison.json and papers there, all or nothing"
+        "--out",
+        metavar="DIR",
+        help="write comparison.json and reports to this folder, all or nothing",
     )
     add_language(compare)
     compare.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -71,36 +77,36 @@ def _compare(options):
         options.old, options.new, former=options.former, new_former=options.new_former,
         courses=options.courses, rule=options.rule,
     )  # fmt: skip
-    found = plain_of_comparison(compare_files(asked))
+    comparison = plain_of_comparison(compare_files(asked))
     written = ()
     if options.out is not None:
-        written = write_comparison(found, options.out, language_of_run(), show.step)
+        written = write_comparison(comparison, options.out, language_of_run(), show.step)
     show.end()
-    print_saved(options, found, _tell, written)
+    print_saved(options, comparison, _tell, written)
 
 
-def _tell(found):
-    """Warnings, what makes up the difference, the verdict and its reasons."""
+def _tell(comparison):
+    """Print warnings, the components of the difference, and the verdict with its reasons."""
     from tankcal.report.comparison import ComparisonPaper
 
-    paper = ComparisonPaper(found, language_of_run())
-    warn(paper.warning(one) for one in found["warnings"][:MOST_WARNINGS])
-    say(_sides(found))
-    say(_sum(found["waterfall"][-1]))
-    say(_verdict(found, paper))
-    for one in found["reasons"]:
-        say(f"  {paper.reason(one)}")
+    paper = ComparisonPaper(comparison, language_of_run())
+    warn(paper.warning(warning) for warning in comparison["warnings"][:MOST_WARNINGS])
+    say(_sides(comparison))
+    say(_sum(comparison["waterfall"][-1]))
+    say(_verdict(comparison, paper))
+    for reason in comparison["reasons"]:
+        say(f"  {paper.reason(reason)}")
 
 
-def _sides(found):
+def _sides(comparison):
     return message(
         "compare_sides",
-        "{former} against {new}: {rows} rows from {low} to {high} m",
-        former=found["former"]["name"],
-        new=found["new"]["name"],
-        rows=len(found["rows"]["height_m"]),
-        low=_plain(found["low_m"]),
-        high=_plain(found["high_m"]),
+        "{former} compared with {new}: {rows} rows from {low} to {high} m",
+        former=comparison["former"]["name"],
+        new=comparison["new"]["name"],
+        rows=len(comparison["rows"]["height_m"]),
+        low=_plain(comparison["low_m"]),
+        high=_plain(comparison["high_m"]),
     )
 
 
@@ -111,20 +117,23 @@ def _sum(column):
         "at {dip} m, m3: former {former}, zero {zero}, temperature {temperature}, head {head}, "
         "roof {roof}, rounding {rounding}, the tank itself {tank}, new {new}",
         dip=_plain(column["height_m"]),
-        **{one: _signed(column[f"{one}_m3"], one not in ("former", "new")) for one in names},
+        **{
+            name: _format_signed(column[f"{name}_m3"], name not in ("former", "new"))
+            for name in names
+        },
     )
 
 
-def _verdict(found, paper):
+def _verdict(comparison, paper):
     return message(
         "compare_verdict",
         "verdict: {verdict} ({rule})",
-        verdict=paper.word(f"verdicts.{found['verdict'] or 'none'}"),
+        verdict=paper.word(f"verdicts.{comparison['verdict'] or 'none'}"),
         rule=paper.found["rule"]["name"],
     )
 
 
-def _signed(value, is_change):
+def _format_signed(value, is_change):
     text = fixed(value, 3, marks())
     return f"+{text}" if is_change and value > 0 else text
 

@@ -1,8 +1,8 @@
-"""`tankcal completion`: the script that completes commands, options, values and files in a shell.
+"""`tankcal completion`: script for completion of commands, options, values and files in a shell.
 
-The script is made of the parser itself, so that it knows every command; it is text, and no Python
-starts at a press of the Tab key. What a parser does not say stands here: which arguments are files
-or folders, by their names in help, and which options have names that ship.
+The script is created from the parser and therefore contains every command. It does not start Python
+at a press of the Tab key. This module defines what the parser does not contain: file and folder
+arguments, identified by their names in the help, and options with shipped names.
 """
 
 import argparse
@@ -23,13 +23,15 @@ for good:
 
 
 def add(commands, make_parser):
-    """The parser of `tankcal completion`; `make_parser` gives (the whole parser in English, its
-    words in the language that is spoken or None)."""
+    """Add the parser of `tankcal completion`.
+
+    make_parser  returns (the complete parser in English, a function that translates it)
+    """
     parser = commands.add_parser(
         "completion",
-        help="write the script by which a shell completes commands",
-        description="Write the script by which a shell completes the commands of tankcal, their "
-        "options, the values of these, files and folders.",
+        help="write the script for command completion in a shell",
+        description="Write the script by which a shell completes the commands of tankcal, options, "
+        "values, files and folders.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -38,14 +40,14 @@ def add(commands, make_parser):
 
 
 def script_for(shell, make_parser):
-    """The script for a shell, as text.
+    """Return the completion script for a shell.
 
     Parameters
     ----------
     shell : str
         One of SHELLS.
     make_parser : callable
-        Gives the parser in English, and a function that puts it into the language that is spoken.
+        Returns the parser in English, and a function that translates it to the current language.
     """
     import shtab
 
@@ -57,7 +59,7 @@ def script_for(shell, make_parser):
 
 
 def names_that_ship():
-    """{(command, option or argument): (names, whether a TOML file may stand there, too)}."""
+    """Return {(command, option or argument): (names, whether a TOML file is also valid)}."""
     from tankcal.camera.formats.writing import KINDS
     from tankcal.cli.pages import page_names
     from tankcal.exports.profiles import shipped_profiles
@@ -83,34 +85,34 @@ def names_that_ship():
 
 
 def mark(parser, named):
-    """Say of each argument of a parser and of its commands what completes it."""
+    """Set the completion of each argument of a parser and of its commands."""
     command = parser.prog.removeprefix("tankcal").strip()
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
-            for one in action.choices.values():
-                mark(one, named)
+            for command_parser in action.choices.values():
+                mark(command_parser, named)
             continue
         for option in action.option_strings or (action.dest,):
             if (command, option) in named:
                 action.complete = _names_or_toml(*named[command, option])
         if action.nargs != 0 and action.choices is None and not hasattr(action, "complete"):
-            found = _files_of(action)
-            if found is not None:
-                action.complete = found
+            files = _files_of(action)
+            if files is not None:
+                action.complete = files
 
 
 def _describe_by_their_lines(parser):
-    """A list of commands shows one line of each, in place of what its own help begins with."""
+    """Describe each command in a list by its one-line help."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for line in action._choices_actions:
                 action.choices[line.dest].description = line.help
-            for one in action.choices.values():
-                _describe_by_their_lines(one)
+            for command_parser in action.choices.values():
+                _describe_by_their_lines(command_parser)
 
 
 def _files_of(action):
-    """What completes an argument that may be a file; None: it is none."""
+    """Return the completion of an argument that may be a file, or None."""
     import shtab
 
     if action.type is not None or not isinstance(action.metavar, str):
@@ -123,7 +125,7 @@ def _files_of(action):
 
 
 def _names_or_toml(names, or_file):
-    """Completes one of these names; a TOML file and what lies in folders, where one may stand."""
+    """Return the completion of names, and of TOML files if `or_file`."""
     words = " ".join(map(shlex.quote, names))
     name = f"_tankcal_names_{sum(ord(c) * k for k, c in enumerate(words, 1))}"
     bash = [f"compgen -W {shlex.quote(words)} -- $1"]

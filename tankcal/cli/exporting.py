@@ -16,41 +16,45 @@ from tankcal.messages import message, printable
 
 
 def add(commands):
-    """The parser of `tankcal export`."""
+    """Add the parser of `tankcal export`."""
     parser = commands.add_parser(
         "export",
         help="write a table for a gauging or inventory system",
-        description="Write the capacity table of a record as a gauging or inventory system takes "
-        "it, by a profile: the rows that err least where it takes only few, each rounded once, "
-        "read back by the linter. The report beside the file (NAME-report.txt) says how far off "
-        "what the system reads is at most. docs/exports.md has the profiles.",
-        epilog="exit status: 0 done; 2 the record, the profile or the options must be mended (one "
-        "line per problem; nothing is written then).",
+        description="Write the capacity table of a record in the form of a gauging or inventory "
+        "system, defined by a profile. If the system limits the number of rows, the rows with the "
+        "smallest error are selected. Each value is rounded once, and the linter checks the file. "
+        "The report beside the file (NAME-report.txt) states the largest error of the volumes "
+        "that the system computes. docs/exports.md lists the profiles.",
+        epilog="exit status: 0 done; 2 the record, the profile or the options must be corrected "
+        "(one line per problem; no file is written).",
     )
     parser.add_argument(
         "record", metavar="RECORD", nargs="?", help="a record.json, or a folder of results"
     )
     parser.add_argument(
-        "--profile", metavar="NAME", help="one of --list, or a TOML file of your own"
+        "--profile", metavar="NAME", help="a profile that --list shows, or your TOML file"
     )
-    parser.add_argument("--list", action="store_true", help="show the profiles there are")
+    parser.add_argument("--list", action="store_true", help="list the shipped profiles")
     most = parser.add_mutually_exclusive_group()
     most.add_argument(
-        "--points", metavar="K", type=parse_list, help="rows at most: those that err least"
+        "--points",
+        metavar="K",
+        type=parse_list,
+        help="largest number of rows; the rows with the smallest error are selected",
     )
     most.add_argument(
         "--max-error-l",
         metavar="LITRES",
         type=positive,
-        help="the fewest rows that err by no more, in litres",
+        help="write the fewest rows with at most this error, in litres",
     )
     parser.add_argument(
         "--gauge-on-shell",
         action="store_true",
-        help="the gauge hangs on the shell: work out HyTD, by which its reference is drawn down",
+        help="the gauge is mounted on the shell: compute HyTD, the movement of its reference",
     )
     parser.add_argument(
-        "--out", metavar="FILE", help="where to write (default: TANK-PROFILE.csv here)"
+        "--out", metavar="FILE", help="output file (default: TANK-PROFILE.csv in this folder)"
     )
     add_language(parser)
     add_json(parser)
@@ -95,16 +99,16 @@ def _refuse_missing(options):
     )
     profile = message(
         "export_needs_profile",
-        "missing; expected one of those that tankcal export --list shows, or a .toml file",
+        "missing; expected a profile that tankcal export --list shows, or a .toml file",
     )
     needed = (("RECORD", options.record, record), ("--profile", options.profile, profile))
-    missing = [Problem(name, text) for name, given, text in needed if given is None]
+    missing = [Problem(name, text) for name, value, text in needed if value is None]
     if missing:
         raise InputError(missing)
 
 
 def _out(options, export, source):
-    """The file to write: as asked, or named by the tank and the profile, in this folder."""
+    """Return the output file: as requested, or named after tank and profile in this folder."""
     from tankcal.exports.exporting import default_name
 
     if options.out is not None:
@@ -115,32 +119,51 @@ def _out(options, export, source):
             or out.resolve() == source.resolve()
         ):
             text = message(
-                "export_out", "expected the name of a file with an ending such as {ending}, that "
-                "is neither a folder, a record nor a profile", ending=export.profile.ending,
-            )  # fmt: skip
+                "export_out",
+                "expected a file name with an ending such as {ending}, not a folder, a record or a "
+                "profile",
+                ending=export.profile.ending,
+            )
             raise InputError(Problem("--out", text))
         return out
     return Path(default_name(export))
 
 
 def _list(options):
-    """The profiles that ship: name, system, points, whether it was verified."""
+    """Print the shipped profiles: name, system, points, whether verified."""
     from tankcal.exports.profiles import shipped_profiles
 
     profiles = shipped_profiles()
     if options.machine:
-        print_json(exit_status=0, profiles=[
-            {"profile": code, "name": one.name, "max_points": one.max_points,
-             "verified": one.verified, "source": one.source} for code, one in profiles.items()
-        ])  # fmt: skip
+        print_json(
+            exit_status=0,
+            profiles=[
+                {
+                    "profile": code,
+                    "name": profile.name,
+                    "max_points": profile.max_points,
+                    "verified": profile.verified,
+                    "source": profile.source,
+                }
+                for code, profile in profiles.items()
+            ],
+        )
         return 0
-    for code, one in profiles.items():
+    for code, profile in profiles.items():
         points = message("export_any_points", "any number of rows")
-        if one.max_points:
-            points = message("export_most_points", "{most} rows at most", most=one.max_points)
+        if profile.max_points:
+            points = message("export_most_points", "at most {most} rows", most=profile.max_points)
         known = message("export_unverified", "not verified")
-        if one.verified:
+        if profile.verified:
             known = message("export_verified", "verified")
-        say(message("export_listed", "{profile} {name}: {points}; {known}",
-                    profile=code.ljust(26), name=one.name, points=points, known=known))  # fmt: skip
+        say(
+            message(
+                "export_listed",
+                "{profile} {name}: {points}; {known}",
+                profile=code.ljust(26),
+                name=profile.name,
+                points=points,
+                known=known,
+            )
+        )
     return 0

@@ -1,7 +1,7 @@
-"""The help of the command line, and its usage errors, in the language that is spoken.
+"""Help and usage errors of the command line in the current language.
 
-The English stands where the arguments are made; the other languages have theirs in their words
-under [help], by the command and the name of the argument.
+The English text is in the definitions of the arguments. Translations are in the words of each
+language under [help], by command and name of the argument.
 """
 
 import argparse
@@ -9,36 +9,36 @@ from contextlib import contextmanager
 
 
 def put_in_words(parser, words):
-    """Give a parser and those of its commands the texts of [help]."""
+    """Replace the texts of a parser and of its commands by the texts of [help]."""
     known = words["help"]
-    own = known[_name(parser)]
-    parser.description = own.get("about", parser.description)
-    parser.epilog = own.get("ending", parser.epilog)
+    texts = known[_name(parser)]
+    parser.description = texts.get("about", parser.description)
+    parser.epilog = texts.get("ending", parser.epilog)
     for action in parser._actions:
         if isinstance(action.metavar, str):
             action.metavar = known["metavars"].get(action.metavar, action.metavar)
         if isinstance(action, argparse._SubParsersAction):
             _put_in_list(action, known)
-            for one in action.choices.values():
-                put_in_words(one, words)
+            for command_parser in action.choices.values():
+                put_in_words(command_parser, words)
         elif action.help is not None and action.dest != "help":
-            action.help = own.get(action.dest) or known["shared"][action.dest]
+            action.help = texts.get(action.dest) or known["shared"][action.dest]
 
 
 @contextmanager
 def argparse_in(words):
-    """Within it argparse itself says what it says in these words; {}: in English."""
-    said = words.get("help", {}).get("argparse", {})
+    """Translate the messages of argparse within the block; {}: English."""
+    translations = words.get("help", {}).get("argparse", {})
     before = argparse._, argparse.ngettext
 
-    def one(text):
-        return said.get(text, text)
+    def translate(text):
+        return translations.get(text, text)
 
     def counted(single, several, count):
-        return one(single if count == 1 else several)
+        return translate(single if count == 1 else several)
 
-    if said:
-        argparse._, argparse.ngettext = one, counted
+    if translations:
+        argparse._, argparse.ngettext = translate, counted
     try:
         yield
     finally:
@@ -46,12 +46,12 @@ def argparse_in(words):
 
 
 def _put_in_list(action, known):
-    """The line of each command in the list of them."""
-    names = {name: _name(one) for name, one in action.choices.items()}
+    """Replace the one-line help of each command in a list."""
+    names = {name: _name(command_parser) for name, command_parser in action.choices.items()}
     for line in action._choices_actions:
         line.help = known[names[line.dest]]["line"]
 
 
 def _name(parser):
-    """The command of a parser: "tankcal", "run", "camera read"."""
+    """Return the command of a parser: "tankcal", "run", "camera read"."""
     return parser.prog.removeprefix("tankcal ")

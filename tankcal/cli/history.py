@@ -1,4 +1,4 @@
-"""`tankcal history`: the tables of one tank over the years."""
+"""`tankcal history`: tables of one tank over the years."""
 
 from tankcal.cli.arguments import add_language, parse_dips
 from tankcal.cli.machine import add_json, print_saved
@@ -18,45 +18,46 @@ MOST_SHOWN = 20  # warnings, and files that are left out
 
 
 def add(commands):
-    """The parser of `tankcal history`."""
+    """Add the parser of `tankcal history`."""
     history = commands.add_parser(
         "history",
-        help="the tables of one tank over the years",
-        description="Search folders for the results of a tank (record.json, inspection.json), "
-        "bring its tables to one basis, and show certificates, volumes, radii and verdicts over "
-        "the years, each with U; what changed from one table to the next is what tankcal compare "
-        "says of them. docs/history.md says how.",
-        epilog="exit status: 0 done; 2 the input must be mended (one line for each file that "
-        "cannot be read).",
+        help="show the tables of one tank over the years",
+        description="Search folders for the results of a tank (record.json, inspection.json) and "
+        "reduce its tables to one basis. Show certificates, volumes, radii and verdicts over the "
+        "years, each with U, and the changes between successive tables by the method of tankcal "
+        "compare. See docs/history.md.",
+        epilog="exit status: 0 done; 2 the input must be corrected (one line for each unreadable "
+        "file).",
     )
     history.add_argument(
         "sources",
         metavar="TANK",
         nargs="+",
-        help="folders, in and below which results are looked for; files record.json or "
-        "inspection.json; former tables, by a former.toml with their date",
+        help="folders to search for results, with their subfolders; files record.json or "
+        "inspection.json; former tables, given by a former.toml with their date",
     )
     history.add_argument(
         "--tank",
         metavar="ID",
         action="append",
         default=[],
-        help="id of the tank, in folders of several; several times where it has had several",
+        help="id of the tank, if the folders contain several tanks; repeat the option for a tank "
+        "with several ids",
     )
     history.add_argument(
         "--at",
         metavar="DIPS",
         type=parse_dips,
-        help="dips that volumes are shown at, m, separated by commas (default: fifths of the "
-        "range that all tables have)",
+        help="dips of the volumes shown, m, separated by commas (default: fifths of the range "
+        "common to all tables)",
     )
     history.add_argument(
         "--courses",
         metavar="FILE",
-        help="courses.csv of an upright tank, where no record has its courses",
+        help="courses.csv of a vertical tank, if no record contains its courses",
     )
     history.add_argument(
-        "--out", metavar="DIR", help="write history.json and papers there, all or nothing"
+        "--out", metavar="DIR", help="write history.json and reports to this folder, all or nothing"
     )
     add_language(history)
     history.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -75,7 +76,7 @@ def _history(options):
 
         refuse_foreign(options.out)
     show = Progress(options.quiet or options.machine)
-    found = plain_of_history(
+    history = plain_of_history(
         history_of_files(
             options.sources,
             tanks=options.tank,
@@ -86,31 +87,31 @@ def _history(options):
     )
     written = ()
     if options.out is not None:
-        written = write_history(found, options.out, language_of_run(), show.step)
+        written = write_history(history, options.out, language_of_run(), show.step)
     show.end()
-    print_saved(options, found, _tell, written)
+    print_saved(options, history, _tell, written)
 
 
-def _tell(found):
-    """Warnings, then a line for each certificate, change and inspection."""
+def _tell(history):
+    """Print warnings and a line for each certificate, change and inspection."""
     from tankcal.report.history import HistoryPaper
 
-    paper = HistoryPaper(found, language_of_run())
-    warn(paper.warning(one) for one in found["warnings"][:MOST_SHOWN])
-    for one in found["left_out"][:MOST_SHOWN]:
-        say(message("history_left_out", "not in the history: {text}", text=paper.warning(one)))
-    say(_span(found))
-    for one in found["certificates"]:
-        say(_certificate(one))
-    for one in found["changes"]:
-        say(_change(one, paper))
-    for one in found["inspections"]:
-        say(_inspection(one))
+    paper = HistoryPaper(history, language_of_run())
+    warn(paper.warning(warning) for warning in history["warnings"][:MOST_SHOWN])
+    for omission in history["left_out"][:MOST_SHOWN]:
+        say(message("history_left_out", "not in the history: {text}", text=paper.warning(omission)))
+    say(_span(history))
+    for certificate in history["certificates"]:
+        say(_certificate(certificate))
+    for change in history["changes"]:
+        say(_change(change, paper))
+    for inspection in history["inspections"]:
+        say(_inspection(inspection))
 
 
-def _span(found):
-    certificates = found["certificates"]
-    tank = found["tank"] or certificates[-1]["file"]
+def _span(history):
+    certificates = history["certificates"]
+    tank = history["tank"] or certificates[-1]["file"]
     if len(certificates) == 1:
         return message(
             "history_one", "{tank}: 1 certificate, {date}", tank=tank, date=certificates[0]["date"]
@@ -125,45 +126,47 @@ def _span(found):
     )
 
 
-def _certificate(one):
+def _certificate(certificate):
     U = ""
-    if one["U_top_m3"] is not None:
-        U = message("history_U", ", U = {uncertainty} m3", uncertainty=_volume(one["U_top_m3"]))
+    if certificate["U_top_m3"] is not None:
+        U = message(
+            "history_U", ", U = {uncertainty} m3", uncertainty=_volume(certificate["U_top_m3"])
+        )
     return message(
         "history_row",
         "  {number}  {date}  {volume} m3 at {dip} m{uncertainty}  {name}",
-        number=one["certificate"],
-        date=one["date"],
-        volume=_volume(one["top_volume_m3"]),
-        dip=_dip(one["top_dip_m"]),
+        number=certificate["certificate"],
+        date=certificate["date"],
+        volume=_volume(certificate["top_volume_m3"]),
+        dip=_dip(certificate["top_dip_m"]),
         uncertainty=U,
-        name=one["number"] or one["file"],
+        name=certificate["number"] or certificate["file"],
     )
 
 
-def _change(one, paper):
-    E_n, d = one["worst_E_n"], one["top_d_m3"]
+def _change(change, paper):
+    E_n, d = change["worst_E_n"], change["top_d_m3"]
     return message(
         "history_change",
         "  {former} to {new}: {d} m3 at {dip} m, worst E_n {E_n}, {verdict}",
-        former=one["former"],
-        new=one["new"],
+        former=change["former"],
+        new=change["new"],
         d=("+" if d > 0 else "") + _volume(d),
-        dip=_dip(one["high_m"]),
+        dip=_dip(change["high_m"]),
         E_n=NOTHING if E_n is None else fixed(E_n, 2, marks()),
-        verdict=paper.words["verdicts"].get(one["verdict"] or "", NOTHING),
+        verdict=paper.words["verdicts"].get(change["verdict"] or "", NOTHING),
     )
 
 
-def _inspection(one):
-    passed = sum(check["verdict"] == "passed" for check in one["checks"])
+def _inspection(inspection):
+    passed = sum(check["verdict"] == "passed" for check in inspection["checks"])
     return message(
         "history_inspected",
         "  inspection of {date}: {passed} of {count} checks passed  {name}",
-        date=one["date"] or NOTHING,
+        date=inspection["date"] or NOTHING,
         passed=passed,
-        count=len(one["checks"]),
-        name=one["file"],
+        count=len(inspection["checks"]),
+        name=inspection["file"],
     )
 
 

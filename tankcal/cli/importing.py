@@ -1,4 +1,4 @@
-"""`tankcal import`: field books of instruments become the CSV files of a job."""
+"""`tankcal import`: conversion of instrument field books to the CSV files of a job."""
 
 import datetime
 import shlex
@@ -15,56 +15,63 @@ LISTS = (".csv", ".txt", ".tsv")
 
 
 def add(commands):
-    """The parser of `tankcal import`."""
+    """Add the parser of `tankcal import`."""
     parser = commands.add_parser(
         "import",
-        help="read field books or a list of points into a job",
-        description="Read the files that total stations export (Leica GSI, RW5, Trimble JobXML, "
-        "Sokkia SDR33, plain tables) and write the tables of a job: set-ups, bare hits of the "
-        "wall, control targets, readings that tie set-ups, all or nothing. A list of points (CSV) "
-        "with headings of its own becomes points.csv, or the table that --table names. "
-        "docs/import.md says what is read of each format.",
-        epilog="exit status: 0 done; 2 the files or the choices must be mended (one line per "
-        "problem: file, row, what was expected; nothing is written then).",
+        help="import field books or a list of points into a job",
+        description="Read the files of total stations (Leica GSI, RW5, Trimble JobXML, Sokkia "
+        "SDR33, plain tables) and write the tables of a job, all or nothing: set-ups, "
+        "reflectorless readings of the wall, control targets, and readings that tie set-ups. A "
+        "list of points (CSV) with your own headings becomes points.csv, or the table that "
+        "--table names. docs/import.md describes each format.",
+        epilog="exit status: 0 done; 2 the files or the options must be corrected (one line per "
+        "problem: file, row, expected value; no file is written).",
     )
     parser.add_argument(
         "names", metavar="FILE", nargs="+", help="the files, in the order of the measurement"
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="the folder of the job (default: this folder, if it is one)"
+        "--out", metavar="DIR", help="the folder of the job (default: this folder, if it is a job)"
     )
     parser.add_argument(
         "--format",
         choices=("gsi", "rw5", "jxl", "sdr", "csv"),
-        help="of all files (default: by their content)",
+        help="format of all files (default: determined from the content)",
     )
     parser.add_argument(
-        "--profile", metavar="FILE.toml", help="which column of a plain table is what"
+        "--profile", metavar="FILE.toml", help="profile: meaning of the columns of a plain table"
     )
     parser.add_argument(
-        "--table", metavar="NAME", help="the table of the job that a list becomes (default: points)"
+        "--table",
+        metavar="NAME",
+        help="the table of the job to which a list is converted (default: points)",
     )
     parser.add_argument(
         "--column",
         metavar="HEADING=COLUMN",
         action="append",
         default=[],
-        help="what a heading of a list means, such as 'Este (m)=x_m'",
+        help="meaning of a heading of a list, such as 'Este (m)=x_m'",
     )
     parser.add_argument(
-        "--yes", action="store_true", help="write a list without asking at the terminal"
+        "--yes", action="store_true", help="write a list without confirmation at the terminal"
     )
     for name, text in (
-        ("hits", "names or codes of bare hits, 1-200 or W* (default: those that begin with WALL, "
-         "HIT, PAREDE or PARED)"),
-        ("control", "names or codes of control targets (default: targets read again)"),
-        ("leave", "names or codes that are not used"),
-        ("check", "names or codes of hits that are only compared (use = check)"),
+        ("hits", "names or codes of reflectorless readings of the wall, 1-200 or W* (default: "
+        "names or codes that begin with WALL, HIT, PAREDE or PARED)"),
+        ("control", "names or codes of control targets (default: targets with repeated readings)"),
+        ("leave", "names or codes to leave out"),
+        ("check", "names or codes of hits for comparison only (use = check)"),
     ):  # fmt: skip
         parser.add_argument(f"--{name}", metavar="PATTERN", action="append", default=[], help=text)
-    parser.add_argument("--no-hits", action="store_true", help="there are no hits, only targets")
     parser.add_argument(
-        "--instrument", metavar="NAME", default="", help="its name in instruments.toml"
+        "--no-hits", action="store_true", help="the files contain targets only, no hits"
+    )
+    parser.add_argument(
+        "--instrument",
+        metavar="NAME",
+        default="",
+        help="name of the instrument in instruments.toml",
     )
     for name, what in (("mm", "distances"), ("arcsec", "angles")):
         parser.add_argument(
@@ -84,19 +91,19 @@ def add(commands):
         "--codes",
         choices=("before", "after"),
         help="code blocks of GSI (words 41 to 49) were stored before or after their readings "
-        "(default: they are told, and not used)",
+        "(default: reported, not used)",
     )
     parser.add_argument(
         "--station-code",
         metavar="CODE",
-        help="the code whose blocks begin a station in GSI: word 42 its name, word 43 the height "
-        "of the instrument in millimetres",
+        help="code of the GSI blocks that begin a station: word 42 is the station name, word 43 "
+        "the instrument height in millimetres",
     )
     parser.add_argument(
-        "--no-control", action="store_true", help="write no known coordinates to control.csv"
+        "--no-control", action="store_true", help="do not write known coordinates to control.csv"
     )
     parser.add_argument(
-        "--replace", action="store_true", help="replace tables that have rows already"
+        "--replace", action="store_true", help="replace tables that already contain rows"
     )
     add_language(parser)
     add_json(parser)
@@ -110,14 +117,14 @@ def _time(text):
         raise refuse_argument(
             message(
                 "option_time",
-                "found {text!r}; expected a date with its time, such as 2026-07-14T09:00",
+                "found {text!r}; expected a date with the time, such as 2026-07-14T09:00",
                 text=text,
             )
         ) from None
 
 
-def _asked_of_folder(folder):
-    """The language of the job that the tables go to; None: there is none yet."""
+def _language_of_folder(folder):
+    """Return the language of the job in a folder, or None."""
     from tankcal.cli.asked_language import asked_language
 
     return asked_language(folder) if (folder / SETTINGS_FILE).is_file() else None
@@ -126,7 +133,7 @@ def _asked_of_folder(folder):
 def _import(options):
     prepare_for_small_work()
     options.out = options.out or _folder_here()
-    speak(options.language or _asked_of_folder(Path(options.out)))
+    speak(options.language or _language_of_folder(Path(options.out)))
     _refuse_workbook(Path(options.out))
     as_list = _list_of(options)
     if as_list is not None:
@@ -152,25 +159,25 @@ def _import(options):
         codes=options.codes,
         station_code=options.station_code,
     )
-    found = import_fieldbooks(options.names, options.out, choices, replace_tables=options.replace)
+    result = import_fieldbooks(options.names, options.out, choices, replace_tables=options.replace)
     if options.machine:
         print_json(
             exit_status=0,
-            summary=list(map(str, found.summary)),
-            warnings=[problem_of(one) for one in found.warnings],
-            files=list(map(str, found.paths)),
+            summary=list(map(str, result.summary)),
+            warnings=[problem_of(warning) for warning in result.warnings],
+            files=list(map(str, result.paths)),
         )
         return None
-    for line in found.summary:
+    for line in result.summary:
         say(line)
-    warn(found.warnings)
+    warn(result.warnings)
     survey = "total-station" if options.no_hits else "wall-hits"
-    say_written(Path(options.out), found.paths, survey)
+    say_written(Path(options.out), result.paths, survey)
     return None
 
 
 def _folder_here():
-    """The folder of the command when it is a job."""
+    """Return the current folder if it is a job."""
     if Path(SETTINGS_FILE).is_file():
         return "."
     raise refuse_argument(
@@ -179,25 +186,26 @@ def _folder_here():
 
 
 def _refuse_workbook(folder):
-    """Raise InputError for a job that is filled in as a workbook: its CSV files are not read."""
+    """Raise InputError for a job in a workbook, because its CSV files would not be read."""
     if (folder / WORKBOOK_FILE).is_file() and not (folder / "job.toml").is_file():
         text = message(
             "import_into_workbook",
-            "is filled in as {book}; expected a job of text files: tankcal new ANOTHER-FOLDER",
+            "contains the workbook {book}; expected a job with CSV files: tankcal new "
+            "ANOTHER-FOLDER",
             book=WORKBOOK_FILE,
         )
         raise InputError(Problem(folder.resolve().name, text))
 
 
 def _list_of(options):
-    """ForeignList of the only file where it is a list of points or of another table, or None."""
+    """Return the ForeignList of a single file with a list of points or another table, or None."""
     if len(options.names) != 1 or options.profile or options.format:
         return None
     from tankcal.fieldbooks import lists
     from tankcal.fieldbooks.detection import is_field_book
 
-    path, given = Path(options.names[0]), dict(map(_column, options.column))
-    is_named = bool(options.table or given)
+    path, stated = Path(options.names[0]), dict(map(_column, options.column))
+    is_named = bool(options.table or stated)
     if not is_named and (path.suffix.lower() not in LISTS or not path.is_file()):
         return None
     name = options.table or (path.stem if lists.is_table(path.stem) else "points")
@@ -208,15 +216,15 @@ def _list_of(options):
     if not is_named and (path.stat().st_size > lists.MAX_BYTES or is_field_book(path.read_bytes())):
         return None
     try:
-        found = lists.read_list(path, Path(options.out), name, given)
+        foreign_list = lists.read_list(path, Path(options.out), name, stated)
     except InputError:
         if is_named:
             raise
         return None  # the reader of field books refuses it
     # at least one needed column beside the name of the point is recognised
-    unknown = {one.name for one in found.missing} - {"point"}
+    unknown = {field_.name for field_ in foreign_list.missing} - {"point"}
     is_list = len(unknown) < sum(field.required for field in lists.COLUMNS[name]) - 1
-    return found if is_named or is_list else None
+    return foreign_list if is_named or is_list else None
 
 
 def _column(text):
@@ -233,7 +241,7 @@ def _column(text):
 
 
 def say_written(folder, paths, survey):
-    """Print the files that were written, and the next command."""
+    """Print the written files and the next command."""
     say(message("import_wrote", "wrote into {folder}:", folder=str(folder)))
     for path in paths:
         print(f"  {printable(path)}")
@@ -241,25 +249,25 @@ def say_written(folder, paths, survey):
 
 
 def _say_next(folder, survey):
-    """What to do then; a folder without job.toml holds tables, but is no job yet."""
+    """Print the next commands; a folder without job.toml is not yet a job."""
     job = folder
     if not (folder / "job.toml").is_file():
         job = folder.parent / f"{folder.resolve().name or 'tank'}-job"
         text = message(
             "import_without_job",
-            "{folder} has no job.toml, so it cannot be run: make an empty job, then import once"
-            " more with --out {job}, which fills in its empty tables",
+            "{folder} has no job.toml, so tankcal run cannot compute it: create an empty job, "
+            "then repeat the import with --out {job}, which fills in the empty tables of that job",
             folder=str(folder),
             job=str(job),
         )
         say(text)
         of_survey = "" if survey is None else f" --survey {survey}"
-        print(f"  tankcal new {_quoted(job)}{of_survey}")
-        print(f"  tankcal import ... --out {_quoted(job)}")
+        print(f"  tankcal new {_quote_path(job)}{of_survey}")
+        print(f"  tankcal import ... --out {_quote_path(job)}")
     say(message("import_next", "then"))
-    print(f"  tankcal run {_quoted(job)}")
+    print(f"  tankcal run {_quote_path(job)}")
 
 
-def _quoted(path):
-    """A path as a shell takes it; its control characters are spelt out."""
+def _quote_path(path):
+    """Return a path quoted for a shell, with escaped control characters."""
     return printable(shlex.quote(str(path)))

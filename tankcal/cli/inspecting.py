@@ -1,4 +1,4 @@
-"""`tankcal inspect`: plumb, roundness, welds and settlement of a tank by its survey."""
+"""`tankcal inspect`: plumb, roundness, welds and settlement of a tank from its survey."""
 
 from tankcal.cli.arguments import add_language, yield_mpa
 from tankcal.cli.machine import add_json, print_saved
@@ -17,32 +17,34 @@ NOMINALS = ("drawing", "mean")
 
 
 def add(commands):
-    """The parser of `tankcal inspect`."""
+    """Add the parser of `tankcal inspect`."""
     inspect = commands.add_parser(
         "inspect",
-        help="plumb, roundness, welds and settlement of a tank by its survey",
-        description="Inspect an upright tank by the survey that calibrates it: plumb, roundness, "
-        "peaking and banding where it was scanned, settlement where it was levelled; each with its "
-        "U, judged by a rule. It is no part of the certificate. docs/inspection.md says how.",
-        epilog="exit status: 0 done, whatever the verdict; 2 the input must be mended; 3 the "
-        "survey has no sound solution.",
+        help="inspect plumb, roundness, welds and settlement of a tank from its survey",
+        description="Inspect a vertical tank with the survey of its calibration: plumb, roundness, "
+        "peaking and banding (from scans), settlement (from levelling). Each result has its "
+        "U and a verdict by a rule. The inspection is not part of the certificate. See "
+        "docs/inspection.md.",
+        epilog="exit status: 0 done, whatever the verdict; 2 the input must be corrected; 3 the "
+        "survey has no valid solution.",
     )
     inspect.add_argument(
         "source", metavar="JOB", help="a job, a record.json, or a folder of results"
     )
     inspect.add_argument(
-        "--rule", metavar="RULE", help="a rule by its name, or a .toml file (default: api_653)"
+        "--rule", metavar="RULE", help="the name of a rule, or a .toml file (default: api_653)"
     )
     inspect.add_argument(
         "--nominal",
         choices=NOMINALS,
         default=NOMINALS[0],
-        help="what radii are compared with: the drawing's, or their own mean",
+        help="reference of the radii: the drawing, or the mean of the measured radii",
     )
     inspect.add_argument(
         "--settlement",
         metavar="FILE",
-        help="elevations round the foot (default: settlement.csv beside the job, if any)",
+        help="elevations along the foot of the shell (default: settlement.csv beside the job, if "
+        "any)",
     )
     inspect.add_argument(
         "--edges",
@@ -53,10 +55,13 @@ def add(commands):
         "--yield-mpa",
         metavar="MPA",
         type=yield_mpa,
-        help="yield stress of the steel, for the limits of settlement (default: as the job says)",
+        help="yield strength of the steel, for the limits of settlement (default: value of the "
+        "job)",
     )
     inspect.add_argument(
-        "--out", metavar="DIR", help="write inspection.json and papers there, all or nothing"
+        "--out",
+        metavar="DIR",
+        help="write inspection.json and reports to this folder, all or nothing",
     )
     add_language(inspect)
     inspect.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -86,40 +91,46 @@ def _inspect(options):
         edges=options.edges,
         yield_pa=None if options.yield_mpa is None else 1e6 * options.yield_mpa,
     )
-    found = plain_of_inspection(inspect_files(asked, show.step, show.part))
+    inspection = plain_of_inspection(inspect_files(asked, show.step, show.part))
     written = ()
     if options.out is not None:
-        written = write_inspection(found, options.out, language_of_run(), show.step)
+        written = write_inspection(inspection, options.out, language_of_run(), show.step)
     show.end()
-    print_saved(options, found, _tell, written)
+    print_saved(options, inspection, _tell, written)
 
 
-def _tell(found):
-    """Warnings, the rule, then a line for each check."""
+def _tell(inspection):
+    """Print warnings, the rule, and a line for each check."""
     from tankcal.report.inspection import InspectionPaper
 
-    paper = InspectionPaper(found, language_of_run())
-    warn(paper.warning(one) for one in found["warnings"][:MOST_WARNINGS])
+    paper = InspectionPaper(inspection, language_of_run())
+    warn(paper.warning(warning) for warning in inspection["warnings"][:MOST_WARNINGS])
     rule = paper.found["rule"]
-    say(message("inspect_by", "judged by {rule} ({file})", rule=rule["name"], file=rule["file"]))
+    say(message("inspect_by", "rule: {rule} ({file})", rule=rule["name"], file=rule["file"]))
     if not rule["verified"]:
-        say(message("inspect_not_read", "* not read in the text: {remark}", remark=rule["remark"]))
-    for one in found["checks"]:
-        say(_line(paper, one))
+        say(
+            message(
+                "inspect_not_read",
+                "* not verified in the text of the standard: {remark}",
+                remark=rule["remark"],
+            )
+        )
+    for check in inspection["checks"]:
+        say(_line(paper, check))
 
 
-def _line(paper, one):
-    """One check: its name, the value with U, the limit, the verdict, where it is."""
-    name, verdict = paper.check_name(one["code"]), paper.verdict(one)
-    if one["value"] is None:
-        return f"{name}: {paper.remark(one) or verdict}"
+def _line(paper, check):
+    """Return the line of a check: name, value with U, limit, verdict, position."""
+    name, verdict = paper.check_name(check["code"]), paper.verdict(check)
+    if check["value"] is None:
+        return f"{name}: {paper.remark(check) or verdict}"
     values = {
         "check": name,
-        "value": paper.value(one),
-        "U": paper.in_unit(one, one["U"]) or "?",
-        "limit": paper.limit(one) or "-",
+        "value": paper.value(check),
+        "U": paper.in_unit(check, check["U"]) or "?",
+        "limit": paper.limit(check) or "-",
         "verdict": verdict,
-        "place": paper.place(one),
+        "place": paper.place(check),
     }
     return message(
         "inspect_check", "{check}: {value}, U {U}, limit {limit}: {verdict} ({place})", **values

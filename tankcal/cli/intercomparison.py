@@ -1,4 +1,4 @@
-"""`tankcal intercomparison`: packages of simulated surveys, answers to them, scores."""
+"""`tankcal intercomparison`: packages of simulated surveys, answers, scores."""
 
 from pathlib import Path
 
@@ -26,13 +26,13 @@ MOST_TANKS = 100
 
 
 def add(commands):
-    """The parser of `tankcal intercomparison` and its commands."""
+    """Add the parsers of `tankcal intercomparison` and its commands."""
     parser = commands.add_parser(
         "intercomparison",
-        help="packages of simulated surveys with sealed truth, answers of any software, scores",
-        description="A proficiency test of software that calibrates tanks: make a package of "
-        "simulated surveys whose true volumes are sealed, answer it, score answers of any "
-        "software. docs/intercomparison.md has the formats and the formulas.",
+        help="compare software: simulated surveys with sealed true volumes, answers, scores",
+        description="Run a proficiency test of software for tank calibration: create a package of "
+        "simulated surveys with sealed true volumes, answer it, and score the answers of any "
+        "software. docs/intercomparison.md describes the formats and the formulas.",
     )
     parser.set_defaults(shown=parser)
     inner = parser.add_subparsers(metavar="WHAT")
@@ -45,28 +45,34 @@ def add(commands):
 def _add_make(commands):
     make = commands.add_parser(
         "make",
-        help="draw tanks, survey them, seal their volumes",
-        description="Write package (to publish), sealed/truth.json (to keep until all answers are "
-        "in) and practice (the same with its truth) into a new folder. The SHA-256 of the truth "
-        "stands in the package.",
+        help="simulate tanks and their surveys, and seal the true volumes",
+        description="Write package (for publication), sealed/truth.json (secret until all answers "
+        "are received) and practice (a package with its true volumes) to a new folder. The "
+        "package contains the SHA-256 of the truth.",
     )
-    make.add_argument("directory", metavar="DIR", help="the folder to make")
-    make.add_argument("--tanks", metavar="N", type=_tanks, default=6, help="how many (default: 6)")
+    make.add_argument("directory", metavar="DIR", help="the folder to create")
+    make.add_argument(
+        "--tanks", metavar="N", type=_tanks, default=6, help="number of tanks (default: 6)"
+    )
     make.add_argument(
         "--practice", metavar="N", type=_tanks_or_none, default=1,
-        help="tanks for practice, with their truth (default: 1; 0: none)",
+        help="number of practice tanks, with their true volumes (default: 1; 0: none)",
     )  # fmt: skip
     make.add_argument(
-        "--seed", metavar="S", type=parse_count, default=1, help="of the draws (default: 1)"
+        "--seed",
+        metavar="S",
+        type=parse_count,
+        default=1,
+        help="seed of the simulation (default: 1)",
     )
     make.add_argument(
         "--secret", metavar="HEX", type=_secret,
-        help="64 hexadecimal digits out of a truth file, to make its package again (default: by "
-        "lot)",
+        help="64 hexadecimal digits from a truth file, to create its package again (default: "
+"random)",
     )  # fmt: skip
     make.add_argument(
         "--methods", metavar="METHOD", nargs="+", choices=METHODS, default=list(METHODS),
-        help=f"of the surveys: {', '.join(METHODS)} (default: all)",
+        help=f"survey methods: {', '.join(METHODS)} (default: all)",
     )  # fmt: skip
     _add_common(make)
     make.set_defaults(command=_make)
@@ -76,8 +82,7 @@ def _add_template(commands):
     template = commands.add_parser(
         "template",
         help="write empty forms for the answers to a package",
-        description="Write participant.toml and a table for each survey, with the heights that "
-        "are asked and nothing else.",
+        description="Write participant.toml and a table for each survey with the required heights.",
     )
     _add_package_and_answers(template)
     template.set_defaults(command=_template)
@@ -86,9 +91,9 @@ def _add_template(commands):
 def _add_answer(commands):
     answer = commands.add_parser(
         "answer",
-        help="compute a package by tankcal and write its answers",
-        description="Run tankcal on every survey of a package and write the answers as any "
-        "participant does.",
+        help="compute a package with tankcal and write the answers",
+        description="Run tankcal on every survey of a package and write the answers in the form "
+        "required of any participant.",
     )
     _add_package_and_answers(answer)
     answer.set_defaults(command=_answer)
@@ -98,18 +103,20 @@ def _add_score(commands):
     score = commands.add_parser(
         "score",
         help="score answers against the truth",
-        description="Check that the truth is the one that was sealed, and tell error, E_n, "
-        "coverage and form of every table, of several participants together.",
-        epilog="exit status: 0 done, whatever the scores; 2 answers or truth must be mended (one "
-        "line per problem).",
+        description="Check that the truth is the sealed truth, and report error, E_n, coverage "
+        "and form of every table of all participants.",
+        epilog="exit status: 0 done, whatever the scores; 2 answers or truth must be corrected "
+        "(one line per problem).",
     )
     score.add_argument("names", metavar="ANSWERS", nargs="+", help="folders of answers")
     score.add_argument("--truth", metavar="TRUTH", required=True, help="truth.json, or its folder")
     score.add_argument(
-        "--package", metavar="PACKAGE", help="the package: its manifest must name this truth, too"
+        "--package", metavar="PACKAGE", help="the package: its manifest must also name this truth"
     )
     score.add_argument(
-        "--out", metavar="DIR", help="write scores.json, page and workbook there, all or nothing"
+        "--out",
+        metavar="DIR",
+        help="write scores.json, web page and workbook to this folder, all or nothing",
     )
     _add_common(score)
     add_json(score)
@@ -118,7 +125,7 @@ def _add_score(commands):
 
 def _add_package_and_answers(parser):
     parser.add_argument("package", metavar="PACKAGE", help="the folder of a package")
-    parser.add_argument("--out", metavar="ANSWERS", required=True, help="the folder to make")
+    parser.add_argument("--out", metavar="ANSWERS", required=True, help="the folder to create")
     _add_common(parser)
 
 
@@ -166,21 +173,26 @@ def _make(options):
     out = Path(options.directory)
     _refuse_existing(out)
     show = Progress(options.quiet)
-    methods = [one for one in METHODS if one in options.methods]
+    methods = [method for method in METHODS if method in options.methods]
     secret = options.secret or secrets.token_hex(32)
-    made = make_package(options.tanks, options.seed, methods, secret=secret, progress=show.part)
+    package = make_package(options.tanks, options.seed, methods, secret=secret, progress=show.part)
     with replaced(out) as folder:
-        write_files(folder / "package", made.files)
-        write_files(folder / "sealed", {TRUTH.file: made.truth})
+        write_files(folder / "package", package.files)
+        write_files(folder / "sealed", {TRUTH.file: package.truth})
         if options.practice:
             practice = make_package(
                 options.practice, options.seed, methods, is_open=True, progress=show.part
             )
             write_files(folder / "practice", {**practice.files, TRUTH.file: practice.truth})
     show.end()
-    say(message("ic_keep_sealed", "keep {file} to yourself until all answers are in; its SHA-256 "
-                "stands in {manifest}", file=str(out / "sealed" / TRUTH.file),
-                manifest=str(out / "package" / "manifest.json")))  # fmt: skip
+    say(
+        message(
+            "ic_keep_sealed",
+            "keep {file} secret until all answers are received; {manifest} contains its SHA-256",
+            file=str(out / "sealed" / TRUTH.file),
+            manifest=str(out / "package" / "manifest.json"),
+        )
+    )
     print_paths(out, ["package", "sealed", *(["practice"] if options.practice else [])])
 
 
@@ -209,9 +221,9 @@ def _answer(options):
     _refuse_existing(options.out)
     manifest = _package(options.package)
     show = Progress(options.quiet)
-    saved, told = answer_package(options.package, manifest, show.part)
+    saved, warnings = answer_package(options.package, manifest, show.part)
     show.end()
-    warn(told)
+    warn(warnings)
     files = answer_files(saved)
     with replaced(options.out) as folder:
         write_files(folder, files)
@@ -231,23 +243,23 @@ def _score(options):
     show = Progress(options.quiet or options.machine)
     show.step(message("ic_scoring", "scoring answers (folders: {count})",
                       count=len(options.names)))  # fmt: skip
-    found = plain_of(score_folders(options.names, options.truth, options.package))
+    scores = plain_of(score_folders(options.names, options.truth, options.package))
     written = ()
     if options.out is not None:
-        written = write_scores(found, options.out, language_of_run(), show.step)
+        written = write_scores(scores, options.out, language_of_run(), show.step)
     show.end()
-    print_saved(options, found, _tell, written)
+    print_saved(options, scores, _tell, written)
 
 
 def _refuse_existing(out):
-    """Raise InputError where the folder to make is there already, and not empty."""
+    """Raise InputError if the folder to create exists and is not empty."""
     from tankcal.report.folders import refuse_foreign
 
     refuse_foreign(out, ())
 
 
 def _package(folder):
-    """The manifest of a package; raises InputError with all that is wrong."""
+    """Return the manifest of a package; raise InputError with all its problems."""
     from tankcal.intercomparison.package import load_package
     from tankcal.job.tables import Log
 
@@ -257,23 +269,23 @@ def _package(folder):
     return manifest
 
 
-def _tell(found):
-    """Warnings, then a line for each participant and method."""
+def _tell(scores):
+    """Print warnings and a line for each participant and method."""
     from tankcal.report.scores import ScoresPaper
 
-    paper = ScoresPaper(found, language_of_run())
-    warn(paper.warning(one) for one in found["warnings"][:MOST_WARNINGS])
-    for one in found["methods"]:
+    paper = ScoresPaper(scores, language_of_run())
+    warn(paper.warning(warning) for warning in scores["warnings"][:MOST_WARNINGS])
+    for score in scores["methods"]:
         values = {
-            "who": paper.participant(one),
-            "method": paper.method(one["method"]),
-            "tables": one["tables"],
-            "asked": one["asked"],
-            "rms": _ppm(one["rms_top_ppm"]),
-            "U": _ppm(one["mean_U_ppm"]),
-            "within": one["tops_within"],
-            "judged": one["tops_judged"],
-            "zeta": NOTHING if one["rms_zeta"] is None else fixed(one["rms_zeta"], 2, marks()),
+            "who": paper.participant(score),
+            "method": paper.method(score["method"]),
+            "tables": score["tables"],
+            "asked": score["asked"],
+            "rms": _ppm(score["rms_top_ppm"]),
+            "U": _ppm(score["mean_U_ppm"]),
+            "within": score["tops_within"],
+            "judged": score["tops_judged"],
+            "zeta": NOTHING if score["rms_zeta"] is None else fixed(score["rms_zeta"], 2, marks()),
         }
         say(
             message(

@@ -1,8 +1,8 @@
-"""`python -m tankcal.cli.kernels`: compile the loops once, at installation, for all who use it.
+"""`python -m tankcal.cli.kernels`: compile the loops once, at installation, for all users.
 
-What comes out lies beside the sources, for this kind of processor; an installation that may not be
-written to afterwards reads it from there. A small survey by photographs and a small table ask for
-every loop that a large one would.
+The compiled loops are saved beside the sources for this kind of processor. A write-protected
+installation reads them from there. A small photogrammetric survey and a small table require every
+loop of a large computation.
 """
 
 import os
@@ -17,14 +17,14 @@ ROWS = 3000  # of the table: from here on a walk over its chords is compiled
 
 
 def main():
-    """Compile what is not kept yet, and say what is; the exit status."""
+    """Compile the loops that are not saved yet, print the result, and return the exit status."""
     os.environ["TANKCAL_COMPILED"] = "1"
     from tankcal.exports.breakpoints import best_breakpoints, fewest_breakpoints
     from tankcal.solver.compiled import available, mark_as_kept
     from tankcal.survey.network import adjust
 
     if not available():
-        text = message("kernels_no_numba", "numba is not installed: nothing to compile")
+        text = message("kernels_no_numba", "numba is not installed: no loop was compiled")
         print(text, file=sys.stderr)
         return 1
     adjusted = adjust(small_survey())
@@ -40,14 +40,14 @@ def main():
     if not mark_as_kept():
         text = message(
             "kernels_not_kept",
-            "{folder} may not be written to: compiled loops were not kept",
+            "{folder} is write-protected: the compiled loops were not saved",
             folder=package,
         )
         print(text, file=sys.stderr)
         return 1
     text = message(
         "kernels_kept",
-        "{count} compiled loops are kept in {folder}",
+        "{count} compiled loops are saved in {folder}",
         count=len(kept), folder=package,
     )  # fmt: skip
     print(text)
@@ -55,7 +55,7 @@ def main():
 
 
 def small_survey():
-    """A Survey of sixteen points by four photographs, half of them control; no residuals."""
+    """Return a Survey of 16 points in 4 photographs, half of them control, without residuals."""
     from tankcal.camera.model import Form
     from tankcal.survey.network import Camera, Photos, Survey
     from tankcal.survey.observations import ControlCoordinates, ImageCoordinates

@@ -1,4 +1,4 @@
-"""`tankcal lint`: mistakes in any capacity table."""
+"""`tankcal lint`: errors in any capacity table."""
 
 from tankcal.cli.arguments import add_language, positive
 from tankcal.cli.machine import add_json, print_json
@@ -10,14 +10,14 @@ MOST_FINDINGS = 50  # that are shown at once
 
 
 def add(commands):
-    """The parser of `tankcal lint`."""
+    """Add the parser of `tankcal lint`."""
     lint = commands.add_parser(
         "lint",
-        help="look for mistakes in a capacity table, of any origin",
-        description="Look for mistakes in a capacity table: unreadable numbers, rows missing, "
-        "doubled or swapped, wrong digits, shifted blocks, wrong units, a total or a last row "
-        "that does not fit. One line a finding; docs/table.md says how they are found.",
-        epilog="exit status: 0 no errors (there may be warnings); 2 errors found, or no table.",
+        help="check any capacity table for errors",
+        description="Check a capacity table for errors: unreadable numbers; missing, repeated or "
+        "exchanged rows; wrong digits; shifted blocks; wrong units; a total or a last row "
+        "that does not fit. One line per finding; docs/table.md describes the tests.",
+        epilog="exit status: 0 no errors (warnings are possible); 2 errors found, or no table.",
     )
     lint.add_argument(
         "file",
@@ -25,16 +25,20 @@ def add(commands):
         help="a CSV file, an Excel workbook (.xlsx), a PDF with the table as text, or a "
         "record.json",
     )
-    lint.add_argument("--sheet", metavar="NAME", help="of a workbook (default: the longest table)")
+    lint.add_argument(
+        "--sheet",
+        metavar="NAME",
+        help="sheet of a workbook (default: the sheet with the longest table)",
+    )
     lint.add_argument(
         "--uneven",
         action="store_true",
-        help="the rows stand where they are needed (breakpoints), not at even steps",
+        help="the rows are breakpoints, not at even steps",
     )
     for name, unit, what in (
-        ("volume", "M3", "volume the tank is meant to hold, m3"),
-        ("diameter", "M", "inside diameter of an upright tank, m; with --nominal-height"),
-        ("height", "M", "height that the last row is meant to have, m"),
+        ("volume", "M3", "nominal volume of the tank, m3"),
+        ("diameter", "M", "inside diameter of a vertical tank, m; requires --nominal-height"),
+        ("height", "M", "nominal height of the last row, m"),
     ):
         lint.add_argument(f"--nominal-{name}", metavar=unit, type=positive, help=what)
     add_language(lint)
@@ -91,7 +95,9 @@ def _warnings(count):
 
 
 def _plain(report):
-    findings = [{"severity": one.severity, **problem_of(one.problem)} for one in report.findings]
+    findings = [
+        {"severity": finding.severity, **problem_of(finding.problem)} for finding in report.findings
+    ]
     return {
         "errors": report.errors,
         "warnings": len(report.findings) - report.errors,

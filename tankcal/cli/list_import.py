@@ -1,4 +1,4 @@
-"""`tankcal import` of a technician's own list: what its headings mean is shown and confirmed."""
+"""`tankcal import` of a user-defined list: display and confirmation of the headings."""
 
 import sys
 from dataclasses import replace
@@ -15,72 +15,73 @@ from tankcal.messages import message, printable
 NO = ("n", "no", "nao", "não")
 
 
-def import_list(found, options):
-    """Show what the headings of a ForeignList mean, ask, and write it; returns the exit status."""
+def import_list(foreign_list, options):
+    """Confirm the headings of a ForeignList, write it, and return the exit status."""
     is_asked = sys.stdin.isatty() and sys.stdout.isatty() and not (options.yes or options.machine)
     folder = Path(options.out)
     if is_asked:
-        found = _ask_missing(found)
-    lines = _lines(found, folder)
+        foreign_list = _ask_missing(foreign_list)
+    lines = _lines(foreign_list, folder)
     if not options.machine:
         for line in lines:
             say(line)
-        warn(found.warnings)
-    refuse_missing(found)
+        warn(foreign_list.warnings)
+    refuse_missing(foreign_list)
     if is_asked and not _is_confirmed():
         complain(
             message(
                 "list_not_written",
-                "nothing was written; --column 'HEADING=COLUMN' gives a heading another meaning",
+                "no file was written; --column 'HEADING=COLUMN' assigns another meaning to a "
+                "heading",
             )
         )
         return 2
-    paths = write_list(found, folder, replace=options.replace)
+    paths = write_list(foreign_list, folder, replace=options.replace)
     if options.machine:
         files = [str(path) for path in paths]
-        warnings = [problem_of(one) for one in found.warnings]
+        warnings = [problem_of(warning) for warning in foreign_list.warnings]
         print_json(
-            exit_status=0, summary=[str(one) for one in lines], warnings=warnings, files=files
+            exit_status=0, summary=[str(line) for line in lines], warnings=warnings, files=files
         )
         return 0
     say_written(folder, paths, None)
     return 0
 
 
-def _lines(found, folder):
-    """What the list becomes: a line for each heading."""
+def _lines(foreign_list, folder):
+    """Return the lines that show the meaning of each heading."""
     first = message(
         "list_becomes",
         "{file} becomes {table}.csv of {folder}:",
-        file=found.table.file,
-        table=found.name,
+        file=foreign_list.table.file,
+        table=foreign_list.name,
         folder=str(folder),
     )
     lines = [first]
-    for heading in found.table.headings:
-        one = found.meanings.get(heading)
+    for heading in foreign_list.table.headings:
+        meaning = foreign_list.meanings.get(heading)
         named = {"heading": heading}
-        if one is None:
+        if meaning is None:
             line = message("list_unused", "  {heading}: not used", **named)
-        elif one.factor == 1:
-            line = message("list_means", "  {heading} = {column}", column=one.column, **named)
+        elif meaning.factor == 1:
+            line = message("list_means", "  {heading} = {column}", column=meaning.column, **named)
         else:
             line = message(
                 "list_means_converted",
                 "  {heading} = {column}, converted from {unit}",
-                column=one.column,
-                unit=one.unit,
+                column=meaning.column,
+                unit=meaning.unit,
                 **named,
             )
         lines.append(line)
     return lines
 
 
-def _ask_missing(found):
-    """The ForeignList with the headings that the user chooses for columns that it lacks."""
-    meanings = dict(found.meanings)
-    for field in found.missing:
-        free = [one for one in found.table.headings if one not in meanings]
+def _ask_missing(foreign_list):
+    """Return the ForeignList with headings chosen by the user for missing columns."""
+    meanings = dict(foreign_list.meanings)
+    for field in foreign_list.missing:
+        free = [title for title in foreign_list.table.headings if title not in meanings]
         if not free:
             break
         say(message("list_ask", "which heading is {column}?", column=field.name))
@@ -90,7 +91,7 @@ def _ask_missing(found):
         if answer.isdecimal() and 1 <= int(answer) <= len(free):
             heading = free[int(answer) - 1]
             meanings[heading] = stated_meaning(heading, field)
-    return replace(found, meanings=meanings)
+    return replace(foreign_list, meanings=meanings)
 
 
 def _is_confirmed():
@@ -98,7 +99,7 @@ def _is_confirmed():
 
 
 def _answer(prompt):
-    """One line of the terminal; its end counts as no."""
+    """Return one line of the terminal; its end counts as no."""
     try:
         return input(prompt).strip()
     except EOFError:

@@ -1,4 +1,4 @@
-"""What `--json` prints: one JSON object on standard output, for programs that call tankcal."""
+"""Output of `--json`: one JSON object on standard output, for other programs."""
 
 import codecs
 import json
@@ -10,12 +10,12 @@ from tankcal.errors import InputError, problem_of
 
 
 def add_json(parser):
-    """The option `--json` of a command."""
+    """Add the option `--json` to a command."""
     parser.add_argument(
         "--json",
         dest="machine",
         action="store_true",
-        help="print one JSON object instead of lines of text, when it fails too; implies --quiet",
+        help="print one JSON object in place of lines of text, also for errors; implies --quiet",
     )
 
 
@@ -26,24 +26,31 @@ def print_json(**values):
     print()
 
 
-def print_saved(options, found, tell, written):
-    """Print what a command found, told by tell(found) in lines of text, and which files it wrote.
+def print_saved(options, results, tell, written):
+    """Print the results of a command, by tell(results) in lines of text, and its written files.
 
-    `written` are their paths below options.out; with `--json` one object is printed of `found`.
+    Parameters
+    ----------
+    options : Namespace
+    results : dict
+        With `--json`, one object with these values is printed.
+    tell : callable
+    written : sequence of Path
+        Paths below options.out.
     """
     if options.machine:
-        print_json(exit_status=0, **found)
+        print_json(exit_status=0, **results)
         return
-    tell(found)
+    tell(results)
     if written:
         print_paths(Path(options.out), [path.name for path in written])
 
 
 def failure(error):
-    """What is printed of a `TankcalError`: its problems, and the exit status that follows."""
+    """Return the output for a `TankcalError`: its problems and the exit status."""
     problems = error.problems if isinstance(error, InputError) else ()
     return {
         "exit_status": error.exit_status,
-        "problems": [problem_of(one) for one in problems],
+        "problems": [problem_of(problem) for problem in problems],
         "error": None if problems else str(error),
     }

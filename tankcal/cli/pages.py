@@ -1,4 +1,4 @@
-"""`tankcal docs`: the pages of the documentation, which ship with the package."""
+"""`tankcal docs`: the documentation pages shipped with the package."""
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
@@ -7,20 +7,21 @@ FOLDER = "docs"
 
 
 def add(commands):
-    """The parser of `tankcal docs`."""
+    """Add the parser of `tankcal docs`."""
     parser = commands.add_parser(
         "docs",
-        help="show the documentation that is installed",
-        description="Print a page of the documentation as text (Markdown), or, without a name, the "
-        "list of the pages and the folder that they are in. What help and messages call "
-        "docs/NAME.md is the page NAME.",
+        help="show the installed documentation",
+        description="Print a page of the documentation as text (Markdown). Without a name, list "
+        "the pages and their folder. The page docs/NAME.md has the name NAME.",
     )
-    parser.add_argument("page", metavar="NAME", nargs="?", help="of a page, such as job-format")
+    parser.add_argument(
+        "page", metavar="NAME", nargs="?", help="name of a page, such as job-format"
+    )
     parser.set_defaults(command=_docs)
 
 
 def page_names():
-    """Names of the pages, in alphabetical order."""
+    """Return the names of the pages in alphabetical order."""
     from tankcal.text.shipped import shipped_folder
 
     return tuple(sorted(path.stem for path in shipped_folder(FOLDER).glob("*.md")))
@@ -41,7 +42,7 @@ def _docs(options):
 
         text = message(
             "page_unknown",
-            "no such page{hint}; expected one of those that tankcal docs lists",
+            "no such page{hint}; expected a page that tankcal docs lists",
             hint=nearest(name, names),
         )
         raise InputError(Problem(options.page[:60], text))
@@ -49,6 +50,6 @@ def _docs(options):
 
 
 def _title(path):
-    """The first heading of a page, without its mark."""
+    """Return the first heading of a page without its mark."""
     with path.open(encoding="utf-8") as lines:
         return next((line[2:].strip() for line in lines if line.startswith("# ")), "")

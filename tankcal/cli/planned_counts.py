@@ -1,4 +1,4 @@
-"""How many of each thing a plan has, in words: one photograph, two photographs."""
+"""Numbers of the items of a plan in words: 1 photograph, 2 photographs."""
 
 from tankcal.messages import message
 
@@ -9,17 +9,17 @@ KINDS = (
 
 
 def plan_holds(plan, counts):
-    """What a plan has, of what it may have.
+    """Return the items of a plan in words.
 
-    counts  {kind, of KINDS: how many}
+    counts  {kind, of KINDS: number}
     """
     parts = [counted(kind, count) for kind, count in counts.items() if count]
     return message("plan_holds", "{tank}: {parts}", tank=plan.job.tank.id, parts=parts)
 
 
 def counted(kind, count):
-    """That many of a kind, of KINDS."""
-    one, many = {
+    """Return the number of items of a kind, of KINDS, in words."""
+    singular, plural = {
         "photographs": (
             message("plan_one_photograph", "{count} photograph", count=count),
             message("plan_photographs", "{count} photographs", count=count),
@@ -45,8 +45,8 @@ def counted(kind, count):
             message("plan_targets", "{count} targets", count=count),
         ),
         "straps": (
-            message("plan_one_strap", "{count} reading of the tape", count=count),
-            message("plan_straps", "{count} readings of the tape", count=count),
+            message("plan_one_strap", "{count} tape reading", count=count),
+            message("plan_straps", "{count} tape readings", count=count),
         ),
         "lines": (
             message("plan_one_line", "{count} reference line", count=count),
@@ -73,4 +73,4 @@ def counted(kind, count):
             message("plan_batches", "{count} batches", count=count),
         ),
     }[kind]
-    return one if count == 1 else many
+    return singular if count == 1 else plural

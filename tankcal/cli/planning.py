@@ -1,4 +1,4 @@
-"""`tankcal plan`: what a survey will be worth, before anyone drives to the site."""
+"""`tankcal plan`: prediction of the uncertainty of a survey before the measurement."""
 
 from pathlib import Path
 
@@ -21,21 +21,21 @@ SHOWN = 12  # changes in the terminal
 
 
 def add(commands):
-    """The parser of `tankcal plan`."""
+    """Add the parser of `tankcal plan`."""
     plan = commands.add_parser(
         "plan",
-        help="plan a survey: the uncertainty of the table before anything is measured",
-        description="Read and check a plan (a job without measured values), find out what is seen "
-        "from where, and predict how well points, sections and every row of the table will be "
-        "known. docs/planning.md says what a plan holds.",
-        epilog="exit status: 0 done; 2 the plan must be mended; 3 the survey would have no sound "
-        "solution.",
+        help="plan a survey: predict the uncertainty of the table before the measurement",
+        description="Read and check a plan (a job without measured values), determine which "
+        "targets are visible from which station, and predict the uncertainty of points, sections "
+        "and every row of the table. docs/planning.md describes the plan.",
+        epilog="exit status: 0 done; 2 the plan must be corrected; 3 the survey would have no "
+        "valid solution.",
     )
     plan.add_argument("plan", metavar="PLAN", help="a plan's folder, or its plan.toml")
     plan.add_argument(
         "--out",
         metavar="DIR",
-        help="write prediction, field sheets and an empty job there, all or nothing",
+        help="write prediction, field sheets and an empty job to this folder, all or nothing",
     )
     plan.add_argument(
         "--workbook",
@@ -45,7 +45,8 @@ def add(commands):
     plan.add_argument(
         "--changes",
         action="store_true",
-        help="try every change of one item: what helps most, what can be spared",
+        help="evaluate every change of one item: the most useful additions and the dispensable "
+        "items",
     )
     plan.add_argument(
         "--smallest",
@@ -56,16 +57,20 @@ def add(commands):
         "--simulate",
         metavar="N",
         type=parse_list,
-        help="draw the readings of N surveys, compute each: do they scatter as predicted?",
+        help="simulate the readings of N surveys, compute each survey, and compare the scatter "
+        "with the prediction",
     )
     plan.add_argument(
         "--blunders",
         metavar="SHARE",
         type=share,
         default=0.0,
-        help="share of the simulated readings that are off by 20 sds, such as 0.01 (default: none)",
+        help="share of the simulated readings with a blunder of 20 standard deviations, such as "
+        "0.01 (default: none)",
     )
-    plan.add_argument("--seed", type=parse_count, default=1, help="of the simulation (default 1)")
+    plan.add_argument(
+        "--seed", type=parse_count, default=1, help="seed of the simulation (default 1)"
+    )
     add_language(plan)
     plan.add_argument("--quiet", action="store_true", help="no progress, only problems")
     plan.set_defaults(command=_plan)
@@ -99,7 +104,7 @@ def _plan(options):
         for line in _remedies(plan, error, options, show):
             say(line)
         raise
-    effects, path = _studied(plan, prediction, options, show)
+    effects, path = _study_changes(plan, prediction, options, show)
     simulated = _simulated(prediction, options, show)
     written = ()
     if options.out is not None:
@@ -110,27 +115,30 @@ def _plan(options):
         )  # fmt: skip
     show.end()
     warn(prediction.warnings)
-    told = wall_summary(prediction) if is_wall else _summary(prediction)
+    summary = wall_summary(prediction) if is_wall else _summary(prediction)
     scatter = wall_scatter(simulated) if is_wall else _scatter(simulated)
-    found = (*told, *_verdict(prediction), *_changes(effects), *_design(path), *scatter)
-    for line in found:
+    lines = (*summary, *_verdict(prediction), *_changes(effects), *_design(path), *scatter)
+    for line in lines:
         say(line)
     if written:
         print_paths(Path(options.out), written)
 
 
 def _refuse_idle(options):
+    """Raise InputError for options that have no effect."""
     from tankcal.errors import InputError, Problem
 
     problems = []
     if options.blunders and options.simulate is None:
         expected = message(
-            "plan_nothing_simulated", "nothing would be simulated; expected --simulate N as well"
+            "plan_nothing_simulated",
+            "has no effect without a simulation; expected --simulate N as well",
         )
         problems.append(Problem("--blunders", expected))
     if options.workbook and options.out is None:
         expected = message(
-            "plan_nothing_written", "nothing would be written; expected --out DIR as well"
+            "plan_nothing_written",
+            "has no effect without an output folder; expected --out DIR as well",
         )
         problems.append(Problem("--workbook", expected))
     if problems:
@@ -143,7 +151,7 @@ def _refuse_simulation(plan, options):
     if options.simulate is not None and plan.design.runs:
         expected = message(
             "plan_runs_not_simulated",
-            "not for a plan of runs of liquid; expected a plan without [[runs]]",
+            "not possible for a plan with runs of liquid; expected a plan without [[runs]]",
         )
         raise InputError(Problem("--simulate", expected))
 
@@ -153,13 +161,14 @@ def _refuse_unlimited(plan):
 
     if plan.limits.relative_u is None:
         expected = message(
-            "plan_no_limit", "missing; expected the U over volume that --smallest is to meet"
+            "plan_no_limit",
+            "missing; expected the relative uncertainty U/V that --smallest must meet",
         )
         raise InputError(Problem("plan.toml", expected, None, "limits.relative_u"))
 
 
-def _studied(plan, prediction, options, show):
-    """Effects of all changes, and the path to the smallest design; () and None: not asked for."""
+def _study_changes(plan, prediction, options, show):
+    """Return the effects of all changes, or (), and the path to the smallest design, or None."""
     from tankcal.planning.improvements import smallest, what_helps
 
     effects = what_helps(plan, progress=show.part, before=prediction) if options.changes else ()
@@ -167,23 +176,23 @@ def _studied(plan, prediction, options, show):
 
 
 def _remedies(plan, error, options, show):
-    """Additions that would give a solution to a survey of targets that has none."""
+    """Yield additions that would determine a survey of targets without a solution."""
     from tankcal.errors import SolutionError
     from tankcal.planning.improvements import what_would_do
     from tankcal.planning.model import Plan
 
     if not options.changes or not isinstance(error, SolutionError) or not isinstance(plan, Plan):
         return
-    found = what_would_do(plan, progress=show.part)
+    remedies = what_would_do(plan, progress=show.part)
     show.end()
-    if found:
-        yield message("plan_remedies", "what would determine it, the best first:")
-    for one in found[:SHOWN]:
+    if remedies:
+        yield message("plan_remedies", "additions that would determine the survey, best first:")
+    for effect in remedies[:SHOWN]:
         yield message(
             "plan_remedy",
             "  {change}: U/V {relative}",
-            change=describe_change(one.change),
-            relative=_percent(one.relative_u),
+            change=describe_change(effect.change),
+            relative=_percent(effect.relative_u),
         )
 
 
@@ -199,7 +208,7 @@ def _simulated(prediction, options, show):
 
 
 def _summary(prediction):
-    """What was planned, and how well points will be known."""
+    """Yield the items of the plan and the predicted quality of its points."""
     from tankcal.planning.bases import by_ends
 
     plan = prediction.plan
@@ -215,8 +224,8 @@ def _summary(prediction):
     yield plan_holds(plan, counts)
     yield message(
         "plan_network",
-        "network: {rows} observations, {unknowns} unknowns, redundancy {dof}; mean sd of a target "
-        "{sd} mm",
+        "network: {rows} observations, {unknowns} unknowns, redundancy {dof}; mean standard "
+        "deviation of a target {sd} mm",
         rows=solution.rows,
         unknowns=solution.estimated,
         dof=solution.dof,
@@ -232,7 +241,7 @@ def _summary(prediction):
     if prediction.undetermined:
         yield message(
             "plan_not_determined",
-            "points that are not determined: {count} ({points})",
+            "points not determined: {count} ({points})",
             count=len(prediction.undetermined),
             points=_first(prediction.undetermined),
         )
@@ -246,21 +255,21 @@ def _summary(prediction):
 
 
 def _verdict(prediction):
-    """The top of the table, the worst delivery, and the limit."""
+    """Yield the top of the table, the worst delivery, and the limit."""
     plan = prediction.plan
     yield _top(prediction.table)
-    for one in prediction.tabled.stated.worst[:1]:
-        worst = one.relative
+    for delivery in prediction.tabled.stated.worst[:1]:
+        worst = delivery.relative
         yield message(
             "plan_worst",
             "worst delivery of {least:g} m or more: {low:g} to {high:g} m, U/V = {relative}",
-            least=one.minimum_m,
+            least=delivery.minimum_m,
             low=worst.low_m,
             high=worst.high_m,
             relative=_percent(worst.relative),
         )
     if plan.limits.relative_u is not None:
-        yield _judged(_percent(plan.limits.relative_u), prediction.meets)
+        yield _describe_limit(_percent(plan.limits.relative_u), prediction.meets)
 
 
 def _top(table):
@@ -276,7 +285,7 @@ def _top(table):
     )
 
 
-def _judged(limit, meets):
+def _describe_limit(limit, meets):
     if meets is None:
         return message("plan_limit", "limit {limit}", limit=limit)
     if meets:
@@ -285,26 +294,26 @@ def _judged(limit, meets):
 
 
 def _first(points):
-    """The first names of points, and that there are more."""
-    return ", ".join(one.name for one in points[:SHOWN]) + ", ..." * (len(points) > SHOWN)
+    """Return the first names of points, with dots for further points."""
+    return ", ".join(point.name for point in points[:SHOWN]) + ", ..." * (len(points) > SHOWN)
 
 
 def _changes(effects):
-    for one in effects[:SHOWN]:
-        if not one.why:
-            yield _effect(one)
+    for effect in effects[:SHOWN]:
+        if not effect.why:
+            yield _effect(effect)
     if len(effects) > SHOWN:
         yield message("plan_more_changes", "  more changes: {more}", more=len(effects) - SHOWN)
 
 
-def _effect(one):
-    """One change; nothing is said of costs where the plan states none."""
+def _effect(effect):
+    """Return the line of a change; costs are shown if the plan states costs."""
     values = {
-        "change": describe_change(one.change),
-        "relative": _percent(one.relative_u),
-        "difference": 1e6 * one.difference,
+        "change": describe_change(effect.change),
+        "relative": _percent(effect.relative_u),
+        "difference": 1e6 * effect.difference,
     }
-    if not any(one.change.plan.costs.values()):
+    if not any(effect.change.plan.costs.values()):
         return message(
             "plan_effect_without_cost",
             "  {change}: U/V {relative} ({difference:+.1f} ppm)",
@@ -314,12 +323,12 @@ def _effect(one):
         "plan_effect",
         "  {change}: U/V {relative} ({difference:+.1f} ppm, cost {cost:+g})",
         **values,
-        cost=one.change.cost,
+        cost=effect.change.cost,
     )
 
 
 def describe_change(change):
-    """What is done to which item of a plan."""
+    """Return the action and the item of a change in words."""
     item = wall_item(change) or _item(change.item, change.name)
     if change.action == "add":
         return message("plan_add", "add {item}", item=item)
@@ -329,7 +338,7 @@ def describe_change(change):
 
 
 def _item(item, name):
-    """An item of a plan (`planning.changes.ITEMS`); rows of targets and readings are named so."""
+    """Return an item of a plan (`planning.changes.ITEMS`) in words."""
     from tankcal.planning.changes import IMAGES, OF_COURSE, ROW
 
     if item == "photo_station":
@@ -348,14 +357,14 @@ def _item(item, name):
     if item == "target_row":
         return message("plan_row", "target row {section}", section=name.removeprefix(ROW))
     if name == IMAGES:
-        return message("plan_all_images", "reading all image points")
-    return message("plan_all_sets", "reading all sets of the total station")
+        return message("plan_all_images", "measurement of all image points")
+    return message("plan_all_sets", "measurement of all sets of the total station")
 
 
 def _design(path):
     if path is None:
         return
-    steps = [describe_change(one.change) for one in path.steps]
+    steps = [describe_change(step.change) for step in path.steps]
     yield message(
         "plan_smallest",
         "smallest design: {steps}",
@@ -370,7 +379,7 @@ def _design(path):
         yield message(
             "plan_smallest_worth",
             "  U/V {before} before, {after} after; cost {start_cost:g} before, {cost:g} after; "
-            "plans tried: {tried}",
+            "plans evaluated: {tried}",
             **values,
             start_cost=path.start_cost,
             cost=path.cost,
@@ -378,27 +387,27 @@ def _design(path):
     else:
         yield message(
             "plan_smallest_without_cost",
-            "  U/V {before} before, {after} after; plans tried: {tried}",
+            "  U/V {before} before, {after} after; plans evaluated: {tried}",
             **values,
         )
     if path.prediction.meets is False:
-        yield message("plan_none_meets", "  no plan that was tried meets the limit")
+        yield message("plan_none_meets", "  no evaluated plan meets the limit")
 
 
-def _scatter(found):
-    if found is None:
+def _scatter(scatter):
+    if scatter is None:
         return
     yield message(
         "plan_scatter",
-        "{runs} simulated surveys, scatter over prediction: coordinates {ratio:.3f}, volume "
-        "{volume_ratio:.3f} (known to {ratio_sd:.2g}); {aside:.1f} values rejected on "
-        "average, without a solution: {failed}",
-        runs=found.runs,
-        ratio=found.ratio,
-        volume_ratio=found.volume_ratio,
-        ratio_sd=found.volume_ratio_sd,
-        aside=found.set_aside.mean(),
-        failed=len(found.failed),
+        "{runs} simulated surveys, ratio of scatter to prediction: coordinates {ratio:.3f}, "
+        "volume {volume_ratio:.3f} (standard deviation {ratio_sd:.2g}); {aside:.1f} values "
+        "rejected on average, without a solution: {failed}",
+        runs=scatter.runs,
+        ratio=scatter.ratio,
+        volume_ratio=scatter.volume_ratio,
+        ratio_sd=scatter.volume_ratio_sd,
+        aside=scatter.set_aside.mean(),
+        failed=len(scatter.failed),
     )
 
 

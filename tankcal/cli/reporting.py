@@ -1,4 +1,4 @@
-"""`tankcal report`: the papers again, from a record alone."""
+"""`tankcal report`: reports created again from a record."""
 
 from pathlib import Path
 
@@ -7,16 +7,16 @@ from tankcal.text.languages import LANGUAGES
 
 
 def add(commands):
-    """The parser of `tankcal report`."""
+    """Add the parser of `tankcal report`."""
     report = commands.add_parser(
         "report",
-        help="write the papers again, from a record",
-        description="Write workbook, notebook, PDFs, web page and CSV files again, all or "
-        "nothing, from record.json alone, or the papers of a comparison from comparison.json, of "
-        "an inspection from inspection.json, of a history from history.json: nothing is computed "
-        "again.",
-        epilog="exit status: 0 done; 2 the record, the language or the letterhead cannot be used. "
-        "Then nothing is written.",
+        help="write the reports again, from a record",
+        description="Write workbook, notebook, PDFs, web page and CSV files again from record.json "
+        "alone, all or nothing. From comparison.json, inspection.json or history.json, write "
+        "the reports of a comparison, an inspection or a history. The results are not "
+        "computed again.",
+        epilog="exit status: 0 done; 2 the record, the language or the letterhead cannot be used; "
+        "no file is written.",
     )
     report.add_argument(
         "record",
@@ -27,12 +27,12 @@ def add(commands):
     report.add_argument(
         "--out",
         metavar="DIR",
-        help="where to write (default: the record's folder); earlier results there are replaced",
+        help="output folder (default: folder of the record); earlier results there are replaced",
     )
     report.add_argument(
         "--language",
         metavar="CODE",
-        help=f"of the papers: {', '.join(LANGUAGES)} (default: that of the job)",
+        help=f"language of the reports: {', '.join(LANGUAGES)} (default: language of the job)",
     )
     add_letterhead(report)
     report.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -40,16 +40,16 @@ def add(commands):
 
 
 def add_letterhead(parser):
-    """The option --letterhead."""
+    """Add the option --letterhead."""
     parser.add_argument(
         "--letterhead",
         metavar="FILE",
-        help="TOML file with the laboratory's name, address, logo and colours (docs/report.md)",
+        help="TOML file with name, address, logo and colours of the laboratory (docs/report.md)",
     )
 
 
 def letterhead_of(options):
-    """The letterhead that the options name, checked; None when they name none."""
+    """Return the checked letterhead of the options, or None."""
     if options.letterhead is None:
         return None
     from tankcal.report.letterhead import load

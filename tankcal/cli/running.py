@@ -1,4 +1,4 @@
-"""`tankcal run` and `tankcal demo`: a job computed, its results written."""
+"""`tankcal run` and `tankcal demo`: computation of a job and output of its results."""
 
 from functools import partial
 from pathlib import Path
@@ -30,14 +30,14 @@ from tankcal.text.digits import (
 
 
 def add(commands):
-    """The parsers of `tankcal run` and `tankcal demo`."""
+    """Add the parsers of `tankcal run` and `tankcal demo`."""
     _add_run(commands)
     demo = commands.add_parser(
         "demo",
         help="run the shipped example",
         description="Compute the shipped example, a reconstruction of the tank of Silva 1995.",
     )
-    demo.add_argument("--out", metavar="DIR", help="where to write", default="tankcal-demo-results")
+    demo.add_argument("--out", metavar="DIR", help="output folder", default="tankcal-demo-results")
     demo.add_argument("--quiet", action="store_true", help="no progress, only problems")
     demo.set_defaults(command=_demo)
 
@@ -46,48 +46,49 @@ def _add_run(commands):
     run = commands.add_parser(
         "run",
         help="compute a job and write its results",
-        description="Read and check a job, compute it, and write the results, all or nothing: "
+        description="Read, check and compute a job, and write the results, all or nothing: "
         "record.json, points.csv, sections.csv, capacity.csv, capacity.xlsx, certificate.xml, "
         "report.ipynb, certificate.pdf, working-papers.pdf, report.pdf (both), field-table.pdf "
         "and report.html. An adjusted survey adds points_cov.npz, photos.csv, cameras.csv, "
         "groups.csv and residuals.csv.",
-        epilog="exit status: 0 done; 2 the input must be mended; 3 no sound solution, or, with "
-        "--strict, the adjustment is in doubt. Then nothing is written.",
+        epilog="exit status: 0 done; 2 the input must be corrected; 3 the survey has no valid "
+        "solution, or, with --strict, the adjustment is doubtful; no file is written.",
     )
     run.add_argument("job", metavar="JOB", help="a job folder, its job.toml, or a job workbook")
     run.add_argument(
         "--out",
         metavar="DIR",
-        help="where to write (default: results in the job's folder, or NAME-results beside "
+        help="output folder (default: results in the folder of the job, or NAME-results beside "
         "NAME.xlsx); earlier results there are replaced",
     )
     run.add_argument(
         "--only",
         choices=("adjustment",),
-        help="stop after the adjustment of the survey; no tank is needed, and adjustment.xlsx "
-        "takes the place of capacity.xlsx",
+        help="stop after the adjustment of the survey; no tank is required, and adjustment.xlsx "
+        "replaces capacity.xlsx",
     )
     run.add_argument(
         "--strict",
         action="store_true",
-        help="write nothing when the global test of the adjustment fails, or when what was set "
-        "aside as a blunder may not be the one (exit status 3)",
+        help="write no file if the global test of the adjustment fails, or if a rejected "
+        "observation may not be the blunder (exit status 3)",
     )
     of_papers = run.add_mutually_exclusive_group()
     add_letterhead(of_papers)
     of_papers.add_argument(
         "--no-papers",
         action="store_true",
-        help="write record and CSV files only; tankcal report makes workbook and papers of them",
+        help="write the record and the CSV files only; tankcal report creates workbook and "
+        "reports from the record",
     )
     run.add_argument(
         "--cluster",
         metavar="WHERE",
         type=parse_cluster,
         default="auto",
-        help="who reads point clouds: local (a worker for each core), a number of workers (0: "
-        "none), or the address of a dask scheduler (default: workers on this machine where they "
-        "pay); the results are the same",
+        help="workers for point clouds: local (one worker per core), a number of workers (0: "
+        "none), or the address of a dask scheduler (default: workers on this machine where "
+        "they save time); the results do not depend on the workers",
     )
     run.add_argument("--quiet", action="store_true", help="no progress, only problems")
     add_json(run)
@@ -113,7 +114,7 @@ def _demo(options):
 
 
 def _print_doubts_of_job(job, show, tell):
-    """Print the implausible inputs before computing, which may take long with them."""
+    """Print implausible inputs before the computation, which they may slow down."""
     doubts = _doubts_among(job.warnings)
     if doubts and tell is _tell:
         show.end()
@@ -123,13 +124,13 @@ def _print_doubts_of_job(job, show, tell):
 def _doubts_among(warnings):
     from tankcal.job.plausibility_table import CODES
 
-    return [one for one in warnings if getattr(one.expected, "code", None) in CODES]
+    return [warning for warning in warnings if getattr(warning.expected, "code", None) in CODES]
 
 
 def _tell(out, paths, warnings, result, adjustment):
-    """Print warnings, a summary and the files; implausible inputs once more at the end."""
+    """Print warnings, a summary and the files; print implausible inputs again at the end."""
     doubts = _doubts_among(warnings)
-    warn(one for one in warnings if one not in doubts)
+    warn(warning for warning in warnings if warning not in doubts)
     if adjustment is not None:
         say(_summary(adjustment))
     if result is not None:
@@ -141,7 +142,7 @@ def _tell(out, paths, warnings, result, adjustment):
 
 
 def _tell_machine(out, paths, warnings, result, adjustment):
-    """The same as one JSON object."""
+    """Print the results as one JSON object."""
     print_json(
         exit_status=0,
         out=str(out),
@@ -149,12 +150,12 @@ def _tell_machine(out, paths, warnings, result, adjustment):
         tank=None if result is None else result.job.tank.id,
         top=None if result is None else _top(result),
         adjustment=None if adjustment is None else _fit(adjustment),
-        warnings=[problem_of(one) for one in warnings],
+        warnings=[problem_of(warning) for warning in warnings],
     )
 
 
 def _top(result):
-    """The top row: numbers in full, k null where U is Monte Carlo's."""
+    """Return the values of the top row; k is null if U results from Monte Carlo."""
     table, stated = result.table, result.intervals
     return {
         "height_m": float(table.height_m[-1]),
@@ -196,15 +197,15 @@ def _compute(cluster, source, out, quiet, strict=False, papers=(), tell=_tell):
 
 
 def _idle_cluster(cluster, clouds):
-    """A warning for workers that were asked for, where there are no clouds for them to read."""
+    """Return a warning for requested workers if there are no clouds to read."""
     if cluster in (None, "auto", 0) or clouds is not None:
         return ()
-    text = message("cluster_idle", "without effect: no point cloud is read")
+    text = message("cluster_idle", "without effect: the job has no point cloud")
     return (Problem("--cluster", text),)
 
 
 def _capacity(result):
-    """One line: what the tank holds to the digits of U, and how many points say so."""
+    """Return one line with the capacity, rounded to the digits of U, and the number of points."""
     top_m = result.table.height_m[-1]
     top, stated = result.at(top_m), result.intervals
     unit, factor, decimals = _volume_unit(result.job.table.volume_unit)
@@ -225,8 +226,8 @@ def _capacity(result):
     if not stated.U_m3[-1] > 0:
         return message(
             "holds_without_u",
-            "{tank}: {volume} {unit} at {height} m, no uncertainty stated, because none was "
-            "declared{points}",
+            "{tank}: {volume} {unit} at {height} m, no uncertainty stated, because no input has "
+            "a declared uncertainty{points}",
             tank=result.job.tank.id,
             volume=fixed(factor * top.value_m3, decimals, marks()),
             unit=unit,
@@ -247,7 +248,7 @@ def _capacity(result):
 
 
 def _volume_unit(name):
-    """(a unit of volumes as the terminal shows it, its factor from m3, decimals of a row)."""
+    """Return (unit of volumes for the terminal, its factor from m3, decimals of a row)."""
     from tankcal.tank.dips import TABLE_DECIMALS, VOLUME_UNITS_M3
 
     shown = message("cubic_metres", "m3") if name == "m3" else name
@@ -272,10 +273,10 @@ def _adjust(cluster, source, out, quiet, strict, papers, tell=_tell):
 
 
 def _refuse_failed(adjustment):
-    """Raise when there is an adjustment that is in doubt, or whose global test failed."""
+    """Raise SolutionError for a doubtful adjustment or a failed global test."""
     if adjustment is not None and adjustment.doubts:
-        nothing = message("strict_nothing", "nothing was written (--strict)")
-        raise SolutionError(*(one.text for one in adjustment.doubts), nothing)
+        nothing = message("strict_nothing", "no file was written (--strict)")
+        raise SolutionError(*(doubt.text for doubt in adjustment.doubts), nothing)
     if adjustment is None or adjustment.redundancy <= 0:
         return
     test = adjustment.adjusted.test()
@@ -284,7 +285,7 @@ def _refuse_failed(adjustment):
             message(
                 "strict_test_failed",
                 "the global test of the adjustment failed: v'Pv = {chi2:.1f}, expected {low:.1f} "
-                "to {high:.1f} ({dof} degrees of freedom, sigma0 = {sigma0:.3f}); nothing was "
+                "to {high:.1f} ({dof} degrees of freedom, sigma0 = {sigma0:.3f}); no file was "
                 "written (--strict)",
                 chi2=test.chi2,
                 low=test.low,
@@ -296,16 +297,16 @@ def _refuse_failed(adjustment):
 
 
 def _summary(adjustment):
-    """One line: how well the survey fits, and how good its points are."""
+    """Return one line with the fit of the survey and the precision of its points."""
     from tankcal.survey.network.quality import precision
 
-    removed = len({(one.kind, one.ids, one.row) for one in adjustment.removed})
+    removed = len({(removal.kind, removal.ids, removal.row) for removal in adjustment.removed})
     free = ~adjustment.fixed.all(axis=1)
     mean = ""
     if free.any():
-        found = precision(adjustment.xyz_m[free], adjustment.covariance_m2[free])
-        sd = format_significant(1000 * found.mean_sd_m, 3, marks())
-        mean = message("mean_sd", ", mean sd {sd} mm", sd=sd)
+        quality = precision(adjustment.xyz_m[free], adjustment.covariance_m2[free])
+        sd = format_significant(1000 * quality.mean_sd_m, 3, marks())
+        mean = message("mean_sd", ", mean standard deviation {sd} mm", sd=sd)
     return message(
         "adjusted",
         "adjustment: {fit}, {set_aside}, {points}{mean}",

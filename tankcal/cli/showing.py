@@ -1,4 +1,4 @@
-"""What the terminal shows, in the language of the job: progress, warnings, lists of files."""
+"""Terminal output in the language of the job: progress, warnings, lists of files."""
 
 import gc
 import os
@@ -14,14 +14,16 @@ from tankcal.text.languages import DEFAULT, nearest_language
 from tankcal.text.time_left import how_far
 
 RECORD = "record.json"
-OBJECTS_AT_ONCE = 10_000  # are made before the garbage collector looks: those of modules stay
-_LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set counts
-TO_THE_END = "\x1b[K"  # a terminal clears the rest of the line
-_spoken = {}  # the words of the language that is spoken; nothing: English as it was made
+OBJECTS_AT_ONCE = (
+    10_000  # allocations between garbage collections: objects of modules are permanent
+)
+_LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # in order of priority
+TO_THE_END = "\x1b[K"  # control sequence: clear the rest of the line
+_spoken = {}  # words of the current language; empty: the English of the messages
 
 
 def speak(language=None):
-    """From now on say what is said in this language; None: in that of the environment."""
+    """Set the language of the output; None: language of the environment."""
     _spoken.clear()
     if language is None:
         setting = next((os.environ[name] for name in _LOCALE if os.environ.get(name)), "")
@@ -33,12 +35,12 @@ def speak(language=None):
 
 
 def words_of_run():
-    """The words of the language that is spoken; {}: English."""
+    """Return the words of the current language; {}: English."""
     return _spoken
 
 
 def speak_of_record(language, *sources):
-    """Speak a language; None: that of the first source that is a record, or holds one."""
+    """Set the language; None: language of the first source that is or contains a record."""
     from tankcal.record import load
 
     speak(language)
@@ -53,12 +55,12 @@ def speak_of_record(language, *sources):
 
 
 def language_of_run():
-    """The code of the language that is spoken."""
+    """Return the code of the current language."""
     return _spoken["language"]["code"] if _spoken else DEFAULT
 
 
 def say_in_language(text):
-    """A text in the language that is spoken; one without a code is as it is."""
+    """Return a text in the current language; a text without a code is unchanged."""
     if not (_spoken and isinstance(text, Message)):
         return printable_lines(text)
     from tankcal.text.words import say as said_in
@@ -67,71 +69,71 @@ def say_in_language(text):
 
 
 def marks():
-    """What stands between the digits of numbers in that language (digits.Marks)."""
+    """Return the number marks of the current language (digits.Marks)."""
     from tankcal.text.digits import PROGRAM, Marks
 
     return Marks(**_spoken["language"]["marks"]) if _spoken else PROGRAM
 
 
 def say(text):
-    """Print a line of the terminal."""
+    """Print a line on standard output."""
     print(say_in_language(text))
 
 
 def complain(text):
-    """Lines on standard error."""
+    """Print lines on standard error."""
     for line in say_in_language(text).splitlines():
         print(f"tankcal: {line}", file=sys.stderr)
 
 
 def read_job(source, show, **options):
-    """The checked Job of a folder or workbook; from now on its language is spoken."""
+    """Return the checked Job of a folder or workbook; set its language."""
     from tankcal.cli.asked_language import asked_language
 
     language = asked_language(source)
     if language is not None:
         speak(language)
     show.step(message("reading_job", "reading {file}", file=str(source)))
-    from tankcal.job import load  # half a second: the line above is told before
+    from tankcal.job import load  # takes half a second: print the line above first
 
     return load(source, **options)
 
 
 def prepare_for_small_work():
-    """A second BLAS thread costs time with small matrices, and looking for garbage often, too."""
+    """Limit BLAS to one thread and collect garbage less often, which is faster here."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(OBJECTS_AT_ONCE)
 
 
 def warn(warnings):
-    """Warnings on standard error."""
+    """Print warnings on standard error."""
     for warning in warnings:
         text = getattr(warning, "text", warning)
         complain(message("warning", "warning: {text}", text=text))
 
 
 def print_doubts(warnings):
-    """What is implausible of the numbers handed in, on standard error, under a line of its own."""
+    """Print implausible inputs on standard error, below a separate heading."""
     if warnings:
         complain(
             message(
                 "doubtful_input",
-                "DOUBTFUL INPUT: the result depends on it (the first page of the certificate "
-                "says so):",
+                "DOUBTFUL INPUT: the results depend on it; see also the first page of the "
+                "certificate:",
             )
         )
     warn(warnings)
 
 
 def print_paths(out, paths):
-    """Print what was written."""
+    """Print the written files."""
     say(message("results_in", "results in {folder}:", folder=str(out)))
     for path in paths:
         print(f"  {printable(path)}")
 
 
 class Progress:
-    """One line on standard error a step; a long step counts on in its own line on a terminal."""
+    """Progress on standard error: one line per step, updated on a terminal."""
 
     def __init__(self, quiet):
         self.quiet = quiet
@@ -140,9 +142,11 @@ class Progress:
         self._line = ""
 
     def step(self, text):
+        """Begin a step."""
         self.part(text, 0, 0)
 
     def part(self, text, done, total):
+        """Show the progress of a step: `done` of `total` parts."""
         if self.quiet:
             return
         line = f"tankcal: {say_in_language(text)}"
@@ -155,19 +159,20 @@ class Progress:
             so_far = say_in_language(how_far(done, total, done - first, time.monotonic() - began))
             width = shutil.get_terminal_size().columns - 1
             if self._line and len(self._line) + 1 + len(so_far) > width:
-                print(file=sys.stderr)  # one that wraps could not be written over
+                print(file=sys.stderr)  # a wrapped line cannot be overwritten
                 self._line = ""
             shown = f"{self._line} {so_far}".lstrip()[:width]
             print(f"\r{shown}{TO_THE_END}", end="", file=sys.stderr, flush=True)
         self.now = text
 
     def aside(self, text):
-        """A line on standard error, above that of a step that goes on."""
+        """Print a line on standard error above the line of the current step."""
         if self.live and self.now and not self.quiet:
             print(f"\r{TO_THE_END}", end="", file=sys.stderr)
         complain(text)
 
     def end(self):
+        """End the line of the current step."""
         if self.live and self.now and not self.quiet:
             print(file=sys.stderr)
         self.now = None

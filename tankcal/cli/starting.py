@@ -1,4 +1,4 @@
-"""`tankcal new`: an empty job to fill in."""
+"""`tankcal new`: creation of an empty job."""
 
 import shlex
 from pathlib import Path
@@ -12,23 +12,25 @@ USUAL_KIND = "vertical"
 
 
 def add(commands):
-    """The parser of `tankcal new`."""
+    """Add the parser of `tankcal new`."""
     new = commands.add_parser(
         "new",
-        help="write an empty job to fill in",
-        description="Write a starter job for that kind of tank, with comments: job.toml and CSV "
-        "files, or with --workbook the same as one Excel workbook, job.xlsx.",
+        help="create an empty job",
+        description="Create an empty job with explanatory comments for the kind of tank: job.toml "
+        "and CSV files, or with --workbook one Excel workbook, job.xlsx.",
     )
     new.add_argument(
-        "directory", metavar="DIR", help="a folder to make; with --workbook also a new .xlsx file"
+        "directory",
+        metavar="DIR",
+        help="the folder to create; with --workbook also a new .xlsx file",
     )
     new.add_argument(
-        "--workbook", action="store_true", help="write an Excel workbook in place of text files"
+        "--workbook", action="store_true", help="create an Excel workbook in place of text files"
     )
     new.add_argument(
         "--language",
         choices=LANGUAGES,
-        help="of the explanations and of the papers (default: that of the environment)",
+        help="language of comments and reports (default: language of the environment)",
     )
     new.add_argument(
         "--kind",
@@ -42,10 +44,10 @@ def add(commands):
             *("photos", "total-station", "strapping", "reference-line", "wall-hits", "tangents"),
             *("triangulation", "cloud", "liquid", "radii"),
         ),
-        help="with files for photographs, total-station readings, circumferences by tape, "
-        "offsets from reference lines, bare hits of the wall, tangents, triangulation with a "
-        "stadia, point clouds, (of any kind of tank) metered liquid, or the radii of a former "
-        "table, in place of surveyed points",
+        help="survey method, with its input files: photographs, total-station readings, "
+        "circumferences by tape, offsets from reference lines, reflectorless readings of the "
+        "wall, tangents, triangulation with a stadia, point clouds, metered liquid (for any "
+        "kind of tank), or the radii of a former table (default: surveyed points)",
     )
     new.set_defaults(command=_new)
 
@@ -58,7 +60,7 @@ def _refuse_other_survey(kind, survey, language):
     except ValueError as error:
         expected = message(
             "survey_of_other_kind",
-            "found {survey}; expected another one: a tank of kind {of_kind} has no such survey",
+            "found {survey}; expected another survey: a tank of kind {of_kind} has no such survey",
             survey=survey,
             of_kind=kind,
         )
@@ -78,8 +80,8 @@ def _new(options):
         _write_field_sheets(directory, *form)
         text = "wrote {file}: fill in job.toml and the CSV files, then"
         _say_then(message("wrote_folder", text, file=str(directory)), directory)
-        say(message("workbook_instead", "to fill in an Excel workbook in their place:"))
-        _print_command("new", directory, *_given(options), "--workbook")
+        say(message("workbook_instead", "to use an Excel workbook in place of these files:"))
+        _print_command("new", directory, *_repeat_options(options), "--workbook")
         return
     path = write_input_workbook(directory, *form)
     if path != directory:
@@ -97,11 +99,13 @@ def _print_command(*words):
     print(f"  {printable(shlex.join(['tankcal', *map(str, words)]))}")
 
 
-def _given(options):
-    """The options of the same form, as they were given."""
-    given = {"--kind": options.kind, "--survey": options.survey, "--language": options.language}
+def _repeat_options(options):
+    """Return the options of the same form as words of a command."""
+    choices = {"--kind": options.kind, "--survey": options.survey, "--language": options.language}
     usual = {"--kind": USUAL_KIND, "--survey": None, "--language": None}
-    return [word for name, one in given.items() if one != usual[name] for word in (name, one)]
+    return [
+        word for name, value in choices.items() if value != usual[name] for word in (name, value)
+    ]
 
 
 def _write_field_sheets(directory, kind, survey, language):
@@ -110,4 +114,10 @@ def _write_field_sheets(directory, kind, survey, language):
     if is_filled_by_pen(survey):
         sheets = directory / FILE
         write_field_sheets(sheets, survey, language, kind)
-        say(message("wrote_field_sheets", "wrote {file}: print it for the crew", file=str(sheets)))
+        say(
+            message(
+                "wrote_field_sheets",
+                "wrote {file}: print it for the survey party",
+                file=str(sheets),
+            )
+        )

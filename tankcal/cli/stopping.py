@@ -1,4 +1,4 @@
-"""A command that ends early: by Ctrl-C, SIGTERM, a closed terminal, or for want of memory."""
+"""Early end of a command: by Ctrl-C, SIGTERM, a closed terminal, or lack of memory."""
 
 import signal
 import threading
@@ -9,9 +9,9 @@ ENDING = ("SIGTERM", "SIGHUP")  # beside SIGINT, which Python turns into Keyboar
 
 
 class Ended(KeyboardInterrupt):
-    """A signal ended the command: what was begun is taken back, as with Ctrl-C.
+    """A signal ended the command; unfinished work is undone, as after Ctrl-C.
 
-    number  of the signal
+    number  number of the signal
     """
 
     def __init__(self, number):
@@ -21,7 +21,7 @@ class Ended(KeyboardInterrupt):
 
 @contextmanager
 def ended_by_signals():
-    """Raise `Ended` in the block when one of ENDING comes; a signal that is ignored remains so."""
+    """Raise `Ended` in the block for a signal of ENDING; ignored signals remain ignored."""
     ours = []
     if threading.current_thread() is threading.main_thread():
         numbers = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
@@ -40,9 +40,9 @@ def _end(number, _):
 
 
 def stopped_status(error):
-    """Exit status of a command by what ended it: 128 and the signal; None: no signal did.
+    """Return the exit status of a command ended by a signal (128 + signal), or None.
 
-    However a library dressed it: what was being handled when an error was raised counts.
+    Also if a library raised another error while handling the signal.
     """
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__context__
@@ -50,10 +50,10 @@ def stopped_status(error):
 
 
 def is_of_memory(error):
-    """Whether a command failed because the system gave it no more memory.
+    """Return whether a command failed for lack of memory.
 
-    Python raises other errors for a library that cannot be loaded and a thread that cannot start.
+    Python raises other errors for libraries that cannot be loaded and threads that cannot start.
     """
     if isinstance(error, ImportError | RuntimeError | OSError):
-        return any(one in str(error).lower() for one in _OF_MEMORY)
+        return any(text in str(error).lower() for text in _OF_MEMORY)
     return isinstance(error, MemoryError)

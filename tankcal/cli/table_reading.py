@@ -1,4 +1,4 @@
-"""`tankcal read-table`: the geometry of a tank out of a former table, and a job made of it."""
+"""`tankcal read-table`: geometry of a tank from a former table, and a job for it."""
 
 from pathlib import Path
 
@@ -19,17 +19,17 @@ MOST_SHOWN = 30  # courses
 
 
 def add(commands):
-    """The parser of `tankcal read-table`."""
+    """Add the parser of `tankcal read-table`."""
     parser = commands.add_parser(
         "read-table",
-        help="read radii, head and zero out of a former capacity table",
-        description="Read the geometry of a tank out of a capacity table of any origin: of an "
-        "upright one radii of the courses, density of the head, zero, seams, things in the tank, "
-        "of a lying one or a sphere its sizes, each with what rounding leaves uncertain. "
-        "With --out a job is written that gives the table again, "
-        "for another density or temperature, too. docs/read-table.md says how it is found.",
-        epilog="exit status: 0 done; 2 table or courses must be mended (one line per problem); "
-        "3 the table does not determine its tank.",
+        help="determine radii, head and zero from a former capacity table",
+        description="Determine the geometry of a tank from a capacity table of any origin. For a "
+        "vertical tank: radii of the courses, density of the head, zero, seams and deadwood. "
+        "For a horizontal tank or a sphere: its dimensions. Each result has the uncertainty "
+        "due to rounding. With --out, write a job that reproduces the table, also for "
+        "another density or temperature. docs/read-table.md describes the method.",
+        epilog="exit status: 0 done; 2 the table or the courses must be corrected (one line per "
+        "problem); 3 the table does not determine the tank.",
     )
     parser.add_argument(
         "file",
@@ -40,23 +40,25 @@ def add(commands):
     parser.add_argument(
         "--courses",
         metavar="FILE",
-        help="courses.csv: course, height_m (blank: seams are found), thickness_mm, from the "
+        help="courses.csv: course, height_m (blank: seams are estimated), thickness_mm, from the "
         "bottom up",
     )
     parser.add_argument(
         "--kind",
         choices=("vertical", "horizontal", "sphere"),
-        help="kind of tank (default: as former.toml says, else vertical)",
+        help="kind of tank (default: kind in former.toml, else vertical)",
     )
-    parser.add_argument("--former", metavar="FILE", help="former.toml: what else is known of it")
-    parser.add_argument("--out", metavar="DIR", help="write a job there, all or nothing")
+    parser.add_argument(
+        "--former", metavar="FILE", help="former.toml: further facts about the former table"
+    )
+    parser.add_argument("--out", metavar="DIR", help="write a job to this folder, all or nothing")
     parser.add_argument(
         "--e-gpa", metavar="GPA", type=positive, default=206.0,
         help="Young's modulus of the shell (default 206)",
     )  # fmt: skip
     parser.add_argument(
         "--bottom", metavar="M", type=positive,
-        help="dip of the highest point of the bottom, m (default: found)",
+        help="dip of the highest point of the bottom, m (default: estimated)",
     )  # fmt: skip
     add_language(parser)
     parser.set_defaults(command=_read_table)
@@ -88,7 +90,7 @@ def _read_table(options):
 
 
 def _summary(read):
-    found = read.geometry
+    geometry = read.geometry
     former = read.former
     yield message(
         "read_rows",
@@ -99,7 +101,7 @@ def _summary(read):
         high=fixed(former.height_m[-1], 3, marks()),
     )
     for k, name in enumerate(read.names[:MOST_SHOWN]):
-        radius, u = _with_u(found.radii_m[k], found.u_m[k])
+        radius, u = _format_with_u(geometry.radii_m[k], geometry.u_m[k])
         yield message(
             "read_radius",
             "course {name}: radius {radius} m, u {u} m",
@@ -107,75 +109,77 @@ def _summary(read):
             radius=radius,
             u=u,
         )
-    if hasattr(found, "head"):
-        yield from _of_table(found)
+    if hasattr(geometry, "head"):
+        yield from _describe_shell(geometry)
     elif not read.names:
-        yield from _of_solid(found)
+        yield from _describe_solid(geometry)
 
 
-def _of_solid(found):
-    """Sizes of a lying tank or a sphere."""
-    fit = getattr(found, "best", found)
+def _describe_solid(geometry):
+    """Yield the dimensions of a horizontal tank or a sphere."""
+    fit = getattr(geometry, "best", geometry)
     values = dict(zip(fit.names, zip(fit.values, fit.u, strict=True), strict=True))
     yield _size(message("read_diameter", "diameter"), values["diameter"])
     if "length" in values:
         yield _size(message("read_length", "length of the cylinder"), values["length"])
-        yield _ends(found, fit)
+        yield _ends(geometry, fit)
     if "end_depth" in values:
         yield _size(message("read_depth", "depth of the ends"), values["end_depth"])
-    yield _size(message("read_zero_of_solid", "dips are less than the depth by"), values["zero"])
-    if hasattr(found, "tilted"):
-        yield from _tilt(found)
+    yield _size(message("read_zero_of_solid", "depth minus dip"), values["zero"])
+    if hasattr(geometry, "tilted"):
+        yield from _tilt(geometry)
     yield message(
-        "read_left_solid", "left: {rms} L (rms)", rms=fixed(1000 * fit.rms_m3, 2, marks())
+        "read_left_solid", "residuals: {rms} L (rms)", rms=fixed(1000 * fit.rms_m3, 2, marks())
     )
 
 
-def _ends(found, fit):
+def _ends(geometry, fit):
     from tankcal.recalibration.solid_geometry import TOLD_APART
 
     ends = fit.ends.replace("_", " ")
-    others = [one for one in found.worse_by if one not in (fit.ends, *found.not_told_apart)]
+    others = [
+        form for form in geometry.worse_by if form not in (fit.ends, *geometry.not_told_apart)
+    ]
     if not others:
         return message("read_ends", "ends: {ends}", ends=ends)
     return message(
         "read_ends_best",
-        "ends: {ends}; the next, {other}, raises chi2 by {by} ({limit} would be told)",
+        "ends: {ends}; the next best form, {other}, raises chi2 by {by} (significant from {limit})",
         ends=ends,
         other=others[0].replace("_", " "),
-        by=fixed(found.worse_by[others[0]], 0, marks()),
+        by=fixed(geometry.worse_by[others[0]], 0, marks()),
         limit=fixed(TOLD_APART, 0, marks()),
     )
 
 
-def _tilt(found):
-    least, largest = (1000 * one for one in found.tilt_size)
-    if found.tilted is None:
+def _tilt(geometry):
+    least, largest = (1000 * tilt_m_m for tilt_m_m in geometry.tilt_size)
+    if geometry.tilted is None:
         yield message(
             "read_no_tilt",
-            "a tilt as one more unknown: none was found that fits better; up to {largest} mm/m "
-            "either way would fit as well",
+            "tilt as additional unknown: no tilt improves the fit; up to {largest} mm/m in "
+            "either direction fits as well",
             largest=fixed(largest, 1, marks()),
         )
         return
-    tilt, u = (1000 * one for one in found.tilted["tilt"])
-    if found.tilted is not found.best:
+    tilt, u = (1000 * value for value in geometry.tilted["tilt"])
+    if geometry.tilted is not geometry.best:
         yield message(
             "read_tilt",
-            "a tilt as one more unknown: {tilt} mm/m, u {u} mm/m; it lowers chi2 by {gain}, and "
-            "{least} to {largest} mm/m either way would fit",
+            "tilt as additional unknown: {tilt} mm/m, u {u} mm/m; it lowers chi2 by {gain}; "
+            "{least} to {largest} mm/m in either direction would fit",
             tilt=fixed(tilt, 2, marks()),
             u=fixed(u, 2, marks()),
-            gain=fixed(found.tilt_gain, 1, marks()),
+            gain=fixed(geometry.tilt_gain, 1, marks()),
             least=fixed(least, 1, marks()),
             largest=fixed(largest, 1, marks()),
         )
         return
-    other, zero = found.tilted.mirrored
+    other, zero = geometry.tilted.mirrored
     yield message(
         "read_leaning",
-        "tilt: {tilt} mm/m, u {u} mm/m: no level tank explains the rows; {other} mm/m with dips "
-        "less by {zero} mm gives the same volumes",
+        "tilt: {tilt} mm/m, u {u} mm/m: no level tank explains the rows; {other} mm/m with "
+        "dips smaller by {zero} mm gives the same volumes",
         tilt=fixed(tilt, 2, marks()),
         u=fixed(u, 2, marks()),
         other=fixed(1000 * other, 2, marks()),
@@ -184,89 +188,89 @@ def _tilt(found):
 
 
 def _size(name, size):
-    value, u = _with_u(*map(float, size))
+    value, u = _format_with_u(*map(float, size))
     return message("read_size", "{name}: {value} m, u {u} m", name=name, value=value, u=u)
 
 
-def _with_u(value, u):
+def _format_with_u(value, u):
     both = format_with_u(value, u, marks(), least=0)
     return both.value, both.uncertainty
 
 
-def _of_table(found):
-    yield _head(found)
-    if found.without_head is not None:
-        rms, largest, radii = found.without_head
+def _describe_shell(geometry):
+    yield _head(geometry)
+    if geometry.without_head is not None:
+        rms, largest, radii = geometry.without_head
         yield message(
             "read_head_left_out",
-            "  with the head left out the rows depart by {rms} L (rms), {largest} L at most, and "
-            "radii by up to {radii} mm",
+            "  without the head, residuals of {rms} L (rms), at most {largest} L, and radii that "
+            "differ by up to {radii} mm",
             rms=fixed(1000 * rms, 2, marks()),
             largest=fixed(1000 * largest, 1, marks()),
-            radii=fixed(1000 * abs(radii - found.radii_m).max(), 2, marks()),
+            radii=fixed(1000 * abs(radii - geometry.radii_m).max(), 2, marks()),
         )
-    yield _zero(found)
-    for number, seam in enumerate(found.seams_m, 1):
+    yield _zero(geometry)
+    for number, seam in enumerate(geometry.seams_m, 1):
         yield _seam(number, seam)
-    for one in found.fittings:
-        yield _thing(one)
-    if not found.fittings:
-        yield message("read_no_things", "nothing in the tank shows")
-    if found.roof_m3 is not None:
-        volume, u = _with_u(found.roof_m3.value, found.roof_m3.u)
+    for fitting in geometry.fittings:
+        yield _describe_deadwood(fitting)
+    if not geometry.fittings:
+        yield message("read_no_things", "no deadwood detected")
+    if geometry.roof_m3 is not None:
+        volume, u = _format_with_u(geometry.roof_m3.value, geometry.roof_m3.u)
         yield message(
             "read_roof", "floating roof: {volume} m3 above its zone, u {u} m3", volume=volume, u=u
         )
-    volume, u = _with_u(found.base_m3.value, found.base_m3.u or found.expected_m3)
+    volume, u = _format_with_u(geometry.base_m3.value, geometry.base_m3.u or geometry.expected_m3)
     yield message(
         "read_lowest",
-        "rows from {lowest} m on; {volume} m3 below that, u {u} m3",
-        lowest=fixed(found.lowest_m, 3, marks()),
+        "rows used from {lowest} m upwards; {volume} m3 below, u {u} m3",
+        lowest=fixed(geometry.lowest_m, 3, marks()),
         volume=volume,
         u=u,
     )
     yield message(
         "read_left",
-        "left: {rms} L (rms), {largest} L at most; rounding alone leaves {expected} L (rms)",
-        rms=fixed(1000 * found.rms_m3, 2, marks()),
-        largest=fixed(1000 * found.largest_m3, 2, marks()),
-        expected=fixed(1000 * found.expected_m3, 2, marks()),
+        "residuals: {rms} L (rms), at most {largest} L; rounding alone causes {expected} L (rms)",
+        rms=fixed(1000 * geometry.rms_m3, 2, marks()),
+        largest=fixed(1000 * geometry.largest_m3, 2, marks()),
+        expected=fixed(1000 * geometry.expected_m3, 2, marks()),
     )
 
 
-def _head(found):
-    density, u = _with_u(found.density_kg_m3.value, found.density_kg_m3.u)
-    if found.head == "with":
+def _head(geometry):
+    density, u = _format_with_u(geometry.density_kg_m3.value, geometry.density_kg_m3.u)
+    if geometry.head == "with":
         return message(
             "read_with_head",
-            "made with the head of {density} kg/m3, u {u} (t = {t})",
+            "computed with the head of {density} kg/m3, u {u} (t = {t})",
             density=density,
             u=u,
-            t=fixed(found.t, 0, marks()),
+            t=fixed(geometry.t, 0, marks()),
         )
-    if found.head == "without":
+    if geometry.head == "without":
         return message(
             "read_without_head",
-            "without head: {density} kg/m3, u {u} (t = {t})",
+            "computed without head: {density} kg/m3, u {u} (t = {t})",
             density=density,
             u=u,
-            t=fixed(found.t, 1, marks()),
+            t=fixed(geometry.t, 1, marks()),
         )
     return message(
         "read_undecided_head",
-        "head or none cannot be told from this table (its density has u {u} kg/m3): radii and job "
-        "are for {density} kg/m3",
-        density=fixed(found.state.density_kg_m3, 0, marks()),
+        "head not determined by this table (its density has u {u} kg/m3): radii and job are "
+        "for {density} kg/m3",
+        density=fixed(geometry.state.density_kg_m3, 0, marks()),
         u=u,
     )
 
 
-def _zero(found):
-    if found.zero_m.u == 0:
+def _zero(geometry):
+    if geometry.zero_m.u == 0:
         return message("read_zero_held", "zero: the bottom of the first course")
-    if not found.zero_m.u <= 0.05:
-        return message("read_zero_unknown", "zero: cannot be told from this table")
-    zero, u = _with_u(1000 * found.zero_m.value, 1000 * found.zero_m.u)
+    if not geometry.zero_m.u <= 0.05:
+        return message("read_zero_unknown", "zero: not determined by this table")
+    zero, u = _format_with_u(1000 * geometry.zero_m.value, 1000 * geometry.zero_m.u)
     return message(
         "read_zero",
         "zero: the first course begins at the dip {zero} mm, u {u} mm",
@@ -277,18 +281,18 @@ def _zero(found):
 
 def _seam(number, seam):
     if not seam.u < 0.04:
-        return message("read_no_seam", "seam {number}: cannot be told", number=number)
-    dip, u = _with_u(seam.value, seam.u)
+        return message("read_no_seam", "seam {number}: not determined", number=number)
+    dip, u = _format_with_u(seam.value, seam.u)
     return message("read_seam", "seam {number}: {dip} m, u {u} m", number=number, dip=dip, u=u)
 
 
-def _thing(one):
-    volume, u = _with_u(1000 * one.volume_m3.value, 1000 * one.volume_m3.u)
+def _describe_deadwood(fitting):
+    volume, u = _format_with_u(1000 * fitting.volume_m3.value, 1000 * fitting.volume_m3.u)
     return message(
         "read_thing",
-        "in the tank from {bottom} to {top} m: {volume} L, u {u} L",
-        bottom=fixed(one.bottom_m.value, 3, marks()),
-        top=fixed(one.top_m.value, 3, marks()),
+        "deadwood from {bottom} to {top} m: {volume} L, u {u} L",
+        bottom=fixed(fitting.bottom_m.value, 3, marks()),
+        top=fixed(fitting.top_m.value, 3, marks()),
         volume=volume,
         u=u,
     )

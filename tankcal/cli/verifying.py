@@ -1,4 +1,4 @@
-"""`tankcal verify`: whether the files of a run belong together, and come out again."""
+"""`tankcal verify`: agreement of the files of a run, and reproduction of the results."""
 
 from dataclasses import asdict
 
@@ -10,33 +10,33 @@ from tankcal.messages import message, printable
 
 
 def add(commands):
-    """The parser of `tankcal verify`."""
+    """Add the parser of `tankcal verify`."""
     verify = commands.add_parser(
         "verify",
-        help="check that the files of a run belong together, and come out again",
-        description="Hold every file of a folder of results against SHA256SUMS, the papers "
-        "against what the record gives when they are made again, the input files of the job, "
-        "where it is at hand, against the hashes in the record, and every number of the record "
-        "against the job computed again. One line a disagreement.",
-        epilog="exit status: 0 nothing disagrees; 2 something does, or there is nothing to "
+        help="check that the files of a run agree and can be reproduced",
+        description="Compare every file of a folder of results with SHA256SUMS, and the reports "
+        "with reports created again from the record. Compare the input files of the job, if "
+        "available, with the hashes in the record, and every number of the record with the job "
+        "computed again. One line per disagreement.",
+        epilog="exit status: 0 no disagreement; 2 at least one disagreement, or no file to "
         "compare.",
     )
     verify.add_argument(
         "results",
         metavar="RESULTS",
-        help="a folder that tankcal wrote: results, a comparison, an inspection, a history, a "
-        "plan, the camera; or a PDF of results",
+        help="a folder written by tankcal: results, comparison, inspection, history, plan or "
+        "camera; or a PDF of results",
     )
     verify.add_argument(
         "--job",
         metavar="DIR",
-        help="folder of the input files, or the job's workbook (default: the folder that the "
-        "results lie in)",
+        help="folder of the input files, or the workbook of the job (default: the parent folder "
+        "of the results)",
     )
     verify.add_argument(
         "--hashes-only",
         action="store_true",
-        help="compare hashes only: no paper is made again, no number computed again",
+        help="compare hashes only, without creating reports or computing numbers again",
     )
     add_language(verify)
     verify.add_argument("--quiet", action="store_true", help="no progress, only problems")
@@ -50,7 +50,7 @@ def _verify(options):
     from tankcal.report.verification import verify
 
     show = Progress(options.quiet or options.machine)
-    found = verify(
+    result = verify(
         options.results,
         options.job,
         hashes_only=options.hashes_only,
@@ -58,23 +58,23 @@ def _verify(options):
         part=show.part,
     )
     show.end()
-    status = 2 if found.problems else 0
+    status = 2 if result.problems else 0
     if options.machine:
-        _print(found, status)
+        _print(result, status)
     else:
-        _tell(found, options.hashes_only)
+        _tell(result, options.hashes_only)
     return status
 
 
-def _print(found, status):
-    again = found.recomputed
+def _print(result, status):
+    again = result.recomputed
     print_json(
         exit_status=status,
-        record_sha256=found.digest,
-        manifest_sha256=found.manifest_sha256,
-        compared=found.compared,
-        inputs_compared=found.inputs_found,
-        papers_made_again=found.papers_again,
+        record_sha256=result.digest,
+        manifest_sha256=result.manifest_sha256,
+        compared=result.compared,
+        inputs_compared=result.inputs_found,
+        papers_made_again=result.papers_again,
         recomputed=None
         if again is None
         else {
@@ -85,10 +85,10 @@ def _print(found, status):
             "largest": None if again.largest is None else _finite(asdict(again.largest)),
             "agrees": again.agrees,
         },
-        compared_by_hash_alone=found.by_hash,
-        compared_by_numbers_alone=found.by_numbers,
-        notes=[str(one) for one in found.notes],
-        problems=[problem_of(one) for one in found.problems],
+        compared_by_hash_alone=result.by_hash,
+        compared_by_numbers_alone=result.by_numbers,
+        notes=[str(note) for note in result.notes],
+        problems=[problem_of(problem) for problem in result.problems],
     )
 
 
@@ -96,101 +96,121 @@ def _finite(values):
     return {key: None if value == float("inf") else value for key, value in values.items()}
 
 
-def _tell(found, hashes_only):
-    for one in found.problems:
-        say(one.text)
-    if found.recomputed is not None:
-        for line in _numbers(found.recomputed):
+def _tell(result, hashes_only):
+    for problem in result.problems:
+        say(problem.text)
+    if result.recomputed is not None:
+        for line in _numbers(result.recomputed):
             say(line)
-    elif found.saved_file == "record.json" and not found.inputs_found:
+    elif result.saved_file == "record.json" and not result.inputs_found:
         say(
             message(
                 "verify_no_inputs",
-                "the input files of the job are not here: neither compared nor computed again",
+                "the input files of the job were not found: neither compared nor computed again",
             )
         )
-    for one in found.notes:
-        say(one)
-    if found.papers_again:
-        say(message("verify_papers_again", "the papers were made again and held against these"))
+    for note in result.notes:
+        say(note)
+    if result.papers_again:
+        say(message("verify_papers_again", "the reports were created again and compared"))
     if hashes_only:
         say(
-            message("verify_hashes_only", "hashes only: no paper made and no number computed again")
+            message(
+                "verify_hashes_only",
+                "hashes only: no report was created and no number was computed again",
+            )
         )
-    _sum(found)
+    _sum(result)
 
 
 def _numbers(again):
-    """What came of the numbers, and which versions made them."""
+    """Yield the comparison of the numbers, and the versions that computed them."""
     if again.different == 0:
         yield message(
             "verify_same_numbers",
-            "computed again: {count} numbers, all the same bit for bit",
+            "computed again: {count} numbers, all identical bit for bit",
             count=again.numbers,
         )
     elif again.largest is None:
         yield message(
             "verify_rounded_numbers",
-            "computed again: {count} numbers, {different} not the same bit for bit, all of them "
-            "by rounding alone",
+            "computed again: {count} numbers, {different} not identical bit for bit, all by "
+            "rounding only",
             count=again.numbers,
             different=again.different,
         )
     else:
-        one = again.largest
+        difference = again.largest
         yield message(
             "verify_near_numbers",
-            "computed again: {count} numbers, {different} not the same bit for bit; measured by "
-            "what is allowed, the largest difference is at {place}: {recorded} and now {computed}, "
-            "{relative} of the largest number there (at most {tolerance})",
+            "computed again: {count} numbers, {different} not identical bit for bit; the largest "
+            "difference relative to its tolerance is at {place}: {recorded} in the record, "
+            "{computed} now, {relative} of the largest number there (tolerance {tolerance})",
             count=again.numbers,
             different=again.different,
-            place=one.place,
-            recorded=f"{one.recorded:.12g}",
-            computed=f"{one.computed:.12g}",
-            relative=f"{one.relative:.1e}",
-            tolerance=f"{one.tolerance:.0e}",
+            place=difference.place,
+            recorded=f"{difference.recorded:.12g}",
+            computed=f"{difference.computed:.12g}",
+            relative=f"{difference.relative:.1e}",
+            tolerance=f"{difference.tolerance:.0e}",
         )
-    made, now = (", ".join(f"{name} {version}" for name, version in versions.items())
-                 for versions in (again.made_by, again.computed_by))  # fmt: skip
-    if made == now:
+    versions_then, versions_now = (
+        ", ".join(f"{name} {version}" for name, version in versions.items())
+        for versions in (again.made_by, again.computed_by)
+    )
+    if versions_then == versions_now:
         yield message(
-            "verify_same_versions", "made and computed again by {versions}", versions=made
+            "verify_same_versions", "computed both times with {versions}", versions=versions_then
         )
     else:
         yield message(
-            "verify_other_versions", "made by {made}; computed again by {now}", made=made, now=now
+            "verify_other_versions",
+            "computed with {made}; computed again with {now}",
+            made=versions_then,
+            now=versions_now,
         )
 
 
-def _in_part(found):
-    """Which files were not compared with what they were made of."""
+def _list_partial(result):
+    """Yield the files that were not compared with files created again."""
     by_hash, by_numbers = (", ".join(map(printable, names))
-                           for names in (found.by_hash, found.by_numbers))  # fmt: skip
+                           for names in (result.by_hash, result.by_numbers))  # fmt: skip
     if by_hash:
-        yield message("verify_by_hash", "compared by their hash in SHA256SUMS alone, which anybody "
-                      "can write again: {files}", files=by_hash)  # fmt: skip
+        yield message(
+            "verify_by_hash",
+            "compared by their hash in SHA256SUMS only, which anybody can recompute: {files}",
+            files=by_hash,
+        )
     if by_numbers:
-        yield message("verify_by_numbers", "of another version of tankcal, compared by their "
-                      "numbers of five digits and more: {files}", files=by_numbers)  # fmt: skip
+        yield message(
+            "verify_by_numbers",
+            "written by another version of tankcal; only numbers of five or more digits were "
+            "compared: {files}",
+            files=by_numbers,
+        )
 
 
-def _sum(found):
-    if found.problems:
-        count = len(found.problems)
+def _sum(result):
+    if result.problems:
+        count = len(result.problems)
         text = message("verify_disagree", "{count} disagreements", count=count)
         say(message("verify_disagrees", "1 disagreement") if count == 1 else text)
         return
-    values = {"count": len(found.compared), "file": found.saved_file,
-              "digest": found.digest or found.manifest_sha256}  # fmt: skip
-    if found.is_whole:
+    values = {"count": len(result.compared), "file": result.saved_file,
+              "digest": result.digest or result.manifest_sha256}  # fmt: skip
+    if result.is_whole:
         say(message("verify_agree", "{count} files compared, all agree: {file} is sha256:{digest}",
                     **values))  # fmt: skip
     else:
-        for text in _in_part(found):
+        for text in _list_partial(result):
             say(text)
-        say(message("verify_agree_in_part", "{count} files agree as far as they were compared: "
-                    "{file} is sha256:{digest}", **values))  # fmt: skip
-    if found.manifest_sha256 and found.digest:
+        say(
+            message(
+                "verify_agree_in_part",
+                "{count} files agree within the comparison made: {file} is sha256:{digest}",
+                **values,
+            )
+        )
+    if result.manifest_sha256 and result.digest:
         say(message("verify_manifest", "SHA256SUMS is sha256:{digest}",
-                    digest=found.manifest_sha256))  # fmt: skip
+                    digest=result.manifest_sha256))  # fmt: skip

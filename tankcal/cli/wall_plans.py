@@ -1,15 +1,15 @@
-"""What the terminal says of a plan of straps, reference lines, wall hits, tangents or liquid."""
+"""Terminal output for plans of straps, reference lines, wall hits, tangents or liquid."""
 
 from tankcal.cli.planned_counts import plan_holds
 from tankcal.cli.showing import marks
 from tankcal.messages import message
 from tankcal.text.digits import fixed, format_significant
 
-SCALES = ("meter_factor", "scale", "instrument_scale")  # that liquid tells something of
+SCALES = ("meter_factor", "scale", "instrument_scale")  # parameters that metered liquid determines
 
 
 def wall_summary(prediction):
-    """What was planned, and how well the radius of its courses will be known."""
+    """Yield the items of the plan and the predicted u of the course radii."""
     from tankcal.record.wall_plan import survey_of
 
     plan = prediction.plan
@@ -18,66 +18,67 @@ def wall_summary(prediction):
     for kind in ("lines", "offsets", "setups", "hits", "tangents", "runs", "batches"):
         counts[kind] = getattr(has, kind)
     yield plan_holds(plan, counts)
-    for one in prediction.courses:
+    for course in prediction.courses:
         yield message(
             "plan_course_radius",
-            "course {course}: u of its mean radius {sd} mm",
-            course=one.name,
-            sd=format_significant(1000 * one.radius_sd_m, 2, marks()),
+            "course {course}: u of the mean radius {sd} mm",
+            course=course.name,
+            sd=format_significant(1000 * course.radius_sd_m, 2, marks()),
         )
     if prediction.filling is not None:
         yield from _filling(prediction.filling)
 
 
-def _filling(found):
-    """What runs of liquid would add to the geometry."""
-    for one in found.dips:
+def _filling(outlook):
+    """Yield the effect of runs of liquid on the uncertainty of the geometry."""
+    for dip in outlook.dips:
         yield message(
             "plan_dip_beside",
-            "V({dip} m): U = {uncertainty} m3; by geometry alone {before} m3",
-            dip=fixed(one.dip_m, 3, marks()),
-            uncertainty=format_significant(one.U_m3, 2, marks()),
-            before=format_significant(one.U_geometry_m3, 2, marks()),
+            "V({dip} m): U = {uncertainty} m3; from geometry alone {before} m3",
+            dip=fixed(dip.dip_m, 3, marks()),
+            uncertainty=format_significant(dip.U_m3, 2, marks()),
+            before=format_significant(dip.U_geometry_m3, 2, marks()),
         )
-    for one in found.causes:
-        if one.kind in SCALES:
+    for cause in outlook.causes:
+        if cause.kind in SCALES:
             yield message(
                 "plan_told_by_liquid",
-                "{name}: u {before} {unit} before the liquid, {after} {unit} after it",
-                name=one.name or message("plan_scale_of_all", "scale"),
-                unit=one.unit,
-                before=format_significant(one.u_before, 3, marks()),
-                after=format_significant(one.u_after, 3, marks()),
+                "{name}: u {before} {unit} without the liquid, {after} {unit} with it",
+                name=cause.name or message("plan_scale_of_all", "scale"),
+                unit=cause.unit,
+                before=format_significant(cause.u_before, 3, marks()),
+                after=format_significant(cause.u_after, 3, marks()),
             )
-    if found.detectable_radius_m is not None:
+    if outlook.detectable_radius_m is not None:
         yield message(
             "plan_radius_shown",
-            "an offset of all radii of the geometry would show from {radius} mm on",
-            radius=format_significant(1000 * found.detectable_radius_m, 2, marks()),
+            "smallest detectable offset of all radii of the geometry: {radius} mm",
+            radius=format_significant(1000 * outlook.detectable_radius_m, 2, marks()),
         )
 
 
-def wall_scatter(found):
-    """What simulated surveys of drawn walls gave; None: there were none."""
-    if found is None:
+def wall_scatter(scatter):
+    """Yield the result of simulated surveys of random walls; nothing for None."""
+    if scatter is None:
         return
-    low, median, high = found.U_ratios
+    low, median, high = scatter.U_ratios
     yield message(
         "plan_wall_scatter",
-        "{runs} simulated surveys of drawn walls: error of the volume over prediction {ratio:.3f} "
-        "(known to {ratio_sd:.2g}); U over prediction {median:.2f} ({low:.2f} to {high:.2f}); true "
-        "volume within U in {covered} of full tanks, {rows} of all rows; {aside:.1f} readings set "
-        "aside on average, without a solution: {failed}",
-        runs=found.runs,
-        ratio=found.volume_ratio,
-        ratio_sd=found.volume_ratio_sd,
+        "{runs} simulated surveys of random walls: ratio of volume error to prediction "
+        "{ratio:.3f} (standard deviation {ratio_sd:.2g}); ratio of U to prediction "
+        "{median:.2f} ({low:.2f} to {high:.2f}); true volume within U in {covered} of full "
+        "tanks, {rows} of all rows; {aside:.1f} readings rejected on average, without a "
+        "solution: {failed}",
+        runs=scatter.runs,
+        ratio=scatter.volume_ratio,
+        ratio_sd=scatter.volume_ratio_sd,
         median=median,
         low=low,
         high=high,
-        covered=_share(found.covered),
-        rows=_share(found.within.mean()),
-        aside=found.set_aside.mean(),
-        failed=len(found.failed),
+        covered=_share(scatter.covered),
+        rows=_share(scatter.within.mean()),
+        aside=scatter.set_aside.mean(),
+        failed=len(scatter.failed),
     )
 
 
@@ -86,20 +87,20 @@ def _share(number):
 
 
 def wall_item(change):
-    """An item of a plan of the wall; None of other plans."""
+    """Return an item of a plan of the wall in words; None for other plans."""
     from tankcal.planning.wall.changes import NUMBERED
     from tankcal.planning.wall.model import WallPlan
 
     name = change.name
     if change.item in NUMBERED:
         name = name.replace(".", marks().decimal)
-    told = {
+    items = {
         "strap": message("plan_item_strap", "circumference {name}", name=name),
         "line": message("plan_item_lines", "{name} reference lines", name=name),
         "face": message("plan_item_face", "the second face of the plummet"),
         "level": message("plan_item_level", "the level {name} of each course", name=name),
-        "hit": message("plan_item_hits", "hits of ring {name}, half as many as it has", name=name),
-        "accuracy": message("plan_item_accuracy", "each reading of the tape, with half its s_mm"),
+        "hit": message("plan_item_hits", "hits of ring {name}, half as many as planned", name=name),
+        "accuracy": message("plan_item_accuracy", "each tape reading, with half its s_mm"),
         "station": message(
             "plan_item_station", "a station of the traverse, all {name} from the axis", name=name
         ),
@@ -124,11 +125,11 @@ def wall_item(change):
         return message("plan_item_finer_dips", "each dip, with half its s_dip_mm")
     if change.item == "half_steps" and change.action == "drop":
         return message("plan_item_every_second", "every second dip of run {name}", name=name)
-    return told.get(change.item)
+    return items.get(change.item)
 
 
 def _filling_items(name):
-    """Items of the runs of a plan."""
+    """Return the items of the runs of a plan."""
     return {
         "step": message("plan_item_step", "a step at the end of run {name}", name=name),
         "top_of_run": message(

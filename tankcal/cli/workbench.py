@@ -1,4 +1,4 @@
-"""`tankcal notebook` and `tankcal app`: a job as a notebook, and the same without its code."""
+"""`tankcal notebook` and `tankcal app`: a job as a notebook, with and without code."""
 
 import argparse
 from pathlib import Path
@@ -13,39 +13,41 @@ MOST_PORT = 65535
 
 
 def add(commands):
-    """The parsers of `tankcal notebook` and `tankcal app`."""
+    """Add the parsers of `tankcal notebook` and `tankcal app`."""
     notebook = commands.add_parser(
         "notebook",
         help="edit, check and compute a job in a notebook",
-        description="Write one notebook that is the job, and open it in JupyterLab: its tables as "
-        "grids that are checked as they are filled in, a button that computes, and the results. "
-        "A notebook that was changed by hand is kept.",
+        description="Write a notebook for the job and open it in JupyterLab. It contains the "
+        "tables as grids, checked during input, a button for the computation, and the results. A "
+        "notebook with manual changes is kept.",
     )
     _add_job(notebook)
     notebook.add_argument(
         "--out",
         metavar="FILE",
-        help="the notebook to write (default: tankcal.ipynb in the job's folder, or NAME.ipynb "
-        "beside NAME.xlsx)",
+        help="the notebook to write (default: tankcal.ipynb in the folder of the job, or "
+        "NAME.ipynb beside NAME.xlsx)",
     )
-    notebook.add_argument("--no-open", action="store_true", help="write the notebook alone")
+    notebook.add_argument(
+        "--no-open", action="store_true", help="write the notebook without opening it"
+    )
     notebook.set_defaults(command=_notebook)
     app = commands.add_parser(
         "app",
-        help="serve a job as a page without code",
-        description="Serve the notebook of a job as a page without code (Voilà), to be edited, "
-        "computed and saved in a browser of this machine. Ctrl-C ends it.",
+        help="serve a job as a web page without code",
+        description="Serve the notebook of a job as a web page without code (Voilà), for editing, "
+        "computing and saving in a browser of this machine. Ctrl-C stops the server.",
     )
     _add_job(app)
     app.add_argument(
         "--address",
         metavar="ADDRESS",
         default="127.0.0.1",
-        help="the address of this machine to listen on (default: 127.0.0.1, which no other machine "
-        "can reach)",
+        help="address of this machine to listen on (default: 127.0.0.1, not accessible from other "
+        "machines)",
     )
-    app.add_argument("--port", metavar="N", type=_port, help="the port (default: one that is free)")
-    app.add_argument("--no-browser", action="store_true", help="open no browser")
+    app.add_argument("--port", metavar="N", type=_port, help="port (default: any free port)")
+    app.add_argument("--no-browser", action="store_true", help="do not open a browser")
     app.set_defaults(command=_app)
 
 
@@ -54,7 +56,7 @@ def _add_job(parser):
     parser.add_argument(
         "--language",
         choices=LANGUAGES,
-        help="of the notebook and of everything in it (default: that of the job)",
+        help="language of the notebook and its contents (default: language of the job)",
     )
 
 
@@ -64,8 +66,8 @@ def _port(text):
     return int(text)
 
 
-def _written(options, out):
-    """Path of the notebook of a job, written or kept as it is."""
+def _write_notebook(options, out):
+    """Return the path of the notebook of a job, after writing it or keeping manual changes."""
     from tankcal.cli.asked_language import asked_language
     from tankcal.workbench.draft import Draft, source_of
     from tankcal.workbench.notebook_file import notebook_path, write_notebook
@@ -83,7 +85,8 @@ def _written(options, out):
     else:
         text = message(
             "kept_notebook",
-            "notebook: {file} was changed by hand and is kept; --out FILE writes a new one",
+            "notebook: {file} contains manual changes and is kept; --out FILE writes a new "
+            "notebook",
             file=str(path),
         )
         say(text)
@@ -95,15 +98,15 @@ def _written(options, out):
 def _notebook(options):
     from tankcal.workbench import serving
 
-    path = _written(options, options.out)
+    path = _write_notebook(options, options.out)
     if options.no_open:
         return
     if not serving.has_lab():
         complain(
             message(
                 "no_lab",
-                "JupyterLab is not installed here; the notebook also opens in any other Jupyter. "
-                "This command installs JupyterLab with the grids: {command}",
+                "JupyterLab is not installed; the notebook also opens in any other Jupyter. To "
+                "install JupyterLab with the grids: {command}",
                 command=install_command("lab"),
             )
         )
@@ -118,11 +121,11 @@ def _app(options):
     if not serving.has_app():
         expected = message(
             "no_app",
-            "Voilà is not installed here; this command installs it: {command}",
+            "Voilà is not installed; to install it: {command}",
             command=install_command("app"),
         )
         raise InputError(Problem("tankcal app", expected))
-    path = _written(options, None)
+    path = _write_notebook(options, None)
     port = serving.free_port(options.address, options.port)
     token = ""
     if not serving.is_local(options.address):
@@ -130,12 +133,16 @@ def _app(options):
         complain(
             message(
                 "app_is_open",
-                "warning: every machine that reaches {address} can read, change and compute this "
-                "job, if it has the token of this address; what is sent is not encrypted",
+                "warning: every machine that can connect to {address} and has the token of this "
+                "address can read, change and compute this job; the data are sent unencrypted",
                 address=options.address,
             )
         )
     address = f"http://{options.address}:{port}/" + (f"?token={token}" if token else "")
-    say(message("app_address", "open {address} in a browser; Ctrl-C ends it", address=address))
+    say(
+        message(
+            "app_address", "open {address} in a browser; Ctrl-C stops the server", address=address
+        )
+    )
     prepare_for_small_work()
     serving.serve_app(path, port, options.address, not options.no_browser, token)

@@ -1,8 +1,9 @@
-"""Field books of total stations: what instruments export becomes the CSV files of a job.
+"""Import of field books of total stations into the CSV files of a job.
 
-One module reads one format (`gsi`, `rw5`, `jobxml`, `sdr`, `profile`) into a `FieldBook`; all that
-follows knows no format: `faces` joins the two faces, `sorting` tells hits from targets, `rows`
-makes the rows of the job's tables, `writing` puts them into its folder.
+One module reads each format (`gsi`, `rw5`, `jobxml`, `sdr`, `profile`) into a `FieldBook`. The
+other modules do not depend on the format: `faces` averages the two faces, `sorting` separates hits
+and targets, `rows` makes the rows of the tables, and `writing` writes them to the folder of the
+job.
 """
 
 from tankcal.fieldbooks.importing import Choices, Imported, import_fieldbooks

@@ -1,7 +1,7 @@
-"""What stands in a field book, whatever the format: set-ups, shots, known points.
+"""Contents of a field book in any format: set-ups, shots, known points.
 
-Angles are degrees, lengths metres. A reader fills a `FieldBook`; what it does not understand it
-counts there, so that nothing is left out in silence.
+Angles are in degrees, lengths in metres. Each reader fills a `FieldBook` and counts the records
+that it does not recognise, so that no record is left out without a message.
 """
 
 import datetime
@@ -16,17 +16,24 @@ FARTHEST_M, HIGHEST_M, MOST_M = 1e4, 50.0, 1e8
 METRES = {"m": 1.0, "mm": 1e-3, "ft": 0.3048, "usft": 1200 / 3937}
 DEGREES = {"deg": 1.0, "gon": 0.9, "mil": 360 / 6400}
 MAX_NUMBER = 40  # characters
-NO_YEAR = 1904  # of a time whose year the file does not say (a leap year)
+NO_YEAR = 1904  # year of times without year in the file (a leap year)
 
 
 @dataclass(frozen=True)
 class SetUp:
-    """A stand of the instrument.
+    """A set-up of the instrument.
 
-    station   name of the point below it; "": the file names none
-    height_m  of the instrument above the point, None: not given
-    xyz_m     east, north and height of the point, None: not given
-    is_told   whether a record of the file begins it; else only readings tell that there is one
+    Attributes
+    ----------
+    station : str
+        Name of the point below the instrument; "" if the file has none.
+    height_m : float or None
+        Height of the instrument above the point; None if unknown.
+    xyz_m : tuple or None
+        East, north and height of the point; None if unknown.
+    row : int
+    is_told : bool
+        Whether a record of the file begins the set-up; otherwise it is inferred from readings.
     """
 
     station: str
@@ -38,13 +45,19 @@ class SetUp:
 
 @dataclass(frozen=True)
 class Shot:
-    """One reading of a point: what the circles and the distance meter showed, on either face.
+    """One reading of a point on one face: circles and distance as displayed.
 
-    setup             place of its `SetUp` in the book
-    direction_deg, zenith_deg, distance_m  None: not read; on face 2 as the circles show them
-    face              1 or 2
-    target_height_m   None: not given
-    prism_mm          prism constant that the file says was in force, None: not given
+    Attributes
+    ----------
+    setup : int
+        Index of the `SetUp` in the book.
+    direction_deg, zenith_deg, distance_m : float or None
+        None if not read; on face 2 the circle readings of face 2.
+    face : int
+        1 or 2.
+    target_height_m : float or None
+    prism_mm : float or None
+        Prism constant in effect according to the file.
     """
 
     setup: int
@@ -63,7 +76,7 @@ class Shot:
 
 @dataclass(frozen=True)
 class KnownPoint:
-    """Coordinates that the file gives a point: east, north, height (None: not given)."""
+    """Coordinates of a point in the file: east, north, height (None if unknown)."""
 
     point: str
     xyz_m: tuple
@@ -72,14 +85,22 @@ class KnownPoint:
 
 @dataclass
 class FieldBook:
-    """One file as read.
+    """Contents of one file.
 
-    units      Messages: the units that were found
-    notes      Messages: corrections that the instrument or this reader applied
-    left_out   {Message or text: [count, first row]}: what was not understood
-    rejected   the same of what the surveyor deleted
-    instrument name of the instrument that the file gives
-    texts      {field: [(text, row)]}: angles and distances as they stand in the file
+    Attributes
+    ----------
+    units : list of Message
+        Units of the file.
+    notes : list of Message
+        Corrections applied by the instrument or by the reader.
+    left_out : dict
+        {Message or text: [count, first row]} of records not recognised.
+    rejected : dict
+        The corresponding counts of records deleted by the surveyor.
+    instrument : str
+        Name of the instrument in the file.
+    texts : dict
+        {field: [(text, row)]}: angles and distances as written in the file.
     """
 
     file: str
@@ -96,36 +117,36 @@ class FieldBook:
 
     @property
     def has_shots(self):
-        """Has the last set-up a shot?"""
+        """Whether the last set-up has a shot."""
         return bool(self.shots) and self.shots[-1].setup == len(self.setups) - 1
 
     def leave_out(self, what, row):
-        """Count something that is not understood, and so is not used."""
+        """Count a record that is not recognised and not used."""
         _count(self.left_out, what, row)
 
     def reject(self, what, row):
-        """Count something that the surveyor deleted."""
+        """Count a record deleted by the surveyor."""
         _count(self.rejected, what, row)
 
     def note(self, text):
-        """Keep what a reader has to say, once."""
+        """Add a note, if it is new."""
         if text not in self.notes:
             self.notes.append(text)
 
     def unit(self, text):
-        """Keep a unit that was found, once."""
+        """Add a unit, if it is new."""
         if text not in self.units:
             self.units.append(text)
 
     def keep_text(self, name, text, row):
-        """Keep a number of a field as it is written; a blank one is none."""
+        """Add the text of a number of a field; a blank text is ignored."""
         if text.strip():
             self.texts.setdefault(name, []).append((text.strip(), row))
 
     def say_units(self, *, length=None, angle=None, last=None):
-        """Keep the units that were found: names of METRES, of DEGREES, or dms and packed_dms.
+        """Add the units of a file: names in METRES and DEGREES, or dms and packed_dms.
 
-        last  what one of the last digit of a length is, such as "1 mm"
+        last  unit of the last digit of a length, such as "1 mm"
         """
         if angle is not None:
             self.unit(message("angles_in", "angles in {unit}", unit=angle))
@@ -141,11 +162,25 @@ class FieldBook:
 
     def add_shot(self, log, row, *, point, direction, zenith, distance, face=None, height=None,
                  code="", time=None, prism=None, setup=None):  # fmt: skip
-        """Keep a reading after its values are seen to be possible.
+        """Add a reading after a check of its values.
 
-        direction, zenith  degrees or None; distance, height metres or None; prism mm or None
-        face   None: 2 where the vertical circle shows more than half a turn
-        setup  place of the set-up; None: the last
+        Parameters
+        ----------
+        log : Log
+        row : int
+        point : str
+        direction, zenith : float or None
+            Degrees.
+        distance, height : float or None
+            Metres.
+        face : int or None
+            None: 2 if the vertical circle shows more than half a turn, else 1.
+        code : str
+        time : datetime or None
+        prism : float or None
+            Prism constant, mm.
+        setup : int or None
+            Index of the set-up; None: the last.
         """
         if not self.setups:
             self.stand("", None, None, row, is_told=False)
@@ -159,12 +194,14 @@ class FieldBook:
         ):
             return
         if distance is not None and distance < 0:
-            text = message("negative_distance", "found a distance below 0; expected one above it")
+            text = message(
+                "negative_distance", "found a negative distance; expected a positive distance"
+            )
             log.problem(self.file, text, row)
             return
-        distance = distance or None  # 0 is how instruments write that none was measured
+        distance = distance or None  # instruments write 0 for no measurement
         if direction is None and zenith is None and distance is None:
-            self.leave_out(message("no_reading", "points without any reading"), row)
+            self.leave_out(message("no_reading", "points without readings"), row)
             return
         zenith = None if zenith is None else zenith % FULL_TURN
         direction = None if direction is None else direction % FULL_TURN
@@ -172,8 +209,8 @@ class FieldBook:
         if face is not None and zenith is not None and face != by_circle:
             text = message(
                 "face_unlike_circle",
-                "found face {face} and a vertical circle of {circle_deg:.4f} degrees; expected one"
-                " of that face: is the circle read from the zenith?",
+                "found face {face} and a vertical circle of {circle_deg:.4f} degrees; expected a "
+                "circle reading of this face (is the circle read from the zenith?)",
                 face=face,
                 circle_deg=zenith,
             )
@@ -190,11 +227,13 @@ def _count(counts, what, row):
 
 
 def _is_within(log, file, row, value, most, unit):
+    """Return whether a value is within its limit; add a problem to the log otherwise."""
     if value is None or abs(value) <= most:
         return True
     text = message(
         "beyond_reason",
-        "found {value:g} {unit}; expected at most {most:g} {unit}: is the unit that of the file?",
+        "found {value:g} {unit}; expected at most {most:g} {unit} (is the unit of the file "
+        "correct?)",
         value=value,
         most=most,
         unit=unit,
@@ -204,7 +243,7 @@ def _is_within(log, file, row, value, most, unit):
 
 
 def number_of(text):
-    """A plain number, or None where the text is none."""
+    """Return a plain number, or None if the text is not a number."""
     text = text.strip()
     if len(text) > MAX_NUMBER or not NUMBER.fullmatch(text):
         return None
@@ -213,32 +252,33 @@ def number_of(text):
 
 
 def unpacked(value):
-    """Degrees of ddd.mmssss, as field books pack them; None: minutes or seconds are impossible."""
+    """Convert ddd.mmssss to degrees; None if minutes or seconds are impossible."""
     text = f"{abs(value):.10f}"
     whole, _, behind = text.partition(".")
     minutes, seconds = int(behind[:2]), float(f"{behind[2:4]}.{behind[4:]}")
-    if minutes >= 60 or seconds > 60:  # 60 is how some round 59.99
+    if minutes >= 60 or seconds > 60:  # some instruments round 59.99 to 60
         return None
     return math.copysign(int(whole) + minutes / 60 + seconds / 3600, value)
 
 
 def refuse_number(log, file, row, text):
-    """Tell that a text is no number."""
+    """Report a text that is not a number."""
     expected = message("no_plain_number", "found {text!r}; expected a number", text=text[:40])
     log.problem(file, expected, row)
 
 
 def refuse_minutes(log, file, row, text):
-    """Tell that the minutes or seconds of an angle cannot be."""
+    """Report impossible minutes or seconds of an angle."""
     expected = message(
         "impossible_minutes",
-        "found {text!r}; expected degrees, minutes and seconds: is it decimal, or gon?",
+        "found {text!r}; expected degrees, minutes and seconds (is the angle in decimal "
+        "degrees or gon?)",
         text=text[:40],
     )
     log.problem(file, expected, row)
 
 
 def plain_name(text):
-    """A point's name without the zeros or blanks that fill its field."""
+    """Return the name of a point without the zeros or blanks that fill its field."""
     text = text.strip()
     return text.lstrip("0") or text[-1:]

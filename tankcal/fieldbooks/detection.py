@@ -1,4 +1,4 @@
-"""Which format a file is in, by its content, and its text."""
+"""Detection of the format of a file from its content, and decoding of its text."""
 
 import re
 
@@ -19,12 +19,12 @@ NAMES = {
 }
 MAX_BYTES, MAX_LINES, MAX_LINE, LOOKED_AT = 50_000_000, 100_000, 4000, 60  # of a file, characters
 _JOBXML = re.compile(r"<(\w+:)?JOBFile[\s>]")
-# A serial transfer puts controls (STX, ETX, Ctrl-Z, zero bytes) around lines, and controls of its
-# flow (XON, XOFF) anywhere.
+# Serial transfers add control characters (STX, ETX, Ctrl-Z, zero bytes) around lines and flow
+# control characters (XON, XOFF) anywhere.
 _AROUND_BYTES = bytes((*range(0x09), *range(0x0B, 0x20), 0x7F))
 _AROUND = _AROUND_BYTES.decode("ascii") + "\ufeff"
 _FLOW = str.maketrans(dict.fromkeys("\x11\x13"))
-_FOREIGN = {  # formats that are not read: a regular expression of their lines
+_FOREIGN = {  # unsupported formats: regular expressions of their lines
     "Nikon RAW": r"CO,\s*Nikon RAW|(MP|CC|ST|CP|SS|F[12]|UP)(,[^,]*){4,}$",
     "Trimble DC": r"00NMSC|10NM.*SCV",
     "Geodimeter": r"\d{1,3}=[^,;\t]*$",
@@ -34,63 +34,81 @@ _FOREIGN = {  # formats that are not read: a regular expression of their lines
 
 
 def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
-    """FieldBook of the bytes of a file, or None after telling the log why it cannot be read.
+    """Return the FieldBook of a file, or None after adding a problem to the log.
 
-    wanted     one of FORMATS; None: by its content
-    described  Profile of plain tables, or None
-    custom     gsi.Custom: what code blocks of GSI mean
+    Parameters
+    ----------
+    file : str
+        Name for messages.
+    data : bytes
+    log : Log
+    wanted : str, optional
+        One of FORMATS. None: determined from the content.
+    described : Profile, optional
+        Meaning of the columns of plain tables.
+    custom : gsi.Custom
+        Meaning of GSI code blocks.
     """
     text = _text(file, data, log)
     if text is None:
         return None
-    found = wanted or _format_of(text, described)
-    if found is None:
+    format_name = wanted or _format_of(text, described)
+    if format_name is None:
         log.problem(file, _refusal(text))
         return None
-    if found == "csv" and described is None:
+    if format_name == "csv" and described is None:
         text = message(
-            "profile_needed", "a plain table needs --profile, which says what its columns are"
+            "profile_needed", "a plain table requires --profile with the meaning of its columns"
         )
         log.problem(file, text)
         return None
-    if found == "jxl":
-        is_plain = find_encoding(data) == "utf-8"  # the bytes of letters in UTF-16 can be controls
+    if format_name == "jxl":
+        is_plain = (
+            find_encoding(data) == "utf-8"
+        )  # bytes of UTF-16 letters may be control characters
         if is_plain:
             return jobxml.read(data.strip(_AROUND_BYTES + b"\r\n\t "), file, log)
         # An editor that writes UTF-16 leaves encoding="UTF-8" in the declaration.
         return jobxml.read(text.strip().encode(errors="replace"), file, log, "utf-8")
-    if has_too_many_lines(file, text, log, MAX_LINES):  # JobXML has many lines for each reading
+    if has_too_many_lines(
+        file, text, log, MAX_LINES
+    ):  # not for JobXML, with many lines per reading
         return None
     for row, line in enumerate(text.split("\n"), 1):
-        if len(line) > MAX_LINE and not (found == "gsi" and gsi.LINE.match(line)):
+        if len(line) > MAX_LINE and not (format_name == "gsi" and gsi.LINE.match(line)):
             expected = message("line_too_long", "a line of more than {most} characters; expected a"
                                " field book", most=MAX_LINE)  # fmt: skip
             log.problem(file, expected, row)
             return None
-    if found == "csv":
+    if format_name == "csv":
         book = profile.read(text, file, log, described)
-    elif found == "gsi":
+    elif format_name == "gsi":
         book = gsi.read(text, file, log, custom)
     else:
-        book = {"rw5": rw5, "sdr": sdr}[found].read(text, file, log)
+        book = {"rw5": rw5, "sdr": sdr}[format_name].read(text, file, log)
     if data.endswith(b"\0") and find_encoding(data) == "utf-8":
         count = len(data) - len(data.rstrip(b"\0"))
-        book.note(message("zeros_at_end", "{count} zero bytes at the end of the file, not read: is"
-                          " its last line complete?", count=count))  # fmt: skip
+        book.note(
+            message(
+                "zeros_at_end",
+                "{count} zero bytes at the end of the file, ignored (is the last line complete?)",
+                count=count,
+            )
+        )
     tell_cut_numbers(book, log)
     return book
 
 
 def is_field_book(data):
-    """Whether bytes are a field book in a format that its content shows."""
+    """Return whether the content of a file is a field book in a known format."""
     text = _text("", data, Log())
     return text is not None and _format_of(text, None) is not None
 
 
 def _text(file, data, log):
-    """The text of a file: UTF-8, UTF-16, else the letters of western Windows.
+    """Decode UTF-8, UTF-16 or western Windows text; None after adding a problem to the log.
 
-    Without the control characters of a serial transfer: they are no part of a line.
+    Control characters of serial transfers are removed, because they are not part of the lines.
     """
     encoding = find_encoding(data)
     for name in ("utf-8", "cp1252", "latin-1") if encoding == "utf-8" else (encoding,):
@@ -103,34 +121,39 @@ def _text(file, data, log):
         row = next((row for row, line in enumerate(lines, 1) if "\0" in line), None)
         if row is None and (any(lines) or "\0" not in text):
             return "\n".join(lines)
-        text = message("binary_file", "a zero byte; expected a text file of an instrument")
+        text = message("binary_file", "contains a zero byte; expected a text file of an instrument")
         log.problem(file, text, row or 1)
         return None
-    text = message("cut_letters", "letters that cannot be read as {encoding}: is the file whole?",
-                   encoding=encoding)  # fmt: skip
+    text = message(
+        "cut_letters",
+        "contains characters that are not {encoding} (is the file complete?)",
+        encoding=encoding,
+    )
     log.problem(file, text)
     return None
 
 
 def _refusal(text):
-    """Refusal of a text of no format that is read; a format that is recognised gets its name."""
+    """Return the message for an unsupported format; it names the format if that is recognised."""
     lines = _first_lines(text)
     for name, pattern in _FOREIGN.items():
         count = sum(re.match(pattern, line.strip(), re.IGNORECASE) is not None for line in lines)
         if count and (2 * count >= len(lines) or name == "LandXML"):
             return message(
                 "format_foreign",
-                "a file in the format {name}, which is not read; expected GSI, RW5, JobXML or"
-                " SDR33: export the job in one of them, or as a plain table with --profile",
+                "a file in the format {name}, which tankcal does not read; expected GSI, RW5, "
+                "JobXML or SDR33: export the job in one of these formats, or as a plain table "
+                "with --profile",
                 name=name,
             )
     return message(
         "format_unknown",
-        "not recognised; expected GSI, RW5, JobXML, SDR33, or a plain table with --profile",
+        "unknown format; expected GSI, RW5, JobXML, SDR33, or a plain table with --profile",
     )
 
 
 def _format_of(text, described):
+    """Return the format of a text, or None."""
     lines = _first_lines(text)
     if lines and lines[0].lstrip().startswith("<"):
         return "jxl" if _JOBXML.search(text[:MAX_BYTES]) else None
@@ -144,5 +167,6 @@ def _format_of(text, described):
 
 
 def _first_lines(text):
+    """Return the first non-blank lines."""
     lines = [line for line in text[: LOOKED_AT * MAX_LINE].split("\n") if line.strip()]
     return lines[:LOOKED_AT]

@@ -1,10 +1,10 @@
-"""Both faces of the instrument: what they show of it, and their means.
+"""Mean of the two faces of the instrument, and its collimation and index errors.
 
     c = (hz1 - hz2 + 180) / 2 . sin z        collimation error
     i = (v1 + v2 - 360) / 2                  index error of the vertical circle
 
-The mean of both faces is free of c and i. A reading of face 2 alone is turned to face 1. What is
-read on one face alone is freed of the c and i that the pairs of its set-up show, as
+The mean of both faces contains neither c nor i. A single reading on face 2 is converted to face 1.
+Single readings are corrected with the mean c and i of the pairs of their set-up:
 
     hz = hz1 - c / sin z,    v = v1 - i
 """
@@ -15,18 +15,22 @@ from dataclasses import dataclass, replace
 from tankcal.fieldbooks.book import FULL_TURN, HALF_TURN
 from tankcal.messages import message
 
-NO_PAIR_DEG = 0.1  # the two faces of one point do not differ by more
-LARGE_DEG = 0.0045  # 0.005 gon: an instrument to be adjusted (own choice)
-LARGE_M = 0.005  # between the distances of both faces
+NO_PAIR_DEG = 0.1  # largest difference of the two faces of one point
+LARGE_DEG = 0.0045  # 0.005 gon: larger errors cause a warning (own choice)
+LARGE_M = 0.005  # largest difference of the distances on both faces
 DEGREE = math.pi / HALF_TURN
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What one pointing makes on face 1: one face, or the mean of both.
+    """Result of pointings to one point on face 1: one face, or the mean of both.
 
-    shot   the Shot with values of face 1
-    faces  "1", "2" or "both"
+    Attributes
+    ----------
+    shot : Shot
+        Values of face 1.
+    faces : str
+        "1", "2" or "both".
     """
 
     shot: object
@@ -35,9 +39,18 @@ class Reading:
 
 @dataclass(frozen=True)
 class FaceReport:
-    """What the pairs of a set-up show of its instrument; degrees, metres.
+    """Instrument errors from the pairs of a set-up; degrees, metres.
 
-    collimation, index  (mean, largest distance from the mean) or None without pairs
+    Attributes
+    ----------
+    setup : int
+    pairs : int
+    single : tuple
+        Number of single readings on face 1 and on face 2.
+    collimation, index : tuple or None
+        (mean, largest deviation from the mean); None without pairs.
+    apart_m : float
+        Largest difference of the distances of a pair.
     """
 
     setup: int
@@ -49,9 +62,9 @@ class FaceReport:
 
 
 def reduce_faces(shots, log):
-    """(Readings in the order of the shots, FaceReport of each set-up).
+    """Return the Readings in the order of the shots, and a FaceReport for each set-up.
 
-    The second face of a point is the next shot of its name on the other face in the same set-up.
+    The second face of a point is the next shot with its name on the other face of the same set-up.
     """
     mates, waiting = {}, {}
     for place, shot in enumerate(shots):
@@ -62,26 +75,30 @@ def reduce_faces(shots, log):
             stack.append(place)
     readings, errors, seconds = [], {}, set(mates.values())
     for place, shot in enumerate(shots):
-        mine = errors.setdefault(shot.setup, {"pairs": [], "1": 0, "2": 0, "apart": 0.0})
+        tally = errors.setdefault(shot.setup, {"pairs": [], "1": 0, "2": 0, "apart": 0.0})
         if place in seconds:
             continue
         if place in mates:
-            pair = sorted((shot, shots[mates[place]]), key=lambda one: one.face)
-            found = _mean(*pair, mine, log)
-            if found is not None:
-                readings.append(Reading(replace(found, row=shot.row, time=shot.time), "both"))
+            pair = sorted((shot, shots[mates[place]]), key=lambda member: member.face)
+            mean = _mean(*pair, tally, log)
+            if mean is not None:
+                readings.append(Reading(replace(mean, row=shot.row, time=shot.time), "both"))
         else:
-            mine[str(shot.face)] += 1
-            readings.append(Reading(_on_face_1(shot), str(shot.face)))
-    reports = {setup: _report(setup, one) for setup, one in errors.items()}
-    return [_freed(one, reports[one.shot.setup]) for one in readings], [*reports.values()]
+            tally[str(shot.face)] += 1
+            readings.append(Reading(_convert_to_face_1(shot), str(shot.face)))
+    reports = {setup: _report(setup, tally) for setup, tally in errors.items()}
+    return [_correct_single(reading, reports[reading.shot.setup]) for reading in readings], [
+        *reports.values()
+    ]
 
 
-def _freed(reading, report):
-    """A reading of one face without the mean c and i of its set-up; others as they are."""
+def _correct_single(reading, report):
+    """Return a single reading corrected by the mean c and i of its set-up."""
     if reading.faces == "both":
         return reading
-    sign = 1.0 if reading.faces == "1" else -1.0  # face 2 is turned already
+    sign = (
+        1.0 if reading.faces == "1" else -1.0
+    )  # readings of face 2 are already converted to face 1, which reverses the sign
     shot, sine = reading.shot, 1.0
     if shot.zenith_deg is not None and report.index is not None:
         shot = replace(shot, zenith_deg=shot.zenith_deg - sign * report.index[0])
@@ -94,42 +111,46 @@ def _freed(reading, report):
 
 
 def _sine(zenith):
+    """Return the sine of a zenith angle in degrees, at least 0.001."""
     return max(math.sin(zenith * DEGREE), 1e-3)
 
 
-def _on_face_1(shot):
+def _convert_to_face_1(shot):
+    """Return a shot converted to face 1."""
     if shot.face == 1:
         return shot
     return replace(
         shot,
-        direction_deg=None if shot.direction_deg is None else _turned(shot.direction_deg),
+        direction_deg=None if shot.direction_deg is None else _turn_half(shot.direction_deg),
         zenith_deg=None if shot.zenith_deg is None else FULL_TURN - shot.zenith_deg,
     )
 
 
-def _turned(direction):
+def _turn_half(direction):
+    """Return a direction plus half a turn, degrees."""
     return (direction + HALF_TURN) % FULL_TURN
 
 
-def _mean(first, second, mine, log):
-    """The mean of a pair on face 1; None after telling that they are none."""
-    turned, found = _on_face_1(second), {}
+def _mean(first, second, tally, log):
+    """Return the mean of a pair on face 1, or None after reporting that the faces disagree."""
+    turned, means = _convert_to_face_1(second), {}
     sine = 1.0
     collimation = index = None
     if None not in (first.zenith_deg, turned.zenith_deg):
         index = (first.zenith_deg - turned.zenith_deg) / 2
-        found["zenith_deg"] = first.zenith_deg - index
-        sine = _sine(found["zenith_deg"])
+        means["zenith_deg"] = first.zenith_deg - index
+        sine = _sine(means["zenith_deg"])
     if None not in (first.direction_deg, turned.direction_deg):
         apart = (first.direction_deg - turned.direction_deg + HALF_TURN) % FULL_TURN - HALF_TURN
         collimation = apart / 2 * sine
-        found["direction_deg"] = (first.direction_deg - apart / 2) % FULL_TURN
-    if any(abs(one) > NO_PAIR_DEG for one in (collimation, index) if one is not None):
+        means["direction_deg"] = (first.direction_deg - apart / 2) % FULL_TURN
+    if any(abs(error) > NO_PAIR_DEG for error in (collimation, index) if error is not None):
         text = message(
             "no_pair_of_faces",
-            "point {point!r}: face 2 is {across_deg:+.4f} degrees across and {up_deg:+.4f} degrees"
-            " up from face 1 (row {row}); expected less than {most:g}: give two points of one name"
-            " different names in the file, or correct the unit of the angles",
+            "point {point!r}: face 2 differs from face 1 (row {row}) by {across_deg:+.4f} "
+            "degrees across and {up_deg:+.4f} degrees up; expected less than {most:g}: if two "
+            "points have one name, change a name in the file; otherwise correct the unit of the "
+            "angles",
             point=first.point,
             across_deg=-2 * (collimation or 0.0),
             up_deg=2 * (index or 0.0),
@@ -138,29 +159,35 @@ def _mean(first, second, mine, log):
         )
         log.problem(second.file, text, second.row)
         return None
-    mine["pairs"].append((collimation, index))
+    tally["pairs"].append((collimation, index))
     if None not in (first.distance_m, turned.distance_m):
-        found["distance_m"] = (first.distance_m + turned.distance_m) / 2
-        mine["apart"] = max(mine["apart"], abs(first.distance_m - turned.distance_m))
-    one = {key: getattr(first, key) for key in ("direction_deg", "zenith_deg", "distance_m")}
-    other = {key: getattr(turned, key) for key in one}
-    merged = {key: other[key] if value is None else value for key, value in one.items()}
-    return replace(first, **(merged | found))
+        means["distance_m"] = (first.distance_m + turned.distance_m) / 2
+        tally["apart"] = max(tally["apart"], abs(first.distance_m - turned.distance_m))
+    first_values = {
+        key: getattr(first, key) for key in ("direction_deg", "zenith_deg", "distance_m")
+    }
+    second_values = {key: getattr(turned, key) for key in first_values}
+    merged = {
+        key: second_values[key] if value is None else value for key, value in first_values.items()
+    }
+    return replace(first, **(merged | means))
 
 
-def _report(setup, mine):
+def _report(setup, tally):
+    """Return the FaceReport of a set-up."""
     return FaceReport(
         setup,
-        len(mine["pairs"]),
-        (mine["1"], mine["2"]),
-        _spread([one for one, _ in mine["pairs"] if one is not None]),
-        _spread([one for _, one in mine["pairs"] if one is not None]),
-        mine["apart"],
+        len(tally["pairs"]),
+        (tally["1"], tally["2"]),
+        _spread([collimation for collimation, _ in tally["pairs"] if collimation is not None]),
+        _spread([index for _, index in tally["pairs"] if index is not None]),
+        tally["apart"],
     )
 
 
 def _spread(values):
+    """Return (mean, largest deviation from the mean), or None without values."""
     if not values:
         return None
     mean = sum(values) / len(values)
-    return mean, max(abs(one - mean) for one in values)
+    return mean, max(abs(value - mean) for value in values)

@@ -1,9 +1,10 @@
-"""Leica GSI-8 and GSI-16: words of a two-figure index, a unit and a signed value.
+"""Leica GSI-8 and GSI-16: words with a two-digit index, a unit and a signed value.
 
-A block begins with word 11 or 41, mostly on a line of its own; digit 6 of a word is its unit. Slope
-distances are what the instrument made of them: its prism constant and ppm are in them already
-(words 51, 58, 59 only say which). Blocks of words 41 to 49 are codes: whether of the readings
-before or after them, or of a station, is the surveyor's custom, and no file says it.
+A block begins with word 11 or 41, usually on a separate line. Digit 6 of a word is its unit. Slope
+distances already contain the prism constant and the ppm of the instrument, which words 51, 58 and
+59 only state. Blocks of words 41 to 49 contain codes. The surveyor determines whether a code
+applies to the readings before or after it, or to a station. The file does not contain this
+information.
 """
 
 import datetime
@@ -26,7 +27,7 @@ from tankcal.messages import message
 LINE = re.compile(r"\s*\*?\d\d[0-9. ]{4}[+-]")
 _WORD = re.compile(r"(\d\d)(.)(.)(.)(.)([+-])(.+)", re.DOTALL)
 _TWO_VALUES = re.compile(r"([+-]\d+)([+-]\d+)")
-LENGTHS = {  # digit 6: unit, how many of the last digit are one of it
+LENGTHS = {  # digit 6: (unit, number of last digits in one unit)
     "0": ("m", 1e3),
     "1": ("ft", 1e3),
     "6": ("m", 1e4),
@@ -40,21 +41,25 @@ LENGTH_WORDS = ("31", "32", "33", *OF_TARGET, *OF_STATION, "87", "88")
 CODES = tuple(f"4{digit}" for digit in range(1, 10))
 KNOWN = (*TEXTS, *CODES, *LENGTH_WORDS, "12", "13", "17", "19", "21", "22", "51", "58", "59")
 SHOWN = 3  # code blocks
-FILLER = re.compile(r"[-?]*")  # some instruments write these characters for no code or name
-NO_VALUE = re.compile(r"0*[-?*. ]+")  # the digits of a word without a value, mostly -----
+FILLER = re.compile(r"[-?]*")  # characters for a missing code or name
+NO_VALUE = re.compile(r"0*[-?*. ]+")  # digits of a word without a value, usually -----
 EARLIEST, LATEST = 1980, 2200  # years
-SAME_M = 0.001  # heights of an instrument, coordinates of a station
-UNLIKE_M = 0.003  # between the horizontal distance of the file and that of slope and angle
+SAME_M = 0.001  # tolerance of instrument heights and station coordinates
+UNLIKE_M = 0.003  # tolerance between the horizontal distance and slope distance times sine
 
 
 @dataclass(frozen=True)
 class Custom:
-    """What code blocks mean to the surveyor.
+    """Meaning of code blocks.
 
-    codes    "before": of the readings that follow, up to the next block; "after": of those since
-             the block before it; None: of none
-    station  code whose block begins a station: word 42 its name, word 43 the height of the
-             instrument in millimetres; None: no code does
+    Attributes
+    ----------
+    codes : str or None
+        "before": codes of the following readings, up to the next block. "after": codes of the
+        readings since the previous block. None: not codes of readings.
+    station : str or None
+        Code of the blocks that begin a station: word 42 is its name, word 43 the instrument height
+        in millimetres. None: no such code.
     """
 
     codes: str | None = None
@@ -65,7 +70,7 @@ UNSAID = Custom()
 
 
 def read(text, file, log, custom=UNSAID):
-    """FieldBook of the text of a GSI file."""
+    """Return the FieldBook of the text of a GSI file."""
     book, state = FieldBook(file, "gsi"), _State()
     for row, line in enumerate(text.split("\n"), 1):
         line = line.lstrip(" \t").rstrip("\t")
@@ -75,8 +80,7 @@ def read(text, file, log, custom=UNSAID):
         if words is None:
             expected = message(
                 "no_gsi_line",
-                "not a block of GSI; expected words such as 21.102+07567500, each as long as the"
-                " others",
+                "not a GSI block; expected words of equal length, such as 21.102+07567500",
             )
             log.problem(file, expected, row)
             continue
@@ -91,51 +95,56 @@ def read(text, file, log, custom=UNSAID):
 
 
 class _State:
-    """What holds from line to line."""
+    """Values that apply from one line to the next."""
 
     height = prism = None
     year = time = None
-    code = ""  # of the code block that holds
-    first = 0  # shot after the last code block
+    code = ""  # code of the current code block
+    first = 0  # index of the first shot after the last code block
 
     def __init__(self):
-        self.blocks = []  # (text, row) of code blocks that nobody explained
+        self.blocks = []  # (text, row) of code blocks of unknown meaning
 
 
 def _words(line):
-    """[(index, digit 3, unit, sign and value)] of a line, or None."""
+    """Return [(index, digit 3, unit, sign and value)] of a line, or None."""
     width = 16 if line.startswith("*") else 8
     body = line.lstrip("*")
     step = 7 + width + 1
     parts = [body[start : start + step] for start in range(0, len(body), step)]
-    parts = [one if one[step - 1 :].strip() else one[: step - 1] for one in parts if one.strip()]
-    if not all(len(one) == 7 + width and _WORD.fullmatch(one) for one in parts):
-        parts = [one.lstrip("*") for one in body.split()]
-        if not all(len(one) == 7 + width and _WORD.fullmatch(one) for one in parts):
+    parts = [
+        part if part[step - 1 :].strip() else part[: step - 1] for part in parts if part.strip()
+    ]
+    if not all(len(part) == 7 + width and _WORD.fullmatch(part) for part in parts):
+        parts = [part.lstrip("*") for part in body.split()]
+        if not all(len(part) == 7 + width and _WORD.fullmatch(part) for part in parts):
             return None
-    matches = [_WORD.fullmatch(one) for one in parts]
-    return [(one[1], one[2] + one[3] + one[4], one[5], one[6] + one[7]) for one in matches] or None
+    matches = [_WORD.fullmatch(part) for part in parts]
+    return [
+        (match[1], match[2] + match[3] + match[4], match[5], match[6] + match[7])
+        for match in matches
+    ] or None
 
 
 def _blocks(words):
-    """The blocks of a line: some programs write several, each begins with its number."""
-    found = [[words[0]]]
-    for one in words[1:]:
-        if one[0] in ("11", "41") and (one[1] + one[2]).isdigit():
-            found.append([])
-        found[-1].append(one)
-    return found
+    """Return the blocks of a line; some programs write several, each with word 11 or 41 first."""
+    blocks = [[words[0]]]
+    for word in words[1:]:
+        if word[0] in ("11", "41") and (word[1] + word[2]).isdigit():
+            blocks.append([])
+        blocks[-1].append(word)
+    return blocks
 
 
 def _take_code(book, log, row, words, state, custom):
-    """A code block: a station, the code of readings, or told as it stands."""
-    given = _known_words(book, log, row, words)
-    if given is None:
+    """Read a code block: a station, a code of readings, or a block of unknown meaning."""
+    values = _select_words(book, log, row, words)
+    if values is None:
         return
-    texts = [_text(given[one]) if one in given else "" for one in CODES]
-    code = " ".join(one for one in texts if one.strip("0"))
+    texts = [_text(values[index]) if index in values else "" for index in CODES]
+    code = " ".join(text for text in texts if text.strip("0"))
     if custom.station is not None and texts[0].upper() == plain_name(custom.station).upper():
-        _begin_station(book, log, row, texts[1], given.get("43"), state)
+        _begin_station(book, log, row, texts[1], values.get("43"), state)
     elif custom.codes == "before":
         state.code = code
     elif custom.codes == "after":
@@ -148,7 +157,7 @@ def _take_code(book, log, row, words, state, custom):
 
 
 def _begin_station(book, log, row, name, word, state):
-    """A set-up from a code block; its height of the instrument stands in millimetres."""
+    """Begin a set-up from a code block; the instrument height is in millimetres."""
     height = None
     if word is not None and _has_value(word):
         digits = word[1][1:]
@@ -157,8 +166,11 @@ def _begin_station(book, log, row, name, word, state):
             return
         height = float(word[1]) / 1000
     if not name.strip("0"):
-        text = message("gsi_station_name", "a code block of a station without word 42; expected"
-                       " the name of the station there")  # fmt: skip
+        text = message(
+            "gsi_station_name",
+            "a code block of a station without word 42; expected the name of the station in word "
+            "42",
+        )
         log.problem(book.file, text, row)
         return
     book.stand(name, height, None, row)
@@ -166,79 +178,91 @@ def _begin_station(book, log, row, name, word, state):
 
 
 def _say_codes(book, blocks):
-    shown = [one for one, _ in blocks if one][:SHOWN]
+    """Add a note about code blocks that are not used."""
+    shown = [code for code, _ in blocks if code][:SHOWN]
     text = message(
         "gsi_codes_not_used",
-        "code blocks (words 41 to 49): {count}, the first in row {row}: {shown}: of which readings"
-        " they are no file says: --codes before or after makes them their codes, --station-code"
-        " the beginning of stations",
+        "code blocks (words 41 to 49): {count}, the first in row {row}: {shown}; GSI does "
+        "not state to which readings they belong: use --codes before or after for codes of "
+        "readings, --station-code for the beginning of stations",
         count=len(blocks),
         row=str(blocks[0][1]),
-        shown="; ".join(one[:40] for one in shown) or "-",
+        shown="; ".join(code[:40] for code in shown) or "-",
     )
     book.note(text)
 
 
 def _take(book, log, row, words, state):
-    given = _known_words(book, log, row, words)
-    if given is None:
+    """Read a block."""
+    words_by_index = _select_words(book, log, row, words)
+    if words_by_index is None:
         return
     values = {}
-    for index in given:
-        if (index in ("21", "22") or index in LENGTH_WORDS) and _has_value(given[index]):
-            values[index] = _value(book, log, row, index, *given[index])
+    for index in words_by_index:
+        if (index in ("21", "22") or index in LENGTH_WORDS) and _has_value(words_by_index[index]):
+            values[index] = _value(book, log, row, index, *words_by_index[index])
             if values[index] is None:
                 return
-    _take_times(given, state)
-    _take_constants(book, given, state)
-    if "12" in given or "13" in given:
-        named = [_text(given[one]) for one in ("13", "12") if one in given]
-        book.instrument = " ".join(one for one in named if not FILLER.fullmatch(one))
-    name = _text(given["11"]) if "11" in given else ""
+    _take_times(words_by_index, state)
+    _take_constants(book, words_by_index, state)
+    if "12" in words_by_index or "13" in words_by_index:
+        named = [_text(words_by_index[index]) for index in ("13", "12") if index in words_by_index]
+        book.instrument = " ".join(
+            name_part for name_part in named if not FILLER.fullmatch(name_part)
+        )
+    name = _text(words_by_index["11"]) if "11" in words_by_index else ""
     name = "" if FILLER.fullmatch(name) else name
     is_reading = any(index in values for index in ("21", "22", "31", "32"))
     _take_station(book, row, name, values, is_reading, state)
-    if "87" in given:  # without a value, the height of the target before does not hold either
+    if "87" in words_by_index:  # a word without value also cancels the previous target height
         state.height = values.get("87")
     if is_reading:
-        texts = [_text(given[one]) for one in (*TEXTS[1:], *CODES) if one in given]
-        code = " ".join(one for one in texts if not FILLER.fullmatch(one))
+        texts = [
+            _text(words_by_index[index])
+            for index in (*TEXTS[1:], *CODES)
+            if index in words_by_index
+        ]
+        code = " ".join(text for text in texts if not FILLER.fullmatch(text))
         _take_shot(book, log, row, name, values, code or state.code, state)
-    elif all(one in values for one in OF_TARGET[:2]):
-        xyz = tuple(values.get(one) for one in OF_TARGET)
+    elif all(index in values for index in OF_TARGET[:2]):
+        xyz = tuple(values.get(index) for index in OF_TARGET)
         book.known.append(KnownPoint(name, xyz, row))
-    elif not any(one in values for one in (*OF_STATION, "87", "88")):
+    elif not any(index in values for index in (*OF_STATION, "87", "88")):
         book.leave_out(message("gsi_without_reading", "blocks without a reading"), row)
 
 
-def _known_words(book, log, row, words):
-    """{index: (unit, signed value)} of the words that are read; None: one stands twice (told)."""
-    given = {}
+def _select_words(book, log, row, words):
+    """Return {index: (unit, signed value)} of known words; None after reporting a repeated word."""
+    words_by_index = {}
     for index, digits, unit, value in words:
         if digits[0].isdigit() and index not in ("11", "41"):
-            what = message("gsi_level_word", "words {word} of a level", word=index + digits[0])
+            what = message(
+                "gsi_level_word", "words {word} of a digital level", word=index + digits[0]
+            )
             book.leave_out(what, row)
         elif index not in KNOWN:
             book.leave_out(message("gsi_word", "words {word}", word=index), row)
-        elif index in given:
-            text = message("gsi_word_twice", "word {word} stands twice in a block", word=index)
+        elif index in words_by_index:
+            text = message("gsi_word_twice", "word {word} occurs twice in a block", word=index)
             log.problem(book.file, text, row)
             return None
         else:
-            given[index] = unit, value
-    return given
+            words_by_index[index] = unit, value
+    return words_by_index
 
 
 def _text(word):
+    """Return the text of a word without filling characters."""
     return plain_name(word[1][1:])
 
 
 def _has_value(word):
+    """Return whether a word has a value."""
     return NO_VALUE.fullmatch(word[1][1:]) is None
 
 
 def _value(book, log, row, index, unit, text):
-    """Degrees or metres of a word, or None after telling the log."""
+    """Return the degrees or metres of a word, or None after adding a problem to the log."""
     digits, is_angle = text[1:], index in ("21", "22")
     known = (ANGLES if is_angle else LENGTHS).get(unit)
     if known is None or not (digits.isascii() and digits.isdigit()):
@@ -260,7 +284,7 @@ def _value(book, log, row, index, unit, text):
     book.say_units(angle=name)
     if name != "dms":
         return sign * number / parts * DEGREES[name]
-    degrees, rest = divmod(number, 100000)  # dddmmsss: the last one is a tenth of a second
+    degrees, rest = divmod(number, 100000)  # dddmmsss: the last digit is a tenth of a second
     minutes, tenths = divmod(rest, 1000)
     if minutes >= 60 or tenths >= 600:
         refuse_minutes(log, book.file, row, text)
@@ -269,50 +293,55 @@ def _value(book, log, row, index, unit, text):
 
 
 def _say_length(book, name, parts):
+    """Add the unit of a length."""
     last = f"{1000 / parts:g} mm" if name == "m" else f"1/{parts:.0f} ft"
     book.say_units(length=name, last=last)
 
 
-def _take_times(given, state):
-    """Words 17 (day, month, year: ddmmyyyy) and 19 (month, day, hour, minute)."""
-    date, clock = (given[one][1][-8:] if one in given else "" for one in ("17", "19"))
+def _take_times(words_by_index, state):
+    """Read words 17 (day, month, year: ddmmyyyy) and 19 (month, day, hour, minute)."""
+    date, clock = (
+        words_by_index[index][1][-8:] if index in words_by_index else "" for index in ("17", "19")
+    )
     if date.isdigit() and EARLIEST <= int(date[-4:]) <= LATEST:
         state.year = int(date[-4:])
     if clock.isdigit():
         month, day, hour, minute = (int(clock[place : place + 2]) for place in (0, 2, 4, 6))
-        try:  # without a year, that of the reader's choice: NO_YEAR stands for it
+        try:  # without a year, NO_YEAR marks a time to be completed
             state.time = datetime.datetime(state.year or NO_YEAR, month, day, hour, minute)
         except ValueError:
             state.time = None
 
 
-def _take_constants(book, given, state):
-    """Prism constant and ppm: only said, for the instrument applied them."""
+def _take_constants(book, words_by_index, state):
+    """Read prism constant and ppm for notes only, because the instrument applied them."""
     ppm = None
-    if "51" in given:
-        both = _TWO_VALUES.fullmatch(given["51"][1])
+    if "51" in words_by_index:
+        both = _TWO_VALUES.fullmatch(words_by_index["51"][1])
         if both:
             ppm, state.prism = float(both[1]), float(both[2])
-    if "58" in given and given["58"][1][1:].isdigit():
-        state.prism = float(given["58"][1]) / (10 if given["58"][0] == "6" else 1)
-    if "59" in given and given["59"][1][1:].isdigit():
-        ppm = float(given["59"][1]) / 1e4
+    if "58" in words_by_index and words_by_index["58"][1][1:].isdigit():
+        state.prism = float(words_by_index["58"][1]) / (10 if words_by_index["58"][0] == "6" else 1)
+    if "59" in words_by_index and words_by_index["59"][1][1:].isdigit():
+        ppm = float(words_by_index["59"][1]) / 1e4
     if ppm:
         text = message(
-            "ppm_in_distances", "ppm {ppm:g}: in the distances already, not applied", ppm=ppm
+            "ppm_in_distances", "ppm {ppm:g}: included in the distances, not applied again", ppm=ppm
         )
         book.note(text)
 
 
 def _take_station(book, row, name, values, is_reading, state):
-    """Begin a set-up where name, coordinates or height of the station change."""
-    xyz = tuple(values.get(one) for one in OF_STATION)
+    """Begin a set-up if name, coordinates or height of the station change."""
+    xyz = tuple(values.get(index) for index in OF_STATION)
     xyz, height = None if None in xyz[:2] else xyz, values.get("88")
     if xyz is None and height is None:
         return
     if book.setups:
         now = book.setups[-1]
-        same_name = is_reading or name == now.station  # a block of a reading names its target
+        same_name = (
+            is_reading or name == now.station
+        )  # in a block with a reading, the name is the target
         same_place = None in (xyz, now.xyz_m) or all(map(_are_same, xyz, now.xyz_m))
         same_height = _are_same(height, now.height_m)
         if same_name and same_place and (same_height or not book.has_shots):
@@ -333,20 +362,21 @@ def _take_station(book, row, name, values, is_reading, state):
 
 
 def _are_same(first, second):
-    """Whether two lengths may be one, though their units have other last digits."""
+    """Return whether two lengths agree within the resolution of different units."""
     return None in (first, second) or abs(first - second) <= SAME_M
 
 
 def _take_shot(book, log, row, name, values, code, state):
-    zenith, distance, level = (values.get(one) for one in ("22", "31", "32"))
+    """Read a reading."""
+    zenith, distance, level = (values.get(index) for index in ("22", "31", "32"))
     sine = None if zenith is None else abs(math.sin(math.radians(zenith)))
     if distance is None and level and sine:
         distance = level / sine
     elif distance and level and sine and abs(distance * sine - level) > UNLIKE_M:
         text = message(
             "horizontal_unlike_slope",
-            "horizontal distance {level_m:.3f} m, but slope distance and vertical circle make"
-            " {made_m:.3f} m: is the circle read from the zenith, in that unit?",
+            "horizontal distance {level_m:.3f} m, but slope distance and vertical circle give "
+            "{made_m:.3f} m (is the circle read from the zenith, in the unit of the file?)",
             level_m=level,
             made_m=distance * sine,
         )

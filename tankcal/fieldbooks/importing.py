@@ -1,4 +1,4 @@
-"""From files of instruments to the tables of a job: the door of the room."""
+"""Import of instrument files into the tables of a job."""
 
 import datetime
 from collections import Counter
@@ -18,26 +18,26 @@ from tankcal.fieldbooks.writing import write_tables
 from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import list_some, message
 
-SAME_M = 0.001  # coordinates of one point that are given twice
+SAME_M = 0.001  # tolerance of repeated coordinates of one point
 SHOWN = 6
 
 
 @dataclass(frozen=True)
 class Choices:
-    """What the user says of the files.
+    """Options of an import.
 
     Attributes
     ----------
     hits, control, leave, check : tuple of str
-        Patterns of names or codes: bare hits of the wall, control targets, what is not used, and
-        of the hits those that are only compared.
-        Without `hits` the names and codes that begin with WALL, HIT, PAREDE or PARED.
+        Patterns of names or codes: reflectorless readings of the wall, control targets, readings to
+        leave out, and hits for comparison only. Without `hits`: names and codes that begin with
+        WALL, HIT, PAREDE or PARED.
     no_hits : bool
-        There are no hits: only targets.
+        The files contain targets only.
     format : str or None
-        One of "gsi", "rw5", "jxl", "sdr", "csv"; None: by the content.
+        One of "gsi", "rw5", "jxl", "sdr", "csv". None: determined from the content.
     profile : str or Path or None
-        What the columns of a plain table are (TOML).
+        TOML file with the meaning of the columns of a plain table.
     instrument : str
         Name of the instrument in instruments.toml; "": blank.
     targets_mm, targets_arcsec : float or None
@@ -45,12 +45,12 @@ class Choices:
     begin, end : datetime or None
         Times of the first and the last reading, for files without times.
     no_control : bool
-        Known coordinates are not written.
+        Do not write known coordinates.
     codes : str or None
-        Code blocks of GSI are codes of the readings that follow ("before") or of those since the
-        block before ("after"); None: they are told, and not used.
+        GSI code blocks are codes of the following readings ("before") or of the readings since the
+        previous block ("after"). None: code blocks are reported and not used.
     station_code : str or None
-        Code whose blocks begin a station in a GSI file.
+        Code of the blocks that begin a station in a GSI file.
     """
 
     hits: tuple = ()
@@ -72,15 +72,15 @@ class Choices:
 
 @dataclass
 class Imported:
-    """What an import made.
+    """Result of an import.
 
     Attributes
     ----------
     summary : list of str
-        Lines: set-ups, hits, named points, units, what was applied, what was left out.
+        Lines with set-ups, hits, targets, units, applied corrections and records left out.
     warnings : list of Problem
     paths : list of Path
-        Files that were written.
+        Written files.
     """
 
     summary: list = field(default_factory=list)
@@ -120,64 +120,68 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     >>> print(found.summary[4])
     hits of the wall: 200
     """
-    log, found = Log(), Imported()
+    log, result = Log(), Imported()
     _check_times(choices, log)
     books = _read_all(files, choices, log)
     log.stop_if_problems()
-    stands, shots = _joined(books)
-    shots = _with_times(shots, choices)
+    stands, shots = _join_books(books)
+    shots = _complete_times(shots, choices)
     readings, reports = reduce_faces(shots, log)
     log.stop_if_problems()
-    places = sorted({one.setup for one in shots})
+    places = sorted({shot.setup for shot in shots})
     names = _names_of_setups(stands, places)
-    known = _known_points(books, stands, places, names, log)
-    stands = {place: (replace(one, station=_station(one, names[place])), file)
-              for place, (one, file) in enumerate(stands) if place in names}  # fmt: skip
+    known = _collect_coordinates(books, stands, places, names, log)
+    stands = {place: (replace(stand, station=_station(stand, names[place])), file)
+              for place, (stand, file) in enumerate(stands) if place in names}  # fmt: skip
     unused = {}
     chosen = sort_readings(
-        readings, choices, {*known, *(one.station for one, _ in stands.values())}, log,
-        lambda what, one: unused.setdefault(what, []).append(one.shot),
+        readings, choices, {*known, *(stand.station for stand, _ in stands.values())}, log,
+        lambda what, reading: unused.setdefault(what, []).append(reading.shot),
     )  # fmt: skip
     _tell_empty_setups(books)
-    chosen = _control_with_times(chosen, choices, unused, log)
+    chosen = _keep_timed_control(chosen, choices, unused, log)
     _check_ties(chosen, choices, log)
     log.stop_if_problems()
     stations = {} if choices.no_control else _stations(known, stands, chosen, log)
-    used = {one.shot.setup for one in (*chosen.hits, *chosen.control, *chosen.ties)}
+    used = {reading.shot.setup for reading in (*chosen.hits, *chosen.control, *chosen.ties)}
     names = {place: name for place, name in names.items() if place in used}
     tables = make_rows(stands, names, stations, chosen, choices)
     check_rows(tables, log)
     if not tables.keys() - {"setups", "control"} and not log.problems:
-        text = message("nothing_read", "no reading that a job can use; expected shots of hits or"
-                       " of targets")  # fmt: skip
+        text = message("nothing_read", "no usable reading; expected readings of hits or targets")
         log.problem(Path(files[0]).name, text)
     log.stop_if_problems()
-    found.paths, standing = write_tables(folder, tables, replace=replace_tables)
-    found.summary = summarise(books, chosen, unused, names, stands, reports, (known, stations),
+    result.paths, standing = write_tables(folder, tables, replace=replace_tables)
+    result.summary = summarise(books, chosen, unused, names, stands, reports, (known, stations),
                               standing)  # fmt: skip
-    found.warnings = [*_unused_customs(choices, books), *warn_of(chosen, names, stands, reports)]
-    return found
+    result.warnings = [*_warn_of_customs(choices, books), *warn_of(chosen, names, stands, reports)]
+    return result
 
 
-def _unused_customs(choices, books):
-    """Choices about code blocks that no file has, for none is GSI."""
+def _warn_of_customs(choices, books):
+    """Yield warnings about options for code blocks if no file is GSI."""
     if any(book.format == "gsi" for book in books):
         return
-    given = (("--codes", choices.codes), ("--station-code", choices.station_code))
-    for option, value in given:
+    options = (("--codes", choices.codes), ("--station-code", choices.station_code))
+    for option, value in options:
         if value is not None:
-            text = message("option_of_gsi", "without effect: none of the files is GSI, and other"
-                           " formats say themselves what a code belongs to")  # fmt: skip
+            text = message(
+                "option_of_gsi",
+                "without effect: none of the files is GSI, and other formats state to which "
+                "readings a code belongs",
+            )
             yield Problem(option, text)
 
 
 def _check_times(choices, log):
+    """Report an end that is not later than the beginning."""
     begin, end = choices.begin, choices.end
     if end is not None and (begin is None or end <= begin):
-        log.problem("--end", message("end_before_begin", "expected a time after that of --begin"))
+        log.problem("--end", message("end_before_begin", "expected a time later than --begin"))
 
 
 def _read_all(files, choices, log):
+    """Return the FieldBooks of all files."""
     described = None
     if choices.profile is not None:
         described = read_profile(Path(choices.profile), log)
@@ -188,7 +192,7 @@ def _read_all(files, choices, log):
     for path in map(Path, files):
         data = read_bytes(path, log, MAX_BYTES)
         if data is not None and data in seen:
-            text = message("file_twice", "the same as {other}; expected each file once",
+            text = message("file_twice", "identical to {other}; expected each file once",
                            other=seen[data])  # fmt: skip
             log.problem(path.name, text)
             continue
@@ -200,18 +204,19 @@ def _read_all(files, choices, log):
     return books
 
 
-def _joined(books):
-    """([(SetUp, file)], shots) of all books, the places of set-ups counted on."""
+def _join_books(books):
+    """Return ([(SetUp, file)], shots) of all books, with consecutive indices of set-ups."""
     stands, shots = [], []
     for book in books:
-        shots += [replace(one, setup=one.setup + len(stands)) for one in book.shots]
-        stands += [(one, book.file) for one in book.setups]
+        shots += [replace(shot, setup=shot.setup + len(stands)) for shot in book.shots]
+        stands += [(setup, book.file) for setup in book.setups]
     return stands, shots
 
 
 def _tell_empty_setups(books):
+    """Count set-ups without readings as left out."""
     for book in books:
-        used = {one.setup for one in book.shots}
+        used = {shot.setup for shot in book.shots}
         for place, stand in enumerate(book.setups):
             if place not in used:
                 what = message("setups_without_readings", "set-ups without readings")
@@ -219,128 +224,138 @@ def _tell_empty_setups(books):
 
 
 def _names_of_setups(stands, places):
-    """{place: name}: that of the station, or S1, S2, ...; a second one of a station gets -2."""
+    """Return {index: name}: the station, or S1, S2, ...; a repeated station gets -2."""
     named = {stands[place][0].station for place in places} - {""}
     free = (f"S{number}" for number in range(1, len(places) + len(named) + 2))
-    free = (one for one in free if one not in named)
-    found, counts = {}, Counter()
+    free = (candidate for candidate in free if candidate not in named)
+    setup_names, counts = {}, Counter()
     for place in places:
         name = stands[place][0].station or next(free)
         counts[name] += 1
-        while counts[name] > 1 and f"{name}-{counts[name]}" in (*named, *found.values()):
+        while counts[name] > 1 and f"{name}-{counts[name]}" in (*named, *setup_names.values()):
             counts[name] += 1
-        found[place] = name if counts[name] == 1 else f"{name}-{counts[name]}"
-    return found
+        setup_names[place] = name if counts[name] == 1 else f"{name}-{counts[name]}"
+    return setup_names
 
 
 def _station(stand, name):
+    """Return the station of a set-up, or the name of the set-up."""
     return stand.station or name
 
 
-def _known_points(books, stands, places, names, log):
-    """{name: list of (xyz, file, row)} of all coordinates that the files give."""
-    given = [(names[place], *stands[place]) for place in places]
+def _collect_coordinates(books, stands, places, names, log):
+    """Return {name: list of (xyz, file, row)} of all coordinates in the files."""
+    occupied = [(names[place], *stands[place]) for place in places]
     items = [
-        (one.station or name, one.xyz_m, file, one.row)
-        for name, one, file in given
-        if one.xyz_m is not None
+        (stand.station or name, stand.xyz_m, file, stand.row)
+        for name, stand, file in occupied
+        if stand.xyz_m is not None
     ]
-    items += [(one.point, one.xyz_m, book.file, one.row) for book in books for one in book.known]
-    found = {}
+    items += [
+        (point.point, point.xyz_m, book.file, point.row) for book in books for point in book.known
+    ]
+    coordinates = {}
     for point, xyz, file, row in items:
-        if any(abs(one) > MOST_M for one in xyz if one is not None):
+        if any(abs(coordinate) > MOST_M for coordinate in xyz if coordinate is not None):
             text = message("coordinate_too_large", "coordinates of {point!r} beyond {most:g} m",
                            point=point[:40], most=MOST_M)  # fmt: skip
             log.problem(file, text, row)
         else:
-            found.setdefault(point, []).append((xyz, file, row))
-    return found
+            coordinates.setdefault(point, []).append((xyz, file, row))
+    return coordinates
 
 
-def _with_times(shots, choices):
-    """Shots with the year that times lack; those without a time get one of begin to end."""
+def _complete_times(shots, choices):
+    """Return shots with complete times.
+
+    The year comes from `begin`. If begin and end are given, shots without a time get times evenly
+    spaced between both.
+    """
     begin, end = choices.begin, choices.end
-    found = []
-    for one in shots:
-        time = one.time
+    dated = []
+    for shot in shots:
+        time = shot.time
         if time is not None and time.year == NO_YEAR:
-            time = None if begin is None else _in_year(time, begin.year)
-        found.append(replace(one, time=time))
-    if begin is None or end is None or len(found) < 2:
-        return found
-    step = (end - begin) / (len(found) - 1)
+            time = None if begin is None else _set_year(time, begin.year)
+        dated.append(replace(shot, time=time))
+    if begin is None or end is None or len(dated) < 2:
+        return dated
+    step = (end - begin) / (len(dated) - 1)
     return [
-        replace(one, time=(begin + place * step).replace(microsecond=0)) if one.time is None
-        else one
-        for place, one in enumerate(found)
+        replace(shot, time=(begin + place * step).replace(microsecond=0)) if shot.time is None
+        else shot
+        for place, shot in enumerate(dated)
     ]  # fmt: skip
 
 
-def _in_year(time, year):
-    """The same day in another year; None: there is no 29 February."""
+def _set_year(time, year):
+    """Return the same day in another year; None for 29 February in other years."""
     try:
         return time.replace(year=year)
     except ValueError:
         return None
 
 
-def _control_with_times(chosen, choices, unused, log):
-    """The same without control readings that have no time; told where the user asked for them."""
-    without = [one.shot for one in chosen.control if one.shot.time is None]
+def _keep_timed_control(chosen, choices, unused, log):
+    """Remove control readings without a time; report them if the user selected them."""
+    without = [reading.shot for reading in chosen.control if reading.shot.time is None]
     if choices.control:
         for shot in without:
             text = message(
                 "control_without_time",
-                "control target {point!r} has no time in the file; expected --begin and --end"
-                " (of a GSI file without a year --begin), or the target with --leave",
+                "control target {point!r} has no time in the file; expected --begin and --end "
+                "(for a GSI file without a year --begin), or --leave for the target",
                 point=shot.point[:40],
             )
             log.problem(shot.file, text, shot.row)
     elif without:
         what = message(
             "again_without_time",
-            "targets read again, without a time in the file: with --begin and --end they become"
-            " control_readings.csv",
+            "targets with repeated readings but without a time in the file; with --begin and "
+            "--end they are written to control_readings.csv",
         )
         unused[what] = without
-    kept = tuple(one for one in chosen.control if one.shot.time is not None)
+    kept = tuple(reading for reading in chosen.control if reading.shot.time is not None)
     return replace(chosen, control=kept)
 
 
 def _check_ties(chosen, choices, log):
+    """Report missing standard deviations of readings to targets that tie set-ups."""
     if not chosen.ties:
         return
     for key, value in (("--targets-mm", choices.targets_mm),
                        ("--targets-arcsec", choices.targets_arcsec)):  # fmt: skip
         if value is None:
-            points = list(dict.fromkeys(one.shot.point for one in chosen.ties))
+            points = list(dict.fromkeys(reading.shot.point for reading in chosen.ties))
             text = message(
                 "ties_without_sd",
-                "targets {points} tie set-ups; expected the standard deviation of readings to"
-                " targets: no file of an instrument has it",
+                "targets {points} tie set-ups; expected the standard deviation of readings to "
+                "targets, which instrument files do not contain",
                 points=list_some(points, SHOWN),
             )
             log.problem(key, text)
 
 
 def _stations(known, stands, chosen, log):
-    """{point: (xyz, file, row)} that the job needs: stations, and targets that tie."""
-    used = [one.station for one, _ in stands.values()] + [one.shot.point for one in chosen.ties]
-    found, told = {}, set()
+    """Return {point: (xyz, file, row)} of the stations and of the targets that tie set-ups."""
+    used = [stand.station for stand, _ in stands.values()] + [
+        reading.shot.point for reading in chosen.ties
+    ]
+    stations, reported = {}, set()
     for point in dict.fromkeys(used):
         for xyz, file, row in known.get(point, ()):
-            before = found.setdefault(point, (xyz, file, row))
+            before = stations.setdefault(point, (xyz, file, row))
             pairs = [(a, b) for a, b in zip(before[0], xyz, strict=True) if None not in (a, b)]
-            if any(abs(a - b) > SAME_M for a, b in pairs) and (point, xyz) not in told:
-                told.add((point, xyz))
+            if any(abs(a - b) > SAME_M for a, b in pairs) and (point, xyz) not in reported:
+                reported.add((point, xyz))
                 text = message(
                     "imported_known_twice",
-                    "point {point!r} has other coordinates than in row {row} of {file}; expected"
-                    " one place of each known point: give one of two points another name, delete"
-                    " the coordinates that do not apply, or leave all out with --no-control",
+                    "point {point!r} has different coordinates in row {row} of {file}; expected "
+                    "one position of each known point: rename one of two different points, delete "
+                    "the invalid coordinates, or leave all out with --no-control",
                     point=point[:40],
                     row=str(before[2]),
                     file=before[1],
                 )
                 log.problem(file, text, row)
-    return found
+    return stations

@@ -1,7 +1,7 @@
-"""Trimble JobXML: records of the controller as XML; angles are decimal degrees, lengths metres.
+"""Trimble JobXML: controller records as XML, with angles in decimal degrees and lengths in metres.
 
-Its readings are raw: prism constant and ppm are applied here, once. The parser takes no document
-type, so no entity can be declared, and nothing outside the file is ever read.
+The readings are raw. Prism constant and ppm are applied here, once. The parser refuses document
+types, so a file can neither declare entities nor refer to other files.
 """
 
 import datetime
@@ -11,7 +11,7 @@ from xml.parsers import expat
 from tankcal.fieldbooks.book import FieldBook, KnownPoint, number_of, refuse_number
 from tankcal.messages import message
 
-DEEPEST, LONGEST = 30, 20_000  # elements in one another, characters of one value
+DEEPEST, LONGEST = 30, 20_000  # nested elements; characters of one value
 READ = ("", "DirectReading", "AngleOnly", "AnglesOnly", "DistanceOnly", "Direct")
 MEANS = ("MeanTurnedAngle", "MeanAngle", "MTA")
 QUIET = ("UnitsRecord", "BackBearingRecord", "JobPropertiesRecord", "CorrectionsRecord",
@@ -21,13 +21,13 @@ _TIME = re.compile(r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)(\.\d+)?(Z|[+-]\d\d:?\d\d)?
 
 
 class _Refused(Exception):
-    """The file cannot be read on; it is told."""
+    """The file cannot be read further; the problem is in the log."""
 
 
 def read(data, file, log, encoding=None):
-    """FieldBook of the bytes of a JobXML file.
+    """Return the FieldBook of the bytes of a JobXML file.
 
-    encoding  of the bytes; None: as the file declares it
+    encoding  encoding of the bytes; None: as declared in the file
     """
     book = FieldBook(file, "jxl")
     taker = _Taker(book, log)
@@ -42,16 +42,16 @@ def read(data, file, log, encoding=None):
         parser.Parse(data, True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
-        text = message("no_xml", "not sound XML ({reason}): is the file whole?", reason=reason)
+        text = message("no_xml", "not valid XML ({reason}); is the file complete?", reason=reason)
         log.problem(file, text, error.lineno)
     except _Refused:
         return book
-    except (ValueError, LookupError):  # an encoding that it declares, and that nobody knows
-        text = message("xml_encoding", "an encoding of XML that is not known; expected UTF-8")
+    except (ValueError, LookupError):  # an unknown declared encoding
+        text = message("xml_encoding", "unknown XML encoding; expected UTF-8")
         log.problem(file, text, 1)
     taker.tell_strays()
     if not taker.has_field_book and not log.problems:
-        text = message("no_field_book", "no FieldBook in it; expected that of a JobXML file")
+        text = message("no_field_book", "no FieldBook element; expected a JobXML file")
         log.problem(file, text)
     if book.shots:
         book.say_units(length="m", angle="deg")
@@ -59,7 +59,7 @@ def read(data, file, log, encoding=None):
 
 
 class _Taker:
-    """Gathers each record below FieldBook as {path: text}, and takes it when it ends."""
+    """Handler of XML events that reads each record below FieldBook as {path: text}."""
 
     def __init__(self, book, log):
         self.book, self.log, self.parser = book, log, None
@@ -82,8 +82,11 @@ class _Taker:
         self.path.append(name)
         self.texts = []
         if len(self.path) > DEEPEST:
-            text = message("xml_deep", "elements within {most} others; expected fewer",
-                           most=DEEPEST)  # fmt: skip
+            text = message(
+                "xml_deep",
+                "elements nested more than {most} deep; expected fewer levels",
+                most=DEEPEST,
+            )
             self.log.problem(self.book.file, text, self.parser.CurrentLineNumber)
             raise _Refused
         self.has_field_book |= name == "FieldBook"
@@ -106,20 +109,20 @@ class _Taker:
         self.texts = []
 
     def take(self, kind):
-        own = {
+        take_record = {
             "PointRecord": self.take_point,
             "StationRecord": self.take_station,
             "TargetRecord": self.take_target,
             "AtmosphereRecord": self.take_atmosphere,
             "InstrumentRecord": self.take_instrument,
         }.get(kind)
-        if own is not None:
-            own()
+        if take_record is not None:
+            take_record()
         elif kind not in QUIET:
             self.book.leave_out(message("jxl_records", "records {kind}", kind=kind[:40]), self.row)
 
     def number(self, key):
-        """A number of the record; None: blank, or none (which is told)."""
+        """Return a number of the record; None if it is blank or invalid (reported)."""
         text = self.record.get(key, "")
         value = number_of(text) if text else None
         if text and value is None:
@@ -128,7 +131,7 @@ class _Taker:
 
     def take_instrument(self):
         named = (self.record.get(key, "")[:40] for key in ("Model", "Serial"))
-        self.book.instrument = " ".join(one for one in named if one)
+        self.book.instrument = " ".join(text for text in named if text)
 
     def take_atmosphere(self):
         is_raw = self.record.get("ApplyPPMToRawDistances", "false").lower() == "true"
@@ -139,12 +142,15 @@ class _Taker:
                            most=MOST_PPM)  # fmt: skip
             self.log.problem(self.book.file, text, self.row)
         elif ppm and is_raw:
-            self.book.note(message("jxl_ppm_applied", "ppm {ppm:g}: raw distances, applied here",
-                                   ppm=ppm))  # fmt: skip
+            self.book.note(
+                message(
+                    "jxl_ppm_applied", "ppm {ppm:g}: the distances are raw, applied here", ppm=ppm
+                )
+            )
         elif ppm:
             text = message(
                 "jxl_ppm_not_applied",
-                "ppm {ppm:g}: not to be applied, as the file says (ApplyPPMToRawDistances)",
+                "ppm {ppm:g}: not applied, as stated in the file (ApplyPPMToRawDistances)",
                 ppm=ppm,
             )
             self.book.note(text)
@@ -160,7 +166,7 @@ class _Taker:
         elif prism:
             text = message(
                 "jxl_prism_applied",
-                "prism constant {prism_mm:+.1f} mm: raw distances, applied here",
+                "prism constant {prism_mm:+.1f} mm: the distances are raw, applied here",
                 prism_mm=1000 * prism,
             )
             self.book.note(text)
@@ -180,7 +186,7 @@ class _Taker:
             book.note(text)
 
     def is_deleted(self):
-        """Whether the surveyor deleted the record; it is counted then."""
+        """Return whether the surveyor deleted the record; deleted records are counted."""
         if self.record.get("Deleted", "false").lower() != "true":
             return False
         self.book.reject(message("deleted", "deleted records"), self.row)
@@ -193,25 +199,27 @@ class _Taker:
         name = self.record.get("Name", "")
         is_shot = any(key.startswith("Circle/") for key in self.record)
         if is_shot and method in MEANS:
-            book.leave_out(message("jxl_means", "means that the controller made of other readings"),
-                           self.row)  # fmt: skip
+            book.leave_out(
+                message("jxl_means", "means computed by the controller from other readings"),
+                self.row,
+            )
         elif is_shot and method in READ:
             self.take_shot(name)
         elif is_shot:
             book.leave_out(message("jxl_method", "points by {method}", method=method[:40]),
                            self.row)  # fmt: skip
         elif "Grid/North" in self.record:
-            xyz = tuple(self.number(f"Grid/{one}") for one in ("East", "North", "Elevation"))
+            xyz = tuple(self.number(f"Grid/{axis}") for axis in ("East", "North", "Elevation"))
             if None not in xyz[:2]:
                 book.known.append(KnownPoint(name, xyz, self.row))
         else:
             book.leave_out(message("jxl_points", "points without circle readings"), self.row)
 
     def take_shot(self, name):
-        book, given = self.book, self.record.get("StationID")
-        place, ppm = self.stations.get(given, (None, self.last_ppm))
-        if place is None and (given or not book.setups):
-            self.strays.setdefault(given or "", [0, self.row])[0] += 1
+        book, station_id = self.book, self.record.get("StationID")
+        place, ppm = self.stations.get(station_id, (None, self.last_ppm))
+        if place is None and (station_id or not book.setups):
+            self.strays.setdefault(station_id or "", [0, self.row])[0] += 1
             return
         height, prism = self.targets.get(self.record.get("TargetID"), (None, 0.0))
         distance = self.number("Circle/EDMDistance")
@@ -227,12 +235,12 @@ class _Taker:
         )  # fmt: skip
 
     def tell_strays(self):
-        """One problem for each station that is missing."""
+        """Report each missing station once."""
         for station, (count, row) in self.strays.items():
             text = message(
                 "jxl_station",
-                "{count} readings of station {station!r}, the first here; expected a StationRecord"
-                " of this ID before them",
+                "{count} readings of station {station!r}, the first in this row; expected a "
+                "StationRecord of this ID before them",
                 count=count,
                 station=station[:40],
             )
@@ -240,7 +248,7 @@ class _Taker:
 
 
 def time_of(text):
-    """A date with its time of day, without zone; None where there is none."""
+    """Return date and time without zone, or None."""
     match = _TIME.fullmatch(text.strip()[:40])
     if match is None:
         return None

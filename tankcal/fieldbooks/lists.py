@@ -1,4 +1,4 @@
-"""A technician's own list (CSV) as a table of a job: foreign headings, units and marks."""
+"""Conversion of a list (CSV) with user-defined headings, units and marks to a table of a job."""
 
 import json
 from dataclasses import dataclass
@@ -17,25 +17,25 @@ from tankcal.messages import message
 from tankcal.text.naming import MAX_NAME
 from tankcal.text.numerals import NUMBER
 
-MEMORY_FILE = "headings.toml"  # in the job folder: what the headings of earlier lists meant
-MOST_DECIMALS = 9  # of a converted length, in the unit of the column
+MEMORY_FILE = "headings.toml"  # in the job folder: meanings of headings of earlier lists
+MOST_DECIMALS = 9  # decimals of a converted length in the unit of the column
 MAX_BYTES = 50_000_000
 
 
 @dataclass
 class ForeignList:
-    """A list as read, and what its headings mean.
+    """A list and the meanings of its headings.
 
     Attributes
     ----------
     name : str
-        Table of the job that it becomes.
+        Table of the job to which it is converted.
     table : Table
-        As read; its decimal mark is that of the list.
+        Rows as read; its decimal mark is the mark of the list.
     meanings : dict of Meaning
-        By heading; others are not used.
+        Meanings by heading; other headings are not used.
     warnings : tuple of Problem
-        Of the reading, such as another encoding.
+        Warnings of the reading, such as another encoding.
     """
 
     name: str
@@ -46,29 +46,33 @@ class ForeignList:
     @property
     def unused(self):
         """Headings without a meaning."""
-        return [one for one in self.table.headings if one not in self.meanings]
+        return [heading for heading in self.table.headings if heading not in self.meanings]
 
     @property
     def missing(self):
-        """Fields that every row needs and that no heading means."""
-        found = {one.column for one in self.meanings.values()}
-        return [one for one in COLUMNS[self.name] if one.required and one.name not in found]
+        """Required fields without a heading."""
+        columns = {meaning.column for meaning in self.meanings.values()}
+        return [
+            field for field in COLUMNS[self.name] if field.required and field.name not in columns
+        ]
 
 
 def is_table(name):
-    """Whether a job has a table of this name."""
+    """Return whether a job has a table of this name."""
     return name in COLUMNS
 
 
 def read_list(path, folder, name="points", given=None):
-    """ForeignList of a CSV file for a table of the job in a folder.
+    """Read a CSV file as a ForeignList for a table of the job in a folder.
 
     Parameters
     ----------
     path, folder : Path
     name : str
+        Name of the table.
     given : dict, optional
-        {heading: column} as the user states it; the rest is recognised or remembered.
+        {heading: column} stated by the user. Other headings are recognised, or known from earlier
+        lists.
 
     Raises
     ------
@@ -77,37 +81,45 @@ def read_list(path, folder, name="points", given=None):
     """
     log, fields = Log(), COLUMNS[name]
     data = read_bytes(path, log, MAX_BYTES)
-    decimal = _declared_decimal(folder, log)
+    decimal = _read_decimal(folder, log)
     table = None if data is None else read_csv(path.name, data, ",", decimal, log)
     log.stop_if_problems()
-    stated = _remembered(folder, name, log) | (given or {})
+    stated = _read_memory(folder, name, log) | (given or {})
     stated = {head: column for head, column in stated.items() if head in table.headings}
     for heading, column in (given or {}).items():
         _check_given(heading, column, table, fields, log)
     log.stop_if_problems()
     taken = set(stated.values())
     free = [field for field in fields if field.name not in taken]
-    headings = [one for one in table.headings if one not in stated]
-    own = {one: Meaning(one, Fraction(1)) for one in headings if one in _names(free)}
-    rest = [one for one in headings if one not in own]
-    free = [field for field in free if field.name not in own]
-    found = {head: one for head, one in meanings_of(rest, free).items() if one.factor is not None}
-    found |= own | {head: _stated(head, column, fields) for head, column in stated.items()}
-    meanings = {one: found[one] for one in table.headings if one in found}
+    headings = [head for head in table.headings if head not in stated]
+    identical = {head: Meaning(head, Fraction(1)) for head in headings if head in _names(free)}
+    rest = [head for head in headings if head not in identical]
+    free = [field for field in free if field.name not in identical]
+    recognised = {
+        head: meaning
+        for head, meaning in meanings_of(rest, free).items()
+        if meaning.factor is not None
+    }
+    recognised |= identical | {
+        head: _make_meaning(head, column, fields) for head, column in stated.items()
+    }
+    meanings = {head: recognised[head] for head in table.headings if head in recognised}
     return ForeignList(name, table, meanings, tuple(log.warnings))
 
 
 def _names(fields):
+    """Return the names of fields."""
     return {field.name for field in fields}
 
 
-def _stated(heading, column, fields):
-    """The Meaning that a user states, with the factor of the unit that the heading has."""
-    [field] = [one for one in fields if one.name == column]
+def _make_meaning(heading, column, fields):
+    """Return the Meaning stated by the user, with the factor of the unit in the heading."""
+    [field] = [field_ for field_ in fields if field_.name == column]
     return stated_meaning(heading, field)
 
 
 def _check_given(heading, column, table, fields, log):
+    """Report a stated heading or column that does not exist."""
     names = [field.name for field in fields]
     if heading not in table.headings:
         text = message(
@@ -128,7 +140,8 @@ def _check_given(heading, column, table, fields, log):
         log.problem("--column", text)
 
 
-def _declared_decimal(folder, log):
+def _read_decimal(folder, log):
+    """Return the decimal mark declared in job.toml, or NOT_KNOWN."""
     path = folder / SETTINGS_FILE
     data = read_bytes(path, log) if path.is_file() else None
     settings = None if data is None else read_toml(SETTINGS_FILE, data, Log())[0]
@@ -136,67 +149,67 @@ def _declared_decimal(folder, log):
     return NOT_KNOWN if marks is None else marks[1]
 
 
-def _remembered(folder, name, log):
-    """{heading: column} of earlier lists for a table."""
+def _read_memory(folder, name, log):
+    """Return {heading: column} of earlier lists for a table."""
     path = folder / MEMORY_FILE
     data = read_bytes(path, log) if path.is_file() else None
     parsed = None if data is None else parsed_toml(MEMORY_FILE, data, log)
     section = {} if parsed is None else parsed[0].get(name, {})
     columns = {field.name for field in COLUMNS[name]}
     section = section if isinstance(section, dict) else {}
-    return {heading: one for heading, one in section.items() if one in columns}
+    return {heading: column for heading, column in section.items() if column in columns}
 
 
-def refuse_missing(found):
-    """Raise InputError, with one problem for each column that a ForeignList lacks."""
+def refuse_missing(foreign_list):
+    """Raise InputError with one problem for each required column without a heading."""
     log = Log()
-    for field in found.missing:
+    for field in foreign_list.missing:
         text = message(
             "list_lacks_column",
-            "no heading means {column} ({note}); expected --column 'HEADING={column}', where "
+            "no heading for {column} ({note}); expected --column 'HEADING={column}', where "
             "HEADING is one of {headings}",
             column=field.name,
             note=field.expectation(),
-            headings=found.unused or [*found.table.headings],
+            headings=foreign_list.unused or [*foreign_list.table.headings],
         )
-        log.problem(found.table.file, text, found.table.heading_row)
+        log.problem(foreign_list.table.file, text, foreign_list.table.heading_row)
     log.stop_if_problems()
 
 
-def write_list(found, folder, *, replace=False):
-    """Write a ForeignList as a table of the job, and remember its headings; returns the paths.
+def write_list(foreign_list, folder, *, replace=False):
+    """Write a ForeignList as a table of the job, save its headings, and return the paths.
 
-    Raises InputError with every problem of its values; nothing is written then.
+    Raises InputError with all problems of its values; no file is written then.
     """
     folder, log = Path(folder), Log()
-    refuse_missing(found)
-    standing = [] if replace else tables_with_rows(folder, [found.name])
+    refuse_missing(foreign_list)
+    standing = [] if replace else tables_with_rows(folder, [foreign_list.name])
     refuse_standing(folder, standing)
-    table = _in_columns(found, log)
+    table = _convert_table(foreign_list, log)
     log.stop_if_problems()
-    read_columns(found.name, table, log)
+    read_columns(foreign_list.name, table, log)
     log.stop_if_problems()
     rows = [["" if cell is None else cell for cell in row] for row in table.rows]
-    memory = {MEMORY_FILE: _memory_text(found, folder)}
-    return write_grids(folder, {found.name: [table.headings, *rows]}, memory)
+    memory = {MEMORY_FILE: _memory_text(foreign_list, folder)}
+    return write_grids(folder, {foreign_list.name: [table.headings, *rows]}, memory)
 
 
-def _in_columns(found, log):
-    """The Table with the columns of the job, decimal points, and lengths in their units."""
-    table = found.table
-    fields = {field.name: field for field in COLUMNS[found.name]}
-    used = [(place, found.meanings[one]) for place, one in enumerate(table.headings)
-            if one in found.meanings]  # fmt: skip
-    headings = tuple(one.column for _, one in used)
+def _convert_table(foreign_list, log):
+    """Return the Table with the columns of the job, decimal points, and lengths in their units."""
+    table = foreign_list.table
+    fields = {field.name: field for field in COLUMNS[foreign_list.name]}
+    used = [(place, foreign_list.meanings[heading]) for place, heading in enumerate(table.headings)
+            if heading in foreign_list.meanings]  # fmt: skip
+    headings = tuple(meaning.column for _, meaning in used)
     rows = [tuple(row[place] for place, _ in used) for row in table.rows]
     plain = Table(table.file, headings, table.heading_row, tuple(rows), table.row_numbers,
                   table.decimal, table.skipped)  # fmt: skip
     decimal = settle_decimal(plain, [*fields.values()], log)
-    kinds = [fields[one.column].kind for _, one in used]
+    kinds = [fields[meaning.column].kind for _, meaning in used]
     rows = tuple(
         tuple(
-            _converted(cell, one.factor, decimal) if kind == "number" else cell
-            for cell, kind, (_, one) in zip(row, kinds, used, strict=True)
+            _convert_cell(cell, meaning.factor, decimal) if kind == "number" else cell
+            for cell, kind, (_, meaning) in zip(row, kinds, used, strict=True)
         )
         for row in rows
     )
@@ -204,8 +217,8 @@ def _in_columns(found, log):
                  table.skipped)  # fmt: skip
 
 
-def _converted(cell, factor, decimal):
-    """A number with a decimal point in the unit of its column; other texts as they are."""
+def _convert_cell(cell, factor, decimal):
+    """Return a number with a decimal point in the unit of its column; other texts are unchanged."""
     if is_blank(cell):
         return cell
     text = cell.strip(" \t")
@@ -220,15 +233,15 @@ def _converted(cell, factor, decimal):
     return value.rstrip("0").rstrip(".")
 
 
-def _memory_text(found, folder):
-    """headings.toml with what the headings of this list and of earlier lists mean."""
+def _memory_text(foreign_list, folder):
+    """Return headings.toml with the meanings of the headings of this and earlier lists."""
     path = folder / MEMORY_FILE
     kept = {}
     if path.is_file():
         parsed = parsed_toml(MEMORY_FILE, path.read_bytes(), Log())
-        kept = {name: one for name, one in (parsed or ({},))[0].items() if is_table(name)}
-    now = {heading: one.column for heading, one in found.meanings.items()}
-    kept[found.name] = kept.get(found.name, {}) | now
+        kept = {name: columns for name, columns in (parsed or ({},))[0].items() if is_table(name)}
+    now = {heading: meaning.column for heading, meaning in foreign_list.meanings.items()}
+    kept[foreign_list.name] = kept.get(foreign_list.name, {}) | now
     lines = []
     for name, headings in kept.items():
         lines += [f"[{name}]", *(f"{json.dumps(head, ensure_ascii=False)} = {json.dumps(column)}"

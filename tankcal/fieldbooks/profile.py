@@ -1,4 +1,4 @@
-"""Plain tables (CSV): which column is what, and in which unit, is declared in a profile (TOML)."""
+"""Plain tables (CSV), with columns and units declared in a profile (TOML)."""
 
 import csv
 import datetime
@@ -39,7 +39,7 @@ _MARKS = str.maketrans({mark: " " for mark in "°º'’′\"″-:"})
 
 @dataclass(frozen=True)
 class Profile:
-    """What the columns of a plain table are.
+    """Columns and units of a plain table.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Profile:
 
 
 def read_profile(path, log):
-    """Profile of a TOML file, or None after telling the log what is wrong."""
+    """Return the Profile of a TOML file, or None after adding problems to the log."""
     data, before = read_bytes(path, log, MAX_PROFILE), len(log.problems)
     parsed = None if data is None else parsed_toml(path.name, data, log)
     if parsed is None:
@@ -76,14 +76,19 @@ def read_profile(path, log):
             log.problem(path.name, text, None, f"columns.{key}")
     for key, value in columns.items():
         if not (isinstance(value, str) and value) and not _is_place(value):
-            log.problem(path.name, message("profile_place", "expected a heading or a number from"
-                        " 1"), rows.get(f"columns.{key}"), f"columns.{key}")  # fmt: skip
+            log.problem(
+                path.name,
+                message("profile_place", "expected a heading or a column number from 1"),
+                rows.get(f"columns.{key}"),
+                f"columns.{key}",
+            )
     values = USUAL | content
     _check_values(path.name, values, rows, log)
     return None if len(log.problems) > before else Profile(columns, values)
 
 
 def _check_values(file, values, rows, log):
+    """Report invalid values of a profile."""
     for key, choices in CHOICES.items():
         if values.get(key) not in choices:
             text = message("profile_choice", "expected one of {choices}",
@@ -99,36 +104,47 @@ def _check_values(file, values, rows, log):
 
 
 def _is_place(value):
+    """Return whether a value is a column number from 1 to 1000."""
     return isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 1000
 
 
 def read(text, file, log, profile):
-    """FieldBook of the text of a plain table."""
+    """Return the FieldBook of the text of a plain table."""
     book, values = FieldBook(file, "csv"), profile.values
-    places = {key: one - 1 for key, one in profile.columns.items() if not isinstance(one, str)}
-    headings = {key: one for key, one in profile.columns.items() if isinstance(one, str)}
+    places = {
+        key: place - 1 for key, place in profile.columns.items() if not isinstance(place, str)
+    }
+    headings = {
+        key: heading for key, heading in profile.columns.items() if isinstance(heading, str)
+    }
     first, key_of_setup = int(values.get("first_row", 1)), None
     for row, cells in _rows(text, file, values["separator"], log):
         if row < first or not any(cells) or cells[0].startswith("#"):
             continue
         if headings:
-            missing = [one for one in headings.values() if one not in cells]
-            for one in missing:
-                expected = message("no_such_heading", "no column {heading!r}; expected it in the"
-                                   " first row", heading=one)  # fmt: skip
+            missing = [heading for heading in headings.values() if heading not in cells]
+            for heading in missing:
+                expected = message(
+                    "no_such_heading",
+                    "no column {heading!r}; expected this heading in the first row",
+                    heading=heading,
+                )
                 log.problem(file, expected, row)
             if missing:
                 return book
-            places |= {key: cells.index(one) for key, one in headings.items()}
+            places |= {key: cells.index(heading) for key, heading in headings.items()}
             headings = None
             continue
-        given = {key: cells[place] if place < len(cells) else "" for key, place in places.items()}
-        key_of_setup = _take(book, log, row, given, values, key_of_setup)
+        row_cells = {
+            key: cells[place] if place < len(cells) else "" for key, place in places.items()
+        }
+        key_of_setup = _take(book, log, row, row_cells, values, key_of_setup)
     book.say_units(length=values["length"], angle=values["angle"])
     return book
 
 
 def _rows(text, file, separator, log):
+    """Yield (row, cells) of each line."""
     for row, line in enumerate(text.split("\n"), 1):
         line = line.rstrip("\r")
         if separator == " ":
@@ -137,55 +153,69 @@ def _rows(text, file, separator, log):
         try:
             cells = next(csv.reader([line], delimiter=separator), [])
         except csv.Error:
-            log.problem(file, message("csv_row", "a row that cannot be divided into cells"), row)
+            log.problem(
+                file,
+                message(
+                    "csv_row",
+                    "a row that cannot be split into cells; expected cells with the separator of "
+                    "the profile",
+                ),
+                row,
+            )
             continue
         yield row, [cell.strip() for cell in cells]
 
 
-def _take(book, log, row, given, values, before):
-    """Take a row; returns what tells its set-up from others."""
+def _take(book, log, row, row_cells, values, before):
+    """Read a row; return the station and instrument height that identify its set-up."""
     lengths = {}
     for key in ("distance", "instrument_height", "target_height"):
-        lengths[key] = _number(book, log, row, given.get(key, ""), values)
+        lengths[key] = _number(book, log, row, row_cells.get(key, ""), values)
         if lengths[key] is False:
             return before
-    angles = {key: _angle(book, log, row, given[key], values) for key in ("direction", "zenith")}
+    angles = {
+        key: _angle(book, log, row, row_cells[key], values) for key in ("direction", "zenith")
+    }
     if False in angles.values():
         return before
     for key in ("direction", "zenith", "distance"):
-        book.keep_text(key, given[key], row)
-    face = {"": None, "1": 1, "2": 2, "I": 1, "II": 2}.get(given.get("face", "").upper(), 0)
-    time = _time(given.get("time", ""), values)
+        book.keep_text(key, row_cells[key], row)
+    face = {"": None, "1": 1, "2": 2, "I": 1, "II": 2}.get(row_cells.get("face", "").upper(), 0)
+    time = _time(row_cells.get("time", ""), values)
     if face == 0 or time is False:
-        text = message("csv_face_or_time", "found face {face!r} and time {time!r}; expected face 1"
-                       " or 2, and a time as time_format says", face=given.get("face", "")[:20],
-                       time=given.get("time", "")[:40])  # fmt: skip
+        text = message(
+            "csv_face_or_time",
+            "found face {face!r} and time {time!r}; expected face 1 or 2, and a time in the form "
+            "of time_format",
+            face=row_cells.get("face", "")[:20],
+            time=row_cells.get("time", "")[:40],
+        )
         log.problem(book.file, text, row)
         return before
     scale = METRES[values["length"]]
     height = lengths["instrument_height"]
     height = values.get("instrument_height_m") if height is None else height * scale
-    here = given.get("setup") or values.get("station", ""), height
+    here = row_cells.get("setup") or values.get("station", ""), height
     if here != before:
         book.stand(*here, None, row)
     zenith = angles["zenith"]
     if zenith is not None and values["vertical"] == "horizon":
         zenith = (FULL_TURN / 4 - zenith) % FULL_TURN
     book.add_shot(
-        log, row, point=given["point"], direction=angles["direction"], zenith=zenith, face=face,
+        log, row, point=row_cells["point"], direction=angles["direction"], zenith=zenith, face=face,
         distance=None if lengths["distance"] is None else lengths["distance"] * scale,
         height=None if lengths["target_height"] is None else lengths["target_height"] * scale,
-        code=given.get("code", ""), time=time,
+        code=row_cells.get("code", ""), time=time,
     )  # fmt: skip
     return here
 
 
 def _number(book, log, row, text, values):
-    """A number, None: blank, False: none, after telling the log."""
+    """Return a number, None if blank, or False after adding a problem to the log."""
     if not text:
         return None
     mark = values["decimal"]
-    is_other = mark == "," and "." in text  # 1.234 is a thousand there
+    is_other = mark == "," and "." in text  # 1.234 may mean one thousand
     value = None if is_other else number_of(text.replace(mark, "."))
     if value is None:
         refuse_number(log, book.file, row, text)
@@ -194,7 +224,7 @@ def _number(book, log, row, text, values):
 
 
 def _angle(book, log, row, text, values):
-    """Degrees, None: blank, False: none, after telling the log."""
+    """Return degrees, None if blank, or False after adding a problem to the log."""
     if not text:
         return None
     if values["angle"] != "dms":
@@ -205,23 +235,24 @@ def _angle(book, log, row, text, values):
             return value * DEGREES[values["angle"]]
         value = unpacked(value)
     else:
-        value = _of_parts(text.replace(",", "."))
+        value = _join_parts(text.replace(",", "."))
     if value is None:
         refuse_minutes(log, book.file, row, text)
         return False
     return value
 
 
-def _of_parts(text):
+def _join_parts(text):
+    """Convert a text with degrees, minutes and seconds to degrees, or return None."""
     sign = -1.0 if text.startswith("-") else 1.0
-    parts = [number_of(one) for one in text.translate(_MARKS).split()]
-    if not 1 <= len(parts) <= 3 or None in parts or any(one >= 60 for one in parts[1:]):
+    parts = [number_of(part) for part in text.translate(_MARKS).split()]
+    if not 1 <= len(parts) <= 3 or None in parts or any(part >= 60 for part in parts[1:]):
         return None
-    return sign * sum(one / 60**power for power, one in enumerate(parts))
+    return sign * sum(part / 60**power for power, part in enumerate(parts))
 
 
 def _time(text, values):
-    """A time, None: blank, False: not as the profile says."""
+    """Return a time, None if blank, or False if it does not have the form of the profile."""
     if not text:
         return None
     try:

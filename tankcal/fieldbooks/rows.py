@@ -1,4 +1,4 @@
-"""Rows of the job's tables, as its contract has them, from readings on face 1."""
+"""Rows of the tables of a job from readings on face 1."""
 
 from dataclasses import dataclass
 
@@ -29,7 +29,7 @@ ANGLE_DECIMALS, LENGTH_DECIMALS = 7, 6  # 0.0004 seconds of arc, a micrometre
 
 @dataclass(frozen=True)
 class Row:
-    """One row of a table: {column: text}, and where it comes from."""
+    """One row of a table, {column: text}, with its source."""
 
     cells: dict
     file: str
@@ -37,40 +37,48 @@ class Row:
 
 
 def make_rows(stands, names, stations, sorted_readings, choices):
-    """{table: list of Row}; tables without rows are not in it.
+    """Return {table: list of Row}, without empty tables.
 
-    stands    the SetUps by their place
-    names     {place: name of the set-up in the job}
-    stations  {name of a point: (x, y, z)} that go into control.csv, and {name: (file, row)}
+    Parameters
+    ----------
+    stands : dict
+        {index: (SetUp, file)}
+    names : dict
+        {index: name of the set-up in the job}
+    stations : dict
+        {point: (xyz, file, row)} for control.csv.
+    sorted_readings : Sorted
+    choices : Choices
     """
     tables = {name: [] for name in CONTRACT}
     for place, name in names.items():
-        given, file = stands[place]
+        setup, file = stands[place]
         cells = {
             "setup": name,
-            "station": given.station,
+            "station": setup.station,
             "instrument": choices.instrument,
-            "instrument_height_m": _length(given.height_m),
+            "instrument_height_m": _length(setup.height_m),
         }
-        tables["setups"].append(Row(cells, file, given.row))
-    for one in sorted_readings.hits:
-        cells = _both_angles(one.shot)
-        if is_meant(one.shot, choices.check):
+        tables["setups"].append(Row(cells, file, setup.row))
+    for reading in sorted_readings.hits:
+        cells = _both_angles(reading.shot)
+        if is_meant(reading.shot, choices.check):
             cells["use"] = "check"
-        tables["wall_hits"].append(_row(one, names, cells, distance=True, time=True))
-    for one in sorted_readings.control:
-        cells = {"target": one.shot.point} | _both_angles(one.shot)
-        tables["control_readings"].append(_row(one, names, cells, distance=True, time=True))
-    for one in sorted_readings.ties:
-        _tie(tables, one, names, choices)
+        tables["wall_hits"].append(_row(reading, names, cells, distance=True, time=True))
+    for reading in sorted_readings.control:
+        cells = {"target": reading.shot.point} | _both_angles(reading.shot)
+        tables["control_readings"].append(_row(reading, names, cells, distance=True, time=True))
+    for reading in sorted_readings.ties:
+        _tie(tables, reading, names, choices)
     for point, (xyz, file, row) in stations.items():
         cells = {"point": point} | dict(zip(("x_m", "y_m", "z_m"), map(_length, xyz), strict=True))
         tables["control"].append(Row(cells, file, row))
     return {name: rows for name, rows in tables.items() if rows}
 
 
-def _row(one, names, cells, *, distance=False, time=False):
-    shot = one.shot
+def _row(reading, names, cells, *, distance=False, time=False):
+    """Return the Row of a reading."""
+    shot = reading.shot
     cells = {"setup": names[shot.setup]} | cells
     if distance:
         cells["distance_m"] = _length(shot.distance_m)
@@ -80,14 +88,16 @@ def _row(one, names, cells, *, distance=False, time=False):
 
 
 def _both_angles(shot):
+    """Return the cells of direction and zenith angle."""
     return {
         "direction_deg": _angle(shot.direction_deg),
         "zenith_deg": _angle(shot.zenith_deg),
     }
 
 
-def _tie(tables, one, names, choices):
-    shot = one.shot
+def _tie(tables, reading, names, choices):
+    """Add the rows of a reading that ties set-ups."""
+    shot = reading.shot
     height = _length(shot.target_height_m)
     seconds, millimetres = _number(choices.targets_arcsec), _number(choices.targets_mm)
     for table, column, text, sd in (
@@ -97,7 +107,7 @@ def _tie(tables, one, names, choices):
     ):
         if text:
             cells = {"to": shot.point, column: text, sd[0]: sd[1], "target_height_m": height}
-            tables[table].append(_row(one, names, cells))
+            tables[table].append(_row(reading, names, cells))
 
 
 def _angle(value):
@@ -113,7 +123,7 @@ def _number(value):
 
 
 def _plain(value, decimals):
-    """Digits without zeros at their end, but with those of a millimetre."""
+    """Format a number without final zeros, with at least three decimals."""
     text = f"{value:.{decimals}f}"
     while text.endswith("0") and len(text) - text.index(".") > 4:
         text = text[:-1]
@@ -121,8 +131,8 @@ def _plain(value, decimals):
 
 
 def check_rows(tables, log):
-    """Tell what the job's contract would refuse, each text once, with the row it comes from."""
-    told = set()
+    """Report values that the tables of a job do not allow, each once, with the source row."""
+    reported = set()
     for table, rows in tables.items():
         for field in CONTRACT[table]:
             for row in rows:
@@ -134,9 +144,9 @@ def check_rows(tables, log):
                 try:
                     read_value(field, text, ".")
                 except Refused as error:
-                    if (field.name, text) not in told:
+                    if (field.name, text) not in reported:
                         log.problem(row.file, error.text, row.row, f"{table}.{field.name}")
-                    told.add((field.name, text))
+                    reported.add((field.name, text))
 
 
 def _refuse(log, row, table, field):
@@ -147,7 +157,7 @@ def _refuse(log, row, table, field):
 
 
 def columns_of(table, rows):
-    """The columns that a table needs, in the order of the contract."""
+    """Return the columns that a table needs, in the order of the job format."""
     return [
         field.name
         for field in CONTRACT[table]

@@ -1,6 +1,7 @@
-"""Carlson and TDS raw data (RW5): records of fields that begin with a code of two letters.
+"""Carlson and TDS raw data (RW5): records with fields that begin with a two-letter code.
 
-Angles are packed, ddd.mmssss (MO, AU0), or gon (AU1); lengths are feet, metres or US feet (UN).
+Angles are packed as ddd.mmssss (MO, AU0) or in gon (AU1). Lengths are in feet, metres or US feet
+(UN).
 """
 
 import datetime
@@ -27,7 +28,7 @@ UNITS = {0: "ft", 1: "m", 2: "usft"}
 _CODES = ("OP", "FP", "BP", "PN", "BS", "BC", "HI", "HR", "AR", "AL", "AZ", "DR", "DL", "BR", "ZE",
           "VA", "CE", "SD", "HD", "EL", "NM", "DT", "TM", "UN", "AU", "AD", "SF", "EC", "EO", "FE",
           "TS", "FC", "N", "E")  # fmt: skip
-# Two fields with their codes, because a raw file of Nikon has records SS without codes.
+# Two fields with codes, because Nikon raw files have records SS without codes.
 _FIELD = rf"\s*(?:{'|'.join(_CODES)})"
 LINE = re.compile(
     rf"\s*(--|(JB|MO|OC|BK|LS|SS|TR|BD|FD|BR|FR|SP)\s*,{_FIELD}[^,]*(,(--|{_FIELD})|$))"
@@ -39,21 +40,21 @@ _TIME = re.compile(r"(?:--|,)\s*TM\s*(\d\d?):(\d\d):(\d\d)", re.IGNORECASE)
 
 
 class _State:
-    """What holds from line to line."""
+    """Values that apply from one line to the next."""
 
     length = angle = None  # of MO
-    units_told = False  # that they are not known
+    units_told = False  # whether unknown units were reported
     station = back = height = rod = None
     azimuth = circle = None  # of the backsight
     key = None  # of the set-up
-    is_told = False  # has there been a record OC?
-    date = None  # of the last note that has one
-    follows_shot = False  # is a time that stands here that of the last reading?
-    kind = None  # of horizontal angle in this set-up: "turned" or "azimuth"
+    is_told = False  # whether there was a record OC
+    date = None  # date of the last note with a date
+    follows_shot = False  # whether a time in this line belongs to the last reading
+    kind = None  # kind of horizontal angle in this set-up: "turned" or "azimuth"
 
 
 def read(text, file, log):
-    """FieldBook of the text of an RW5 file."""
+    """Return the FieldBook of the text of an RW5 file."""
     book, state = FieldBook(file, "rw5"), _State()
     for row, line in enumerate(text.split("\n"), 1):
         line = line.strip()
@@ -65,6 +66,7 @@ def read(text, file, log):
 
 
 def _take(book, log, row, line, state):
+    """Read a record."""
     kind, fields, code = _fields(line)
     before = len(book.shots)
     if kind in RECORDS:
@@ -78,7 +80,7 @@ def _take(book, log, row, line, state):
         _take_point(book, log, row, state.station, fields, state)
     elif kind == "BK":
         state.back = fields.get("BP")
-        state.azimuth, state.circle = (_angle(fields.get(one), state) for one in ("BS", "BC"))
+        state.azimuth, state.circle = (_angle(fields.get(key), state) for key in ("BS", "BC"))
     elif kind == "LS":
         if "HI" in fields:
             state.height = _length(book, log, row, fields["HI"], state)
@@ -92,26 +94,27 @@ def _take(book, log, row, line, state):
 
 
 def _fields(line):
-    """(kind, {code: text}, note) of a record."""
+    """Return (kind, {code: text}, note) of a record."""
     body, _, note = line.partition(",--")
     kind, *parts = body.split(",")
-    found = {}
+    fields = {}
     for part in parts:
         part = part.strip()
-        code = next((one for one in _CODES if part.upper().startswith(one)), None)
+        code = next((prefix for prefix in _CODES if part.upper().startswith(prefix)), None)
         if code is not None:
-            found.setdefault(code, part[len(code) :].strip())
-    return kind.strip().upper(), found, note.strip() or found.get("FC", "")
+            fields.setdefault(code, part[len(code) :].strip())
+    return kind.strip().upper(), fields, note.strip() or fields.get("FC", "")
 
 
 def _take_note(book, row, line, state):
+    """Read the date and time of a note; count other notes."""
     date, time = _DATE.match(line), _TIME.search(line)
     if date:
-        month, day, year = (int(one) for one in date.groups())
+        month, day, year = (int(number) for number in date.groups())
         state.date = (year, month, day)
     if time and state.date:
         try:
-            when = datetime.datetime(*state.date, *(int(one) for one in time.groups()))
+            when = datetime.datetime(*state.date, *(int(number) for number in time.groups()))
         except ValueError:
             return
         if state.follows_shot:
@@ -122,7 +125,8 @@ def _take_note(book, row, line, state):
 
 
 def _take_mode(book, log, row, fields, state):
-    length, angle = (number_of(fields.get(one, "")) for one in ("UN", "AU"))
+    """Read the units of a record MO."""
+    length, angle = (number_of(fields.get(key_, "")) for key_ in ("UN", "AU"))
     angle = 0 if "AU" not in fields else angle
     if length not in UNITS or angle not in (0, 1):
         text = message(
@@ -142,7 +146,7 @@ def _take_mode(book, log, row, fields, state):
         if value is not None and value != usual:
             text = message(
                 "rw5_correction",
-                "{key} {value:g} of MO: distances are taken as they stand, it is not applied",
+                "{key} {value:g} of MO: not applied, distances are used as written",
                 key=key,
                 value=value,
             )
@@ -150,6 +154,7 @@ def _take_mode(book, log, row, fields, state):
 
 
 def _length(book, log, row, text, state):
+    """Return a length in metres, or None."""
     value = number_of(text)
     if value is None:
         refuse_number(log, book.file, row, text)
@@ -158,7 +163,7 @@ def _length(book, log, row, text, state):
 
 
 def _angle(text, state):
-    """Degrees, or None where there are none."""
+    """Return degrees, or None."""
     value = None if text is None else number_of(text)
     if value is None or state.angle is None:
         return None
@@ -166,33 +171,35 @@ def _angle(text, state):
 
 
 def _take_point(book, log, row, name, fields, state):
+    """Read the coordinates of a point."""
     if state.length is None:
         return
-    given = [number_of(fields.get(one, "")) for one in ("E", "N", "EL")]
-    for one, code in zip(given, ("E", "N", "EL"), strict=True):
-        if one is None and fields.get(code):
+    coordinates = [number_of(fields.get(axis, "")) for axis in ("E", "N", "EL")]
+    for value, code in zip(coordinates, ("E", "N", "EL"), strict=True):
+        if value is None and fields.get(code):
             refuse_number(log, book.file, row, fields[code])
-    if name and None not in given[:2]:
+    if name and None not in coordinates[:2]:
         scale = METRES[state.length]
-        xyz = tuple(None if one is None else one * scale for one in given)
+        xyz = tuple(None if value is None else value * scale for value in coordinates)
         book.known.append(KnownPoint(name, xyz, row))
 
 
 def _take_shot(book, log, row, kind, fields, code, state):
+    """Read a reading; begin a set-up if station, backsight or instrument height change."""
     if state.length is None:
         if not state.units_told:
             state.units_told = True
             text = message(
-                "units_unknown", "no units before it; expected a record MO with UN and AU"
+                "units_unknown", "no units before this record; expected a record MO with UN and AU"
             )
             log.problem(book.file, text, row)
         return
-    if state.station is None:  # no record OC: the reading itself names its station
+    if state.station is None:  # without record OC the reading names its station
         state.station = fields.get("OP")
     if "OP" in fields and fields["OP"] != state.station:
         text = message(
             "other_station",
-            "read from {found!r}, but the set-up is over {station!r}; expected the same",
+            "read from {found!r}, but the set-up is over {station!r}; expected the same point",
             found=fields["OP"][:40],
             station=state.station or "",
         )
@@ -202,9 +209,15 @@ def _take_shot(book, log, row, kind, fields, code, state):
     if here != state.key:
         state.key, state.kind = here, None
         book.stand(state.station or "", state.height, None, row, is_told=state.is_told)
-    codes = [one for one in (*_HORIZONTAL, "ZE", "VA", "SD", "HD") if one in fields]
-    given = {one: fields[one] for one in codes}
-    bad = [one for one in codes if one != "BR" and number_of(given[one]) is None]
+    codes = [
+        field_code for field_code in (*_HORIZONTAL, "ZE", "VA", "SD", "HD") if field_code in fields
+    ]
+    texts = {field_code: fields[field_code] for field_code in codes}
+    bad = [
+        field_code
+        for field_code in codes
+        if field_code != "BR" and number_of(texts[field_code]) is None
+    ]
     if bad or "CE" in fields:
         text = message(
             "rw5_fields",
@@ -214,18 +227,23 @@ def _take_shot(book, log, row, kind, fields, code, state):
         )
         log.problem(book.file, text, row)
         return
-    for one in codes:
-        book.keep_text(one, given[one], row)
-    _add(book, log, row, kind, {one: given[one] for one in codes}, code, state,
+    for field_code in codes:
+        book.keep_text(field_code, texts[field_code], row)
+    _add(book, log, row, kind, {field_code: texts[field_code] for field_code in codes}, code, state,
          fields.get("FP", ""))  # fmt: skip
 
 
-def _add(book, log, row, kind, given, code, state, name):
-    angles = {one: _angle(text, state) for one, text in given.items() if one not in ("SD", "HD")}
-    angles |= {"BR": _of_bearing(given["BR"], state)} if "BR" in given else {}
-    bad = [one for one, value in angles.items() if value is None]
+def _add(book, log, row, kind, texts, code, state, name):
+    """Add a reading to the book."""
+    angles = {
+        field_code: _angle(text, state)
+        for field_code, text in texts.items()
+        if field_code not in ("SD", "HD")
+    }
+    angles |= {"BR": _convert_bearing(texts["BR"], state)} if "BR" in texts else {}
+    bad = [field_code for field_code, value in angles.items() if value is None]
     if bad:
-        refuse_minutes(log, book.file, row, given[bad[0]])
+        refuse_minutes(log, book.file, row, texts[bad[0]])
         return
     direction, is_turned = _direction(angles)
     if direction is not None:
@@ -234,8 +252,8 @@ def _add(book, log, row, kind, given, code, state, name):
             if state.azimuth is None:
                 text = message(
                     "azimuths_and_angles",
-                    "azimuths and angles from the backsight in one set-up, whose BK has no"
-                    " azimuth; expected one kind, or the azimuth of the backsight",
+                    "azimuths and angles from the backsight in one set-up, whose BK has no "
+                    "azimuth; expected one kind of angle, or the azimuth of the backsight",
                 )
                 log.problem(book.file, text, row)
                 return
@@ -245,16 +263,16 @@ def _add(book, log, row, kind, given, code, state, name):
     zenith = angles.get("ZE")
     if zenith is None and "VA" in angles:
         zenith = FULL_TURN / 4 - angles["VA"]
-    distance = number_of(given["SD"]) if "SD" in given else None
-    if distance is None and "HD" in given and zenith:
-        distance = number_of(given["HD"]) / max(abs(math.sin(math.radians(zenith))), 1e-6)
+    distance = number_of(texts["SD"]) if "SD" in texts else None
+    if distance is None and "HD" in texts and zenith:
+        distance = number_of(texts["HD"]) / max(abs(math.sin(math.radians(zenith))), 1e-6)
     distance = None if distance is None else distance * METRES[state.length]
     book.add_shot(log, row, point=name, direction=direction, zenith=zenith, distance=distance,
                   face=FACES.get(kind), height=state.rod, code=code)  # fmt: skip
 
 
 def _direction(angles):
-    """(degrees clockwise or None, whether they count from the backsight)."""
+    """Return (degrees clockwise or None, whether they count from the backsight)."""
     turns = {
         "AR": lambda value: value,
         "AL": lambda value: -value,
@@ -267,8 +285,8 @@ def _direction(angles):
     return angles.get("AZ", angles.get("BR")), False
 
 
-def _of_bearing(text, state):
-    """Azimuth of a quadrant bearing such as N45.3000E."""
+def _convert_bearing(text, state):
+    """Return the azimuth of a quadrant bearing such as N45.3000E."""
     match = _BEARING.fullmatch(text.strip())
     value = _angle(match[2], state) if match else None
     if value is None:

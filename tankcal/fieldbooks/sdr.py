@@ -1,7 +1,7 @@
-"""Sokkia SDR33 and SDR20 (SDR2x): fields of fixed width after a code of four characters.
+"""Sokkia SDR33 and SDR20 (SDR2x): fields of fixed width after a four-character code.
 
-The header says units and order of coordinates, record 01 from where vertical angles count. Names
-are 16 characters wide and numbers 16 in SDR33, 4 and 10 in SDR20. Angles are decimal.
+The header states units and order of coordinates, record 01 the origin of vertical angles. SDR33 has
+names of 16 characters and numbers of 16, SDR20 names of 4 and numbers of 10. Angles are decimal.
 """
 
 import datetime
@@ -24,14 +24,14 @@ ANGLES, LENGTHS = {"1": "deg", "2": "gon", "4": "mil"}, {"1": "m", "2": "ft"}
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _STAMP = re.compile(r"(\d\d?)-([A-Za-z]{3})-(\d\d(?:\d\d)?)\s+(\d\d?):(\d\d)(?::(\d\d))?")
 _CONSTANT = re.compile(r"(?:P\.?C\.?\s*mm[^:]*|\bPrism):\s*([+-]?[0-9.]+)", re.IGNORECASE)
-# What the mount and the vertical circle are, before the three constants at the end of record 01.
-# Not by its column: names of 17 characters are written where 16 have room.
+# Mounting and vertical circle, before the three constants at the end of record 01. The column is
+# not fixed, because some programs write names of 17 characters.
 _FLAGS = re.compile(r"\d([12])(?:\s+[+-]?\d*\.\d*)*\s*$")
-OTHERS = ("04", "05", "10", "12")  # collimation, atmosphere, job: said by other records
+OTHERS = ("04", "05", "10", "12")  # collimation, atmosphere, job: not needed
 
 
 class _State:
-    """What holds from line to line."""
+    """Values that apply from one line to the next."""
 
     wide = True
     angle = length = None
@@ -41,7 +41,7 @@ class _State:
 
 
 def read(text, file, log):
-    """FieldBook of the text of an SDR file."""
+    """Return the FieldBook of the text of an SDR file."""
     book, state = FieldBook(file, "sdr"), _State()
     lines = text.split("\n")
     derived = any(line[:3] == "09F" for line in lines)
@@ -49,16 +49,18 @@ def read(text, file, log):
         if not line.strip():
             continue
         kind, way = line[:2], line[2:4]
-        if line.strip() == "0000":  # ends a file
+        if line.strip() == "0000":  # end of a file
             continue
         if kind == "00":
             _take_header(book, log, row, line, state)
         elif state.length is None:
-            text = message("sdr_header", "no header before it; expected a record 00NM with units")
+            text = message(
+                "sdr_header", "no header before this record; expected a record 00NM with units"
+            )
             log.problem(file, text, row)
             return book
         elif kind == "09" and way == "MC" and derived:
-            book.leave_out(message("means", "means that the instrument made of other readings"),
+            book.leave_out(message("means", "means computed by the instrument from other readings"),
                            row)  # fmt: skip
         else:
             _take(book, log, row, line, state)
@@ -66,6 +68,7 @@ def read(text, file, log):
 
 
 def _take_header(book, log, row, line, state):
+    """Read format, units and order of coordinates."""
     units = line[40:46].ljust(6)
     if not HEADER.match(line) or units[0] not in ANGLES or units[1] not in LENGTHS:
         text = message(
@@ -83,6 +86,7 @@ def _take_header(book, log, row, line, state):
 
 
 def _take(book, log, row, line, state):
+    """Read a record."""
     kind, way = line[:2], line[2:4]
     takers = {
         "01": _take_instrument,
@@ -97,19 +101,21 @@ def _take(book, log, row, line, state):
     if kind in takers:
         takers[kind](book, log, row, line, state)
     elif kind == "11":
-        what = message("reduced", "readings that were reduced (azimuth, level distance)")
+        what = message("reduced", "reduced readings (azimuth, horizontal distance)")
         book.leave_out(what, row)
     elif kind not in OTHERS:
         book.leave_out(message("sdr_records", "records {kind}", kind=kind + way), row)
 
 
 def _take_instrument(book, _log, _row, line, state):
+    """Read the instrument name and the origin of vertical angles."""
     flags = _FLAGS.search(line[5:][-80:])
     state.from_zenith = flags is None or flags[1] == "1"
     book.instrument = " ".join(line[5:21].split())
 
 
 def _take_station(book, log, row, line, state):
+    """Begin a set-up."""
     parts = _fields(line, state, 1, 4)
     values = _numbers(book, log, row, parts[1:], METRES[state.length])
     if values is None:
@@ -119,11 +125,13 @@ def _take_station(book, log, row, line, state):
 
 
 def _take_rod(book, log, row, line, state):
+    """Read the height of the target."""
     values = _numbers(book, log, row, [line[4:20]], METRES[state.length])
     state.rod = values[0] if values else state.rod
 
 
 def _take_scale(book, _log, _row, line, _state):
+    """Add a note about a scale factor, which is not applied."""
     scale = number_of(line[4:20])
     if scale not in (None, 1.0):
         text = message(
@@ -133,46 +141,51 @@ def _take_scale(book, _log, _row, line, _state):
 
 
 def _take_backsight(book, _log, row, _line, _state):
-    """Another backsight after readings is another zero of the circle: a set-up of its own."""
+    """Begin a set-up after readings, because a new backsight changes the zero of the circle."""
     if book.has_shots:
         now = book.setups[-1]
         book.stand(now.station, now.height_m, now.xyz_m, row, is_told=now.is_told)
 
 
 def _fields(line, state, names, numbers):
-    """Texts of the fields of a record: so many names, then so many numbers."""
+    """Return the texts of the fields of a record: names, then numbers."""
     widths = [16 if state.wide else 4] * names + [16 if state.wide else 10] * numbers
-    found, place = [], 4
+    fields, place = [], 4
     for width in widths:
-        found.append(line[place : place + width].strip())
+        fields.append(line[place : place + width].strip())
         place += width
-    return [*found, line[place:].strip()]
+    return [*fields, line[place:].strip()]
 
 
 def _numbers(book, log, row, texts, scale):
-    """Numbers of texts, None where one is blank; None after telling the log."""
-    found = [number_of(text) if text.strip() else None for text in texts[:4]]
-    bad = [text for text, one in zip(texts[:4], found, strict=True) if text.strip() and one is None]
+    """Return numbers (None if blank), or None after adding a problem to the log."""
+    numbers = [number_of(text) if text.strip() else None for text in texts[:4]]
+    bad = [
+        text
+        for text, number in zip(texts[:4], numbers, strict=True)
+        if text.strip() and number is None
+    ]
     if bad:
         text = message(
             "sdr_number",
-            "found {text!r}; expected a number: is this the width of the fields that the header"
-            " says?",
+            "found {text!r}; expected a number (do the field widths agree with the header?)",
             text=bad[0],
         )
         log.problem(book.file, text, row)
         return None
-    return [None if one is None else one * scale for one in found]
+    return [None if number is None else number * scale for number in numbers]
 
 
 def _coordinates(values, state):
+    """Return east, north and height."""
     north, east, height = values[:3]
     return (north, east, height) if state.east_first else (east, north, height)
 
 
 def _take_point(book, log, row, line, state):
+    """Read known coordinates; computed coordinates are left out."""
     if line[2:4] != "KI":
-        book.leave_out(message("computed_points", "coordinates that were computed of readings"),
+        book.leave_out(message("computed_points", "coordinates computed from readings"),
                        row)  # fmt: skip
         return
     parts = _fields(line, state, 1, 3)
@@ -182,18 +195,20 @@ def _take_point(book, log, row, line, state):
 
 
 def _take_shot(book, log, row, line, state):
+    """Read an observation."""
     way = line[2:4]
     face = {"F1": 1, "F2": 2}.get(way)
     if face is None and way != "MC":
         book.leave_out(message("sdr_observations", "observations {kind}", kind=line[:4]), row)
         return
     station, point, distance, vertical, direction, code = _fields(line, state, 2, 3)
-    if not book.setups:  # no record 02: the reading itself names its station
+    if not book.setups:  # without record 02 the reading names its station
         book.stand(plain_name(station), None, None, row, is_told=False)
     if plain_name(station) != book.setups[-1].station:
         text = message(
             "sdr_station",
-            "read from {found!r}, but the last record 02 is of {station!r}; expected the same",
+            "read from {found!r}, but the last record 02 is of {station!r}; expected the same "
+            "point",
             found=station,
             station=book.setups[-1].station,
         )
@@ -219,7 +234,7 @@ def _take_shot(book, log, row, line, state):
 
 
 def _take_note(book, _log, row, line, state):
-    """Notes: a time stamp belongs to the reading before it, a prism constant to those after it."""
+    """Read a time stamp of the previous reading, or a prism constant of the next readings."""
     stamp, constant = _STAMP.search(line), _CONSTANT.search(line)
     if stamp and line[2:4] == "TS":
         when = _time(stamp)
@@ -233,6 +248,7 @@ def _take_note(book, _log, row, line, state):
 
 
 def _time(stamp):
+    """Return the time of a stamp, or None."""
     day, month, year, hour, minute, second = stamp.groups()
     if month.lower() not in MONTHS:
         return None

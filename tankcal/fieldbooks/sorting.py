@@ -1,4 +1,4 @@
-"""Which readings are bare hits of the wall, which are control targets, which tie set-ups."""
+"""Classification of readings: hits of the wall, control targets, targets that tie set-ups."""
 
 import re
 from collections import Counter
@@ -7,18 +7,23 @@ from fnmatch import fnmatchcase
 
 from tankcal.messages import message
 
-SAID = ("WALL", "HIT", "PAREDE", "PARED")  # a code or name that begins so is a bare hit
+SAID = ("WALL", "HIT", "PAREDE", "PARED")  # initial letters of codes and names of hits
 SHOWN = 8
 _RANGE = re.compile(r"(\d{1,9})-(\d{1,9})")
 
 
 @dataclass(frozen=True)
 class Sorted:
-    """Readings by what they are; each a tuple of Reading.
+    """Readings by kind; each a tuple of Reading.
 
-    hits     of the bare wall
-    control  of control targets, read again to see a drift
-    ties     of targets that tie set-ups
+    Attributes
+    ----------
+    hits : tuple
+        Reflectorless readings of the wall.
+    control : tuple
+        Repeated readings of control targets, for drift.
+    ties : tuple
+        Readings of targets that tie set-ups.
     """
 
     hits: tuple
@@ -27,113 +32,124 @@ class Sorted:
 
 
 def is_meant(shot, patterns):
-    """Whether a pattern means the name or the code of a shot: a range 1-200, or with * and ?"""
+    """Return whether a pattern (1-200, or with * and ?) matches the name or code of a shot."""
     for pattern in patterns:
         limits = _RANGE.fullmatch(pattern)
         if limits and shot.point.isascii() and shot.point.isdigit():
             if int(limits[1]) <= int(shot.point[:18]) <= int(limits[2]):
                 return True
-        elif any(fnmatchcase(one.upper(), pattern.upper()) for one in (shot.point, shot.code)):
+        elif any(fnmatchcase(text.upper(), pattern.upper()) for text in (shot.point, shot.code)):
             return True
     return False
 
 
 def says_hit(shot):
-    """Whether its name or its code calls a shot a hit."""
-    return any(one.upper().startswith(SAID) for one in (shot.point, shot.code))
+    """Return whether the name or the code identifies a shot as a hit."""
+    return any(text.upper().startswith(SAID) for text in (shot.point, shot.code))
 
 
 def sort_readings(readings, choices, known, log, leave_out):
-    """Sorted readings of all books.
+    """Return the Sorted readings of all books.
 
-    choices    Choices of the user
-    known      names of points whose coordinates are known
-    leave_out  leave_out(what, Reading): told of each reading that is not used
+    Parameters
+    ----------
+    readings : list of Reading
+    choices : Choices
+    known : set of str
+        Points with known coordinates.
+    log : Log
+    leave_out : callable
+        leave_out(what, Reading), called for each reading that is not used.
     """
     hits, control, others = [], [], []
-    for one in readings:
-        shot = one.shot
+    for reading in readings:
+        shot = reading.shot
         if is_meant(shot, choices.leave):
-            leave_out(message("left_by_choice", "left out by choice"), one)
+            leave_out(message("left_by_choice", "left out by choice"), reading)
         elif is_meant(shot, choices.control):
-            control.append(one)
+            control.append(reading)
         elif is_meant(shot, choices.check) or (
             is_meant(shot, choices.hits) if choices.hits else says_hit(shot)
         ):
-            hits.append(one)
+            hits.append(reading)
         else:
-            others.append(one)
+            others.append(reading)
     if not hits and not choices.no_hits:
         _refuse_without_hits(readings, choices, log)
-    whole = [one for one in hits if None not in _values(one.shot)]
-    for one in hits:
-        if None in _values(one.shot):
+    whole = [reading for reading in hits if None not in _values(reading.shot)]
+    for reading in hits:
+        if None in _values(reading.shot):
             leave_out(message("hit_not_whole", "hits without direction, zenith angle or distance"),
-                      one)  # fmt: skip
-    return Sorted(tuple(whole), *_targets(control, others, {one.shot.setup for one in whole},
-                                           choices, known, leave_out))  # fmt: skip
+                      reading)  # fmt: skip
+    setups_of_hits = {reading.shot.setup for reading in whole}
+    targets = _targets(control, others, setups_of_hits, choices, known, leave_out)
+    return Sorted(tuple(whole), *targets)
 
 
 def _values(shot):
+    """Return direction, zenith angle and distance."""
     return shot.direction_deg, shot.zenith_deg, shot.distance_m
 
 
 def _targets(control, others, of_hits, choices, known, leave_out):
-    """(control readings, ties): of targets that nobody called so, by how often they were read.
+    """Return (control readings, ties), from the number of readings of each target.
 
-    of_hits  places of the set-ups of hits; one set-up alone needs no tie
+    of_hits  indices of the set-ups of hits; a single set-up needs no tie
     """
-    targets = sorted((*others, *control), key=lambda one: (one.shot.setup, one.shot.row))
-    setups, asked = {}, {id(one) for one in control}
-    for one in targets:
-        setups.setdefault(one.shot.point, set()).add(one.shot.setup)
-    times = Counter((one.shot.setup, one.shot.point) for one in targets)
-    are_several = len({one.shot.setup for one in targets} | of_hits) > 1
+    targets = sorted(
+        (*others, *control), key=lambda reading: (reading.shot.setup, reading.shot.row)
+    )
+    setups, asked = {}, {id(reading) for reading in control}
+    for reading in targets:
+        setups.setdefault(reading.shot.point, set()).add(reading.shot.setup)
+    times = Counter((reading.shot.setup, reading.shot.point) for reading in targets)
+    are_several = len({reading.shot.setup for reading in targets} | of_hits) > 1
     again, ties = [], []
-    for one in targets:
-        name = one.shot.point
+    for reading in targets:
+        name = reading.shot.point
         is_tie = choices.no_hits or (are_several and (len(setups[name]) > 1 or name in known))
-        is_again = id(one) in asked or (
-            times[one.shot.setup, name] > 1 and not (choices.control or choices.no_hits)
+        is_again = id(reading) in asked or (
+            times[reading.shot.setup, name] > 1 and not (choices.control or choices.no_hits)
         )
         if is_tie:
-            ties.append(one)
+            ties.append(reading)
         if is_again:
-            again.append(one)
+            again.append(reading)
         if not is_tie and not is_again:
             what = message(
                 "ties_nothing",
-                "targets that tie nothing: read once, and from one set-up, or the only one",
+                "targets that tie no set-ups: read once, from one set-up or from the only set-up",
             )
-            leave_out(what, one)
+            leave_out(what, reading)
     return tuple(again), tuple(ties)
 
 
 def _refuse_without_hits(readings, choices, log):
-    names = _in_ranges([one.shot.point for one in readings])
+    """Report that no reading is a hit."""
+    names = _join_ranges([reading.shot.point for reading in readings])
     shown = [*names[:SHOWN], *(["..."] if len(names) > SHOWN else [])]
     text = message(
         "which_are_hits",
-        "none of the points {names} is called a hit; expected --hits with their names or codes,"
-        " such as --hits '1-200' or --hits 'W*', or --no-hits",
+        "none of the points {names} is identified as a hit; expected --hits with names or "
+        "codes, such as --hits '1-200' or --hits 'W*', or --no-hits",
         names=", ".join(shown) or "-",
     )
     log.problem("--hits", text)
 
 
-def _in_ranges(names):
-    """Names in their order, runs of numbers as 1-200."""
-    found = []
+def _join_ranges(names):
+    """Return names in their order, with consecutive numbers as 1-200."""
+    runs = []
     for name in dict.fromkeys(names):
         if name.isascii() and name.isdigit() and len(name) < 10:
             number = int(name)
-            if found and isinstance(found[-1], list) and found[-1][1] == number - 1:
-                found[-1][1] = number
+            if runs and isinstance(runs[-1], list) and runs[-1][1] == number - 1:
+                runs[-1][1] = number
                 continue
-            found.append([number, number])
+            runs.append([number, number])
         else:
-            found.append(name[:30])
+            runs.append(name[:30])
     return [
-        one if isinstance(one, str) else str(one[0]) if one[0] == one[1] else f"{one[0]}-{one[1]}"
-        for one in found
+        run if isinstance(run, str) else str(run[0]) if run[0] == run[1] else f"{run[0]}-{run[1]}"
+        for run in runs
     ]

@@ -1,4 +1,4 @@
-"""What an import says: what was found, what was applied, and what was left out."""
+"""Summary of an import: contents, applied corrections, and records left out."""
 
 from tankcal.errors import Problem
 from tankcal.fieldbooks.detection import NAMES
@@ -8,33 +8,45 @@ from tankcal.messages import list_some, message
 
 SHOWN = 8
 ARCSEC = 3600.0
-APPLIED_BY_INSTRUMENT = ("gsi", "sdr")  # formats whose distances have the prism constant in them
+APPLIED_BY_INSTRUMENT = ("gsi", "sdr")  # formats with distances that include the prism constant
 
 
 def summarise(books, chosen, unused, names, stands, reports, coordinates, standing):
-    """Lines, in the order in which a surveyor asks.
+    """Return the lines of the summary.
 
-    unused       {what: shots}
-    coordinates  ({known point: ...}, {those of them that were written: ...})
-    standing     other tables of the folder that have rows
+    Parameters
+    ----------
+    books : list of FieldBook
+    chosen : Sorted
+    unused : dict
+        {reason: shots}
+    names : dict
+        {index: name of the set-up}
+    stands : dict
+        {index: (SetUp, file)}
+    reports : list of FaceReport
+    coordinates : tuple of dict
+        Known points, and the points written to control.csv.
+    standing : list of str
+        Other tables of the folder that contain rows.
     """
     lines = []
     for book in books:
-        lines += _of_book(book)
-    shown = [_of_setup(name, stands[place][0].station) for place, name in names.items()]
+        lines += _describe_book(book)
+    shown = [_describe_setup(name, stands[place][0].station) for place, name in names.items()]
     lines.append(message("import_setups", "set-ups: {names}", names=list_some(shown, SHOWN)))
-    reports = [one for one in reports if one.setup in names]
+    reports = [report for report in reports if report.setup in names]
     for report in reports:
-        lines += _of_faces(names[report.setup], report)
+        lines += _describe_faces(names[report.setup], report)
     lines.append(message("import_hits", "hits of the wall: {count}", count=len(chosen.hits)))
-    lines += _of_targets(chosen)
+    lines += _describe_targets(chosen)
     known, stations = coordinates
     if known:
         lines.append(
             message(
                 "import_known",
-                "points with coordinates: {count}; in control.csv, without standard deviations:"
-                " {names}",
+                "points with coordinates: {count}; written to control.csv, without standard "
+                "deviations: {names}",
                 count=len(known),
                 names=list_some(list(stations), SHOWN) or ["-"],
             )
@@ -46,37 +58,39 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
                 "not used: {what}: {count} ({names})",
                 what=what,
                 count=len(shots),
-                names=list_some(list(dict.fromkeys(one.point or "?" for one in shots)), SHOWN),
+                names=list_some(list(dict.fromkeys(shot.point or "?" for shot in shots)), SHOWN),
             )
         )
     if standing:
-        tables = [f"{one}.csv" for one in standing]
+        tables = [f"{table}.csv" for table in standing]
         lines.append(
             message(
                 "import_standing",
-                "{tables}: left as they are, nothing in the files is for them",
+                "{tables}: unchanged, the files contain no data for them",
                 tables=tables,
             )
         )
     return lines
 
 
-def _of_setup(name, station):
+def _describe_setup(name, station):
+    """Return the name of a set-up, with its station if different."""
     return name if name == station else f"{name} ({station})"
 
 
-def _of_book(book):
-    made = [NAMES[book.format], *([book.instrument] if book.instrument else [])]
-    yield message("import_file", "{file}: {made}; {units}", file=book.file, made=made,
+def _describe_book(book):
+    """Yield the lines about a file."""
+    source = [NAMES[book.format], *([book.instrument] if book.instrument else [])]
+    yield message("import_file", "{file}: {made}; {units}", file=book.file, made=source,
                   units=book.units or ["-"])  # fmt: skip
     if book.format in APPLIED_BY_INSTRUMENT and book.shots:
-        constants = sorted({one.prism_mm for one in book.shots if one.prism_mm is not None})
+        constants = sorted({shot.prism_mm for shot in book.shots if shot.prism_mm is not None})
         yield message(
             "import_applied",
-            "{file}: distances as the instrument wrote them, with its prism constant ({constants})"
-            " and ppm in them: nothing is applied again",
+            "{file}: distances as written by the instrument, including its prism constant "
+            "({constants}) and ppm: no correction is applied again",
             file=book.file,
-            constants=[f"{one:+g} mm" for one in constants] or ["-"],
+            constants=[f"{constant:+g} mm" for constant in constants] or ["-"],
         )
     for note in book.notes:
         yield message("import_note", "{file}: {note}", file=book.file, note=note)
@@ -87,15 +101,19 @@ def _of_book(book):
                 yield message("import_rejected", "{file}: {what}, not used: {count}, the first in"
                               " row {row}", **values)  # fmt: skip
             else:
-                yield message("import_left_out", "{file}: not understood, so left out: {what}:"
-                              " {count}, the first in row {row}", **values)  # fmt: skip
+                yield message(
+                    "import_left_out",
+                    "{file}: not recognised and left out: {what}: {count}, the first in row {row}",
+                    **values,
+                )
 
 
-def _of_faces(setup, report):
+def _describe_faces(setup, report):
+    """Yield the lines about the faces of a set-up."""
     yield message(
         "import_faces",
-        "set-up {setup}: {pairs} points on both faces (their mean is taken), {first} on face 1"
-        " alone, {second} on face 2 alone",
+        "set-up {setup}: {pairs} points on both faces (averaged), {first} on face 1 only, "
+        "{second} on face 2 only",
         setup=setup,
         pairs=report.pairs,
         first=report.single[0],
@@ -104,9 +122,9 @@ def _of_faces(setup, report):
     if report.collimation is not None and report.index is not None:
         yield message(
             "import_collimation",
-            "set-up {setup}: collimation {c_arcsec:+.1f} arcsec (none further than"
-            " {c_spread:.1f}), index error {i_arcsec:+.1f} arcsec (none further than"
-            " {i_spread:.1f}), both distances within {apart_mm:.1f} mm",
+            "set-up {setup}: collimation {c_arcsec:+.1f} arcsec (largest deviation "
+            "{c_spread:.1f}), index error {i_arcsec:+.1f} arcsec (largest deviation "
+            "{i_spread:.1f}), distances of the two faces within {apart_mm:.1f} mm",
             setup=setup,
             c_arcsec=ARCSEC * report.collimation[0],
             c_spread=ARCSEC * report.collimation[1],
@@ -117,16 +135,17 @@ def _of_faces(setup, report):
     if sum(report.single) and (report.collimation or report.index):
         yield message(
             "import_freed",
-            "set-up {setup}: the collimation and index errors of its pairs are removed from its"
-            " {count} readings on one face alone",
+            "set-up {setup}: {count} readings on one face corrected by the mean collimation and "
+            "index errors of the pairs",
             setup=setup,
             count=sum(report.single),
         )
 
 
-def _of_targets(chosen):
+def _describe_targets(chosen):
+    """Yield the lines about targets."""
     for readings, is_control in ((chosen.control, True), (chosen.ties, False)):
-        points = list(dict.fromkeys(one.shot.point for one in readings))
+        points = list(dict.fromkeys(reading.shot.point for reading in readings))
         if points and is_control:
             yield message("import_control", "readings of control targets: {count} ({names})",
                           count=len(readings), names=list_some(points, SHOWN))  # fmt: skip
@@ -136,84 +155,94 @@ def _of_targets(chosen):
 
 
 def warn_of(chosen, names, stands, reports):
-    """Problems that do not stop an import, but deserve a look."""
-    found = []
+    """Return warnings about readings that may need correction."""
+    problems = []
     for place, name in names.items():
         stand, file = stands[place]
         if not stand.is_told and stand.height_m is not None:
-            text = message("station_of_readings", "set-up {setup}: no record of a station in the"
-                           " file, only the height of the instrument: its point is named by the"
-                           " readings or not at all, and a second stand that the file does not"
-                           " name would not show; look at setups.csv", setup=name)  # fmt: skip
-            found.append(Problem(file, text, stand.row))
+            text = message(
+                "station_of_readings",
+                "set-up {setup}: the file has no station record, only an instrument height; the "
+                "station is named by the readings or unknown, and a second station without a "
+                "record is not detected; check setups.csv",
+                setup=name,
+            )
+            problems.append(Problem(file, text, stand.row))
         elif not stand.is_told:
-            text = message("no_station", "set-up {setup}: no station in the file, so its point and"
-                           " the height of the instrument are unknown: fill them into setups.csv"
-                           " before you run the job", setup=name)  # fmt: skip
-            found.append(Problem(file, text, stand.row))
+            text = message(
+                "no_station",
+                "set-up {setup}: the file has no station, so the station name and the instrument "
+                "height are unknown; enter them in setups.csv before you run the job",
+                setup=name,
+            )
+            problems.append(Problem(file, text, stand.row))
         elif stand.height_m is None:
-            text = message("no_instrument_height", "set-up {setup}: no height of the instrument in"
-                           " the file: it is left blank (0)", setup=name)  # fmt: skip
-            found.append(Problem(file, text, stand.row))
-    for report in (one for one in reports if one.setup in names):
+            text = message(
+                "no_instrument_height",
+                "set-up {setup}: the file has no instrument height; it is left blank (0)",
+                setup=name,
+            )
+            problems.append(Problem(file, text, stand.row))
+    for report in (report for report in reports if report.setup in names):
         name, file = names[report.setup], stands[report.setup][1]
         for what in (report.collimation, report.index):
             if what is not None and max(abs(what[0]), what[1]) > LARGE_DEG:
                 text = message(
                     "instrument_to_adjust",
-                    "set-up {setup}: the two faces differ by an error of {size:.0f} arcsec, over"
-                    " {limit:.0f}: is the instrument adjusted? Points on one face alone are freed"
-                    " of its mean only",
+                    "set-up {setup}: the two faces differ by an error of {size:.0f} arcsec, above "
+                    "the limit of {limit:.0f} (is the instrument adjusted?); readings on one face "
+                    "are corrected by the mean error only",
                     setup=name,
                     size=ARCSEC * max(abs(what[0]), what[1]),
                     limit=ARCSEC * LARGE_DEG,
                 )
-                found.append(Problem(file, text))
+                problems.append(Problem(file, text))
                 break
         if report.apart_m > LARGE_M:
             text = message(
                 "distances_apart",
-                "set-up {setup}: distances of both faces differ by {apart_mm:.1f} mm, over"
-                " {limit_mm:.0f}",
+                "set-up {setup}: distances of the two faces differ by {apart_mm:.1f} mm, above the "
+                "limit of {limit_mm:.0f}",
                 setup=name,
                 apart_mm=1000 * report.apart_m,
                 limit_mm=1000 * LARGE_M,
             )
-            found.append(Problem(file, text))
+            problems.append(Problem(file, text))
     if len(chosen.hits) > MOST_HITS:
         shot = chosen.hits[0].shot
         text = message(
             "more_hits_than_a_job_takes",
-            "{count} hits, and a job takes at most {most}: leave some out with --leave",
+            "{count} hits, but a job allows at most {most}; leave some out with --leave",
             count=len(chosen.hits),
             most=MOST_HITS,
         )
-        found.append(Problem(shot.file, text, shot.row))
-    found += _of_constants(chosen)
+        problems.append(Problem(shot.file, text, shot.row))
+    problems += _check_constants(chosen)
     if chosen.ties:
         text = message(
             "frame_not_held",
-            "targets tie set-ups, and no file has standard deviations of coordinates: give those of"
-            " known points here, or [adjustment] datum = 'minimal' in job.toml",
+            "targets tie set-ups, but no file has standard deviations of coordinates; enter the "
+            "standard deviations of known points here, or set [adjustment] datum = 'minimal' in "
+            "job.toml",
         )
-        found.append(Problem("control.csv", text))
-    return found
+        problems.append(Problem("control.csv", text))
+    return problems
 
 
-def _of_constants(chosen):
-    """Hits that seem to have been read with the constant of a prism."""
-    hits = {one.shot.prism_mm for one in chosen.hits} - {None}
-    targets = {one.shot.prism_mm for one in (*chosen.control, *chosen.ties)} - {None}
+def _check_constants(chosen):
+    """Yield warnings about hits with an unlikely prism constant."""
+    hits = {reading.shot.prism_mm for reading in chosen.hits} - {None}
+    targets = {reading.shot.prism_mm for reading in (*chosen.control, *chosen.ties)} - {None}
     first = chosen.hits[0].shot if chosen.hits else None
     if len(hits) > 1:
         text = message("several_constants", "hits with several prism constants: {constants} mm",
-                       constants=[f"{one:+g}" for one in sorted(hits)])  # fmt: skip
+                       constants=[f"{constant:+g}" for constant in sorted(hits)])  # fmt: skip
         yield Problem(first.file, text, first.row)
     elif hits - {0.0} and hits == targets:
         text = message(
             "constant_of_prism",
-            "hits of the bare wall with the prism constant of the targets, {constant:+g} mm: was"
-            " the instrument set to ranging without reflector?",
+            "hits without reflector have the prism constant of the targets, {constant:+g} mm "
+            "(was the instrument set to reflectorless measurement?)",
             constant=next(iter(hits)),
         )
         yield Problem(first.file, text, first.row)

@@ -1,7 +1,7 @@
-"""The tables of an import in the folder of a job: all of them, or nothing.
+"""Writing of imported tables to the folder of a job, all or nothing.
 
-A table that has only headings, as `tankcal new` writes it, is filled in; one with rows is left as
-it is, and the import refused, unless it is to be replaced.
+A table with headings only, as written by `tankcal new`, is filled in. A table with rows is kept and
+the import is refused, unless it is to be replaced.
 """
 
 import io
@@ -19,25 +19,25 @@ from tankcal.text.spreadsheets import write_guarded
 
 
 def write_tables(folder, tables, *, replace):
-    """Write {table: rows} into a folder; returns (paths, names of other tables with rows).
+    """Write {table: rows} to a folder; return (paths, names of other tables with rows).
 
-    Raises InputError when the folder is a file, or where tables with rows stand in the way.
+    Raises InputError if the folder is a file, or if a table already contains rows.
     """
     folder = Path(folder)
     standing = tables_with_rows(folder, CONTRACT)
     refuse_standing(folder, [] if replace else [name for name in standing if name in tables])
-    grids = {name: _grid(name, rows) for name, rows in tables.items()}
+    grids = {name: _make_grid(name, rows) for name, rows in tables.items()}
     paths = write_grids(folder, grids)
-    return paths, [one for one in standing if one not in tables]
+    return paths, [table for table in standing if table not in tables]
 
 
 def tables_with_rows(folder, names):
-    """The tables of a job folder that have rows already."""
+    """Return the tables of a job folder that contain rows."""
     return [name for name in names if _has_rows(folder / f"{name}.csv")]
 
 
 def refuse_standing(folder, names):
-    """Raise InputError when the folder is a file, or for tables that are not to be replaced."""
+    """Raise InputError if the folder is a file, or for tables that are not to be replaced."""
     log = Log()
     if folder.exists() and not folder.is_dir():
         text = message("import_into_file", "is a file; expected the folder of a job")
@@ -45,14 +45,14 @@ def refuse_standing(folder, names):
     for name in names:
         text = message(
             "table_stands",
-            "has rows already, and is left as it is; expected an empty table, or --replace",
+            "already contains rows and is left unchanged; expected an empty table, or --replace",
         )
         log.problem(f"{name}.csv", text)
     log.stop_if_problems()
 
 
 def write_grids(folder, grids, others=None):
-    """Write {table: rows of cells, numbers with a point} and {name: text}; returns the paths."""
+    """Write {table: rows of cells with decimal points} and {name: text}; return the paths."""
     log = Log()
     separator, decimal = _marks(folder, log)
     log.stop_if_problems()
@@ -65,7 +65,7 @@ def write_grids(folder, grids, others=None):
 
 
 def _marks(folder, log):
-    """Separator and decimal mark of the job in the folder."""
+    """Return separator and decimal mark of the job in the folder."""
     if not (folder / SETTINGS_FILE).is_file():
         return ",", "."
     data = read_bytes(folder / SETTINGS_FILE, log)
@@ -81,20 +81,20 @@ def _lines(path):
 
 
 def _has_rows(path):
-    """Whether a file has more than comments and a heading."""
+    """Return whether a file contains more than comments and headings."""
     return sum(bool(line.strip(" ,;\t")) and not line.startswith("#") for line in _lines(path)) > 1
 
 
 def _comments(path):
-    """The comments at the head of a table that is filled in."""
+    """Return the comments at the head of a table that is filled in."""
     if _has_rows(path):
         return ""
     return "".join(f"{line}\n" for line in _lines(path) if line.startswith("#"))
 
 
-def _grid(name, rows):
+def _make_grid(name, rows):
     columns = columns_of(name, rows)
-    return [columns, *([row.cells.get(one, "") for one in columns] for row in rows)]
+    return [columns, *([row.cells.get(column, "") for column in columns] for row in rows)]
 
 
 def _text(name, grid, separator, decimal):
@@ -113,7 +113,7 @@ def _text(name, grid, separator, decimal):
 
 
 def _put(folder, texts):
-    """Write the files beside the folder first, then move all of them into it."""
+    """Write the files to a temporary folder, then move all of them into the folder."""
     target = folder.resolve()
     target.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(prefix=".tankcal-", dir=target.parent))
@@ -130,7 +130,7 @@ def _put(folder, texts):
 
 
 def _move_all(temporary, target, names):
-    """Move files into a folder; where one cannot be, those moved before go back."""
+    """Move files into a folder; restore the previous state if a move fails."""
     kept, done = temporary / "before", []
     kept.mkdir()
     try:

@@ -1,1 +1,1 @@
-"""Words: messages in the languages of the users, numbers as they are written, names."""
+"""Messages in the languages of the users, formats of numbers, and names."""

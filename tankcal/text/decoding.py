@@ -1,7 +1,7 @@
-"""Text of a file of any program: the one place that determines its encoding.
+"""Decoding of text files written by any program.
 
 Editors and spreadsheets write UTF-8 with or without a byte order mark, and UTF-16 under the name
-"Unicode". Each of these is recognised from the first bytes.
+"Unicode". The encoding is determined from the first bytes.
 """
 
 import codecs
@@ -22,7 +22,7 @@ _MARK = "\ufeff"  # the byte order mark after decoding
 
 
 def find_encoding(data):
-    """Encoding of the bytes of a text: by the byte order mark, else by zeros in ASCII letters."""
+    """Return the encoding of bytes, from the byte order mark or from zeros in ASCII letters."""
     for mark, name in _MARKS:
         if data.startswith(mark):
             return name
@@ -35,18 +35,18 @@ def find_encoding(data):
 
 
 def decode_text(data, encoding=None):
-    """Text of bytes without byte order marks at its start.
+    """Decode bytes and remove byte order marks at the start.
 
     Parameters
     ----------
     data : bytes
     encoding : str or None
-        Name of the encoding; None: as `find_encoding` determines it.
+        Name of the encoding. None: determined by `find_encoding`.
 
     Raises
     ------
     UnicodeDecodeError
-        The bytes are not text of that encoding.
+        The bytes are not text in this encoding.
 
     Examples
     --------
@@ -59,7 +59,7 @@ def decode_text(data, encoding=None):
 
 
 def is_western(data):
-    """Whether bytes are a text in Windows-1252, and in none of the encodings of Unicode.
+    """Return whether bytes are text in Windows-1252 and not in a Unicode encoding.
 
     Examples
     --------
@@ -74,6 +74,7 @@ def is_western(data):
 
 
 def _can_decode(data, encoding):
+    """Return whether bytes can be decoded with an encoding."""
     try:
         data.decode(encoding)
     except UnicodeDecodeError:
@@ -82,7 +83,7 @@ def _can_decode(data, encoding):
 
 
 def read_json(path):
-    """Content of a JSON file in UTF-8 or UTF-16, with or without a byte order mark.
+    """Return the content of a JSON file in UTF-8 or UTF-16, with or without a byte order mark.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Cells of the lines of a text table, and the mark between them, by the text itself."""
+"""Separator and cells of the lines of a text table."""
 
 import csv
 import re
@@ -7,7 +7,7 @@ BY_CERTAINTY = (";", "\t", ",")  # a comma may be a decimal mark
 
 
 def find_separator(lines):
-    """The mark that divides most lines into equally many cells.
+    """Return the separator that divides most lines into the same number of cells.
 
     Examples
     --------
@@ -18,32 +18,38 @@ def find_separator(lines):
 
 
 def count_agreeing(lines, separator):
-    """How many lines have the most frequent number of separators, if that is not zero; else -1."""
+    """Count the lines with the most frequent number of separators; -1 if this number is 0."""
     counts = [line.count(separator) for line in lines]
     usual = max(set(counts), key=lambda count: (count > 0, counts.count(count)))
     return counts.count(usual) if usual > 0 else -1
 
 
 def separator_of_table(lines, usual):
-    """The separator of a table whose first line has its headings.
+    """Return the separator of a table with headings in the first line.
 
-    lines  without comments and blank lines
-    usual  the separator of a table of one column
+    Parameters
+    ----------
+    lines : list of str
+        Lines without comments and blank lines.
+    usual : str
+        Separator returned for a table with one column.
     """
-    heading = "".join(lines[0].split('"')[::2]) if lines else ""  # what is outside the quotes
-    found = [mark for mark in BY_CERTAINTY if mark in heading]
-    if len(found) == 1:
-        return found[0]
-    return find_separator(lines) if found else usual
+    heading = "".join(lines[0].split('"')[::2]) if lines else ""  # text outside quotation marks
+    marks = [mark for mark in BY_CERTAINTY if mark in heading]
+    if len(marks) == 1:
+        return marks[0]
+    return find_separator(lines) if marks else usual
 
 
 def split_cells(line, separator):
-    """Cells of a line of a CSV file without the blanks around them; a cell holds no line break.
+    """Split a line of a CSV file into cells without surrounding blanks.
+
+    A cell contains no line break.
 
     Raises
     ------
     csv.Error
-        The line has quotation marks without a partner.
+        The line has an unmatched quotation mark.
 
     Examples
     --------
@@ -54,15 +60,16 @@ def split_cells(line, separator):
         return [cell.strip() for cell in line.split(separator)]
     try:
         cells = _read_cells(line, separator)
-    except csv.Error:  # `csv` takes blanks before a quotation mark, but none behind it
+    except csv.Error:  # `csv` accepts blanks before a quotation mark, not after it
         cells = _read_cells(_BLANKS_BEHIND[separator].sub('"', line), separator)
     return [cell.strip() for cell in cells]
 
 
-_BLANKS_BEHIND = {  # a quotation mark: blanks that end its cell
+_BLANKS_BEHIND = {  # pattern of blanks between a quotation mark and the end of its cell
     mark: re.compile(rf'"[^\S{mark}]+(?={mark}|$)') for mark in BY_CERTAINTY
 }
 
 
 def _read_cells(line, separator):
+    """Split a line into cells with the strict parser of `csv`."""
     return next(csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True))

@@ -1,10 +1,10 @@
-"""Writing a value to the digits that its uncertainty deserves: one function for every paper.
+"""Rounding of values and uncertainties for all reports.
 
-The uncertainty keeps two significant digits and the value ends at the same place (JCGM 100:2008
-7.2.6). Both are rounded to the nearest, a half away from zero, as the spreadsheet that shows the
-same numbers does: on their 15 decimal digits, so that 2.675 is a half although its binary form
-lies below it. Two digits rounded down lose at most 4.8 % of U (10.5 -> 10); where a rounding would
-take more than 5 % away, which one digit can, U is rounded up (EA-4/02, 6.3).
+The uncertainty has two significant digits, and the value ends at the same decimal (JCGM 100:2008
+7.2.6). Both are rounded to nearest, with halves away from zero, on their 15 decimal digits, as
+spreadsheets do: 2.675 is a half although its binary form is smaller. With two digits, rounding
+down reduces U by at most 4.8 % (10.5 -> 10). U is rounded up where rounding would reduce it by more
+than 5 %, which is possible with one digit (EA-4/02, 6.3).
 """
 
 from dataclasses import dataclass
@@ -12,10 +12,14 @@ from decimal import ROUND_HALF_UP, ROUND_UP, Context, Decimal
 from math import inf, isfinite
 
 NOTHING = "–"
-LITRE_DECIMALS = 3  # rows of a table in m3 keep their litres: deliveries are far better known
-UNKNOWN_DECIMALS = 6  # of a value without an uncertainty: it is not rounded to one
-WITH_U = range(-12, 15)  # powers of ten of a first digit that are written out beside an uncertainty
-WITHOUT_U = range(-4, 6)  # and in a number that has none
+LITRE_DECIMALS = (
+    3  # rows of a table in m3 show litres, because deliveries have a smaller uncertainty
+)
+UNKNOWN_DECIMALS = 6  # decimals of a value without uncertainty
+WITH_U = range(
+    -12, 15
+)  # powers of ten of the first digit without separate power, for values with uncertainty
+WITHOUT_U = range(-4, 6)  # the same for values without uncertainty
 _LARGEST_LOSS = Decimal("0.05")
 SIGNIFICANT = 2  # digits of u (JCGM 100:2008 7.2.6)
 _WIDE = Context(prec=400)
@@ -24,13 +28,20 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True)
 class Marks:
-    """What stands between digits.
+    """Decimal mark, group mark and minus sign of numbers.
 
-    decimal      decimal mark
-    group        between groups of three digits; "" for none
-    least        digits that a whole part has when it is grouped: 5 leaves 1234 as it is
-    of_decimals  True: digits behind the mark are grouped too (SI Brochure 5.4.4)
-    minus        sign of a negative value
+    Attributes
+    ----------
+    decimal : str
+        Decimal mark.
+    group : str
+        Mark between groups of three digits; "" for no groups.
+    least : int
+        Smallest number of digits of a grouped integer part: with 5, 1234 is not grouped.
+    of_decimals : bool
+        Whether digits after the decimal mark are grouped (SI Brochure 5.4.4).
+    minus : str
+        Sign of a negative value.
     """
 
     decimal: str = "."
@@ -44,19 +55,26 @@ ENGLISH = Marks()
 ENGLISH_SI = Marks(group="\N{NARROW NO-BREAK SPACE}", of_decimals=True)
 PORTUGUESE = Marks(decimal=",", group=".", least=4)
 COMMA_SI = Marks(decimal=",", group="\N{NARROW NO-BREAK SPACE}", of_decimals=True)
-PROGRAM = Marks(minus="-")  # CSV, and whatever a program reads again
+PROGRAM = Marks(minus="-")  # CSV and other machine-readable output
 
 
 @dataclass(frozen=True)
 class Written:
-    """A value and its uncertainty as texts with the same last place.
+    """Formatted value and uncertainty with the same last decimal.
 
-    value, uncertainty  separate texts without the power of ten; NOTHING for what is not known
-    power               " × 10ⁿ" that belongs to both, or ""
-    both                "12.345 ± 0.067", with a power "(1.234 ± 0.056) × 10²⁰"
-    concise             "12.345(67)" (JCGM 100 7.2.2), "12.3(1.2)" where U has a digit before the
-                        mark; without uncertainty the value alone
-    decimals            digits behind the mark; negative: that many whole digits are rounded off
+    Attributes
+    ----------
+    value, uncertainty : str
+        Separate texts without the power of ten; NOTHING if unknown.
+    power : str
+        Common power of ten, " × 10ⁿ", or "".
+    both : str
+        "12.345 ± 0.067", with a power of ten "(1.234 ± 0.056) × 10²⁰".
+    concise : str
+        "12.345(67)" (JCGM 100 7.2.2); "12.3(1.2)" if U has a digit before the decimal mark; the
+        value alone if the uncertainty is unknown.
+    decimals : int
+        Digits after the decimal mark; negative for rounded integer digits.
     """
 
     value: str
@@ -70,22 +88,37 @@ class Written:
 def format_with_u(
     value, u, marks=ENGLISH, *, significant=SIGNIFICANT, least=None, written_out=WITH_U
 ):
-    """`value` with its standard or expanded uncertainty `u`, both in one unit.
+    """Format a value with its standard or expanded uncertainty, both in one unit.
 
-    value        number; None, nan and inf are written as NOTHING
-    u            0 or more; None, nan and inf: not known, and 0 exact: the value then has
-                 UNKNOWN_DECIMALS
-    significant  digits of u, 1 or more
-    least        decimals that both have at least: 0 keeps whole units (12 346 ± 1 235 instead of
-                 12 300 ± 1 200), 3 the litres; None: as u says
-    written_out  powers of ten of the first digit (of the larger of both) that are not set apart
-    Raises ValueError for a negative u.
+    Parameters
+    ----------
+    value : float or None
+        None, nan and inf are formatted as NOTHING.
+    u : float or None
+        Not negative. None, nan and inf: unknown; 0: exact. The value then has UNKNOWN_DECIMALS.
+    marks : Marks
+    significant : int
+        Significant digits of u, at least 1.
+    least : int or None
+        Smallest number of decimals: 0 keeps whole units (12 346 ± 1 235 instead of 12 300 ± 1 200),
+        3 keeps litres. None: determined by u only.
+    written_out : range
+        Powers of ten of the first digit (of the larger number) that need no separate power.
+
+    Returns
+    -------
+    Written
+
+    Raises
+    ------
+    ValueError
+        u is negative.
     """
     if not _is_number(value):
         return Written(NOTHING, NOTHING, "", NOTHING, NOTHING, UNKNOWN_DECIMALS)
     known = _is_number(u)
     number, spread = _exact(value), _exact(u if known else 0.0)
-    exponent = max((one.adjusted() for one in (number, spread) if one), default=0)
+    exponent = max((quantity.adjusted() for quantity in (number, spread) if quantity), default=0)
     exponent = 0 if exponent in written_out else exponent
     number, spread = number.scaleb(-exponent, _WIDE), spread.scaleb(-exponent, _WIDE)
     decimals = _decimals(spread, significant, least)
@@ -102,16 +135,16 @@ def format_with_u(
 
 
 def decimals_of(u, *, significant=SIGNIFICANT, least=0):
-    """Decimals that show u with `significant` digits, at least `least` (None: may be negative).
+    """Return the number of decimals that show u with `significant` digits, at least `least`.
 
-    UNKNOWN_DECIMALS where u is 0, None or not finite. For what takes a number of decimals, such as
-    the number format of a cell. Raises ValueError for a negative u.
+    If `least` is None the result may be negative. The result is UNKNOWN_DECIMALS if u is 0, None or
+    not finite. It serves number formats of cells. Raises ValueError for a negative u.
     """
     return _decimals(_exact(u if _is_number(u) else 0.0), significant, least)
 
 
 def round_u(u, *, significant=SIGNIFICANT):
-    """u as it is printed: 417 is 420, which no number format makes of it; None where not known."""
+    """Round u to the printed value, such as 417 to 420; None if u is unknown."""
     if not _is_number(u):
         return None
     exact = _exact(u)
@@ -119,57 +152,74 @@ def round_u(u, *, significant=SIGNIFICANT):
 
 
 def bound_of_decimals(decimals, *, significant=SIGNIFICANT):
-    """The u below which `decimals_of` gives that many decimals or more: 0.0995 for 3."""
+    """Return the bound of u below which `decimals_of` gives at least this number of decimals."""
     return (10**significant - 0.5) / 10.0**decimals
 
 
 def decimals_of_mantissa(value, u, *, significant=SIGNIFICANT):
-    """Decimals of the mantissa of `value`, at least 0, with which it ends where its u does.
+    """Return the decimals of the mantissa of `value` that end at the last digit of u, at least 0.
 
-    For a number format with a power of ten (1.742E-03). UNKNOWN_DECIMALS where u is 0 or not known.
+    For number formats with a power of ten (1.742E-03). The result is UNKNOWN_DECIMALS if u is 0 or
+    unknown.
     """
     if not (_is_number(u) and u and _is_number(value) and value):
         return UNKNOWN_DECIMALS
     last = _decimals(_exact(u), significant, None)
-    return max(_rounded(_exact(value), last).adjusted() + last, 0)
+    return max(_round(_exact(value), last).adjusted() + last, 0)
 
 
 def decimals_of_rows(
     uncertainties, *, significant=SIGNIFICANT, least=0, most=None, unknown=UNKNOWN_DECIMALS
 ):
-    """Decimals of each row of a column by its own uncertainty, at least `least`.
+    """Return the number of decimals of each row of a column, from the uncertainty of the row.
 
-    most  at most so many, where an uncertainty may be the rounding of what is exact; None: any
-    A row without an uncertainty (0, None or nan: the empty tank) is written as the next one is,
-    else as the one before it, and with `unknown` decimals where no row has one.
+    A row without an uncertainty (0, None or nan: the empty tank) has the decimals of the next row,
+    else of the previous row.
+
+    Parameters
+    ----------
+    uncertainties : sequence of (float or None)
+    significant : int
+        Significant digits of an uncertainty.
+    least : int
+        Smallest number of decimals.
+    most : int, optional
+        Largest number of decimals, for uncertainties that may be rounding errors of exact values.
+    unknown : int
+        Decimals of all rows if no row has an uncertainty.
+
+    Returns
+    -------
+    list of int
     """
     most = inf if most is None else most
     known = [_is_number(u) and u != 0 for u in uncertainties]
-    found = [
+    decimals = [
         min(decimals_of(u, significant=significant, least=least), most) if here else None
         for u, here in zip(uncertainties, known, strict=True)
     ]
-    following = next((d for d in reversed(found) if d is not None), unknown)
-    for i in reversed(range(len(found))):
-        following = found[i] = following if found[i] is None else found[i]
-    return found
+    following = next((d for d in reversed(decimals) if d is not None), unknown)
+    for i in reversed(range(len(decimals))):
+        following = decimals[i] = following if decimals[i] is None else decimals[i]
+    return decimals
 
 
 def decimals_of_height(height_m):
-    """Decimals of a height: millimetres, and up to two more where these are not zeros."""
+    """Return the decimals of a height in metres: 3, or up to 5 if these are not zeros."""
     shown = round(height_m, 5)
     return next((d for d in (3, 4) if round(height_m, d) == shown), 5)
 
 
 def fixed(value, decimals, marks=ENGLISH):
-    """`value` with that many decimals (0 or more) and no minus before zero; NOTHING for none."""
+    """Format `value` with a number of decimals (0 or more), without a minus sign before zero."""
     return _text(_exact(value), decimals, marks) if _is_number(value) else NOTHING
 
 
 def format_significant(value, digits, marks=ENGLISH):
-    """`value` with that many significant digits, no whole digit rounded off; NOTHING for none.
+    """Format `value` with a number of significant digits, without rounding integer digits.
 
-    For what has no uncertainty beside it, or is one. Powers of ten but WITHOUT_U are set apart.
+    For values without a stated uncertainty, and for uncertainties. Powers of ten outside WITHOUT_U
+    are separate. None, nan and inf are formatted as NOTHING.
     """
     if not _is_number(value):
         return NOTHING
@@ -178,44 +228,47 @@ def format_significant(value, digits, marks=ENGLISH):
 
 
 def shortest(value, marks=ENGLISH, *, digits=6):
-    """`format_significant` without zeros at its end: a number as somebody chose it."""
+    """Format `value` as `format_significant` does, without trailing zeros."""
     if not _is_number(value):
         return NOTHING
     number, decimals, exponent = _mantissa(value, digits)
-    needed = -_rounded(number, decimals).normalize(_WIDE).as_tuple().exponent
+    needed = -_round(number, decimals).normalize(_WIDE).as_tuple().exponent
     return _text(number, max(needed, 0), marks) + _power(exponent)
 
 
 def superscript(text):
-    """Digits and hyphens raised: "mm-2" is "mm⁻²"."""
+    """Convert digits and hyphens to superscripts: "mm-2" to "mm⁻²"."""
     return str(text).translate(_SUPERSCRIPTS)
 
 
 def _is_number(value):
+    """Return whether a value is a finite number."""
     return value is not None and isfinite(value)
 
 
 def _exact(value):
-    """The 15 decimal digits that a double holds for certain."""
+    """Return the decimal number of the 15 digits that a double represents reliably."""
     return Decimal(f"{float(value):.15g}")
 
 
 def _mantissa(value, digits):
-    """Number, its decimals and the power of ten set apart, for so many significant digits."""
+    """Return (number, decimals, separate power of ten) for a number of significant digits."""
     number = _exact(value)
     if not number:
         return number, 0, 0
-    exponent = _rounded(number, digits - 1 - number.adjusted()).adjusted()
+    exponent = _round(number, digits - 1 - number.adjusted()).adjusted()
     if exponent in WITHOUT_U:
         return number, max(digits - 1 - exponent, 0), 0
     return number.scaleb(-exponent, _WIDE), digits - 1, exponent
 
 
 def _power(exponent):
+    """Format a power of ten; "" for the power 0."""
     return f"\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10{superscript(exponent)}" if exponent else ""
 
 
 def _decimals(u, significant, least):
+    """Return the decimals that show u with a number of significant digits."""
     if u < 0:
         raise ValueError(f"uncertainty {u}: expected 0 or more")
     if significant < 1:
@@ -229,29 +282,31 @@ def _decimals(u, significant, least):
 
 
 def _spread(u, decimals):
-    rounded = _rounded(u, decimals)
+    """Round an uncertainty to a number of decimals; up, where rounding loses more than 5 %."""
+    rounded = _round(u, decimals)
     if u and (u - rounded) / u > _LARGEST_LOSS:
-        return _rounded(u, decimals, ROUND_UP)
+        return _round(u, decimals, ROUND_UP)
     return rounded
 
 
-def _rounded(number, decimals, rounding=ROUND_HALF_UP):
+def _round(number, decimals, rounding=ROUND_HALF_UP):
+    """Round a number to a number of decimals, halves away from zero."""
     return number.quantize(Decimal(1).scaleb(-decimals), rounding, _WIDE)
 
 
 def _text(number, decimals, marks):
     """Digits with their marks; a zero has no sign."""
-    rounded = _rounded(number, decimals)
+    rounded = _round(number, decimals)
     whole, _, behind = f"{rounded.copy_abs():f}".partition(".")
     if marks.group and len(whole) >= marks.least:
-        whole = _grouped(whole[::-1], marks.group)[::-1]
+        whole = _group_digits(whole[::-1], marks.group)[::-1]
     if marks.group and marks.of_decimals and len(behind) >= marks.least:
-        behind = _grouped(behind, marks.group)
+        behind = _group_digits(behind, marks.group)
     sign = marks.minus if rounded < 0 else ""
     return sign + whole + (marks.decimal + behind if behind else "")
 
 
-def _grouped(digits, mark):
+def _group_digits(digits, mark):
     return mark.join(digits[i : i + 3] for i in range(0, len(digits), 3))
 
 

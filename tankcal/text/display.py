@@ -1,4 +1,4 @@
-"""How results show themselves: one line of text, and small HTML tables for notebooks."""
+"""Short text and HTML representations of results in notebooks."""
 
 from html import escape
 
@@ -6,14 +6,14 @@ from tankcal.text.digits import ENGLISH, NOTHING, fixed, format_with_u
 
 
 def volume_text(volume_m3: float, U_m3: float, k: float | None = None) -> str:
-    """A volume with its expanded uncertainty, both to the digits of U.
+    """Format a volume with its expanded uncertainty, both rounded to the digits of U.
 
     Parameters
     ----------
     volume_m3, U_m3 : float
         Volume and expanded uncertainty, m3.
     k : float, optional
-        Coverage factor; None where U is not k u, but Monte Carlo's.
+        Coverage factor. None if U results from Monte Carlo and not from k u.
 
     Examples
     --------
@@ -30,14 +30,14 @@ def volume_text(volume_m3: float, U_m3: float, k: float | None = None) -> str:
 
 
 def table_html(caption: str, headings, rows) -> str:
-    """A small HTML table; what stands in the cells is text, numbers stand at the right.
+    """Return a small HTML table; texts are escaped, numbers are right-aligned.
 
     Examples
     --------
     >>> "<td>2 &lt; 3</td>" in table_html("Rows", ["a"], [["2 < 3"]])
     True
     """
-    head = "".join(f"<th>{escape(str(one))}</th>" for one in headings)
+    head = "".join(f"<th>{escape(str(heading))}</th>" for heading in headings)
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
     return (
         f"<table><caption>{escape(caption)}</caption>"
@@ -46,6 +46,7 @@ def table_html(caption: str, headings, rows) -> str:
 
 
 def _cell(value):
+    """Return one HTML cell."""
     if value is None:
         return f"<td>{NOTHING}</td>"
     if isinstance(value, str):

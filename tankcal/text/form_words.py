@@ -1,6 +1,6 @@
-"""The words that forms in Portuguese and Spanish have for choices and for yes and no.
+"""Portuguese and Spanish words for choices and for yes and no in forms.
 
-A form may hold them in place of the English ones. The first word is the one that a form offers.
+A form may contain these words in place of the English words. A form offers the first word.
 """
 
 import unicodedata
@@ -138,33 +138,35 @@ FORM_WORDS = {
 
 
 def word_of(language, choice):
-    """How a form in this language calls a choice; as it is where it has no word of its own."""
+    """Return the word for a choice in a language; the choice itself if there is no word."""
     return FORM_WORDS.get(language, {}).get(choice, (choice,))[0]
 
 
 def meant(word, choices):
-    """The one of the choices that a word of any form means, or None: none of them, or several.
+    """Return the choice that a word of any form means; None if it matches no choice or several.
 
-    A choice is also meant by its own letters and digits, however they are parted and in capitals
-    or not: "DIN 28011" for din_28011. Units and codes of one or two letters are taken as they are.
+    A choice also matches regardless of case, blanks and punctuation: "DIN 28011" matches din_28011.
+    This does not apply to units and codes of one or two letters.
     """
     plain = _plain(word)
-    found = {
+    matches = {
         choice
         for words in FORM_WORDS.values()
         for choice in choices
         if plain in map(_plain, words.get(choice, ()))
     }
-    if not found:
+    if not matches:
         bare = _bare(word)
-        found = {one for one in choices if len(bare) > 2 and _bare(one) == bare}
-    return found.pop() if len(found) == 1 else None
+        matches = {choice for choice in choices if len(bare) > 2 and _bare(choice) == bare}
+    return matches.pop() if len(matches) == 1 else None
 
 
 def _bare(word):
+    """Return the letters and digits of a word in lower case, without accents."""
     return "".join(char for char in _plain(word) if char.isalnum())
 
 
 def _plain(word):
+    """Return a word in lower case without accents and underscores."""
     letters = unicodedata.normalize("NFKD", word.strip().lower().replace("_", " "))
     return "".join(letter for letter in letters if not unicodedata.combining(letter))

@@ -1,29 +1,35 @@
-"""Names beside the marks of a drawing, none over another or over a mark.
+"""Placement of labels beside the marks of a drawing without overlaps.
 
-A name goes to the first of the places about its mark that is free; where no form of it finds one
-it is left out. Sizes of text are estimated, since the reader's program sets it.
+A label takes the first free position around its mark. If no form of the label fits, it is left out.
+Text sizes are estimated, because the viewer renders the text.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-LETTER, LINE = 0.56, 1.15  # of the size of the type: mean width of a letter, height of a line
-MARK = 2.5  # points about a mark that no name covers
+LETTER, LINE = 0.56, 1.15  # mean letter width and line height, relative to the type size
+MARK = 2.5  # free radius around a mark, points
 AROUND = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
-FARTHER = (1.0, 2.2)  # times the least distance from the mark
+FARTHER = (1.0, 2.2)  # multiples of the smallest distance from the mark
 _SIDES = {-1: "right", 0: "center", 1: "left"}
 _ENDS = {-1: "top", 0: "center", 1: "bottom"}
 
 
 @dataclass(frozen=True)
 class Label:
-    """A name beside a place of a drawing.
+    """Label of a position in a drawing.
 
-    x, y     the place, in the units of the axes
-    texts    the name, then shorter forms of it
-    clear    typographic points from the place to the name, at least
-    outward  (2,) direction that is tried first
+    Attributes
+    ----------
+    x, y : float
+        Position in the units of the axes.
+    texts : tuple of str
+        The name, then shorter forms.
+    clear : float
+        Smallest distance between position and label, typographic points.
+    outward : tuple of float
+        Preferred direction (2,).
     """
 
     x: float
@@ -34,25 +40,37 @@ class Label:
 
 
 def write_labels(ax, labels, marks, *, size, room=MARK, **style):
-    """Write the labels that find room, the first first; returns how many were left out.
+    """Write the labels that fit, in the given order; return the number of labels left out.
 
-    marks   (n, 2) places that no name may cover, in the units of the axes
-    room    typographic points about a mark that are kept free, one for all or (n,)
-    The axes must have their final limits and place.
+    Parameters
+    ----------
+    ax : matplotlib Axes
+        With final limits and position.
+    labels : sequence of Label
+    marks : array_like (n, 2)
+        Positions that no label may cover, in the units of the axes.
+    size : float
+        Type size, points.
+    room : float or array_like (n,)
+        Free radius around a mark, typographic points.
+
+    Returns
+    -------
+    int
     """
     ax.apply_aspect()
-    places = _in_points(ax, np.array([[one.x, one.y] for one in labels]).reshape(-1, 2))
-    around = _in_points(ax, np.asarray(marks, dtype=float).reshape(-1, 2))
+    places = _convert_to_points(ax, np.array([[item.x, item.y] for item in labels]).reshape(-1, 2))
+    around = _convert_to_points(ax, np.asarray(marks, dtype=float).reshape(-1, 2))
     half = np.broadcast_to(np.asarray(room, dtype=float), len(around))[:, None]
     taken = np.column_stack([around - half, around + half])
-    frame = _in_points(ax, np.array([[*ax.get_xlim()], [*ax.get_ylim()]]).T).ravel()
+    frame = _convert_to_points(ax, np.array([[*ax.get_xlim()], [*ax.get_ylim()]]).T).ravel()
     left_out = 0
     for label, place in zip(labels, places, strict=True):
-        found = _free(label, place, taken, frame, size)
-        if found is None:
+        position = _find_place(label, place, taken, frame, size)
+        if position is None:
             left_out += 1
             continue
-        text, side, offset, box = found
+        text, side, offset, box = position
         taken = np.vstack([taken, box])
         ax.annotate(
             text, (label.x, label.y), textcoords="offset points", xytext=offset, fontsize=size,
@@ -61,13 +79,13 @@ def write_labels(ax, labels, marks, *, size, room=MARK, **style):
     return left_out
 
 
-def _in_points(ax, xy):
-    """Places of the axes in typographic points of the figure."""
+def _convert_to_points(ax, xy):
+    """Convert positions in the axes to typographic points of the figure."""
     return ax.transData.transform(xy) * 72 / ax.figure.dpi
 
 
-def _free(label, place, taken, frame, size):
-    """(text, side, offset, box) of the first form and place that cover nothing; None: none."""
+def _find_place(label, place, taken, frame, size):
+    """Return (text, side, offset, box) of the first free form and position, or None."""
     sides = sorted(AROUND, key=lambda side: -np.dot(side, label.outward) / np.hypot(*side))
     for text in label.texts:
         extent = np.array([LETTER * len(text), LINE]) * size
@@ -83,7 +101,7 @@ def _free(label, place, taken, frame, size):
 
 
 def _overlaps(box, others):
-    """(n,) whether a box [x0, y0, x1, y1] covers part of each of the others."""
+    """Return whether a box [x0, y0, x1, y1] overlaps each of the others, shape (n,)."""
     x0, y0, x1, y1 = others.T
     beside = (x0 < box[2]) & (box[0] < x1)
     return beside & (y0 < box[3]) & (box[1] < y1)

@@ -1,10 +1,12 @@
-"""The languages of the papers: each is one file of words (report_templates/words/)."""
+"""Languages of the reports; each has a file in report_templates/words/."""
 
 DEFAULT = "en"
 LANGUAGES = (DEFAULT, "pt-BR", "es")
 
 
 def nearest_language(given):
-    """The language that a code such as "pt", "pt_PT.UTF-8" or "ES" means; None for no such one."""
+    """Return the language for a code such as "pt", "pt_PT.UTF-8" or "ES"; None if unsupported."""
     first = given.strip().lower()[:2] if isinstance(given, str) else ""
-    return next((one for one in LANGUAGES if first and one.lower()[:2] == first), None)
+    return next(
+        (language for language in LANGUAGES if first and language.lower()[:2] == first), None
+    )

@@ -1,4 +1,4 @@
-"""What a name may be: of points, photos, cameras and everything else that a user names."""
+"""Permitted names of points, photos, cameras and other user-defined objects."""
 
 import re
 
@@ -7,12 +7,14 @@ _NAME = re.compile(r"\w[\w .()/#-]*")
 
 
 def is_name(text):
-    """Whether a text can be a name: a letter, digit or _ first, then also spaces and - . ( ) / #"""
+    """Return whether a text is a name: a letter, digit or _, then also spaces and - . ( ) / #"""
     return len(text) <= MAX_NAME and _NAME.fullmatch(text) is not None
 
 
 def file_name(text, otherwise):
-    """A text as part of a file name: what no file system takes is _; what is left may be none.
+    """Convert a text to part of a file name; invalid characters become _.
+
+    Returns `otherwise` if no character remains.
 
     >>> file_name("T-1 / north", "tank")
     'T-1_north'

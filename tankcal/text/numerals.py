@@ -1,4 +1,4 @@
-"""How a number is written in text: plain digits, without groups, in tables and on command lines."""
+"""Patterns of numbers in tables and on command lines: plain digits without groups."""
 
 import re
 

@@ -1,6 +1,6 @@
-"""Where the files are that ship beside the code: the examples and the report templates.
+"""Locations of the shipped files: examples, documentation and report templates.
 
-In a wheel they lie inside the package, in a checkout beside it.
+In a wheel these folders are inside the package, in a checkout beside it.
 """
 
 from pathlib import Path
@@ -11,9 +11,9 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def shipped_folder(name):
-    """Path of the shipped folder `name` ("examples", "report_templates").
+    """Return the path of a shipped folder, such as "examples" or "report_templates".
 
-    Raises TankcalError when the installation lacks it.
+    Raises TankcalError if the installation lacks the folder.
     """
     for place in (_PACKAGE / name, _PACKAGE.parent / name):
         if place.is_dir():

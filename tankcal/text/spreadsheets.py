@@ -1,7 +1,7 @@
-"""Texts in CSV files that a spreadsheet would execute as formulas.
+"""Protection of CSV texts that a spreadsheet would execute as formulas.
 
-With an apostrophe before its sign a spreadsheet shows such a text. A table of a job is read without
-the apostrophe, so that a text is the same after it was written and read.
+An apostrophe before the sign makes a spreadsheet show such a text. Tables of a job are read without
+the apostrophe, so a text is unchanged after writing and reading.
 """
 
 import csv
@@ -12,9 +12,9 @@ _SIGNS = ("=", "+", "-", "@", "\t")
 
 
 def guard_formula(text):
-    """The text, with an apostrophe before it where a spreadsheet would take it for a formula.
+    """Return the text, with an apostrophe if a spreadsheet would execute it as a formula.
 
-    A number keeps its sign, with either decimal mark, and so does a dash for a missing value.
+    Signed numbers, with either decimal mark, and dashes for missing values are not changed.
 
     Examples
     --------
@@ -28,7 +28,7 @@ def guard_formula(text):
 
 
 def unguard_formula(text):
-    """The text without the apostrophe of `guard_formula`.
+    """Return the text without the apostrophe of `guard_formula`.
 
     Examples
     --------
@@ -39,6 +39,6 @@ def unguard_formula(text):
 
 
 def write_guarded(stream, rows, separator=","):
-    """Write rows of cells as CSV to a stream, the texts among them guarded."""
+    """Write rows of cells as CSV to a stream, with protected texts."""
     guarded = ([guard_formula(c) if isinstance(c, str) else c for c in row] for row in rows)
     csv.writer(stream, delimiter=separator, lineterminator="\n").writerows(guarded)

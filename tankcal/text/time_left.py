@@ -1,14 +1,22 @@
-"""How far a long step is, and how long it will still take."""
+"""Progress and remaining time of a long step."""
 
 from tankcal.messages import message
 
-JUDGED_S, MILLION = 2.0, 1_000_000  # of a step, before the time left is told
+JUDGED_S, MILLION = (
+    2.0,
+    1_000_000,
+)  # seconds before the remaining time is estimated; limit for counts in millions
 
 
 def how_far(done, total, fresh, seconds):
-    """How much of a long step is done, and how long it will still take; of millions, their rate.
+    """Return the progress and the remaining time of a long step; for millions also the rate.
 
-    fresh  of `done`, what was done within so many seconds
+    Parameters
+    ----------
+    done, total : int
+    fresh : int
+        The part of `done` that was completed within `seconds`.
+    seconds : float
     """
     left = ""
     if seconds >= JUDGED_S and fresh > 0 and done < total:

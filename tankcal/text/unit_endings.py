@@ -1,4 +1,4 @@
-"""The unit that the name of a key or column ends with."""
+"""Units in the endings of keys and columns."""
 
 from tankcal.text.digits import superscript
 
@@ -29,7 +29,7 @@ _UNITS = {
 
 
 def parted(name):
-    """(name without its unit, unit): ("height", "m") of height_m, ("K1", "mm⁻²") of K1_mm-2."""
+    """Split a name into (name, unit): ("height", "m") for height_m, ("K1", "mm⁻²") for K1_mm-2."""
     stem, power = name.rpartition("_mm-")[::2]
     if stem:
         return stem, f"mm{superscript('-' + power)}"

@@ -1,4 +1,4 @@
-"""Codes of the record as sentences, in the reader's language (report_templates/words/)."""
+"""Conversion of the codes of a record to sentences in the language of the reader."""
 
 from numbers import Integral, Number
 
@@ -7,27 +7,27 @@ from tankcal.messages import as_plain, fill_template
 from tankcal.text.digits import NOTHING, Marks, fixed, shortest
 from tankcal.text.form_words import NOTES, word_of
 from tankcal.text.languages import DEFAULT
-from tankcal.text.word_files import load_words as load_words  # the door to words of every kind
+from tankcal.text.word_files import load_words as load_words  # re-exported
 
 
 def language_of(record):
-    """The language that the job of a record asks for."""
-    table = record["job"]["table"] or {}  # a survey alone has none
+    """Return the language of the job of a record."""
+    table = record["job"]["table"] or {}  # None for a survey without tank
     return table.get("language") or DEFAULT
 
 
 def marks_of(words):
-    """What stands between the digits of numbers in this language (digits.Marks)."""
+    """Return the decimal mark and other number marks of a language (digits.Marks)."""
     return Marks(**words["language"]["marks"])
 
 
 def sentence(words, group, code, value=None):
-    """What `code` (with `value`) of the record says, as a sentence of `words[group]`.
+    """Return the sentence of `words[group]` for `code` (and `value`) of the record.
 
-    A template may use {value}: a list comes as its items joined by ", ", a number with up to six
-    digits. A table of templates is looked up by the value as text, then "none" for null or an empty
-    list, then "other". A code or value without words comes back as "code: value", for an assumption
-    is never hidden.
+    A template may contain {value}: a list is shown as its items joined by ", ", a number with up to
+    six digits. In a table of templates, the key is the value as text, then "none" for null or an
+    empty list, then "other". A code or value without words is shown as "code: value", so that no
+    assumption is hidden.
     """
     if isinstance(value, list | tuple):
         value = ", ".join(str(item) for item in value) or None
@@ -42,7 +42,7 @@ def sentence(words, group, code, value=None):
 
 
 def choice_sentence(words, choice):
-    """One choice {code, value} of the record as a sentence, its numbers in the reader's style."""
+    """Return the sentence of a choice {code, value} of the record."""
     code, value = choice["code"], choice["value"]
     if code == "coverage":
         value = percent(words, value)
@@ -54,86 +54,93 @@ def choice_sentence(words, choice):
     return sentence(words, "choices", code, value)
 
 
-# ---- texts that the record has in English, with a code and the values in them
+# ---- English texts of the record, with a code and values
 
-MESSAGES = ("warnings", "formulas", "datum", "problems")  # groups of their templates
+MESSAGES = ("warnings", "formulas", "datum", "problems")  # groups of templates
 
 
 def message_sentence(words, text, code, values):
-    """A text of the record in the reader's language; as it is where its code has no words."""
-    template = next((words[one][code] for one in MESSAGES if code in words.get(one, {})), None)
+    """Translate a text of the record; it is unchanged if its code has no words."""
+    template = next(
+        (words[group][code] for group in MESSAGES if code in words.get(group, {})), None
+    )
     if template is None:
         return text
-    named = {key: _named(words, key, value) for key, value in values.items()}
+    named = {key: _name_value(words, key, value) for key, value in values.items()}
     return fill_template(
         template,
         named,
         number=lambda value, form: _number(value, form, marks_of(words)),
-        said=lambda one: message_sentence(words, one["text"], one["code"], one["values"]),
+        said=lambda nested: message_sentence(
+            words, nested["text"], nested["code"], nested["values"]
+        ),
     )
 
 
 def say(words, text):
-    """A text in the reader's language, if it is a Message; any other text as it is."""
+    """Return a Message in the language of the reader; any other text is returned unchanged."""
     known = as_plain(text)
     return message_sentence(words, str(text), known["code"], known["values"])
 
 
 def translate_record(words, record):
-    """A record whose texts are in the reader's language, as far as it says them by a code."""
+    """Return a record with texts in the language of the reader, where the texts have codes."""
     adjustment, corrections = record["adjustment"], record["corrections"]
     return {
         **record,
-        "warnings": [_placed(words, _said(words, one, "text")) for one in record["warnings"]],
-        "corrections": [_said(words, one, "formula", "formula_") for one in corrections],
+        "warnings": [
+            _placed(words, _translate_row(words, row, "text")) for row in record["warnings"]
+        ],
+        "corrections": [_translate_row(words, row, "formula", "formula_") for row in corrections],
         "adjustment": adjustment and _adjustment_in_language(words, adjustment),
         "rule": record.get("rule") and _rule_in_language(words, record),
     }
 
 
 def _adjustment_in_language(words, adjustment):
-    left_out = [_said(words, one, "text") for one in adjustment.get("left_out", [])]
+    """Return the adjustment of a record with translated texts."""
+    left_out = [_translate_row(words, row, "text") for row in adjustment.get("left_out", [])]
     places = {}
     if residuals := adjustment.get("residuals"):  # by columns
         files = residuals["file"]
-        said = {one: _place_said(words, one) for one in set(files)}
-        places["residuals"] = residuals | {"file": [said[one] for one in files]}
+        translated = {file: _translate_place(words, file) for file in set(files)}
+        places["residuals"] = residuals | {"file": [translated[file] for file in files]}
     if held := adjustment.get("held"):
-        places["held"] = [_placed(words, one) for one in held]
+        places["held"] = [_placed(words, row) for row in held]
     return {
         **adjustment,
         **places,
-        "datum": _said(words, adjustment["datum"], "words", "words_"),
-        "aside": [one["text"] for one in left_out] or adjustment["aside"],
+        "datum": _translate_row(words, adjustment["datum"], "words", "words_"),
+        "aside": [row["text"] for row in left_out] or adjustment["aside"],
     }
 
 
 def _rule_in_language(words, record):
-    """The verdict with the texts of a shipped rule; those of a laboratory's own file stay."""
+    """Return the verdict with translated texts of a shipped rule; user rules stay unchanged."""
     rule, texts = record["rule"], words.get("rule_texts", {})
     return {**rule, "rule": {**rule["rule"], **texts.get(record["job"]["table"]["rule"], {})}}
 
 
-def _said(words, row, key, of=""):
-    """A row of the record with the text in `key`; one of an older record has no code."""
+def _translate_row(words, row, key, of=""):
+    """Return a row with a translated text in `key`; rows of older records have no code."""
     code, values = row.get(f"{of}code"), row.get(f"{of}values", {})
     return {**row, key: message_sentence(words, row[key], code, values)}
 
 
 def _placed(words, row):
-    """A row of the record whose sheet is named in the reader's language."""
-    return {**row, "file": _place_said(words, row["file"])}
+    """Return a row of the record with a translated name of its sheet."""
+    return {**row, "file": _translate_place(words, row["file"])}
 
 
-def _place_said(words, file):
-    """The name of a file as it is, of a sheet with the language's word for it."""
+def _translate_place(words, file):
+    """Return a file name unchanged, or the translated name of a sheet."""
     if not file.startswith(SHEET):
         return file
     return message_sentence(words, file, "in_sheet", {"sheet": file.removeprefix(SHEET)})
 
 
 def _number(value, form, marks):
-    """A number in a form of Python, ".1f", ".3g", "+g" or "" for a count, with these marks."""
+    """Format a number with a Python format (".1f", ".3g", "+g"; "" for a count) and marks."""
     if value is not None and not isinstance(value, Number):
         return str(value)
     if not form and not isinstance(value, Integral):
@@ -145,30 +152,30 @@ def _number(value, form, marks):
     return sign + fixed(value, int(digits or 0), marks)
 
 
-def _named(words, key, value):
-    """Codes among the values of a message as their names."""
+def _name_value(words, key, value):
+    """Replace codes among the values of a message by names."""
     if key == "row" or key.endswith("_row"):
-        return str(value)  # no count
+        return str(value)  # a row number has no group marks
     if key == "note":
         return _notes(words).get(value, value) if isinstance(value, str) else value
     if key == "choice":
         return word_of(words["language"].get("code"), value)
     if key == "kind":
-        known = words["observations"]  # some by the table that they stand in
+        known = words["observations"]  # some kinds are named after their table
         return known.get(value, known.get(f"{value.replace(' ', '_')}s", value))
     if key in ("group", "of_group"):
         name = words["observed"].get(value, value)
         return name[:1].lower() + name[1:]
     if key == "inputs":
-        return "; ".join(name_of_input(words, one) for one in value)
+        return "; ".join(name_of_input(words, code) for code in value)
     if key == "entries":  # of [certificate]
         labels = words["page"] | words["labels"]
-        return "; ".join(labels.get(one, one) for one in value)
+        return "; ".join(labels.get(entry, entry) for entry in value)
     return value
 
 
 def _notes(words):
-    """{English note of a key or column of a job: the same in this language}."""
+    """Return {English note of a key or column of a job: translated note}."""
     translated = words.get("input", {}).get("notes", {})
     return {
         note: translated[group][key]
@@ -177,7 +184,7 @@ def _notes(words):
     }
 
 
-_DECLARED = ("head",)  # choices whose number the job gave: it is not rounded
+_DECLARED = ("head",)  # choices with a number of the job, which is not rounded
 
 
 NAMED_INPUTS = (
@@ -189,9 +196,9 @@ NAMED_INPUTS = (
 
 
 def input_name(words, row):
-    """The name of an input of the budget; a default is marked as such.
+    """Return the name of an input of the budget; a default value is marked.
 
-    Some have the name of their item or instrument beside it.
+    Some inputs include the name of their item or instrument.
     """
     shared = row["input"] == "deadwood" and row["unit"] == "%"
     name = name_of_input(words, "deadwood_share" if shared else row["input"])
@@ -201,17 +208,17 @@ def input_name(words, row):
 
 
 def name_of_input(words, code):
-    """An input by its code; correlated ones are one, "a & b"."""
-    return " & ".join(words["inputs"].get(one, one) for one in code.split(" & "))
+    """Return the name of an input; correlated inputs have one name, "a & b"."""
+    return " & ".join(words["inputs"].get(part, part) for part in code.split(" & "))
 
 
-# ---- what the record says of an adjustment: the same sentences on paper and in the workbook
+# ---- sentences about an adjustment, for reports and workbook
 
-MOST_NAMES = 12  # that a sentence lists
+MOST_NAMES = 12  # largest number of names in a sentence
 
 
 def group_name(words, group):
-    """A group of observations in words: "Distances (tape 1)", "Zenith angles"."""
+    """Return the name of a group of observations: "Distances (tape 1)", "Zenith angles"."""
     known, name = words["observed"], group["name"]
     if name in known:
         return known[name]
@@ -220,68 +227,68 @@ def group_name(words, group):
 
 
 def observation_name(words, reading):
-    """What a reading is: some kinds are told apart by their files, such as zenith angles."""
+    """Return the kind of a reading; some, such as zenith angles, are identified by their files."""
     known, kind = words["observations"], reading["kind"]
     return known.get(reading["file"].removesuffix(".csv"), known.get(kind, kind))
 
 
 def global_test_sentence(words, adjustment):
-    """What the global test says, with its bounds."""
+    """Return the result of the global test with its bounds."""
     bounds = adjustment["chi2_bounds"]
     if bounds is None:
         return words["texts"]["test_none"]
     verdict = "above" if adjustment["chi2"] > bounds[1] else "below"
-    low, high, chi2 = (_fixed(words, value, 1) for value in (*bounds, adjustment["chi2"]))
+    low, high, chi2 = (_format_fixed(words, value, 1) for value in (*bounds, adjustment["chi2"]))
     return words["texts"][f"test_{'passed' if adjustment['passed'] else verdict}"].format(
         low=low,
         high=high,
         statistic=chi2,
-        dof=_fixed(words, adjustment["redundancy"]),
+        dof=_format_fixed(words, adjustment["redundancy"]),
         confidence=percent(words, adjustment["confidence"]),
     )
 
 
 def scale_sentence(words, adjustment):
-    """Which variance factor the covariances bear."""
-    factor = _fixed(words, adjustment["cov_scale"], 3)
+    """Return the variance factor used for the covariances."""
+    factor = _format_fixed(words, adjustment["cov_scale"], 3)
     return words["texts"][f"scale_{adjustment['scale']}"].format(factor=factor)
 
 
 def snooping_sentence(words, adjustment):
-    """How blunders were searched, and how many observations were rejected."""
+    """Return the method of blunder detection and the number of rejected observations."""
     if not adjustment["snooping"]:
         return words["texts"]["snooping_off"]
     removed = {(row["kind"], tuple(row["ids"]), row["row"]) for row in adjustment["removed"]}
     return words["texts"]["snooping_on"].format(
-        critical=_fixed(words, adjustment["critical_w"], 2),
-        rounds=_fixed(words, adjustment["rounds"]),
-        removed=_fixed(words, len(removed)),
+        critical=_format_fixed(words, adjustment["critical_w"], 2),
+        rounds=_format_fixed(words, adjustment["rounds"]),
+        removed=_format_fixed(words, len(removed)),
     )
 
 
 def datum_sentences(words, adjustment):
-    """What holds the frame, and what depends on that choice."""
+    """Return sentences about the datum and about quantities that depend on it."""
     datum, texts = adjustment["datum"], words["texts"]
     held = [name for name in datum["held"] if datum["choice"] != "inner" or ":" not in name]
-    found = [texts[f"datum_{datum['choice']}"].format(held=list_names(words, held))]
+    sentences = [texts[f"datum_{datum['choice']}"].format(held=list_names(words, held))]
     if len(held) < len(datum["held"]):
         fixed = [name for name in datum["held"] if ":" in name]
-        found = [
+        sentences = [
             texts["datum_fixed"].format(held=list_names(words, fixed)),
-            *(found if held else []),
+            *(sentences if held else []),
         ]
     if datum["defect"]:
         words_of_defect = datum["words"].split(";")[0].rstrip(".")
-        found.append(texts["datum_defect"].format(words=words_of_defect))
+        sentences.append(texts["datum_defect"].format(words=words_of_defect))
         by_control = "_control" if datum["choice"] == "control" else ""
-        found.append(texts[f"datum_dependent{by_control}"])
+        sentences.append(texts[f"datum_dependent{by_control}"])
     for what in ("vertical", "scale"):
-        found.append(texts[f"{what}_{'observed' if datum[what] else 'not_observed'}"])
-    return found
+        sentences.append(texts[f"{what}_{'observed' if datum[what] else 'not_observed'}"])
+    return sentences
 
 
 def verdict_sentences(words, adjustment):
-    """A sentence for each group of observations that is not what was declared."""
+    """Return a sentence for each group of observations that differs from its declared accuracy."""
     return [
         words["texts"][f"group_{row['verdict']}"].format(
             group=group_name(words, row),
@@ -296,26 +303,28 @@ _FACTORS = {"factor": "factor", "low": "factor_low", "high": "factor_high"}
 
 
 def method_line(words, adjustment):
-    """What was measured, how many points, sigma0: one line for a certificate."""
+    """Return the observations, the number of points and sigma0 in one line for a certificate."""
     parts = []
     if adjustment["photos"]:
         cameras = list_names(words, dict.fromkeys(row["camera"] for row in adjustment["photos"]))
         photographs = words["observed"]["photographs"]
-        parts.append(f"{photographs} ({cameras}): {_fixed(words, len(adjustment['photos']))}")
+        parts.append(
+            f"{photographs} ({cameras}): {_format_fixed(words, len(adjustment['photos']))}"
+        )
     groups = [row for row in adjustment["groups"] if row["kind"] != "weighted unknown"]
     for row in sorted(groups, key=lambda row: row["kind"] != "image coordinate"):
         name = group_name(words, row)
-        parts.append(f"{name[:1].lower()}{name[1:]}: {_fixed(words, row['count'])}")
+        parts.append(f"{name[:1].lower()}{name[1:]}: {_format_fixed(words, row['count'])}")
     sigma0 = adjustment["sigma0"]
     return words["texts"]["method_of_survey"].format(
         observed=", ".join(parts),
-        points=_fixed(words, len(adjustment["points"])),
-        sigma=NOTHING if sigma0 is None else _fixed(words, sigma0, 2),
+        points=_format_fixed(words, len(adjustment["points"])),
+        sigma=NOTHING if sigma0 is None else _format_fixed(words, sigma0, 2),
     )
 
 
 def list_names(words, names):
-    """The first names, and how many more there are; "P7:xyz" is P7."""
+    """Return the first names and the number of further names; "P7:xyz" is shown as P7."""
     names = [str(name).removesuffix(":xyz") for name in names]
     if names == ["all"]:
         return words["texts"]["all_points"]
@@ -326,19 +335,19 @@ def list_names(words, names):
 
 
 def make_sentence(text):
-    """A text of the record with a capital letter and a full stop."""
+    """Return a text of the record with a capital letter and a full stop."""
     return text[:1].upper() + text[1:].rstrip(".") + "."
 
 
 def percent(words, share):
-    """A share in percent, in the reader's style."""
+    """Format a share in percent with the marks of the language."""
     return f"{shortest(100 * share, marks_of(words))}\N{NO-BREAK SPACE}%"
 
 
 def factor_text(words, value):
-    """A factor of standard deviations."""
-    return _fixed(words, value, 2 if value < 10 else 1)
+    """Format a ratio of standard deviations."""
+    return _format_fixed(words, value, 2 if value < 10 else 1)
 
 
-def _fixed(words, value, decimals=0):
+def _format_fixed(words, value, decimals=0):
     return fixed(value, decimals, marks_of(words))

@@ -496,7 +496,7 @@ def test_something_in_the_way_fails_that_job_alone(tmp_path, place, capsys):
         way.write_text("something else")
     assert main(batch_of(tmp_path)) == 2
     (line,) = errors(capsys)
-    assert line.startswith(f"tankcal: T-0: {place}: is no file or folder of a batch (")
+    assert line.startswith(f"tankcal: T-0: {place}: is not a file or folder of a batch (")
     rows = summary(tmp_path / "out")
     assert {name: row["status"] for name, row in rows.items()} == {"T-0": "failed", "T-1": "done"}
 

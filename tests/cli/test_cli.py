@@ -259,7 +259,7 @@ def test_an_interruption_in_disguise_is_no_traceback(done, monkeypatch, capsys):
 
     monkeypatch.setattr(report, "build", interrupted)
     assert main(["run", str(done), "--quiet"]) == 130
-    assert "stopped; results are as they were" in capsys.readouterr().err
+    assert "stopped; earlier results are unchanged" in capsys.readouterr().err
 
 
 def table(path, wrong=None):

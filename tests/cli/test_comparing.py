@@ -37,7 +37,7 @@ def test_two_tables_alone(tables, capsys):
     """Nothing is declared: it is said what was not done, and U is not known."""
     assert main(["compare", *tables, "--quiet"]) == 0
     said = capsys.readouterr()
-    assert "old.csv against new.csv: 165 rows from 0.1 to 8.3 m" in said.out
+    assert "old.csv compared with new.csv: 165 rows from 0.1 to 8.3 m" in said.out
     assert "temperature 0.000" in said.out
     for word in ("former.reference_temperature_c", "former.liquid_density_kg_m3", "U of one"):
         assert word in said.out

@@ -6,8 +6,16 @@ from wall_plan_folders import HITS, plan_of
 
 from tankcal.cli import main
 from tankcal.cli.planned_counts import KINDS, counted
+from tankcal.cli.showing import speak
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words, message_sentence
+
+
+@pytest.fixture(autouse=True)
+def english_afterwards():
+    """Other tests read the terminal in English."""
+    yield
+    speak("en")
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

@@ -52,7 +52,7 @@ def test_five_are_named_and_the_others_counted(tmp_path, capsys):
     folder = planted(tmp_path / "job", "reference-line", "offsets", "offset_mm", 25, rows)
     (line,) = told(folder)
     assert line.count("(row ") == 5
-    assert line.endswith(" and 2 more, in the working papers")
+    assert line.endswith(" and 2 more (see the working papers)")
     assert main(["run", str(folder), "--out", str(tmp_path / "out"), "--quiet"]) == 0
     shown = capsys.readouterr().out
     assert shown.index("U = ") < shown.index(line)

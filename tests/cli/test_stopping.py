@@ -32,7 +32,7 @@ def test_a_signal_is_told_as_ctrl_c_is(monkeypatch, capsys, name):
     try:
         monkeypatch.setattr(linting, "_lint", lambda options: os.kill(os.getpid(), number))
         assert main(["lint", "table.csv"]) == 128 + number
-        assert capsys.readouterr().err.startswith("tankcal: stopped; results are as they were")
+        assert capsys.readouterr().err.startswith("tankcal: stopped; earlier results are unchanged")
         assert signal.getsignal(number) == signal.SIG_DFL
     finally:
         signal.signal(number, usual)

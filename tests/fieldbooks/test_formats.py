@@ -386,7 +386,7 @@ def test_an_end_needs_a_beginning_before_it(tmp_path, capsys):
     book.write_text(RW5)
     for times in (["--end", "2026-07-14"], ["--begin", "2026-07-14T09:00", "--end", "2026-07-13"]):
         assert main(["import", str(book), "--out", str(tmp_path / "job"), *times]) == 2
-        assert capsys.readouterr().err.startswith("tankcal: --end: expected a time after")
+        assert capsys.readouterr().err.startswith("tankcal: --end: expected a time later")
     with pytest.raises(SystemExit):
         main(["import", str(book), "--out", str(tmp_path / "job"), "--begin", "soon"])
 
@@ -462,4 +462,4 @@ def test_json_and_another_language(tmp_path, capsys):
     assert main(["import", str(book), "--out", str(tmp_path / "j"), "--language", "pt-BR"]) == 0
     shown = capsys.readouterr().out
     assert "visadas à parede: 2" in shown
-    assert "not understood" not in shown
+    assert "not recognised" not in shown

@@ -80,7 +80,7 @@ def test_headings_of_the_user_are_remembered(job, tmp_path, capsys):
     out = ["--out", str(folder)]
     assert main(["import", str(path), "--table", "points", *out]) == 2
     said = capsys.readouterr().err.splitlines()
-    assert ["no heading means" in one for one in said] == [True, True]
+    assert ["no heading for" in one for one in said] == [True, True]
     assert "expected --column 'HEADING=x_m'" in said[0]
     assert not (folder / "headings.toml").exists()
     named = ["--column", "A (mm)=x_m", "--column", "B (mm)=y_m"]
@@ -135,7 +135,7 @@ def test_a_job_in_a_workbook_gets_no_files_beside_it(tmp_path, capsys):
     path.write_text("Ponto;X;Y;Z\nP1;1,2;2,3;3,4\n")
     capsys.readouterr()
     assert main(["import", str(path), "--out", str(folder)]) == 2
-    assert "is filled in as job.xlsx" in capsys.readouterr().err
+    assert "contains the workbook job.xlsx" in capsys.readouterr().err
     assert [one.name for one in folder.iterdir()] == ["job.xlsx"]
 
 

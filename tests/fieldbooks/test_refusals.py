@@ -206,7 +206,8 @@ def test_a_file_twice_and_a_name_that_no_job_takes(tmp_path, capsys):
         (tmp_path / name).write_text(text)
     files = [str(tmp_path / name) for name in ("a.rw5", "b.rw5")]
     assert main(["import", *files, "--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == "tankcal: b.rw5: the same as a.rw5; expected each file once\n"
+    told = "tankcal: b.rw5: identical to a.rw5; expected each file once\n"
+    assert capsys.readouterr().err == told
     (tmp_path / "a.rw5").write_text(text.replace("OP1", "OP+1"))
     assert main(["import", files[0], "--out", str(tmp_path / "out")]) == 2
     lines = capsys.readouterr().err.splitlines()

@@ -324,7 +324,7 @@ def test_the_command_line_with_a_limit_that_nothing_meets(changed, capsys, monke
     assert main(["plan", str(folder), "--smallest", "--quiet"]) == 0
     told = capsys.readouterr().out
     assert "NOT met" in told
-    assert "no plan that was tried meets the limit" in told
+    assert "no evaluated plan meets the limit" in told
 
 
 @pytest.mark.slow

@@ -57,7 +57,7 @@ def _rows_of_run(folder):
 def test_what_is_said(folder, capsys):
     assert run(folder) == 0
     said = capsys.readouterr().out
-    assert "made with the head of" in said
+    assert "computed with the head of" in said
     assert "zero: the bottom of the first course" in said
 
 
@@ -129,7 +129,7 @@ def test_a_tilt_that_is_not_found_is_said_to_be_none(tmp_path, capsys):
     (tmp_path / "lying.csv").write_text("\n".join(["dip_m,volume_L", *lines]))
     assert main(["read-table", str(tmp_path / "lying.csv"), "--kind", "horizontal"]) == 0
     said = capsys.readouterr().out
-    assert "a tilt as one more unknown: none was found that fits better; up to 0.8 mm/m" in said
+    assert "tilt as additional unknown: no tilt improves the fit; up to 0.8 mm/m" in said
     assert "lowers chi2" not in said
 
 
@@ -250,7 +250,7 @@ def test_seams_of_courses_that_do_not_fit_are_told(low, tmp_path, capsys):
     assert ("do not fit the table: with seams at 2.40, 4.80, 7.20, 9.60 m" in said.err) == (
         low is not None
     )
-    assert ("nothing in the tank shows" in said.out) == (low is None)
+    assert ("no deadwood detected" in said.out) == (low is None)
 
 
 def test_courses_that_are_not_reached_are_left_out(folder):

@@ -100,4 +100,4 @@ def test_other_last_digits_are_told_as_rounding():
     assert found.largest is None
     (told, _) = verifying._numbers(found)
     assert told.code == "verify_rounded_numbers"
-    assert f"{found.different} not the same bit for bit" in told
+    assert f"{found.different} not identical bit for bit" in told

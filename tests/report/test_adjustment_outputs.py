@@ -713,7 +713,7 @@ def test_summary_states_the_quality(job, only, capsys, monkeypatch):
     assert main(["run", str(job), "--only", "adjustment", "--strict"]) == 0
     out = capsys.readouterr().out
     assert out.startswith("adjustment: sigma0 = ")
-    for words in ("global test passed", "3 observations rejected", "48 points", "mean sd 1."):
+    for words in ("global test passed", "3 observations rejected", "48 points", "deviation 1."):
         assert words in out
 
 
@@ -728,7 +728,7 @@ def test_strict_writes_nothing_when_the_global_test_fails(doubtful, capsys):
     assert main(["run", str(doubtful), "--strict", "--quiet", "--only", "adjustment"]) == 3
     error = capsys.readouterr().err
     assert "the global test of the adjustment failed: v'Pv = " in error
-    assert "nothing was written (--strict)" in error
+    assert "no file was written (--strict)" in error
     assert not (doubtful / "results").exists()
 
 

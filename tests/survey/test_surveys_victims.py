@@ -258,7 +258,7 @@ def test_strict_refuses_what_is_in_doubt(tmp_path, capsys):
     assert main(command) == 3
     error = capsys.readouterr().err
     assert "the error may equally be in distance B-C" in error
-    assert "nothing was written (--strict)" in error
+    assert "no file was written (--strict)" in error
     assert not (tmp_path / "results").exists()
 
 

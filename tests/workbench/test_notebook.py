@@ -134,7 +134,7 @@ def test_the_app_warns_of_an_open_address(folder, capsys, monkeypatch, address, 
     monkeypatch.setattr(serving, "serve_app", lambda *given: served.append(given))
     assert main(["app", str(folder), "--address", address, "--no-browser"]) == 0
     said = capsys.readouterr()
-    assert ("every machine that reaches" in said.err) == is_open
+    assert ("every machine that can connect to" in said.err) == is_open
     ((_, port, where, is_browser, token),) = served
     assert (port, where, is_browser) == (4711, address, False)
     assert (len(token) > 20) == is_open
