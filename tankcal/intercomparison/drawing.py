@@ -61,7 +61,7 @@ def draw_tank(rng, name, family):
     defects += _DEFECTS_BY_FAMILY[family](rng, radius, joints)
     slope = rng.uniform(3e-3, 6e-3) if family == "leaning" else abs(rng.normal(0, 1.2e-3))
     tilt_azimuth = rng.uniform(0, FULL_TURN)
-    thickness = 0.0045 * radius / 7 * (1 - joints[:-1] / height) + 0.005  # typical thickness, m
+    thickness = 0.0045 * radius / 7 * (1 - joints[:-1] / height) + 0.005  # typical of storage tanks
     plates = np.round(thickness, 3) * (1 + 0.01 * rng.normal(size=len(thickness)))
     plate_z = float(rng.uniform(0.02, 0.08))
     floor = _floor(rng, radius)
