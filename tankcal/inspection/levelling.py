@@ -395,11 +395,11 @@ def _radial_line(values, rows, log):
                        " millimetres?", azimuth=azimuth, rise=float(np.ptp(z)),
                        most=MOST_RISE_M)  # fmt: skip
         log.problem(values.file, text, row, "z_m")
-    welds = [one for one in np.array(values.of("weld_deg"))[rows] if one is not None]
+    welds = [angle for angle in np.array(values.of("weld_deg"))[rows] if angle is not None]
     if len(set(welds)) > 1:
         text = message("edge_two_welds", "the line at {azimuth:g} degrees has {angles} degrees;"
                        " expected one angle of its weld", azimuth=azimuth,
-                       angles=list_some([f"{one:g}" for one in dict.fromkeys(welds)],
+                       angles=list_some([f"{angle:g}" for angle in dict.fromkeys(welds)],
                                         SHOWN))  # fmt: skip
         log.problem(values.file, text, row, "weld_deg")
     has_sd = values.of("s_mm")[0] is not None

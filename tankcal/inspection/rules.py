@@ -103,7 +103,7 @@ def parse_rule(file, data, log):
         expected = message(
             "unknown_section_of_inspection",
             "unknown section; expected [rule] or one of {sections}{hint}",
-            sections=[f"[{one}]" for one in SECTIONS],
+            sections=[f"[{name}]" for name in SECTIONS],
             hint=nearest(section, (*SECTIONS, "rule")),
         )
         log.problem(file, expected, rows.get(section), f"[{section}]")

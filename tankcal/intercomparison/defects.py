@@ -178,7 +178,8 @@ class Buckle(Defect):
         return _side_azimuths(self, radius_m)
 
 
-KINDS = {one.__name__.lower(): one for one in (Oval, Seam, Band, Course, Dent, Flat, Buckle)}
+# Class of each kind of defect in plain data.
+KINDS = {kind.__name__.lower(): kind for kind in (Oval, Seam, Band, Course, Dent, Flat, Buckle)}
 
 
 def plain_of(defect):

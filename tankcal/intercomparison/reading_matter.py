@@ -52,4 +52,4 @@ def _note(file, name):
         fields = KEYS[section]
     else:
         fields = COLUMNS.get(owner) or REGISTER_KEYS[owner]
-    return next((one.note for one in fields if one.name == name), "")
+    return next((field.note for field in fields if field.name == name), "")

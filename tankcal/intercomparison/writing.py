@@ -30,7 +30,7 @@ def toml_text(sections):
     """Text of a TOML file with {section: {key: value}}."""
     parts = []
     for section, entries in sections.items():
-        lines = [f"{key} = {_value(one)}" for key, one in entries.items()]
+        lines = [f"{key} = {_value(value)}" for key, value in entries.items()]
         parts.append("\n".join([f"[{section}]", *lines]) + "\n")
     return "\n".join(parts)
 

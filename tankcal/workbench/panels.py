@@ -109,7 +109,7 @@ class TableGrid:
                 **{k: v for k, v in content.items() if k != "kind"}
             )
         except InputError as error:  # a locked workbook, or a key that cannot be edited here
-            say(desk, "\n".join(desk.reader.say(one) for one in error.texts))
+            say(desk, "\n".join(desk.reader.say(text) for text in error.texts))
             self.refresh()
             return
         if content["kind"] == "every":
@@ -234,7 +234,7 @@ def further_panel(desk):
             if name not in desk.draft.tables:
                 desk.draft.add_table(name)
         except InputError as error:
-            say(desk, "\n".join(reader.say(one) for one in error.texts))
+            say(desk, "\n".join(reader.say(text) for text in error.texts))
             return
         heading = _page(f"<h3>{escape(reader.title(name))}</h3><p>{escape(reader.note(name))}</p>")
         grids.children = (*grids.children, heading, TableGrid(desk, name).grid)
@@ -327,7 +327,7 @@ class ResultsPanel:
             )
             self.state.value += warnings_page(self.desk)
         elif isinstance(run.error, TankcalError):
-            self._state("\n".join(self.desk.reader.say(one) for one in run.error.texts))
+            self._state("\n".join(self.desk.reader.say(text) for text in run.error.texts))
         elif isinstance(run.error, OSError):
             reason = self.desk.reader.say(reason_of(run.error))
             self._state(word("not_written", reason=reason))

@@ -23,10 +23,10 @@ def table_page(shown, left_out):
     `left_out(count)` returns the text of the row that replaces omitted rows.
     """
     head = "".join(
-        f"<th{_class_of(shown.marks, None, place)}>{escape(one.heading)}"
-        f"<small>{escape(one.name if shown.takes_rows else one.unit)}</small>"
+        f"<th{_class_of(shown.marks, None, place)}>{escape(column.heading)}"
+        f"<small>{escape(column.name if shown.takes_rows else column.unit)}</small>"
         f"{_reason(shown.marks, None, place)}</th>"
-        for place, one in enumerate(shown.columns)
+        for place, column in enumerate(shown.columns)
     )
     half = MOST_ROWS // 2
     cut = len(shown.rows) > MOST_ROWS

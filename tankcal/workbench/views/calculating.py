@@ -95,9 +95,9 @@ class Calculator:
         )
         return Answer(answer, tuple(self._ullage(dip)))
 
-    def delivery(self, one, other):
+    def delivery(self, first, second):
         """Answer with the volume between two dips, entered in metres in any order."""
-        dips = [self._dip(one), self._dip(other)]
+        dips = [self._dip(first), self._dip(second)]
         for dip in dips:
             if isinstance(dip, Answer):
                 return dip

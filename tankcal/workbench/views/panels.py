@@ -76,7 +76,7 @@ class CalculatorPanel:
     def _shower(self, name, fields, ask):
         def show(_change=None):
             texts = [field.value for field in fields]
-            is_asked = any(one.strip() for one in texts)
+            is_asked = any(text.strip() for text in texts)
             self.answers[name].value = _answer_html(ask(*texts)) if is_asked else ""
 
         return show
