@@ -51,7 +51,7 @@ class Run:
 
     def start(self):
         """Start the computation in a new thread, and return the thread."""
-        thread = threading.Thread(target=self._guarded, daemon=True)
+        thread = threading.Thread(target=self._compute_in_thread, daemon=True)
         thread.start()
         return thread
 
@@ -62,7 +62,7 @@ class Run:
             raise self.error
         return self
 
-    def _guarded(self):
+    def _compute_in_thread(self):
         """Compute, and keep an error for the thread that waits."""
         try:
             self._compute()

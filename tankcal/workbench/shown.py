@@ -173,7 +173,7 @@ class Reader:
         for owner, key in places:
             field = field_of(name, owner, key)
             shown = shown_text(field, texts.get((owner, key), ""), ".", self.mark)
-            rows.append([owner, key, shown, *self._told(name, owner, key, field)])
+            rows.append([owner, key, shown, *self._unit_and_note(name, owner, key, field)])
         index = {place: number for number, place in enumerate(places)}
         value = 2
         marks = self._marks(check, name, lambda place: self._place_of_key(index, place, value))
@@ -197,7 +197,7 @@ class Reader:
             return first, None
         return index.get(place), value
 
-    def _told(self, name, owner, key, field):
+    def _unit_and_note(self, name, owner, key, field):
         """Unit of a key, and its description with the expected values."""
         if owner in NOT_HERE:
             return "", self.word("in_file")

@@ -100,7 +100,7 @@ class PointsPanel(traitlets.HasTraits):
 
     def _line(self, point):
         """Text of a point in the list: name, deviation and reason."""
-        parts = [point.name, self._off(point), why(self.paper, point)]
+        parts = [point.name, self._deviation(point), why(self.paper, point)]
         return " · ".join(part for part in parts if part)
 
     def _sentence(self, point):
@@ -113,7 +113,7 @@ class PointsPanel(traitlets.HasTraits):
             parts.append(self.paper.number(point.height_m, "m", decimals=3))
         return " · ".join(parts)
 
-    def _off(self, point):
+    def _deviation(self, point):
         """Text of the deviation of a point from the wall."""
         if point.off_m is None:
             return ""
