@@ -1,1 +1,1 @@
-"""Inspection by the same survey: plumbness, roundness, peaking, settlement, each with its U."""
+"""Inspection by the calibration survey: plumbness, roundness, peaking and settlement with U."""

@@ -1,4 +1,4 @@
-"""What an inspection starts from: a job, whose survey is computed, or a record that was kept."""
+"""Input of an inspection: a job, whose survey is computed, or the saved record of a run."""
 
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -19,14 +19,15 @@ from tankcal.record.schema import filled_from
 from tankcal.record.texts import warnings_of as records_of
 from tankcal.record.wall_shape import shape_record
 
-RECORD = "record.json"
+RECORD = "record.json"  # file name of the record in a folder of results
+# Attribute of a job or key of a record, and the code of the method in `InspectedTank`.
 METHODS = {"clouds": "scan", "hits": "hits", "tangents": "tangents", "strapping": "straps",
            "lines": "lines"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Basis:
-    """What is known of a tank before it is inspected.
+    """Data of a tank that an inspection starts from.
 
     Attributes
     ----------
@@ -35,21 +36,21 @@ class Basis:
     file : str
         Name of the job or of the record.
     folder : Path
-        Where tables of levelling may lie beside it.
+        Folder of the job or of the record; levelling tables are searched for here.
     job : dict
         The job as read, a `record.making.JobAsRead` as plain data.
     shape : dict or None
-        The shape of its wall, a `record.wall_shape.WallShapeRecord` as plain data.
+        Shape of the wall, a `record.wall_shape.WallShapeRecord` as plain data.
     methods : tuple of str
-        What observed the wall.
+        Survey methods that observed the wall.
     warnings : list of dict
-        What was told of the survey, as in a record.
+        Warnings about the survey, in the form of a record.
     sha256 : str or None
-        Of the record.
+        Hash of the record file; None for a job.
     is_older : bool
-        Whether it is a record of a surveyed wall that does not keep its shape.
+        Whether the record has a surveyed wall but, from an older version, not its shape.
     survey : Surveyed or None
-        Of a job: what was computed.
+        Computed survey of a job; None for a record.
     """
 
     source: str
@@ -65,24 +66,24 @@ class Basis:
 
     @property
     def strength(self):
-        """`Strength` that settlement is limited by, its yield stress as the job says."""
-        said, survey = self.job.get("inspection") or {}, self.sizes
-        known = {"yield_pa": said.get("yield_pa"), "e_pa": self.job["material"]["e_pa"]}
-        return Strength(survey.diameter_m, survey.height_m or None, **known)
+        """`Strength` for the settlement limits, with the yield stress that the job states."""
+        stated, sizes = self.job.get("inspection") or {}, self.sizes
+        known = {"yield_pa": stated.get("yield_pa"), "e_pa": self.job["material"]["e_pa"]}
+        return Strength(sizes.diameter_m, sizes.height_m or None, **known)
 
     @property
     def rule(self):
-        """Name of the rule that the job asks for; None: it does not say."""
+        """Name of the rule that the job requires, or None if the job names no rule."""
         return (self.job.get("inspection") or {}).get("rule")
 
     @property
     def courses_m(self):
-        """Heights of the courses from the bottom up."""
-        return tuple(one["height_m"] for one in self.job["courses"])
+        """Heights of the courses from the bottom up, m."""
+        return tuple(course["height_m"] for course in self.job["courses"])
 
     @property
     def sizes(self):
-        """`Sizes` that the wall is judged by, the radius as the drawing has it."""
+        """`Sizes` for the checks of the wall, with the nominal radius of the drawing."""
         nominal = None
         if self.shape is not None:
             nominal = self.shape["nominal_radius_m"]
@@ -93,28 +94,36 @@ class Basis:
 
 
 def basis_of(source, progress, part_progress=None):
-    """The `Basis` of a job, a record.json or a folder of results.
+    """Read the `Basis` from a job, a record.json or a folder of results.
 
     Parameters
     ----------
     source : path
+        Job, record.json or folder of results.
     progress, part_progress : callable
-        As of `tankcal.run`.
+        Callbacks as in `tankcal.run`.
+
+    Returns
+    -------
+    Basis
 
     Raises
     ------
-    InputError, SolutionError
-        Of the job or the record; for a tank that does not stand upright.
+    InputError
+        If the job or the record is invalid, or if the tank is not upright.
+    SolutionError
+        If the survey of the job cannot be adjusted.
     """
     path = Path(source)
     if (path / RECORD).is_file():
         path = path / RECORD
     if path.suffix.lower() == ".json":
-        return _of_record(path)
-    return _of_job(path, progress, part_progress)
+        return _basis_of_record(path)
+    return _basis_of_job(path, progress, part_progress)
 
 
-def _refuse_others(file, kind):
+def _require_upright(file, kind):
+    """Raise InputError unless the tank is upright."""
     if kind != "vertical":
         expected = message(
             "inspect_not_upright",
@@ -125,18 +134,19 @@ def _refuse_others(file, kind):
         raise InputError(Problem(file, expected, column="tank.kind"))
 
 
-def _of_job(path, progress, part_progress):
+def _basis_of_job(path, progress, part_progress):
+    """Read a job and compute its survey."""
     job = load(path)
     settings = "job.toml" if path.is_dir() else path.name
-    _refuse_others(settings, job.tank.kind)
+    _require_upright(settings, job.tank.kind)
     try:
-        found = find_survey(job, progress, part_progress=part_progress)
+        survey = find_survey(job, progress, part_progress=part_progress)
     except InputError as error:
         raise InputError(placed(job, error.problems)) from error
-    job, wall = found.job, found.survey
+    job, wall = survey.job, survey.survey
     is_wall = isinstance(wall, Wall)
-    told = (*job.warnings, *(found.adjustment.warnings if found.adjustment else ()))
-    told = (*told, *(warnings_of(job, wall) if is_wall else ()))
+    warnings = (*job.warnings, *(survey.adjustment.warnings if survey.adjustment else ()))
+    warnings = (*warnings, *(warnings_of(job, wall) if is_wall else ()))
     return Basis(
         source="job",
         file=job.source,
@@ -144,12 +154,13 @@ def _of_job(path, progress, part_progress):
         job=to_plain(filled_from(JobAsRead, job, inspection=job.inspection)),
         shape=to_plain(shape_record(job, wall)),
         methods=_methods({name: getattr(job, name) for name in METHODS}, is_wall),
-        warnings=to_plain(records_of(dict.fromkeys(placed(job, told)))),
-        survey=found,
+        warnings=to_plain(records_of(dict.fromkeys(placed(job, warnings)))),
+        survey=survey,
     )
 
 
-def _of_record(path):
+def _basis_of_record(path):
+    """Read a saved record."""
     record = tankcal.record.load(path)
     kind = (record["job"]["tank"] or {}).get("kind")
     if kind is None:
@@ -157,7 +168,7 @@ def _of_record(path):
             "inspect_no_tank", "a record without a tank; expected that of a run with its table"
         )
         raise InputError(Problem(path.name, expected))
-    _refuse_others(path.name, kind)
+    _require_upright(path.name, kind)
     return Basis(
         source="record",
         file=path.name,
@@ -172,8 +183,9 @@ def _of_record(path):
     )  # fmt: skip
 
 
-def _methods(found, is_wall):
-    """What observed a wall, in the words of `InspectedTank`."""
-    named = tuple(word for key, word in METHODS.items() if found.get(key) is not None)
-    sighted = {"scan", "hits", "tangents"} & set(named)
-    return named if sighted or not is_wall else ("points", *named)
+def _methods(source, is_wall):
+    """Codes of the methods that observed a wall, as in `InspectedTank`."""
+    names = tuple(word for key, word in METHODS.items() if source.get(key) is not None)
+    # Without scans, hits or tangents, the shell was fitted to measured points.
+    sightings = {"scan", "hits", "tangents"} & set(names)
+    return names if sightings or not is_wall else ("points", *names)

@@ -1,12 +1,13 @@
-"""The gap of a board laid over a weld, from the profile of the wall, and its uncertainty.
+"""Gap between a board laid over a weld and the wall, from a profile, with its uncertainty.
 
-With e(s) the departure of the wall from a circle along the arc, or from a straight line up the
-wall, outwards positive and 0 at the weld, and the ends of a board of length b on the wall,
+e(s) is the deviation of the wall from a circle along the arc, or from a straight line up the wall.
+It is positive outwards; s is the distance from the weld. A board of length b touches the wall with
+both ends, and the gap is
 
     g(s) = e(s) - [e(-b/2) + e(b/2)] / 2 - s [e(b/2) - e(-b/2)] / b
 
-so that shift and lean of the profile drop out, and with them to first order what all points of a
-scan share: offset, scale and registration. Source: docs/inspection.md.
+A shift or a tilt of the profile cancels. The errors that all points of a scan share (offset, scale
+and registration) therefore cancel to first order. Source: docs/inspection.md.
 """
 
 from dataclasses import dataclass
@@ -14,15 +15,15 @@ from functools import lru_cache
 
 import numpy as np
 
-BOARD_M = 0.914  # 36 in
-REACH_M = 0.150  # of the weld, within which the largest gap counts
-UNCERTAIN = 0.25  # of the limit: a gap whose u exceeds that is not determined
-END_M = 0.04  # on both sides of an end of the board, where the wall is taken for straight
-HOLE_M = 0.06  # between places of the wall near the weld; wider, and the peak may lie in it
-STEP_M, STEEP = 0.010, 0.4  # no wall rises so much from cell to cell, or is so steep
+BOARD_M = 0.914  # length of the board, 36 in
+REACH_M = 0.150  # distance from the weld within which the largest gap is searched for
+UNCERTAIN = 0.25  # largest u of a determined gap, as a share of its limit
+END_M = 0.04  # half width of the zone at an end of the board that is fitted by a straight line
+HOLE_M = 0.06  # largest distance between cells near the weld; a wider hole may hide the peak
+STEP_M, STEEP = 0.010, 0.4  # largest step between cells and largest slope of a wall
 BEAD_M = 0.02  # half the width of a bead
-BESIDE_M = 0.0375  # of the wall beside a bead, that is led on under it
-MISSED = 2.0  # over this: of a second difference, what the mean of a cell or a bridge may miss
+BESIDE_M = 0.0375  # width of the wall on either side of a bead that is extrapolated under it
+MISSED = 2.0  # second difference over the largest error of a cell mean or of a bridge
 
 
 def board_gap(s_m, e_m, board_m=BOARD_M):
@@ -31,14 +32,15 @@ def board_gap(s_m, e_m, board_m=BOARD_M):
     Parameters
     ----------
     s_m, e_m : ndarray, shape (n,)
-        Places from the weld, ascending, and departures of the wall there, straight between, m.
+        Distances from the weld, ascending, and deviations of the wall there, m. Between two
+        places the wall is taken as straight.
     board_m : float, optional
         Length of the board, m.
 
     Returns
     -------
     ndarray, shape (n,)
-        Positive outwards, m; nan beyond the ends.
+        Gaps, positive outwards, m; nan beyond the ends of the board.
 
     Examples
     --------
@@ -53,16 +55,16 @@ def board_gap(s_m, e_m, board_m=BOARD_M):
 
 @dataclass(frozen=True)
 class BoardGaps:
-    """Gaps at the places of a profile; nan where they are not determined.
+    """Gaps at the cells of a profile; nan where a gap is not determined.
 
     Attributes
     ----------
     gap_m : ndarray, shape (n,)
-        Outwards positive, m.
+        Gaps, positive outwards, m.
     noise_m2 : ndarray, shape (n,)
-        Variance by the noise of the places that make the gap, m2.
+        Variance of the gaps from the noise of the cells, m2.
     missed_m2 : ndarray, shape (n,)
-        Variance by the form of the wall within and between the cells, m2.
+        Variance of the gaps from the unresolved form of the wall in and between cells, m2.
     """
 
     gap_m: np.ndarray
@@ -71,31 +73,37 @@ class BoardGaps:
 
 
 def gaps_of_profile(s_m, e_m, sd_m, *, board_m=BOARD_M, reach_m=REACH_M, has_bead=False):
-    """`BoardGaps` of a profile of cells; None where it does not bear a board.
+    """Compute the `BoardGaps` of a profile of cells, or None if no board can be laid over it.
 
-    It has no hole near the weld, the wall on both sides of each end, and no step that none but
-    something on the wall makes.
+    A board requires three things: no hole near the weld, cells on both sides of each end, and no
+    step. A step shows an object on the wall.
 
-    The wall at an end of the board is that of a straight line through the cells beside it. What
-    the mean of a cell misses of a form that bends within it is told by the departure of the cell
-    from its neighbours (less their noise): of a ridge in the middle of a cell a third of it, of one
-    between two cells all, of a smooth one a twelfth. Up to a half counts, each part as likely.
+    The wall at an end of the board is a straight line through the cells beside the end. The mean
+    of a cell misses a part of a form that bends within the cell. The second difference of the cell
+    and its neighbours, less their noise, bounds this part. The part is a third of the second
+    difference for a ridge in the middle of a cell, all of it for a ridge between two cells, and a
+    twelfth for a smooth form. A uniform distribution up to a half is assumed.
 
     Parameters
     ----------
     s_m, e_m, sd_m : ndarray, shape (n,)
-        Middles of cells, ascending and even, 0 at the weld; departures of the wall, nan: not
-        known; their standard deviations, m.
+        Middles of cells, ascending, equally spaced, 0 at the weld; deviations of the wall, nan if
+        unknown; standard deviations of the deviations, m.
     board_m, reach_m : float, optional
-        Length of the board; how far from the weld no hole may be, m.
+        Length of the board; distance from the weld within which no hole is allowed, m.
     has_bead : bool, optional
-        Whether a bead hides the weld: the wall under it is led on from both sides.
+        Whether a bead hides the weld. If so, the wall under the bead is extrapolated from both
+        sides.
+
+    Returns
+    -------
+    BoardGaps or None
 
     Examples
     --------
     >>> s = np.linspace(-0.55, 0.55, 89)
-    >>> found = gaps_of_profile(s, 0.008 * np.exp(-abs(s) / 0.15), np.full(89, 2e-4))
-    >>> round(float(np.nanmax(found.gap_m)), 5), round(float(found.noise_m2[44] ** 0.5), 6)
+    >>> gaps = gaps_of_profile(s, 0.008 * np.exp(-abs(s) / 0.15), np.full(89, 2e-4))
+    >>> round(float(np.nanmax(gaps.gap_m)), 5), round(float(gaps.noise_m2[44] ** 0.5), 6)
     (0.00762, 0.000208)
     """
     cell = float(s_m[1] - s_m[0])
@@ -108,26 +116,34 @@ def gaps_of_profile(s_m, e_m, sd_m, *, board_m=BOARD_M, reach_m=REACH_M, has_bea
     weights = _weights(s_m.tobytes(), known.tobytes(), bead.tobytes(), board_m)
     if weights is None:
         return None
+    # Unknown cells have weight 0; their nan must not enter the products.
     e = np.where(known, e_m, 0.0)
     variance = np.where(known, sd_m, 0.0) ** 2
     gap, missed = np.full((2, len(s_m)), np.nan)
     within = (known | bead) & (np.abs(s_m) <= board_m / 2 + 1e-9)
     gap[within] = (weights @ e)[within]
+    # Variance a^2 / 3 of a uniform distribution of half width a, the second difference / MISSED.
     missed[known] = _second_differences(s_m[known], e[known], variance[known]) / MISSED**2 / 3
     if bead.any():
-        missed[bead] = _led_on(s_m, e, bead, known, gap) / MISSED**2 / 3
-    ends = [float(np.nanmean(missed[np.abs(s_m - at) <= END_M])) for at in _ends(board_m)]
+        missed[bead] = _extrapolation_squares(s_m, e, bead, known, gap) / MISSED**2 / 3
+    # The gap contains half of each end, hence a quarter of the variance of each end.
+    ends = [float(np.nanmean(missed[np.abs(s_m - at) <= END_M])) for at in _board_ends(board_m)]
     missed = np.where(within, missed + sum(ends) / 4, np.nan)
     return BoardGaps(gap, np.where(within, weights**2 @ variance, np.nan), missed)
 
 
 def bead_height(s_m, gap_m):
-    """By how much the middle of a weld stands off the wall that is led on from both sides, m.
+    """Height of a bead above the wall, which is extrapolated from both sides of the bead, m.
 
     Parameters
     ----------
     s_m, gap_m : ndarray, shape (n,)
-        Middles of cells and gaps there, as the middle of many boards has them; nan: not known.
+        Middles of cells, and medians of the gaps of many boards there; nan if unknown.
+
+    Returns
+    -------
+    float
+        Height with its sign; 0 if the cells do not determine it.
     """
     bead = np.abs(s_m) <= BEAD_M + 1e-9
     known = np.isfinite(gap_m)
@@ -137,12 +153,13 @@ def bead_height(s_m, gap_m):
     return float(off[np.nanargmax(np.abs(off))])
 
 
-def _ends(board_m):
+def _board_ends(board_m):
+    """Places of the two ends of the board, m."""
     return -board_m / 2, board_m / 2
 
 
 def _has_no_hole(s_m, cell, reach_m):
-    """Are there places all over the reach of the weld?"""
+    """Whether cells cover the reach on both sides of the weld without a hole."""
     near = s_m[np.abs(s_m) <= reach_m + cell]
     if len(near) < 3 or near[0] > cell - reach_m or near[-1] < reach_m - cell:
         return False
@@ -150,7 +167,7 @@ def _has_no_hole(s_m, cell, reach_m):
 
 
 def _has_step(s_m, e_m, board_m):
-    """Does the wall under a board rise faster, within two cells, than a plate does?"""
+    """Whether the wall under a board rises within two cells by more than a plate can."""
     inside = np.abs(s_m) <= board_m / 2 + END_M
     s, e = s_m[inside], e_m[inside]
     return any(
@@ -161,12 +178,15 @@ def _has_step(s_m, e_m, board_m):
 
 @lru_cache(maxsize=512)
 def _weights(s_bytes, known_bytes, bead_bytes, board_m):
-    """(n, n) of gaps over departures, None: the board has no ends; boards are alike, mostly."""
+    """Weights (n, n) of the deviations in the gaps, or None if an end of the board has no cells.
+
+    The weights are cached because most boards have the same known cells.
+    """
     s = np.frombuffer(s_bytes)
     known, bead = np.frombuffer(known_bytes, dtype=bool), np.frombuffer(bead_bytes, dtype=bool)
     cell = s[1] - s[0]
-    lines = [_line_at(s, known, at, max(END_M, 1.5 * cell)) for at in _ends(board_m)]
-    if any(one is None for one in lines):
+    lines = [_line_at(s, known, at, max(END_M, 1.5 * cell)) for at in _board_ends(board_m)]
+    if any(line is None for line in lines):
         return None
     weights = np.diag(known.astype(float))
     if bead.any():
@@ -175,56 +195,60 @@ def _weights(s_bytes, known_bytes, bead_bytes, board_m):
             return None
         weights[bead] = rows
     low, high = lines
+    # g(s) of the module's docstring, with the two ends as straight lines.
     return weights - (low + high) / 2 - s[:, None] * (high - low) / board_m
 
 
 def _line_at(s, known, at, reach):
-    """(n,) weights of a straight line's value at a place inside its points; None: it has none."""
-    near = known & (np.abs(s - at) <= reach + 1e-9)
-    x = s[near] - at
+    """Weights (n,) of the value of a straight line at `at`, or None without points around it."""
+    is_near = known & (np.abs(s - at) <= reach + 1e-9)
+    x = s[is_near] - at
     if len(x) < 2 or x[0] > 1e-9 or x[-1] < -1e-9:
         return None
-    found = np.zeros(len(s))
-    found[near] = _straight(x, 0.0)
-    return found
+    weights = np.zeros(len(s))
+    weights[is_near] = _line_weights(x, 0.0)
+    return weights
 
 
-def _straight(x, at):
-    """Weights of the value at a place, of a straight line through values at x."""
+def _line_weights(x, at):
+    """Weights of the value at `at` of the least-squares line through values at x."""
     off = x - x.mean()
     return 1 / len(x) + (at - x.mean()) * off / (off @ off)
 
 
 def _bridges(s, known, bead):
-    """(cells of the bead, n) weights of what is led on from both sides; None: a side is missing."""
+    """Weights (bead cells, n) of the wall under a bead, or None if a side has too few cells.
+
+    The wall is the mean of the two straight lines extrapolated from both sides.
+    """
     cell = s[1] - s[0]
     wide = max(BESIDE_M, 2 * cell) + 1e-9
     low, high = s[bead].min() - cell / 2, s[bead].max() + cell / 2
     sides = known & (s < low) & (s > low - wide), known & (s > high) & (s < high + wide)
     if any(np.count_nonzero(side) < 2 for side in sides):
         return None
-    found = np.zeros((np.count_nonzero(bead), len(s)))
-    for row, at in zip(found, s[bead], strict=True):
+    weights = np.zeros((np.count_nonzero(bead), len(s)))
+    for row, at in zip(weights, s[bead], strict=True):
         for side in sides:
-            row[side] = _straight(s[side], at) / 2
-    return found
+            row[side] = _line_weights(s[side], at) / 2
+    return weights
 
 
 def _second_differences(s, e, variance):
-    """(n,) squares of what values are off the straight line between neighbours, less noise."""
-    found = np.zeros(len(s))
+    """Squares (n,) of the deviations from the line between the two neighbours, less noise."""
+    squares = np.zeros(len(s))
     if len(s) < 3:
-        return found
+        return squares
     part = (s[1:-1] - s[:-2]) / (s[2:] - s[:-2])
-    off = e[1:-1] - (1 - part) * e[:-2] - part * e[2:]
+    deviation = e[1:-1] - (1 - part) * e[:-2] - part * e[2:]
     noise = variance[1:-1] + (1 - part) ** 2 * variance[:-2] + part**2 * variance[2:]
-    found[1:-1] = np.maximum(off**2 - noise, 0.0)
-    found[[0, -1]] = found[[1, -2]]
-    return found
+    squares[1:-1] = np.maximum(deviation**2 - noise, 0.0)
+    squares[[0, -1]] = squares[[1, -2]]
+    return squares
 
 
-def _led_on(s, e, bead, known, gap):
-    """(cells of the bead,) squares of what leading on adds to the gaps on both sides of it."""
+def _extrapolation_squares(s, e, bead, known, gap):
+    """Squares (bead cells,) of the gaps under the bead less the mean gap beside it."""
     at = s[bead]
     beside = np.array([gap[known & (s < at[0])][-1], gap[known & (s > at[-1])][0]])
     return (gap[bead] - beside.mean()) ** 2

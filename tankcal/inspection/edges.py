@@ -1,11 +1,11 @@
-"""The bottom along radial lines: where its edge bends down, and by how much.
+"""Edge settlement of the bottom along radial lines.
 
-Two straight lines through the readings meet at the break-over point x. The edge is R - x wide, R
-being the shell's radius, and drops by
+Two straight lines through the readings meet at the break-over point x. With the radius R of the
+shell, the width of the settled edge is R - x, and its drop is
 
     B = z(x) - z(R) = -m (R - x),    m the slope of the outer line
 
-What bulges inside of there is found by `bulges`.
+`bulges` searches for bulges inside of the break-over point.
 """
 
 from dataclasses import dataclass
@@ -23,11 +23,11 @@ from tankcal.inspection.verdict import gravity
 from tankcal.messages import message
 from tankcal.record.inspection import EdgeProfile, InspectionLimit
 
-FAR_FROM_SHELL_M = 0.3  # of the last reading: from there to the shell the line is carried on
-WIDEST_EDGE, WIDEST_EDGE_M = 0.3, 3.0  # of the radius, and in all
-MOST_BULGES = 3  # of a profile that are rejected
-ZONE = 3.0  # times that: the readings that the bent line goes through
-BEYOND_SHELL = 1.02  # of the shell's radius: farther out is another unit, or another tank
+FAR_FROM_SHELL_M = 0.3  # distance of the last reading from the shell that causes a warning
+WIDEST_EDGE, WIDEST_EDGE_M = 0.3, 3.0  # largest width of an edge: share of the radius, and metres
+MOST_BULGES = 3  # largest number of bulges that are rejected from a profile
+ZONE = 3.0  # width of the zone that the bent line is fitted in, over the largest width of an edge
+BEYOND_SHELL = 1.02  # largest valid radius over the shell's radius; more is another unit or tank
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class Break:
     Attributes
     ----------
     radius_m, z_m : float
-        Of the break-over point.
+        Radius and elevation of the break-over point, m.
     inner, outer : float
-        Slopes dz/dr inside and outside of it.
+        Slopes dz/dr inside and outside of the break-over point.
     cofactor : ndarray, shape (4, 4)
-        Covariance of (z, inner, outer, radius), m2 and so on.
+        Covariance of (z, inner, outer, radius), with z and radius in m.
     dof : float
-        Of it; inf where standard deviations were given.
+        Degrees of freedom of the covariance; inf if standard deviations were given.
     """
 
     radius_m: float
@@ -54,14 +54,29 @@ class Break:
     dof: float
 
     def drop(self, shell_radius_m):
-        """(B, its standard uncertainty) at the shell, m."""
+        """Drop B of the edge at the shell and its standard uncertainty, m."""
         width = shell_radius_m - self.radius_m
+        # dB/d(outer) = -width and dB/d(radius) = outer.
         gradient = np.array([0.0, 0.0, -width, self.outer])
         return -self.outer * width, float(np.sqrt(gradient @ self.cofactor @ gradient))
 
 
 def bent_line(r, unknowns):
-    """(z (n,), Jacobian (n, 4)) of a line that bends, by its (z, inner, outer, radius).
+    """Elevations of a bent line at the radii r, and their Jacobian.
+
+    Parameters
+    ----------
+    r : ndarray, shape (n,)
+        Radii, m.
+    unknowns : sequence of 4 float
+        Elevation of the bend, inner slope, outer slope and radius of the bend.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Elevations, m.
+    ndarray, shape (n, 4)
+        Derivatives of the elevations with respect to the unknowns.
 
     Examples
     --------
@@ -70,36 +85,45 @@ def bent_line(r, unknowns):
     """
     z, inner, outer, x = unknowns
     inside = r < x
-    off = r - x
+    distance = r - x
     slope = np.where(inside, inner, outer)
-    columns = [np.ones(len(r)), np.where(inside, off, 0.0), np.where(inside, 0.0, off), -slope]
-    return z + slope * off, np.column_stack(columns)
+    columns = [
+        np.ones(len(r)),
+        np.where(inside, distance, 0.0),
+        np.where(inside, 0.0, distance),
+        -slope,
+    ]
+    return z + slope * distance, np.column_stack(columns)
 
 
 def find_break(r, z, sd, shell_radius_m):
-    """The break-over point of a profile, or None: its edge does not bend down (at 0.1 %).
+    """Find the break-over point of a profile.
 
-    Sought within `widest_edge` of the shell, by the readings within three times that, but those
-    of a bulge: its flank is no break (`bulges.beside_a_bulge`). What the bent line leaves of them
-    counts where it is more than their standard deviations.
+    The point is searched for within `widest_edge` of the shell. The fit uses the readings within
+    three times this distance. Readings on a bulge are rejected, because the flank of a bulge is no
+    break (`bulges.beside_a_bulge`). If the residuals exceed the standard deviations, the
+    covariance is scaled by the residuals.
 
     Parameters
     ----------
     r, z : ndarray, shape (n,)
-        Rising radii and elevations, m.
+        Ascending radii and elevations, m.
     sd : ndarray, shape (n,), or None
-        Standard deviations; None: by what the bent line leaves.
+        Standard deviations of the elevations, m; None if they follow from the residuals.
     shell_radius_m : float
+        Radius of the shell, m.
 
     Returns
     -------
     Break or None
+        None if the edge does not bend down significantly (0.1 %).
     """
     widest = widest_edge(shell_radius_m)
     near = r >= shell_radius_m - ZONE * widest
     r, z = r[near], z[near]
     weights = np.ones(len(r)) if sd is None else 1.0 / sd[near]
     best = _best_bend(r, z, weights, shell_radius_m - widest)
+    # A profile may have several bulges; each round rejects the most significant bulge.
     for _ in range(MOST_BULGES):
         beside = best and beside_a_bulge(r, z, weights, best[0], shell_radius_m - widest)
         if beside is None:
@@ -111,13 +135,19 @@ def find_break(r, z, sd, shell_radius_m):
     squares, unknowns = best
     straight = _squares(np.column_stack([np.ones(len(r)), r]), z, weights)[1]
     dof, gained = len(r) - 4, straight - squares
+    # The bend must be downwards, and better than rounding.
     if unknowns[2] >= unknowns[1] or gained <= 1e-9 * straight:
         return None
-    left = squares / dof
-    if sd is not None and left <= 1:
+    residual_variance = squares / dof
+    # The bent line has two unknowns more than the straight line: chi-squared test with the given
+    # standard deviations, F test with the residuals.
+    if sd is not None and residual_variance <= 1:
         factor, chance = 1.0, scipy.stats.chi2.sf(gained, 2)
     else:
-        factor, chance = left, scipy.stats.f.sf(gained / 2 / max(left, 1e-12 * gained), 2, dof)
+        factor, chance = (
+            residual_variance,
+            scipy.stats.f.sf(gained / 2 / max(residual_variance, 1e-12 * gained), 2, dof),
+        )
     if chance > ALPHA:
         return None
     jacobian = bent_line(r, unknowns)[1] * weights[:, None]
@@ -127,81 +157,89 @@ def find_break(r, z, sd, shell_radius_m):
 
 
 def _best_bend(r, z, weights, least_radius):
-    """(sum of squares, unknowns) of the best line that bends there or farther out, or None."""
+    """Sum of squares and unknowns of the best line that bends at `least_radius` or beyond."""
     if len(r) < LEAST_READINGS:
         return None
-    bends = [one for one in _bends(r, z, weights) if one[1][3] >= least_radius]
-    return min(bends, key=lambda one: one[0], default=None)
+    bends = [bend for bend in _bends(r, z, weights) if bend[1][3] >= least_radius]
+    return min(bends, key=lambda bend: bend[0], default=None)
 
 
 def widest_edge(shell_radius_m):
-    """Widest edge of a bottom that is looked for, m: 3 m, of small tanks 0.3 of the radius."""
+    """Largest width of a settled edge, m: 3 m, or 0.3 of the radius of a small tank."""
     return min(WIDEST_EDGE_M, WIDEST_EDGE * shell_radius_m)
 
 
 def _squares(columns, z, weights):
-    """(unknowns, weighed sum of squares) of a linear fit."""
+    """Unknowns and weighted sum of squared residuals of a linear fit."""
     unknowns = np.linalg.lstsq(columns * weights[:, None], z * weights, rcond=None)[0]
     return unknowns, float(np.sum(((columns @ unknowns - z) * weights) ** 2))
 
 
 def _bends(r, z, weights):
-    """(sum of squares, unknowns) of the best line that bends at or after each inner reading.
+    """Sum of squares and unknowns of the best line that bends at or after each inner reading.
 
-    Between two readings the two lines are free of each other; where they do not meet there, the
-    best bend is at a reading.
+    Between two readings, the two lines are fitted independently. If they do not meet in this
+    interval, the best bend is at a reading.
     """
     columns = np.column_stack([np.ones(len(r)), r])
     for k in range(1, len(r) - 1):
-        off = r - r[k]
-        bent = np.column_stack([np.ones(len(r)), np.minimum(off, 0), np.maximum(off, 0)])
+        distance = r - r[k]
+        bent = np.column_stack([np.ones(len(r)), np.minimum(distance, 0), np.maximum(distance, 0)])
         unknowns, squares = _squares(bent, z, weights)
         yield squares, (*unknowns, r[k])
         if k > len(r) - 3:
             continue
         parts = slice(k + 1), slice(k + 1, None)
-        (one, left), (two, right) = (_squares(columns[i], z[i], weights[i]) for i in parts)
+        (inner, inner_squares), (outer, outer_squares) = (
+            _squares(columns[i], z[i], weights[i]) for i in parts
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
-            x = (one[0] - two[0]) / (two[1] - one[1])
+            x = (inner[0] - outer[0]) / (outer[1] - inner[1])
         if r[k] < x < r[k + 1]:
-            yield left + right, (one[0] + one[1] * x, one[1], two[1], x)
+            yield inner_squares + outer_squares, (inner[0] + inner[1] * x, inner[1], outer[1], x)
 
 
-# ---- what is judged, and what is saved
+# ---- figures and saved profiles
 
 
 def assess_edges(lines, shell_radius_m, edge, bulge, *, file, log):
-    """EdgeProfile of each radial line, and the figures that are judged.
+    """Compute the edge profile of each radial line, and the figures of edge and bulge.
 
     Parameters
     ----------
     lines : tuple of RadialLine
+        Levelled profiles.
     shell_radius_m : float
+        Radius of the shell, m.
     edge, bulge : EdgeLimits, BulgeLimits
+        Limits of the rule.
     file : str
         Name of edge_profiles.csv.
     log : Log
-        Takes warnings, and problems of lines that are not of this tank.
+        Receives warnings, and problems of lines that do not belong to this tank.
 
     Returns
     -------
-    list of EdgeProfile, list of Figure
+    list of EdgeProfile
+        One profile for each line.
+    list of Figure
+        The edge settlement, and the largest bulge if there is a bulge.
     """
-    before = len(log.problems)
+    problem_count = len(log.problems)
     for line in lines:
         _check_reach(line, shell_radius_m, file, log)
-    if len(log.problems) > before or not lines:
+    if len(log.problems) > problem_count or not lines:
         return [], []
-    breaks = [find_break(one.radius_m, one.z_m, one.sd_m, shell_radius_m) for one in lines]
+    breaks = [find_break(item.radius_m, item.z_m, item.sd_m, shell_radius_m) for item in lines]
     profiles = [
-        _profile(line, found, shell_radius_m, edge)
-        for line, found in zip(lines, breaks, strict=True)
+        _profile(line, bend, shell_radius_m, edge) for line, bend in zip(lines, breaks, strict=True)
     ]
     figures = [_edge_figure(lines, profiles, breaks, edge), _bulge_figure(lines, breaks, bulge)]
-    return profiles, [one for one in figures if one is not None]
+    return profiles, [item for item in figures if item is not None]
 
 
 def _check_reach(line, shell_radius_m, file, log):
+    """Report lines that go beyond the shell, end far from it or have few readings near it."""
     last = float(line.radius_m[-1])
     if last > BEYOND_SHELL * shell_radius_m:
         text = message("edge_beyond_shell", "the line at {azimuth:g} degrees goes to {last:.4g} m,"
@@ -224,97 +262,98 @@ def _check_reach(line, shell_radius_m, file, log):
         log.warning(file, text, line.row, "radius_m")
 
 
-def _profile(line, found, shell_radius_m, edge):
+def _profile(line, bend, shell_radius_m, edge):
     """The `EdgeProfile` of one line."""
-    given = {
+    measured = {
         "azimuth_deg": line.azimuth_deg,
         "radius_m": line.radius_m.tolist(),
         "z_mm": (1000 * line.z_m).tolist(),
     }
-    if found is None:
-        nothing = dict.fromkeys(("break_radius_m", "width_m", "drop_mm", "U_mm", "limit_mm"))
-        return EdgeProfile(**given, **nothing)
-    width = shell_radius_m - found.radius_m
-    drop, u = found.drop(shell_radius_m)
+    if bend is None:
+        undetermined = dict.fromkeys(("break_radius_m", "width_m", "drop_mm", "U_mm", "limit_mm"))
+        return EdgeProfile(**measured, **undetermined)
+    width = shell_radius_m - bend.radius_m
+    drop, u = bend.drop(shell_radius_m)
     return EdgeProfile(
-        **given,
-        break_radius_m=found.radius_m,
+        **measured,
+        break_radius_m=bend.radius_m,
         width_m=width,
         drop_mm=1000 * drop,
-        U_mm=1000 * u * float(coverage_factor(PROBABILITY, found.dof)),
+        U_mm=1000 * u * float(coverage_factor(PROBABILITY, bend.dof)),
         limit_mm=largest_drop_mm(edge, width, 2 * shell_radius_m, line.weld_deg),
     )
 
 
 def _edge_figure(lines, profiles, breaks, edge):
-    """Figure of the line whose drop is nearest its limit, or the largest."""
-    with_break = [i for i, one in enumerate(profiles) if one.drop_mm is not None]
+    """Figure of the line that decides the check of the edge settlement."""
+    with_break = [i for i, profile in enumerate(profiles) if profile.drop_mm is not None]
     place = {"code": "edge_settlement", "unit": "mm", "used": len(profiles)}
     if not with_break:
         return Figure(value=None, U=None, k=None, dof=0.0, limit=None, remark="no_break", **place)
     limited = [i for i in with_break if profiles[i].limit_mm is not None]
     worst = max(limited or with_break, key=lambda i: _gravity(profiles[i]))
-    one, found = profiles[worst], breaks[worst]
+    profile, bend = profiles[worst], breaks[worst]
     limit = None
-    if one.limit_mm is not None:
-        limit = InspectionLimit("edge_settlement", one.limit_mm, edge.clause, edge.verified)
+    if profile.limit_mm is not None:
+        limit = InspectionLimit("edge_settlement", profile.limit_mm, edge.clause, edge.verified)
     return Figure(
-        value=one.drop_mm,
-        U=one.U_mm,
-        k=float(coverage_factor(PROBABILITY, found.dof)),
-        dof=found.dof,
+        value=profile.drop_mm,
+        U=profile.U_mm,
+        k=float(coverage_factor(PROBABILITY, bend.dof)),
+        dof=bend.dof,
         limit=limit,
-        azimuth_deg=one.azimuth_deg,
+        azimuth_deg=profile.azimuth_deg,
         remark="edge_by_curves" if edge.curves else "edge_by_width",
         remark_values={
-            "width_m": one.width_m,
+            "width_m": profile.width_m,
             "weld_deg": lines[worst].weld_deg,
-            "below_inner_line_mm": one.drop_mm + 1000 * found.inner * one.width_m,
+            "below_inner_line_mm": profile.drop_mm + 1000 * bend.inner * profile.width_m,
         },
         **place,
     )
 
 
 def _gravity(profile):
+    """Sort key of a profile with a break-over point, see `verdict.gravity`."""
     return gravity(profile.drop_mm, profile.U_mm, profile.limit_mm)
 
 
 def _bulge_figure(lines, breaks, bulge):
-    """Figure of the largest bulge or dent inside of the break-over points; None: there is none."""
+    """Figure of the largest bulge or dent inside of the break-over points, or None."""
     ratio = bulge.height_per_radius_mm_m
-    found = []
+    bulges = []
     for line, bend in zip(lines, breaks, strict=True):
         inside = line.radius_m <= (np.inf if bend is None else bend.radius_m)
         sd = None if line.sd_m is None else line.sd_m[inside]
-        one = find_bulge(line.radius_m[inside], line.z_m[inside], sd, ratio)
-        if one is not None:
-            found.append((line, one))
-    if not found:
+        largest = find_bulge(line.radius_m[inside], line.z_m[inside], sd, ratio)
+        if largest is not None:
+            bulges.append((line, largest))
+    if not bulges:
         return None
     normal = float(coverage_factor(PROBABILITY, np.inf))
-    line, one = max(found, key=lambda two: _gravity_of_bulge(two[1], normal, ratio))
-    k = normal if np.isfinite(one.u_m) else None
+    line, largest = max(bulges, key=lambda two: _gravity_of_bulge(two[1], normal, ratio))
+    k = normal if np.isfinite(largest.u_m) else None
     limit = None
     if ratio is not None:
-        value = ratio * one.half_length_m
+        value = ratio * largest.half_length_m
         limit = InspectionLimit("bottom_bulge", value, bulge.clause, bulge.verified)
     return Figure(
         code="bottom_bulge",
         unit="mm",
-        value=1000 * one.height_m,
-        U=None if k is None else 1000 * k * one.u_m,
+        value=1000 * largest.height_m,
+        U=None if k is None else 1000 * k * largest.u_m,
         k=k,
         dof=0.0 if k is None else np.inf,
         limit=limit,
         azimuth_deg=line.azimuth_deg,
-        used=len(found),
+        used=len(bulges),
         remark="bulge_place",
-        remark_values={"radius_m": one.radius_m, "half_length_m": one.half_length_m},
+        remark_values={"radius_m": largest.radius_m, "half_length_m": largest.half_length_m},
     )
 
 
 def _gravity_of_bulge(bulge, k, ratio):
-    """`gravity` of a bulge in mm; ratio  limit of its height, mm per metre of its half length."""
+    """Sort key of a bulge, see `verdict.gravity`; `ratio` is the limit, mm per m half length."""
     limit = None if ratio is None else ratio * bulge.half_length_m
     U = 1000 * k * bulge.u_m if np.isfinite(bulge.u_m) else None
     return gravity(1000 * bulge.height_m, U, limit)

@@ -1,4 +1,4 @@
-"""Epochs of a levelling: what each has, its points against what is asked for, and differences."""
+"""Epochs of a levelling, the checks of their points, and the differences between epochs."""
 
 import re
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ import scipy
 from tankcal.inspection.out_of_plane import arcs_after
 from tankcal.messages import list_some, message
 
-LEAST_POINTS = 8
-WIDEST_GAP_DEG = 90.0
-SHOWN = 5  # names in one line
-OTHER_DATUM_M = 1.0  # a tank does not settle by more: the epochs have no bench mark in common
-WITHIN_NOISE = 0.05  # level at which elevations are all the same but for their errors
+LEAST_POINTS = 8  # least number of points of an epoch
+WIDEST_GAP_DEG = 90.0  # largest gap between neighbouring points of an epoch
+SHOWN = 5  # largest number of names listed in a message
+OTHER_DATUM_M = 1.0  # largest mean settlement; more shows epochs without a common bench mark
+WITHIN_NOISE = 0.05  # significance level of the test that all elevations are equal
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,15 @@ class Epoch:
     Attributes
     ----------
     name : str
-        Of the epoch.
+        Name of the epoch.
     since : str or None
-        The earlier one of a difference.
+        Name of the earlier epoch of a difference; None for an epoch itself.
     points : tuple of str
-        Names.
-    azimuth_rad, z_m, u_m : ndarray, shape (n,)
-        Rising from 0 to 2 pi, clockwise from +y; elevations (means of repeats), and their standard
-        uncertainties, nan where none is known.
+        Names of the points.
+    azimuth_rad : ndarray, shape (n,)
+        Azimuths, ascending from 0 to 2 pi, clockwise from +y.
+    z_m, u_m : ndarray, shape (n,)
+        Elevations (means of repeated readings) and their standard uncertainties, nan if unknown.
     """
 
     name: str
@@ -44,21 +45,21 @@ class Epoch:
 
 @dataclass(frozen=True)
 class Levelling:
-    """Every epoch of settlement.csv.
+    """All epochs of settlement.csv.
 
     Attributes
     ----------
     file : str
-        Its name.
+        Name of the file.
     epochs : tuple of Epoch
-        Dates in their order, other names in the order of the file.
+        Epochs in the order of their dates; epochs with other names in the order of the file.
     sd_known : bool
-        Whether s_mm was given; else it is of the repeats, if there are any.
+        Whether s_mm was given. If not, the standard deviation is estimated from repeated readings.
     dof : float
-        Degrees of freedom of all standard deviations: inf as given, else those of the repeats; 0:
-        none is known.
+        Degrees of freedom of all standard deviations: inf if given, the degrees of freedom of the
+        repeated readings if estimated, and 0 if unknown.
     radius_m : float or None
-        Of the circle through the points; None: they came with azimuths.
+        Radius of the circle through the points, m; None if azimuths were given.
     """
 
     file: str
@@ -69,7 +70,7 @@ class Levelling:
 
 
 def is_date(name):
-    """Whether a name is a date whose order is that of its letters: 2024, 2024-05, 2024-05-31.
+    """Whether a name is a date that sorts as text, such as 2024, 2024-05 or 2024-05-31.
 
     >>> [is_date(name) for name in ("2024", "2024-05", "2024-02-30", "31-12-2019", "2024-5-31")]
     [True, True, False, False, False]
@@ -84,44 +85,44 @@ def is_date(name):
 
 
 def is_like_a_date(name):
-    """Whether a name is of numbers and hyphens, as dates are, but is none (31-12-2019)."""
+    """Whether a name has numbers and hyphens as a date, but is no such date (31-12-2019)."""
     return re.fullmatch(r"[0-9]+(-[0-9]+){1,2}", name) is not None and not is_date(name)
 
 
 def in_order(epochs):
-    """Epochs by date where all names are dates such as 2024, 2024-05 or 2024-05-31."""
-    dated = all(is_date(one.name) for one in epochs)
-    return sorted(epochs, key=lambda one: one.name) if dated else epochs
+    """Epochs sorted by date if all names are dates such as 2024, 2024-05 or 2024-05-31."""
+    dated = all(is_date(epoch.name) for epoch in epochs)
+    return sorted(epochs, key=lambda epoch: epoch.name) if dated else epochs
 
 
 def differences(levelling, log):
-    """Epochs of changes: each later one since the first, and the last since the one before it."""
-    pairs = [(one, levelling.epochs[0]) for one in levelling.epochs[1:]]
+    """Differences of each later epoch to the first, and of the last epoch to the previous one."""
+    pairs = [(epoch, levelling.epochs[0]) for epoch in levelling.epochs[1:]]
     if len(pairs) > 1:
         pairs.append((levelling.epochs[-1], levelling.epochs[-2]))
-    found = [_difference(*pair, levelling.file, log) for pair in pairs]
-    return [one for one in found if one is not None]
+    changes = [_difference(*pair, levelling.file, log) for pair in pairs]
+    return [epoch for epoch in changes if epoch is not None]
 
 
 def _difference(later, earlier, file, log):
-    """Epoch of the change at the points of both; None, and a warning, where they are too few."""
-    places = {point: i for i, point in enumerate(earlier.points)}
-    both = [i for i, point in enumerate(later.points) if point in places]
-    others = [places[later.points[i]] for i in both]
-    alone = [*dict.fromkeys(point for point in (*later.points, *earlier.points)
-                            if point not in places or point not in later.points)]  # fmt: skip
-    z = later.z_m[both] - earlier.z_m[others]
-    gaps = np.degrees(arcs_after(later.azimuth_rad[both])) if both else np.array([360.0])
+    """Difference of two epochs at their common points, or None if these are too few."""
+    earlier_place = {point: i for i, point in enumerate(earlier.points)}
+    common = [i for i, point in enumerate(later.points) if point in earlier_place]
+    earlier_rows = [earlier_place[later.points[i]] for i in common]
+    unmatched = [*dict.fromkeys(point for point in (*later.points, *earlier.points)
+                      if point not in earlier_place or point not in later.points)]  # fmt: skip
+    z = later.z_m[common] - earlier.z_m[earlier_rows]
+    gaps = np.degrees(arcs_after(later.azimuth_rad[common])) if common else np.array([360.0])
     names = {"later": later.name, "earlier": earlier.name}
-    if len(both) < LEAST_POINTS or gaps.max() > WIDEST_GAP_DEG:
+    if len(common) < LEAST_POINTS or gaps.max() > WIDEST_GAP_DEG:
         text = message("levels_no_difference", "{count} points are in both {later!r} and"
                        " {earlier!r}; {least} all round would be needed: no difference of the two"
-                       " is made", count=len(both), least=LEAST_POINTS, **names)  # fmt: skip
+                       " is made", count=len(common), least=LEAST_POINTS, **names)  # fmt: skip
         log.warning(file, text, None, "epoch")
         return None
-    if alone:
+    if unmatched:
         text = message("levels_alone", "only one of {later!r} and {earlier!r} has {points}: left"
-                       " out of their difference", points=list_some(alone, SHOWN),
+                       " out of their difference", points=list_some(unmatched, SHOWN),
                        **names)  # fmt: skip
         log.warning(file, text, None, "epoch")
     if abs(np.mean(z)) > OTHER_DATUM_M:
@@ -129,20 +130,33 @@ def _difference(later, earlier, file, log):
                        " whole: without a common bench mark nothing is said of uniform settlement",
                        off=float(np.mean(z)), **names)  # fmt: skip
         log.warning(file, text, None, "elevation_m")
-    u = np.hypot(later.u_m[both], earlier.u_m[others])
-    points = tuple(later.points[i] for i in both)
-    return Epoch(later.name, earlier.name, points, later.azimuth_rad[both], z, u)
+    u = np.hypot(later.u_m[common], earlier.u_m[earlier_rows])
+    points = tuple(later.points[i] for i in common)
+    return Epoch(later.name, earlier.name, points, later.azimuth_rad[common], z, u)
 
 
 def warn_of_points(epoch, file, diameter_m, limits, log):
-    """Warnings of too few points for the tank, of an odd number, and of wide gaps."""
+    """Warn of too few points for the tank, of an odd number of points, and of wide gaps.
+
+    Parameters
+    ----------
+    epoch : Epoch
+    file : str
+        Name of settlement.csv.
+    diameter_m : float
+        Diameter of the tank, m.
+    limits : SettlementLimits
+        Limits of the number and the distance of points; None in a field for no limit.
+    log : Log
+        Receives the warnings.
+    """
     count, per_point = len(epoch.points), limits.diameter_per_point_m
-    wanted = 0 if per_point is None else int(np.ceil(diameter_m / per_point - 1e-9))
-    wanted += wanted % 2
-    if count < wanted:
+    required = 0 if per_point is None else int(np.ceil(diameter_m / per_point - 1e-9))
+    required += required % 2
+    if count < required:
         text = message("levels_fewer_than_asked", "epoch {epoch!r} has {count} points; a tank of"
                        " {diameter:.4g} m asks for {wanted}", epoch=epoch.name, count=count,
-                       diameter=diameter_m, wanted=wanted)  # fmt: skip
+                       diameter=diameter_m, wanted=required)  # fmt: skip
         log.warning(file, text)
     if count % 2:
         text = message("levels_odd", "epoch {epoch!r} has {count} points; an even number is"
@@ -160,15 +174,19 @@ def warn_of_points(epoch, file, diameter_m, limits, log):
 
 
 def is_within_noise(epoch, dof):
-    """Whether the elevations of an Epoch are all the same but for their errors (chi2 or F, 5 %)."""
+    """Whether the elevations of an epoch agree within their uncertainties (5 %).
+
+    The test is the chi-squared test, or the F test if the standard deviations were estimated with
+    `dof` degrees of freedom. Without a standard deviation (dof = 0) the result is False.
+    """
     if not dof:
         return False
     weights = epoch.u_m**-2.0
-    off = epoch.z_m - np.average(epoch.z_m, weights=weights)
-    weighed, free = float(off**2 @ weights), len(off) - 1
-    chance = (
-        scipy.stats.chi2.sf(weighed, free)
+    deviations = epoch.z_m - np.average(epoch.z_m, weights=weights)
+    chi2, count = float(deviations**2 @ weights), len(deviations) - 1
+    significance = (
+        scipy.stats.chi2.sf(chi2, count)
         if np.isinf(dof)
-        else scipy.stats.f.sf(weighed / free, free, dof)
+        else scipy.stats.f.sf(chi2 / count, count, dof)
     )
-    return bool(chance > WITHIN_NOISE)
+    return bool(significance > WITHIN_NOISE)

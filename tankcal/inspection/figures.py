@@ -1,15 +1,15 @@
-"""A figure of an inspection before it is judged: value, U, and the limit it is held against."""
+"""Figure of an inspection before the decision: value, expanded uncertainty and limit."""
 
 from dataclasses import dataclass, field
 
 from tankcal.record.inspection import InspectionLimit
 
-PROBABILITY = 0.95  # of the interval that U spans
+PROBABILITY = 0.95  # coverage probability of U
 
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """One number against at most one limit, in the words of `InspectionCheck`.
+    """A measured value with at most one limit, in the terms of `InspectionCheck`.
 
     Attributes
     ----------
@@ -18,26 +18,26 @@ class Figure:
     unit : str
         "mm", "1/m" or "" (a ratio).
     value : float or None
-        With its sign; None: not determined.
+        Value with its sign; None if not determined.
     U : float or None
-        Expanded, for PROBABILITY; None: no standard deviation is known.
+        Expanded uncertainty for PROBABILITY; None if no standard deviation is known.
     k : float or None
         Coverage factor of U.
     dof : float
         Degrees of freedom of U; may be inf.
     limit : InspectionLimit or None
-        None: the rule has none, or what it needs is not given.
+        None if the rule has no limit, or if the limit requires data that are not given.
     at_least : bool
-        Whether the value must reach the limit; else its size must stay within it.
+        Whether the limit is a lower limit of the value; if not, an upper limit of its magnitude.
     course, height_m, azimuth_deg, epoch : optional
-        Where, and of which epoch or difference of two.
+        Place of the value, and its epoch or difference of two epochs.
     used : int
-        Places that the largest was taken from.
+        Number of places that the largest value was selected from.
     reading, U_reading : float or None
-        Largest single reading and its expanded uncertainty, where the value is an estimate of the
-        largest true value; None: the value is a reading itself.
+        Largest single reading and its expanded uncertainty if the value estimates the largest true
+        value; None if the value is a reading.
     remark, remark_values
-        Code of what is to be read beside it, and its numbers.
+        Code of a remark on the value, and the numbers of the remark.
     """
 
     code: str

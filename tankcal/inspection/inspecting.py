@@ -1,4 +1,4 @@
-"""The assembling of an inspection: figures of all parts, judged, as an `InspectionFile`."""
+"""Assemble an inspection: figures and verdicts of all parts as an `InspectionFile`."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,26 +23,26 @@ from tankcal.pipeline.cloud_passes import Reading
 from tankcal.record.inspection import InspectedTank, InspectionFile, InspectionRule
 from tankcal.record.texts import WarningRecord, warnings_of
 
-NOMINALS = ("drawing", "mean")
-OFF_NOMINAL_MM = 5.0  # of the mean radius: less is within what shells are built to
+NOMINALS = ("drawing", "mean")  # sources of the nominal radius
+OFF_NOMINAL_MM = 5.0  # deviation of the mean radius that is within building tolerances
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What to inspect, and by what.
+    """Input and options of an inspection.
 
     Attributes
     ----------
     source : path
         A job, a record.json, or a folder of results.
     rule : str or None
-        Name of a shipped rule, or path of a file; None: as the job says, else DEFAULT.
+        Name of a shipped rule or path of a rule file. If None, the rule of the job, or DEFAULT.
     nominal : str
-        One of NOMINALS: what the radii are compared with, that of the drawing or their own mean.
+        One of NOMINALS: the radii are compared with the radius of the drawing or with their mean.
     settlement, edges : path or None
-        settlement.csv and edge_profiles.csv; None: files of these names beside a job, if any.
+        settlement.csv and edge_profiles.csv. If None, files of these names in the folder of a job.
     yield_pa : float or None
-        Yield stress of the shell's steel; None: as the job says.
+        Yield stress of the shell's steel, Pa. If None, the yield stress that the job states.
     """
 
     source: str | Path
@@ -59,8 +59,9 @@ def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
     Parameters
     ----------
     asked : Asked
+        Input and options.
     progress, part_progress : callable, optional
-        As of `tankcal.run`.
+        Callbacks as in `tankcal.run`.
 
     Returns
     -------
@@ -69,27 +70,27 @@ def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
     Raises
     ------
     InputError
-        With every problem of rule and tables; of the job or the record; for an older record, which
-        does not keep the shape of its wall.
+        If the rule, the tables, the job or the record have problems, or if an older record does
+        not contain the shape of its wall. The error lists all problems.
     SolutionError
-        As `tankcal.run`.
+        As in `tankcal.run`.
 
     Examples
     --------
     >>> from tankcal.inspection.inspecting import Asked, inspect_files
-    >>> found = inspect_files(Asked("examples/silva-1995"))
-    >>> [(one.code, one.verdict) for one in found.checks[:2]]
+    >>> inspection = inspect_files(Asked("examples/silva-1995"))
+    >>> [(check.code, check.verdict) for check in inspection.checks[:2]]
     [('plumbness_axis', 'passed'), ('plumbness_generatrix', 'guard_band')]
     """
     log, progress = Log(), progress or (lambda text: None)
     rule = None if asked.rule is None else find_rule(asked.rule, log)
-    files = _levelled(asked)
-    _read_alone(files, log)  # what is wrong with them is told before a long survey is computed
+    files = _levelling_paths(asked)
+    _check_levellings(files, log)  # report their problems before a long computation of the survey
     log.stop_if_problems()
     basis = basis_of(asked.source, progress, part_progress)
     rule = rule or _rule_of_job(basis, log)
     if basis.is_older and files == (None, None):
-        log.problem(basis.file, _older())
+        log.problem(basis.file, _older_message())
     log.stop_if_problems()
     strength = basis.strength
     if asked.yield_pa is not None:
@@ -97,78 +98,87 @@ def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
     bottom = inspect_bottom(*files, strength, rule.sections, log)
     log.stop_if_problems()
     welds = _welds(basis, rule, part_progress, progress)
-    found = inspection_of(basis, rule, bottom, welds, nominal=asked.nominal)
-    told = [_older_warning(basis)] if basis.is_older else []
-    return replace(found, warnings=[*found.warnings, *warnings_of([*log.warnings, *told])])
+    inspection = inspection_of(basis, rule, bottom, welds, nominal=asked.nominal)
+    older = [_older_warning(basis)] if basis.is_older else []
+    return replace(
+        inspection, warnings=[*inspection.warnings, *warnings_of([*log.warnings, *older])]
+    )
 
 
-def _levelled(asked):
-    """Paths of the two tables of levelling: as asked, or beside a job; None where there is none."""
-    source, found = Path(asked.source), []
+def _levelling_paths(asked):
+    """Paths of the two levelling tables, given or in the folder of a job; None for no table."""
+    source, paths = Path(asked.source), []
     folder = source if source.is_dir() else source.parent
     is_job = not ((source / RECORD).is_file() or source.suffix.lower() == ".json")
     for given, name in zip((asked.settlement, asked.edges), OF_INSPECTIONS, strict=True):
         beside = folder / name if is_job and (folder / name).is_file() else None
-        found.append(beside if given is None else Path(given))
-    return tuple(found)
+        paths.append(beside if given is None else Path(given))
+    return tuple(paths)
 
 
-def _read_alone(files, log):
-    """Tell `log` what is wrong with the tables of levelling themselves."""
-    told = Log()  # their warnings come once more with the figures
+def _check_levellings(files, log):
+    """Report the problems of the levelling tables to `log`."""
+    alone = Log()  # drops the warnings, which are reported again with the figures
     settlement, edges = files
     if settlement is not None:
-        read_settlement(settlement, told)
+        read_settlement(settlement, alone)
     if edges is not None:
-        read_edge_profiles(edges, told)
-    log.problems += told.problems
+        read_edge_profiles(edges, alone)
+    log.problems += alone.problems
 
 
 def _rule_of_job(basis, log):
-    """The rule that a job names, a file beside it, or the usual one; None after telling `log`."""
+    """Rule that a job names, or the default rule; None if `log` received a problem of the rule."""
     name = basis.rule or DEFAULT
     is_file = name.lower().endswith(".toml")
     return find_rule(str(basis.folder / name) if is_file else name, log)
 
 
 def _welds(basis, rule, part_progress, progress):
-    """`GapsFound` at the welds: of the clouds of a job, else of none."""
+    """`GapsFound` at the welds, from the clouds of a job or without any determined gap."""
     if basis.survey is not None:
-        most = {code: limit_of(rule, code) for code in ("peaking", "banding")}
-        limits = {code: one.value for code, one in most.items() if one is not None}
+        gap_limits = {code: limit_of(rule, code) for code in ("peaking", "banding")}
+        limits = {code: entry.value for code, entry in gap_limits.items() if entry is not None}
         return gaps_of_result(basis.survey, limits, Reading(None, part_progress), progress)
-    given = [one.get("welds_rad") or () for one in basis.job["courses"]]
-    return undetermined(known_welds(basis.courses_m, given), "gap_no_cloud")
+    given_rad = [entry.get("welds_rad") or () for entry in basis.job["courses"]]
+    return undetermined(known_welds(basis.courses_m, given_rad), "gap_no_cloud")
 
 
 def inspection_of(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
-    """The `InspectionFile` of what was computed.
+    """Build the `InspectionFile` from the results of all parts.
 
     Parameters
     ----------
     basis : basis.Basis
+        Job or record, with the shape of the wall.
     rule : rules.Rule or None
-        None: figures without limits.
+        Rule with the limits; None for figures without limits.
     bottom : bottom.Bottom, optional
+        Results of the levellings.
     welds : largest_gaps.GapsFound, optional
+        Gaps at the welds.
     nominal : str
         One of NOMINALS.
+
+    Returns
+    -------
+    record.inspection.InspectionFile
     """
-    sizes, own, bottom = basis.sizes, [], bottom or Bottom()
+    sizes, problems, bottom = basis.sizes, [], bottom or Bottom()
     if nominal == "mean":
         sizes = replace(sizes, nominal_radius_m=None)
     if basis.shape is None:
         figures, generatrices, levels = not_surveyed(rule, sizes, "wall_not_surveyed"), None, []
     else:
         figures, generatrices, levels = inspect_shape(basis.shape, sizes, rule)
-        own += _doubts(basis, sizes, levels)
+        problems += _shape_warnings(basis, sizes, levels)
     if welds is not None:
-        figures += [_of_gap(one, limit_of(rule, one.code)) for one in welds.figures]
-    checks = [judged(one) for one in (*figures, *bottom.figures)]  # in the order of CHECKS
+        figures += [_gap_figure(item, limit_of(rule, item.code)) for item in welds.figures]
+    checks = [judged(item) for item in (*figures, *bottom.figures)]  # in the order of CHECKS
     return InspectionFile(
         notice=basis.job["certificate"].get("notice") or "",
-        tank=_tank(basis, sizes, levels),
-        rule=_rule(rule),
+        tank=_tank_record(basis, sizes, levels),
+        rule=_rule_record(rule),
         as_built=bottom.as_built,
         checks=checks,
         generatrices=generatrices,
@@ -176,33 +186,34 @@ def inspection_of(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
         gaps=[] if welds is None else list(welds.gaps),
         settlements=list(bottom.settlements),
         edges=list(bottom.edges),
-        warnings=[*(WarningRecord(**one) for one in basis.warnings), *warnings_of(own)],
+        warnings=[*(WarningRecord(**item) for item in basis.warnings), *warnings_of(problems)],
     )
 
 
-def _of_gap(one, limit):
-    """The `Figure` of a `largest_gaps.GapFigure`."""
+def _gap_figure(gap, limit):
+    """`Figure` of a `largest_gaps.GapFigure`."""
     return Figure(
-        code=one.code,
+        code=gap.code,
         unit="mm",
-        value=one.value_mm,
-        U=one.U_mm,
-        k=one.k,
+        value=gap.value_mm,
+        U=gap.U_mm,
+        k=gap.k,
         dof=np.inf,
         limit=limit,
-        course=one.course,
-        height_m=one.height_m,
-        azimuth_deg=one.azimuth_deg,
-        used=one.used,
-        remark=one.remark,
-        remark_values=one.remark_values,
+        course=gap.course,
+        height_m=gap.height_m,
+        azimuth_deg=gap.azimuth_deg,
+        used=gap.used,
+        remark=gap.remark,
+        remark_values=gap.remark_values,
     )
 
 
-def _tank(basis, sizes, levels):
+def _tank_record(basis, sizes, levels):
+    """`InspectedTank` of the file."""
     survey, is_surveyed = basis.job["survey"] or {}, basis.shape is not None
     by_drawing = sizes.nominal_radius_m is not None
-    mean_m = 2 * float(np.mean([one.mean_radius_m for one in levels])) if levels else None
+    mean_m = 2 * float(np.mean([level.mean_radius_m for level in levels])) if levels else None
     return InspectedTank(
         id=basis.job["tank"]["id"],
         name=basis.job["source"],
@@ -219,19 +230,20 @@ def _tank(basis, sizes, levels):
     )
 
 
-def _rule(rule):
+def _rule_record(rule):
+    """`InspectionRule` of the file, or None without a rule."""
     if rule is None:
         return None
     return InspectionRule(rule.name, rule.file, rule.source, rule.verified, rule.remark)
 
 
-def _doubts(basis, sizes, levels):
-    """What the shape of a wall should be read with."""
+def _shape_warnings(basis, sizes, levels):
+    """Warnings about the shape of a wall."""
     if sizes.nominal_radius_m is not None:
-        yield from _of_nominal(basis, sizes, levels)
-    yield from _of_set_aside(basis)
-    plumbs = [*basis.shape["plumbs"][-1:], *basis.shape["courses"]]
-    if any(sum(one["is_read"]) < LEAST_READ for one in plumbs):
+        yield from _nominal_warnings(basis, sizes, levels)
+    yield from _rejected_warnings(basis)
+    plumb_lines = [*basis.shape["plumbs"][-1:], *basis.shape["courses"]]
+    if any(sum(plumb["is_read"]) < LEAST_READ for plumb in plumb_lines):
         text = message(
             "inspect_between_readings",
             "fewer than {least} generatrices have readings at both ends: the plumb is estimated "
@@ -242,9 +254,9 @@ def _doubts(basis, sizes, levels):
         yield Problem(basis.file, text)
 
 
-def _of_nominal(basis, sizes, levels):
-    """Every radius on one side of the nominal one: is that what was built?"""
-    means = [1000 * (one.mean_radius_m - sizes.nominal_radius_m) for one in levels]
+def _nominal_warnings(basis, sizes, levels):
+    """Warning if the mean radii of all levels deviate alike from the nominal radius."""
+    means = [1000 * (level.mean_radius_m - sizes.nominal_radius_m) for level in levels]
     spread = max(means) - min(means)
     middle = sum(means) / len(means)
     if abs(middle) > max(2 * spread, OFF_NOMINAL_MM):
@@ -258,24 +270,25 @@ def _of_nominal(basis, sizes, levels):
         yield Problem(basis.file, text, column="tank.nominal_diameter_m")
 
 
-def _of_set_aside(basis):
-    """Points near the wall that were not taken for it, and so are not judged."""
-    found = basis.shape["set_aside"]
-    if not found:
+def _rejected_warnings(basis):
+    """Warning about rejected points near the wall, which enter no check."""
+    rejected = basis.shape["set_aside"]
+    if not rejected:
         return
-    worst = max(found, key=lambda one: abs(one["residual_mm"]))
+    worst = max(rejected, key=lambda point: abs(point["residual_mm"]))
     text = message(
         "inspect_set_aside",
         "{count} points near the wall were not taken for it and are not judged, the farthest "
         "{point} ({residual_mm:+.1f} mm, {height_m:.2f} m up, azimuth {azimuth_deg:.0f} deg): "
         "fittings or slips, or a dent? look there",
-        count=len(found),
+        count=len(rejected),
         **worst,
     )
     yield Problem(basis.file, text)
 
 
-def _older():
+def _older_message():
+    """Message that an older record cannot be inspected."""
     return message(
         "inspect_older_record",
         "a record of a version that did not keep the shape of its wall (radii by azimuth and "
@@ -284,6 +297,7 @@ def _older():
 
 
 def _older_warning(basis):
+    """Warning that only the levellings of an older record are inspected."""
     text = message(
         "inspect_older_record_alone",
         "a record of a version that did not keep the shape of its wall: only what was levelled is "

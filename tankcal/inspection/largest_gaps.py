@@ -1,4 +1,4 @@
-"""The largest gap of each weld and of all, with the U of the largest of many."""
+"""Largest gap of each weld and of all welds, with the expanded uncertainty of a maximum."""
 
 from dataclasses import dataclass
 
@@ -10,35 +10,38 @@ from tankcal.inspection.weld_boards import TOGETHER, noise_factor
 from tankcal.record.inspection import WeldGap
 from tankcal.uncertainty import coverage_factor
 
-LEAST_SEEN, WELL_SEEN = 0.5, 0.9  # of the boards of a weld: it is determined, it is seen whole
-KEPT = 3  # profiles of each kind, of the largest gaps
-PROBABILITY = 0.95
-IN_MM = 1000.0
+# Least share of determined boards: for a determined weld, and for all welds without a remark.
+LEAST_SEEN, WELL_SEEN = 0.5, 0.9
+KEPT = 3  # number of profiles saved for each kind of weld, at the largest gaps
+PROBABILITY = 0.95  # coverage probability of U
+IN_MM = 1000.0  # millimetres per metre
 
 
 @dataclass(frozen=True)
 class GapFigure:
-    """The largest gap of one kind of weld, for judging.
+    """Largest gap of one kind of weld.
 
     Attributes
     ----------
     code : str
         "peaking" or "banding".
     value_mm, U_mm, k : float or None
-        Outwards positive; None: not determined at any weld.
+        Gap, positive outwards, its expanded uncertainty and coverage factor; None if no gap is
+        determined at any weld.
     course : int or None
-        From the bottom, 1 first.
+        Course, counted from 1 at the bottom.
     height_m, azimuth_deg : float or None
-        Of the middle of the board, above the bottom of the shell and clockwise from +y.
+        Middle of the board: height above the bottom of the shell, and azimuth clockwise from +y.
     used : int
-        Welds that it is the largest of.
+        Number of welds with a determined gap.
     remark : str or None
-        "gap_no_weld", "gap_no_cloud", "gap_too_sparse", "gap_too_uncertain"; where a value is,
-        "gap_not_all": some welds have none, or "gap_partly_seen": there are parts of welds where
-        no board can be laid.
+        Without a value: "gap_no_weld", "gap_no_cloud", "gap_too_sparse" or "gap_too_uncertain".
+        With a value: "gap_not_all" if some welds have no determined gap, "gap_partly_seen" if no
+        board can be laid over some parts of the welds, or None.
     remark_values : dict
-        welds, determined; where a value is seen, too: the share of boards that could be laid over
-        the welds that have one; of "gap_too_uncertain" u_mm (the least) and most_mm.
+        Number of `welds` and of `determined` welds. With a value, also `seen`, the share of
+        determined boards of these welds. For "gap_too_uncertain", also the least u, `u_mm`, and
+        its limit, `most_mm`.
     """
 
     code: str
@@ -55,53 +58,64 @@ class GapFigure:
 
 @dataclass(frozen=True)
 class GapsFound:
-    """Gaps at the welds: a `WeldGap` of each, and a `GapFigure` of peaking and of banding."""
+    """Gaps at the welds: a `WeldGap` for each weld, and a `GapFigure` for each kind of weld."""
 
     gaps: tuple
     figures: tuple
 
 
 def largest_gaps(kind, boards, limit_mm):
-    """`WeldGap` of each weld, and the `GapFigure` of all.
+    """Determine the largest gap of each weld of a kind, and of all these welds.
 
     Parameters
     ----------
     kind : str
         "peaking" or "banding".
     boards : sequence of Boards
-        Of each weld of that kind.
+        Boards of each weld of this kind.
     limit_mm : float or None
-        Of a gap, mm; None: not known.
+        Limit of the gap, mm; None if unknown.
+
+    Returns
+    -------
+    list of WeldGap
+        One gap for each weld.
+    GapFigure
+        Largest gap of all welds.
     """
     if not boards:
         return [], _no_figure(kind, 0, "gap_no_weld")
-    more = noise_factor(boards) ** 2
+    # Neighbouring cells may share noise, so the variance of the noise is scaled.
+    noise_scale = noise_factor(boards) ** 2
     most_m = np.inf if limit_mm is None else UNCERTAIN * limit_mm / IN_MM
-    largest = [_largest(one, more, most_m) for one in boards]
-    told = [one.seen >= LEAST_SEEN for one in largest]
-    sizes = [abs(one.gap_m) if known else -1.0 for one, known in zip(largest, told, strict=True)]
+    largest = [_largest(item, noise_scale, most_m) for item in boards]
+    determined = [item.seen >= LEAST_SEEN for item in largest]
+    sizes = [
+        abs(item.gap_m) if known else -1.0 for item, known in zip(largest, determined, strict=True)
+    ]
     order = np.argsort(sizes, kind="stable")[::-1]
     kept = set(order[:KEPT].tolist())
     gaps = [
-        _weld_gap(one, found, more, i in kept) if told[i] else _no_gap(one.weld)
-        for i, (one, found) in enumerate(zip(boards, largest, strict=True))
+        _weld_gap(item, gap, noise_scale, i in kept) if determined[i] else _no_gap(item.weld)
+        for i, (item, gap) in enumerate(zip(boards, largest, strict=True))
     ]
-    if not any(told):
-        least_m = min(one.least_u_m for one in largest)
+    if not any(determined):
+        least_m = min(item.least_u_m for item in largest)
         if not most_m < least_m < np.inf:
             return gaps, _no_figure(kind, len(boards), "gap_too_sparse")
         figure = _no_figure(kind, len(boards), "gap_too_uncertain")
         figure.remark_values.update(u_mm=IN_MM * least_m, most_mm=IN_MM * most_m)
         return gaps, figure
-    known = [(boards[i], largest[i]) for i in np.flatnonzero(told)]
-    return gaps, _figure(kind, gaps[order[0]], largest[order[0]], known, len(boards), more)
+    known = [(boards[i], largest[i]) for i in np.flatnonzero(determined)]
+    return gaps, _figure(kind, gaps[order[0]], largest[order[0]], known, len(boards), noise_scale)
 
 
-def _figure(kind, gap, worst, known, welds, more):
-    """`GapFigure` of the largest; known  (Boards, _Largest) of the welds that have one."""
-    rivals = sum(_rivals(*one, more, abs(worst.gap_m) - 2 * worst.u_m) for one in known)
+def _figure(kind, gap, worst, known, welds, noise_scale):
+    """`GapFigure` of the largest gap; `known` has (Boards, _Largest) of each determined weld."""
+    # Gaps that may exceed the largest gap within 2 u of both are candidates for the true maximum.
+    rivals = sum(_rivals(*pair, noise_scale, abs(worst.gap_m) - 2 * worst.u_m) for pair in known)
     k = factor_of_largest(rivals)
-    seen = float(np.mean([found.seen for _, found in known]))
+    seen = float(np.mean([gap_of_weld.seen for _, gap_of_weld in known]))
     remark = "gap_partly_seen" if seen < WELL_SEEN else None
     return GapFigure(
         code=kind,
@@ -118,16 +132,18 @@ def _figure(kind, gap, worst, known, welds, more):
 
 
 def undetermined(welds, remark):
-    """`GapsFound` of welds that nothing is told of, such as of a survey by points or straps."""
+    """`GapsFound` without any determined gap, as for a survey by points or strapping."""
     figures = []
     for kind in (PEAKING, BANDING):
-        count = sum(one.kind == kind for one in welds)
+        count = sum(weld.kind == kind for weld in welds)
         figures.append(_no_figure(kind, count, remark if count else "gap_no_weld"))
-    return GapsFound(tuple(_no_gap(one) for one in welds), tuple(figures))
+    return GapsFound(tuple(_no_gap(weld) for weld in welds), tuple(figures))
 
 
 def factor_of_largest(rivals):
-    """k of the largest of so many independent gaps: 95 % that none is further off than k u.
+    """Coverage factor k of the largest of independent gaps.
+
+    With a probability of 95 %, the error of none of the `rivals` gaps exceeds k u.
 
     >>> round(factor_of_largest(1), 3), round(factor_of_largest(20), 3)
     (1.96, 3.016)
@@ -137,10 +153,18 @@ def factor_of_largest(rivals):
 
 @dataclass(frozen=True)
 class _Largest:
-    """Of the boards of a weld: which board and cell, its gap and u, and how many might be it.
+    """Largest gap of a weld.
 
-    sure       (boards,) boards that have a gap whose u is small enough
-    least_u_m  of all that have a gap; inf: none has
+    Attributes
+    ----------
+    board, cell : int
+        Board and cell of the gap.
+    gap_m, u_m : float
+        Gap and its standard uncertainty, m.
+    sure : ndarray of bool, shape (boards,)
+        Boards that have a gap with a sufficiently small u.
+    least_u_m : float
+        Smallest u of all gaps, m; inf if no board has a gap.
     """
 
     board: int
@@ -152,40 +176,42 @@ class _Largest:
 
     @property
     def seen(self):
-        """Share of the boards that are sure."""
+        """Share of the boards with a determined gap."""
         return float(np.mean(self.sure))
 
 
-def _largest(boards, more, most_m):
-    """`_Largest` within reach of the weld, of boards whose u is at most that."""
+def _largest(boards, noise_scale, most_m):
+    """`_Largest` within reach of the weld, from boards whose u is at most `most_m`."""
     sizes = np.where(np.isfinite(boards.gap_m), np.abs(boards.gap_m), -1.0)
     sizes[:, np.abs(boards.s_m) > REACH_M + 1e-9] = -1.0
     cell = np.argmax(sizes, axis=1)
     row = np.arange(len(cell))
-    u = np.where(sizes[row, cell] >= 0, _u_of(boards, more)[row, cell], np.inf)
+    u = np.where(sizes[row, cell] >= 0, _standard_u(boards, noise_scale)[row, cell], np.inf)
     sure = (u < np.inf) & (u <= most_m)
     board = int(np.argmax(np.where(sure, sizes[row, cell], -1.0)))
     place = board, int(cell[board])
     return _Largest(*place, float(boards.gap_m[place]), float(u[board]), sure, float(u.min()))
 
 
-def _u_of(boards, more):
-    return np.sqrt(more * boards.noise_m2 + boards.missed_m2)
+def _standard_u(boards, noise_scale):
+    """Standard uncertainties of the gaps, m; `noise_scale` multiplies the variance of the noise."""
+    return np.sqrt(noise_scale * boards.noise_m2 + boards.missed_m2)
 
 
-def _rivals(boards, largest, more, least_m):
-    """How many independent gaps of a weld may be larger than that: 2 u beyond it."""
+def _rivals(boards, largest, noise_scale, least_m):
+    """Number of independent gaps of a weld whose value plus 2 u reaches `least_m`."""
     near = np.abs(boards.s_m) <= REACH_M + 1e-9
     with np.errstate(invalid="ignore"):
-        may = np.abs(boards.gap_m) + 2 * _u_of(boards, more) >= least_m
-    return max(1, -(-np.count_nonzero(may[largest.sure][:, near]) // TOGETHER))
+        is_candidate = np.abs(boards.gap_m) + 2 * _standard_u(boards, noise_scale) >= least_m
+    return max(1, -(-np.count_nonzero(is_candidate[largest.sure][:, near]) // TOGETHER))
 
 
-def _weld_gap(boards, found, more, with_profile):
-    weld, along = boards.weld, float(boards.along[found.board])
+def _weld_gap(boards, largest, noise_scale, with_profile):
+    """`WeldGap` of a determined weld."""
+    weld, along = boards.weld, float(boards.along[largest.board])
     is_upright = weld.kind == PEAKING
-    profile = boards.gap_m[found.board]
-    rivals = _rivals(boards, found, more, abs(found.gap_m) - 2 * found.u_m)
+    profile = boards.gap_m[largest.board]
+    rivals = _rivals(boards, largest, noise_scale, abs(largest.gap_m) - 2 * largest.u_m)
     known = np.isfinite(profile) & with_profile
     azimuth = weld.azimuth_rad if is_upright else along
     return WeldGap(
@@ -193,15 +219,15 @@ def _weld_gap(boards, found, more, with_profile):
         course=weld.course + 1,
         height_m=along if is_upright else weld.low_m,
         azimuth_deg=float(np.degrees(azimuth) % 360),
-        gap_mm=IN_MM * found.gap_m,
-        U_mm=IN_MM * factor_of_largest(rivals) * found.u_m,
+        gap_mm=IN_MM * largest.gap_m,
+        U_mm=IN_MM * factor_of_largest(rivals) * largest.u_m,
         along_mm=np.round(IN_MM * boards.s_m[known], 1).tolist(),
         profile_mm=np.round(IN_MM * profile[known], 2).tolist(),
     )
 
 
 def _no_gap(weld):
-    """`WeldGap` of a weld of which nothing is determined."""
+    """`WeldGap` of a weld without a determined gap."""
     return WeldGap(
         kind=weld.kind,
         course=weld.course + 1,
@@ -215,5 +241,6 @@ def _no_gap(weld):
 
 
 def _no_figure(kind, welds, remark):
+    """`GapFigure` without a determined gap."""
     values = {"welds": welds, "determined": 0}
     return GapFigure(kind, None, None, None, None, None, None, 0, remark, values)

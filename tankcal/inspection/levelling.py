@@ -1,6 +1,7 @@
-"""settlement.csv and edge_profiles.csv: what was levelled round a tank and across its bottom.
+"""Reading of the levelling tables settlement.csv and edge_profiles.csv.
 
-Every problem of a file goes to the log; what is read is in SI units, points by azimuth.
+All problems of a file are reported to the log. The values are in SI units, with points sorted by
+azimuth.
 """
 
 from dataclasses import dataclass
@@ -48,14 +49,16 @@ EDGE_PROFILES = (
     number("weld_deg", "between the lap weld and the radial line, degrees; blank: 90, parallel to"
            " the shell", 0, 90),
 )  # fmt: skip
-ONE_EPOCH = "1"  # the name of an epoch that has none
-LEAST_READINGS = 5
+ONE_EPOCH = "1"  # name of an epoch without a name
+LEAST_READINGS = 5  # least number of readings of a radial line
+# Largest numbers of points, epochs, readings of a line, and lines.
 MOST_POINTS, MOST_EPOCHS, MOST_READINGS, MOST_LINES = 1000, 50, 500, 200
-LONGEST_START = 10_000  # bytes that the heading is looked for in
-MOST_RISE_M = 2.0  # of one epoch, or along one profile: more is another unit
-LEAST_SD_MM = 0.01
-SAME_PLACE_DEG, SAME_AZIMUTH_DEG = 1.0, 0.05  # of one point's rows; of two points
-OFF_CIRCLE = 0.05  # of the radius
+LONGEST_START = 10_000  # number of bytes within which the heading is searched for
+MOST_RISE_M = 2.0  # largest range of an epoch or of a profile; more shows another unit
+LEAST_SD_MM = 0.01  # smallest valid largest s_mm; less shows another unit
+# Largest difference of azimuths in the rows of one point, and least difference of two points.
+SAME_PLACE_DEG, SAME_AZIMUTH_DEG = 1.0, 0.05
+OFF_CIRCLE = 0.05  # largest distance of a point from the circle, as a share of its radius
 
 
 @dataclass(frozen=True)
@@ -65,14 +68,15 @@ class RadialLine:
     Attributes
     ----------
     azimuth_deg : float
-        From 0 to 360, clockwise from +y.
+        Azimuth from 0 to 360, clockwise from +y.
     radius_m, z_m : ndarray, shape (n,)
+        Ascending radii from the tank's centre, and elevations, m.
     sd_m : ndarray, shape (n,), or None
-        None: not given.
+        Standard deviations of the elevations, m; None if not given.
     weld_deg : float or None
-        Between the lap weld and the radial line; None: taken as parallel to the shell.
+        Angle between the lap weld and the radial line; None for a weld parallel to the shell.
     row : int
-        Its first in the file.
+        First row of the line in the file.
     """
 
     azimuth_deg: float
@@ -84,37 +88,37 @@ class RadialLine:
 
 
 def read_settlement(path, log):
-    """Levelling of settlement.csv; None after telling `log` every problem of it."""
-    before, values = len(log.problems), _read(path, SETTLEMENT, log)
+    """Read the `Levelling` of settlement.csv, or report its problems to `log` and return None."""
+    problem_count, values = len(log.problems), _read(path, SETTLEMENT, log)
     if values is None:
         return None
     epochs = _epochs_of_rows(values, log)
-    placed = _azimuths(values, log)
-    if len(log.problems) > before:
+    circle_azimuths = _azimuths(values, log)
+    if len(log.problems) > problem_count:
         return None
-    azimuth, radius_m = placed
+    azimuth, radius_m = circle_azimuths
     places = _places(values, azimuth, log)
     groups = _repeats(values, epochs)
     given = values.of("s_mm")[0] is not None
     pooled, dof = _pooled_sd(values, groups)
     if given:
-        _tell_disagreeing(values, groups, log)
+        _warn_of_repeats(values, groups, log)
     sd_m = values.numbers("s_mm") / 1000 if given else np.full(len(epochs), pooled)
-    made = [_epoch(name, values, groups, places, sd_m) for name in dict.fromkeys(epochs)]
-    for one in made:
-        _check_epoch(one, values.file, log)
-    if len(log.problems) > before:
+    epoch_list = [_epoch(name, values, groups, places, sd_m) for name in dict.fromkeys(epochs)]
+    for epoch in epoch_list:
+        _check_epoch(epoch, values.file, log)
+    if len(log.problems) > problem_count:
         return None
     if not (given or dof):
         text = message("levels_no_sd", "neither s_mm nor a point that was levelled twice: no"
                        " uncertainty is known, so nothing can be said to pass")  # fmt: skip
         log.warning(values.file, text)
     dof = np.inf if given else float(dof)
-    return Levelling(values.file, tuple(in_order(made)), given, dof, radius_m)
+    return Levelling(values.file, tuple(in_order(epoch_list)), given, dof, radius_m)
 
 
 def _epoch(name, values, groups, places, sd_m):
-    """Epoch of its rows: points by azimuth, repeats as their mean weighted by their sds."""
+    """`Epoch` with points by azimuth; repeated readings are averaged with weights 1 / sd^2."""
     points = sorted((p for e, p in groups if e == name), key=lambda p: places.get(p, 0.0))
     rows = [groups[name, point] for point in points]
     return Epoch(
@@ -122,14 +126,14 @@ def _epoch(name, values, groups, places, sd_m):
         since=None,
         points=tuple(points),
         azimuth_rad=np.radians([places.get(point, np.nan) for point in points]),
-        z_m=np.array([_mean(values, one, sd_m) for one in rows]),
-        u_m=np.array([np.sum(sd_m[one] ** -2.0) ** -0.5 for one in rows]),
+        z_m=np.array([_mean(values, point_rows, sd_m) for point_rows in rows]),
+        u_m=np.array([np.sum(sd_m[point_rows] ** -2.0) ** -0.5 for point_rows in rows]),
     )
 
 
 def read_edge_profiles(path, log):
-    """RadialLines of edge_profiles.csv; None after telling `log` every problem of it."""
-    before, values = len(log.problems), _read(path, EDGE_PROFILES, log)
+    """Read the radial lines of edge_profiles.csv, or report problems to `log` and return None."""
+    problem_count, values = len(log.problems), _read(path, EDGE_PROFILES, log)
     if values is None:
         return None
     azimuth = values.numbers("azimuth_deg") % 360
@@ -140,17 +144,17 @@ def read_edge_profiles(path, log):
                        most=MOST_LINES)  # fmt: skip
         log.problem(values.file, text, None, "azimuth_deg")
         return None
-    for one in angles:
-        rows = np.flatnonzero(azimuth == one)
+    for angle in angles:
+        rows = np.flatnonzero(azimuth == angle)
         rows = rows[np.argsort(values.numbers("radius_m")[rows], kind="stable")]
         lines.append(_radial_line(values, rows, log))
-    return None if len(log.problems) > before else tuple(lines)
+    return None if len(log.problems) > problem_count else tuple(lines)
 
 
 def _read(path, fields, log):
-    """ColumnValues of a CSV file, without problems and with rows, or None."""
+    """Read the ColumnValues of a CSV file; None if it has problems or no rows."""
     path = Path(path)
-    before, data = len(log.problems), read_bytes(path, log)
+    problem_count, data = len(log.problems), read_bytes(path, log)
     if data is None:
         return None
     table = read_csv(path.name, data, *_marks(data), log)
@@ -159,14 +163,14 @@ def _read(path, fields, log):
     values = read_columns(None, table, log, fields)
     if values.is_empty:
         log.problem(path.name, message("levels_no_rows", "no rows; expected levelled points"))
-    sds = [one for one in values.of("s_mm") if one is not None]
+    sds = [sd for sd in values.of("s_mm") if sd is not None]
     if sds and max(sds) < LEAST_SD_MM:
         log.problem(path.name, tiny_sd("mm", max(sds)), values.rows[0], "s_mm")
-    return None if len(log.problems) > before else values
+    return None if len(log.problems) > problem_count else values
 
 
 def _marks(data):
-    """(separator, decimal mark) by the heading of a CSV file: Brazilian Excel writes ; and ,"""
+    """Separator and decimal mark of a CSV file, from its heading; Brazilian Excel uses ; and ,"""
     lines = (line.strip() for line in data[:LONGEST_START].splitlines())
     heading = next((line for line in lines if line and not line.startswith(b"#")), b"")
     return (";", ",") if b";" in heading else (",", ".")
@@ -176,8 +180,8 @@ def _marks(data):
 
 
 def _epochs_of_rows(values, log):
-    """Name of the epoch of each row; blanks, two spellings and what is no date are told."""
-    names, first = values.of("epoch"), {}
+    """Names of the epochs of all rows; report blanks, two spellings and invalid dates."""
+    names, first_spelling = values.of("epoch"), {}
     if not any(names):
         return [ONE_EPOCH] * len(names)
     for row, name in zip(values.rows, names, strict=True):
@@ -185,7 +189,7 @@ def _epochs_of_rows(values, log):
             text = message("levels_no_epoch", "blank; expected the epoch, as in other rows")
             log.problem(values.file, text, row, "epoch")
             continue
-        known, known_row = first.setdefault(name.casefold(), (name, row))
+        known, known_row = first_spelling.setdefault(name.casefold(), (name, row))
         if is_like_a_date(name) and known_row == row:
             text = message("levels_no_date", "found {name!r}; expected a date such as 2024-05-31,"
                            " or a name", name=name)  # fmt: skip
@@ -195,15 +199,18 @@ def _epochs_of_rows(values, log):
                            " {first_row}", name=name, known=known,
                            first_row=known_row)  # fmt: skip
             log.problem(values.file, text, row, "epoch")
-    if len(first) > MOST_EPOCHS:
+    if len(first_spelling) > MOST_EPOCHS:
         text = message("levels_many_epochs", "{count} epochs; expected at most {most}",
-                       count=len(first), most=MOST_EPOCHS)  # fmt: skip
+                       count=len(first_spelling), most=MOST_EPOCHS)  # fmt: skip
         log.problem(values.file, text, None, "epoch")
     return names
 
 
 def _azimuths(values, log):
-    """((rows,) azimuths in degrees, nan where blank; radius of their circle or None)."""
+    """Azimuths (rows,) in degrees, nan if blank, and the radius of their circle or None.
+
+    None is returned if the columns are incomplete or contradictory.
+    """
     azimuth, x, y = (values.numbers(name) for name in ("azimuth_deg", "x_m", "y_m"))
     has_azimuth, has_x, has_y = (values.columns[name] is not None
                                  for name in ("azimuth_deg", "x_m", "y_m"))  # fmt: skip
@@ -226,13 +233,14 @@ def _azimuths(values, log):
 
 
 def _on_circle(values, x, y, log):
-    """Azimuths about the centre of the circle through all points, and its radius."""
+    """Azimuths about the centre of the circle through all points, and its radius, m."""
     known = np.isfinite(x) & np.isfinite(y)
     for row, one_x, one_y in zip(values.rows, x, y, strict=True):
         if np.isfinite(one_x) != np.isfinite(one_y):
             name, other = ("x_m", "y_m") if np.isnan(one_x) else ("y_m", "x_m")
             log.problem(values.file, missing_beside(other), row, name)
     xy = np.column_stack([x, y])[known]
+    # Equal covariances give equal weights; only the circle is used, not its uncertainty.
     try:
         circle = fit_circle(xy, np.broadcast_to(np.eye(2) * 1e-4, (len(xy), 2, 2)))
     except (SolutionError, ValueError):
@@ -240,19 +248,19 @@ def _on_circle(values, x, y, log):
                        " coordinates of points round the tank")  # fmt: skip
         log.problem(values.file, text, None, "x_m")
         return None
-    off = np.abs(circle.residuals_m)
-    for row, one in zip(np.array(values.rows)[known], off, strict=True):
-        if one > OFF_CIRCLE * circle.radius_m:
+    deviations = np.abs(circle.residuals_m)
+    for row, deviation in zip(np.array(values.rows)[known], deviations, strict=True):
+        if deviation > OFF_CIRCLE * circle.radius_m:
             text = message("levels_off_circle", "{off:.3g} m off the circle through all points,"
                            " radius {radius:.4g} m; expected points at the shell",
-                           off=float(one), radius=circle.radius_m)  # fmt: skip
+                           off=float(deviation), radius=circle.radius_m)  # fmt: skip
             log.problem(values.file, text, int(row), "x_m")
     azimuth = np.degrees(np.arctan2(x - circle.x_m, y - circle.y_m))
     return azimuth, circle.radius_m
 
 
 def _places(values, azimuth, log):
-    """{point: azimuth in degrees, 0 to 360}, the mean of its rows; contradictions are told."""
+    """Mean azimuth of each point, {point: degrees from 0 to 360}; report contradictions."""
     rows_of = {}
     for i, point in enumerate(values.of("point")):
         rows_of.setdefault(point, []).append(i)
@@ -266,21 +274,22 @@ def _places(values, azimuth, log):
             log.problem(values.file, text, values.rows[rows[0]], "point")
             continue
         first = azimuth[given[0]]
-        turned = [(azimuth[i] - first + 180) % 360 - 180 for i in given]
-        for i, off in zip(given, turned, strict=True):
-            if abs(off) > SAME_PLACE_DEG:
+        # Differences from -180 to 180 degrees, so that the mean is valid across north.
+        differences = [(azimuth[i] - first + 180) % 360 - 180 for i in given]
+        for i, difference in zip(given, differences, strict=True):
+            if abs(difference) > SAME_PLACE_DEG:
                 text = message("levels_moved", "point {point!r} is at {azimuth:.2f} degrees here,"
                                " at {first:.2f} in row {first_row}; expected one place",
                                point=point, azimuth=float(azimuth[i]) % 360,
                                first=float(first) % 360,
                                first_row=values.rows[given[0]])  # fmt: skip
                 log.problem(values.file, text, values.rows[i], "point")
-        places[point] = float(first + np.mean(turned)) % 360
+        places[point] = float(first + np.mean(differences)) % 360
     return places
 
 
 def _repeats(values, epochs):
-    """{(epoch, point): its rows}."""
+    """Rows of each point in each epoch, {(epoch, point): rows}."""
     groups = {}
     for i, pair in enumerate(zip(epochs, values.of("point"), strict=True)):
         groups.setdefault(pair, []).append(i)
@@ -288,9 +297,9 @@ def _repeats(values, epochs):
 
 
 def _pooled_sd(values, groups):
-    """Standard deviation of one reading by all repeats, m, and its degrees of freedom.
+    """Pooled standard deviation of a reading from repeats, m, and its degrees of freedom.
 
-    Repeats that are all the same show no more than that a row was copied: nan and 0.
+    Identical repeats suggest copied rows; the result is then nan and 0.
     """
     z = values.numbers("elevation_m")
     dof = sum(len(rows) - 1 for rows in groups.values())
@@ -301,29 +310,29 @@ def _pooled_sd(values, groups):
 
 
 def _mean(values, rows, sd_m):
-    """Elevation of the rows of one point, weighted by their sds where these are known."""
+    """Mean elevation of the rows of a point, m, with weights 1 / sd^2 if the sds are known."""
     weights = None if np.isnan(sd_m[rows[0]]) else sd_m[rows] ** -2.0
     return np.average(values.numbers("elevation_m")[rows], weights=weights)
 
 
-def _tell_disagreeing(values, groups, log):
-    """A warning where repeats differ by more than s_mm lets them (0.1 %)."""
+def _warn_of_repeats(values, groups, log):
+    """Warn if repeats differ by more than s_mm allows (chi-squared test, 0.1 %)."""
     z, sd = values.numbers("elevation_m"), values.numbers("s_mm") / 1000
     dof = sum(len(rows) - 1 for rows in groups.values())
     if not dof:
         return
-    weighed = sum(
+    squares = sum(
         np.sum(((z[rows] - _mean(values, rows, sd)) / sd[rows]) ** 2) for rows in groups.values()
     )
-    if scipy.stats.chi2.sf(weighed, dof) < ALPHA:
+    if scipy.stats.chi2.sf(squares, dof) < ALPHA:
         text = message("levels_repeats_off", "points that were levelled again differ {times:.1f}"
                        " times as much as s_mm says",
-                       times=float(np.sqrt(weighed / dof)))  # fmt: skip
+                       times=float(np.sqrt(squares / dof)))  # fmt: skip
         log.warning(values.file, text, None, "s_mm")
 
 
 def _check_epoch(epoch, file, log):
-    """Problems of one epoch: too few points, two at one place, half of the round, another unit."""
+    """Report too few points, equal azimuths, wide gaps and another unit in an epoch."""
     if len(epoch.points) < LEAST_POINTS:
         text = message("levels_few_points", "epoch {epoch!r} has {count} points; expected at least"
                        " {least}", epoch=epoch.name, count=len(epoch.points),
@@ -362,7 +371,7 @@ def _check_epoch(epoch, file, log):
 
 
 def _radial_line(values, rows, log):
-    """RadialLine of the rows of one azimuth, with its problems told."""
+    """`RadialLine` of the rows of one azimuth; report its problems."""
     radius, z = values.numbers("radius_m")[rows], values.numbers("z_m")[rows]
     row, azimuth = values.rows[min(rows)], float(values.numbers("azimuth_deg")[rows[0]] % 360)
     if len(rows) < LEAST_READINGS:
@@ -386,13 +395,13 @@ def _radial_line(values, rows, log):
                        " millimetres?", azimuth=azimuth, rise=float(np.ptp(z)),
                        most=MOST_RISE_M)  # fmt: skip
         log.problem(values.file, text, row, "z_m")
-    welds = [one for one in np.array(values.of("weld_deg"))[rows] if one is not None]
+    welds = [angle for angle in np.array(values.of("weld_deg"))[rows] if angle is not None]
     if len(set(welds)) > 1:
         text = message("edge_two_welds", "the line at {azimuth:g} degrees has {angles} degrees;"
                        " expected one angle of its weld", azimuth=azimuth,
-                       angles=list_some([f"{one:g}" for one in dict.fromkeys(welds)],
+                       angles=list_some([f"{angle:g}" for angle in dict.fromkeys(welds)],
                                         SHOWN))  # fmt: skip
         log.problem(values.file, text, row, "weld_deg")
-    given = values.of("s_mm")[0] is not None
-    sd_m = values.numbers("s_mm")[rows] / 1000 if given else None
+    has_sd = values.of("s_mm")[0] is not None
+    sd_m = values.numbers("s_mm")[rows] / 1000 if has_sd else None
     return RadialLine(azimuth, radius, z, sd_m, float(welds[0]) if welds else None, row)

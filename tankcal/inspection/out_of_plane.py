@@ -1,13 +1,15 @@
-"""Settlement out of the tilted plane: its size at points, between neighbours, and its curvature.
+"""Out-of-plane settlement: residuals of the tilted plane, S at each point, and the curvature.
 
-With t the azimuth, a + p cos t + q sin t is the plane by least squares, U = P z what is left of the
-elevations z, and all that is judged is linear in z, so that its covariance is that of z carried on.
+The least-squares plane is a + p cos t + q sin t, with the azimuth t. Its residuals U = P z are
+linear in the elevations z, and so are S and the curvature. The law of propagation therefore gives
+their covariance from the covariance of z.
 
     S_i = U_i - (d_n U_prev + d_p U_next) / (d_p + d_n)
 
-with the arcs d_p and d_n to both neighbours: the mean of the two where they are even. A curve of
-curvature c has |S| = c d_p d_n / 2, which makes one limit of curvature out of the limits for any
-spacing. Source: Marr, Ramos & Lambe 1982, Criteria for settlement of tanks, J. Geotech. Eng. 108.
+with the arcs d_p and d_n to the previous and the next point. For equal arcs, the second term is the
+mean of the two neighbours. A curve of curvature c has |S| = c d_p d_n / 2. The limits of S for any
+spacing therefore correspond to one limit of the curvature. Source: Marr, Ramos & Lambe 1982,
+Criteria for settlement of tanks, J. Geotech. Eng. 108.
 """
 
 from dataclasses import dataclass
@@ -17,10 +19,10 @@ import scipy
 
 from tankcal.geometry.form import harmonics
 
-LEVEL_M = 1e-9  # points that differ by less are level: what is left is rounding
-NEARLY = 1.25  # times as many points as a subset needs: none is left out
-_COARSE_STEPS = 12  # of simulated curvatures, along the shortest wave
-_STEPS = 32  # of the search for the largest curvature, along the shortest wave
+LEVEL_M = 1e-9  # range of elevations that is due to rounding; such points are level
+NEARLY = 1.25  # number of points over the size of the subset, up to which all points are used
+_COARSE_STEPS = 12  # grid steps per shortest wave, for simulated curvatures
+_STEPS = 32  # grid steps per shortest wave, for the search for the largest curvature
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,9 @@ class Plane:
     residual_operator : ndarray, shape (n, n)
         U = residual_operator @ z.
     a_m, p_m, q_m : float
-        Mean, and height towards azimuth 0 and 90 degrees, m.
+        Mean elevation, and rise of the plane towards azimuths 0 and 90 degrees at the shell, m.
     fitted_m, residual_m : ndarray, shape (n,)
-        Plane at the points, and U, m.
+        Elevations of the plane at the points, and residuals U, m.
     """
 
     operator: np.ndarray
@@ -54,11 +56,12 @@ class Plane:
 
     @property
     def highest_rad(self):
-        """Azimuth of that point, atan2(q, p), from 0 to 2 pi."""
+        """Azimuth of the highest point of the plane, atan2(q, p), from 0 to 2 pi."""
         return float(np.arctan2(self.q_m, self.p_m) % (2 * np.pi))
 
     def b_gradient(self):
-        """(n,) change of b with each elevation."""
+        """Derivatives (n,) of b with respect to the elevations."""
+        # A level plane has no direction; any direction gives a valid u.
         direction = (self.p_m, self.q_m) if self.b_m > 0 else (1.0, 0.0)
         return np.array(direction) / np.hypot(*direction) @ self.operator[1:]
 
@@ -69,7 +72,7 @@ def fit_plane(azimuth_rad, z_m):
     Parameters
     ----------
     azimuth_rad, z_m : array_like, shape (n,)
-        Azimuths, clockwise from +y; elevations, m. Three different azimuths at least.
+        Azimuths, clockwise from +y, and elevations, m, at three or more different azimuths.
 
     Returns
     -------
@@ -98,26 +101,28 @@ def fit_plane(azimuth_rad, z_m):
 
 
 def _least_squares(columns):
-    """(u, n) unknowns by least squares of n observations.
+    """Least-squares operator (u, n), from n observations to u unknowns.
 
-    Sines and cosines of different azimuths, no more than points, are never of lower rank.
+    Sines and cosines at different azimuths have full rank if there are no more than points.
     """
     basis, root = np.linalg.qr(columns)
     return np.linalg.solve(root, basis.T)
 
 
 def explained_share(z_m, residual_m):
-    """R2 = 1 - sum U^2 / sum (z - mean z)^2, and its change with each elevation.
+    """Share of the variance that the plane explains, R2 = 1 - sum U^2 / sum (z - mean z)^2.
 
     Parameters
     ----------
     z_m, residual_m : ndarray, shape (n,)
-        Elevations, and what the plane leaves of them, m.
+        Elevations and their residuals U, m.
 
     Returns
     -------
-    float, ndarray of shape (n,)
-        Of level points 1 and 0.
+    float
+        R2; 1 for level points.
+    ndarray, shape (n,)
+        Derivatives of R2 with respect to the elevations, 1/m; 0 for level points.
 
     Examples
     --------
@@ -126,25 +131,26 @@ def explained_share(z_m, residual_m):
     0.75
     """
     about_mean = z_m - np.mean(z_m)
-    scatter, left = about_mean @ about_mean, residual_m @ residual_m
+    scatter, residual_squares = about_mean @ about_mean, residual_m @ residual_m
     if np.ptp(z_m) < LEVEL_M:
         return 1.0, np.zeros(len(z_m))
-    gradient = -2 * residual_m / scatter + 2 * left * about_mean / scatter**2
-    return float(1 - left / scatter), gradient
+    # Quotient rule; P is a projection, so that d(sum U^2)/dz = 2 U.
+    gradient = -2 * residual_m / scatter + 2 * residual_squares * about_mean / scatter**2
+    return float(1 - residual_squares / scatter), gradient
 
 
 @dataclass(frozen=True)
 class Neighbours:
-    """Points between their neighbours along the shell.
+    """Selected points and the arcs to their neighbours along the shell.
 
     Attributes
     ----------
     places : ndarray of int, shape (m,)
-        Which of the n points, by azimuth.
+        Indices of the selected points among all n points, by azimuth.
     operator : ndarray, shape (m, n)
-        S = operator @ U.
+        Linear map with S = operator @ U.
     before_m, after_m : ndarray, shape (m,)
-        Arcs to the neighbours, m.
+        Arcs to the previous and to the next point, m.
     """
 
     places: np.ndarray
@@ -154,24 +160,25 @@ class Neighbours:
 
     @property
     def arc_m(self):
-        """(m,) mean of the arcs to both neighbours."""
+        """Mean (m,) of the arcs to both neighbours, m."""
         return (self.before_m + self.after_m) / 2
 
     def limits_m(self, curvature_per_m):
-        """(m,) largest |S| of a curvature: c L^2 / 2, with d_p d_n in the place of L^2."""
+        """Limits (m,) of |S| for a largest curvature c in 1/m, c d_p d_n / 2, m."""
         return curvature_per_m * self.before_m * self.after_m / 2
 
 
 def between_neighbours(azimuth_rad, radius_m, places=None):
-    """How S comes of U for points in the order of their azimuths, or for some of them.
+    """Compute the linear map from U to S for all points, or for selected points.
 
     Parameters
     ----------
     azimuth_rad : ndarray, shape (n,)
-        Rising, within one turn.
+        Azimuths, ascending within one turn.
     radius_m : float
+        Radius of the shell, m.
     places : array_like of int, optional
-        The points that are used, rising; None: all.
+        Ascending indices of the selected points; by default all points.
 
     Returns
     -------
@@ -179,23 +186,23 @@ def between_neighbours(azimuth_rad, radius_m, places=None):
 
     Examples
     --------
-    >>> found = between_neighbours(np.radians([0.0, 90.0, 180.0, 270.0]), 2 / np.pi)
-    >>> found.operator[1].tolist(), found.arc_m.round(9).tolist()
+    >>> neighbours = between_neighbours(np.radians([0.0, 90.0, 180.0, 270.0]), 2 / np.pi)
+    >>> neighbours.operator[1].tolist(), neighbours.arc_m.round(9).tolist()
     ([-0.5, 1.0, -0.5, 0.0], [1.0, 1.0, 1.0, 1.0])
     """
     places = np.arange(len(azimuth_rad)) if places is None else np.asarray(places)
     after = radius_m * arcs_after(np.asarray(azimuth_rad)[places])
     before = np.roll(after, 1)
-    rows, both = np.arange(len(places)), before + after
+    rows, arc_sum = np.arange(len(places)), before + after
     operator = np.zeros((len(places), len(azimuth_rad)))
     operator[rows, places] = 1.0
-    operator[rows, np.roll(places, 1)] -= after / both
-    operator[rows, np.roll(places, -1)] -= before / both
+    operator[rows, np.roll(places, 1)] -= after / arc_sum
+    operator[rows, np.roll(places, -1)] -= before / arc_sum
     return Neighbours(places, operator, before, after)
 
 
 def arcs_after(azimuth_rad):
-    """(n,) angle from each of rising azimuths to the next, rad.
+    """Angles (n,) from each of n ascending azimuths to the next azimuth, rad.
 
     Examples
     --------
@@ -206,24 +213,26 @@ def arcs_after(azimuth_rad):
 
 
 def spaced_subset(azimuth_rad, residual_m, radius_m, *, arc_m, least):
-    """Points about `arc_m` apart, among them the farthest from the plane on either side of it.
+    """Select points about `arc_m` apart that include the largest residuals of both signs.
 
-    From the farthest point on, the nearest to each even step is taken (of two as near the one
-    farther from the plane); the farthest on the other side takes the place of its neighbour.
+    The selection starts at the point farthest from the plane and takes the nearest point to each
+    equal step. Of two equally near points, the point with the larger residual is taken. The point
+    with the largest residual of the opposite sign then replaces the selected point nearest to it.
 
     Parameters
     ----------
     azimuth_rad, residual_m : ndarray, shape (n,)
-        Rising azimuths, and U.
+        Ascending azimuths and residuals U, m.
     radius_m, arc_m : float
-        Of the shell; wanted between neighbours.
+        Radius of the shell, and required distance of neighbours along the shell, m.
     least : int
-        Fewest points; their number is even.
+        Least number of points; the number of selected points is even.
 
     Returns
     -------
     ndarray of int
-        Their places, rising; all n where they are hardly more than are wanted.
+        Ascending indices of the selected points. All points are selected if they are fewer than
+        1.25 times the required number.
 
     Examples
     --------
@@ -232,40 +241,40 @@ def spaced_subset(azimuth_rad, residual_m, radius_m, *, arc_m, least):
     [0, 2, 4, 6, 8, 10, 12, 14]
     """
     count, size = len(azimuth_rad), np.abs(residual_m)
-    wanted = max(least, int(np.ceil(2 * np.pi * radius_m / arc_m - 1e-9)))
-    wanted += wanted % 2
-    if count <= NEARLY * wanted:
+    required = max(least, int(np.ceil(2 * np.pi * radius_m / arc_m - 1e-9)))
+    required += required % 2
+    if count <= NEARLY * required:
         return np.arange(count)
     farthest = int(np.argmax(size))
     chosen = [farthest]
-    for step in range(1, wanted):
-        at = azimuth_rad[farthest] + 2 * np.pi * step / wanted
-        away = np.abs((azimuth_rad - at + np.pi) % (2 * np.pi) - np.pi)
-        away[chosen] = np.inf
-        near = np.flatnonzero(away <= away.min() + 1e-6)
-        chosen.append(int(near[np.argmax(size[near])]))
+    for step in range(1, required):
+        azimuth = azimuth_rad[farthest] + 2 * np.pi * step / required
+        distance = np.abs((azimuth_rad - azimuth + np.pi) % (2 * np.pi) - np.pi)
+        distance[chosen] = np.inf
+        nearest = np.flatnonzero(distance <= distance.min() + 1e-6)
+        chosen.append(int(nearest[np.argmax(size[nearest])]))
     other = int(np.argmax(-np.sign(residual_m[farthest]) * residual_m))
     if other not in chosen:
-        away = (azimuth_rad[chosen] - azimuth_rad[other] + np.pi) % (2 * np.pi) - np.pi
-        away[0] = np.inf  # the farthest stays
-        chosen[int(np.argmin(np.abs(away)))] = other
+        distance = (azimuth_rad[chosen] - azimuth_rad[other] + np.pi) % (2 * np.pi) - np.pi
+        distance[0] = np.inf  # the farthest point remains selected
+        chosen[int(np.argmin(np.abs(distance)))] = other
     return np.sort(chosen)
 
 
 @dataclass(frozen=True)
 class Curvature:
-    """The largest curvature of the harmonics of U, along the shell.
+    """Largest curvature of the harmonics of U along the shell.
 
     Attributes
     ----------
     highest : int
-        Harmonics 2 to this one.
+        Highest harmonic; the lowest is 2.
     per_m : float
-        |d2U/ds2| there, 1/m.
+        Largest |d2U/ds2|, 1/m.
     azimuth_rad : float
-        There.
+        Azimuth of the largest curvature.
     gradient : ndarray, shape (n,)
-        Its change with each elevation, 1/m2.
+        Derivatives of the curvature with respect to the elevations, 1/m2.
     """
 
     highest: int
@@ -275,16 +284,19 @@ class Curvature:
 
 
 def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
-    """Largest |d2U/ds2| of harmonics 2 to `highest`, fitted together with the plane.
+    """Find the largest |d2U/ds2| of harmonics 2 to `highest`, fitted together with the plane.
 
     (1/R)^2 max |sum k^2 (a_k cos k t + b_k sin k t)|, k from 2
 
     Parameters
     ----------
     azimuth_rad, z_m : ndarray, shape (n,)
-        n above 2 highest; z elevations or U, which give the same.
+        Azimuths and elevations, m, of more than 2 `highest` points. The residuals U in place of the
+        elevations give the same result.
     radius_m : float
+        Radius of the shell, m.
     highest : int
+        Highest harmonic.
 
     Returns
     -------
@@ -293,8 +305,8 @@ def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
     Examples
     --------
     >>> t = np.radians(np.arange(0.0, 360.0, 30.0))
-    >>> found = largest_curvature_of(t, 0.001 * np.cos(2 * t), 2.0, 3)
-    >>> round(found.per_m, 9)
+    >>> curvature = largest_curvature_of(t, 0.001 * np.cos(2 * t), 2.0, 3)
+    >>> round(curvature.per_m, 9)
     0.001
     """
     operator = _least_squares(harmonics(azimuth_rad, highest))
@@ -302,39 +314,43 @@ def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
     weights = _curvature_weights(radius_m, highest)
 
     def size(t):
+        """Magnitude of the curvature at azimuths t."""
         return np.abs(harmonics(np.atleast_1d(t), highest) @ (weights * unknowns))
 
+    # The largest value on a grid starts a local search, which cannot end in another maximum.
     step = 2 * np.pi / (_STEPS * highest)
     grid = np.arange(_STEPS * highest) * step
     start = grid[np.argmax(size(grid))]
-    found = scipy.optimize.minimize_scalar(
+    search = scipy.optimize.minimize_scalar(
         lambda t: -size(t)[0],
         bounds=(start - step, start + step),
         method="bounded",
         options={"xatol": 1e-9},
     )
-    at = found.x if -found.fun > size(start)[0] else start
+    at = search.x if -search.fun > size(start)[0] else start
     rows = harmonics([at], highest)[0] * weights
     sign = -1.0 if rows @ unknowns < 0 else 1.0
     return Curvature(highest, float(size(at)[0]), float(at % (2 * np.pi)), sign * rows @ operator)
 
 
 def curvature_rows(azimuth_rad, radius_m, highest, start_rad):
-    """Curvature of the harmonics of U on an even grid of azimuths, as a linear map of elevations.
+    """Linear map from the elevations to the curvature on an equally spaced grid of azimuths.
 
     Parameters
     ----------
     azimuth_rad : ndarray, shape (n,)
+        Azimuths of the points.
     radius_m : float
+        Radius of the shell, m.
     highest : int
-        As of `largest_curvature_of`.
+        Highest harmonic, as in `largest_curvature_of`.
     start_rad : float
-        A place of the grid, such as that of the largest curvature.
+        A point of the grid, such as the azimuth of the largest curvature.
 
     Returns
     -------
     ndarray, shape (m, n)
-        Curvature, 1/m, is rows @ z; the grid misses at most 3.4 % of another maximum.
+        The curvature, 1/m, is rows @ z. The grid underestimates another maximum by at most 3.4 %.
     """
     count = _COARSE_STEPS * highest
     grid = start_rad + np.arange(count) * 2 * np.pi / count
@@ -343,6 +359,6 @@ def curvature_rows(azimuth_rad, radius_m, highest, start_rad):
 
 
 def _curvature_weights(radius_m, highest):
-    """(2 highest + 1,) k^2 / R^2 of each harmonic, 0 of the plane."""
+    """Weights (2 highest + 1,): k^2 / R^2 of each harmonic k, and 0 of the plane."""
     squares = np.repeat(np.arange(1, highest + 1), 2) ** 2.0
     return np.concatenate([[0.0, 0.0, 0.0], squares[2:]]) / radius_m**2

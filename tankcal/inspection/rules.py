@@ -1,7 +1,8 @@
-"""Rules of an inspection as files: the shipped ones, and a house rule of one's own.
+"""Rules of an inspection: shipped rule files and rule files of the user.
 
-A rule is a TOML file (docs/inspection.md): [rule] says what it is, every other section holds the
-limits of one kind of check. A rule may lack any of them: a check without limit is a bare figure.
+A rule is a TOML file (docs/inspection.md). [rule] describes the rule, and every other section
+contains the limits of one kind of check. Each of these sections is optional. A check without a
+limit yields a value without a verdict.
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from tankcal.job.tables import nearest
 from tankcal.messages import message
 from tankcal.record.inspection import InspectionLimit
 
-DEFAULT = "api_653"
+DEFAULT = "api_653"  # rule of an inspection that names no rule
 HEAD = (
     Field("name", "text", "name of the rule", required=True),
     Field("source", "text", "where its values were read", required=True),
@@ -45,15 +46,16 @@ SECTIONS = {
 
 @dataclass(frozen=True)
 class Rule:
-    """What an inspection is judged by.
+    """Limits of an inspection, as read from a rule file.
 
     Attributes
     ----------
     name, source, remark : str
+        Name of the rule, source of its values, and a remark, "" if none.
     file : str
-        Name of its file.
+        Name of the rule file.
     sections : dict
-        {section: {key: value or None}} of its limits; `verified` of each filled in.
+        Limits, {section: {key: value or None}}. Each section has a value of `verified`.
     """
 
     name: str
@@ -64,13 +66,28 @@ class Rule:
 
     @property
     def verified(self):
-        """Whether every value was read in the text itself."""
-        return all(one["verified"] for one in self.sections.values())
+        """Whether all values were read in the text of the standard itself."""
+        return all(section["verified"] for section in self.sections.values())
 
 
 def parse_rule(file, data, log):
-    """The Rule in the bytes of a TOML file, or None after telling `log` every problem of it."""
-    told = len(log.problems)
+    """Parse the `Rule` in the bytes of a TOML file.
+
+    Parameters
+    ----------
+    file : str
+        Name of the file, for messages.
+    data : bytes
+        Content of the file.
+    log : Log
+        Receives the problems of the file.
+
+    Returns
+    -------
+    Rule or None
+        None if the file has problems.
+    """
+    problem_count = len(log.problems)
     settings, rows = read_toml(file, data, log)
     if settings is None:
         return None
@@ -86,17 +103,18 @@ def parse_rule(file, data, log):
         expected = message(
             "unknown_section_of_inspection",
             "unknown section; expected [rule] or one of {sections}{hint}",
-            sections=[f"[{one}]" for one in SECTIONS],
+            sections=[f"[{name}]" for name in SECTIONS],
             hint=nearest(section, (*SECTIONS, "rule")),
         )
         log.problem(file, expected, rows.get(section), f"[{section}]")
-    if len(log.problems) == told and not sections:
+    if len(log.problems) == problem_count and not sections:
         expected = message(
             "no_limits_of_inspection", "no limits; expected sections such as [roundness]"
         )
         log.problem(file, expected)
-    if len(log.problems) > told:
+    if len(log.problems) > problem_count:
         return None
+    # A section without `verified` or `clause` takes `verified` of the whole rule, and no clause.
     for values in sections.values():
         if values["verified"] is None:
             values["verified"] = bool(head["verified"])
@@ -109,47 +127,55 @@ shipped_names, shipped_rule = _SHIPPED.names, _SHIPPED.rule
 
 
 def find_rule(name, log):
-    """The Rule of a shipped rule's name or the path of a file; None after telling `log`.
+    """Read a shipped `Rule` by its name, or a rule file by its path.
 
-    name  such as "api_653" or "rules/house.toml"
+    The name is such as "api_653" or "rules/house.toml". If the rule is missing or invalid, `log`
+    receives the problems, and None is returned.
     """
-    found = _SHIPPED.named(name, log)
-    return None if found is None else found[0]
+    rules = _SHIPPED.named(name, log)
+    return None if rules is None else rules[0]
 
 
 def limit_of(rule, code, *, diameter_m=None, height_m=None):
-    """The `InspectionLimit` of a check of the wall; None: the rule has none, or lacks a size.
+    """Compute the `InspectionLimit` of a check of the wall.
 
     Parameters
     ----------
     rule : Rule or None
+        Rule with the limits; None for no limits.
     code : str
         "plumbness_axis", "plumbness_generatrix", "plumbness_course", "roundness_low",
         "roundness_high", "peaking" or "banding".
     diameter_m : float, optional
-        Nominal, of the tank: the radii are limited by it.
+        Nominal diameter of the tank, m; required for the roundness.
     height_m : float, optional
-        Of the shell, or of a course: the plumb is limited by it.
+        Height of the shell or of a course, m; required for the plumbness.
+
+    Returns
+    -------
+    InspectionLimit or None
+        None if the rule has no limit of the check, or if a required size is not given.
 
     Examples
     --------
     >>> rule = shipped_rule("api_653")
-    >>> [limit_of(rule, "plumbness_axis", height_m=one).value for one in (9.5, 14.0)]
+    >>> [limit_of(rule, "plumbness_axis", height_m=height).value for height in (9.5, 14.0)]
     [95.0, 127.0]
-    >>> [limit_of(rule, "roundness_low", diameter_m=one).value for one in (11, 12, 80)]
+    >>> [limit_of(rule, "roundness_low", diameter_m=size).value for size in (11, 12, 80)]
     [13.0, 19.0, 32.0]
     """
-    section = _SECTION_OF.get(code, code)
-    found = None if rule is None else rule.sections.get(section)
-    if found is None:
+    section = _SECTIONS_BY_CODE.get(code, code)
+    limits = None if rule is None else rule.sections.get(section)
+    if limits is None:
         return None
-    value = _VALUE_OF[section](found, code, diameter_m, height_m)
+    value = _LIMITS_BY_SECTION[section](limits, code, diameter_m, height_m)
     if value is None:
         return None
-    return InspectionLimit(code, float(value), found["clause"], found["verified"])
+    return InspectionLimit(code, float(value), limits["clause"], limits["verified"])
 
 
-_SECTION_OF = {
+# Section of a rule for each check whose code is not the name of its section.
+_SECTIONS_BY_CODE = {
     "plumbness_axis": "plumbness",
     "plumbness_generatrix": "plumbness",
     "roundness_low": "roundness",
@@ -157,30 +183,34 @@ _SECTION_OF = {
 }
 
 
-def _of_height(found, code, diameter_m, height_m):
+def _height_limit_mm(limits, code, diameter_m, height_m):
+    """Limit in mm, a share of the height up to `most_mm`; None without a height."""
     if height_m is None:
         return None
-    most = found.get("most_mm")
-    value = 1000 * found["part_of_height"] * height_m
+    most = limits.get("most_mm")
+    value = 1000 * limits["part_of_height"] * height_m
     return value if most is None else min(value, most)
 
 
-def _of_diameter(found, code, diameter_m, height_m):
-    times = 1.0 if code == "roundness_low" else found["times_higher"]
-    if diameter_m is None or times is None:
+def _diameter_limit_mm(limits, code, diameter_m, height_m):
+    """Limit in mm by steps of the diameter; None without a diameter or a limit higher up."""
+    factor = 1.0 if code == "roundness_low" else limits["times_higher"]
+    if diameter_m is None or factor is None:
         return None
-    steps = sorted(found["by_diameter"] or ())
-    return times * next((most for below, most in steps if diameter_m < below), found["above_mm"])
+    steps = sorted(limits["by_diameter"] or ())
+    return factor * next((most for below, most in steps if diameter_m < below), limits["above_mm"])
 
 
-def _fixed(found, code, diameter_m, height_m):
-    return found["most_mm"]
+def _fixed_limit_mm(limits, code, diameter_m, height_m):
+    """Limit in mm that depends on no size of the tank."""
+    return limits["most_mm"]
 
 
-_VALUE_OF = {
-    "plumbness": _of_height,
-    "plumbness_course": _of_height,
-    "roundness": _of_diameter,
-    "peaking": _fixed,
-    "banding": _fixed,
+# Function that computes the limit of each section, in mm.
+_LIMITS_BY_SECTION = {
+    "plumbness": _height_limit_mm,
+    "plumbness_course": _height_limit_mm,
+    "roundness": _diameter_limit_mm,
+    "peaking": _fixed_limit_mm,
+    "banding": _fixed_limit_mm,
 }

@@ -1,9 +1,10 @@
-"""Settlement of each epoch and between two: the plane, what is out of it, and what is judged.
+"""Settlement of each epoch and between two epochs: tilted plane, out-of-plane part and figures.
 
-Three figures answer the same question, for the limit of S grows with the square of the spacing: S
-with all points, S with a subset spaced as the text asks, and the curvature, which no spacing
-changes. Each figure estimates the true value: the bias of the largest reading of many, and of R2,
-is removed by extrapolation to errors of 0 (`tankcal.inspection.extrapolation`).
+The limit of S grows with the square of the spacing of the points. Three figures therefore describe
+the out-of-plane settlement: S of all points, S of a subset with the spacing that the rule requires,
+and the curvature, which is independent of the spacing. Each figure estimates the true value. The
+bias of the largest reading and of R2 is removed by extrapolation to errors of 0
+(`tankcal.inspection.extrapolation`).
 """
 
 from dataclasses import dataclass
@@ -29,22 +30,24 @@ from tankcal.inspection.settlement_limits import largest_curvature
 from tankcal.messages import message
 from tankcal.record.inspection import Settlement, SettlementPoint
 
-SAME_TANK = 1.25  # ratio of two diameters that are of one tank
+SAME_TANK = 1.25  # largest ratio of two radii of the same tank
 
 
 @dataclass(frozen=True)
 class Largest:
-    """The S that is nearest its limit (or the largest, where there is none), and its limit.
+    """The S with the largest ratio to its limit, or the largest S without limits.
 
     Attributes
     ----------
     place : int
-        Of the point, among all.
+        Index of the point among all points.
     S_m, u_m : float
-        Reading with its sign; standard uncertainty, nan: not known.
+        Reading with its sign, and standard uncertainty, nan if unknown, m.
     limit_m : float or None
+        Limit of |S| at this point, m.
     true : Estimate or None
-        Of the largest true |S|, at the limit of this place, m; None: no u is known.
+        Estimate of the largest true |S|, converted to the limit of this point, m; None if no u is
+        known.
     """
 
     place: int
@@ -56,27 +59,37 @@ class Largest:
 
 @dataclass(frozen=True)
 class Assessed:
-    """What settlement of one epoch, or between two, comes to, in m.
+    """Computed settlement of one epoch, or between two epochs, in m.
 
     Attributes
     ----------
     epoch : Epoch
+        Epoch or difference of two epochs.
     dof, k : float
-        Of all uncertainties; 0 and nan: none is known.
+        Degrees of freedom and coverage factor of all uncertainties; 0 and nan if unknown.
     plane : Plane
+        Tilted plane.
     r2, u_r2 : float
+        R2 of the readings and its standard uncertainty.
     true_r2 : Estimate or None
+        Estimate of the true R2.
     all_points, subset : Neighbours
+        All points, and the subset with the spacing of the rule.
     S_m, u_S_m : ndarray, shape (n,)
-        Of all points.
+        S of all points and its standard uncertainty.
     largest, largest_of_subset, largest_by_arc : Largest
-        Of all points, of the subset, and of all by the limit that has no strength in it.
+        Largest S of all points, of the subset, and of all points with the limit that does not
+        depend on the strength of the steel.
     limits_m : ndarray, shape (n,), or None
-        Of S of all points.
+        Limits of |S| of all points.
     curvature : Curvature
+        Largest curvature of the readings.
     u_curvature_per_m : float
+        Standard uncertainty of the largest curvature, 1/m.
     true_curvature : Estimate or None
+        Estimate of the largest true curvature, 1/m.
     curvature_limit_per_m : float or None
+        Limit of the curvature, 1/m.
     """
 
     epoch: Epoch
@@ -102,27 +115,33 @@ class Assessed:
     @property
     def label(self):
         """Name of the epoch, or "later - earlier"."""
-        one = self.epoch
-        return one.name if one.since is None else f"{one.name} - {one.since}"
+        epoch = self.epoch
+        return epoch.name if epoch.since is None else f"{epoch.name} - {epoch.since}"
 
 
 def assess_settlement(levelling, strength, limits, log):
-    """Settlement of every epoch and of their differences, and the figures that are judged.
+    """Compute the settlement of all epochs and of their differences, and the figures.
 
-    Each epoch stands against the first, and the last against the one before it.
+    Each later epoch is compared with the first epoch, and the last epoch also with the previous
+    epoch.
 
     Parameters
     ----------
     levelling : Levelling
+        Epochs of settlement.csv.
     strength : Strength
         Diameter, height and steel of the tank.
     limits : SettlementLimits
+        Limits of the rule.
     log : Log
-        Takes warnings, and a problem where the points are those of another tank.
+        Receives warnings, and a problem if the points belong to another tank.
 
     Returns
     -------
-    list of Settlement, list of Figure
+    list of Settlement
+        One item for each epoch, then for each difference.
+    list of Figure
+        Figures in the same order.
     """
     radius_m, told = levelling.radius_m, strength.diameter_m / 2
     if radius_m is not None and not 1 / SAME_TANK < radius_m / told < SAME_TANK:
@@ -134,13 +153,29 @@ def assess_settlement(levelling, strength, limits, log):
     for epoch in levelling.epochs:
         warn_of_points(epoch, levelling.file, strength.diameter_m, limits, log)
     epochs = [*levelling.epochs, *differences(levelling, log)]
-    assessed = [assess(one, levelling.dof, strength, limits) for one in epochs]
-    figures = [figure for one in assessed for figure in figures_of(one, limits)]
-    return [settlement_of(one, strength, levelling.sd_known) for one in assessed], figures
+    assessed = [assess(item, levelling.dof, strength, limits) for item in epochs]
+    figures = [figure for item in assessed for figure in figures_of(item, limits)]
+    return [settlement_of(item, strength, levelling.sd_known) for item in assessed], figures
 
 
 def assess(epoch, dof, strength, limits):
-    """`Assessed` of an Epoch; dof is of its uncertainties, 0: none is known."""
+    """Compute the settlement of an epoch or of a difference.
+
+    Parameters
+    ----------
+    epoch : Epoch
+        Elevations, m.
+    dof : float
+        Degrees of freedom of their standard uncertainties; 0 if these are unknown.
+    strength : Strength
+        Diameter, height and steel of the tank.
+    limits : SettlementLimits
+        Limits of the rule.
+
+    Returns
+    -------
+    Assessed
+    """
     azimuth, z, radius_m = epoch.azimuth_rad, epoch.z_m, strength.diameter_m / 2
     variance = np.full(len(z), np.nan) if not dof else epoch.u_m**2
     plane = fit_plane(azimuth, z)
@@ -152,26 +187,30 @@ def assess(epoch, dof, strength, limits):
         arc_m=limits.subset_arc_m,
         least=limits.least_points,
     )
-    every, subset = (between_neighbours(azimuth, radius_m, one) for one in (None, chosen))
-    most = largest_curvature(limits, strength)
+    every, subset = (between_neighbours(azimuth, radius_m, points) for points in (None, chosen))
+    curvature_limit = largest_curvature(limits, strength)
     S, u_S = _out_of_plane(every, plane, variance)
     every_limit, subset_limit = (
-        None if most is None else one.limits_m(most) for one in (every, subset)
+        None if curvature_limit is None else points.limits_m(curvature_limit)
+        for points in (every, subset)
     )
     by_arc = None if limits.de_beer is None else every.arc_m / limits.de_beer
+    # Harmonics up to h have 2 h + 1 unknowns, which must not exceed the number of points.
     highest = min(limits.highest_harmonic or len(z) // 4, (len(z) - 1) // 2)
     curvature = largest_curvature_of(azimuth, z, radius_m, highest)
-    bends = curvature_rows(azimuth, radius_m, highest, curvature.azimuth_rad)
+    curvature_map = curvature_rows(azimuth, radius_m, highest, curvature.azimuth_rad)
     errors = simulate_errors(azimuth, z, epoch.u_m) if dof else None
 
     def true_value(statistic, reading):
+        """Estimate of the true statistic, or None without uncertainties."""
         return None if errors is None else estimate(statistic, z, reading, errors)
 
     def largest_of(neighbours, limits_m):
+        """`Largest` of the points of `neighbours`."""
         return _largest(neighbours, plane, variance, limits_m, true_value)
 
     largest = largest_of(every, every_limit)
-    is_whole = len(subset.places) == len(every.places)  # the same points: not simulated twice
+    is_whole = len(subset.places) == len(every.places)  # avoids a second simulation
     return Assessed(
         epoch=epoch,
         dof=dof,
@@ -190,39 +229,46 @@ def assess(epoch, dof, strength, limits):
         limits_m=every_limit,
         curvature=curvature,
         u_curvature_per_m=_u(curvature.gradient, variance),
-        true_curvature=true_value(Statistic(bends, _largest_size), curvature.per_m),
-        curvature_limit_per_m=most,
+        true_curvature=true_value(Statistic(curvature_map, _largest_size), curvature.per_m),
+        curvature_limit_per_m=curvature_limit,
     )
 
 
 def _out_of_plane(neighbours, plane, variance):
-    """(S, its standard uncertainty) of the points of some neighbours."""
+    """S of the points of `neighbours` and its standard uncertainty, m."""
     rows = neighbours.operator @ plane.residual_operator
     return neighbours.operator @ plane.residual_m, np.sqrt(rows**2 @ variance)
 
 
 def _u(gradient, variance):
+    """Standard uncertainty of a function of independent elevations with these variances."""
     return float(np.sqrt(gradient**2 @ variance))
 
 
 def _largest_size(values):
-    """(...) largest |value| of the last axis of (..., m)."""
+    """Largest |value| along the last axis, from shape (..., m) to (...)."""
     return np.max(np.abs(values), axis=-1)
 
 
 def _share_statistic(plane):
-    """`Statistic` of R2: the operator holds what is out of the plane, then what is out of level."""
+    """`Statistic` of R2; its operator stacks the residuals and the deviations from the mean."""
     count = len(plane.residual_m)
     level = np.eye(count) - 1 / count
 
     def share(values):
-        left, scatter = (np.sum(one**2, axis=-1) for one in np.split(values, 2, axis=-1))
-        return np.where(scatter > 0, 1 - left / np.where(scatter > 0, scatter, 1.0), 1.0)
+        """R2 of stacked residuals and deviations; 1 for level points."""
+        residual_squares, scatter = (
+            np.sum(part**2, axis=-1) for part in np.split(values, 2, axis=-1)
+        )
+        return np.where(
+            scatter > 0, 1 - residual_squares / np.where(scatter > 0, scatter, 1.0), 1.0
+        )
 
     return Statistic(np.concatenate([plane.residual_operator, level]), share, most=1.0)
 
 
 def _largest(neighbours, plane, variance, limits_m, true_value):
+    """`Largest` of the points of `neighbours`."""
     S, u = _out_of_plane(neighbours, plane, variance)
     limits = np.ones(len(S)) if limits_m is None else limits_m
     at = int(np.argmax(np.abs(S) / limits))
@@ -237,22 +283,22 @@ def _largest(neighbours, plane, variance, limits_m, true_value):
     )
 
 
-# ---- what is judged, and what is saved
+# ---- figures and saved settlements
 
 
 def figures_of(assessed, limits):
-    """Figures of one Assessed, in the order of the papers."""
+    """Figures of an `Assessed`, in the order of the report."""
     every, subset = assessed.all_points, assessed.subset
-    found = [_r2_figure(assessed, limits)]
-    for code, one, used in (
+    figures = [_r2_figure(assessed, limits)]
+    for code, largest, used in (
         ("settlement_all", assessed.largest, len(every.places)),
         ("settlement_subset", assessed.largest_of_subset, len(subset.places)),
     ):
-        value = None if one.limit_m is None else 1000 * one.limit_m
-        limit = limits.limit(code, value)
-        found.append(_S_figure(code, assessed, one, limit, used))
+        limit_mm = None if largest.limit_m is None else 1000 * largest.limit_m
+        limit = limits.limit(code, limit_mm)
+        figures.append(_S_figure(code, assessed, largest, limit, used))
     curvature = assessed.curvature
-    found.append(
+    figures.append(
         _figure(
             assessed,
             code="settlement_curvature",
@@ -268,22 +314,22 @@ def figures_of(assessed, limits):
         )
     )
     if assessed.largest_by_arc is not None:
-        one = assessed.largest_by_arc
-        limit = limits.limit("settlement_de_beer", 1000 * one.limit_m, limits.de_beer_clause)
-        found.append(_S_figure("settlement_de_beer", assessed, one, limit, len(every.places)))
-    return found
+        largest = assessed.largest_by_arc
+        limit = limits.limit("settlement_de_beer", 1000 * largest.limit_m, limits.de_beer_clause)
+        figures.append(_S_figure("settlement_de_beer", assessed, largest, limit, len(every.places)))
+    return figures
 
 
 def _figure(assessed, *, reading, u, true, **given):
-    """`Figure` of a reading and of the estimate of its true value; without a u the reading."""
+    """`Figure` of the estimate of a true value, or of the reading if no u is known."""
     if true is None:
-        found = {"value": reading, "U": None, "k": None}
+        values = {"value": reading, "U": None, "k": None}
     else:
         value = float(np.copysign(true.value, reading))
-        found = {"value": value, "U": assessed.k * true.u, "k": assessed.k,
+        values = {"value": value, "U": assessed.k * true.u, "k": assessed.k,
                  "reading": reading, "U_reading": assessed.k * u}  # fmt: skip
     return Figure(
-        **found,
+        **values,
         dof=assessed.dof,
         epoch=assessed.label,
         **given,
@@ -291,6 +337,7 @@ def _figure(assessed, *, reading, u, true, **given):
 
 
 def _S_figure(code, assessed, largest, limit, used):
+    """`Figure` of a largest S, in mm."""
     return _figure(
         assessed,
         code=code,
@@ -306,7 +353,7 @@ def _S_figure(code, assessed, largest, limit, used):
 
 
 def _r2_figure(assessed, limits):
-    """R2, not determined where the elevations are level but for their errors."""
+    """`Figure` of R2, not determined if the elevations are level within their uncertainties."""
     noise = is_within_noise(assessed.epoch, assessed.dof)
     return _figure(
         assessed,
@@ -323,9 +370,23 @@ def _r2_figure(assessed, limits):
 
 
 def settlement_of(assessed, strength, sd_known):
-    """The `Settlement` of one Assessed, as it is saved."""
+    """Build the `Settlement` of the record.
+
+    Parameters
+    ----------
+    assessed : Assessed
+        Computed settlement.
+    strength : Strength
+        Diameter of the tank, m.
+    sd_known : bool
+        Whether s_mm was given.
+
+    Returns
+    -------
+    Settlement
+    """
     plane, epoch, k = assessed.plane, assessed.epoch, assessed.k
-    turn = np.pi * strength.diameter_m
+    circumference_m = np.pi * strength.diameter_m
     variance = epoch.u_m**2 if assessed.dof else np.full(len(epoch.z_m), np.nan)
     curvature = assessed.curvature
     return Settlement(
@@ -340,10 +401,10 @@ def settlement_of(assessed, strength, sd_known):
         tilt_mm_per_m=1000 * plane.b_m / (strength.diameter_m / 2),
         R2=assessed.r2,
         sd_known=sd_known,
-        arc_m=turn / len(epoch.points),
+        arc_m=circumference_m / len(epoch.points),
         limit_mm=_in_mm(assessed.largest.limit_m),
         limit_half_mm=_in_mm(limit_of_every_second(assessed)),
-        subset_arc_m=turn / len(assessed.subset.places),
+        subset_arc_m=circumference_m / len(assessed.subset.places),
         subset_limit_mm=_in_mm(assessed.largest_of_subset.limit_m),
         harmonics=curvature.highest,
         curvature_per_m=curvature.per_m,
@@ -354,16 +415,21 @@ def settlement_of(assessed, strength, sd_known):
 
 
 def limit_of_every_second(assessed):
-    """Limit of S where it is nearest its own, from the neighbours next but one; m or None."""
-    most, every, at = assessed.curvature_limit_per_m, assessed.all_points, assessed.largest.place
-    if most is None:
+    """Limit of the largest S for neighbours at twice the spacing, m, or None without a limit."""
+    curvature_limit, every, place = (
+        assessed.curvature_limit_per_m,
+        assessed.all_points,
+        assessed.largest.place,
+    )
+    if curvature_limit is None:
         return None
-    before = every.before_m[at] + every.before_m[at - 1]
-    after = every.after_m[at] + every.after_m[(at + 1) % len(every.places)]
-    return most * before * after / 2
+    before = every.before_m[place] + every.before_m[place - 1]
+    after = every.after_m[place] + every.after_m[(place + 1) % len(every.places)]
+    return curvature_limit * before * after / 2
 
 
 def _point(assessed, i):
+    """`SettlementPoint` of point i."""
     epoch, plane, k = assessed.epoch, assessed.plane, assessed.k
     limits = assessed.limits_m
     return SettlementPoint(
@@ -381,8 +447,10 @@ def _point(assessed, i):
 
 
 def _known(value):
+    """Value as float, or None if it is not finite."""
     return float(value) if np.isfinite(value) else None
 
 
 def _in_mm(value_m):
+    """Value in mm, or None for None."""
     return None if value_m is None else float(1000 * value_m)

@@ -1,7 +1,7 @@
-"""What a rule file says of settlement, of the bottom's edge and of its bulges.
+"""Limits of a rule file for settlement, the edge of the bottom and bulges of the bottom.
 
-`[settlement]`, `[edge]` and `[bulge]` of tankcal/inspection/rules/api_653.toml: the keys of each,
-and the limits that they make for a tank.
+The module contains the keys of the sections `[settlement]`, `[edge]` and `[bulge]` of a rule file
+such as tankcal/inspection/rules/api_653.toml, and computes the limits for a tank.
 """
 
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ BULGE = (
 
 @dataclass(frozen=True)
 class SettlementLimits:
-    """Limits of `[settlement]`; without a rule there are none, and the subset is 30 ft apart."""
+    """Limits of `[settlement]`. The defaults, without a rule, are no limits and 30 ft spacing."""
 
     curvature_factor: float | None = None
     least_points: int = 8
@@ -62,7 +62,7 @@ class SettlementLimits:
     verified: bool = False
 
     def limit(self, name, value, clause=None):
-        """InspectionLimit of a value; None of None."""
+        """`InspectionLimit` of a value, or None for None; by default with the section's clause."""
         if value is None:
             return None
         clause = self.clause if clause is None else clause
@@ -71,7 +71,11 @@ class SettlementLimits:
 
 @dataclass(frozen=True)
 class EdgeLimits:
-    """Limits of `[edge]`; `curves` has rows (diameter m, width m, parallel mm, across mm)."""
+    """Limits of `[edge]`.
+
+    The rows of `curves` have diameter, m, width, m, and the largest drops, mm, beside lap welds
+    parallel to the shell and across it.
+    """
 
     drop_per_width_mm_m: float | None = None
     curves: tuple = ()
@@ -89,7 +93,7 @@ class BulgeLimits:
 
 
 def settlement_limits(section):
-    """SettlementLimits of {key: value} of a rule's `[settlement]`; of None those of no rule.
+    """`SettlementLimits` of the section `[settlement]`, {key: value}, or of no rule for None.
 
     Examples
     --------
@@ -97,35 +101,42 @@ def settlement_limits(section):
     >>> limits.curvature_factor, limits.de_beer
     (11, None)
     """
-    given = _given(section)
+    given = _given_values(section)
     counts = {key: int(given[key]) for key in ("least_points", "highest_harmonic") if key in given}
     return SettlementLimits(**(given | counts))
 
 
 def edge_limits(section):
-    """EdgeLimits of {key: value} of a rule's `[edge]`; of None those of no rule."""
-    return EdgeLimits(**_given(section))
+    """`EdgeLimits` of the section `[edge]`, {key: value}, or of no rule for None."""
+    return EdgeLimits(**_given_values(section))
 
 
 def bulge_limits(section):
-    """BulgeLimits of {key: value} of a rule's `[bulge]`; of None those of no rule."""
-    return BulgeLimits(**_given(section))
+    """`BulgeLimits` of the section `[bulge]`, {key: value}, or of no rule for None."""
+    return BulgeLimits(**_given_values(section))
 
 
-def _given(section):
-    return {key: one for key, one in (section or {}).items() if one is not None}
+def _given_values(section):
+    """Keys of a section that have a value."""
+    return {key: value for key, value in (section or {}).items() if value is not None}
 
 
 def largest_curvature(limits, strength):
-    """Largest curvature of the shell's foot, c Y / (E H), 1/m; None where one is not given.
+    """Limit of the curvature of the shell's foot, c Y / (E H), 1/m.
 
-    In any one system of units it is |S| <= c L^2 Y / (2 E H) of points L apart.
+    For points at a distance L, it is equivalent to |S| <= c L^2 Y / (2 E H) in consistent units.
 
     Parameters
     ----------
     limits : SettlementLimits
-        For c.
+        Limits with the factor c.
     strength : Strength
+        Yield stress Y, Young's modulus E and height H.
+
+    Returns
+    -------
+    float or None
+        None if c, Y, E or H is not given.
 
     Examples
     --------
@@ -140,14 +151,14 @@ def largest_curvature(limits, strength):
 
 @dataclass(frozen=True)
 class Strength:
-    """What the limits of settlement need of a tank; what is not known is None.
+    """Sizes and steel of a tank for the limits of settlement; None for an unknown value.
 
     Attributes
     ----------
     diameter_m, height_m : float
-        Of the shell.
+        Diameter and height of the shell, m.
     yield_pa, e_pa : float
-        Yield stress and Young's modulus of its steel.
+        Yield stress and Young's modulus of the shell's steel, Pa.
     """
 
     diameter_m: float | None
@@ -157,18 +168,25 @@ class Strength:
 
 
 def largest_drop_mm(limits, width_m, diameter_m, weld_deg=None):
-    """Largest drop of the bottom's edge, mm, or None: the rule has none for this width.
+    """Limit of the drop of the bottom's edge.
 
-    Curves are interpolated between their widths and diameters, never beyond. Beside a lap weld at
-    an angle a to the radial line it is B_across - (B_across - B_parallel) sin a.
+    Curves are interpolated between their widths and diameters, without extrapolation. Beside a lap
+    weld at an angle a to the radial line, the limit is B_across - (B_across - B_parallel) sin a.
 
     Parameters
     ----------
     limits : EdgeLimits
+        Curves, or the drop per width.
     width_m, diameter_m : float
-        Of the settled edge; of the tank.
+        Width of the settled edge, and diameter of the tank, m.
     weld_deg : float, optional
-        Between lap weld and radial line, degrees; None: parallel to the shell, the stricter.
+        Angle between lap weld and radial line, degrees. By default the weld is parallel to the
+        shell, which gives the stricter limit.
+
+    Returns
+    -------
+    float or None
+        Limit, mm; None if the rule has no limit for this width and diameter.
 
     Examples
     --------
@@ -185,19 +203,22 @@ def largest_drop_mm(limits, width_m, diameter_m, weld_deg=None):
     diameters = np.unique(rows[:, 0])
     if not diameters[0] <= diameter_m <= diameters[-1]:
         return None
+    # Interpolate in the width on both neighbouring diameters, then between these diameters.
     above = np.searchsorted(diameters, diameter_m)
     pair = diameters[[max(above - 1, 0), above]]
-    of_pair = [_of_curve(rows[rows[:, 0] == one], width_m) for one in pair]
-    if None in (of_pair[0], of_pair[1]):
+    drops = [
+        _drops_of_curve(rows[rows[:, 0] == curve_diameter], width_m) for curve_diameter in pair
+    ]
+    if None in (drops[0], drops[1]):
         return None
     share = 0.0 if pair[0] == pair[1] else (diameter_m - pair[0]) / (pair[1] - pair[0])
-    parallel, across = (1 - share) * np.array(of_pair[0]) + share * np.array(of_pair[1])
+    parallel, across = (1 - share) * np.array(drops[0]) + share * np.array(drops[1])
     angle = np.pi / 2 if weld_deg is None else np.radians(weld_deg)
     return float(across - (across - parallel) * np.sin(angle))
 
 
-def _of_curve(rows, width_m):
-    """(parallel, across) of the curve of one diameter, or None outside of its widths."""
+def _drops_of_curve(rows, width_m):
+    """Drops beside parallel and across welds for one diameter, mm, or None outside its widths."""
     rows = rows[np.argsort(rows[:, 1])]
     if not rows[0, 1] <= width_m <= rows[-1, 1]:
         return None

@@ -1,6 +1,6 @@
-"""Plumb and roundness of a wall, out of the shape that a record keeps of it.
+"""Plumbness and roundness of a wall, from its shape in a record.
 
-The gravest place decides a check (`verdict.gravity`): a tank passes only where every place does.
+The place with the largest `verdict.gravity` decides a check: a tank passes only if all places pass.
 """
 
 from dataclasses import dataclass
@@ -20,23 +20,23 @@ WALL_CHECKS = (
 )  # fmt: skip
 
 
-LEAST_READ = 8  # generatrices with a reading at both ends, that others are left out for
+LEAST_READ = 8  # number of generatrices with readings at both ends, from which others are omitted
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Sizes of a tank that its wall is judged by.
+    """Nominal sizes of a tank for the checks of its wall.
 
     Attributes
     ----------
     nominal_radius_m : float or None
-        That the radii are compared with; None: their mean.
+        Radius that the measured radii are compared with, m; None for their mean.
     height_m : float
-        Of the shell.
+        Height of the shell, m.
     courses_m : tuple of float
-        Heights of the courses.
+        Heights of the courses, m.
     diameter_m : float or None
-        Nominal, that limits go by; None: not given.
+        Nominal diameter that determines limits, m; None if not given.
     """
 
     nominal_radius_m: float | None
@@ -47,7 +47,7 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Spread:
-    """Values at many places, with their expanded uncertainty and its coverage factor."""
+    """Values at n places with expanded uncertainty, coverage factor and degrees of freedom."""
 
     value: np.ndarray
     U: np.ndarray
@@ -55,70 +55,91 @@ class Spread:
     dof: np.ndarray
 
     def times(self, factor):
-        """The same by a factor."""
+        """Values and expanded uncertainties times a factor."""
         return Spread(factor * self.value, factor * self.U, self.k, self.dof)
 
 
 def spread_of(value, u, dof):
-    """`Spread` of values, standard uncertainties and degrees of freedom (None: infinite)."""
-    dof = np.array([np.inf if one is None else one for one in dof], dtype=float)
+    """Build a `Spread`.
+
+    Parameters
+    ----------
+    value, u : sequence of float, length n
+        Values and standard uncertainties, in the same unit.
+    dof : sequence of float or None, length n
+        Degrees of freedom; None for infinite.
+
+    Returns
+    -------
+    Spread
+    """
+    dof = np.array([np.inf if nu is None else nu for nu in dof], dtype=float)
     k = coverage_factor(PROBABILITY, dof)
     return Spread(np.array(value, dtype=float), k * np.array(u, dtype=float), k, dof)
 
 
 def deciding_place(value, U, limit):
-    """Index of the place that decides a check of many.
+    """Index of the place that decides a check of many places.
 
     Parameters
     ----------
     value, U : ndarray, shape (n,)
+        Values and expanded uncertainties, in the unit of the limit.
     limit : float or None
+        Limit of the check; None for no limit.
+
+    Returns
+    -------
+    int
 
     Examples
     --------
     >>> values, U = np.array([3.0, -7.0, 6.5]), np.array([1.0, 1.0, 2.0])
-    >>> [deciding_place(values, U, one) for one in (6.0, 9.0, None)]
+    >>> [deciding_place(values, U, limit) for limit in (6.0, 9.0, None)]
     [1, 2, 1]
     """
     return max(range(len(value)), key=lambda i: gravity(value[i], U[i], limit))
 
 
 def inspect_shape(shape, sizes, rule):
-    """Figures of plumb and roundness, and what is drawn of them.
+    """Compute the figures of plumbness and roundness, and the data of their charts.
 
     Parameters
     ----------
     shape : dict
         A `record.wall_shape.WallShapeRecord` as plain data.
     sizes : Sizes
+        Nominal sizes of the tank.
     rule : rules.Rule or None
+        Rule with the limits.
 
     Returns
     -------
     figures : list of Figure
         Each of WALL_CHECKS, in their order.
     generatrices : Generatrices or None
-        None: no two levels have a known centre.
+        None if fewer than two levels have a known centre.
     levels : list of InspectedLevel
+        Radii of all levels.
     """
-    levels = [_level(one, sizes.nominal_radius_m) for one in shape["levels"]]
-    found = [
+    levels = [_level(level, sizes.nominal_radius_m) for level in shape["levels"]]
+    figures = [
         _axis(shape["axis"], sizes, rule),
         _generatrix(shape, sizes, rule),
         _courses(shape, sizes, rule),
         _roundness("roundness_low", shape, sizes, rule),
         _roundness("roundness_high", shape, sizes, rule),
     ]
-    return found, _generatrices(shape), levels
+    return figures, _generatrices(shape), levels
 
 
 def not_surveyed(rule, sizes, remark):
-    """Figures of the checks of a wall that nothing is known of."""
+    """Figures of the checks of a wall that was not surveyed, without values."""
     return [_undetermined(code, _limit(rule, code, sizes), remark) for code in WALL_CHECKS]
 
 
 def _limit(rule, code, sizes, course=None):
-    """Limit of a check; of a course by its own height."""
+    """Limit of a check; the limit of a course depends on the height of this course."""
     height = sizes.height_m
     if code == "plumbness_course":
         height = None if course is None else sizes.courses_m[course - 1]
@@ -126,80 +147,86 @@ def _limit(rule, code, sizes, course=None):
 
 
 def _undetermined(code, limit, remark):
+    """Figure without a value."""
     return Figure(
         code=code, unit="mm", value=None, U=None, k=None, dof=np.inf, limit=limit, remark=remark
     )
 
 
-# ---- the plumb
+# ---- plumbness
 
 
 def _axis(axis, sizes, rule):
-    """The centre of the top against that of the bottom, over the height of the shell."""
+    """Figure of the axis: offset of the top centre from the bottom centre, over the shell."""
+    # The offset between two levels is extrapolated to the height of the shell.
     limit = _limit(rule, "plumbness_axis", sizes)
     if axis is None:
         return _undetermined("plumbness_axis", limit, "one_level")
-    over = axis["high_m"] - axis["low_m"]
-    size = spread_of([hypot(axis["x_mm"], axis["y_mm"])], [axis["u_mm"]], [axis["dof"]])
-    size = size.times(sizes.height_m / over)
-    towards = degrees(atan2(axis["x_mm"], axis["y_mm"])) % 360
+    distance_m = axis["high_m"] - axis["low_m"]
+    offset = spread_of([hypot(axis["x_mm"], axis["y_mm"])], [axis["u_mm"]], [axis["dof"]])
+    offset = offset.times(sizes.height_m / distance_m)
+    azimuth_deg = degrees(atan2(axis["x_mm"], axis["y_mm"])) % 360
     return Figure(
         code="plumbness_axis",
         unit="mm",
-        **_at(size, 0),
+        **_values_at(offset, 0),
         limit=limit,
-        azimuth_deg=towards,
+        azimuth_deg=azimuth_deg,
         used=2,
-        **_lean(size.value[0], sizes.height_m, axis),
+        **_lean_remark(offset.value[0], sizes.height_m, axis),
     )
 
 
 def _generatrix(shape, sizes, rule):
-    """The top of each generatrix against its bottom, over the height of the shell."""
+    """Figure of the generatrices: offset of the top from the bottom, over the shell."""
     limit = _limit(rule, "plumbness_generatrix", sizes)
     if not shape["plumbs"]:
         return _undetermined("plumbness_generatrix", limit, "one_level")
     top = shape["plumbs"][-1]
-    return _of_plumb("plumbness_generatrix", top, sizes.height_m, limit)
+    return _plumb_figure("plumbness_generatrix", top, sizes.height_m, limit)
 
 
 def _courses(shape, sizes, rule):
-    """The worst course: the top of each of its generatrices against its bottom, over its height."""
-    found = []
-    for one in shape["courses"]:
-        limit = _limit(rule, "plumbness_course", sizes, one["course"])
-        height = sizes.courses_m[one["course"] - 1]
-        found.append(_of_plumb("plumbness_course", one, height, limit, one["course"]))
-    if not found:
+    """Figure of the deciding course: offset of the top of its generatrices from the bottom."""
+    figures = []
+    for item in shape["courses"]:
+        limit = _limit(rule, "plumbness_course", sizes, item["course"])
+        height = sizes.courses_m[item["course"] - 1]
+        figures.append(_plumb_figure("plumbness_course", item, height, limit, item["course"]))
+    if not figures:
         return _undetermined("plumbness_course", None, "one_level_a_course")
-    used = sum(one.used for one in found)
-    worst = max(found, key=lambda one: gravity(one.value, one.U, one.limit and one.limit.value))
+    used = sum(item.used for item in figures)
+    worst = max(
+        figures, key=lambda item: gravity(item.value, item.U, item.limit and item.limit.value)
+    )
     return Figure(**(vars(worst) | {"used": used}))
 
 
-def _of_plumb(code, plumb, height_m, limit, course=None):
-    over = plumb["high_m"] - plumb["low_m"]
+def _plumb_figure(code, plumb, height_m, limit, course=None):
+    """Figure of the deciding generatrix between two levels, extrapolated to `height_m`."""
+    distance_m = plumb["high_m"] - plumb["low_m"]
     chosen = np.array(plumb["is_read"], dtype=bool)
-    if np.count_nonzero(chosen) < LEAST_READ:  # else what a level does between readings is no part
+    # With enough generatrices that have readings, interpolated generatrices are omitted.
+    if np.count_nonzero(chosen) < LEAST_READ:
         chosen[:] = True
     rows = [[plumb[name][i] for i in np.flatnonzero(chosen)]
             for name in ("azimuth_deg", "departure_mm", "u_mm", "dof")]  # fmt: skip
-    azimuth_deg, found = rows[0], spread_of(*rows[1:]).times(height_m / over)
-    place = deciding_place(found.value, found.U, limit and limit.value)
+    azimuth_deg, departures = rows[0], spread_of(*rows[1:]).times(height_m / distance_m)
+    place = deciding_place(departures.value, departures.U, limit and limit.value)
     return Figure(
         code=code,
         unit="mm",
-        **_at(found, place),
+        **_values_at(departures, place),
         limit=limit,
         course=course,
         azimuth_deg=azimuth_deg[place] % 360,
-        used=len(found.value),
-        **_lean(found.value[place], height_m, plumb),
+        used=len(departures.value),
+        **_lean_remark(departures.value[place], height_m, plumb),
     )
 
 
-def _lean(value_mm, height_m, levels):
-    """Remark: between which levels, per metre, and one in how much."""
+def _lean_remark(value_mm, height_m, levels):
+    """Remark with the two levels, the tilt in mm per metre, and the tilt as 1 in n."""
     per_m = float(value_mm) / height_m
     one_in = 1000 / abs(per_m) if per_m else None
     values = {"low_m": levels["low_m"], "high_m": levels["high_m"], "mm_per_m": per_m,
@@ -207,7 +234,7 @@ def _lean(value_mm, height_m, levels):
     return {"remark": "plumb_between", "remark_values": values}
 
 
-def _at(spread, place):
+def _values_at(spread, place):
     """Value, U, k and degrees of freedom at a place."""
     return {
         "value": float(spread.value[place]),
@@ -218,21 +245,21 @@ def _at(spread, place):
 
 
 def _generatrices(shape):
-    """`Generatrices` of all levels with a centre, the lowest of them the plumb of all."""
+    """`Generatrices` of all levels with a centre, relative to the lowest of these levels."""
     if not shape["plumbs"]:
         return None
-    of_height = {one["height_m"]: one["course"] for one in shape["levels"]}
+    course_by_height = {item["height_m"]: item["course"] for item in shape["levels"]}
     low = shape["plumbs"][0]["low_m"]
-    rows = [spread_of(one["departure_mm"], one["u_mm"], one["dof"]) for one in shape["plumbs"]]
-    heights = [low, *(one["high_m"] for one in shape["plumbs"])]
+    rows = [spread_of(item["departure_mm"], item["u_mm"], item["dof"]) for item in shape["plumbs"]]
+    heights = [low, *(item["high_m"] for item in shape["plumbs"])]
     azimuth = shape["plumbs"][0]["azimuth_deg"]
-    nothing = np.zeros(len(azimuth))
+    zeros = np.zeros(len(azimuth))
     return Generatrices(
-        azimuth_deg=[one % 360 for one in azimuth],
+        azimuth_deg=[item % 360 for item in azimuth],
         height_m=heights,
-        course=[of_height[one] for one in heights],
-        departure_mm=[nothing, *(one.value for one in rows)],
-        U_mm=[nothing, *(one.U for one in rows)],
+        course=[course_by_height[item] for item in heights],
+        departure_mm=[zeros, *(item.value for item in rows)],
+        U_mm=[zeros, *(item.U for item in rows)],
     )
 
 
@@ -240,43 +267,46 @@ def _generatrices(shape):
 
 
 def _departures(level, nominal_m):
-    """`Spread` of the radii of a level less the nominal one, mm; None: less their mean."""
+    """`Spread` of the radii of a level less the nominal radius, or less their mean for None, mm."""
     radius = np.array(level["radius_m"])
     nominal_m = radius.mean() if nominal_m is None else nominal_m
     return spread_of(1000 * (radius - nominal_m), level["u_mm"], level["dof"])
 
 
 def _level(level, nominal_m):
-    found = _departures(level, nominal_m)
+    """`InspectedLevel` of a level of the shape."""
+    departures = _departures(level, nominal_m)
     return InspectedLevel(
         height_m=level["height_m"],
         course=level["course"],
         mean_radius_m=float(np.mean(level["radius_m"])),
         centre_x_m=level["centre_x_m"],
         centre_y_m=level["centre_y_m"],
-        azimuth_deg=[one % 360 for one in level["azimuth_deg"]],
-        departure_mm=found.value,
-        U_mm=found.U,
+        azimuth_deg=[angle % 360 for angle in level["azimuth_deg"]],
+        departure_mm=departures.value,
+        U_mm=departures.U,
     )
 
 
 def _roundness(code, shape, sizes, rule):
+    """Figure of the roundness of the low levels, or of all higher levels."""
     is_low = code == "roundness_low"
     limit = _limit(rule, code, sizes)
-    levels = [one for one in shape["levels"] if one["is_low"] == is_low]
+    levels = [item for item in shape["levels"] if item["is_low"] == is_low]
     if not levels:
         return _undetermined(code, limit, "no_level_there")
-    every = [_departures(one, sizes.nominal_radius_m) for one in levels]
-    whole = Spread(*(np.concatenate([getattr(one, name) for one in every])
+    spreads = [_departures(item, sizes.nominal_radius_m) for item in levels]
+    whole = Spread(*(np.concatenate([getattr(item, name) for item in spreads])
                      for name in ("value", "U", "k", "dof")))  # fmt: skip
     place = deciding_place(whole.value, whole.U, limit and limit.value)
-    at = [(one, azimuth) for one in levels for azimuth in one["azimuth_deg"]]
-    level, azimuth = at[place]
+    places = [(item, azimuth) for item in levels for azimuth in item["azimuth_deg"]]
+    level, azimuth = places[place]
+    # A low level without a centre was estimated from the levels above it.
     is_measured = level["centre_x_m"] is not None or not is_low
     mean = 1000 * (np.mean(level["radius_m"]) - (sizes.nominal_radius_m or 0.0))
     remark = {}
     if not is_measured:
-        nearest = min((one["height_m"] for one in shape["levels"] if not one["is_low"]),
+        nearest = min((item["height_m"] for item in shape["levels"] if not item["is_low"]),
                       key=lambda height: abs(height - level["height_m"]))  # fmt: skip
         remark = {"remark": "low_level_estimated", "remark_values": {"nearest_m": nearest}}
     elif sizes.nominal_radius_m is not None:
@@ -284,7 +314,7 @@ def _roundness(code, shape, sizes, rule):
     return Figure(
         code=code,
         unit="mm",
-        **_at(whole, place),
+        **_values_at(whole, place),
         limit=limit,
         course=level["course"],
         height_m=level["height_m"],

@@ -1,16 +1,16 @@
-"""The verdict on a figure of an inspection: guard bands and probability of conformity.
+"""Decision on a figure of an inspection: guard bands and probability of conformity.
 
-With the limit L of |value| and the expanded uncertainty U
+The limit L of |value| and the expanded uncertainty U determine the verdict:
 
     passed              |value| + U <= L
     guard_band          |value| <= L < |value| + U          (conditional pass)
     guard_band_beyond   |value| - U <= L < |value|          (conditional fail)
     failed              L < |value| - U
 
-A limit that must be reached (the share that a plane explains) is judged in the same way downwards.
-A U of 95 % leaves 2.5 % on either side: at most 2.5 % of the tanks beyond a limit pass, and at most
-2.5 % of the tanks within it fail. Without U no figure passes or fails. Where the value estimates
-the largest of many, the largest reading with its own U must also be within the limit to pass.
+A lower limit (of the share that a plane explains) is treated accordingly. For a coverage
+probability of 95 %, at most 2.5 % of the tanks beyond a limit pass, and at most 2.5 % of the tanks
+within the limit fail. Without U no figure passes or fails. If the value estimates the largest of
+many true values, the largest reading plus its U must also be within the limit.
 Sources: ILAC-G8:09/2019 4.2.3, guard bands w = U; JCGM 106:2012 7.3, 8.3.2.
 """
 
@@ -21,24 +21,26 @@ from tankcal.tank.rules import conformity_probability
 
 
 def verdict_of(value, U, limit, *, at_least=False, reading=None, U_reading=None):
-    """Code of the verdict on a value.
+    """Determine the verdict on a value.
 
     Parameters
     ----------
     value : float or None
+        Measured value.
     U : float or None
         Expanded uncertainty, in the unit of the value.
     limit : float or None
+        Limit, in the unit of the value.
     at_least : bool
-        Whether the value must reach the limit; else its size must stay within it.
+        Whether the limit is a lower limit of the value; if not, an upper limit of its magnitude.
     reading, U_reading : float or None
-        Largest reading and its U, of a value that is an estimate; None: the value is a reading.
+        Largest reading and its U if the value is an estimate; None if the value is a reading.
 
     Returns
     -------
     str
-        "passed", "guard_band", "guard_band_beyond", "failed", or "not_determined" where there is no
-        value or no limit, or no U of a value within its limit.
+        "passed", "guard_band", "guard_band_beyond", "failed" or "not_determined". The last applies
+        without a value or a limit, and to a value within its limit without U.
 
     Examples
     --------
@@ -51,36 +53,42 @@ def verdict_of(value, U, limit, *, at_least=False, reading=None, U_reading=None)
     """
     if value is None or limit is None:
         return "not_determined"
-    room = _room(value, limit, at_least)
+    margin = _margin(value, limit, at_least)
     if U is None:
-        return "not_determined" if room >= 0 else "guard_band_beyond"
-    if room < 0:
-        return "guard_band_beyond" if room >= -U else "failed"
-    is_clear = reading is None or _room(reading, limit, at_least) >= U_reading
-    return "passed" if room >= U and is_clear else "guard_band"
+        return "not_determined" if margin >= 0 else "guard_band_beyond"
+    if margin < 0:
+        return "guard_band_beyond" if margin >= -U else "failed"
+    is_clear = reading is None or _margin(reading, limit, at_least) >= U_reading
+    return "passed" if margin >= U and is_clear else "guard_band"
 
 
-def _room(value, limit, at_least):
-    """Distance of a value from its limit, negative beyond it."""
+def _margin(value, limit, at_least):
+    """Distance of a value from its limit, negative if the value is beyond the limit."""
     return value - limit if at_least else limit - abs(value)
 
 
 def gravity(value, U, limit):
-    """Sort key of a place among many: the place with the largest key decides a check.
+    """Sort key of a place; the place with the largest key decides a check of many places.
 
-    Places that fail come before those beyond the limit, and those before places within it, which
-    are ordered by |value| + U: a tank passes only where every place does.
+    Places that fail have the largest keys, then places beyond the limit, then places within the
+    limit in the order of |value| + U. A tank therefore passes only if all places pass.
 
     Parameters
     ----------
     value : float
+        Measured value.
     U, limit : float or None
-        None: not known, or no limit.
+        Expanded uncertainty and limit, in the unit of the value; None if unknown.
+
+    Returns
+    -------
+    tuple of int and float
+        Rank, and a ratio that sorts places of the same rank.
 
     Examples
     --------
     >>> places = [(6.5, 1.0), (9.0, 4.0), (5.0, 1.2), (4.0, 2.5)]
-    >>> sorted(places, key=lambda one: gravity(*one, 5.2), reverse=True)
+    >>> sorted(places, key=lambda place: gravity(*place, 5.2), reverse=True)
     [(6.5, 1.0), (9.0, 4.0), (4.0, 2.5), (5.0, 1.2)]
     """
     size, U = abs(value), U or 0.0
@@ -92,20 +100,25 @@ def gravity(value, U, limit):
 
 
 def probability_of(value, u, limit, dof=math.inf, *, at_least=False):
-    """Probability that a value conforms, by the normal distribution or Student's t; None: unknown.
+    """Probability of conformity of a value, by the normal distribution or Student's t.
 
     Parameters
     ----------
     value, u, limit : float or None
-        u standard uncertainty.
+        Value, its standard uncertainty and its limit, in one unit.
     dof : float
         Degrees of freedom of u.
     at_least : bool
-        As of `verdict_of`.
+        Whether the limit is a lower limit, as in `verdict_of`.
+
+    Returns
+    -------
+    float or None
+        None if the value, u or the limit is None.
 
     Examples
     --------
-    At the limit one half, a lower tail of 2.5 % further off:
+    The probability is 0.5 at the limit, and 0.975 at 1.96 u within the limit:
 
     >>> round(probability_of(6.28, 1.0, 6.28), 3), round(probability_of(4.32, 1.0, 6.28), 3)
     (0.5, 0.975)
@@ -117,9 +130,9 @@ def probability_of(value, u, limit, dof=math.inf, *, at_least=False):
 
 
 def judged(figure):
-    """The `InspectionCheck` of a `figures.Figure`."""
+    """`InspectionCheck` of a `figures.Figure`, with its verdict and probability of conformity."""
     limit = None if figure.limit is None else figure.limit.value
-    at_least = {"at_least": figure.at_least}
+    direction = {"at_least": figure.at_least}
     u = figure.U / figure.k if figure.U is not None and figure.k else None
     return InspectionCheck(
         code=figure.code,
@@ -133,14 +146,14 @@ def judged(figure):
         epoch=figure.epoch,
         used=figure.used,
         limit=figure.limit,
-        probability=probability_of(figure.value, u, limit, figure.dof, **at_least),
+        probability=probability_of(figure.value, u, limit, figure.dof, **direction),
         verdict=verdict_of(
             figure.value,
             figure.U,
             limit,
             reading=figure.reading,
             U_reading=figure.U_reading,
-            **at_least,
+            **direction,
         ),
         reading=figure.reading,
         U_reading=figure.U_reading,

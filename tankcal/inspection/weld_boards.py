@@ -1,9 +1,9 @@
-"""Boards laid along welds: the gaps that each scan tells of them, put together.
+"""Gaps of boards laid along welds, combined from all scans.
 
-Each scan tells the gaps of a board by itself, so that what its points share (offset, scale,
-registration) drops out to first order, before the gaps of all scans are averaged. The noise of a
-gap is that of its cells; neighbours may share noise, and the scatter of the gaps of boards that are
-laid side by side along the welds says how much more it is.
+The gaps of a board are computed for each scan, then averaged over the scans. The common errors of
+the points of a scan (offset, scale and registration) therefore cancel to first order. The noise of
+a gap follows from the noise of its cells. Neighbouring cells may have common noise. The scatter
+of the gaps of boards side by side along the welds determines the additional noise.
 """
 
 from dataclasses import dataclass, replace
@@ -15,11 +15,11 @@ from tankcal.geometry.outlines import FULL_TURN
 from tankcal.inspection.boards import BOARD_M, END_M, REACH_M, bead_height, gaps_of_profile
 from tankcal.inspection.known_welds import BANDING, PEAKING
 
-TOGETHER = 2  # boards along the weld that are averaged: 0.3 m
-LAGS = 2, 4, 6  # boards between those whose scatter is looked at: apart, they share no point
-FEWEST = 20  # gaps that a scatter is told by
-LEAST_BEAD_M, SURE_BEAD = 0.001, 3.0  # height of a bead, and over its sd
-LEAST_PEAK_M = 0.002  # that a loose weld is put in the middle of
+TOGETHER = 2  # number of boards averaged along the weld, 0.3 m
+LAGS = 2, 4, 6  # distances of compared boards, in boards; at these distances no point is shared
+FEWEST = 20  # least number of gaps for an estimate of the scatter
+LEAST_BEAD_M, SURE_BEAD = 0.001, 3.0  # least height of a bead: absolute, and in its sd
+LEAST_PEAK_M = 0.002  # least height of a peak to which a loose weld is moved
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,12 @@ class Boards:
     ----------
     weld : KnownWeld
     s_m : ndarray, shape (cells,)
-        Places across the weld, m.
+        Distances across the weld, m.
     along : ndarray, shape (boards,)
-        Middle of each board: height of a vertical weld, m; turn of a horizontal one, rad.
+        Middle of each board: its height on a vertical weld, m; its azimuth on a horizontal weld,
+        rad.
     gap_m, noise_m2, missed_m2 : ndarray, shape (boards, cells)
-        As `boards.BoardGaps` has them; nan: not determined.
+        Gaps and variances as in `boards.BoardGaps`; nan if not determined.
     """
 
     weld: object
@@ -46,31 +47,52 @@ class Boards:
 
 
 def reach_of(weld, across_m):
-    """How far from a weld cells are asked for, m."""
+    """Distance from a weld within which cells are required, m."""
     return BOARD_M / 2 + weld.loose_m + max(END_M, 1.5 * across_m) + 2 * across_m
 
 
 def boards_of(wall, weld, across_m, grid, distance, sd):
-    """`Boards` of a weld; a loose one is put where its peak is, and a bead is left out."""
+    """Compute the `Boards` of a weld.
+
+    A loose weld is moved to its peak. If the weld has a bead, the wall under the bead is
+    extrapolated from both sides.
+
+    Parameters
+    ----------
+    wall : CloudWall
+        Coarse cells of the wall.
+    weld : KnownWeld
+        The weld.
+    across_m : float
+        Approximate width of a fine cell, m.
+    grid : FineGrid
+        Fine cells beside the welds of this kind.
+    distance, sd : ndarray, shape (scans, slots + 1)
+        Distances of the wall in the fine cells and their standard deviations, m, of `located`.
+
+    Returns
+    -------
+    Boards
+    """
     profiles = _profiles(wall, weld, across_m, grid, distance, sd)
-    found = _averaged(weld, *profiles)
-    if weld.loose_m and (moved := _moved(found)):
-        azimuth = (weld.azimuth_rad + moved / wall.surface.radius_m) % FULL_TURN
+    boards = _averaged_boards(weld, *profiles)
+    if weld.loose_m and (offset := _peak_offset(boards)):
+        azimuth = (weld.azimuth_rad + offset / wall.surface.radius_m) % FULL_TURN
         weld = replace(weld, azimuth_rad=azimuth)
         profiles = _profiles(wall, weld, across_m, grid, distance, sd)
-        found = _averaged(weld, *profiles)
-    if _has_bead(found):
-        found = _averaged(weld, *profiles, has_bead=True)
-    return found
+        boards = _averaged_boards(weld, *profiles)
+    if _has_bead(boards):
+        boards = _averaged_boards(weld, *profiles, has_bead=True)
+    return boards
 
 
 def _profiles(wall, weld, across_m, grid, distance, sd):
-    """Places (cells,) across, places (bands,) along, departures and sds (scans, bands, cells)."""
+    """Distances (cells,) across and (bands,) along; deviations and sds (scans, bands, cells)."""
     reach = reach_of(replace(weld, loose_m=0.0), across_m)
     if weld.kind == PEAKING:
         step = FULL_TURN * wall.surface.radius_m / grid.columns
-        middle = round(weld.azimuth_rad / FULL_TURN * grid.columns - 0.5)
-        column = middle + np.arange(-int(reach / step), int(reach / step) + 1)
+        centre_column = round(weld.azimuth_rad / FULL_TURN * grid.columns - 0.5)
+        column = centre_column + np.arange(-int(reach / step), int(reach / step) + 1)
         turn = (column + 0.5) * FULL_TURN / grid.columns
         s = (turn - weld.azimuth_rad) * wall.surface.radius_m
         height = grid.middles_m - wall.joints_m[0]
@@ -84,45 +106,47 @@ def _profiles(wall, weld, across_m, grid, distance, sd):
     return s, along, distance[:, slot], sd[:, slot]
 
 
-def _averaged(weld, s, along, e, sd, has_bead=False):
-    """`Boards` of two bands each, means over the scans by the noise of their own gaps."""
+def _averaged_boards(weld, s, along, e, sd, has_bead=False):
+    """`Boards` of two bands each, as means over the scans with weights 1 / noise variance."""
     gap, noise, missed = np.full((3, *e.shape), np.nan)
     for scan, band in np.ndindex(e.shape[:2]):
-        found = gaps_of_profile(s, e[scan, band], sd[scan, band], has_bead=has_bead)
-        if found is not None:
-            gap[scan, band], noise[scan, band] = found.gap_m, found.noise_m2
-            missed[scan, band] = found.missed_m2
+        board = gaps_of_profile(s, e[scan, band], sd[scan, band], has_bead=has_bead)
+        if board is not None:
+            gap[scan, band], noise[scan, band] = board.gap_m, board.noise_m2
+            missed[scan, band] = board.missed_m2
     weight = np.where(np.isfinite(gap), 1 / noise, 0.0)
     sums = [weight.sum(axis=0), np.nansum(weight * gap, axis=0), np.nansum(weight * missed, axis=0)]
     if weld.kind == BANDING:
-        sums = [one + np.roll(one, -1, axis=0) for one in sums]
+        sums = [part + np.roll(part, -1, axis=0) for part in sums]
         along = along + (along[1] - along[0]) / 2
     elif len(along) >= TOGETHER:
-        sums = [one[1:] + one[:-1] for one in sums]
+        sums = [part[1:] + part[:-1] for part in sums]
         along = (along[1:] + along[:-1]) / 2
+    # Mean of the sums; the noise variance of the mean is 1 / sum of weights.
     total = np.where(sums[0] > 0, sums[0], np.nan)
     return Boards(weld, s, along, sums[1] / total, 1 / total, sums[2] / total)
 
 
-def _middle(boards):
-    """(cells,) medians of the gaps of all boards; nan where fewer than half of them are."""
+def _median_gaps(boards):
+    """Medians (cells,) of the known gaps of all boards, m; nan without a known gap."""
     known = np.isfinite(boards.gap_m)
-    told = known.any(axis=0)
-    found = np.full(len(boards.s_m), np.nan)
-    found[told] = np.nanmedian(boards.gap_m[:, told], axis=0)
-    return found
+    determined = known.any(axis=0)
+    medians = np.full(len(boards.s_m), np.nan)
+    medians[determined] = np.nanmedian(boards.gap_m[:, determined], axis=0)
+    return medians
 
 
-def _moved(boards):
-    """By how much the middle of a peak lies beside a loose weld, m; 0: there is none."""
-    near = np.where(np.abs(boards.s_m) <= boards.weld.loose_m, np.abs(_middle(boards)), np.nan)
+def _peak_offset(boards):
+    """Offset of the middle of a peak from a loose weld, m; 0 without a peak."""
+    near = np.where(np.abs(boards.s_m) <= boards.weld.loose_m, np.abs(_median_gaps(boards)), np.nan)
     if not np.nanmax(np.nan_to_num(near)) > LEAST_PEAK_M:
         return 0.0
     return float(boards.s_m[np.nanargmax(near)])
 
 
 def _has_bead(boards):
-    height = abs(bead_height(boards.s_m, _middle(boards)))
+    """Whether the weld has a significant bead."""
+    height = abs(bead_height(boards.s_m, _median_gaps(boards)))
     known = boards.noise_m2[np.isfinite(boards.noise_m2)]
     if not len(known):
         return False
@@ -130,23 +154,32 @@ def _has_bead(boards):
 
 
 def noise_factor(boards):
-    """By how much gaps scatter from board to board, over what the noise of their cells says; >= 1.
+    """Ratio (>= 1) of the scatter of the gaps between boards to the noise of their cells.
 
-    The gap of a board less the middle of two others, as far on one side as on the other, has the
-    variance of the noise where the wall changes evenly along the weld; boards that share no point
-    are taken, at three distances, and the larger scatter counts. By medians: single bends of the
-    wall do not count, the form of many does, and makes U larger.
+    The gap of a board is compared with the mean of two boards at equal distances on both sides. If
+    the wall changes linearly along the weld, the difference contains only noise. Boards at three
+    distances are used, which share no point, and the largest scatter is returned. The scatter is
+    estimated by medians: a single bend of the wall has no effect, but many bends increase U.
+
+    Parameters
+    ----------
+    boards : sequence of Boards
+        Boards of all welds of a kind.
+
+    Returns
+    -------
+    float
     """
     ratios = {lag: [] for lag in LAGS}
-    for one in boards:
-        near = np.abs(one.s_m) <= REACH_M + 1e-9
-        gap, noise = one.gap_m[:, near], one.noise_m2[:, near]
+    for item in boards:
+        near = np.abs(item.s_m) <= REACH_M + 1e-9
+        gap, noise = item.gap_m[:, near], item.noise_m2[:, near]
         for lag in LAGS:
             if len(gap) > 2 * lag:
-                off = gap[lag:-lag] - (gap[: -2 * lag] + gap[2 * lag :]) / 2
+                differences = gap[lag:-lag] - (gap[: -2 * lag] + gap[2 * lag :]) / 2
                 sd = np.sqrt(noise[lag:-lag] + (noise[: -2 * lag] + noise[2 * lag :]) / 4)
-                known = np.isfinite(off)
-                ratios[lag].append(np.abs(off[known] / sd[known]))
-    told = [np.concatenate(one) for one in ratios.values() if one]
-    medians = [float(np.median(one)) for one in told if len(one) >= FEWEST]
+                known = np.isfinite(differences)
+                ratios[lag].append(np.abs(differences[known] / sd[known]))
+    pooled = [np.concatenate(item) for item in ratios.values() if item]
+    medians = [float(np.median(item)) for item in pooled if len(item) >= FEWEST]
     return max(1.0, SD_OVER_MEDIAN * max(medians, default=0.0))

@@ -1,1 +1,1 @@
-"""Comparison of software: tanks by lot, surveys of them, sealed truth, answers and their scores."""
+"""Comparison of software: random tanks, simulated surveys, sealed volumes, answers and scores."""

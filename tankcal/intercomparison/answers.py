@@ -1,4 +1,4 @@
-"""Answers: empty forms, and answers of any program read with all their problems at once."""
+"""Answers of a comparison: write empty forms, and read the answers of any program."""
 
 import csv
 import io
@@ -58,9 +58,9 @@ CSV_KEYS = (
     choice("decimal", "mark of their decimals", (".", ",")),
 )
 SECTIONS = {"participant": KEYS, "csv": CSV_KEYS}
-SAME_M = 1e-6  # heights that are one
-MOST_NAMED = 5
-MOST_TIMES = 4  # as many rows as heights that were asked: beyond it one line says so
+SAME_M = 1e-6  # largest difference of heights that are treated as equal
+MOST_NAMED = 5  # largest number of heights listed in a message
+MOST_TIMES = 4  # largest number of rows per requested height; more rows give a single problem
 ABOUT = (
     message(
         "ic_about_participant",
@@ -72,9 +72,16 @@ ABOUT = (
 
 @dataclass(frozen=True)
 class Answers:
-    """What a participant handed in, checked against what was asked.
+    """Answers of a participant, checked against the requested surveys and heights.
 
-    saved    AnswersFile        folder  its name        warnings  Problems that stop nothing
+    Attributes
+    ----------
+    saved : AnswersFile
+        The answers.
+    folder : str
+        Name of their folder.
+    warnings : tuple of Problem
+        Warnings about the answers.
     """
 
     saved: AnswersFile
@@ -83,26 +90,26 @@ class Answers:
 
 
 def file_of(tank, method):
-    """Name of the table of a survey."""
+    """Name of the table of answers for a survey."""
     return f"{tank}_{method}.csv"
 
 
-# ---- written
+# ---- writing
 
 
 def template_files(manifest, said=str):
-    """{name: bytes} of empty forms for every survey of a package.
+    """Empty forms for all surveys of a package, {name: bytes}.
 
-    said  said(message) gives a comment in the language of whoever fills it in
+    `said(message)` returns the text of a comment in the language of the participant.
     """
-    lines = [*(f"# {said(one)}" for one in ABOUT), "", "[participant]"]
-    for one in KEYS:
-        value = manifest["truth_sha256"] if one.name == "package" else ""
-        value = "2026-01-31" if one.kind == "date" else _quoted(value)
-        lines.append(f"{'' if one.required else '# '}{one.name} = {value}  # {said(one.note)}")
+    lines = [*(f"# {said(item)}" for item in ABOUT), "", "[participant]"]
+    for item in KEYS:
+        value = manifest["truth_sha256"] if item.name == "package" else ""
+        value = "2026-01-31" if item.kind == "date" else _quoted(value)
+        lines.append(f"{'' if item.required else '# '}{item.name} = {value}  # {said(item.note)}")
     lines += ["", "# [csv]", '# separator = ";"', '# decimal = ","', ""]
     files = {PARTICIPANT: "\n".join(lines).encode()}
-    heights = {one["tank"]: one["heights_m"] for one in manifest["tanks"]}
+    heights = {item["tank"]: item["heights_m"] for item in manifest["tanks"]}
     for job in manifest["jobs"]:
         rows = [[f"{height:g}", "", "", ""] for height in heights[job["tank"]]]
         files[file_of(job["tank"], job["method"])] = _table(rows)
@@ -110,73 +117,89 @@ def template_files(manifest, said=str):
 
 
 def answer_files(saved):
-    """{name: bytes} of an AnswersFile: what any program may write."""
-    who = saved.participant
+    """Files of an AnswersFile, {name: bytes}, in the format for all programs."""
+    participant = saved.participant
     lines = ["[participant]"]
-    for one in KEYS:
-        value = getattr(who, one.name)
+    for item in KEYS:
+        value = getattr(participant, item.name)
         if value is not None:
-            lines.append(f"{one.name} = {value}" if one.kind == "date" else
-                         f"{one.name} = {_quoted(value)}")  # fmt: skip
+            lines.append(f"{item.name} = {value}" if item.kind == "date" else
+                         f"{item.name} = {_quoted(value)}")  # fmt: skip
     files = {PARTICIPANT: ("\n".join(lines) + "\n").encode()}
-    for one in saved.answers:
-        columns = zip(one.height_m, one.volume_m3, one.U_m3, one.k, strict=True)
-        rows = [[f"{height:g}", *map(_cell, rest)] for height, *rest in columns]
-        files[file_of(one.tank, one.method)] = _table(rows)
+    for item in saved.answers:
+        columns = zip(item.height_m, item.volume_m3, item.U_m3, item.k, strict=True)
+        rows = [[f"{height:g}", *map(_cell, values)] for height, *values in columns]
+        files[file_of(item.tank, item.method)] = _table(rows)
     return files
 
 
 def _table(rows):
+    """Bytes of a CSV table with the headings of answers."""
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(
-        [[one.name for one in ROWS if one.name != "coverage"], *rows]
+        [[field.name for field in ROWS if field.name != "coverage"], *rows]
     )
     return stream.getvalue().encode()
 
 
 def _cell(value):
+    """Text of a value; blank for None or nan."""
     return "" if value is None or not np.isfinite(value) else f"{value:.9g}"
 
 
 def _quoted(text):
+    """Text as a TOML string, whose escapes are those of JSON."""
     return json.dumps(text, ensure_ascii=False)
 
 
-# ---- read
+# ---- reading
 
 
 def read_answers(folder, asked, log):
-    """The `Answers` of a folder; None after telling `log` all that is wrong.
+    """Read the `Answers` of a folder.
 
-    asked  {tank: heights} of the truth or the manifest, and methods of each: {tank: (heights, set
-           of methods or None)}
+    Parameters
+    ----------
+    folder : path
+        Folder with participant.toml and tables, or with answers.json.
+    asked : dict
+        Requested heights and methods of the truth or the manifest, {tank: (heights, set of
+        methods)}.
+    log : Log
+        Receives the problems and warnings.
+
+    Returns
+    -------
+    Answers or None
+        None if the folder has problems.
     """
-    folder, before = Path(folder), len(log.problems)
+    folder, problem_count = Path(folder), len(log.problems)
     if not folder.is_dir():
         log.problem(str(folder.name or folder), message("ic_no_folder", "not found; expected a "
                     "folder of answers with participant.toml and tables"))  # fmt: skip
         return None
-    warnings = _Told(log)
+    warnings = _WarningStart(log)
     if (folder / ANSWERS.file).is_file():
         saved = _read_json(folder / ANSWERS.file, asked, log, warnings)
     else:
         saved = _read_tables(folder, asked, log, warnings)
-    if saved is not None and not saved.answers and len(log.problems) == before:
+    if saved is not None and not saved.answers and len(log.problems) == problem_count:
         log.problem(folder.name, message("ic_no_answers", "no volume in any table; expected the "
                     "answers of one survey at least"))  # fmt: skip
-    if len(log.problems) > before:
+    if len(log.problems) > problem_count:
         return None
     return Answers(saved, folder.resolve().name, tuple(log.warnings[warnings.first :]))
 
 
-class _Told:
-    """Where the warnings of one folder begin in a log."""
+class _WarningStart:
+    """Index of the first warning of a folder in a log."""
 
     def __init__(self, log):
         self.first = len(log.warnings)
 
 
 def _read_tables(folder, asked, log, warnings):
+    """AnswersFile of participant.toml and CSV tables, or None without a participant."""
     participant, marks = _participant(folder / PARTICIPANT, log)
     known = {
         file_of(tank, method): (tank, method)
@@ -193,15 +216,15 @@ def _read_tables(folder, asked, log, warnings):
                            such=list_some(sorted(known), 3))  # fmt: skip
             log.problem(path.name, text)
             continue
-        found = _read_table(path, *known[path.name], asked, marks, log)
-        if found is not None:
-            answers.append(found)
+        answer = _read_table(path, *known[path.name], asked, marks, log)
+        if answer is not None:
+            answers.append(answer)
     return AnswersFile(participant, answers) if participant else None
 
 
 def _participant(path, log):
-    """(Participant or None, (separator, decimal mark) or None) of participant.toml."""
-    before, data = len(log.problems), read_bytes(path, log, MAX_SETTINGS_BYTES)
+    """Participant and (separator, decimal mark) of participant.toml, each None if invalid."""
+    problem_count, data = len(log.problems), read_bytes(path, log, MAX_SETTINGS_BYTES)
     settings, sections = (None, {}) if data is None else read_toml(path.name, data, log)
     if settings is None:
         return None, None
@@ -209,21 +232,21 @@ def _participant(path, log):
         if section not in SECTIONS:
             text = unknown_section(section, SECTIONS)
             log.problem(path.name, text, sections.get(section), f"[{section}]")
-    found = {
+    section_values = {
         name: read_section(path.name, name, fields, settings.get(name, {}), sections.get(name), log)
         for name, fields in SECTIONS.items()
     }
     marks = declared_marks(path.name, settings, log)
-    if len(log.problems) > before:
+    if len(log.problems) > problem_count:
         return None, marks
-    values = found["participant"]
+    values = section_values["participant"]
     day = values["date"]
     return Participant(**values | {"date": None if day is None else str(day)}), marks
 
 
 def _read_table(path, tank, method, asked, marks, log):
-    """The Answer of a table; None where it is empty or wrong."""
-    before, data = len(log.problems), read_bytes(path, log)
+    """Read the Answer of a table; None if the table is empty or invalid."""
+    problem_count, data = len(log.problems), read_bytes(path, log)
     if data is None:
         return None
     marks = marks or _likely_marks(data)
@@ -234,9 +257,9 @@ def _read_table(path, tank, method, asked, marks, log):
     if "volume_m3" not in table.headings:
         text = message("ic_no_volumes", "missing column; expected volumes in cubic metres")
         log.problem(path.name, text, table.heading_row, "volume_m3")
-    if len(log.problems) > before:
+    if len(log.problems) > problem_count:
         return None
-    height, volume, U, k, coverage = (values.numbers(one.name) for one in ROWS)
+    height, volume, U, k, coverage = (values.numbers(item.name) for item in ROWS)
     k = _factors(path.name, values.rows, U, k, coverage, log)
     _check_heights(path.name, values.rows, height, asked[tank][0], log)
     given = np.isfinite(volume)
@@ -244,38 +267,38 @@ def _read_table(path, tank, method, asked, marks, log):
         if not is_given and np.isfinite(spread):
             text = message("ic_U_alone", "an uncertainty without a volume; expected both")
             log.problem(path.name, text, row, "U_m3")
-    if len(log.problems) > before:
+    if len(log.problems) > problem_count:
         return None
-    _tell_missing(path.name, height[given], asked[tank][0], log)
+    _warn_of_missing(path.name, height[given], asked[tank][0], log)
     if not given.any():
         return None
     if np.any(np.isfinite(U) & ~np.isfinite(k)):
         text = message("ic_no_k", "U_m3 without k or coverage in some rows: they have E_n, no zeta")
         log.warning(path.name, text)
-    columns = (one[given].tolist() for one in (height, volume, U, k))
+    columns = (item[given].tolist() for item in (height, volume, U, k))
     return Answer(tank, method, *columns)
 
 
 def _likely_marks(data):
-    """(separator, decimal mark) of a table whose participant.toml cannot be read: told already."""
+    """Probable separator and decimal mark of a table without a valid participant.toml."""
     text = data.decode(find_encoding(data), "replace")
     heading = text.partition("\n")[0]
-    separator = next((one for one in SEPARATORS[1:] if one in heading), SEPARATORS[0])
+    separator = next((mark for mark in SEPARATORS[1:] if mark in heading), SEPARATORS[0])
     return separator, "," if separator != "," and "," in text else "."
 
 
 def _factors(name, rows, U, k, coverage, log):
-    """Coverage factors: as stated, or of the stated probability of a normal distribution."""
-    for row, factor, share in zip(rows, k, coverage, strict=True):
-        if np.isfinite(factor) and np.isfinite(share):
+    """Coverage factors: stated, or of a normal distribution for the stated probability."""
+    for row, factor, probability in zip(rows, k, coverage, strict=True):
+        if np.isfinite(factor) and np.isfinite(probability):
             text = message("ic_k_twice", "k and coverage both given; expected one of them")
             log.problem(name, text, row, "coverage")
-    found = np.where(np.isfinite(coverage), norm.ppf((1 + np.nan_to_num(coverage)) / 2), k)
-    return np.where(np.isfinite(U), found, np.nan)
+    factors = np.where(np.isfinite(coverage), norm.ppf((1 + np.nan_to_num(coverage)) / 2), k)
+    return np.where(np.isfinite(U), factors, np.nan)
 
 
 def _has_too_many(name, count, asked, log):
-    """Whether, told to `log`, there are so many rows that to name each would help nobody."""
+    """Whether a table has too many rows for a message about each; if so, report it to `log`."""
     if count <= MOST_TIMES * len(asked):
         return False
     text = message("ic_too_many_rows", "{count} rows; expected {asked} at most, one for each "
@@ -285,31 +308,31 @@ def _has_too_many(name, count, asked, log):
 
 
 def _check_heights(name, rows, height, asked, log):
-    """Heights are those that are asked, each once."""
-    wanted, seen = np.asarray(asked), {}
-    for row, one in zip(rows, height, strict=True):
-        near = int(np.argmin(np.abs(wanted - one)))
-        if abs(wanted[near] - one) > SAME_M:
+    """Report heights that were not requested or that occur twice."""
+    requested, seen = np.asarray(asked), {}
+    for row, value in zip(rows, height, strict=True):
+        nearest = int(np.argmin(np.abs(requested - value)))
+        if abs(requested[nearest] - value) > SAME_M:
             text = message("ic_not_asked", "{height:g} m was not asked; the nearest height that was"
-                           " is {near:g} m", height=one, near=wanted[near])  # fmt: skip
+                           " is {near:g} m", height=value, near=requested[nearest])  # fmt: skip
             log.problem(name, text, row, "height_m")
-        elif near in seen:
+        elif nearest in seen:
             text = message("ic_height_twice", "{height:g} m stands in row {first}, too; expected "
-                           "each height once", height=one, first=seen[near])  # fmt: skip
+                           "each height once", height=value, first=seen[nearest])  # fmt: skip
             log.problem(name, text, row, "height_m")
         else:
-            seen[near] = row
+            seen[nearest] = row
 
 
-def _tell_missing(name, height, asked, log):
-    """A warning that names heights without a volume."""
-    missing = [one for one in asked if not np.any(np.abs(height - one) <= SAME_M)]
+def _warn_of_missing(name, height, asked, log):
+    """Warn of requested heights without a volume."""
+    missing = [item for item in asked if not np.any(np.abs(height - item) <= SAME_M)]
     if missing:
         text = message(
             "ic_missing_heights", "{missing} of {asked} heights without a volume ({heights})",
             missing=len(missing), asked=len(asked),
             heights=list_some(
-                [message("ic_height", "{height:g} m", height=one) for one in missing], MOST_NAMED
+                [message("ic_height", "{height:g} m", height=item) for item in missing], MOST_NAMED
             ),
         )  # fmt: skip
         log.warning(name, text)
@@ -319,39 +342,41 @@ def _tell_missing(name, height, asked, log):
 
 
 def _read_json(path, asked, log, warnings):
+    """AnswersFile of answers.json, or None if it has problems."""
     from tankcal.intercomparison.package import load_saved
 
-    found = load_saved(ANSWERS, path, log)
-    if found is None:
+    data = load_saved(ANSWERS, path, log)
+    if data is None:
         return None
-    before, answers, seen = len(log.problems), [], set()
-    for one in found["answers"]:
-        name = f"{path.name}, {one['tank']} {one['method']}"
-        lengths = {len(one[key]) for key in ("height_m", "volume_m3", "U_m3", "k")}
-        place = one["tank"], one["method"]
-        if one["tank"] not in asked or one["method"] not in asked[one["tank"]][1]:
+    problem_count, answers, seen = len(log.problems), [], set()
+    for entry in data["answers"]:
+        name = f"{path.name}, {entry['tank']} {entry['method']}"
+        lengths = {len(entry[key]) for key in ("height_m", "volume_m3", "U_m3", "k")}
+        place = entry["tank"], entry["method"]
+        if entry["tank"] not in asked or entry["method"] not in asked[entry["tank"]][1]:
             log.problem(name, message("ic_unknown_survey", "no such survey in the package"))
         elif place in seen:
             log.problem(name, message("ic_survey_twice", "answered twice; expected once"))
         elif len(lengths) > 1:
             log.problem(name, message("ic_uneven", "lists of different lengths; expected a value "
                         "(or null) for each height"))  # fmt: skip
-        elif not _has_too_many(name, len(one["height_m"]), asked[one["tank"]][0], log):
-            U, k = (_checked_positive(name, key, one[key], log) for key in ("U_m3", "k"))
-            height = np.array(one["height_m"], float)
-            _check_heights(name, range(1, len(height) + 1), height, asked[one["tank"]][0], log)
-            _tell_missing(name, height, asked[one["tank"]][0], log)
+        elif not _has_too_many(name, len(entry["height_m"]), asked[entry["tank"]][0], log):
+            U, k = (_checked_positive(name, key, entry[key], log) for key in ("U_m3", "k"))
+            height = np.array(entry["height_m"], float)
+            _check_heights(name, range(1, len(height) + 1), height, asked[entry["tank"]][0], log)
+            _warn_of_missing(name, height, asked[entry["tank"]][0], log)
             if len(height):
-                answers.append(Answer(*place, one["height_m"], one["volume_m3"], U, k))
+                answers.append(Answer(*place, entry["height_m"], entry["volume_m3"], U, k))
         seen.add(place)
-    if len(log.problems) > before:
+    if len(log.problems) > problem_count:
         return None
-    return AnswersFile(Participant(**found["participant"]), answers)
+    return AnswersFile(Participant(**data["participant"]), answers)
 
 
 def _checked_positive(name, key, values, log):
-    found = np.array([np.nan if one is None else one for one in values], float)
-    if np.any(found <= 0):
+    """List of values, nan for None; report values that are not positive."""
+    numbers = np.array([np.nan if value is None else value for value in values], float)
+    if np.any(numbers <= 0):
         log.problem(name, message("ic_not_positive", "a value of 0 or below; expected above 0, or "
                     "null"), None, key)  # fmt: skip
-    return found.tolist()
+    return numbers.tolist()

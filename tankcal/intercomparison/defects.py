@@ -1,8 +1,8 @@
-"""What makes a wall other than round: each defect is a function of azimuth and height.
+"""Defects of a round wall, each a function of azimuth and height.
 
-Every defect tells where it is not smooth (`kinks_rad`, `edges_m`), so that the quadrature of the
-volumes can put its panels there. None of it is of the form that `tankcal.geometry.field` assumes of
-a wall: cusps, chords and caps have bounds, and hang together in height and azimuth.
+Each defect provides the places where it is not smooth (`kinks_rad`, `edges_m`), at which the
+quadrature of the volumes divides its panels. No defect has the form that `tankcal.geometry.field`
+assumes for a wall: cusps, chords and caps are bounded, and depend jointly on height and azimuth.
 """
 
 from dataclasses import asdict, dataclass
@@ -13,45 +13,53 @@ FULL_TURN = 2 * np.pi
 
 
 def signed_arc(azimuth, at, radius_m):
-    """Arc from one azimuth to others the shorter way, m."""
-    away = azimuth - at
-    return radius_m * (away - FULL_TURN * np.round(away / FULL_TURN))
+    """Signed arc from the azimuth `at` to other azimuths, the shorter way round, m."""
+    difference = azimuth - at
+    return radius_m * (difference - FULL_TURN * np.round(difference / FULL_TURN))
 
 
 def smooth_step(part):
-    """0 up to 0, 1 from 1 on, between them a cubic that is level at both ends."""
+    """Smooth step: 0 up to 0, 1 from 1, and a cubic with zero slope at both ends in between."""
     part = np.clip(part, 0.0, 1.0)
     return part * part * (3 - 2 * part)
 
 
 def cap_of(part):
-    """1 at 0, 0 beyond -1 and 1, a squared cosine between them."""
+    """Cap: 1 at 0, a squared cosine from -1 to 1, and 0 beyond."""
     return np.cos(np.pi / 2 * np.clip(part, -1, 1)) ** 2
 
 
 @dataclass(frozen=True)
 class Defect:
-    """What all have: between which heights above the foot of the shell they act."""
+    """Base of all defects, with the heights above the foot of the shell between which it acts."""
 
     low_m: float
     high_m: float
 
     def offset_m(self, azimuth, z, radius_m):
-        """(n,) how far the wall stands outside the nominal radius at (n,) places within it."""
+        """Offset (n,) of the wall outwards from the nominal radius, m.
+
+        Parameters
+        ----------
+        azimuth, z : ndarray, shape (n,)
+            Azimuths, rad, and heights between `low_m` and `high_m`.
+        radius_m : float
+            Nominal radius, m.
+        """
         raise NotImplementedError
 
     def kinks_rad(self, radius_m):
-        """Azimuths at which it is not smooth."""
+        """Azimuths at which the defect is not smooth, rad."""
         return ()
 
     def edges_m(self):
-        """Heights at which it is not smooth."""
+        """Heights at which the defect is not smooth, m."""
         return (self.low_m, self.high_m)
 
 
 @dataclass(frozen=True)
 class Oval(Defect):
-    """A wave round the shell that grows and turns on the way up."""
+    """A wave round the shell whose size and phase change with the height."""
 
     waves: int
     foot_size_m: float
@@ -67,27 +75,27 @@ class Oval(Defect):
 
 @dataclass(frozen=True)
 class Seam(Defect):
-    """A vertical seam or weld: a ridge or a valley with flanks that fall as exp(-arc / flank)."""
+    """A vertical seam or weld: a ridge or valley with flanks that decay as exp(-arc / flank)."""
 
     azimuth_rad: float
     size_m: float
     flank_m: float
-    fade_m: float  # at both ends in height; 0: it ends at once
+    fade_m: float  # length of the transition at both ends in height; 0 for a sharp end
 
     def offset_m(self, azimuth, z, radius_m):
         arc = np.abs(signed_arc(azimuth, self.azimuth_rad, radius_m))
-        return self.size_m * np.exp(-arc / self.flank_m) * _faded(self, z)
+        return self.size_m * np.exp(-arc / self.flank_m) * _fade_factor(self, z)
 
     def kinks_rad(self, radius_m):
         return (self.azimuth_rad, self.azimuth_rad + np.pi)
 
     def edges_m(self):
-        return _faded_edges(self)
+        return _fade_edges(self)
 
 
 @dataclass(frozen=True)
 class Band(Defect):
-    """A girth weld that draws the wall in all round, with flanks up and down."""
+    """A horizontal weld that contracts the wall all round, with flanks above and below."""
 
     height_m: float
     size_m: float
@@ -102,12 +110,12 @@ class Band(Defect):
 
 @dataclass(frozen=True)
 class Course(Defect):
-    """What one course has all round: a step of its radius, a taper, a bulge between its welds."""
+    """Axially symmetric form of a course: step of the radius, taper, and bulge between welds."""
 
     step_m: float
     taper_m: float  # from the foot of the course to its top
-    bulge_m: float  # of the middle
-    bell: float  # share of the bulge that is level at the welds, the rest is a parabola
+    bulge_m: float  # offset of the middle
+    bell: float  # share of the bulge that is a cosine with zero slope at the welds, else a parabola
 
     def offset_m(self, azimuth, z, radius_m):
         zeta = 2 * (z - self.low_m) / (self.high_m - self.low_m) - 1
@@ -117,7 +125,7 @@ class Course(Defect):
 
 @dataclass(frozen=True)
 class Dent(Defect):
-    """A smooth dent, or a bump where its size is above 0."""
+    """A smooth dent, or a bump if its size is positive."""
 
     azimuth_rad: float
     size_m: float
@@ -128,12 +136,12 @@ class Dent(Defect):
         return self.size_m * cap_of(arc / self.half_width_m) * cap_of(_zeta(self, z))
 
     def kinks_rad(self, radius_m):
-        return _sides(self, radius_m)
+        return _side_azimuths(self, radius_m)
 
 
 @dataclass(frozen=True)
 class Flat(Defect):
-    """A plate that was never rolled there: the chord of an arc, in place of the arc."""
+    """A flat place where a plate was not rolled: the chord of an arc in place of the arc."""
 
     azimuth_rad: float
     half_width_m: float
@@ -142,18 +150,18 @@ class Flat(Defect):
     def offset_m(self, azimuth, z, radius_m):
         arc = np.abs(signed_arc(azimuth, self.azimuth_rad, radius_m))
         chord = np.maximum(self.half_width_m**2 - arc**2, 0) / (2 * radius_m)
-        return -chord * _faded(self, z)
+        return -chord * _fade_factor(self, z)
 
     def kinks_rad(self, radius_m):
-        return _sides(self, radius_m)
+        return _side_azimuths(self, radius_m)
 
     def edges_m(self):
-        return _faded_edges(self)
+        return _fade_edges(self)
 
 
 @dataclass(frozen=True)
 class Buckle(Defect):
-    """A buckle by vacuum or fire: folds in and out under a cap."""
+    """A buckle by vacuum or fire: inward and outward folds under a cap."""
 
     azimuth_rad: float
     size_m: float
@@ -167,41 +175,44 @@ class Buckle(Defect):
         )
 
     def kinks_rad(self, radius_m):
-        return _sides(self, radius_m)
+        return _side_azimuths(self, radius_m)
 
 
-KINDS = {one.__name__.lower(): one for one in (Oval, Seam, Band, Course, Dent, Flat, Buckle)}
+# Class of each kind of defect in plain data.
+KINDS = {kind.__name__.lower(): kind for kind in (Oval, Seam, Band, Course, Dent, Flat, Buckle)}
 
 
 def plain_of(defect):
-    """A defect as plain data."""
+    """Plain data of a defect, with its kind."""
     return {"kind": type(defect).__name__.lower(), **asdict(defect)}
 
 
 def defect_of(plain):
-    """The defect of plain data."""
+    """Build the defect from plain data."""
     values = dict(plain)
     return KINDS[values.pop("kind")](**values)
 
 
-def _sides(defect, radius_m):
-    """Azimuths at which a patch begins and ends."""
+def _side_azimuths(defect, radius_m):
+    """Azimuths of both sides of a defect of limited width, rad."""
     half = defect.half_width_m / radius_m
     return (defect.azimuth_rad - half, defect.azimuth_rad + half)
 
 
 def _zeta(defect, z):
-    """-1 at its foot, 1 at its top."""
+    """Relative height, -1 at the lower end of the defect and 1 at its upper end."""
     return 2 * (z - defect.low_m) / (defect.high_m - defect.low_m) - 1
 
 
-def _faded(defect, z):
+def _fade_factor(defect, z):
+    """Factor from 0 to 1 for smooth lower and upper ends of a defect."""
     if defect.fade_m <= 0:
         return 1.0
     foot = smooth_step((z - defect.low_m) / defect.fade_m)
     return foot * smooth_step((defect.high_m - z) / defect.fade_m)
 
 
-def _faded_edges(defect):
+def _fade_edges(defect):
+    """Heights of the ends of a defect and of its transitions, m."""
     fade = max(defect.fade_m, 0.0)
     return (defect.low_m, defect.low_m + fade, defect.high_m - fade, defect.high_m)

@@ -1,4 +1,4 @@
-"""Folders of answers and a truth file, checked together and scored."""
+"""Check and score folders of answers against a truth file."""
 
 from pathlib import Path
 
@@ -11,21 +11,26 @@ from tankcal.record.intercomparison import ANSWERS, PACKAGE
 
 
 def score_folders(folders, truth, package=None):
-    """The `ScoresFile` of folders of answers.
+    """Score folders of answers.
 
     Parameters
     ----------
     folders : sequence of path
+        Folders of answers, one for each participant.
     truth : path
-        Of truth.json, or its folder.
+        The file truth.json, or its folder.
     package : path, optional
-        Of the package, whose manifest must name this truth, too.
+        The package; its manifest must also state the SHA-256 of this truth.
+
+    Returns
+    -------
+    ScoresFile
 
     Raises
     ------
     InputError
-        With every problem of all folders, the truth and the package: also where answers or
-        manifest name another truth.
+        If the folders, the truth or the package have problems, or if answers or manifest refer to
+        another truth. The error lists all problems.
     """
     log, committed = Log(), []
     coverage = 0.95
@@ -37,24 +42,30 @@ def score_folders(folders, truth, package=None):
     opened = load_truth(truth, committed, log)
     if opened is None:
         log.stop_if_problems()
-    found, own = opened
-    asked = {one["tank"]: (one["heights_m"], set(found["methods"])) for one in found["tanks"]}
+    truth_data, truth_sha256 = opened
+    asked = {
+        item["tank"]: (item["heights_m"], set(truth_data["methods"]))
+        for item in truth_data["tanks"]
+    }
     problems, participants = list(log.problems), []
     for folder in folders:
-        mine = Log()
-        answers = read_answers(folder, asked, mine)
-        if answers is not None and answers.saved.participant.package != own:
-            mine.problem(_source(folder), _other_package(answers.saved.participant.package, own))
-        problems += [_placed(folder, one, folders) for one in mine.problems]
+        folder_log = Log()
+        answers = read_answers(folder, asked, folder_log)
+        if answers is not None and answers.saved.participant.package != truth_sha256:
+            folder_log.problem(
+                _source(folder), _other_package(answers.saved.participant.package, truth_sha256)
+            )
+        problems += [_placed(folder, item, folders) for item in folder_log.problems]
         if answers is not None:
-            told = [_placed(folder, one, folders) for one in answers.warnings]
-            participants.append(_with_warnings(answers, told))
+            warnings = [_placed(folder, item, folders) for item in answers.warnings]
+            participants.append(_with_warnings(answers, warnings))
     if problems:
         raise InputError(problems)
-    return score(participants, found, own, coverage)
+    return score(participants, truth_data, truth_sha256, coverage)
 
 
 def _other_package(promised, own):
+    """Message that answers refer to another package."""
     from tankcal.messages import message
 
     return message(
@@ -67,12 +78,12 @@ def _other_package(promised, own):
 
 
 def _source(folder):
-    """The file of a folder that says whose answers they are."""
+    """Name of the file of a folder that identifies the participant."""
     return ANSWERS.file if (Path(folder) / ANSWERS.file).is_file() else PARTICIPANT
 
 
 def _placed(folder, problem, folders):
-    """A problem with the folder before its file, where there are several."""
+    """Problem with the folder before its file name if several folders are scored."""
     from dataclasses import replace
 
     if len(folders) < 2:
@@ -80,7 +91,8 @@ def _placed(folder, problem, folders):
     return replace(problem, file=f"{Path(folder).resolve().name}/{problem.file}")
 
 
-def _with_warnings(answers, told: list[Problem]):
+def _with_warnings(answers, warnings: list[Problem]):
+    """Answers with other warnings."""
     from dataclasses import replace
 
-    return replace(answers, warnings=tuple(told))
+    return replace(answers, warnings=tuple(warnings))

@@ -1,4 +1,4 @@
-"""Our own answers: tankcal on every survey of a package, in the format of any participant."""
+"""Answers of tankcal to all surveys of a package, in the format for all participants."""
 
 import datetime
 import math
@@ -15,42 +15,45 @@ def answer_package(folder, manifest, progress=None, run=None):
     Parameters
     ----------
     folder : path
-        Of the package.
+        Folder of the package.
     manifest : dict
-        Its manifest, checked.
+        Checked manifest of the package.
     progress : callable, optional
-        progress(text, done, total).
+        Function progress(text, done, total).
     run : callable, optional
-        run(folder of a job) gives what has `at(height)`; None: tankcal.
+        Function run(folder of a job) that returns an object with a method `at(height)`; by default
+        tankcal.
 
     Returns
     -------
-    tuple of (AnswersFile, tuple of Problem)
-        A survey that has no sound solution, or that is refused, is told and left out.
+    AnswersFile
+        Answers to all surveys with a valid solution.
+    tuple of Problem
+        Problems of the other surveys.
     """
     progress = progress or (lambda *_: None)
     run = run or _run
-    heights = {one["tank"]: one["heights_m"] for one in manifest["tanks"]}
-    answers, told = [], []
+    heights = {item["tank"]: item["heights_m"] for item in manifest["tanks"]}
+    answers, problems = [], []
     step = message("ic_answering", "computing the surveys")
-    for place, job in enumerate(manifest["jobs"]):
-        progress(step, place, len(manifest["jobs"]))
+    for number, job in enumerate(manifest["jobs"]):
+        progress(step, number, len(manifest["jobs"]))
         asked = heights[job["tank"]]
         try:
             table = run(Path(folder) / job["folder"])
             volumes = [table.at(height) for height in asked]
         except InputError as error:
-            told += [_of_job(job, one) for one in error.problems]
+            problems += [_problem_of_job(job, item) for item in error.problems]
             continue
         except TankcalError as error:
-            told += [Problem(job["folder"], text) for text in error.texts]
+            problems += [Problem(job["folder"], text) for text in error.texts]
             continue
-        U = [one.U_m3 if one.U_m3 > 0 else math.nan for one in volumes]
-        k = [math.nan if one.k is None else one.k for one in volumes]
-        values = [one.value_m3 for one in volumes]
+        U = [item.U_m3 if item.U_m3 > 0 else math.nan for item in volumes]
+        k = [math.nan if item.k is None else item.k for item in volumes]
+        values = [item.value_m3 for item in volumes]
         answers.append(Answer(job["tank"], job["method"], list(asked), values, U, k))
     progress(step, len(manifest["jobs"]), len(manifest["jobs"]))
-    who = Participant(
+    participant = Participant(
         name="tankcal",
         software="tankcal",
         version=version(),
@@ -59,16 +62,18 @@ def answer_package(folder, manifest, progress=None, run=None):
         remarks=None,
         package=manifest["truth_sha256"],
     )
-    return AnswersFile(who, answers), tuple(told)
+    return AnswersFile(participant, answers), tuple(problems)
 
 
 def _run(folder):
+    """Capacity table of a job by tankcal."""
     import tankcal
 
     return tankcal.run(tankcal.load(folder))
 
 
-def _of_job(job, problem):
+def _problem_of_job(job, problem):
+    """Problem with the folder of its job before the file name."""
     from dataclasses import replace
 
     return replace(problem, file=f"{job['folder']}/{problem.file}")

@@ -1,10 +1,10 @@
-"""A package of surveys whose truth is sealed: made, and read again.
+"""Packages of simulated surveys with sealed true volumes: write and read.
 
-The truth is a file of its own, truth.json. Its SHA-256 stands in the manifest of the package, so
-that anybody can see later that it was not changed (a commitment): `sha256sum truth.json` is all
-that it takes. A nonce of 256 bits within keeps the hash from being found by trying. The generator
-is public, so a seed alone would be no secret either: of a sealed package the draws hang on 256
-random bits more, which stand in the truth alone.
+The true volumes are in a separate file, truth.json. The manifest of the package contains the
+SHA-256 of this file (a commitment). With `sha256sum truth.json`, anybody can later verify that the
+file was not changed. A nonce of 256 bits in the file prevents a search for the truth by its hash.
+The generator is public, so that the seed alone would not be a secret. The draws of a sealed package
+therefore also depend on 256 random bits that only the truth contains.
 """
 
 import hashlib
@@ -34,61 +34,61 @@ from tankcal.record.intercomparison import (
     version,
 )
 
-LICENCE = "CC0-1.0"
-COVERAGE = 0.95
-DENSITIES_KG_M3 = (0.0, 850.0)  # of the head: tanks take turns
-SCHEMA = "answers.schema.json"
+LICENCE = "CC0-1.0"  # SPDX identifier
+COVERAGE = 0.95  # coverage probability of the requested U
+DENSITIES_KG_M3 = (0.0, 850.0)  # density of the liquid, alternating between tanks
+SCHEMA = "answers.schema.json"  # file name of the JSON schema of answers
 
 
 @dataclass(frozen=True)
 class Made:
-    """A package and its truth, as {path: bytes} and bytes."""
+    """Files of a package, {path: bytes}, and the bytes of its truth file."""
 
     files: dict
     truth: bytes
 
 
 def make_package(count, seed, methods, *, secret="", nonce=None, is_open=False, progress=None):
-    """Draw tanks, survey each by all methods, and seal their volumes.
+    """Draw tanks, simulate surveys by all methods, and seal the true volumes.
 
     Parameters
     ----------
     count : int
-        Tanks.
+        Number of tanks.
     seed : int
-        Of the draws.
+        Seed of the random numbers.
     methods : sequence of str
-        Of `observers.METHODS`.
+        Keys of `observers.METHODS`.
     secret : str
-        Hexadecimal digits that the draws hang on, too; "": on the seed alone, which anybody can
-        try.
+        Hexadecimal digits that also determine the random numbers. With "", the seed alone
+        determines them, and anybody can repeat the draws.
     nonce : str, optional
-        Hexadecimal digits; None: by lot.
+        Hexadecimal digits; random by default.
     is_open : bool
-        Whether the truth will lie beside it, for practice.
+        Whether the truth is published with the package, for practice.
     progress : callable, optional
-        progress(text, done, total).
+        Function progress(text, done, total).
 
     Returns
     -------
     Made
-        The same for the same seed, secret and nonce.
+        Identical for the same seed, secret and nonce.
     """
     progress = progress or (lambda *_: None)
     step = message("ic_making", "drawing tanks and surveying them")
     files, asked, truth, jobs, used = {}, [], [], [], {}
     total = count * len(methods)
     for number in range(count):
-        tank, wanted, true = _tank(number, seed, secret)
+        tank, requested, true = _draw_case(number, seed, secret)
         asked.append(
-            AskedTank(tank.name, list(wanted.dips_m), wanted.reference_temperature_c,
-                      wanted.density_kg_m3)
+            AskedTank(tank.name, list(requested.dips_m), requested.reference_temperature_c,
+                      requested.density_kg_m3)
         )  # fmt: skip
         truth.append(true)
-        for place, method in enumerate(methods):
-            progress(step, number * len(methods) + place, total)
+        for index, method in enumerate(methods):
+            progress(step, number * len(methods) + index, total)
             rng = _stream(seed, secret, number, 1 + list(METHODS).index(method))
-            parts = METHODS[method](tank, Chance(rng), wanted)
+            parts = METHODS[method](tank, Chance(rng), requested)
             _note_names(parts, used)
             folder = f"{tank.name}/{method}"
             jobs.append(AskedJob(tank.name, method, folder))
@@ -97,7 +97,7 @@ def make_package(count, seed, methods, *, secret="", nonce=None, is_open=False, 
     nonce = secrets.token_hex(32) if nonce is None else nonce
     sealed = TruthFile(version(), nonce, secret, seed, list(methods), truth)
     truth_bytes = as_bytes(plain_of(sealed))
-    files |= _beside(used, is_open)
+    files |= _documentation(used, is_open)
     manifest = PackageFile(
         tankcal=version(),
         open=is_open,
@@ -112,26 +112,26 @@ def make_package(count, seed, methods, *, secret="", nonce=None, is_open=False, 
     return Made(files, truth_bytes)
 
 
-def _tank(number, seed, secret):
-    """Tank, what is asked of it, and its assigned values."""
+def _draw_case(number, seed, secret):
+    """Tank, the requested heights and conditions, and the assigned values."""
     family = FAMILIES[number % len(FAMILIES)]
     name = f"T{number + 1:02d}"
     tank = draw_tank(_stream(seed, secret, number, 0), name, family)
-    wanted = ask(tank, DENSITIES_KG_M3[number % len(DENSITIES_KG_M3)])
-    volumes = tank.volumes_m3(wanted.dips_m, wanted.density_kg_m3)
-    error = tank.volume_error_m3(wanted.dips_m, wanted.density_kg_m3)
-    true = TrueTank(name, family, list(wanted.dips_m), volumes.tolist(), error, tank.plain())
-    return tank, wanted, true
+    requested = ask(tank, DENSITIES_KG_M3[number % len(DENSITIES_KG_M3)])
+    volumes = tank.volumes_m3(requested.dips_m, requested.density_kg_m3)
+    error = tank.volume_error_m3(requested.dips_m, requested.density_kg_m3)
+    true = TrueTank(name, family, list(requested.dips_m), volumes.tolist(), error, tank.plain())
+    return tank, requested, true
 
 
 def _stream(seed, secret, *places):
-    """A generator of its own for each tank and method, so that a choice of methods changes none."""
+    """Random generator of a tank and method, independent of the choice of other methods."""
     text = f"tankcal intercomparison {seed} {secret} {' '.join(map(str, places))}"
     return np.random.default_rng(list(hashlib.sha256(text.encode()).digest()))
 
 
 def _note_names(parts, used):
-    """Add keys and columns of a job to {file: names}."""
+    """Add the keys and columns of a job to `used`, {file: names}."""
     for path in parts.settings:
         used.setdefault("job.toml", {})[path] = None
     for name, rows in parts.tables.items():
@@ -141,8 +141,8 @@ def _note_names(parts, used):
             used.setdefault(f"{name}.toml", {}).update(dict.fromkeys(entry))
 
 
-def _beside(used, is_open):
-    """What is to be read: README, columns, schema of the answers, licence."""
+def _documentation(used, is_open):
+    """Documentation of a package: README, columns, schema of the answers, licence."""
     from tankcal.intercomparison.reading_matter import columns_text, readme_text
     from tankcal.text.shipped import shipped_folder
 
@@ -157,12 +157,12 @@ def _beside(used, is_open):
 
 
 def as_bytes(plain):
-    """Plain data as the bytes of a file."""
+    """Bytes of a JSON file with plain data."""
     return (json.dumps(plain, ensure_ascii=False, indent=1, allow_nan=False) + "\n").encode()
 
 
 def digest(data):
-    """SHA-256 of bytes, as hexadecimal digits."""
+    """SHA-256 of bytes in hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()
 
 
@@ -174,58 +174,73 @@ def write_files(folder, files):
         path.write_bytes(data)
 
 
-# ---- read again
+# ---- reading
 
 
 def load_package(folder, log):
-    """The manifest of a package as plain data, its files as they were; None after telling `log`."""
+    """Read the manifest of a package as plain data and verify its files.
+
+    Missing and changed files are reported to `log`, and None is returned.
+    """
     path = Path(folder)
     path = path / PACKAGE.file if path.is_dir() else path
-    found = load_saved(PACKAGE, path, log)
-    if found is None:
+    manifest = load_saved(PACKAGE, path, log)
+    if manifest is None:
         return None
-    before = len(log.problems)
-    for one in found["files"]:
-        data = _bytes(path.parent, one["file"])
+    problem_count = len(log.problems)
+    for entry in manifest["files"]:
+        data = _bytes_of_file(path.parent, entry["file"])
         if data is None:
             text = message("ic_file_missing", "is missing; expected it, as the manifest names it")
-            log.problem(one["file"], text)
-        elif digest(data) != one["sha256"]:
+            log.problem(entry["file"], text)
+        elif digest(data) != entry["sha256"]:
             text = message("ic_file_changed", "is not the file that the manifest names: its "
                            "SHA-256 is another; get the package again")  # fmt: skip
-            log.problem(one["file"], text)
-    return None if len(log.problems) > before else found
+            log.problem(entry["file"], text)
+    return None if len(log.problems) > problem_count else manifest
 
 
 def load_truth(path, committed, log):
-    """(truth as plain data, SHA-256 of the file), or None after telling `log`.
+    """Read the truth and verify its SHA-256.
 
-    committed  SHA-256 by manifest and answers, each with the name of the file that says so
+    Parameters
+    ----------
+    path : path
+        The file truth.json, or its folder.
+    committed : sequence of (str, str)
+        File names of manifest and answers, each with the SHA-256 that the file states.
+    log : Log
+        Receives the problems.
+
+    Returns
+    -------
+    tuple of (dict, str) or None
+        Truth as plain data and SHA-256 of the file; None if there are problems.
     """
     path = Path(path)
     path = path / TRUTH.file if path.is_dir() else path
-    found = load_saved(TRUTH, path, log)
-    if found is None:
+    truth_data = load_saved(TRUTH, path, log)
+    if truth_data is None:
         return None
-    before, own = len(log.problems), digest(path.read_bytes())
+    problem_count, truth_sha256 = len(log.problems), digest(path.read_bytes())
     for name, promised in committed:
-        if promised != own:
+        if promised != truth_sha256:
             text = message(
                 "ic_other_truth",
                 "names the truth with SHA-256 {promised}; that of {truth} is {own}: it was changed,"
                 " or belongs to another package",
-                promised=promised, truth=path.name, own=own,
+                promised=promised, truth=path.name, own=truth_sha256,
             )  # fmt: skip
             log.problem(name, text)
-    for one in found["tanks"]:
-        if len(one["heights_m"]) != len(one["volume_m3"]):
+    for tank in truth_data["tanks"]:
+        if len(tank["heights_m"]) != len(tank["volume_m3"]):
             log.problem(path.name, message("ic_truth_uneven", "{tank}: as many volumes as heights "
-                        "expected", tank=one["tank"]))  # fmt: skip
-    return None if len(log.problems) > before else (found, own)
+                        "expected", tank=tank["tank"]))  # fmt: skip
+    return None if len(log.problems) > problem_count else (truth_data, truth_sha256)
 
 
 def load_saved(saved_format, path, log):
-    """Data of a saved file, checked; None after telling `log`."""
+    """Read and check the data of a saved file, or report problems to `log` and return None."""
     from tankcal.errors import InputError
     from tankcal.job.tables import read_bytes
 
@@ -242,8 +257,8 @@ def load_saved(saved_format, path, log):
     return None
 
 
-def _bytes(folder, name):
-    """A file within a folder; None where there is none, or its path leads out of it."""
+def _bytes_of_file(folder, name):
+    """Bytes of a file in a folder; None if it is missing or its path leaves the folder."""
     path = (folder / name).resolve()
     if not path.is_relative_to(folder.resolve()) or not path.is_file():
         return None

@@ -1,4 +1,4 @@
-"""What is to be read beside the files of a package: README and the list of keys and columns."""
+"""Documentation in a package: README, and the list of keys and columns."""
 
 from tankcal.intercomparison.observers.cloud import LAS_STEP_M
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
@@ -23,7 +23,7 @@ own frame: the scanner is at its origin, and it stands a little out of level.
 
 
 def readme_text(is_open):
-    """README.md of a package."""
+    """Text of README.md of a package."""
     text = (shipped_folder("report_templates") / "intercomparison" / "readme.md").read_text(
         encoding="utf-8"
     )
@@ -32,9 +32,9 @@ def readme_text(is_open):
 
 
 def columns_text(used):
-    """COLUMNS.md: what the contract of a job says of the names that a package uses.
+    """Text of COLUMNS.md: notes of the job contract on all names that a package uses.
 
-    used  {file: names}
+    The names are given as {file: names}.
     """
     parts = [HEAD.format(step=LAS_STEP_M)]
     for file in sorted(used):
@@ -45,11 +45,11 @@ def columns_text(used):
 
 
 def _note(file, name):
-    """The note of a key or column in the contract."""
+    """Note on a key or column in the contract of a job."""
     owner = file.rpartition(".")[0]
     if file == "job.toml":
         section, _, name = name.rpartition(".")
-        known = KEYS[section]
+        fields = KEYS[section]
     else:
-        known = COLUMNS.get(owner) or REGISTER_KEYS[owner]
-    return next((one.note for one in known if one.name == name), "")
+        fields = COLUMNS.get(owner) or REGISTER_KEYS[owner]
+    return next((field.note for field in fields if field.name == name), "")

@@ -1,17 +1,18 @@
-"""Scores of answers against assigned values, as proficiency tests have them.
+"""Scores of answers against assigned values, as in proficiency tests.
 
-With x the answer, X the assigned value, U and u = U / k as stated (ISO 13528:2022, 9.7 and 9.6; the
-assigned values are those of a quadrature, U_ref is its numerical error):
+x is the answer, X the assigned value, U the stated expanded uncertainty, and u = U / k. The
+assigned values come from a quadrature, whose numerical error is U_ref. The scores are those of
+ISO 13528:2022, 9.7 and 9.6:
 
     E_n = (x - X) / sqrt(U^2 + U_ref^2)          zeta = (x - X) / sqrt(u^2 + u_ref^2)
 
-|E_n| <= 1 is expected of 95 % of what is stated with U at 95 %. Rows of one table share nearly all
-of their errors, so tables, not rows, are the independent units: the standard deviation of a share
-of rows is that of a ratio of sums over tables,
+For a coverage probability of 95 %, |E_n| <= 1 is expected for 95 % of the answers. The rows of a
+table have nearly all errors in common. Tables, not rows, are therefore the independent units, and
+the standard deviation of a share of rows follows from a ratio of sums over tables,
 
     p = sum m_i / sum n_i      s^2 = J / (J - 1) sum (m_i - p n_i)^2 / (sum n_i)^2
 
-and of the tops of tables the exact binomial bounds (Clopper and Pearson) are given.
+For the top rows of tables, the exact binomial bounds (Clopper and Pearson) are computed.
 """
 
 import numpy as np
@@ -27,81 +28,101 @@ from tankcal.record.intercomparison import (
 )
 from tankcal.record.texts import warnings_of
 
-EVERY = "*"  # in place of a method: all of them
-SAME_M = 1e-6
-DELIVERIES_M = (0.01, 0.1, 2.0)
-FEWEST_ROWS = 4  # that a line is put through
+EVERY = "*"  # replaces the method in scores of all methods
+SAME_M = 1e-6  # largest difference of heights that are treated as equal
+DELIVERIES_M = (0.01, 0.1, 2.0)  # differences of height of the scored deliveries
+FEWEST_ROWS = 4  # least number of rows for the fit of zero and scale
 BOUNDS = 0.95  # probability between the exact bounds
 
 
 def score(participants, truth, truth_sha256, coverage=0.95):
-    """The `ScoresFile` of several `answers.Answers`.
+    """Score the answers of several participants.
 
     Parameters
     ----------
     participants : sequence of Answers
+        Answers of each participant.
     truth : dict
-        As of `package.load_truth`.
+        Plain data of `package.load_truth`.
     truth_sha256 : str
+        SHA-256 of the truth file.
     coverage : float
-        That was asked for.
+        Requested coverage probability of U.
+
+    Returns
+    -------
+    ScoresFile
     """
-    true = {one["tank"]: one for one in truth["tanks"]}
+    true = {item["tank"]: item for item in truth["tanks"]}
     tables = [
-        score_table(place, answer, true[answer.tank])
-        for place, one in enumerate(participants)
-        for answer in one.saved.answers
+        score_table(number, answer, true[answer.tank])
+        for number, item in enumerate(participants)
+        for answer in item.saved.answers
     ]
     order = {method: i for i, method in enumerate([*truth["methods"], EVERY])}
     methods = []
-    for place in range(len(participants)):
-        own = [one for one in tables if one.participant == place]
+    for number in range(len(participants)):
+        tables_of_participant = [item for item in tables if item.participant == number]
         for method in order:
-            some = [one for one in own if method in (one.method, EVERY)]
+            tables_of_method = [
+                item for item in tables_of_participant if method in (item.method, EVERY)
+            ]
             asked = len(true) * (len(truth["methods"]) if method == EVERY else 1)
-            if some:
-                methods.append(score_method(place, method, some, asked))
+            if tables_of_method:
+                methods.append(score_method(number, method, tables_of_method, asked))
     return ScoresFile(
         tankcal=version(),
         truth_sha256=truth_sha256,
         coverage_probability=coverage,
-        participants=[one.saved.participant for one in participants],
-        tables=sorted(tables, key=lambda one: (one.participant, one.tank, order[one.method])),
+        participants=[item.saved.participant for item in participants],
+        tables=sorted(tables, key=lambda item: (item.participant, item.tank, order[item.method])),
         methods=methods,
-        warnings=warnings_of([w for one in participants for w in one.warnings]),
+        warnings=warnings_of([w for item in participants for w in item.warnings]),
     )
 
 
 def score_table(participant, answer, true):
-    """The `ScoredTable` of one answer.
+    """Score one table of answers.
 
-    true  the tank of the truth file
+    Parameters
+    ----------
+    participant : int
+        Index of the participant.
+    answer : Answer
+        Answers for one survey.
+    true : dict
+        The tank in the truth file.
+
+    Returns
+    -------
+    ScoredTable
     """
-    wanted, assigned = np.array(true["heights_m"]), np.array(true["volume_m3"])
+    requested, assigned = np.array(true["heights_m"]), np.array(true["volume_m3"])
     order = np.argsort(answer.height_m)
     height = np.array(answer.height_m, float)[order]
-    at = np.argmin(np.abs(wanted[:, None] - height), axis=0)
+    # Index of the requested height of each row.
+    at = np.argmin(np.abs(requested[:, None] - height), axis=0)
     volume, U, k = (
-        np.array([np.nan if one is None else one for one in values], float)[order]
+        np.array([np.nan if value is None else value for value in values], float)[order]
         for values in (answer.volume_m3, answer.U_m3, answer.k)
     )
     exact, error, full = assigned[at], volume - assigned[at], assigned[-1]
     reference = true["numerical_error_m3"]
     E_n = error / np.hypot(U, reference)
     zeta = error / np.hypot(U / k, reference)
-    judged = np.isfinite(E_n)
-    has_top = at[-1] == len(wanted) - 1
+    is_judged = np.isfinite(E_n)
+    has_top = at[-1] == len(requested) - 1
     return ScoredTable(
         participant=participant,
         tank=answer.tank,
         method=answer.method,
-        rows=ScoredRows(*(one.tolist() for one in (wanted[at], exact, error, U, E_n, zeta))),
-        missing=len(wanted) - len(height),
+        rows=ScoredRows(*(value.tolist() for value in (requested[at], exact, error, U, E_n, zeta))),
+        missing=len(requested) - len(height),
         top_error_ppm=float(1e6 * error[-1] / full) if has_top else None,
-        top_E_n=float(E_n[-1]) if has_top and judged[-1] else None,
+        top_E_n=float(E_n[-1]) if has_top and is_judged[-1] else None,
         rms_ppm=float(1e6 * _rms(error) / full),
-        within=int(np.sum(np.abs(E_n[judged]) <= 1)),
-        judged=int(judged.sum()),
+        within=int(np.sum(np.abs(E_n[is_judged]) <= 1)),
+        judged=int(is_judged.sum()),
         mean_U_ppm=_or_none(1e6 * _mean(U[np.isfinite(U)]) / full),
         rms_zeta=_or_none(_rms(zeta[np.isfinite(zeta)])),
         form=form_of(height, volume, exact, full),
@@ -109,18 +130,28 @@ def score_table(participant, answer, true):
 
 
 def form_of(height, volume, exact, full):
-    """The `TableForm` of a table.
+    """Determine errors of zero, scale, form and deliveries of a table.
 
-    height, volume, exact  (n,) rising heights, answers, assigned values     full  the largest value
+    Parameters
+    ----------
+    height, volume, exact : ndarray, shape (n,)
+        Ascending heights, m, answers and assigned values, m3.
+    full : float
+        Largest assigned value, m3.
+
+    Returns
+    -------
+    TableForm
     """
     error = volume - exact
     zero = scale = form = None
     if len(height) >= FEWEST_ROWS:
+        # error = zero + scale * volume + form; the form is the residual of the line.
         design = np.column_stack([np.ones(len(exact)), exact])
         (zero, scale), *_ = np.linalg.lstsq(design, error, rcond=None)
         form = float(1e6 * _rms(error - design @ [zero, scale]) / full)
         zero, scale = float(zero), float(1e6 * scale)
-    small, larger, large = (_deliveries(height, volume, exact, one) for one in DELIVERIES_M)
+    small, larger, large = (_deliveries(height, volume, exact, step) for step in DELIVERIES_M)
     return TableForm(
         falling_rows=int(np.sum(np.diff(volume) <= 0)),
         zero_m3=zero,
@@ -134,18 +165,34 @@ def form_of(height, volume, exact, full):
 
 
 def _deliveries(height, volume, exact, step):
-    """Relative errors of deliveries between rows that are so far apart."""
+    """Relative errors of the deliveries between rows whose heights differ by `step`."""
     low, high = np.nonzero(np.abs(height[None, :] - height[:, None] - step) <= SAME_M)
     true = exact[high] - exact[low]
     return (volume[high] - volume[low] - true) / true
 
 
 def score_method(participant, method, tables, asked):
-    """The `MethodScore` of some tables of one participant."""
-    tops = np.array([one.top_error_ppm for one in tables if one.top_error_ppm is not None])
-    E_n = np.array([one.top_E_n for one in tables if one.top_E_n is not None])
-    within = np.array([one.within for one in tables])
-    judged = np.array([one.judged for one in tables])
+    """Score the tables of a participant for a method, or for all methods.
+
+    Parameters
+    ----------
+    participant : int
+        Index of the participant.
+    method : str
+        Method, or EVERY.
+    tables : sequence of ScoredTable
+        Scored tables of this participant and method.
+    asked : int
+        Number of requested tables.
+
+    Returns
+    -------
+    MethodScore
+    """
+    tops = np.array([table.top_error_ppm for table in tables if table.top_error_ppm is not None])
+    E_n = np.array([table.top_E_n for table in tables if table.top_E_n is not None])
+    within = np.array([table.within for table in tables])
+    judged = np.array([table.judged for table in tables])
     share, u_share = share_within(within, judged)
     good = int(np.sum(np.abs(E_n) <= 1))
     low, high = exact_bounds(good, len(E_n))
@@ -157,27 +204,35 @@ def score_method(participant, method, tables, asked):
         bias_ppm=_or_none(_mean(tops)),
         u_bias_ppm=float(np.std(tops, ddof=1) / np.sqrt(len(tops))) if len(tops) > 1 else None,
         rms_top_ppm=_or_none(_rms(tops)),
-        rms_ppm=_pooled([one.rms_ppm for one in tables]),
-        mean_U_ppm=_or_none(_mean(_known(one.mean_U_ppm for one in tables))),
+        rms_ppm=_pooled([table.rms_ppm for table in tables]),
+        mean_U_ppm=_or_none(_mean(_known(table.mean_U_ppm for table in tables))),
         share_within=share,
         u_share=u_share,
         tops_within=good,
         tops_judged=len(E_n),
         tops_low=low,
         tops_high=high,
-        rms_zeta=_pooled([one.rms_zeta for one in tables]),
-        form_ppm=_pooled([one.form.form_ppm for one in tables]),
-        delivery_1cm_percent=_pooled([one.form.delivery_1cm_percent for one in tables]),
-        delivery_10cm_percent=_pooled([one.form.delivery_10cm_percent for one in tables]),
-        delivery_2m_ppm=_pooled([one.form.delivery_2m_ppm for one in tables]),
-        falling_rows=sum(one.form.falling_rows for one in tables),
+        rms_zeta=_pooled([table.rms_zeta for table in tables]),
+        form_ppm=_pooled([table.form.form_ppm for table in tables]),
+        delivery_1cm_percent=_pooled([table.form.delivery_1cm_percent for table in tables]),
+        delivery_10cm_percent=_pooled([table.form.delivery_10cm_percent for table in tables]),
+        delivery_2m_ppm=_pooled([table.form.delivery_2m_ppm for table in tables]),
+        falling_rows=sum(table.form.falling_rows for table in tables),
     )
 
 
 def share_within(within, judged):
-    """Share of rows within their intervals, and its standard deviation over tables.
+    """Share of rows with |E_n| <= 1, and its standard deviation over tables.
 
-    within, judged  (tables,) rows within, and rows judged
+    Parameters
+    ----------
+    within, judged : ndarray of int, shape (tables,)
+        Number of rows with |E_n| <= 1, and of all rows with an E_n.
+
+    Returns
+    -------
+    share, sd : float or None
+        None if not determined.
 
     Examples
     --------
@@ -185,8 +240,8 @@ def share_within(within, judged):
     >>> share_within(np.array([10, 5]), np.array([10, 10]))
     (0.75, 0.25)
     """
-    some = judged > 0
-    within, judged = within[some], judged[some]
+    has_rows = judged > 0
+    within, judged = within[has_rows], judged[has_rows]
     if not len(judged):
         return None, None
     share, count = within.sum() / judged.sum(), len(judged)
@@ -197,11 +252,11 @@ def share_within(within, judged):
 
 
 def exact_bounds(good, count, probability=BOUNDS):
-    """Bounds of a probability of which so many of `count` were good (Clopper and Pearson).
+    """Exact bounds of a probability, from `good` successes in `count` trials (Clopper and Pearson).
 
     Examples
     --------
-    >>> [round(one, 4) for one in exact_bounds(5, 5)]
+    >>> [round(bound, 4) for bound in exact_bounds(5, 5)]
     [0.4782, 1.0]
     """
     if not count:
@@ -213,21 +268,25 @@ def exact_bounds(good, count, probability=BOUNDS):
 
 
 def _known(values):
-    return np.array([one for one in values if one is not None], float)
+    """Array of the values that are not None."""
+    return np.array([value for value in values if value is not None], float)
 
 
 def _pooled(values):
-    """rms of those that are known."""
+    """Root mean square of the values that are not None, or None."""
     return _or_none(_rms(_known(values)))
 
 
 def _mean(values):
+    """Mean; nan for no values."""
     return float(np.mean(values)) if len(values) else np.nan
 
 
 def _rms(values):
+    """Root mean square; nan for no values."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else np.nan
 
 
 def _or_none(value):
+    """Value as float, or None if it is not finite."""
     return float(value) if np.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""What every survey of a tank shares: errors by lot, what is declared, and the parts of a job."""
+"""Common part of all simulated surveys: random errors, declared values and the files of a job."""
 
 import datetime
 from dataclasses import dataclass, field
@@ -8,32 +8,34 @@ import numpy as np
 from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.tank import REFERENCE_C
 
-NOMINAL_E_GPA, U_E_GPA = 206.0, 2.0
-NOMINAL_EXPANSION, U_EXPANSION = 1.15e-5, 4e-7
+NOMINAL_E_GPA, U_E_GPA = 206.0, 2.0  # declared Young's modulus and its standard uncertainty
+NOMINAL_EXPANSION, U_EXPANSION = 1.15e-5, 4e-7  # declared thermal expansion and its u, 1/K
+# Standard uncertainties: plate thickness, paint, height of a course, dip plate, shell temperature.
 U_PLATE_M, U_PAINT_M, U_COURSE_M, U_ZERO_M, U_SHELL_K = 1.5e-4, 5e-5, 1e-3, 1e-3, 1.0
-FLOOR_POINTS, FLOOR_SD_M = (4, 8, 12, 16, 20), 1.5e-3  # on rings round the middle; of levelling
-FITTING_PART = 0.02  # standard uncertainty of the volume of a thing
-STEP_M = 0.01  # of the table that is asked for
+# Numbers of bottom points on rings round the middle, and standard deviation of their levelling.
+FLOOR_POINTS, FLOOR_SD_M = (4, 8, 12, 16, 20), 1.5e-3
+FITTING_PART = 0.02  # relative standard uncertainty of the volume of deadwood
+STEP_M = 0.01  # height step of the requested table
 
 
 @dataclass
 class Chance:
-    """Errors by lot; size 0: a perfect crew, whose readings are the truth."""
+    """Random errors of a simulated survey; with size 0 the readings have no errors."""
 
     rng: np.random.Generator
     size: float = 1.0
 
     def normal(self, sd, shape=None):
-        """Normal errors of a standard deviation."""
+        """Normal errors with standard deviation `sd`."""
         return self.size * sd * self.rng.normal(size=shape)
 
     def declared(self, sd, digits=2):
-        """What a crew declares of a standard deviation: the truth, or a little more or less."""
+        """Declared value of a standard deviation: exact in half of the cases, else 15 % off."""
         factor = np.exp(0.15 * self.rng.normal()) if self.rng.uniform() < 0.5 else 1.0
         return float(f"{sd * (factor if self.size else 1.0):.{digits}g}")
 
     def blunders(self, count, share):
-        """(k,) numbers of the readings that are spoilt: this share of them, about."""
+        """Indices (k,) of the readings with a gross error; `share` is their expected share."""
         if not self.size:
             return np.empty(0, dtype=int)
         return np.flatnonzero(self.rng.uniform(size=count) < share)
@@ -41,12 +43,18 @@ class Chance:
 
 @dataclass
 class Parts:
-    """The files of a job, before they are written.
+    """Content of the files of a job.
 
-    settings   {"section.key": value} of job.toml
-    tables     {name: [headings, row, ...]} of CSV files
-    registers  {"instruments": {name: {key: value}}} of further TOML files
-    files      {path: bytes} beside them
+    Attributes
+    ----------
+    settings : dict
+        Settings of job.toml, {"section.key": value}.
+    tables : dict
+        CSV files, {name: [headings, row, ...]}.
+    registers : dict
+        Other TOML files, such as {"instruments": {name: {key: value}}}.
+    files : dict
+        Other files, {path: bytes}.
     """
 
     settings: dict
@@ -57,12 +65,26 @@ class Parts:
 
 @dataclass(frozen=True)
 class Site:
-    """A tank on the day of one survey.
+    """A tank during a survey.
 
-    shell_c    true temperature of the shell     grown  by how much lengths are longer than cool
-    frame_m    (3,) the foot of the axis in the frame of the survey
-    zero_m     the dip plate as levelled, above the foot of the shell
-    inputs     rows of uncertainty.csv so far
+    Attributes
+    ----------
+    tank : Tank
+        The true tank.
+    chance : Chance
+        Random errors of the survey.
+    outside : bool
+        Whether the survey is from outside.
+    shell_c : float
+        True temperature of the shell.
+    frame_m : ndarray, shape (3,)
+        Foot of the axis in the coordinate system of the survey.
+    zero_m : float
+        Levelled height of the dip plate above the foot of the shell.
+    parts : Parts
+        Files of the job.
+    inputs : list
+        Rows of uncertainty.csv.
     """
 
     tank: object
@@ -76,30 +98,57 @@ class Site:
 
     @property
     def grown(self):
+        """Factor of all lengths by thermal expansion, relative to the reference temperature."""
         return self.tank.grown(self.shell_c)
 
     def places(self, azimuth, z, off_m=0.0, outside=None):
-        """(n, 3) true places of the warm wall in the frame of the survey; z of the cool tank."""
+        """True points (n, 3) of the expanded wall in the coordinate system of the survey, m.
+
+        Parameters
+        ----------
+        azimuth, z : array_like, shape (n,)
+            Azimuths, rad, and heights of the tank at the reference temperature, m.
+        off_m : float or array_like, shape (n,)
+            Distance outwards from the wall, m.
+        outside : bool, optional
+            Whether the points are on the outside; by default as in the survey.
+        """
         outside = self.outside if outside is None else outside
         cool = self.tank.places_m(azimuth, z, 0.0, outside)
         if np.any(off_m):
             ray = np.column_stack([np.sin(azimuth), np.cos(azimuth), np.zeros(len(cool))])
+            # The distance itself does not expand, so it is divided by the factor applied below.
             cool = cool + np.asarray(off_m)[..., None] * ray / self.grown
         return self.frame_m + self.grown * cool
 
     def level(self, z):
-        """Height above the table's zero, as the crew reads it, of heights of the cool tank."""
+        """Observed heights above the dip plate, for heights z at the reference temperature, m."""
         return self.grown * np.asarray(z) - self.zero_m
 
     def add_input(self, name, u, unit, note):
-        """A row of uncertainty.csv."""
+        """Add a row to uncertainty.csv."""
         self.inputs.append([name, u, unit, note])
 
 
 def observe_site(tank, chance, asked, *, outside, frame_m=(0.0, 0.0, 0.0)):
-    """The `Site` of one survey: course heights, plates, bottom and things as a crew declares them.
+    """Simulate the common observations of a survey: courses, plates, bottom and deadwood.
 
-    asked  `Asked` of the tank: what the table is to be for
+    Parameters
+    ----------
+    tank : Tank
+        The true tank.
+    chance : Chance
+        Random errors.
+    asked : Asked
+        Requested conditions of the capacity table.
+    outside : bool
+        Whether the survey is from outside.
+    frame_m : sequence of 3 float
+        Foot of the axis in the coordinate system of the survey, m.
+
+    Returns
+    -------
+    Site
     """
     shell_c = float(np.round(chance.rng.uniform(12.0, 32.0), 1))
     read_c = round(shell_c + float(chance.normal(U_SHELL_K)), 1)
@@ -126,12 +175,13 @@ def observe_site(tank, chance, asked, *, outside, frame_m=(0.0, 0.0, 0.0)):
 
 
 def finish(site):
-    """The Parts of a site, with its inputs."""
+    """`Parts` of a site, with its uncertainty.csv."""
     site.parts.tables["uncertainty"] = [["input", "u", "unit", "note"], *site.inputs]
     return site.parts
 
 
 def _settings(tank, asked, outside, read_c, frame, zero):
+    """Settings of job.toml."""
     return {
         "tank.id": tank.name,
         "tank.kind": "vertical",
@@ -153,20 +203,20 @@ def _settings(tank, asked, outside, read_c, frame, zero):
 
 
 def _courses(site):
-    """Heights along the shell, plates and paint as measured, the last two with one error each."""
+    """Rows of courses.csv; plates and paint have one common error each for all courses."""
     tank, chance = site.tank, site.chance
     along = np.hypot(1, np.hypot(*tank.lean))
     heights = tank.courses_m * np.array(along) + chance.normal(U_COURSE_M, len(tank.courses_m))
     plate, paint = chance.normal(U_PLATE_M), chance.normal(U_PAINT_M)
     rows = [["course", "height_m", "thickness_mm", "paint_mm"][: 4 if site.outside else 3]]
     for k, (height, true) in enumerate(zip(heights, tank.plates_m, strict=True), 1):
-        said = [round(1000 * float(one), 3) for one in (true + plate, tank.paint_m + paint)]
-        rows.append([str(k), round(float(height), 5), *said[: len(rows[0]) - 2]])
+        measured = [round(1000 * float(value), 3) for value in (true + plate, tank.paint_m + paint)]
+        rows.append([str(k), round(float(height), 5), *measured[: len(rows[0]) - 2]])
     return rows
 
 
 def _bottom(site):
-    """Levelled points on rings round the middle, and close to the wall."""
+    """Rows of bottom.csv: levelled points in the middle, on rings and close to the wall."""
     tank, chance = site.tank, site.chance
     rows = [["x_m", "y_m", "z_m", "s_mm"]]
     places = [(0.0, 0.0)]
@@ -176,28 +226,35 @@ def _bottom(site):
         places += list(zip(r * np.sin(turn), r * np.cos(turn), strict=True))
     x, y = np.array(places).T
     z = tank.floor.height_m(x, y, tank.radius_m)
-    seen = site.frame_m + site.grown * np.column_stack([x, y, z])
-    seen[:, 2] += chance.normal(FLOOR_SD_M, len(seen))
-    return rows + [[*np.round(one, 5).tolist(), 1000 * FLOOR_SD_M] for one in seen]
+    observed = site.frame_m + site.grown * np.column_stack([x, y, z])
+    observed[:, 2] += chance.normal(FLOOR_SD_M, len(observed))
+    return rows + [[*np.round(point, 5).tolist(), 1000 * FLOOR_SD_M] for point in observed]
 
 
 def _fittings(site):
-    """Things in the tank: their dips, volumes from drawings, u of each."""
+    """Rows of deadwood.csv: dips, volumes from drawings and their u."""
     tank, chance = site.tank, site.chance
     rows = [["name", "bottom_m", "top_m", "volume_m3", "u_m3"]]
-    for one in tank.fittings:
-        u = max(FITTING_PART * abs(one.volume_m3), 1e-3)
-        volume = one.volume_m3 + chance.normal(u)
-        low, high = np.round(np.array([one.low_m, one.high_m]) - tank.plate_z_m, 4)
-        rows.append([one.name, float(low), float(high), round(float(volume), 5), round(u, 5)])
+    for fitting in tank.fittings:
+        u = max(FITTING_PART * abs(fitting.volume_m3), 1e-3)
+        volume = fitting.volume_m3 + chance.normal(u)
+        low, high = np.round(np.array([fitting.low_m, fitting.high_m]) - tank.plate_z_m, 4)
+        rows.append([fitting.name, float(low), float(high), round(float(volume), 5), round(u, 5)])
     return rows
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What a table of a tank is asked for.
+    """Requested heights and conditions of a capacity table.
 
-    dips_m  heights above the dip plate at which volumes are wanted
+    Attributes
+    ----------
+    dips_m : tuple of float
+        Heights above the dip plate.
+    density_kg_m3 : float
+        Density of the liquid; 0 for an empty shell.
+    reference_temperature_c : float
+        Reference temperature of the shell.
     """
 
     dips_m: tuple
@@ -206,10 +263,10 @@ class Asked:
 
 
 def ask(tank, density_kg_m3):
-    """The `Asked` of a tank: every half metre, and pairs 1 cm, 10 cm and 2 m apart.
+    """`Asked` of a tank: every half metre, and pairs for deliveries of 1 cm, 10 cm and 2 m.
 
-    The pairs of deliveries of 1 and 10 cm stand in the middle of every course and across every
-    weld between courses, where a table by sections has its corners.
+    The deliveries of 1 cm and 10 cm are in the middle of every course and across every weld between
+    courses, where a table computed by sections changes its slope.
     """
     lowest = tank.lowest_level_m - tank.plate_z_m
     top = np.floor(100 * (tank.height_m - tank.plate_z_m - 0.02)) / 100
@@ -220,5 +277,5 @@ def ask(tank, density_kg_m3):
     for place in places:
         low = np.round(place, 2)
         dips |= {low, low + 0.01, low + 0.1}
-    found = sorted({round(float(one), 2) for one in dips if first - 1e-9 <= one <= top + 1e-9})
-    return Asked(tuple(found), density_kg_m3)
+    rounded = sorted({round(float(dip), 2) for dip in dips if first - 1e-9 <= dip <= top + 1e-9})
+    return Asked(tuple(rounded), density_kg_m3)

@@ -1,4 +1,4 @@
-"""The files of a job, written from its parts."""
+"""Write the files of a job from its parts."""
 
 import io
 import json
@@ -8,7 +8,7 @@ from tankcal.text.spreadsheets import write_guarded
 
 
 def job_files(parts):
-    """{path: bytes} of a job's folder."""
+    """Files of a job's folder, {path: bytes}, from its `Parts`."""
     files = {"job.toml": toml_text(_sections(parts.settings)).encode()}
     for name, rows in parts.tables.items():
         if len(rows) > 1:
@@ -20,30 +20,32 @@ def job_files(parts):
 
 
 def csv_text(rows, separator=","):
-    """Rows as CSV."""
+    """Text of a CSV file with these rows."""
     stream = io.StringIO()
     write_guarded(stream, rows, separator)
     return stream.getvalue()
 
 
 def toml_text(sections):
-    """{section: {key: value}} as TOML."""
+    """Text of a TOML file with {section: {key: value}}."""
     parts = []
     for section, entries in sections.items():
-        lines = [f"{key} = {_value(one)}" for key, one in entries.items()]
+        lines = [f"{key} = {_value(value)}" for key, value in entries.items()]
         parts.append("\n".join([f"[{section}]", *lines]) + "\n")
     return "\n".join(parts)
 
 
 def _sections(settings):
-    found = {}
+    """Convert {"section.key": value} to {section: {key: value}}."""
+    sections = {}
     for path, value in settings.items():
         section, _, key = path.rpartition(".")
-        found.setdefault(section, {})[key] = value
-    return found
+        sections.setdefault(section, {})[key] = value
+    return sections
 
 
 def _value(value):
+    """Value as TOML; strings, numbers and flags have the form of JSON."""
     if isinstance(value, date):
         return value.isoformat()
     if isinstance(value, list | tuple):

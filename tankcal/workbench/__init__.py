@@ -1,4 +1,4 @@
-"""The workbench: a job edited, checked and computed in a notebook (docs/notebook.md)."""
+"""Workbench: edit, check and compute a job in a notebook (docs/notebook.md)."""
 
 from tankcal.workbench.desk import Desk, Refusal, open_job
 

@@ -1,7 +1,7 @@
-"""A job workbook under edit: its sheets as tables and keys, written back cell by cell (openpyxl).
+"""Editing of a job workbook: its sheets as tables and keys, written cell by cell (openpyxl).
 
-Cells that were not edited keep value and look. A workbook with formulas in the sheets of the job
-is only looked at: what a formula gave is lost when another program than Excel writes the file.
+Cells that were not edited keep value and format. A workbook with formulas in the sheets of the job
+is read-only, because openpyxl does not save the values of formulas.
 """
 
 import datetime
@@ -20,10 +20,22 @@ from tankcal.workbench.tables import EditedTable, Row
 
 @dataclass(frozen=True)
 class SheetOrigin:
-    """Where a table stands in its sheet.
+    """Place of a table in its sheet.
 
-    slots  numbers of its rows, in which a state is written from the first on
-    raws   what the cells of these rows hold
+    Attributes
+    ----------
+    title : str
+        Title of the sheet.
+    first_column, heading_row : int
+        First column of the table, and row of its headings, from 1.
+    before : int
+        Number of headings in the sheet as read.
+    slots : tuple of int
+        Numbers of the rows of the table, which are filled again from the first.
+    raws : tuple of tuple
+        Values of the cells of these rows.
+    kind : str
+        Kind of tank, which determines the columns.
     """
 
     title: str
@@ -35,7 +47,10 @@ class SheetOrigin:
     kind: str
 
     def render(self, table):
-        """(the table itself, number of each row): `written_book` puts it into the workbook."""
+        """Table and number of each row in the sheet, None for a new blank row.
+
+        `written_book` writes the table into the workbook.
+        """
         written = [not (row.line is None and row.is_blank) for row in table.rows]
         places = iter(self._places(sum(written)))
         return table, [next(places) if is_written else None for is_written in written]
@@ -46,11 +61,11 @@ class SheetOrigin:
         return [*self.slots[:count], *more]
 
     def write(self, table, book):
-        """Write a state into its sheet of an openpyxl workbook."""
+        """Write a state of the table into its sheet of an openpyxl workbook."""
         is_new = self.title not in book.sheetnames
         sheet = book.create_sheet(self.title) if is_new else book[self.title]
         _, numbers = self.render(table)
-        fields = {one.name: one for one in columns_of(table.name, self.kind)}
+        fields = {field.name: field for field in columns_of(table.name, self.kind)}
         for place, heading in enumerate(table.headings[self.before :], self.before):
             sheet.cell(self.heading_row, self.first_column + place, heading)
         for row, number in zip(table.rows, numbers, strict=True):
@@ -66,10 +81,20 @@ class SheetOrigin:
 
 @dataclass(frozen=True)
 class BookKeys:
-    """Keys of a sheet under edit; the same as `keys.EditedKeys` of a file.
+    """Edited keys of a sheet, with the interface of `keys.EditedKeys`.
 
-    rows  (Entry, number of its row in the sheet, None of a new one, is it changed)
-    columns  of owner, key and value in the sheet
+    Attributes
+    ----------
+    name, file, title : str
+        Name of the settings or list, file in messages, and title of the sheet.
+    columns : tuple of int
+        Columns of owner, key and value in the sheet, from 1.
+    last_row : int
+        Last row of the sheet.
+    rows : tuple of (Entry, int or None, bool)
+        Each entry, the number of its row (None for a new entry), and whether it was changed.
+    unwritten : dict
+        Ambiguous values that are not written, {(owner, key): text}.
     """
 
     name: str
@@ -84,52 +109,53 @@ class BookKeys:
 
     @property
     def entries(self):
-        """The Entries of the sheet, in its order."""
+        """Entries of the sheet in its order."""
         return [
-            replace(one, text=self.unwritten.get((one.owner, one.key)) or one.text)
-            for one, _, _ in self.rows
+            replace(entry, text=self.unwritten.get((entry.owner, entry.key)) or entry.text)
+            for entry, _, _ in self.rows
         ]
 
     def set_value(self, owner, key, text):
-        """The state after one value."""
-        waiting = {place: one for place, one in self.unwritten.items() if place != (owner, key)}
+        """New state with the value of a key."""
+        unwritten = {place: item for place, item in self.unwritten.items() if place != (owner, key)}
         if isinstance(text, Unwritten):
-            waiting[owner, key] = text
+            unwritten[owner, key] = text
             text = ""
-        known = [(one.owner, one.key) for one, _, _ in self.rows]
-        made = Entry(owner, key, str(text))
-        if (owner, key) in known:
-            place = known.index((owner, key))
-            row = (made, self.rows[place][1], True)
+        existing = [(item.owner, item.key) for item, _, _ in self.rows]
+        new_entry = Entry(owner, key, str(text))
+        if (owner, key) in existing:
+            place = existing.index((owner, key))
+            row = (new_entry, self.rows[place][1], True)
             rows = (*self.rows[:place], row, *self.rows[place + 1 :])
         else:
-            rows = (*self.rows, (made, None, True))
-        return replace(self, rows=rows, unwritten=waiting)
+            rows = (*self.rows, (new_entry, None, True))
+        return replace(self, rows=rows, unwritten=unwritten)
 
     def write(self, book):
-        """Write what changed into its sheet of an openpyxl workbook."""
-        sheet, new = book[self.title], self.last_row
+        """Write the changed values into the sheet of an openpyxl workbook."""
+        sheet, last = book[self.title], self.last_row
         for entry, number, is_changed in self.rows:
             if not is_changed:
                 continue
             if number is None:
-                new = number = new + 1
+                last = number = last + 1
                 _put(sheet.cell(number, self.columns[0]), entry.owner)
                 _put(sheet.cell(number, self.columns[1]), entry.key)
-            of = field_of(self.name, entry.owner, entry.key)
-            _put(sheet.cell(number, self.columns[2]), cell_value(of, entry.text))
+            key_field = field_of(self.name, entry.owner, entry.key)
+            _put(sheet.cell(number, self.columns[2]), cell_value(key_field, entry.text))
 
 
 def _put(cell, value):
+    """Set the value of a cell unless it is unchanged."""
     if cell.value == value and type(cell.value) is type(value):
         return
     cell.value = value
     if isinstance(value, str):
-        cell.data_type = "s"  # never a formula, whatever it begins with
+        cell.data_type = "s"  # never a formula, even if it begins with =
 
 
-def cell_value(of, text):
-    """A typed text as a cell holds it: a number or a day where it is one.
+def cell_value(key_field, text):
+    """Convert an entered text to the value of a cell: number, date or text.
 
     Examples
     --------
@@ -139,7 +165,7 @@ def cell_value(of, text):
     """
     if not text or isinstance(text, Unwritten):
         return None
-    kind = of.kind if of is not None else "text"
+    kind = key_field.kind if key_field is not None else "text"
     if kind in ("number", "numbers") and NUMBER.fullmatch(text):
         return float(text)
     if kind == "date":
@@ -151,10 +177,24 @@ def cell_value(of, text):
 
 
 def read_book(data, kind_of):
-    """(tables, keys, whether a sheet of the job has a formula) of the bytes of a workbook.
+    """Read the tables and keys of a workbook.
 
-    kind_of  gives the kind of tank of the BookKeys of the settings, or None
-    Sheets that the check refuses (two of a name, no headings) are left out: it says why.
+    Sheets that the check refuses (two of the same name, no headings) are omitted; the check reports
+    the reason.
+
+    Parameters
+    ----------
+    data : bytes
+        Content of the workbook.
+    kind_of : callable
+        Function that returns the kind of tank from the BookKeys of the settings or None.
+
+    Returns
+    -------
+    tables : dict of EditedTable
+    keys : dict of BookKeys
+    has_formula : bool
+        Whether a sheet of the job contains a formula.
     """
     from openpyxl import load_workbook
 
@@ -169,53 +209,54 @@ def read_book(data, kind_of):
     grids = {name: _grid(sheet) for name, sheet in sheets.items()}
     keys = {}
     for name in (SETTINGS_SHEET, *REGISTERS):
-        made = _keys(name, *grids[name]) if grids.get(name) else None
-        if made is not None:
-            keys[name] = made
+        sheet_keys = _keys(name, *grids[name]) if grids.get(name) else None
+        if sheet_keys is not None:
+            keys[name] = sheet_keys
     kind = kind_of(keys.get(SETTINGS_SHEET))
     tables = {name: _table(name, *grids[name], kind) for name in TABLES if grids.get(name)}
     return tables, keys, has_formula
 
 
 def new_sheet_table(name, headings, kind):
-    """EditedTable of a sheet that is not there yet, without rows."""
+    """`EditedTable` of a new sheet, without rows."""
     origin = SheetOrigin(name, 1, 1, 0, (), (), kind)
     return EditedTable(name, sheet_named(name), tuple(headings), (), ".", origin)
 
 
 def written_book(data, tables, keys):
-    """The bytes of a workbook after the states that differ from what it holds."""
+    """Bytes of a workbook after writing the changed tables and keys into it."""
     from openpyxl import load_workbook
 
     book = load_workbook(io.BytesIO(data))
     for table in tables:
         table.origin.write(table, book)
-    for one in keys:
-        one.write(book)
+    for sheet_keys in keys:
+        sheet_keys.write(book)
     out = io.BytesIO()
     book.save(out)
     return out.getvalue()
 
 
 def _grid(sheet):
-    """(title, first column, [(number, values)] with the headings first, last row), or None."""
+    """Title, first column, rows [(number, values)] from the headings on, and last row, or None."""
     rows = [
         (number, list(values))
         for number, values in enumerate(sheet.iter_rows(values_only=True), 1)
-        if any(one is not None for one in values)
+        if any(value is not None for value in values)
         and not (isinstance(values[0], str) and values[0].lstrip().startswith("#"))
     ]
     if not rows:
         return None
     first = 1 if rows[0][1][0] not in (None, "") else 2
     rows = [(number, values[first - 1 :]) for number, values in rows]
-    last = max(place for place, one in enumerate(rows[0][1]) if one is not None) + 1
+    last = max(place for place, value in enumerate(rows[0][1]) if value is not None) + 1
     return sheet.title, first, [(number, values[:last]) for number, values in rows], sheet.max_row
 
 
 def _table(name, title, first, rows, _last_row, kind):
+    """`EditedTable` of a sheet."""
     number, headings = rows[0]
-    headings = tuple("" if one is None else str(one).strip() for one in headings)
+    headings = tuple("" if heading is None else str(heading).strip() for heading in headings)
     origin = SheetOrigin(
         title,
         first,
@@ -225,16 +266,20 @@ def _table(name, title, first, rows, _last_row, kind):
         tuple(tuple(values) for _, values in rows[1:]),
         kind,
     )
-    made = tuple(Row(tuple(map(_text, values)), i) for i, (_, values) in enumerate(rows[1:]))
-    return EditedTable(name, sheet_named(name), headings, made, ".", origin)
+    table_rows = tuple(Row(tuple(map(_text, values)), i) for i, (_, values) in enumerate(rows[1:]))
+    return EditedTable(name, sheet_named(name), headings, table_rows, ".", origin)
 
 
 def _keys(name, title, first, rows, last_row):
-    headings = [one.strip() if isinstance(one, str) else one for one in rows[0][1]]
-    needed = (REGISTERS.get(name, SECTION), KEY, VALUE)
-    if not set(needed) <= set(headings):
+    """`BookKeys` of a sheet, or None if a column is missing."""
+    headings = [
+        name_of_column.strip() if isinstance(name_of_column, str) else name_of_column
+        for name_of_column in rows[0][1]
+    ]
+    required = (REGISTERS.get(name, SECTION), KEY, VALUE)
+    if not set(required) <= set(headings):
         return None
-    places = [headings.index(one) for one in needed]
+    places = [headings.index(name_of_column) for name_of_column in required]
     entries = []
     for number, values in rows[1:]:
         owner, key, value = (values[place] for place in places)
@@ -246,6 +291,7 @@ def _keys(name, title, first, rows, last_row):
 
 
 def _text(value):
+    """Text of the value of a cell; numbers have the fewest digits that preserve the value."""
     if value is None:
         return ""
     if isinstance(value, bool):

@@ -1,4 +1,4 @@
-"""The computing of a saved job: with progress, and to be stopped."""
+"""Computation of a saved job, with progress and Stop."""
 
 import threading
 import time
@@ -9,29 +9,32 @@ from tankcal.text.time_left import how_far
 
 
 class Stopped(TankcalError):
-    """Somebody pressed Stop: nothing was written."""
+    """The user stopped the computation; nothing was written."""
 
 
 class Run:
-    """One computing of a job: the same as `tankcal run`, step by step.
+    """Computation of a job with the steps of `tankcal run`.
 
     Parameters
     ----------
     source, out : Path
         The job and the folder of the results.
     tell : callable, optional
-        tell(text, share), a Message and 0 to 1 or None, as a step goes on.
+        Function tell(text, share) that receives the progress of a step: a Message, and a share
+        from 0 to 1 or None.
     papers : bool, optional
-        False: record and CSV files only.
+        Whether to write reports; if not, only record and CSV files are written.
     on_result : callable, optional
-        on_result(result) as soon as the table is there, before the papers.
+        Function on_result(result) that is called after the computation, before the reports.
 
     Attributes
     ----------
     result : Result or None
+        Result of the job.
     files : list of Path
-        What was written.
+        Written files.
     error : BaseException or None
+        Error that ended the computation.
     """
 
     def __init__(self, source, out, tell=None, papers=True, on_result=None):
@@ -43,29 +46,31 @@ class Run:
         self.result, self.files, self.error = None, [], None
 
     def stop(self):
-        """Ask it to stop; it does at the next step."""
+        """Stop the computation at its next step."""
         self._is_stopped.set()
 
     def start(self):
-        """Begin in a thread of its own, which is returned."""
-        thread = threading.Thread(target=self._guarded, daemon=True)
+        """Start the computation in a new thread, and return the thread."""
+        thread = threading.Thread(target=self._compute_in_thread, daemon=True)
         thread.start()
         return thread
 
     def wait(self):
-        """Compute, and return when all is written; what went wrong is raised."""
+        """Compute and write the results, and raise the error if there is an error."""
         self.start().join()
         if self.error is not None:
             raise self.error
         return self
 
-    def _guarded(self):
+    def _compute_in_thread(self):
+        """Compute, and keep an error for the thread that waits."""
         try:
             self._compute()
-        except BaseException as error:  # handed over to whoever waits
+        except BaseException as error:  # raised again by `wait`
             self.error = error
 
     def _compute(self):
+        """Read and compute the job, and write the results."""
         import tankcal
         from tankcal.report import outputs
 
@@ -77,9 +82,11 @@ class Run:
         self.files = outputs.write(self.result, self.out, self._part, papers=self.papers)
 
     def _step(self, text):
+        """Report the start of a step."""
         self._part(text, 0, 0)
 
     def _part(self, text, done, total):
+        """Report the progress of a step with the time left; raise Stopped after Stop."""
         if self._is_stopped.is_set():
             raise Stopped(message("run_stopped", "stopped; nothing was written"))
         if text != self._now:

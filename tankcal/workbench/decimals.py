@@ -1,30 +1,34 @@
-"""What stands in a cell as a person of a language reads and types it, and as the file has it.
+"""Conversion of the text of a cell between the decimal mark of the file and of the language.
 
-A number is shown with the decimal mark of the language. The other mark is never taken for it in
-silence: 1.234 is one thousand and more to one reader, and little more than one to another.
+A number is shown with the decimal mark of the language. The other mark is never accepted silently:
+1.234 is more than one thousand in some languages, and little more than one in others.
 """
 
 from tankcal.job.fields import Field
 from tankcal.text.numerals import NUMBER
 
-LISTS = ("numbers", "ranges", "rows")  # several numbers in one cell; their texts have points
+LISTS = ("numbers", "ranges", "rows")  # kinds with several numbers in a cell, with decimal points
 
 
 class Unwritten(str):
-    """An entry that may be read in two ways: it is shown, told, and never written to the file."""
+    """An ambiguous number: it is shown and reported, but not written to the file."""
 
 
 def shown_text(field: Field | None, text: str, in_file: str, in_language: str) -> str:
-    """A cell of the file as the grid shows it.
+    """Convert the text of a cell in the file to the text in the grid.
 
     Parameters
     ----------
     field : Field or None
-        What the column takes; None: a column that is not known.
+        Field of the column; None for an unknown column.
     text : str
-        As the file has it.
+        Text in the file.
     in_file, in_language : str
-        The decimal marks of the file and of the reader.
+        Decimal marks of the file and of the language.
+
+    Returns
+    -------
+    str
 
     Examples
     --------
@@ -42,9 +46,21 @@ def shown_text(field: Field | None, text: str, in_file: str, in_language: str) -
 
 
 def entered_text(field: Field | None, text: str, in_file: str, in_language: str) -> str:
-    """What a person typed as the file is to have it; `Unwritten` where it could be two numbers.
+    """Convert an entered text to the text in the file.
 
-    Parameters are those of `shown_text`.
+    Parameters
+    ----------
+    field : Field or None
+        Field of the column; None for an unknown column.
+    text : str
+        Entered text.
+    in_file, in_language : str
+        Decimal marks of the file and of the language.
+
+    Returns
+    -------
+    str
+        An `Unwritten` if the text is ambiguous.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""The desk: one job opened in a notebook, with its tables, checks, results and Save.
+"""Desk: a job opened in a notebook, with its tables, checks, results and Save.
 
-Without widgets it does the same by calls:
+Without widgets, the same actions are function calls:
 
     desk = open_job("my-tank")
     desk.enter("points", 0, "x_m", "6.5021")
@@ -25,12 +25,13 @@ from tankcal.workbench.keys import SETTINGS, field_of
 from tankcal.workbench.plain import list_page, table_page, text_page
 from tankcal.workbench.shown import Reader
 
-OF_PERSONS = ("JPY_SESSION_NAME", "VOILA_REQUEST_URL", "VSCODE_PID")  # set where somebody looks on
-WIDGETS = ("ipywidgets", "anywidget")
+# Environment variables of interactive sessions.
+OF_PERSONS = ("JPY_SESSION_NAME", "VOILA_REQUEST_URL", "VSCODE_PID")
+WIDGETS = ("ipywidgets", "anywidget")  # packages required for grids and buttons
 
 
 class Refusal(TankcalError):
-    """What a notebook cannot go on with; it shows as its lines, without a traceback."""
+    """An error that a notebook shows as its message, without a traceback."""
 
     exit_status = 2
 
@@ -39,24 +40,24 @@ class Refusal(TankcalError):
 
 
 def is_attended():
-    """Does somebody look on (JupyterLab, Voilà, VS Code), and not a program alone?"""
+    """Whether the session is interactive (JupyterLab, Voilà, VS Code)."""
     return any(os.environ.get(name) for name in OF_PERSONS)
 
 
 def open_job(job=".", *, out=None, language=None, live=None):
-    """Open a job on a desk.
+    """Open a job in a notebook.
 
     Parameters
     ----------
     job : path
         A job folder, its job.toml, or a job workbook.
     out : path, optional
-        Of the results; None: where `tankcal run` writes them.
+        Folder of the results; by default the folder of `tankcal run`.
     language : str, optional
-        Of everything that is shown; None: that of the job.
+        Language of all texts; by default the language of the job.
     live : bool, optional
-        True: grids and buttons; False: plain tables, and the results are computed when they are
-        shown; None: live where somebody looks on.
+        True for grids and buttons. False for plain tables, with results computed when they are
+        shown. By default, grids and buttons in interactive sessions only.
 
     Returns
     -------
@@ -65,7 +66,7 @@ def open_job(job=".", *, out=None, language=None, live=None):
     Raises
     ------
     Refusal
-        Where there is no job.
+        If there is no job.
 
     Examples
     --------
@@ -73,34 +74,39 @@ def open_job(job=".", *, out=None, language=None, live=None):
     >>> desk.names[:3], len(desk.problems)
     (('points', 'courses', 'uncertainty'), 0)
     """
-    known = nearest_language(language)
+    supported = nearest_language(language)
     try:
         draft = Draft.open(job)
     except InputError as error:
-        reader = Reader(known or DEFAULT)
-        lines = [reader.line(one) for one in error.problems]
+        reader = Reader(supported or DEFAULT)
+        lines = [reader.line(problem) for problem in error.problems]
         here = reader.word("counted_from", folder=str(Path.cwd()))
         raise Refusal("\n".join([*lines, here])) from None
-    language = known or nearest_language(draft.value("table", "language")) or DEFAULT
+    language = supported or nearest_language(draft.value("table", "language")) or DEFAULT
     out = Path(out) if out is not None else default_folder(draft.source)
     is_live = is_attended() if live is None else bool(live)
     return Desk(draft, out, Reader(language), is_live)
 
 
 class Desk:
-    """A job on a desk. Its tables are attributes: `desk.points`, `desk.courses`, `desk.cameras`.
+    """A job in a notebook; its tables are attributes, such as `desk.points` or `desk.cameras`.
 
     Attributes
     ----------
     draft : Draft
+        Edited files of the job.
     reader : Reader
+        Texts in the language.
     out : Path
+        Folder of the results.
     is_live : bool
+        Whether grids and buttons are shown.
     last_run : Run or None
+        Last computation.
     is_stale : bool
-        Was something edited or overruled since the last run?
+        Whether the job was edited or overruled since the last computation.
     said : str
-        What the head says of the last thing that was done.
+        Message about the last action, shown in the head.
     """
 
     def __init__(self, draft, out, reader, is_live):
@@ -110,21 +116,21 @@ class Desk:
         self.every_key, self.said, self.waiting = {}, "", None
         self._listeners, self._checked = [], None
 
-    # ---- what is there
+    # ---- content
 
     @property
     def names(self):
-        """Names of the tables that the job has, in the order of the contract."""
+        """Names of the tables of the job, in the order of the contract."""
         return tuple(name for name in TABLES if name in self.draft.tables)
 
     @property
     def lists(self):
-        """Names of its lists: cameras, instruments, clouds, meters."""
+        """Names of the lists of the job: cameras, instruments, clouds, meters."""
         return tuple(name for name in REGISTERS if name in self.draft.keys)
 
     @property
     def further(self):
-        """Names of the tables that it may have, too."""
+        """Names of the tables that can be added to the job."""
         kind = self.draft.kind or "vertical"
         of_surveys = [name for names in SURVEYS.values() for name in names]
         may = [*TABLES_OF_KIND[kind], *(of_surveys if kind == "vertical" else ())]
@@ -139,64 +145,66 @@ class Desk:
         return sorted({*super().__dir__(), *self.names, *self.lists})
 
     def table(self, name):
-        """The view of a table or of a list, as a notebook shows it."""
+        """View of a table or of a list for a notebook."""
         return TableView(self, name)
 
     @property
     def settings(self):
-        """The view of job.toml, or of the sheet of settings."""
+        """View of job.toml, or of the sheet of settings."""
         return TableView(self, SETTINGS)
 
     def show(self, name):
-        """The ShownTable of a table, of a list or of the settings ("job")."""
+        """`ShownTable` of a table, of a list or of the settings ("job")."""
         return self.reader.show(self.draft, self.outcome, name, self.every_key.get(name, False))
 
     # ---- checks
 
     @property
     def outcome(self):
-        """The Check of the job as it stands here."""
+        """`Check` of the edited job."""
         if self._checked is None:
             self._checked = self.draft.check()
         return self._checked
 
     @property
     def problems(self):
-        """What is wrong with the job, and what deserves a look, as a list that shows itself."""
+        """Problems and warnings of the job, as a list that a notebook can show."""
         return Findings(self)
 
     def listen(self, act):
-        """Call act() whenever something changed."""
+        """Register a function act() that is called after each change."""
         self._listeners.append(act)
 
     def changed(self):
-        """Something was edited: forget what was checked, and tell everybody."""
+        """Discard the check after an edit, and notify the listeners."""
         self.edited()
         self.tell()
 
     def edited(self):
-        """Something was edited: what was checked and computed counts no more."""
+        """Discard the check after an edit, and mark the results as outdated."""
         self._checked, self.said = None, ""
         self.is_stale = self.last_run is not None
 
     def tell(self):
-        """Tell everybody who listens."""
+        """Notify the listeners."""
         for act in tuple(self._listeners):
             act()
 
     # ---- edits
 
     def enter(self, name, row, column, text):
-        """Type a text into a cell, as a person of the language does.
+        """Enter a text in a cell, with the decimal mark of the language.
 
         Parameters
         ----------
         name : str
-            Of a table ("points"); of "job" and the lists row is the owner, column the key.
+            Name of a table ("points"), of a list, or "job".
         row : int or str
-            From 0.
+            Row from 0; for "job" and lists, the owner of a key.
         column : str
+            Column; for "job" and lists, the key.
         text : str
+            Entered text.
         """
         if isinstance(row, str):
             typed = entered_text(field_of(name, row, column), text, ".", self.reader.mark)
@@ -206,7 +214,7 @@ class Desk:
         self.changed()
 
     def save(self):
-        """Write what was edited into the files of the job, all or nothing; returns their Paths."""
+        """Write the edited files of the job, all or none of them, and return their paths."""
         try:
             written = self.draft.save()
         except InputError as error:
@@ -219,29 +227,44 @@ class Desk:
         return written
 
     def refusal(self, error):
-        """A Refusal that says an error of tankcal in the language."""
-        return Refusal("\n".join(self.reader.say(one) for one in error.texts))
+        """`Refusal` with an error of tankcal in the language."""
+        return Refusal("\n".join(self.reader.say(text) for text in error.texts))
 
     # ---- computing
 
     def begin(self, tell=None, papers=True, on_result=None):
-        """Save, and the Run of the job to be started; Refusal: the job cannot be computed."""
+        """Save the job, and return a `Run` that is not yet started.
+
+        Parameters
+        ----------
+        tell, papers, on_result
+            As in `Run`.
+
+        Returns
+        -------
+        Run
+
+        Raises
+        ------
+        Refusal
+            If the job cannot be computed or saved.
+        """
         if not self.outcome.is_sound:
-            raise Refusal("\n".join(self.reader.line(one) for one in self.outcome.problems))
+            raise Refusal("\n".join(self.reader.line(problem) for problem in self.outcome.problems))
         try:
-            self.draft.refuse_changed_elsewhere()  # what is shown is what is computed
+            self.draft.refuse_changed_elsewhere()  # so that the shown job is computed
         except InputError as error:
             raise self.refusal(error) from None
         self.save()
         return Run(self.draft.source, self.out, tell, papers, on_result)
 
     def run(self, papers=True):
-        """Save, compute and write the results, as `tankcal run` does; returns the result.
+        """Save the job, compute it and write the results as `tankcal run`; return the result.
 
         Raises
         ------
         Refusal
-            With every problem, where the job cannot be computed.
+            If the job cannot be computed, with all problems.
         """
         run = self.begin(papers=papers)
         try:
@@ -255,27 +278,30 @@ class Desk:
         return run.result
 
     def keep_run(self, run):
-        """Take a Run for the last one."""
+        """Store a `Run` as the last computation."""
         self.last_run, self.is_stale = run, False
 
     @property
     def results(self):
-        """Run, progress and results, as a notebook shows them.
+        """Run button, progress and results for a notebook.
 
-        Where the desk is not live the job is computed, and a Refusal raised where that fails.
+        Without widgets, the job is computed first, and a Refusal is raised if that fails.
         """
         if not self.is_live and (self.last_run is None or self.is_stale):
             self.run()
         return Results(self)
 
     def overrule(self, point, decision, reason):
-        """Note in the job's table of overrulings what a person decides about a rejected point.
+        """Enter the user's decision about a rejected point in the table of overrulings.
 
         Parameters
         ----------
         point : str
+            Name of the point.
         decision : {"keep", "leave_out"}
+            Decision.
         reason : str
+            Reason of the decision.
         """
         draft, name = self.draft, "overrulings"
         columns = ("point", "decision", "reason", "date")
@@ -288,23 +314,23 @@ class Desk:
                 draft.add_column(name, column)
             table = draft.tables[name]
             column = table.headings.index("point")
-            known = [row.cells[column] for row in table.rows]
-            row = known.index(point) if point in known else len(known)
-            if row == len(known):
+            points = [row.cells[column] for row in table.rows]
+            row = points.index(point) if point in points else len(points)
+            if row == len(points):
                 draft.insert_rows(name, row)
-            draft.set_cells(name, [(row, *one) for one in given.items()])
+            draft.set_cells(name, [(row, *entry) for entry in given.items()])
         self.changed()
 
     @property
     def more(self):
-        """What adds a table that the job does not have."""
+        """Selection of a table to add to the job."""
         return Further(self)
 
     def _repr_mimebundle_(self, include=None, exclude=None):
         return bundle(self, "head_panel", text_page(self.head_text()))
 
     def head_text(self):
-        """Which job this is, and whether it is sound, in a few lines."""
+        """Path of the job and numbers of its problems and warnings, in a few lines."""
         problems, warnings = len(self.outcome.problems), len(self.outcome.warnings)
         word = self.reader.word
         lines = [word("job_is", job=str(self.draft.source.resolve()))]
@@ -315,7 +341,19 @@ class Desk:
 
 
 def bundle(desk, panel, page, *given):
-    """What a notebook shows: a panel of widgets where the desk is live, and the page always."""
+    """MIME bundle for a notebook: the HTML page, and a panel of widgets if the desk is live.
+
+    Parameters
+    ----------
+    desk : Desk
+        Desk of the job.
+    panel : str
+        Name of a function of `panels`.
+    page : str
+        HTML.
+    *given
+        Further arguments of the function.
+    """
     shown = {"text/html": page, "text/plain": panel}
     if desk.is_live:
         from tankcal.workbench import panels
@@ -326,7 +364,7 @@ def bundle(desk, panel, page, *given):
 
 
 class TableView:
-    """A table, a list or the settings of a desk, as a notebook shows it."""
+    """View of a table, a list or the settings for a notebook."""
 
     def __init__(self, desk, name):
         self.desk, self.name = desk, name
@@ -342,20 +380,20 @@ class TableView:
         return bundle(self.desk, "table_panel", page, self.name)
 
     def _missing(self):
-        """Why there is nothing to be shown: what the check says of it, or that it is not there."""
+        """HTML with the reason why a table cannot be shown: its problems, or that it is missing."""
         reader, check = self.desk.reader, self.desk.outcome
         title = reader.title(self.name)
-        own = [
-            (BAD, reader.line(one))
-            for one in check.problems
-            if one.file.removeprefix("sheet ").rpartition(".")[0] == self.name
-            or one.file.removeprefix("sheet ") == self.name
+        lines = [
+            (BAD, reader.line(problem))
+            for problem in check.problems
+            if problem.file.removeprefix("sheet ").rpartition(".")[0] == self.name
+            or problem.file.removeprefix("sheet ") == self.name
         ]
-        return list_page(own, reader.word("no_such_table", title=title))
+        return list_page(lines, reader.word("no_such_table", title=title))
 
 
 class Findings:
-    """Problems and warnings of a desk: a sequence of Problem that a notebook shows as a list."""
+    """Problems of a desk as a sequence; a notebook shows them with the warnings as a list."""
 
     def __init__(self, desk):
         self._desk = desk
@@ -371,10 +409,10 @@ class Findings:
 
     @property
     def page(self):
-        """As HTML."""
+        """HTML of problems and warnings."""
         check, line = self._desk.outcome, self._desk.reader.line
-        lines = [(BAD, line(one)) for one in check.problems]
-        lines += [(DOUBTFUL, line(one)) for one in check.warnings]
+        lines = [(BAD, line(problem)) for problem in check.problems]
+        lines += [(DOUBTFUL, line(problem)) for problem in check.warnings]
         return list_page(lines, self._desk.reader.word("nothing_wrong"))
 
     def _repr_mimebundle_(self, include=None, exclude=None):
@@ -382,7 +420,7 @@ class Findings:
 
 
 class Further:
-    """Tables that a job may have, to be added."""
+    """Tables that can be added to a job."""
 
     def __init__(self, desk):
         self._desk = desk
@@ -394,7 +432,7 @@ class Further:
 
 
 class Results:
-    """The results of a desk: under a button where it is live, else as they are."""
+    """Results of a desk; with a Run button if the desk is live."""
 
     def __init__(self, desk):
         self._desk = desk

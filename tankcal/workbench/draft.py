@@ -1,4 +1,4 @@
-"""A job under edit: its files as they stand on the disk and as they are to be.
+"""Editing of a job: its files on the disk and in their edited state.
 
 draft = Draft.open("my-tank")
 draft.set_cells("points", [(0, "x_m", "6.5021")])
@@ -44,11 +44,11 @@ FORMULAS = message(
     "has formulas in the sheets of the job; edit it in Excel or LibreOffice, for their values "
     "would be lost here",
 )
-KEPT_EDITS = 200  # that Undo takes back
+KEPT_EDITS = 200  # number of edits that Undo can revert
 
 
 def source_of(path):
-    """The job that a path names: its folder or its workbook; InputError: there is none."""
+    """Folder or workbook of the job at a path; InputError if there is no job."""
     path = Path(path)
     is_settings = path.name == SETTINGS_FILE and path.is_file()
     folder = path.parent if is_settings else path
@@ -68,19 +68,20 @@ def source_of(path):
 
 
 class Draft:
-    """The state of the files of a job, with what was before.
+    """State of the files of a job, with previous states for Undo.
 
     Attributes
     ----------
     source : Path
         Folder or workbook.
     tables : dict of EditedTable
+        Tables of the job.
     keys : dict of EditedKeys
-        "job", and the lists of cameras, instruments, clouds and meters that are there.
+        The settings ("job"), and the existing lists of cameras, instruments, clouds and meters.
     locked : Message or None
-        Why nothing may be edited.
+        Reason why the job cannot be edited.
     unreadable : list of Problem
-        Files of keys that cannot be read, and so cannot be edited here.
+        Problems of files of keys that cannot be read, and therefore cannot be edited here.
     """
 
     def __init__(self, source):
@@ -88,8 +89,8 @@ class Draft:
         self.is_book = source.is_file()
         self.locked = None
         self.unreadable = []
-        self._disk = {}  # {file: its bytes, None: not there}
-        self._first = {}  # {file of a table or of keys: state that is on the disk}
+        self._disk = {}  # {file: its bytes, None for a missing file}
+        self._first = {}  # {name of a table or of keys: its state on the disk}
         self._before, self._marks = [], (",", ".")
         self.tables, self.keys = {}, {}
         if self.is_book:
@@ -100,19 +101,20 @@ class Draft:
 
     @classmethod
     def open(cls, path):
-        """The Draft of a job folder, its job.toml or a workbook; InputError: there is no job."""
+        """Open a job folder, its job.toml or a workbook; InputError if there is no job."""
         return cls(source_of(path))
 
     # ---- reading
 
     def _content(self, name):
-        """The bytes of a file, None where it is not there or cannot be read (the check tells)."""
+        """Bytes of a file, None if it is missing or unreadable, which the check reports."""
         path = self.source if self.is_book else self.source / name
         data = read_beside(path.parent, path.name, Log()) if path.exists() else None
         self._disk[name] = data
         return data
 
     def _read_folder(self):
+        """Read the tables and keys of a job folder."""
         log = Log()
         self.unreadable = log.problems
         data = self._content(SETTINGS_FILE)
@@ -139,55 +141,59 @@ class Draft:
                     self.tables[name] = read_csv_table(name, file, text, *marks)
 
     def _add_keys(self, name, file, data):
-        """Keys that tomllib and tomlkit both read; others are looked at by the check alone."""
+        """Add keys that both tomllib and tomlkit can read; other files are only checked."""
         import tomlkit
         from tomlkit.exceptions import TOMLKitError  # a key given twice is no ValueError
 
         with suppress(ValueError, AttributeError, RecursionError, TOMLKitError):
             text = decode_text(data)
             tomlkit.parse(text)
-            made = EditedKeys(name, file, text)
-            if made.entries is not None:
-                self.keys[name] = made
+            edited_keys = EditedKeys(name, file, text)
+            if edited_keys.entries is not None:
+                self.keys[name] = edited_keys
 
     def _read_book(self):
+        """Read the tables and keys of a workbook."""
         data = self._content(self.source.name)
-        with suppress(Exception):  # whatever ails a damaged file: the check tells it in words
+        with suppress(Exception):  # the check reports a damaged file
             self.tables, self.keys, has_formula = read_book(data, self._kind_of)
             self.locked = FORMULAS if has_formula else None
 
-    # ---- what is there
+    # ---- content
 
     @property
     def kind(self):
-        """The kind of tank, None where the settings do not say it."""
+        """Kind of tank, or None if the settings do not state it."""
         return self._kind_of(self.keys.get(SETTINGS))
 
     @staticmethod
     def _kind_of(settings):
-        given = next(
+        """Kind of tank of the settings, also if misspelt, or None."""
+        kind = next(
             (
-                one.text
-                for one in (settings.entries if settings is not None else ())
-                if (one.owner, one.key) == ("tank", "kind")
+                entry.text
+                for entry in (settings.entries if settings is not None else ())
+                if (entry.owner, entry.key) == ("tank", "kind")
             ),
             "",
         )
-        return given if given in KINDS else meant(given, KINDS) if given else None
+        return kind if kind in KINDS else meant(kind, KINDS) if kind else None
 
     def value(self, owner, key):
-        """The text of a key of the settings; "" where it is not given."""
+        """Text of a key of the settings, or "" if it is not given."""
         settings = self.keys.get(SETTINGS)
         entries = settings.entries if settings is not None else ()
-        return next((one.text for one in entries if (one.owner, one.key) == (owner, key)), "")
+        return next(
+            (entry.text for entry in entries if (entry.owner, entry.key) == (owner, key)), ""
+        )
 
     def fields(self, name):
-        """{heading: Field} of the columns that a table may have."""
-        return {one.name: one for one in columns_of(name, self.kind)}
+        """Columns that a table may have, {heading: Field}."""
+        return {field.name: field for field in columns_of(name, self.kind)}
 
     @property
     def is_changed(self):
-        """Does a file differ from the one on the disk?"""
+        """Whether a file differs from the file on the disk."""
         now = {**self.tables, **self.keys}
         return any(state is not self._first.get(name) for name, state in now.items()) or any(
             name not in now for name in self._first
@@ -196,7 +202,7 @@ class Draft:
     # ---- edits
 
     def set_cells(self, name, changes):
-        """Put texts of the file into cells: [(row, heading, text)], row counted from 0."""
+        """Set the texts of cells, [(row, heading, text)], with rows counted from 0."""
         table = self.tables[name]
         places = [
             (row, table.headings.index(heading), text)
@@ -207,37 +213,51 @@ class Draft:
         self.tables[name] = table.set_cells(places)
 
     def insert_rows(self, name, place, count=1):
-        """Put blank rows before row `place`."""
+        """Insert blank rows before row `place`."""
         self._keep()
         self.tables[name] = self.tables[name].insert_rows(place, count)
 
     def remove_rows(self, name, places):
-        """Take rows out."""
+        """Remove rows."""
         self._keep()
         self.tables[name] = self.tables[name].remove_rows(places)
 
     def add_column(self, name, heading):
-        """Put a blank column at the right."""
+        """Add a blank column at the right, unless it exists."""
         if heading not in self.tables[name].headings:
             self._keep()
             self.tables[name] = self.tables[name].add_column(heading)
 
     def add_table(self, name, headings=None):
-        """A table that the job did not have, without rows.
-
-        headings  None: the columns that it must have
-        """
-        needed = [one.name for one in COLUMNS[name] if one.suits(self.kind) and one.required]
-        needed = headings or needed or [one.name for one in columns_of(name, self.kind)]
+        """Add a table without rows; by default with the required columns."""
+        required = [
+            field.name for field in COLUMNS[name] if field.suits(self.kind) and field.required
+        ]
+        required = headings or required or [field.name for field in columns_of(name, self.kind)]
         self._keep()
         if self.is_book:
-            self.tables[name] = new_sheet_table(name, needed, self.kind)
+            self.tables[name] = new_sheet_table(name, required, self.kind)
             return
         self._disk.setdefault(f"{name}.csv", None)
-        self.tables[name] = new_csv_table(name, f"{name}.csv", needed, *self._marks)
+        self.tables[name] = new_csv_table(name, f"{name}.csv", required, *self._marks)
 
     def set_value(self, name, owner, key, text):
-        """Give a key of the settings or of a list a value, in the text of the file."""
+        """Set the value of a key of the settings or of a list.
+
+        Parameters
+        ----------
+        name : str
+            "job" or the name of a list.
+        owner, key : str
+            Section or list entry, and key.
+        text : str
+            Text in the file.
+
+        Raises
+        ------
+        InputError
+            If the key cannot be edited here.
+        """
         from tomlkit.exceptions import TOMLKitError
 
         keys = self.keys[name]
@@ -252,10 +272,12 @@ class Draft:
 
     @staticmethod
     def _refuse(keys, owner, key):
+        """Raise InputError for a key that cannot be edited here."""
         expected = message("key_not_edited_here", "cannot be edited here; edit the file itself")
         raise InputError(Problem(keys.file, expected, None, f"{owner}.{key}"))
 
     def _keep(self):
+        """Store the state for Undo before an edit; InputError if the job is locked."""
         if self.locked is not None:
             raise InputError(Problem(self.source.name, self.locked))
         self._before.append((dict(self.tables), dict(self.keys)))
@@ -263,7 +285,7 @@ class Draft:
 
     @contextmanager
     def as_one_edit(self):
-        """What is edited within is one edit for Undo; on an error nothing of it stays."""
+        """Context in which all edits are a single edit for Undo, and are discarded on an error."""
         state, before = (dict(self.tables), dict(self.keys)), [*self._before]
         try:
             yield
@@ -274,7 +296,7 @@ class Draft:
             self._before = [*before, state][-KEPT_EDITS:]
 
     def undo(self):
-        """Take the last edit back; False: there is none."""
+        """Revert the last edit, and return whether there was an edit."""
         if not self._before:
             return False
         self.tables, self.keys = self._before.pop()
@@ -283,9 +305,9 @@ class Draft:
     # ---- files
 
     def edited(self):
-        """({file: bytes} of the files that differ from the disk, {table: numbers of its rows})."""
+        """Files that differ from the disk, {file: bytes}, and row numbers, {table: numbers}."""
         rendered = {name: table.render() for name, table in self.tables.items()}
-        numbers = {name: one for name, (_, one) in rendered.items()}
+        numbers = {name: row_numbers for name, (_, row_numbers) in rendered.items()}
         now = {**self.tables, **self.keys}
         changed = [name for name, state in now.items() if state is not self._first.get(name)]
         if self.is_book:
@@ -300,10 +322,11 @@ class Draft:
 
     @property
     def _original(self):
+        """Bytes of the workbook on the disk."""
         return self._disk[self.source.name]
 
     def check(self):
-        """Read the job as it would be after saving: `Check` with every problem, by cell."""
+        """Check the job in its edited state, and return a `Check` with all problems by cell."""
         files, numbers = self.edited()
         problems, warnings, job = (), (), None
         try:
@@ -311,18 +334,20 @@ class Draft:
             warnings = job.warnings
         except InputError as error:
             problems = error.problems
-        own = [*self._not_written()]
-        places = {(one.file, one.row, one.column) for one in own}
+        ambiguous = [*self._not_written()]
+        # Of a value that is not written, only its own problem is reported.
+        places = {(problem.file, problem.row, problem.column) for problem in ambiguous}
         problems = [
-            one
-            for one in problems
-            if (one.file, one.row, one.column) not in places
-            and (one.file, None, one.column) not in places
+            problem
+            for problem in problems
+            if (problem.file, problem.row, problem.column) not in places
+            and (problem.file, None, problem.column) not in places
         ]
         off = self._switched_off(numbers)
-        return found_in(self, numbers, Check((*own, *problems), (*warnings, *off), job))
+        return found_in(self, numbers, Check((*ambiguous, *problems), (*warnings, *off), job))
 
     def _not_written(self):
+        """Yield a problem for each ambiguous value."""
         for table in self.tables.values():
             numbers = table.render()[1] if table.unwritten else ()
             for row, column in table.unwritten:
@@ -332,7 +357,7 @@ class Draft:
                 yield Problem(keys.file, NOT_TOLD_APART, None, f"{owner}.{key}")
 
     def _switched_off(self, numbers):
-        """Rows that an edit made a comment of."""
+        """Warnings of rows that an edit made a comment."""
         return [
             Problem(table.file, OFF, numbers[name][place], table.headings[0])
             for name, table in self.tables.items()
@@ -341,22 +366,22 @@ class Draft:
         ]
 
     def save(self):
-        """Write the files that were edited, all or nothing.
+        """Write the edited files, all or none of them.
 
         Returns
         -------
         list of Path
-            What was written; nothing where nothing differs.
+            Written files; empty if no file differs.
 
         Raises
         ------
         InputError
-            Where an entry cannot be written, or a file is no longer as it was read: of those
-            that are to be written, or of all where nothing is.
+            If a value is ambiguous, or if another program has changed an edited file (any file, if
+            no file was edited).
         """
-        waiting = [*self._not_written()]
-        if waiting:
-            raise InputError(waiting)
+        ambiguous = [*self._not_written()]
+        if ambiguous:
+            raise InputError(ambiguous)
         files, _ = self.edited()
         folder, paths = self._folder, self._paths(files)
         self.refuse_changed_elsewhere(files or self._disk)
@@ -370,13 +395,15 @@ class Draft:
 
     @property
     def _folder(self):
+        """Folder of the files."""
         return self.source.parent if self.is_book else self.source
 
     def _paths(self, names):
+        """Absolute paths of files, {name: path}."""
         return {name: (self._folder / name).resolve() for name in names}
 
     def refuse_changed_elsewhere(self, names=None):
-        """InputError where one of these files, or of all, is no longer as it was read."""
+        """Raise InputError if another program has changed one of these files, or any file."""
         expected = message(
             "changed_elsewhere",
             "another program has changed the file since it was opened here; nothing was written. "
@@ -392,9 +419,9 @@ class Draft:
 
 
 def _edited_text(file, data):
-    """The text of a CSV file with its byte order mark, or None where it cannot be read.
+    """Text of a CSV file with its byte order mark, or None if it cannot be decoded.
 
-    An edited file is written in UTF-8. One in Windows-1252 gets the mark, by which Excel
+    Edited files are written in UTF-8. A file in Windows-1252 gets a byte order mark, by which Excel
     recognises UTF-8.
     """
     if is_western(data):
@@ -403,11 +430,15 @@ def _edited_text(file, data):
 
 
 def _digest(data):
+    """SHA-256 of bytes, or None for a missing file."""
     return None if data is None else hashlib.sha256(data).hexdigest()
 
 
 def _replace_all(contents, before, paths):
-    """Write {path: bytes} beside their goals, then put all in place; on an error none of them."""
+    """Replace files by {path: bytes}, all or none of them.
+
+    The new files are first written next to the files that they replace.
+    """
     staged, done = {}, []
     names = {path: name for name, path in paths.items()}
     try:
@@ -422,6 +453,7 @@ def _replace_all(contents, before, paths):
             temporary.replace(path)
             done.append(path)
     except OSError:
+        # Restore the files that were already replaced.
         for path in done:
             data = before[names[path]]
             path.unlink() if data is None else path.write_bytes(data)

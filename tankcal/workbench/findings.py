@@ -1,15 +1,15 @@
-"""What the check of a job found, placed in the cells of its tables."""
+"""Problems and warnings of the check of a job, assigned to the cells of its tables."""
 
 from dataclasses import dataclass, field, replace
 
 from tankcal.errors import SHEET, Problem
 
-BAD, DOUBTFUL = "bad", "doubtful"
+BAD, DOUBTFUL = "bad", "doubtful"  # levels of a problem and of a warning; also CSS classes
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A problem (BAD) or a warning (DOUBTFUL) of a cell."""
+    """Problem (BAD) or warning (DOUBTFUL) of a cell."""
 
     level: str
     problem: Problem
@@ -17,16 +17,18 @@ class Mark:
 
 @dataclass(frozen=True)
 class Check:
-    """The outcome of a check.
+    """Result of a check.
 
     Attributes
     ----------
     problems, warnings : tuple of Problem
+        Problems and warnings of the job.
     job : Job or None
-        Where there is no problem.
+        The job; None if it has problems.
     marks : dict
-        {table or keys: {(row, column): tuple of Mark}}. Of a table the row counts from 0 and the
-        column is its heading, of keys they are owner and key; None: the whole row, column or table.
+        Marks of cells, {table or keys: {(row, column): tuple of Mark}}. For a table, the row is
+        counted from 0 and the column is a heading; for keys, they are owner and key. None denotes
+        the whole row, column or table.
     """
 
     problems: tuple
@@ -36,12 +38,27 @@ class Check:
 
     @property
     def is_sound(self):
-        """Is there nothing that keeps the job from being computed?"""
+        """Whether the job has no problem and can be computed."""
         return not self.problems
 
 
 def found_in(draft, numbers, check):
-    """The check with its marks, of the numbers that the rows of each table have in their file."""
+    """Assign the problems and warnings of a check to cells.
+
+    Parameters
+    ----------
+    draft : Draft
+        Edited files of the job.
+    numbers : dict
+        Number of each row of each table in its file, {table: sequence of int or None}.
+    check : Check
+        Check without marks.
+
+    Returns
+    -------
+    Check
+        Check with marks.
+    """
     rows = {
         name: {number: place for place, number in enumerate(known) if number is not None}
         for name, known in numbers.items()
@@ -54,14 +71,14 @@ def found_in(draft, numbers, check):
                 continue
             place = _place(problem, rows.get(name))
             if name in draft.keys:
-                place = _place_in_keys(problem, {one.owner for one in draft.keys[name].entries})
+                place = _place_in_keys(problem, {entry.owner for entry in draft.keys[name].entries})
             known = marks.setdefault(name, {})
             known[place] = (*known.get(place, ()), Mark(level, problem))
     return replace(check, marks=marks)
 
 
 def _table_of(draft, problem):
-    """Name of the table or keys that a problem is of; None: of none."""
+    """Name of the table or keys that a problem concerns, or None."""
     name = problem.file.removeprefix(SHEET)
     if not draft.is_book:
         name, _, ending = problem.file.rpartition(".")
@@ -71,17 +88,19 @@ def _table_of(draft, problem):
 
 
 def _place(problem, rows):
+    """Row from 0 and heading of a problem of a table."""
     return (rows or {}).get(problem.row), problem.column
 
 
 def _place_in_keys(problem, owners):
+    """Owner and key of a problem of keys; the owner may itself contain a dot."""
     if problem.column is None:
         return None, None
     if problem.column.startswith("["):
         return problem.column.strip("[]"), None
-    known = [one for one in owners if problem.column.startswith(f"{one}.")]
-    if known:
-        owner = max(known, key=len)
+    matches = [owner_name for owner_name in owners if problem.column.startswith(f"{owner_name}.")]
+    if matches:
+        owner = max(matches, key=len)
         return owner, problem.column.removeprefix(f"{owner}.")
     owner, _, key = problem.column.rpartition(".")
     return owner or key, key if owner else None

@@ -1,7 +1,7 @@
-"""Keys and values under edit: job.toml, and the lists of cameras, instruments, clouds, meters.
+"""Editing of keys and values: job.toml, and the lists of cameras, instruments, clouds, meters.
 
-The text of the file is the state: an edit changes one value in it (tomlkit), so that comments,
-order and spaces of all else stay. What is no TOML is not edited here.
+The state is the text of the file. An edit changes one value in the text (tomlkit), and preserves
+comments, order and spaces. A file that is no valid TOML cannot be edited here.
 """
 
 import datetime
@@ -14,13 +14,13 @@ from tankcal.job.fields import Field
 from tankcal.text.numerals import NUMBER
 from tankcal.workbench.decimals import Unwritten
 
-SETTINGS = "job"
-NOT_HERE = ("csv",)  # sections that say how the other files are written
+SETTINGS = "job"  # name of the settings
+NOT_HERE = ("csv",)  # sections that are not edited here, because they define the format of files
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A value: of a key, of a section or of a camera or instrument (`owner`)."""
+    """Value of a key of a section, or of a camera or instrument (`owner`)."""
 
     owner: str
     key: str
@@ -29,16 +29,16 @@ class Entry:
 
 @dataclass(frozen=True)
 class EditedKeys:
-    """A file of keys in one state.
+    """State of a file of keys.
 
     Attributes
     ----------
     name, file : str
-        "job" or the name of a list; "job.toml".
+        "job" or the name of a list, and the name of the file, such as "job.toml".
     text : str
-        Of the file.
+        Text of the file.
     unwritten : dict
-        {(owner, key): entry that is not written}.
+        Ambiguous values that are not written, {(owner, key): text}.
     """
 
     name: str
@@ -50,49 +50,56 @@ class EditedKeys:
 
     @property
     def entries(self):
-        """The Entries of the file, in its order, with what is not written in their place."""
-        found = [
+        """Entries of the file in its order, including values that are not written."""
+        entries = [
             Entry(owner, key, self.unwritten.get((owner, key)) or _text_of(value))
             for owner, given in self._owners(tomllib.loads(self.text))
             for key, value in given.items()
         ]
-        known = {(one.owner, one.key) for one in found}
+        known = {(entry.owner, entry.key) for entry in entries}
         new = [Entry(*place, text) for place, text in self.unwritten.items() if place not in known]
-        return found + new
+        return entries + new
 
     def _owners(self, content):
-        """Pairs (owner, {key: value}); keys of a section within an entry as section.key."""
+        """Yield (owner, {key: value}); a key in a section of an entry is named section.key."""
         if self.name != SETTINGS:
-            inside = content.get(self.name)
-            for owner, given in (inside if isinstance(inside, dict) else {}).items():
+            entries = content.get(self.name)
+            for owner, given in (entries if isinstance(entries, dict) else {}).items():
                 if isinstance(given, dict):
                     yield owner, dict(_flat(given))
             return
-        todo = [(name, given) for name, given in content.items() if isinstance(given, dict)]
-        while todo:
-            name, given = todo.pop(0)
-            within = [(key, one) for key, one in given.items() if isinstance(one, dict)]
-            yield name, {key: one for key, one in given.items() if not isinstance(one, dict)}
-            todo += [(f"{name}.{key}", one) for key, one in within]
+        pending = [(name, given) for name, given in content.items() if isinstance(given, dict)]
+        while pending:
+            name, given = pending.pop(0)
+            inner = [(key, item) for key, item in given.items() if isinstance(item, dict)]
+            yield name, {key: item for key, item in given.items() if not isinstance(item, dict)}
+            pending += [(f"{name}.{key}", item) for key, item in inner]
 
     def set_value(self, owner, key, text):
-        """The state after one value; a blank one stays as "" where the key is there."""
+        """New state with the value of a key; a blank value of an existing key becomes ""."""
         import tomlkit
 
-        waiting = {place: one for place, one in self.unwritten.items() if place != (owner, key)}
+        unwritten = {place: item for place, item in self.unwritten.items() if place != (owner, key)}
         if isinstance(text, Unwritten):
-            waiting[owner, key] = text
+            unwritten[owner, key] = text
             text = ""
         document = tomlkit.parse(self.text)
         place, last = self._table_of(document, owner, key, bool(text))
         if place is not None and (text or last in place):
-            made = toml_value(field_of(self.name, owner, key), text, place.get(last))
-            if last not in place or place[last] != made or type(place[last]) is not type(made):
-                place[last] = made  # its comment stays
-        return replace(self, text=tomlkit.dumps(document), unwritten=waiting)
+            new_value = toml_value(field_of(self.name, owner, key), text, place.get(last))
+            if (
+                last not in place
+                or place[last] != new_value
+                or type(place[last]) is not type(new_value)
+            ):
+                place[last] = new_value  # preserves its comment
+        return replace(self, text=tomlkit.dumps(document), unwritten=unwritten)
 
     def _table_of(self, document, owner, key, is_made):
-        """(table of the document that holds a key, the key there); None: there is none."""
+        """Table of the document that contains a key, or None, and the key in this table.
+
+        With `is_made`, missing tables are added.
+        """
         import tomlkit
 
         path = owner.split(".") if self.name == SETTINGS else [self.name, owner]
@@ -115,20 +122,21 @@ class EditedKeys:
         return place, key
 
     def render(self):
-        """The bytes of the file, and no numbers of rows: problems name owner and key."""
+        """Bytes of the file, and None for row numbers, as problems state owner and key."""
         return self.text.encode("utf-8"), None
 
 
-def _flat(given):
-    for key, value in given.items():
+def _flat(values):
+    """Yield keys and values, with keys of inner tables as table.key."""
+    for key, value in values.items():
         if isinstance(value, dict):
-            yield from ((f"{key}.{inner}", one) for inner, one in value.items())
+            yield from ((f"{key}.{inner}", item) for inner, item in value.items())
         else:
             yield key, value
 
 
 def field_of(name, owner, key):
-    """The Field of a key, None of one that is not known."""
+    """`Field` of a key, or None for an unknown key."""
     if name == SETTINGS:
         fields = KEYS.get(owner, ())
     else:
@@ -136,29 +144,47 @@ def field_of(name, owner, key):
         family = FAMILIES.get(name, {}).get(key.partition(".")[0])
         if "." in key and family is not None:
             return family
-        long = {short: one for one, short in SHORT_KEYS[name].items()}
-        key = long.get(key, key)
-    return next((one for one in fields if one.name == key), None)
+        long_names = {
+            short: name_in_contract for name_in_contract, short in SHORT_KEYS[name].items()
+        }
+        key = long_names.get(key, key)
+    return next(
+        (name_in_contract for name_in_contract in fields if name_in_contract.name == key), None
+    )
 
 
 def _text_of(value):
-    """A value of a TOML file as one line: lists with ; between, pairs as low-high."""
+    """Text of a TOML value in one line; lists are separated by ;, pairs are low-high."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, list):
-        if value and all(isinstance(one, list) for one in value):
-            pairs = all(len(one) == 2 for one in value)
-            return "; ".join(("-" if pairs else " ").join(map(_text_of, one)) for one in value)
+        if value and all(isinstance(item, list) for item in value):
+            pairs = all(len(item) == 2 for item in value)
+            return "; ".join(("-" if pairs else " ").join(map(_text_of, item)) for item in value)
         return "; ".join(map(_text_of, value))
     if isinstance(value, datetime.datetime | datetime.date | datetime.time):
         return value.isoformat()
     return str(value)
 
 
-def toml_value(of: Field | None, text: str, before=None):
-    """A typed text as a value of TOML: a number where it is one, else a text.
+def toml_value(key_field: Field | None, text: str, before=None):
+    """Convert an entered text to a TOML value.
+
+    Parameters
+    ----------
+    of : Field or None
+        Field of the key; None for an unknown key.
+    text : str
+        Entered text.
+    before : object, optional
+        Previous value; a date or a list that was a string stays a string.
+
+    Returns
+    -------
+    tomlkit item
+        Number, flag, date or list if the text is valid for the field, else a string.
 
     Examples
     --------
@@ -169,7 +195,7 @@ def toml_value(of: Field | None, text: str, before=None):
     """
     import tomlkit
 
-    kind = of.kind if of is not None else "text"
+    kind = key_field.kind if key_field is not None else "text"
     words = text.strip().lower()
     if kind == "flag" and words in ("true", "false"):
         return tomlkit.item(words == "true")
@@ -188,6 +214,7 @@ def toml_value(of: Field | None, text: str, before=None):
 
 
 def _toml_number(text):
+    """TOML number with the digits of the text."""
     import tomlkit
 
     try:
@@ -197,13 +224,13 @@ def _toml_number(text):
 
 
 def _list_of(kind, text):
-    """A list as TOML has it, of a text with ; between its parts; None: it is none."""
+    """List of a text with parts separated by ;, or None if the text is no such list."""
     parts = [part.strip() for part in text.split(";")]
     if kind == "names":
         return parts
-    between = {"numbers": None, "ranges": "-", "rows": " "}[kind]
-    rows = [[one] if between is None else one.split(between) for one in parts]
-    if not all(NUMBER.fullmatch(one.strip()) for row in rows for one in row):
+    mark = {"numbers": None, "ranges": "-", "rows": " "}[kind]
+    rows = [[item] if mark is None else item.split(mark) for item in parts]
+    if not all(NUMBER.fullmatch(item.strip()) for row in rows for item in row):
         return None
-    rows = [[float(one) for one in row] for row in rows]
-    return [row[0] for row in rows] if between is None else rows
+    rows = [[float(item) for item in row] for row in rows]
+    return [row[0] for row in rows] if mark is None else rows

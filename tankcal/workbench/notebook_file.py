@@ -1,4 +1,4 @@
-"""The notebook of a job: few cells, a line of Python each; it is written beside the job."""
+"""Notebook of a job: a few cells with a line of Python each, written next to the job."""
 
 import hashlib
 import json
@@ -10,26 +10,30 @@ from tankcal.messages import message
 from tankcal.text.decoding import read_json
 from tankcal.workbench.desk import open_job
 
-FOLDER_NAME = "tankcal.ipynb"
-OURS = "tankcal"  # of the metadata: which cells we wrote
+FOLDER_NAME = "tankcal.ipynb"  # file name of the notebook of a job folder
+OURS = "tankcal"  # key of the metadata with the hash of the written cells
 
 
 def notebook_path(source):
-    """Where the notebook of a job (a Path) goes when nobody says where."""
+    """Default path of the notebook of a job (a Path)."""
     return source / FOLDER_NAME if source.is_dir() else source.with_suffix(".ipynb")
 
 
 def make_notebook(source, path, language=None):
-    """The notebook of a job as plain data (nbformat 4.5).
+    """Build the notebook of a job as plain data (nbformat 4.5).
 
     Parameters
     ----------
     source : Path
-        Folder or workbook.
+        Folder or workbook of the job.
     path : Path
-        Where the notebook is to lie: JOB is counted from there.
+        Path of the notebook; the path of the job in the notebook is relative to its folder.
     language : str, optional
-        None: that of the job.
+        Language of the texts; by default the language of the job.
+
+    Returns
+    -------
+    dict
     """
     desk = open_job(source, language=language, live=False)
     reader = desk.reader
@@ -37,7 +41,7 @@ def make_notebook(source, path, language=None):
     job = _counted_from(source.resolve(), path.resolve().parent)
     name = source.resolve().name
     tank = _plain(desk.draft.value("tank", "id") or name)
-    name = name.replace("`", "'")  # which would end the code that it stands in
+    name = name.replace("`", "'")  # a backquote would end the code in Markdown
     cells = [
         _text(f"# {words['title'].format(tank=tank)}\n\n{words['about'].format(job=name)}"),
         _code(
@@ -68,34 +72,53 @@ def make_notebook(source, path, language=None):
 
 
 def write_notebook(source, path, language=None):
-    """Write the notebook of a job; returns whether it was written.
+    """Write the notebook of a job.
 
-    A file of keys that cannot be read does not prevent it: the notebook shows what is wrong.
+    A file of keys that cannot be read is no obstacle, because the notebook shows its problems.
 
-    One that somebody changed is left as it is (False); so is one of the same cells, whose outputs
-    stay. Any other file of that name is refused (InputError).
+    Parameters
+    ----------
+    source : Path
+        Folder or workbook of the job.
+    path : Path
+        Path of the notebook.
+    language : str, optional
+        Language of the texts; by default the language of the job.
+
+    Returns
+    -------
+    bool
+        False if the user has changed an existing notebook, which is then preserved. An existing
+        notebook with the same cells is also preserved, with its outputs, and the result is True.
+
+    Raises
+    ------
+    InputError
+        If the path is a file that is no notebook.
     """
-    made = make_notebook(source, path, language)
+    notebook = make_notebook(source, path, language)
     if path.exists():
-        there = _read(path)
-        if _digest(there["cells"]) != there["metadata"].get(OURS, {}).get("sha256"):
+        existing = _read(path)
+        if _digest(existing["cells"]) != existing["metadata"].get(OURS, {}).get("sha256"):
             return False
-        if _digest(there["cells"]) == _digest(made["cells"]):
+        if _digest(existing["cells"]) == _digest(notebook["cells"]):
             return True
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(json.dumps(made, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    temporary.write_text(
+        json.dumps(notebook, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
     temporary.replace(path)
     return True
 
 
 def _read(path):
-    """The notebook that lies there; InputError for what is none."""
+    """Read an existing notebook; InputError if the file is no notebook."""
     try:
-        found = read_json(path)
-        if isinstance(found["cells"], list) and isinstance(found["metadata"], dict):
-            _digest(found["cells"])
-            return found
+        notebook = read_json(path)
+        if isinstance(notebook["cells"], list) and isinstance(notebook["metadata"], dict):
+            _digest(notebook["cells"])
+            return notebook
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         pass
     expected = message(
@@ -105,7 +128,7 @@ def _read(path):
 
 
 def _counted_from(source, folder):
-    """The path of a job from a folder: short where the job is there or below, else in full."""
+    """Path of a job, relative to a folder if the job is in the folder, else absolute."""
     if source == folder:
         return "."
     if folder in source.parents:
@@ -114,24 +137,28 @@ def _counted_from(source, folder):
 
 
 def _digest(cells):
-    sources = [[one["cell_type"], "".join(one["source"])] for one in cells]
+    """SHA-256 of the types and sources of cells."""
+    sources = [[cell["cell_type"], "".join(cell["source"])] for cell in cells]
     return hashlib.sha256(json.dumps(sources).encode()).hexdigest()
 
 
 def _plain(text):
-    """A text as Markdown that shows it as it is; no backslashes, for some begin a formula."""
+    """Escape a text for Markdown, without backslashes, which may begin a formula."""
     return re.sub(r"[#$&*<>\[\\\]_`|~]", lambda mark: f"&#{ord(mark[0])};", " ".join(text.split()))
 
 
 def _part(title, note, code):
+    """Cells of a section: title with note, and code."""
     return [_text(f"## {title}\n\n{note}".rstrip()), _code(code)]
 
 
 def _text(source):
+    """Markdown cell."""
     return {"cell_type": "markdown", "id": "", "metadata": {}, "source": source}
 
 
 def _code(source, *tags):
+    """Code cell."""
     return {
         "cell_type": "code",
         "id": "",

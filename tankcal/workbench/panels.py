@@ -1,4 +1,4 @@
-"""The widgets of a desk: grids, list of problems, Save, Run with progress, results."""
+"""Widgets of a desk: grids, list of problems, Save, Run with progress, and results."""
 
 import asyncio
 from html import escape
@@ -10,14 +10,14 @@ from tankcal.workbench.desk import Refusal
 from tankcal.workbench.grid import Grid
 from tankcal.workbench.result_views import live_results, warnings_page
 
-PAUSE_S = 0.3  # after an edit, before the job is checked
+PAUSE_S = 0.3  # pause after an edit before the job is checked
 
 
 def later(desk):
-    """Check the job when nothing was typed for a moment, then tell everybody."""
+    """Check the job after a pause without edits, and notify the listeners."""
     try:
         loop = asyncio.get_running_loop()
-    except RuntimeError:  # nobody waits
+    except RuntimeError:  # without an event loop there is no pause
         desk.tell()
         return
     if desk.waiting is not None:
@@ -26,12 +26,16 @@ def later(desk):
 
 
 def _button(text, act, style="", icon=""):
-    made = widgets.Button(description=text, button_style=style, icon=icon, layout={"width": "auto"})
-    made.on_click(lambda _: act())
-    return made
+    """Button that calls act()."""
+    button = widgets.Button(
+        description=text, button_style=style, icon=icon, layout={"width": "auto"}
+    )
+    button.on_click(lambda _: act())
+    return button
 
 
 def _page(html=""):
+    """HTML widget."""
     return widgets.HTML(html)
 
 
@@ -39,12 +43,12 @@ def _page(html=""):
 
 
 def table_panel(desk, name):
-    """A table, a list or the settings as a grid."""
+    """Grid of a table, a list or the settings."""
     return widgets.VBox([TableGrid(desk, name).grid])
 
 
 class TableGrid:
-    """The grid of a table of a desk: what is typed goes to the desk, its marks come back."""
+    """Grid of a table of a desk; edits are passed to the desk, which returns marks."""
 
     def __init__(self, desk, name):
         self.desk, self.name = desk, name
@@ -58,6 +62,7 @@ class TableGrid:
         desk.listen(self.refresh)
 
     def _content(self, shown):
+        """Traits of the grid for a ShownTable."""
         return {
             "columns": [vars(one) for one in shown.columns],
             "rows": shown.rows,
@@ -69,13 +74,14 @@ class TableGrid:
 
     @staticmethod
     def _marks(shown):
+        """Marks as lists [row, column, level, text]."""
         return [[*place, *mark] for place, mark in shown.marks.items()]
 
     def refresh(self):
-        """Show the table as it stands on the desk: changed cells alone where nothing else did."""
+        """Update the grid; if only cells have changed, only these cells are sent."""
         desk, grid = self.desk, self.grid
         if self.name not in desk.draft.tables and self.name not in desk.draft.keys:
-            return  # taken back by Undo; the check says what is missing
+            return  # removed by Undo; the check reports a missing table
         shown = desk.show(self.name)
         content = self._content(shown)
         same = len(shown.rows) == len(grid.rows) and content["columns"] == grid.columns
@@ -96,13 +102,14 @@ class TableGrid:
                 setattr(grid, key, value)
 
     def _heard(self, _widget, content, _buffers):
+        """Handle a message of the grid, whose kind is the name of a method below."""
         desk = self.desk
         try:
             getattr(self, f"_{content['kind']}")(
                 **{k: v for k, v in content.items() if k != "kind"}
             )
-        except InputError as error:  # a locked workbook, a key that is not edited here
-            say(desk, "\n".join(desk.reader.say(one) for one in error.texts))
+        except InputError as error:  # a locked workbook, or a key that cannot be edited here
+            say(desk, "\n".join(desk.reader.say(text) for text in error.texts))
             self.refresh()
             return
         if content["kind"] == "every":
@@ -112,11 +119,13 @@ class TableGrid:
         later(desk)
 
     def _enter(self, changes):
+        """Enter texts in cells."""
         desk = self.desk
         with desk.draft.as_one_edit():
             desk.reader.enter(desk.draft, self.name, changes, desk.every_key.get(self.name, False))
 
     def _paste(self, row, column, cells):
+        """Paste a block of cells, with new rows below the table if required."""
         draft, shown = self.desk.draft, self.grid.columns
         changes = [
             (row + down, shown[column + right]["name"], text)
@@ -132,26 +141,31 @@ class TableGrid:
             self._enter(changes)
 
     def _insert(self, row, count):
+        """Insert blank rows."""
         self.desk.draft.insert_rows(self.name, row, count)
         self.refresh()
 
     def _remove(self, rows):
+        """Remove rows."""
         self.desk.draft.remove_rows(self.name, rows)
         self.refresh()
 
     def _column(self, name):
+        """Add a column."""
         self.desk.draft.add_column(self.name, name)
         self.refresh()
 
     def _every(self, value):
+        """Show all keys, or only given and required keys."""
         self.desk.every_key[self.name] = bool(value)
 
     def _undo(self):
+        """Revert the last edit."""
         self.desk.draft.undo()
 
 
 def say(desk, text):
-    """Say something at the head of the desk."""
+    """Show a message in the head of the desk."""
     desk.said = text
     desk.tell()
 
@@ -160,7 +174,7 @@ def say(desk, text):
 
 
 def head_panel(desk):
-    """Which job it is, its state, Save and Undo."""
+    """Path and state of the job, with Save and Undo."""
     word, page = desk.reader.word, _page()
 
     def save():
@@ -193,7 +207,7 @@ def head_panel(desk):
 
 
 def findings_panel(desk):
-    """Every problem and warning, live."""
+    """Problems and warnings, updated after each edit."""
     page = _page()
     page.add_class("tankcal-findings")
 
@@ -206,7 +220,7 @@ def findings_panel(desk):
 
 
 def further_panel(desk):
-    """Adds a table that the job may have, and shows its grid."""
+    """Selection of a table to add, and the grids of added tables."""
     reader = desk.reader
     names = {f"{reader.title(name)} ({name})": name for name in desk.further}
     choice = widgets.Dropdown(options={"": None, **names}, layout={"width": "24em"})
@@ -220,7 +234,7 @@ def further_panel(desk):
             if name not in desk.draft.tables:
                 desk.draft.add_table(name)
         except InputError as error:
-            say(desk, "\n".join(reader.say(one) for one in error.texts))
+            say(desk, "\n".join(reader.say(text) for text in error.texts))
             return
         heading = _page(f"<h3>{escape(reader.title(name))}</h3><p>{escape(reader.note(name))}</p>")
         grids.children = (*grids.children, heading, TableGrid(desk, name).grid)
@@ -234,12 +248,12 @@ def further_panel(desk):
 
 
 def results_panel(desk):
-    """Run and Stop, progress with the time left, and the results below."""
+    """Run, Stop, progress with the time left, and the results."""
     return ResultsPanel(desk).box
 
 
 class ResultsPanel:
-    """Runs the saved job in a thread; the widgets are changed in the loop of the notebook alone."""
+    """Computes the saved job in a thread; only the event loop of the notebook changes widgets."""
 
     def __init__(self, desk):
         word = desk.reader.word
@@ -259,12 +273,12 @@ class ResultsPanel:
         desk.listen(self.refresh)
 
     def refresh(self):
-        """Say that what is shown is older than the job, when it is."""
+        """Show a message if the results are older than the job."""
         if self.desk.is_stale and self.run is None:
             self._state(self.desk.reader.word("stale"), "#6b4e00")
 
     def start(self):
-        """Save and compute."""
+        """Save the job and start the computation."""
         if self.run is not None:
             return
         loop = asyncio.get_running_loop()
@@ -283,22 +297,24 @@ class ResultsPanel:
         self.waiting = loop.create_task(self._finish(thread))
 
     def stop(self):
-        """Ask the run to stop."""
+        """Stop the computation at its next step."""
         if self.run is not None:
             self.run.stop()
             self.step.value = escape(self.desk.reader.word("stopping"))
 
     def _tell(self, text, share):
+        """Show the progress of a step."""
         self.step.value = escape(self.desk.reader.say(text))
         if share is not None:
             self.bar.value = share
 
     def _show(self, result):
-        """The results as soon as they are there, while the papers are being written."""
+        """Show the results while the reports are still being written."""
         self.desk.keep_run(self.run)
         self.view.children = (live_results(self.desk),)
 
     async def _finish(self, thread):
+        """Wait for the end of the computation, and show its files or its error."""
         await asyncio.to_thread(thread.join)
         run, self.run = self.run, None
         self.button.disabled, self.stopper.disabled = False, True
@@ -311,7 +327,7 @@ class ResultsPanel:
             )
             self.state.value += warnings_page(self.desk)
         elif isinstance(run.error, TankcalError):
-            self._state("\n".join(self.desk.reader.say(one) for one in run.error.texts))
+            self._state("\n".join(self.desk.reader.say(text) for text in run.error.texts))
         elif isinstance(run.error, OSError):
             reason = self.desk.reader.say(reason_of(run.error))
             self._state(word("not_written", reason=reason))
@@ -319,5 +335,6 @@ class ResultsPanel:
             self._state(f"{type(run.error).__name__}: {run.error}")
 
     def _state(self, text, colour="#8c1d18"):
+        """Show a message below the buttons; red by default."""
         lines = "".join(f"<div>{escape(line)}</div>" for line in text.splitlines())
         self.state.value = f'<div style="color: {colour}">{lines}</div>' if lines else ""

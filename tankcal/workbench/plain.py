@@ -1,8 +1,8 @@
-"""Tables and lists as plain HTML, where there are no widgets: the same texts and colours."""
+"""Tables and lists as plain HTML, with the texts and colours of the widgets."""
 
 from html import escape
 
-MOST_ROWS = 400  # of a page; the middle of a longer table is left out
+MOST_ROWS = 400  # largest number of rows of a page; the middle of a longer table is omitted
 STYLE = """<style>
 .tankcal-plain { border-collapse: collapse; font-size: 13px; }
 .tankcal-plain th, .tankcal-plain td { border: 1px solid #bbb; padding: 2px 6px; text-align: left; }
@@ -18,15 +18,15 @@ ul.tankcal-list li.bad { color: #8c1d18; } ul.tankcal-list li.doubtful { color: 
 
 
 def table_page(shown, left_out):
-    """A ShownTable as HTML; a marked cell says why within it.
+    """HTML of a ShownTable, with the problem in each marked cell.
 
-    left_out(count)  the text of a row that stands for so many
+    `left_out(count)` returns the text of the row that replaces omitted rows.
     """
     head = "".join(
-        f"<th{_class_of(shown.marks, None, place)}>{escape(one.heading)}"
-        f"<small>{escape(one.name if shown.takes_rows else one.unit)}</small>"
+        f"<th{_class_of(shown.marks, None, place)}>{escape(column.heading)}"
+        f"<small>{escape(column.name if shown.takes_rows else column.unit)}</small>"
         f"{_reason(shown.marks, None, place)}</th>"
-        for place, one in enumerate(shown.columns)
+        for place, column in enumerate(shown.columns)
     )
     half = MOST_ROWS // 2
     cut = len(shown.rows) > MOST_ROWS
@@ -51,6 +51,7 @@ def table_page(shown, left_out):
 
 
 def _row(shown, row):
+    """HTML of a row."""
     cells = "".join(
         f"<td{_class_of(shown.marks, row, place, 'number' if column.is_number else '')}>"
         f"{escape(text)}{_reason(shown.marks, row, place)}</td>"
@@ -61,18 +62,20 @@ def _row(shown, row):
 
 
 def _class_of(marks, row, column, also=""):
+    """HTML attribute with the classes of a cell."""
     level = marks.get((row, column), ("",))[0]
-    names = " ".join(one for one in (also, level) if one)
+    names = " ".join(name for name in (also, level) if name)
     return f' class="{names}"' if names else ""
 
 
 def _reason(marks, row, column):
-    found = marks.get((row, column))
-    return f'<small class="reason">{escape(found[1])}</small>' if found else ""
+    """HTML of the problem of a cell, or ""."""
+    mark = marks.get((row, column))
+    return f'<small class="reason">{escape(mark[1])}</small>' if mark else ""
 
 
 def list_page(lines, nothing):
-    """[(level, text)] as a list; `nothing` is said where there are none."""
+    """HTML of a list [(level, text)], or the text `nothing` if the list is empty."""
     if not lines:
         return f"{STYLE}<p>{escape(nothing)}</p>"
     items = "".join(f'<li class="{level}">{escape(text)}</li>' for level, text in lines)
@@ -80,5 +83,5 @@ def list_page(lines, nothing):
 
 
 def text_page(text):
-    """A text of several lines as HTML."""
+    """HTML of a text with a paragraph for each line."""
     return "".join(f"<p>{escape(line)}</p>" for line in text.splitlines())

@@ -1,4 +1,4 @@
-"""What a desk shows of its last run: the views of `tankcal.workbench.views`."""
+"""Results of the last computation of a desk, shown by `tankcal.workbench.views`."""
 
 from html import escape
 
@@ -8,7 +8,7 @@ from tankcal.workbench.plain import list_page
 
 
 def live_results(desk):
-    """The widget of the last run of a desk; who decides about a point there, the desk notes."""
+    """Widget of the last computation; decisions about points are passed to the desk."""
     from tankcal.workbench.views import results_view
 
     result = desk.last_run.result
@@ -16,15 +16,19 @@ def live_results(desk):
 
 
 def warnings_page(desk):
-    """What the last run of a desk warns of beyond the check of the job, as HTML; "": nothing."""
+    """HTML of warnings of the last computation that the check did not give, or ""."""
     result = desk.last_run.result
-    known = {one.text for one in result.job.warnings}
-    found = [one for one in result.warnings if one.text not in known]
-    return list_page([(DOUBTFUL, desk.reader.line(one)) for one in found], "") if found else ""
+    known = {warning.text for warning in result.job.warnings}
+    warnings = [warning for warning in result.warnings if warning.text not in known]
+    return (
+        list_page([(DOUBTFUL, desk.reader.line(warning)) for warning in warnings], "")
+        if warnings
+        else ""
+    )
 
 
 def results_page(desk):
-    """The same as HTML without buttons, with what was written above it."""
+    """HTML of the last computation, without buttons, below the list of written files."""
     from tankcal.report.paper import Paper
     from tankcal.workbench.views.page import SavedView
 

@@ -1,4 +1,4 @@
-"""Programs of others that show the notebook: JupyterLab, and Voilà without the code."""
+"""Show the notebook in JupyterLab, or in Voilà without its code."""
 
 import ipaddress
 import os
@@ -10,55 +10,58 @@ from importlib.util import find_spec
 from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import message
 
-HERE = "127.0.0.1"
-# The page takes nothing from elsewhere, and its kernel's messages go nowhere else: the template of
-# Voilà names a style sheet of another host, which a machine without a network would wait for.
+HERE = "127.0.0.1"  # address that only this machine can reach
+# The page loads nothing from other hosts, and sends the messages of its kernel to no other host.
+# The template of Voilà refers to a style sheet on another host; a machine without a network would
+# wait for it.
 POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob: ws: wss:; frame-ancestors 'self'"
 )
-# Voilà refuses the request of a closed page to end its kernel: each visit would keep one.
-# A run that goes on tells its progress, and is let finish.
-LEFT_S, LOOK_S = 600, 60  # nobody looks on and nothing is computed; how often that is looked for
+# Voilà refuses the request of a closed page to end its kernel, so that idle kernels must be ended.
+# A running computation reports its progress and is not idle.
+LEFT_S, LOOK_S = 600, 60  # idle time after which a kernel is ended, and interval of the check
 
 
 def has_lab():
-    """Is JupyterLab installed, with the widgets of the grids?"""
+    """Whether JupyterLab and the widgets of the grids are installed."""
     return all(map(find_spec, ("jupyterlab", "ipywidgets", "anywidget")))
 
 
 def has_app():
-    """Is Voilà installed, with the widgets of the grids?"""
+    """Whether Voilà and the widgets of the grids are installed."""
     return all(map(find_spec, ("voila", "ipywidgets", "anywidget")))
 
 
 def open_lab(notebook, is_browser=True):
-    """Show a notebook in JupyterLab, on this machine alone, until it is stopped."""
+    """Show a notebook in JupyterLab, on this machine only, until JupyterLab is stopped."""
     from jupyterlab.labapp import LabApp
 
     _let_kernels_start_quickly()
-    given = [str(notebook), f"--ServerApp.ip={HERE}", "--ServerApp.answer_yes=True"]
-    LabApp.launch_instance(given if is_browser else [*given, "--no-browser"])
+    arguments = [str(notebook), f"--ServerApp.ip={HERE}", "--ServerApp.answer_yes=True"]
+    LabApp.launch_instance(arguments if is_browser else [*arguments, "--no-browser"])
 
 
 def serve_app(notebook, port, address=HERE, is_browser=True, token=""):
-    """Serve a notebook by Voilà, without its code, until it is stopped.
+    """Serve a notebook by Voilà, without its code, until Voilà is stopped.
 
     Parameters
     ----------
     notebook : Path
+        The notebook.
     port : int
+        Port of the server.
     address : str
-        That it listens on.
+        Address of the server.
     is_browser : bool
-        Open it in a browser.
+        Whether to open a browser.
     token : str
-        That a visitor must bring; "": none.
+        Token that a visitor requires; "" for no token.
     """
     from traitlets.config import Config
     from voila.app import Voila
 
     _let_kernels_start_quickly()
-    given = [
+    arguments = [
         str(notebook),
         f"--Voila.ip={address}",
         f"--port={port}",
@@ -67,34 +70,36 @@ def serve_app(notebook, port, address=HERE, is_browser=True, token=""):
         "--strip_sources=True",
     ]
     headers = {"Content-Security-Policy": POLICY}
-    left = {"cull_idle_timeout": LEFT_S, "cull_interval": LOOK_S, "cull_connected": False}
-    # On an address of this machine alone there is no token. A web page whose host name resolves to
-    # this machine (DNS rebinding) must not reach the kernel: other host names are refused.
+    idle_settings = {"cull_idle_timeout": LEFT_S, "cull_interval": LOOK_S, "cull_connected": False}
+    # A local address requires no token. A web page whose host name resolves to this machine (DNS
+    # rebinding) must not reach the kernel, so that other host names are refused.
     tornado = {"headers": headers, "allow_remote_access": not is_local(address)}
-    settings = Config({"Voila": {"tornado_settings": tornado}, "MappingKernelManager": left})
-    Voila.launch_instance(given, config=settings)
+    settings = Config(
+        {"Voila": {"tornado_settings": tornado}, "MappingKernelManager": idle_settings}
+    )
+    Voila.launch_instance(arguments, config=settings)
 
 
 def is_local(address):
-    """Is it an address that this machine alone can reach?"""
+    """Whether only this machine can reach the address."""
     with suppress(ValueError):
         return ipaddress.ip_address(address).is_loopback
     return address == "localhost"
 
 
 def new_token():
-    """A word that nobody guesses."""
+    """New random token for access to a server."""
     return secrets.token_urlsafe(18)
 
 
 def free_port(address, wanted=None):
-    """The port asked for, or any that is free; InputError where the address or port is not ours."""
+    """Return the wanted port or a free port; InputError if address or port is unavailable."""
     try:
         family = socket.getaddrinfo(address, wanted or 0, type=socket.SOCK_STREAM)[0][0]
-        with socket.socket(family, socket.SOCK_STREAM) as tried:
-            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            tried.bind((address, wanted or 0))
-            return tried.getsockname()[1]
+        with socket.socket(family, socket.SOCK_STREAM) as connection:
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            connection.bind((address, wanted or 0))
+            return connection.getsockname()[1]
     except (OSError, OverflowError, UnicodeError) as error:
         reason = reason_of(error)
         expected = message(
@@ -108,6 +113,6 @@ def free_port(address, wanted=None):
 
 
 def _let_kernels_start_quickly():
-    """As the command line does: a second BLAS thread costs time with small matrices."""
+    """Set environment variables for kernels; several BLAS threads are slow for small matrices."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("PYDEVD_DISABLE_FILE_VALIDATION", "1")

@@ -1,4 +1,4 @@
-"""A table of a draft as it is shown: headings, notes, texts and marks in the reader's language."""
+"""Display of a table of a draft: headings, notes, texts and marks in the reader's language."""
 
 from dataclasses import dataclass
 
@@ -10,13 +10,14 @@ from tankcal.workbench.decimals import entered_text, shown_text
 from tankcal.workbench.findings import BAD
 from tankcal.workbench.keys import NOT_HERE, SETTINGS, field_of
 
+# Names of the columns in which keys are shown.
 OWNER, KEY, VALUE, UNIT, EXPECTED = "owner", "key", "value", "unit", "expected"
-MOST_CHOICES = 12  # that are said in words
+MOST_CHOICES = 12  # largest number of choices that are translated; longer lists are codes
 
 
 @dataclass(frozen=True)
 class ShownColumn:
-    """A column: its name in the file, heading and unit, and what it takes, in words."""
+    """A shown column: name in the file, heading, unit, and a note on the expected values."""
 
     name: str
     heading: str
@@ -28,18 +29,23 @@ class ShownColumn:
 
 @dataclass(frozen=True)
 class ShownTable:
-    """What a grid or a page shows of a table.
+    """Content of a grid or a page for a table.
 
     Attributes
     ----------
     name, file, title, note : str
+        Name of the table, its file, its title and its description.
     columns : tuple of ShownColumn
+        Columns.
     rows : list of list of str
+        Texts of the cells.
     marks : dict
-        {(row, column): (BAD or DOUBTFUL, text)}, both counted from 0; None: the whole row, column
-        or table.
+        Problems and warnings, {(row, column): (BAD or DOUBTFUL, text)}, with row and column counted
+        from 0. None denotes the whole row, column or table.
     addable : tuple of str
-        Columns that the table may have and has not.
+        Columns that can be added.
+    takes_rows : bool
+        Whether rows can be inserted and removed.
     """
 
     name: str
@@ -54,11 +60,12 @@ class ShownTable:
 
 
 class Reader:
-    """How tables are shown to a reader of a language, and what he types is understood.
+    """Display and entry of tables in a language.
 
     Parameters
     ----------
     language : str
+        Code of the language, such as "pt-BR".
     """
 
     def __init__(self, language):
@@ -68,35 +75,54 @@ class Reader:
         self.mark = marks_of(self.words).decimal
 
     def word(self, code, **values):
-        """A text of the group [workbench]."""
+        """Text of the group [workbench] of the words."""
         return self.words["workbench"][code].format(**values)
 
     def say(self, text):
-        """A message in the language, in one line."""
+        """Text of a message in the language, in a single line."""
         return say(self.words, text)
 
     def title(self, name):
-        """What a table, the settings or a list is called."""
+        """Title of a table, the settings or a list."""
         return self.words["input"]["titles"].get(name, name)
 
     def note(self, name):
-        """What a table or a list is for."""
+        """Description of a table or a list."""
         notes = self.texts.notes
-        found = notes["tables"].get(name) or notes["registers"].get(name)
-        return found or self.word("settings_note")
+        note = notes["tables"].get(name) or notes["registers"].get(name)
+        return note or self.word("settings_note")
 
     # ---- showing
 
     def show(self, draft, check, name, every_key=False):
-        """The ShownTable of a table, of the settings or of a list."""
+        """Build the `ShownTable` of a table, of the settings or of a list.
+
+        Parameters
+        ----------
+        draft : Draft
+            Edited files of the job.
+        check : Check
+            Check of the job.
+        name : str
+            Name of the table or list, or "job".
+        every_key : bool
+            Whether to show all keys, not only given and required keys.
+
+        Returns
+        -------
+        ShownTable
+        """
         if name in draft.keys:
             return self._show_keys(draft, check, name, every_key)
         return self._show_table(draft, check, name)
 
     def _show_table(self, draft, check, name):
+        """`ShownTable` of a table."""
         table, fields = draft.tables[name], draft.fields(name)
-        columns = tuple(self._column(name, one, fields.get(one)) for one in table.headings)
-        kinds = [fields.get(one) for one in table.headings]
+        columns = tuple(
+            self._column(name, heading, fields.get(heading)) for heading in table.headings
+        )
+        kinds = [fields.get(heading) for heading in table.headings]
         rows = [
             [
                 shown_text(field, text, table.decimal, self.mark)
@@ -104,9 +130,9 @@ class Reader:
             ]
             for row in table.rows
         ]
-        places = {one: place for place, one in enumerate(table.headings)}
+        places = {heading: place for place, heading in enumerate(table.headings)}
         marks = self._marks(check, name, lambda place: (place[0], places.get(place[1])))
-        addable = tuple(one for one in fields if one not in places)
+        addable = tuple(heading for heading in fields if heading not in places)
         return ShownTable(
             name,
             _plain_file(table.file),
@@ -120,6 +146,7 @@ class Reader:
         )
 
     def _column(self, name, heading, field):
+        """`ShownColumn` of a column of a table."""
         if field is None:
             return ShownColumn(heading, heading or "?")
         note = self.texts.notes["columns"].get(f"{name}.{field.name}", field.note)
@@ -131,20 +158,22 @@ class Reader:
         )
 
     def _expectation(self, field):
+        """Text of the expected values of a field."""
         if len(field.choices) > MOST_CHOICES:  # codes, such as the inputs of uncertainty
             return ", ".join(field.choices)
         if field.kind == "choice" or (field.choices and field.kind != "number"):
-            return ", ".join(self.texts.choice(one) for one in field.choices)
+            return ", ".join(self.texts.choice(choice) for choice in field.choices)
         return self.say(field.expectation())
 
     def _show_keys(self, draft, check, name, every_key):
+        """`ShownTable` of the settings or of a list."""
         places = key_places(draft, name, every_key)
-        texts = {(one.owner, one.key): one.text for one in draft.keys[name].entries}
+        texts = {(entry.owner, entry.key): entry.text for entry in draft.keys[name].entries}
         rows = []
         for owner, key in places:
             field = field_of(name, owner, key)
             shown = shown_text(field, texts.get((owner, key), ""), ".", self.mark)
-            rows.append([owner, key, shown, *self._told(name, owner, key, field)])
+            rows.append([owner, key, shown, *self._unit_and_note(name, owner, key, field)])
         index = {place: number for number, place in enumerate(places)}
         value = 2
         marks = self._marks(check, name, lambda place: self._place_of_key(index, place, value))
@@ -161,14 +190,15 @@ class Reader:
 
     @staticmethod
     def _place_of_key(index, place, value):
+        """Row and column in which a problem of (owner, key) is shown."""
         owner, key = place
         if key is None:
-            first = next((row for (one, _), row in index.items() if one == owner), None)
+            first = next((row for (name, _), row in index.items() if name == owner), None)
             return first, None
         return index.get(place), value
 
-    def _told(self, name, owner, key, field):
-        """Unit of a key, and what it is and takes."""
+    def _unit_and_note(self, name, owner, key, field):
+        """Unit of a key, and its description with the expected values."""
         if owner in NOT_HERE:
             return "", self.word("in_file")
         if field is None:
@@ -180,36 +210,39 @@ class Reader:
         return parted(field.name)[1], f"{note} · {self._expectation(field)}"
 
     def _marks(self, check, name, placed):
-        """{(row, column): (level, text)}; of several in a cell the worst level, each on a line."""
-        found = {}
+        """Marks {(row, column): (level, text)}; several marks of a cell share the worst level."""
+        texts = {}
         for place, marks in check.marks.get(name, {}).items():
-            is_bad = any(one.level == BAD for one in marks)
+            is_bad = any(mark.level == BAD for mark in marks)
             text = "\n".join(
-                f"{place_of_key(one)}{self.say(one.problem.expected)}"
+                f"{place_of_key(mark)}{self.say(mark.problem.expected)}"
                 if placed(place) == (None, None)
-                else self.say(one.problem.expected)
-                for one in marks
+                else self.say(mark.problem.expected)
+                for mark in marks
             )
             level = BAD if is_bad else marks[0].level
-            known = found.get(placed(place))
+            known = texts.get(placed(place))
             if known is not None:
                 level = BAD if BAD in (level, known[0]) else level
                 text = f"{known[1]}\n{text}"
-            found[placed(place)] = level, text
-        return found
+            texts[placed(place)] = level, text
+        return texts
 
-    # ---- typing
+    # ---- entry
 
     def enter(self, draft, name, changes, every_key=False):
-        """Put what was typed into a table: [(row, name of the column, text)].
+        """Enter texts in a table.
 
         Parameters
         ----------
         draft : Draft
+            Edited files of the job.
         name : str
+            Name of the table or list, or "job".
         changes : list of (int, str, str)
+            Row from 0, name of the column and entered text.
         every_key : bool
-            As the table was shown.
+            Whether all keys are shown, which determines the rows of keys.
         """
         if name in draft.keys:
             places = key_places(draft, name, every_key)
@@ -229,21 +262,21 @@ class Reader:
         )
 
     def line(self, problem):
-        """A problem or a warning as one line."""
+        """Text of a problem or a warning in a single line."""
         return self.say(problem.text)
 
 
 def place_of_key(mark):
-    """Where a problem is whose cell is not shown: "x_m: " or nothing."""
+    """Prefix "x_m: " with the column of a problem whose cell is not shown, or ""."""
     return f"{mark.problem.column}: " if mark.problem.column else ""
 
 
 def key_places(draft, name, every_key=False):
-    """(owner, key) of each row that is shown of the settings or of a list.
+    """Owner and key of each shown row of the settings or of a list.
 
-    Those that stand in the file or must be given; with every_key all that the tank may have.
+    Shown are keys in the file and required keys; with `every_key`, all keys for the kind of tank.
     """
-    given = [(one.owner, one.key) for one in draft.keys[name].entries]
+    given = [(item.owner, item.key) for item in draft.keys[name].entries]
     known = set(given)
     if name != SETTINGS:
         owners = dict.fromkeys(owner for owner, _ in given)
@@ -252,18 +285,19 @@ def key_places(draft, name, every_key=False):
         fields = {section: KEYS[section] for section in SECTIONS if section not in NOT_HERE}
     kind = draft.kind if name == SETTINGS else None
     places = []
-    for owner, of_owner in fields.items():
+    for owner, owner_fields in fields.items():
         places += [
-            (owner, one.name)
-            for one in of_owner
-            if (owner, one.name) in known
-            or (one.suits(kind) and (every_key or (kind is not None and one.is_required(kind))))
+            (owner, item.name)
+            for item in owner_fields
+            if (owner, item.name) in known
+            or (item.suits(kind) and (every_key or (kind is not None and item.is_required(kind))))
         ]
-        own = [place for place in given if place[0] == owner]
-        places += [place for place in own if place not in set(places)]
+        owner_places = [place for place in given if place[0] == owner]
+        places += [place for place in owner_places if place not in set(places)]
     seen = set(places)
     return places + [place for place in given if place not in seen]
 
 
 def _plain_file(file):
+    """Name of a file, or of a sheet without its prefix."""
     return str(file).removeprefix(SHEET)

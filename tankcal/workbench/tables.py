@@ -1,7 +1,7 @@
-"""A table under edit: headings and rows of text, each row knowing where in its file it stands.
+"""Editing of a table: headings and rows of text, each row with its place in the file.
 
-A state is never changed: an edit gives the next one, so that what was before can be had back.
-What is not edited stays in the file byte for byte.
+A state is immutable. An edit returns a new state, so that the previous state is available for Undo.
+Unedited parts of the file are preserved byte for byte.
 """
 
 import re
@@ -12,14 +12,21 @@ from tankcal.text.spreadsheets import guard_formula, unguard_formula
 from tankcal.workbench.decimals import Unwritten
 
 _ENDING = re.compile("\r\n|\r|\n")
-MARK_OF_ORDER = "\N{ZERO WIDTH NO-BREAK SPACE}"
+MARK_OF_ORDER = "\N{ZERO WIDTH NO-BREAK SPACE}"  # byte order mark
 
 
 @dataclass(frozen=True)
 class Row:
-    """One row: `line` is its place in the file as read, None of a new one.
+    """A row of a table.
 
-    changed  positions of the cells that are no longer those of the file
+    Attributes
+    ----------
+    cells : tuple of str
+        Texts of the cells.
+    line : int or None
+        Index of its line in the file as read; None for a new row.
+    changed : frozenset of int
+        Indices of the cells that differ from the file.
     """
 
     cells: tuple[str, ...]
@@ -28,23 +35,26 @@ class Row:
 
     @property
     def is_blank(self):
+        """Whether all cells are blank."""
         return not any(self.cells)
 
 
 @dataclass(frozen=True)
 class EditedTable:
-    """A table of a job in one state.
+    """State of a table of a job.
 
     Attributes
     ----------
     name, file : str
-        "points", "points.csv"; of a workbook "sheet points".
+        Name such as "points", and file "points.csv", or "sheet points" in a workbook.
     headings : tuple of str
+        Headings of the columns.
     rows : tuple of Row
+        Rows.
     decimal : str
-        The mark of its numbers.
+        Decimal mark.
     origin : CsvLines or SheetOrigin
-        The file as it was read, which renders a state.
+        File or sheet as read, which renders a state.
     """
 
     name: str
@@ -55,7 +65,7 @@ class EditedTable:
     origin: object
 
     def set_cells(self, changes):
-        """The state after [(row, column, text)]; row and column count from 0."""
+        """New state with changed cells, [(row, column, text)]; row and column count from 0."""
         rows = list(self.rows)
         for place, column, text in changes:
             row = rows[place]
@@ -65,21 +75,21 @@ class EditedTable:
         return replace(self, rows=tuple(rows))
 
     def insert_rows(self, place, count=1):
-        """The state with blank rows before row `place`."""
+        """New state with blank rows before row `place`."""
         blank = (Row(("",) * len(self.headings)),) * count
         return replace(self, rows=(*self.rows[:place], *blank, *self.rows[place:]))
 
     def remove_rows(self, places):
-        """The state without some rows."""
-        gone = set(places)
+        """New state without the rows at `places`."""
+        removed = set(places)
         return replace(
-            self, rows=tuple(row for place, row in enumerate(self.rows) if place not in gone)
+            self, rows=tuple(row for place, row in enumerate(self.rows) if place not in removed)
         )
 
     def add_column(self, heading):
-        """The state with one more column, blank, at the right.
+        """New state with a blank column at the right.
 
-        Where cells stand beyond the headings, the first of these columns gets the heading.
+        If there are cells beyond the headings, the first column without a heading gets the heading.
         """
         if "" in self.headings:
             place = self.headings.index("")
@@ -93,7 +103,7 @@ class EditedTable:
 
     @property
     def unwritten(self):
-        """[(row, column)] of the entries that are not written."""
+        """Places [(row, column)] of the ambiguous values, which are not written."""
         return [
             (place, column)
             for place, row in enumerate(self.rows)
@@ -102,17 +112,28 @@ class EditedTable:
         ]
 
     def render(self):
-        """(what the origin makes of it, number of each row in the file, None of a blank one)."""
+        """Content rendered by the origin, and number of each row in the file, None for blank."""
         return self.origin.render(self)
 
 
 @dataclass(frozen=True)
 class CsvLines:
-    """The lines of a CSV file as read.
+    """Lines of a CSV file as read.
 
-    lines    with the line's end of each beside it, in `endings`
-    heading  index of the line of headings, None: there is none
-    before   headings of that line
+    Attributes
+    ----------
+    separator : str
+        Separator of the columns.
+    lines, endings : tuple of str
+        Lines without their ends, and the end of each line.
+    heading : int or None
+        Index of the line of headings; None without headings.
+    before : tuple of str
+        Headings of this line.
+    mark : str
+        Byte order mark, or "".
+    ending : str
+        End of new lines.
     """
 
     separator: str
@@ -124,19 +145,21 @@ class CsvLines:
     ending: str = "\n"
 
     def render(self, table):
-        """(bytes of the file, number of each row)."""
-        out, numbers = [], []
-        rest = iter(range(len(self.lines)))
-        of_rows = set(self.row_lines)
+        """Bytes of the file, and number of each row in the file, None for a new blank row."""
+        output, numbers = [], []
+        remaining = iter(range(len(self.lines)))
+        row_lines = set(self.row_lines)
 
         def emit(text, ending=None):
-            out.append(text + (self.ending if ending is None else ending))
+            """Append a line."""
+            output.append(text + (self.ending if ending is None else ending))
 
         def copy_until(stop):
-            for line in rest:
+            """Copy lines that are no rows, such as comments, up to the line `stop`."""
+            for line in remaining:
                 if line == stop:
                     return True
-                if line not in of_rows:
+                if line not in row_lines:
                     emit(self.lines[line], self.endings[line])
             return False
 
@@ -155,25 +178,27 @@ class CsvLines:
             if row.line is not None:
                 copy_until(row.line)
                 ending = self.endings[row.line]
-            if out and not out[-1].endswith(("\n", "\r")):
-                out[-1] += self.ending  # the last line of the file had no end
+            if output and not output[-1].endswith(("\n", "\r")):
+                output[-1] += self.ending  # if the last line of the file has no end
             emit(self._text_of(row), ending)
-            numbers.append(len(out))
+            numbers.append(len(output))
         copy_until(None)
-        text = self.mark + "".join(out)
+        text = self.mark + "".join(output)
         return text.encode("utf-8"), numbers
 
     @property
     def row_lines(self):
-        """Indices of the lines that were rows when the file was read."""
+        """Indices of the lines that are rows of the file as read."""
         begin = 0 if self.heading is None else self.heading + 1
         return [i for i in range(begin, len(self.lines)) if is_row(self.lines[i])]
 
     def _heading_of(self, table):
-        added = [one for one in table.headings[len(self.before) :] if one]
+        """Line of headings with added columns."""
+        added = [heading for heading in table.headings[len(self.before) :] if heading]
         return self.separator.join((self.lines[self.heading], *map(self._quoted, added)))
 
     def _text_of(self, row):
+        """Line of a row, in which only changed cells differ from the file."""
         if row.line is None:
             return self.separator.join(map(self._quoted, row.cells))
         line = self.lines[row.line]
@@ -187,6 +212,7 @@ class CsvLines:
         return self.separator.join(parts)
 
     def _quoted(self, text):
+        """Text of a cell in the file, with quotation marks if required; "" if ambiguous."""
         if isinstance(text, Unwritten):
             return ""
         text = guard_formula(_ENDING.sub(" ", text).strip())
@@ -196,7 +222,21 @@ class CsvLines:
 
 
 def read_csv_table(name, file, text, separator, decimal):
-    """EditedTable of the text of a CSV file (the byte order mark still before it)."""
+    """Read the `EditedTable` of a CSV file.
+
+    Parameters
+    ----------
+    name, file : str
+        Name of the table and of the file.
+    text : str
+        Text of the file, with its byte order mark if it has a mark.
+    separator, decimal : str
+        Declared separator and decimal mark.
+
+    Returns
+    -------
+    EditedTable
+    """
     mark = MARK_OF_ORDER if text.startswith(MARK_OF_ORDER) else ""
     lines, endings = _lines(text.removeprefix(mark))
     heading = next((i for i, line in enumerate(lines) if is_row(line)), None)
@@ -204,25 +244,25 @@ def read_csv_table(name, file, text, separator, decimal):
     before = ()
     if heading is not None:
         before = tuple(cell_of(part) for part in split_line(lines[heading], separator))
-    ending = next((one for one in endings if one), "\n")
+    ending = next((line_end for line_end in endings if line_end), "\n")
     origin = CsvLines(separator, lines, endings, heading, before, mark, ending)
-    split = [
+    split_rows = [
         (line, tuple(cell_of(part) for part in split_line(lines[line], separator)))
         for line in (origin.row_lines if heading is not None else ())
     ]
-    width = max([len(before), *(len(cells) for _, cells in split)])
-    headings = before + ("",) * (width - len(before))  # cells beyond them are shown, too
-    rows = tuple(Row(cells + ("",) * (width - len(cells)), line) for line, cells in split)
+    width = max([len(before), *(len(cells) for _, cells in split_rows)])
+    headings = before + ("",) * (width - len(before))  # cells without a heading are also shown
+    rows = tuple(Row(cells + ("",) * (width - len(cells)), line) for line, cells in split_rows)
     return EditedTable(name, file, headings, rows, decimal, origin)
 
 
 def new_csv_table(name, file, headings, separator, decimal):
-    """EditedTable of a file that is not there yet, without rows."""
+    """`EditedTable` of a new file, without rows."""
     return EditedTable(name, file, tuple(headings), (), decimal, CsvLines(separator))
 
 
 def _lines(text):
-    """(lines, the end of each); the last end is "" where the text does not end with one."""
+    """Lines, and the end of each line; the last end is "" if the text ends without it."""
     lines, endings, begin = [], [], 0
     for end in _ENDING.finditer(text):
         lines.append(text[begin : end.start()])
@@ -235,7 +275,7 @@ def _lines(text):
 
 
 def split_line(line, separator):
-    """The cells of a line as they are written, with their quotation marks and spaces.
+    """Split a line into the cells as written, with quotation marks and spaces.
 
     Examples
     --------
@@ -244,20 +284,20 @@ def split_line(line, separator):
     """
     if '"' not in line:
         return line.split(separator)
-    parts, begin, quoted, fresh = [], 0, False, True
+    parts, begin, quoted, at_start = [], 0, False, True
     for place, char in enumerate(line):
-        if char == '"' and (quoted or fresh):
+        if char == '"' and (quoted or at_start):
             quoted = not quoted
         elif char == separator and not quoted:
             parts.append(line[begin:place])
-            begin, fresh = place + 1, True
+            begin, at_start = place + 1, True
             continue
-        fresh = (fresh and char == " ") or quoted
+        at_start = (at_start and char == " ") or quoted
     return [*parts, line[begin:]]
 
 
 def cell_of(part):
-    """What a written cell says.
+    """Text of a cell as written, without quotation marks and spaces.
 
     Examples
     --------

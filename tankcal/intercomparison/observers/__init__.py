@@ -1,10 +1,10 @@
-"""One crew for each method: what it reads of a tank, as the files of a job.
+"""Simulated surveys of a tank by each method, as the files of a job.
 
     parts = METHODS["tape"](tank, Chance(rng), asked)
 
-A crew knows the true tank, adds the errors of its instruments and declares what a crew declares of
-them. Formulas stand here once more, on purpose: none of `tankcal.survey` or `tankcal.geometry` is
-used, so that a mistake there is no part of the truth here.
+A simulation adds errors of the instruments to the true tank, and declares their standard
+uncertainties. The formulas are deliberately independent of `tankcal.survey` and `tankcal.geometry`,
+so that an error there does not affect the true values.
 """
 
 from tankcal.intercomparison.observers.cloud import observe_cloud

@@ -1,4 +1,4 @@
-"""Two scans from within the tank, placed by targets that a total station has read."""
+"""Simulated survey by two scans from inside, registered by targets of a total station."""
 
 import struct
 
@@ -8,18 +8,36 @@ from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.observers.sighting import Tool, incidence, rays_of, read_targets
 from tankcal.intercomparison.site import finish, observe_site
 
+# Standard uncertainties of the scanner: offset, scale, and bias at 60 degrees of incidence.
 U_OFFSET_M, U_SCALE, U_BIAS_M = 1e-3, 10e-6, 1e-3
-NOISE_M = (0.8e-3, 2.0e-3)  # of a range, by lot
-TARGET_SD_M, TARGETS = 6e-4, 6
-TOOL = {"u_scale_ppm": 5.0, "u_offset_mm": 0.3}
-TOOL_SD_RAD, TOOL_SD_M = 2 / 206265, 5e-4
+NOISE_M = (0.8e-3, 2.0e-3)  # smallest and largest standard deviation of a range
+TARGET_SD_M, TARGETS = 6e-4, 6  # standard deviation of a scanned target, number of targets
+TOOL = {"u_scale_ppm": 5.0, "u_offset_mm": 0.3}  # standard uncertainties of the total station
+TOOL_SD_RAD, TOOL_SD_M = 2 / 206265, 5e-4  # standard deviations of the total station
+# Largest tilt of the scanner about each axis; lowest and highest elevation of its rays.
 LEVELLED_RAD, LOWEST_RAD, HIGHEST_RAD = 0.01, np.radians(-40), np.radians(72)
-SPOILT, FAR_M = 0.002, 0.4  # share of points that come from nowhere, and how far before the wall
-LAS_STEP_M = 1e-4
+SPOILT, FAR_M = 0.002, 0.4  # share of stray points, and their largest distance before the wall
+LAS_STEP_M = 1e-4  # resolution of coordinates in LAS files
 
 
 def observe_cloud(tank, chance, asked, points=200_000):
-    """So many points in two scans; columns of the roof stand before the wall."""
+    """Simulate two scans with together `points` points; roof columns hide parts of the wall.
+
+    Parameters
+    ----------
+    tank : Tank
+        The true tank.
+    chance : Chance
+        Random errors.
+    asked : Asked
+        Requested conditions of the capacity table.
+    points : int
+        Number of rays of both scans.
+
+    Returns
+    -------
+    Parts
+    """
     rng = chance.rng
     site = observe_site(tank, chance, asked, outside=False)
     scale, offset = chance.normal(U_SCALE), chance.normal(U_OFFSET_M)
@@ -31,13 +49,13 @@ def observe_cloud(tank, chance, asked, points=200_000):
     reach = 1.02 * tank.radius_m * site.grown
     low = -0.3
     for name, place in zip("AB", _stands(rng, tank), strict=True):
-        turned = _rotation(rng)
-        own, ranges = _scan(chance, site, place, turned, points // 2, bias, noise)
+        rotation = _rotation(rng)
+        rays, ranges = _scan(chance, site, place, rotation, points // 2, bias, noise)
         ranges = ranges * (1 + scale) + offset
-        parts.files[f"scans/{name.lower()}.las"] = las_bytes(ranges[:, None] * own)
-        for target, at in targets.items():
-            seen = (at - place) @ turned + chance.normal(TARGET_SD_M, 3)
-            rows.append([name, target, *np.round(seen, 5).tolist(), 1000 * TARGET_SD_M])
+        parts.files[f"scans/{name.lower()}.las"] = las_bytes(ranges[:, None] * rays)
+        for target, position in targets.items():
+            observed = (position - place) @ rotation + chance.normal(TARGET_SD_M, 3)
+            rows.append([name, target, *np.round(observed, 5).tolist(), 1000 * TARGET_SD_M])
         clouds[name] = {
             "file": f"scans/{name.lower()}.las",
             "unit": "m",
@@ -55,27 +73,27 @@ def observe_cloud(tank, chance, asked, points=200_000):
 
 
 def _stands(rng, tank):
-    """Two places of the scanner, some way off the middle on either side."""
-    at = rng.uniform(0, FULL_TURN)
-    away = tank.radius_m * rng.uniform(0.2, 0.35, 2)
-    for turn, off in ((at, away[0]), (at + np.pi + 0.5, away[1])):
-        yield np.array([off * np.sin(turn), off * np.cos(turn), rng.uniform(1.4, 1.7)])
+    """Yield two places of the scanner, on opposite sides of the middle."""
+    azimuth = rng.uniform(0, FULL_TURN)
+    distances = tank.radius_m * rng.uniform(0.2, 0.35, 2)
+    for turn, distance in ((azimuth, distances[0]), (azimuth + np.pi + 0.5, distances[1])):
+        yield np.array([distance * np.sin(turn), distance * np.cos(turn), rng.uniform(1.4, 1.7)])
 
 
 def _targets(rng, site):
-    """{name: place} of targets within the tank, at different heights, all around."""
+    """Places of targets in the tank, {name: place}, at different heights and azimuths."""
     tank = site.tank
-    found = {}
+    places = {}
     for k in range(TARGETS):
-        at = FULL_TURN * (k + 0.3 * rng.uniform(-1, 1)) / TARGETS
-        off = tank.radius_m * rng.uniform(0.75, 0.9)
+        azimuth = FULL_TURN * (k + 0.3 * rng.uniform(-1, 1)) / TARGETS
+        distance = tank.radius_m * rng.uniform(0.75, 0.9)
         z = rng.uniform(0.3, 1.0) if k % 2 else rng.uniform(0.5, 0.8) * tank.height_m
-        found[f"T{k + 1}"] = np.array([off * np.sin(at), off * np.cos(at), z])
-    return found
+        places[f"T{k + 1}"] = np.array([distance * np.sin(azimuth), distance * np.cos(azimuth), z])
+    return places
 
 
 def _read_network(site, targets):
-    """One set-up of a total station that gives the frame: it and a mark are held."""
+    """Add a set-up of a total station, whose station and mark are control points."""
     chance, rng = site.chance, site.chance.rng
     station, mark = np.array([0.1, 0.15, 1.5]), np.array([0.3 * site.tank.radius_m, -0.1, 0.9])
     tool = Tool(
@@ -83,13 +101,13 @@ def _read_network(site, targets):
         0.0, TOOL_SD_M, TOOL_SD_RAD,
     )  # fmt: skip
     zero = float(rng.uniform(0, FULL_TURN))
-    seen = {**targets, "R1": mark}
-    read = read_targets(chance, station, np.array(list(seen.values())), tool, zero)
+    sighted = {**targets, "R1": mark}
+    readings = read_targets(chance, station, np.array(list(sighted.values())), tool, zero)
     tables = site.parts.tables
     tables["directions"] = [["setup", "to", "direction_deg", "s_arcsec"]]
     tables["zenith_angles"] = [["setup", "to", "zenith_deg", "s_arcsec"]]
     tables["slope_distances"] = [["setup", "to", "distance_m", "s_mm"]]
-    for name, (direction, zenith, length) in zip(seen, read.tolist(), strict=True):
+    for name, (direction, zenith, length) in zip(sighted, readings.tolist(), strict=True):
         tables["directions"].append(["1", name, round(float(np.degrees(direction)), 6), 2.0])
         tables["zenith_angles"].append(["1", name, round(float(np.degrees(zenith)), 6), 2.0])
         tables["slope_distances"].append(["1", name, round(length, 5), 1000 * TOOL_SD_M])
@@ -97,7 +115,10 @@ def _read_network(site, targets):
         ["setup", "station", "instrument", "instrument_height_m"],
         ["1", "S1", "TS-1", 0.0],
     ]
-    held = [[name, *map(float, at), 0.0, 0.0, 0.0] for name, at in (("S1", station), ("R1", mark))]
+    held = [
+        [name, *map(float, position), 0.0, 0.0, 0.0]
+        for name, position in (("S1", station), ("R1", mark))
+    ]
     tables["control"] = [["point", "x_m", "y_m", "z_m", "sx_mm", "sy_mm", "sz_mm"], *held]
     site.parts.registers["instruments"] = {
         "TS-1": {"kind": "total_station", "certificate": "simulated", **TOOL}
@@ -105,7 +126,7 @@ def _read_network(site, targets):
 
 
 def _rotation(rng):
-    """(3, 3) from the scanner's frame to that of the tank: turned, and a little out of level."""
+    """Random rotation (3, 3) from the scanner's to the tank's coordinates, with a small tilt."""
     a, b = LEVELLED_RAD * rng.uniform(-1, 1, 2)
     c = rng.uniform(0, FULL_TURN)
     about_x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
@@ -114,34 +135,34 @@ def _rotation(rng):
     return about_z @ about_y @ about_x
 
 
-def _scan(chance, site, place, turned, count, bias, noise):
-    """Rays in the scanner's own frame, and their ranges with noise; only those that return."""
+def _scan(chance, site, place, rotation, count, bias, noise):
+    """Unit rays (n, 3) in the scanner's coordinates and noisy ranges (n,) of the returns, m."""
     rng, tank, f = chance.rng, site.tank, site.grown
     lines = int(np.sqrt(count * (HIGHEST_RAD - LOWEST_RAD) / FULL_TURN))
     columns = count // lines
     rise, turn = np.meshgrid(
         np.linspace(LOWEST_RAD, HIGHEST_RAD, lines), FULL_TURN * np.arange(columns) / columns
     )
-    own = rays_of(turn.ravel(), np.pi / 2 - rise.ravel())
-    origin, rays = place / f, own @ turned.T
+    scanner_rays = rays_of(turn.ravel(), np.pi / 2 - rise.ravel())
+    origin, rays = place / f, scanner_rays @ rotation.T
     cool = tank.ranges_m(origin, rays)
-    met = np.isfinite(cool)
-    across = np.ones(len(own))
-    across[met] = incidence(tank, origin + cool[met, None] * rays[met], rays[met])
-    ranges = f * cool + bias * (1 / np.maximum(across, 0.1) - 1)
-    for one in tank.fittings:
-        if one.width_m > 0:
-            ranges = np.minimum(ranges, f * _column_ranges_m(one, origin, rays))
+    is_hit = np.isfinite(cool)
+    cosine = np.ones(len(scanner_rays))
+    cosine[is_hit] = incidence(tank, origin + cool[is_hit, None] * rays[is_hit], rays[is_hit])
+    ranges = f * cool + bias * (1 / np.maximum(cosine, 0.1) - 1)
+    for fitting in tank.fittings:
+        if fitting.width_m > 0:
+            ranges = np.minimum(ranges, f * _column_ranges_m(fitting, origin, rays))
     ranges = np.minimum(ranges, f * _floor_ranges_m(tank, origin, rays))
-    ranges += chance.normal(noise, len(own))
-    spoilt = chance.blunders(len(own), SPOILT)
+    ranges += chance.normal(noise, len(scanner_rays))
+    spoilt = chance.blunders(len(scanner_rays), SPOILT)
     ranges[spoilt] -= rng.uniform(0, FAR_M, len(spoilt))
-    seen = np.isfinite(ranges)
-    return own[seen], ranges[seen]
+    is_return = np.isfinite(ranges)
+    return scanner_rays[is_return], ranges[is_return]
 
 
 def _column_ranges_m(column, origin, rays):
-    """Where rays first meet an upright round column; inf: they do not."""
+    """Distances along rays to an upright round column, m; inf for rays that miss it."""
     x, y = origin[0] - column.x_m, origin[1] - column.y_m
     a = rays[:, 0] ** 2 + rays[:, 1] ** 2
     b = rays[:, 0] * x + rays[:, 1] * y
@@ -153,24 +174,25 @@ def _column_ranges_m(column, origin, rays):
 
 
 def _floor_ranges_m(tank, origin, rays):
-    """Where rays meet the bottom; inf: they do not."""
+    """Distances along rays to the bottom, m; inf for rays that miss it."""
     down = rays[:, 2] < -1e-3
     t = np.full(len(rays), np.inf)
-    d = rays[down]
-    length = origin[2] / -d[:, 2]
+    direction = rays[down]
+    length = origin[2] / -direction[:, 2]
+    # The bottom is nearly level, so that a vertical correction converges.
     for _ in range(20):
-        at = origin + length[:, None] * d
-        miss = at[:, 2] - tank.floor.height_m(at[:, 0], at[:, 1], tank.radius_m)
-        length = length + miss / -d[:, 2]
+        points = origin + length[:, None] * direction
+        height = points[:, 2] - tank.floor.height_m(points[:, 0], points[:, 1], tank.radius_m)
+        length = length + height / -direction[:, 2]
     t[down] = length
     return t
 
 
 def las_bytes(xyz):
-    """A LAS 1.2 file, point format 0, of coordinates in steps of 0.1 mm (no library is needed)."""
+    """Bytes of a LAS 1.2 file, point format 0, with coordinates (n, 3) in steps of 0.1 mm."""
     steps = np.round(xyz / LAS_STEP_M).astype("<i4")
     low, high = steps.min(axis=0) * LAS_STEP_M, steps.max(axis=0) * LAS_STEP_M
-    bounds = [one for pair in zip(high, low, strict=True) for one in map(float, pair)]
+    bounds = [bound for pair in zip(high, low, strict=True) for bound in map(float, pair)]
     head = struct.pack(
         "<4sHHIHH8sBB32s32sHHHIIBHI5I3d3d6d",
         *(b"LASF", 0, 0, 0, 0, 0, b"\0" * 8, 1, 2),

@@ -1,4 +1,4 @@
-"""Offsets from plumb lines round the tank; the first course is strapped."""
+"""Simulated survey by the optical reference line method, with strapping of the first course."""
 
 import numpy as np
 
@@ -6,15 +6,30 @@ from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.observers.tape import strap
 from tankcal.intercomparison.site import finish, observe_site
 
-FEWEST, ARC_M, PARTS = 8, 3.5, (0.2, 0.8)  # lines: one for so much of the circumference
-COLLIMATION_RAD, STANDS_M = 6 / 206265, 0.3  # of the plummet; its height above the foot
-READ_M = 5e-4
-REPEATS = 3  # of the straps
-CLOSE_M, MOST_STEPS = 1e-9, 60
+# Least number of lines, largest arc between them, and levels as shares of a course.
+FEWEST, ARC_M, PARTS = 8, 3.5, (0.2, 0.8)
+COLLIMATION_RAD, STANDS_M = 6 / 206265, 0.3  # collimation error of the plummet, height above foot
+READ_M = 5e-4  # standard deviation of an offset
+REPEATS = 3  # number of circumference measurements at a level
+CLOSE_M, MOST_STEPS = 1e-9, 60  # last step and number of iterations of `offsets_m`
 
 
 def observe_lines(tank, chance, asked):
-    """One plummet on lines evenly round the tank, read on both faces at two levels of a course."""
+    """Simulate offsets from equally spaced lines, on both faces at two levels of each course.
+
+    Parameters
+    ----------
+    tank : Tank
+        The true tank.
+    chance : Chance
+        Random errors.
+    asked : Asked
+        Requested conditions of the capacity table.
+
+    Returns
+    -------
+    Parts
+    """
     rng = chance.rng
     site = observe_site(tank, chance, asked, outside=True)
     strap(site, [0], REPEATS)
@@ -27,14 +42,14 @@ def observe_lines(tank, chance, asked):
     reference = PARTS[0] * tank.courses_m[0]
     feet = tank.places_m(azimuth, np.full(count, reference), outside=True)[:, :2] * site.grown
     outwards = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
-    lines = feet + stands[:, None] * outwards  # warm places of the plumb lines
+    lines = feet + stands[:, None] * outwards  # places at the temperature of the shell
     for course, (low, height) in enumerate(zip(tank.joints_m[:-1], tank.courses_m, strict=True)):
         for part in PARTS:
             z = low + part * height
-            true = offsets_m(site, lines, outwards, z)
+            offsets = offsets_m(site, lines, outwards, z)
             for face, sign in ((1, 1), (2, -1)):
-                leans = sign * kappa * (z - STANDS_M)
-                read = true + leans + chance.normal(READ_M, count)
+                tilt_errors = sign * kappa * (z - STANDS_M)
+                readings = offsets + tilt_errors + chance.normal(READ_M, count)
                 level = round(float(site.level(z)), 4)
                 is_reference = "true" if course == 0 and part == PARTS[0] else ""
                 rows += [
@@ -42,17 +57,19 @@ def observe_lines(tank, chance, asked):
                         name,
                         str(course + 1),
                         level,
-                        round(1000 * one, 3),
+                        round(1000 * offset, 3),
                         read_sd,
                         face,
                         is_reference,
                     ]
-                    for name, one in zip(names, read.tolist(), strict=True)
+                    for name, offset in zip(names, readings.tolist(), strict=True)
                 ]
     parts = site.parts
     angles = np.degrees(azimuth).round(6).tolist()
     parts.tables["lines"] = [["line", "azimuth_deg", "side"]]
-    parts.tables["lines"] += [[name, at, "outside"] for name, at in zip(names, angles, strict=True)]
+    parts.tables["lines"] += [
+        [name, azimuth_deg, "outside"] for name, azimuth_deg in zip(names, angles, strict=True)
+    ]
     parts.tables["offsets"] = rows
     parts.registers["instruments"]["ZL-1"] = {"kind": "plummet", "certificate": "simulated"}
     parts.settings["shell.shape_sd_mm"] = chance.declared(1000 * _form_m(tank), 1)
@@ -60,18 +77,31 @@ def observe_lines(tank, chance, asked):
 
 
 def offsets_m(site, lines, inwards_from, z):
-    """(n,) horizontal distances from plumb lines to the warm wall at a height of the cool tank."""
+    """Horizontal distances (n,) from vertical lines to the expanded wall, m.
+
+    Parameters
+    ----------
+    site : Site
+        Tank during the survey.
+    lines : ndarray, shape (n, 2)
+        Places of the lines.
+    inwards_from : ndarray, shape (n, 2)
+        Unit vectors outwards.
+    z : float
+        Height at the reference temperature.
+    """
     tank, f = site.tank, site.grown
-    found = np.full(len(lines), 0.2)
+    offsets = np.full(len(lines), 0.2)
     for _ in range(MOST_STEPS):
-        there = (lines - found[:, None] * inwards_from) / f
-        beyond = tank.beyond_m(np.column_stack([there, np.full(len(lines), z)]), outside=True)
-        found += f * beyond
+        places = (lines - offsets[:, None] * inwards_from) / f
+        beyond = tank.beyond_m(np.column_stack([places, np.full(len(lines), z)]), outside=True)
+        offsets += f * beyond
         if np.abs(beyond).max() < CLOSE_M:
             break
-    return found
+    return offsets
 
 
 def _form_m(tank):
+    """Standard deviation of the radius round the middle of the first course, m."""
     azimuth = FULL_TURN * np.arange(2048) / 2048
     return float(np.std(tank.radii_m(azimuth, tank.courses_m[0] / 2)))

@@ -1,4 +1,4 @@
-"""What a total station reads: angles, and distances to targets or to the bare wall."""
+"""Simulated readings of a total station: angles, and distances to targets or to the wall."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,16 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Tool:
-    """An instrument: what it adds to distances, and how its readings scatter.
+    """Errors of an instrument.
 
-    bias_m  how much more it ranges on the wall at 60 degrees of incidence than square to it
+    Attributes
+    ----------
+    scale, offset_m : float
+        Scale error and offset of distances.
+    bias_m : float
+        Additional distance to the wall at 60 degrees of incidence, compared with 0 degrees.
+    sd_m, sd_rad : float
+        Standard deviations of distances and angles.
     """
 
     scale: float = 0.0
@@ -20,45 +27,75 @@ class Tool:
 
 
 def angles_of(away, zero=0.0):
-    """Direction clockwise from a zero, and zenith angle, of vectors (n, 3)."""
+    """Directions (n,), clockwise from `zero`, and zenith angles (n,) of vectors (n, 3), rad."""
     direction = np.arctan2(away[:, 0], away[:, 1]) - zero
     return direction % (2 * np.pi), np.arctan2(np.hypot(away[:, 0], away[:, 1]), away[:, 2])
 
 
 def rays_of(direction, zenith):
-    """(n, 3) unit vectors of directions from +y and zenith angles."""
+    """Unit vectors (n, 3) of directions, clockwise from +y, and zenith angles, rad."""
     level = np.sin(zenith)
     return np.column_stack([level * np.sin(direction), level * np.cos(direction), np.cos(zenith)])
 
 
 def read_targets(chance, station, targets, tool, zero=0.0):
-    """(n, 3) direction, zenith angle, distance read to targets (n, 3)."""
-    away = np.asarray(targets, float) - station
-    direction, zenith = angles_of(away, zero)
-    length = np.linalg.norm(away, axis=1) * (1 + tool.scale) + tool.offset_m
-    read = np.column_stack([direction, zenith, length])
-    return read + chance.normal(1.0, read.shape) * [tool.sd_rad, tool.sd_rad, tool.sd_m]
+    """Simulate direction, zenith angle and distance (n, 3) to targets.
+
+    Parameters
+    ----------
+    chance : Chance
+        Random errors.
+    station : ndarray, shape (3,)
+        Place of the instrument.
+    targets : array_like, shape (n, 3)
+        Places of the targets.
+    tool : Tool
+        Errors of the instrument.
+    zero : float
+        Azimuth of the zero of the horizontal circle, rad.
+    """
+    vectors = np.asarray(targets, float) - station
+    direction, zenith = angles_of(vectors, zero)
+    length = np.linalg.norm(vectors, axis=1) * (1 + tool.scale) + tool.offset_m
+    readings = np.column_stack([direction, zenith, length])
+    return readings + chance.normal(1.0, readings.shape) * [tool.sd_rad, tool.sd_rad, tool.sd_m]
 
 
 def incidence(tank, places, rays):
-    """(n,) cosines of the angles between rays and the wall's normal at cool places (n, 3)."""
-    away = places[:, :2] - tank.axis_m(places[:, 2])
-    normal = np.column_stack([away, -(away @ tank.lean)])
+    """Cosines (n,) of the incidence of rays (n, 3) on the wall at places (n, 3).
+
+    The places are those of the tank at the reference temperature.
+    """
+    radial_vector = places[:, :2] - tank.axis_m(places[:, 2])
+    normal = np.column_stack([radial_vector, -(radial_vector @ tank.lean)])
     return np.abs(np.sum(normal * rays, axis=1)) / np.linalg.norm(normal, axis=1)
 
 
 def read_wall(chance, site, station, aims, tool, zero=0.0):
-    """(n, 3) direction, zenith angle, distance read to the warm wall from within.
+    """Simulate direction, zenith angle and distance (n, 3) to the expanded wall from inside.
 
-    station  in the frame of the survey      aims  (n, 3) where the sight goes, in that frame
+    Parameters
+    ----------
+    chance : Chance
+        Random errors.
+    site : Site
+        Tank during the survey.
+    station : array_like, shape (3,)
+        Place of the instrument in the coordinate system of the survey.
+    aims : array_like, shape (n, 3)
+        Points on the lines of sight, in the same system.
+    tool : Tool
+        Errors of the instrument.
+    zero : float
+        Azimuth of the zero of the horizontal circle, rad.
     """
     tank, f = site.tank, site.grown
-    away = np.asarray(aims, float) - station
-    rays = away / np.linalg.norm(away, axis=1, keepdims=True)
+    vectors = np.asarray(aims, float) - station
+    rays = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     origin = (np.asarray(station, float) - site.frame_m) / f
     cool = tank.ranges_m(origin, rays)
-    across = incidence(tank, origin + cool[:, None] * rays, rays)
-    direction, zenith = angles_of(away, zero)
-    length = f * cool * (1 + tool.scale) + tool.offset_m + tool.bias_m * (1 / across - 1)
-    read = np.column_stack([direction, zenith, length])
-    return read + chance.normal(1.0, read.shape) * [tool.sd_rad, tool.sd_rad, tool.sd_m]
+    cosine = incidence(tank, origin + cool[:, None] * rays, rays)
+    direction, zenith = angles_of(vectors, zero)
+    length = f * cool * (1 + tool.scale) + tool.offset_m + tool.bias_m * (1 / cosine - 1)
+    readings = np.column_stack([direction, zenith, length])
+    return readings + chance.normal(1.0, readings.shape) * [tool.sd_rad, tool.sd_rad, tool.sd_m]

@@ -1,4 +1,4 @@
-"""A tape round the outside of every course: it lies on the convex hull of the shell."""
+"""Simulated strapping of every course: the tape follows the convex hull of the outside."""
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -6,17 +6,19 @@ from scipy.spatial import ConvexHull
 from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.site import finish, observe_site
 
-LEVELS, REPEATS = (0.2, 0.8), 2
+LEVELS, REPEATS = (0.2, 0.8), 2  # levels as shares of a course, measurements at a level
+# Tape: u of its scale, thermal expansion, 1/K, certified temperature and tension.
 U_SCALE, TAPE_EXPANSION, TAPE_C, TAPE_N = 12e-6, 1.15e-5, 20.0, 50.0
+# Tape: thickness, cross-section, Young's modulus, and standard deviations of laying and reading.
 THICK_M, SECTION_MM2, TAPE_E_GPA, LAYING_M, READ_M = 2e-4, 2.5, 206.0, 3e-4, 4e-4
-PULL_SD_N = 3.0  # of the mean pull round the tank against what is read
-LONGEST_STEP_M = 0.004  # between the places that the hull is made of
+PULL_SD_N = 3.0  # standard deviation of the mean tension round the tank from the reading
+LONGEST_STEP_M = 0.004  # largest distance between points of the hull
 
 
 def girth_m(tank, z):
-    """Perimeter of the convex hull of the outside at a height of the cool tank.
+    """Perimeter of the convex hull of the outside at a height, m, at the reference temperature.
 
-    What a polygon is short of the curve between its corners is made good as for a circle.
+    The difference of length between polygon and curve is corrected as for a circle.
     """
     count = int(FULL_TURN * tank.radius_m / LONGEST_STEP_M)
     azimuth = FULL_TURN * (np.arange(count) + 0.5) / count
@@ -26,7 +28,21 @@ def girth_m(tank, z):
 
 
 def observe_tape(tank, chance, asked):
-    """Two levels of each course, twice each."""
+    """Simulate two circumferences at each of two levels of each course.
+
+    Parameters
+    ----------
+    tank : Tank
+        The true tank.
+    chance : Chance
+        Random errors.
+    asked : Asked
+        Requested conditions of the capacity table.
+
+    Returns
+    -------
+    Parts
+    """
     site = observe_site(tank, chance, asked, outside=True)
     strap(site, range(len(tank.courses_m)))
     form = _shape_m(tank)
@@ -35,7 +51,17 @@ def observe_tape(tank, chance, asked):
 
 
 def strap(site, courses, repeats=REPEATS):
-    """Put circumferences of these courses and their tape into the parts of a site."""
+    """Add simulated circumferences and the tape to the files of a site.
+
+    Parameters
+    ----------
+    site : Site
+        Tank during the survey.
+    courses : iterable of int
+        Indices of the courses.
+    repeats : int
+        Number of measurements at a level.
+    """
     tank, chance, parts = site.tank, site.chance, site.parts
     scale, read_sd = chance.normal(U_SCALE), chance.declared(1000 * READ_M)
     stiff_n = SECTION_MM2 * 1e-6 * TAPE_E_GPA * 1e9
@@ -46,6 +72,7 @@ def strap(site, courses, repeats=REPEATS):
             true = site.grown * girth_m(tank, z) + np.pi * THICK_M
             for _ in range(repeats):
                 pull = float(np.round(chance.rng.uniform(45, 60)))
+                # True length of a nominal metre: scale, temperature and tension of the tape.
                 unit = (1 + scale) * (1 + TAPE_EXPANSION * (site.shell_c - TAPE_C))
                 unit *= 1 + (pull + chance.normal(PULL_SD_N) - TAPE_N) / stiff_n
                 error = chance.normal(LAYING_M) + chance.normal(READ_M)
@@ -69,7 +96,7 @@ def strap(site, courses, repeats=REPEATS):
 
 
 def _shape_m(tank):
-    """Standard deviation of the radius round the wall, over its courses."""
+    """Standard deviation of the radius round the wall, root mean square over the courses, m."""
     azimuth = FULL_TURN * np.arange(2048) / 2048
     middles = (tank.joints_m[:-1] + tank.joints_m[1:]) / 2
     return float(np.sqrt(np.mean([np.var(tank.radii_m(azimuth, z)) for z in middles])))

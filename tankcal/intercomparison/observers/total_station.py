@@ -1,4 +1,4 @@
-"""Bare hits of the wall by a total station in the tank, off its middle."""
+"""Simulated survey by reflectorless points from a total station in the tank, off its middle."""
 
 import numpy as np
 
@@ -6,20 +6,37 @@ from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.observers.sighting import Tool, read_targets, read_wall
 from tankcal.intercomparison.site import finish, observe_site
 
+# Standard uncertainties of scale, offset and incidence bias; standard deviation of a distance.
 U_SCALE, U_OFFSET_M, U_BIAS_M, HIT_SD_M, ARCSEC = 10e-6, 5e-4, 1e-3, 1.2e-3, 1 / 206265
-HIT_SD_RAD = 5 * ARCSEC
-PARTS, COUNTS = (0.2, 0.8), (20, 24, 30)
-TOOL_HEIGHT_M, OFF_PART = 1.6, 0.15  # of the instrument; off the middle, of the radius
-TARGETS, TIMES = 3, ("2026-05-04T09:00", "2026-05-04T10:15")
-SPOILT, LADDER_M = 0.01, (0.06, 0.15)
-MOST_HITS = 2400
+HIT_SD_RAD = 5 * ARCSEC  # standard deviation of an angle
+PARTS, COUNTS = (0.2, 0.8), (20, 24, 30)  # levels as shares of a course, points per level
+TOOL_HEIGHT_M, OFF_PART = 1.6, 0.15  # height, and largest offset from the middle over the radius
+TARGETS, TIMES = 3, ("2026-05-04T09:00", "2026-05-04T10:15")  # number and times of control targets
+SPOILT, LADDER_M = 0.01, (0.06, 0.15)  # share of points on a ladder, and its distance
+MOST_HITS = 2400  # largest number of points
 
 
 def observe_hits(tank, chance, asked):
-    """One set-up, two levels of each course; its mark is the origin, its circle gives the axes."""
+    """Simulate one set-up with two levels of each course.
+
+    The ground mark of the set-up is the origin, and its horizontal circle defines the axes.
+
+    Parameters
+    ----------
+    tank : Tank
+        The true tank.
+    chance : Chance
+        Random errors.
+    asked : Asked
+        Requested conditions of the capacity table.
+
+    Returns
+    -------
+    Parts
+    """
     rng = chance.rng
-    aside = OFF_PART * tank.radius_m * rng.uniform(-1, 1, 2)
-    mark = np.array([*aside, float(tank.floor.height_m(*aside, tank.radius_m))])
+    offset = OFF_PART * tank.radius_m * rng.uniform(-1, 1, 2)
+    mark = np.array([*offset, float(tank.floor.height_m(*offset, tank.radius_m))])
     site = observe_site(tank, chance, asked, outside=False, frame_m=-np.round(mark, 3))
     height = float(np.round(TOOL_HEIGHT_M + 0.05 * rng.normal(), 3))
     station = np.array([0.0, 0.0, height])
@@ -28,15 +45,15 @@ def observe_hits(tank, chance, asked):
         HIT_SD_M, HIT_SD_RAD,
     )  # fmt: skip
     course, aims = _aims(rng, site)
-    read = read_wall(chance, site, station, aims, tool)
-    spoilt = chance.blunders(len(read), SPOILT)
-    read[spoilt, 2] -= rng.uniform(*LADDER_M, len(spoilt))
+    readings = read_wall(chance, site, station, aims, tool)
+    spoilt = chance.blunders(len(readings), SPOILT)
+    readings[spoilt, 2] -= rng.uniform(*LADDER_M, len(spoilt))
     parts = site.parts
     parts.tables["wall_hits"] = [["setup", "course", "direction_deg", "zenith_deg", "distance_m",
                                   "time"]]  # fmt: skip
     parts.tables["wall_hits"] += [
-        ["I", str(number + 1), *_angles(one), round(float(one[2]), 5), TIMES[0]]
-        for number, one in zip(course, read, strict=True)
+        ["I", str(number + 1), *_angles(reading), round(float(reading[2]), 5), TIMES[0]]
+        for number, reading in zip(course, readings, strict=True)
     ]
     parts.tables["control_readings"] = _control(site, station, tool)
     parts.tables["setups"] = [
@@ -58,7 +75,7 @@ def observe_hits(tank, chance, asked):
 
 
 def _aims(rng, site):
-    """Number of the course, and places that the sight goes to: evenly round, by lot turned."""
+    """Course indices and aimed points, equally spaced from a random azimuth at each level."""
     tank = site.tank
     count = min(int(rng.choice(COUNTS)), MOST_HITS // (2 * len(tank.courses_m)))
     course, azimuth, z = [], [], []
@@ -72,17 +89,18 @@ def _aims(rng, site):
 
 
 def _control(site, station, tool):
-    """Three targets on the wall, read before the hits and after them."""
+    """Rows of readings to three targets on the wall, before and after the wall points."""
     rows = [["setup", "target", "direction_deg", "zenith_deg", "distance_m", "time"]]
     tank, chance = site.tank, site.chance
     azimuth = FULL_TURN * (np.arange(TARGETS) + 0.2) / TARGETS
     places = site.places(azimuth, np.full(TARGETS, min(1.5, 0.4 * tank.height_m)), -0.002)
-    steady = Tool(tool.scale, tool.offset_m, 0.0, 0.5e-3, 3 * ARCSEC)
+    target_tool = Tool(tool.scale, tool.offset_m, 0.0, 0.5e-3, 3 * ARCSEC)
     for time in TIMES:
-        for k, one in enumerate(read_targets(chance, station, places, steady)):
-            rows.append(["I", f"K{k + 1}", *_angles(one), round(float(one[2]), 5), time])
+        for k, reading in enumerate(read_targets(chance, station, places, target_tool)):
+            rows.append(["I", f"K{k + 1}", *_angles(reading), round(float(reading[2]), 5), time])
     return rows
 
 
-def _angles(read):
-    return [round(float(one), 6) for one in np.degrees(read[:2])]
+def _angles(reading):
+    """Direction and zenith angle of a reading in degrees."""
+    return [round(float(angle), 6) for angle in np.degrees(reading[:2])]

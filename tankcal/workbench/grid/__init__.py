@@ -1,4 +1,4 @@
-"""The grid: a table of a job as a widget of JupyterLab and Voilà (anywidget)."""
+"""Grid: a table of a job as a widget of JupyterLab and Voilà (anywidget)."""
 
 from pathlib import Path
 
@@ -9,10 +9,10 @@ HERE = Path(__file__).parent
 
 
 class Grid(anywidget.AnyWidget):
-    """A table to be filled in; `on_msg` hands over what a person does.
+    """An editable table; `on_msg` passes on the actions of the user.
 
-    Its rows are changed in place by `put`, which sends the changed cells alone: a view that comes
-    later gets the rows as they are then.
+    `put` changes rows in place and sends only the changed cells. A view that is opened later gets
+    the current rows.
     """
 
     _esm = HERE / "grid.js"
@@ -29,7 +29,7 @@ class Grid(anywidget.AnyWidget):
     locked = traitlets.Bool().tag(sync=True)
 
     def put(self, cells):
-        """Show [(row, column, text)] in place of what these cells show."""
+        """Show new texts in cells, [(row, column, text)]."""
         for row, column, text in cells:
             self.rows[row][column] = text
-        self.send({"kind": "cells", "cells": [list(one) for one in cells]})
+        self.send({"kind": "cells", "cells": [list(cell) for cell in cells]})

@@ -1,4 +1,4 @@
-"""What a notebook shows of a result: table, calculators, wall with rejected points, budget.
+"""Views of a result in a notebook: table, calculators, wall with rejected points, budget.
 
 results_view(result)                      in the language of the job
 results_view(result, on_overrule=decide)  with buttons that call decide(point, decision, reason)
@@ -14,25 +14,24 @@ __all__ = ["results_view"]
 
 
 def results_view(result, record=None, language=None, on_overrule=None):
-    """What can be looked at of a result, as an object that displays itself.
+    """Build a view of a result that a notebook displays.
 
     Parameters
     ----------
     result : Result
-        Of `tankcal.run`.
+        Result of `tankcal.run`.
     record : dict, optional
-        Its record; None: it is made.
+        Record of the result; by default it is computed.
     language : str, optional
-        None: that which the job asks for.
+        Language of the texts; by default the language of the job.
     on_overrule : callable, optional
-        on_overrule(point, decision, reason) is called when somebody decides about a point,
-        decision "keep" or "leave_out"; None: nobody can.
+        Function on_overrule(point, decision, reason) that receives the user's decision about a
+        point, "keep" or "leave_out". By default there are no buttons for decisions.
 
     Returns
     -------
     ipywidgets.Widget or SavedView
-        A widget where ipywidgets is installed; else the same as a page without buttons, which
-        `SavedView` gives as HTML.
+        A widget if ipywidgets is installed, else a `SavedView`, an HTML page without buttons.
 
     Examples
     --------

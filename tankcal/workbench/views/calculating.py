@@ -1,7 +1,7 @@
-"""What the calculators answer: volume of a dip, dip of a volume, volume between two dips.
+"""Answers of the calculators: volume of a dip, dip of a volume, volume between two dips.
 
-The volumes, U and k are those that certificate and page state: between two rows U is that of the
-row with the larger one, a delivery that was simulated has the U of its simulation.
+Volumes, U and k agree with the certificate and the page. Between two rows, the larger U of the rows
+applies. A simulated delivery has the U of its simulation.
 """
 
 import re
@@ -15,20 +15,22 @@ from tankcal.text.digits import decimals_of, decimals_of_height, fixed
 from tankcal.text.words import say
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)")
-SAME_M = 1e-9
-MOST_LETTERS = 40  # of what was typed, in an answer
+SAME_M = 1e-9  # largest difference of dips that are treated as equal
+MOST_LETTERS = 40  # largest number of characters of the entered text in an answer
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A sentence, what stands beside it, and whether the question was refused.
+    """Answer of a calculator.
 
     Attributes
     ----------
     text : str
+        Sentence with the answer.
     facts : tuple of (str, str)
-        Labels and values.
+        Labels and values of further results.
     is_refused : bool
+        Whether the question was refused.
     """
 
     text: str
@@ -37,13 +39,13 @@ class Answer:
 
 
 def typed_number(text):
-    """The number that was typed, with a decimal point or comma; None for anything else."""
+    """Number in an entered text, with decimal point or comma, or None."""
     plain = text.strip().replace(",", ".")
     return float(plain) if len(plain) < MOST_LETTERS and _NUMBER.fullmatch(plain) else None
 
 
 class Calculator:
-    """Answers for a result, in the words of a paper of its record."""
+    """Answers for a result, in the language of a `Paper` of its record."""
 
     def __init__(self, result, paper):
         self.result, self.paper = result, paper
@@ -58,18 +60,18 @@ class Calculator:
     # ---- questions
 
     def volume_at(self, text):
-        """The volume at a dip in metres."""
+        """Answer with the volume at a dip, entered in metres."""
         dip = self._dip(text)
         if isinstance(dip, Answer):
             return dip
-        found, row = self.result.at(dip), self._worse_row(dip)
+        volume, row = self.result.at(dip), self._worse_row(dip)
         stated = self.result.intervals
         U, k = stated.U_m3[row], self.result.table.k[row] if stated.by_gum[row] else None
         facts = [self._standard(self.result.table.u_m3[row])]
-        return self._stated(found.value_m3, float(U), k, [*facts, *self._ullage(dip)])
+        return self._stated(volume.value_m3, float(U), k, [*facts, *self._ullage(dip)])
 
     def dip_of(self, text):
-        """The dip of a volume in the unit of the table."""
+        """Answer with the dip of a volume, entered in the unit of the table."""
         volume = typed_number(text)
         if volume is None:
             return self._refused(
@@ -78,10 +80,10 @@ class Calculator:
                 unit=self._unit.symbol,
             )
         try:
-            found = self.result.dip_of(volume / self._unit.factor)
+            result = self.result.dip_of(volume / self._unit.factor)
         except HeightError as error:
             return self._refused("views.refused", reason=say(self.paper.words, error.args[0]))
-        dip, u = float(found.height_m[0]), float(found.u_m[0])
+        dip, u = float(result.height_m[0]), float(result.u_m[0])
         k = float(self.result.table.at(dip).k)
         paper = self.paper
         answer = paper.word(
@@ -93,23 +95,23 @@ class Calculator:
         )
         return Answer(answer, tuple(self._ullage(dip)))
 
-    def delivery(self, one, other):
-        """The volume between two dips in metres, given in any order."""
-        dips = [self._dip(one), self._dip(other)]
+    def delivery(self, first, second):
+        """Answer with the volume between two dips, entered in metres in any order."""
+        dips = [self._dip(first), self._dip(second)]
         for dip in dips:
             if isinstance(dip, Answer):
                 return dip
         low, high = sorted(dips)
         if high - low < SAME_M:
             return self._refused("web.same_dip")
-        found = self.result.delivery(low, high)
-        facts = [] if found.k is None else [self._standard(found.u_m3)]
-        return self._stated(found.value_m3, found.U_m3, found.k, facts)
+        delivery = self.result.delivery(low, high)
+        facts = [] if delivery.k is None else [self._standard(delivery.u_m3)]
+        return self._stated(delivery.value_m3, delivery.U_m3, delivery.k, facts)
 
     # ---- parts of an answer
 
     def _dip(self, text):
-        """A dip of the table; an `Answer` that refuses it."""
+        """Dip in the range of the table, or an `Answer` that refuses the entered text."""
         heights, dip = self.result.table.height_m, typed_number(text)
         if not text.strip():
             return self._refused("web.type_dip")
@@ -125,12 +127,13 @@ class Calculator:
         return float(np.clip(dip, heights[0], heights[-1]))
 
     def _worse_row(self, dip):
-        """Number of the row that a dip is read from, of two that with the larger U."""
+        """Index of the row of a dip, or of the neighbouring row with the larger U."""
         rows = self.result.table.rows_of(dip)
         U = self.result.intervals.U_m3[rows]
         return int(rows[-1] if U[-1] >= U[0] else rows[0])
 
     def _stated(self, volume_m3, U_m3, k, facts):
+        """Answer with a volume, its U and k, and the relative U; k is None if simulated."""
         volume, U = volume_m3 * self._unit.factor, U_m3 * self._unit.factor
         least = self._unit.least
         places = decimals_of(U) if U > 0 else least
@@ -150,22 +153,27 @@ class Calculator:
         return Answer(answer, tuple(facts))
 
     def _standard(self, u_m3):
+        """Label and value of the standard uncertainty."""
         u = float(u_m3) * self._unit.factor
         places = decimals_of(u) if u > 0 else self._unit.least
         return self.paper.word("web.standard_u"), self._quantity(u, places)
 
     def _ullage(self, dip):
+        """Label and value of the ullage of a dip, if the reference height is known."""
         reference = self.result.job.datum.reference_height_m
         if reference is None:
             return []
         return [(self.paper.word("web.ullage"), self._metres(reference - dip))]
 
     def _quantity(self, value, places):
+        """Text of a volume with its unit."""
         return f"{fixed(value, places, self.paper.marks)}\N{NO-BREAK SPACE}{self._unit.symbol}"
 
     def _metres(self, height, places=None):
+        """Text of a height in metres."""
         places = decimals_of_height(height) if places is None else places
         return f"{fixed(height, places, self.paper.marks)}\N{NO-BREAK SPACE}m"
 
     def _refused(self, name, **values):
+        """Answer that refuses a question."""
         return Answer(self.paper.word(name, **values), is_refused=True)

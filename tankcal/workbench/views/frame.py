@@ -1,4 +1,4 @@
-"""A page in a frame, as a widget that tells which point is looked at in it (anywidget)."""
+"""Page in a frame, as a widget that reports the selected point (anywidget)."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import traitlets
 
 
 class Frame(anywidget.AnyWidget):
-    """A page of the report in a sandbox; `chosen` is the point that is looked at."""
+    """A page of the report in a sandbox; `chosen` is the name of the selected point."""
 
     _esm = Path(__file__).parent / "frame.js"
     page = traitlets.Unicode().tag(sync=True)

@@ -1,7 +1,7 @@
-"""Pages that a notebook frames: parts of the report's page, with its scripts and no others.
+"""Pages for frames in a notebook: parts of the page of the report, with its scripts only.
 
-The frame is a sandbox: a page in it reaches nothing of the notebook, and asks the network for
-nothing. The same page stands in a saved notebook, where its calculators and pictures still work.
+The frame is a sandbox: a page has no access to the notebook and loads nothing from the network. In
+a saved notebook, the calculators and pictures of the page still work.
 """
 
 from html import escape
@@ -15,26 +15,26 @@ from tankcal.report.web.capacity_data import calculator
 from tankcal.report.web.tank_shape import tank_view
 from tankcal.report.web.wall_map import wall_map_view
 
-HEIGHT = "44rem"
+HEIGHT = "44rem"  # height of a frame
 
 
 def table_page(paper, with_calculator=True):
-    """The page of the capacity table; its finder finds a row by its dip or any number."""
+    """Page of the capacity table, with a search for rows by dip or any number."""
     blocks = [calculator(paper)] if with_calculator else []
     return _page(paper, [*blocks, *capacity.capacity_blocks(paper)])
 
 
 def wall_page(paper):
-    """The page of the wall, unrolled and in three dimensions; None where there is nothing."""
+    """Page of the wall, unrolled and in three dimensions, or None if it would be empty."""
     blocks = [wall_map_view(paper)] if paper.record["sections"] else []
-    seen = tank_view(paper)
-    if not blocks and seen.data["reason"]:
+    shape_view = tank_view(paper)
+    if not blocks and shape_view.data["reason"]:
         return None
-    return _page(paper, [*blocks, seen])
+    return _page(paper, [*blocks, shape_view])
 
 
 def whole_page(paper):
-    """Everything on one page: of a notebook without widgets, or a saved one."""
+    """Page with all parts, for a notebook without widgets or a saved notebook."""
     record, blocks = paper.record, [calculator(paper), *capacity.capacity_blocks(paper)]
     if record["sections"]:
         blocks.append(wall_map_view(paper))
@@ -49,16 +49,17 @@ def whole_page(paper):
 
 
 def _page(paper, blocks):
+    """HTML page of blocks."""
     first = document(
         title=f"{paper.word('views.results')}, {paper.subject()}",
         language=paper.words["language"]["code"],
         notice=str(paper.record["job"]["certificate"].get("notice", "")),
     )
-    return page([one.data for one in (first, *blocks)], has_contents=False)
+    return page([block.data for block in (first, *blocks)], has_contents=False)
 
 
 def framed(html, title, height=HEIGHT):
-    """A page in a frame, as HTML."""
+    """HTML of a frame that contains a page."""
     style = f"box-sizing:border-box;width:100%;height:{height};border:1px solid #c3cad2"
     return (
         f'<iframe sandbox="allow-scripts" title="{escape(title)}" style="{style}" '
@@ -67,14 +68,14 @@ def framed(html, title, height=HEIGHT):
 
 
 class SavedView:
-    """The results as one page; `html` is that page."""
+    """Results as a single HTML page, `html`, which a notebook displays in a frame."""
 
     def __init__(self, paper):
         self._paper = paper
 
     @property
     def html(self):
-        """The page, whole."""
+        """HTML of the page with all parts."""
         return whole_page(self._paper)
 
     def _repr_html_(self):

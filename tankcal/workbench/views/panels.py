@@ -1,4 +1,4 @@
-"""The widgets of a result: table and calculators, wall with rejected points, budget."""
+"""Widgets of a result: table and calculators, wall with rejected points, budget."""
 
 from html import escape
 from importlib.util import find_spec
@@ -10,12 +10,13 @@ from tankcal.workbench.views.page import framed, table_page, wall_page
 from tankcal.workbench.views.points import PointsPanel
 from tankcal.workbench.views.supposing import BudgetPanel
 
-WIDE = {"width": "100%"}
+WIDE = {"width": "100%"}  # layout
+# Style that prevents truncated titles of tabs.
 WHOLE_TITLES = "<style>.tankcal-titled .lm-TabBar-tab { flex: 0 0 auto !important }</style>"
 
 
 def live_view(result, paper, on_overrule):
-    """The whole view as one widget."""
+    """Widget with all parts of the view as tabs."""
     word = paper.word
     parts = {"views.table": table_part(result, paper)}
     wall = wall_page(paper)
@@ -23,14 +24,14 @@ def live_view(result, paper, on_overrule):
         parts["views.wall"] = wall_part(result, paper, wall, on_overrule)
     if result.table.sources:
         parts["views.budget"] = BudgetPanel(result, paper).box
-    tabs = widgets.Tab(children=list(parts.values()), titles=[word(one) for one in parts])
+    tabs = widgets.Tab(children=list(parts.values()), titles=[word(name) for name in parts])
     view = widgets.VBox([widgets.HTML(WHOLE_TITLES), tabs], layout=WIDE)
     view.add_class("tankcal-titled")
     return view
 
 
 def frame_of(html, title):
-    """A page as a widget; one that tells nothing where anywidget is missing."""
+    """Widget with a page; without anywidget, it does not report the selected point."""
     if find_spec("anywidget") is None:
         return widgets.HTML(framed(html, title), layout=WIDE)
     from tankcal.workbench.views.frame import Frame
@@ -39,14 +40,14 @@ def frame_of(html, title):
 
 
 def table_part(result, paper):
-    """The calculators, and below them the table with its finder."""
+    """Widget with the calculators, and the table with its search below."""
     page = table_page(paper, with_calculator=False)
     table = frame_of(page, paper.word("views.table"))
     return widgets.VBox([CalculatorPanel(result, paper).box, table])
 
 
 class CalculatorPanel:
-    """Three questions: volume of a dip, dip of a volume, volume between two dips."""
+    """Three calculators: volume of a dip, dip of a volume, volume between two dips."""
 
     def __init__(self, result, paper):
         self.calculator = Calculator(result, paper)
@@ -75,7 +76,7 @@ class CalculatorPanel:
     def _shower(self, name, fields, ask):
         def show(_change=None):
             texts = [field.value for field in fields]
-            is_asked = any(one.strip() for one in texts)
+            is_asked = any(text.strip() for text in texts)
             self.answers[name].value = _answer_html(ask(*texts)) if is_asked else ""
 
         return show
@@ -91,6 +92,7 @@ def _field(label, value=""):
 
 
 def _answer_html(answer):
+    """HTML of an `Answer`."""
     colour = ' style="color:#a01818"' if answer.is_refused else ' style="font-size:1.1em"'
     facts = "".join(
         f"<br><small>{escape(name)}: {escape(value)}</small>" for name, value in answer.facts
@@ -99,7 +101,7 @@ def _answer_html(answer):
 
 
 def wall_part(result, paper, page, on_overrule):
-    """The list of rejected points beside the pictures, each telling the other what is looked at."""
+    """List of rejected points and pictures of the wall, with a common selected point."""
     points = PointsPanel(paper, on_overrule)
     if page is None:
         return points.box

@@ -1,4 +1,4 @@
-"""Rejected points one by one, and what a person decides about them."""
+"""List of rejected points, with the user's decisions about them."""
 
 from html import escape
 
@@ -12,13 +12,14 @@ from tankcal.text.words import say
 
 
 class PointsPanel(traitlets.HasTraits):
-    """The list, the point that is looked at, and buttons that decide.
+    """List of rejected points, the selected point, and buttons for decisions.
 
     Parameters
     ----------
     paper : Paper
+        Texts and record of the result.
     on_overrule : callable or None
-        on_overrule(point, decision, reason); None: nobody can decide here.
+        Function on_overrule(point, decision, reason) that receives decisions; None for no buttons.
     """
 
     chosen = traitlets.Unicode()
@@ -26,11 +27,11 @@ class PointsPanel(traitlets.HasTraits):
     def __init__(self, paper, on_overrule):
         super().__init__()
         self.paper, self.on_overrule = paper, on_overrule
-        self.points = {one.name: one for one in looked_at(paper.record)}
+        self.points = {item.name: item for item in looked_at(paper.record)}
         self.used = _used(paper.record)
         word = paper.word
         self.list = widgets.Select(
-            options=[(self._line(one), one.name) for one in self.points.values()],
+            options=[(self._line(item), item.name) for item in self.points.values()],
             value=None,
             rows=min(max(len(self.points), 3), 10),
             layout={"width": "60rem", "max_width": "100%"},
@@ -44,8 +45,8 @@ class PointsPanel(traitlets.HasTraits):
         self.previous = _button("◀ " + word("views.previous"), lambda: self.step(-1))
         self.next = _button(word("views.next") + " ▶", lambda: self.step(1))
         self.decide = {
-            one: _button(word(f"views.{one}"), lambda one=one: self.overrule(one))
-            for one in DECISIONS
+            item: _button(word(f"views.{item}"), lambda item=item: self.overrule(item))
+            for item in DECISIONS
         }
         self.list.observe(lambda change: self._choose(change["new"]), "value")
         self.observe(lambda change: self._show(), "chosen")
@@ -53,6 +54,7 @@ class PointsPanel(traitlets.HasTraits):
         self._show()
 
     def _rows(self):
+        """Widgets of the panel from top to bottom."""
         word, count = self.paper.word, len(self.points)
         heading = word("views.looked_at", count=count) if count else word("views.none_rejected")
         rows = [widgets.HTML(f"<b>{escape(heading)}</b>")]
@@ -63,22 +65,24 @@ class PointsPanel(traitlets.HasTraits):
             return rows
         return [*rows, self.reason, widgets.HBox(list(self.decide.values())), self.state]
 
-    # ---- looking
+    # ---- selection
 
     def step(self, by):
-        """Look at the next point of the list, or at the one before it."""
+        """Select the point `by` places further in the list, cyclically."""
         names = list(self.points)
         if not names:
             return
         start = -1 if by > 0 else 0
-        at = names.index(self.chosen) if self.chosen in self.points else start
-        self.chosen = names[(at + by) % len(names)]
+        place = names.index(self.chosen) if self.chosen in self.points else start
+        self.chosen = names[(place + by) % len(names)]
 
     def _choose(self, name):
+        """Select a point of the list."""
         if name is not None:
             self.chosen = name
 
     def _show(self):
+        """Show the selected point."""
         name = self.chosen
         self.list.value = name if name in self.points else None
         point, word = self.points.get(name), self.paper.word
@@ -94,28 +98,31 @@ class PointsPanel(traitlets.HasTraits):
         else:
             self.told.value = f"<div>{escape(word('views.choose_point'))}</div>"
 
-    def _line(self, one):
-        parts = [one.name, self._off(one), why(self.paper, one)]
+    def _line(self, point):
+        """Text of a point in the list: name, deviation and reason."""
+        parts = [point.name, self._deviation(point), why(self.paper, point)]
         return " · ".join(part for part in parts if part)
 
-    def _sentence(self, one):
-        parts = [self._line(one)]
-        if one.w is not None:
-            parts.append(f"w = {self.paper.number(one.w, decimals=1)}")
-        if one.azimuth_deg is not None:
-            parts.append(f"{self.paper.number(one.azimuth_deg, decimals=1)}°")
-            parts.append(self.paper.number(one.height_m, "m", decimals=3))
+    def _sentence(self, point):
+        """Text of the selected point, with test value and place."""
+        parts = [self._line(point)]
+        if point.w is not None:
+            parts.append(f"w = {self.paper.number(point.w, decimals=1)}")
+        if point.azimuth_deg is not None:
+            parts.append(f"{self.paper.number(point.azimuth_deg, decimals=1)}°")
+            parts.append(self.paper.number(point.height_m, "m", decimals=3))
         return " · ".join(parts)
 
-    def _off(self, one):
-        if one.off_m is None:
+    def _deviation(self, point):
+        """Text of the deviation of a point from the wall."""
+        if point.off_m is None:
             return ""
-        return self.paper.number(one.off_m, "mm", decimals=1)
+        return self.paper.number(point.off_m, "mm", decimals=1)
 
-    # ---- deciding
+    # ---- decisions
 
     def overrule(self, decision):
-        """Hand over a decision about the point that is looked at; refused without a reason."""
+        """Pass on a decision about the selected point; a decision requires a reason."""
         word, name = self.paper.word, self.chosen
         reason = " ".join(self.reason.value.split())
         if not reason:
@@ -124,7 +131,7 @@ class PointsPanel(traitlets.HasTraits):
         try:
             self.on_overrule(name, decision, reason)
         except InputError as error:
-            lines = [say(self.paper.words, one) for one in error.texts]
+            lines = [say(self.paper.words, text) for text in error.texts]
             self._state("\n".join(lines), "#a01818")
         except TankcalError as error:
             self._state(str(error), "#a01818")
@@ -133,20 +140,22 @@ class PointsPanel(traitlets.HasTraits):
             self._state(word(f"views.decided_{decision}", point=name), "#14603c")
 
     def _state(self, text, colour):
+        """Show a message below the buttons."""
         lines = "<br>".join(map(escape, text.splitlines()))
         self.state.value = f'<div role="status" style="color:{colour}">{lines}</div>'
 
 
 def _used(record):
-    """{name: distance from the circle of its section, m} of the points of the wall."""
+    """Deviations of the used points from the circles of their sections, {name: m}."""
     return {
-        one["point"]: one["residual_m"]
-        for one in record["points"]
-        if one["used"] and one["residual_m"] is not None
+        point["point"]: point["residual_m"]
+        for point in record["points"]
+        if point["used"] and point["residual_m"] is not None
     }
 
 
 def _button(text, act):
-    made = widgets.Button(description=text, layout={"width": "auto"})
-    made.on_click(lambda _: act())
-    return made
+    """Button that calls act()."""
+    button = widgets.Button(description=text, layout={"width": "auto"})
+    button.on_click(lambda _: act())
+    return button

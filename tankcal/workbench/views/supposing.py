@@ -1,4 +1,4 @@
-"""The budget at any height, with a factor for each u: what if this u were half?"""
+"""Budget at any height, with a factor for each standard uncertainty."""
 
 from html import escape
 
@@ -10,7 +10,7 @@ from tankcal.text.words import say
 from tankcal.workbench.views.calculating import typed_number
 from tankcal.workbench.views.what_if import sentences, suppose, table_html
 
-LARGEST, STEP = 3.0, 0.05
+LARGEST, STEP = 3.0, 0.05  # largest factor, and step of its slider
 STYLE = """<style>.tankcal-budget th, .tankcal-budget td { padding: 0 8px; line-height: 1.6;
   vertical-align: top } .tankcal-budget .left { text-align: left }
 .tankcal-budget .right, .tankcal-budget .decimal { text-align: right; white-space: nowrap;
@@ -18,12 +18,12 @@ STYLE = """<style>.tankcal-budget th, .tankcal-budget td { padding: 0 8px; line-
 
 
 class BudgetPanel:
-    """A slider for the dip, a second dip for a delivery, and a factor for each line."""
+    """Slider of the dip, second dip of a delivery, and a factor for each line of the budget."""
 
     def __init__(self, result, paper):
         self.result, self.paper = result, paper
         word, heights = paper.word, result.table.height_m
-        labels = [(paper.height(float(one)), float(one)) for one in heights]
+        labels = [(paper.height(float(item)), float(item)) for item in heights]
         wide = {"description_width": "initial"}
         self.dip = widgets.SelectionSlider(
             options=labels,
@@ -36,15 +36,17 @@ class BudgetPanel:
         self.low = widgets.Text(
             description=word("views.low_dip"), style=wide, layout={"width": "22rem"}
         )
-        supposed = suppose(result, paper, float(heights[-1]))
-        self.factors = [self._slider(name) for name in supposed.names]
+        initial = suppose(result, paper, float(heights[-1]))
+        self.factors = [self._slider(name) for name in initial.names]
         self.reset = widgets.Button(description=word("views.reset"), layout={"width": "auto"})
         self.reset.on_click(lambda _: self.put_back())
         self.totals, self.table = widgets.HTML(), widgets.HTML()
         self.table.add_class("tankcal-budget")
-        for one in (self.dip, self.low, *self.factors):
-            one.observe(self.show, "value")
-        lines = [widgets.HBox([one, self._readout(one), self._half(one)]) for one in self.factors]
+        for item in (self.dip, self.low, *self.factors):
+            item.observe(self.show, "value")
+        lines = [
+            widgets.HBox([item, self._readout(item), self._half(item)]) for item in self.factors
+        ]
         heading = widgets.HTML(f"<b>{escape(word('views.what_if'))}</b>")
         reset = widgets.HBox([self.reset])
         self.box = widgets.VBox(
@@ -61,20 +63,22 @@ class BudgetPanel:
         self.show()
 
     def _slider(self, name):
+        """Slider of the factor of a line."""
         return widgets.FloatSlider(
             value=1.0,
             min=0.0,
             max=LARGEST,
             step=STEP,
             description=name,
-            tooltip=name,  # a long one is cut
+            tooltip=name,  # the description may be truncated
             continuous_update=False,
-            readout=False,  # it knows the decimal point alone
+            readout=False,  # its readout has a decimal point in all languages
             style={"description_width": "24rem"},
             layout={"width": "44rem"},
         )
 
     def _readout(self, slider):
+        """Label with the value of a slider, with the decimal mark of the language."""
         label = widgets.Label(layout={"width": "3rem", "flex": "none"})
 
         def show(_change=None):
@@ -85,6 +89,7 @@ class BudgetPanel:
         return label
 
     def _half(self, slider):
+        """Button that sets the factor of a slider to a half."""
         button = widgets.Button(
             description="× ½",
             tooltip=self.paper.word("views.half"),
@@ -98,12 +103,12 @@ class BudgetPanel:
         return button
 
     def put_back(self):
-        """All u as they are."""
-        for one in self.factors:
-            one.value = 1.0
+        """Reset all factors to 1."""
+        for slider in self.factors:
+            slider.value = 1.0
 
     def show(self, _change=None):
-        """Compute the budget with what is chosen now."""
+        """Compute and show the budget with the current dips and factors."""
         low, text = None, self.low.value.strip()
         try:
             if text:
@@ -112,22 +117,23 @@ class BudgetPanel:
                     raise _Typed(self.paper.word("web.no_number", text=text[:40]))
                 if low >= self.dip.value:
                     raise _Typed(self.paper.word("views.not_below"))
-            factors = {i: one.value for i, one in enumerate(self.factors)}
-            found = suppose(self.result, self.paper, self.dip.value, low, factors)
+            factors = {i: slider.value for i, slider in enumerate(self.factors)}
+            supposed = suppose(self.result, self.paper, self.dip.value, low, factors)
         except _Typed as error:
             self._refuse(str(error))
             return
         except HeightError as error:
             self._refuse(say(self.paper.words, error.args[0]))
             return
-        said = "<br>".join(map(escape, sentences(self.paper, found)))
-        self.totals.value = f'<div role="status">{said}</div>'
-        self.table.value = STYLE + table_html(self.paper, found)
+        text_html = "<br>".join(map(escape, sentences(self.paper, supposed)))
+        self.totals.value = f'<div role="status">{text_html}</div>'
+        self.table.value = STYLE + table_html(self.paper, supposed)
 
     def _refuse(self, text):
+        """Show a message in place of the budget."""
         self.totals.value = f'<div role="status" style="color:#a01818">{escape(text)}</div>'
         self.table.value = ""
 
 
 class _Typed(Exception):
-    """What was typed is no dip."""
+    """The entered text is no valid dip."""

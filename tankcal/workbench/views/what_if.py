@@ -1,7 +1,7 @@
-"""What if this u were half: the budget of a volume with other u of its lines.
+"""Budget of a volume with changed standard uncertainties of its lines.
 
-U comes of the law of propagation and of the table alone, as the budget of the papers; where the
-certificate states U by Monte Carlo this is not that U, and the answer says so.
+U follows from the law of propagation, as in the budget of the report. If the certificate states a U
+by Monte Carlo, this U differs, and the answer states the difference of method.
 """
 
 from dataclasses import dataclass, replace
@@ -17,16 +17,18 @@ from tankcal.text.digits import UNKNOWN_DECIMALS, decimals_of, fixed
 
 @dataclass(frozen=True)
 class Supposed:
-    """The budget as it is, and with the factors.
+    """Budgets without and with changed standard uncertainties.
 
     Attributes
     ----------
     now, then : Budget
+        Budget without and with the factors.
     names : tuple of str
-        Of the lines, in words.
+        Names of the lines in the language.
     factors : tuple of float
+        Factor of u of each line.
     is_simulated : bool
-        Does the certificate state U by Monte Carlo there?
+        Whether the certificate states this U by Monte Carlo.
     """
 
     now: object
@@ -37,17 +39,22 @@ class Supposed:
 
 
 def suppose(result, paper, high_m, low_m=None, factors=None):
-    """`Supposed` of a dip, or of the delivery between two dips.
+    """Compute the budget of a dip, or of a delivery between two dips, with factors of u.
 
     Parameters
     ----------
     result : Result
+        Result of the job.
     paper : Paper
-        Of its record.
+        Paper of its record, for the names of the lines.
     high_m, low_m : float
-        Dips, m; low_m None: the volume below high_m.
+        Dips, m; with low_m None, the volume below high_m.
     factors : dict, optional
-        {number of a line: factor of its u}; lines that are not there stay as they are.
+        Factors of u, {index of a line: factor}; 1 for other lines.
+
+    Returns
+    -------
+    Supposed
 
     Raises
     ------
@@ -55,26 +62,26 @@ def suppose(result, paper, high_m, low_m=None, factors=None):
         For a dip outside the table.
     """
     now = result.budget(high_m, low_m)
-    every = tuple(float((factors or {}).get(i, 1.0)) for i in range(len(now.lines)))
-    then = result.budget(high_m, low_m, factors=every)
-    names = tuple(paper.input_name(one) for one in to_plain(budget_lines(now.lines)))
+    all_factors = tuple(float((factors or {}).get(i, 1.0)) for i in range(len(now.lines)))
+    then = result.budget(high_m, low_m, factors=all_factors)
+    names = tuple(paper.input_name(line) for line in to_plain(budget_lines(now.lines)))
     stated = result.at(high_m) if low_m is None else result.delivery(low_m, high_m)
-    return Supposed(now, then, names, every, stated.interval == "monte_carlo")
+    return Supposed(now, then, names, all_factors, stated.interval == "monte_carlo")
 
 
 def sentences(paper, supposed):
-    """What the budget comes to, now and then."""
+    """Sentences with volume, U, k and degrees of freedom, without and with the factors."""
     now, then = supposed.now, supposed.then
-    said = [
+    lines = [
         paper.word(
             "views.budget_now",
             volume=paper.number(now.volume_m3, "m3", u=now.U_m3),
             **_totals(paper, now),
         )
     ]
-    if any(one != 1.0 for one in supposed.factors):
+    if any(factor != 1.0 for factor in supposed.factors):
         change = 100 * (then.U_m3 / now.U_m3 - 1) if now.U_m3 > 0 else 0.0
-        said.append(
+        lines.append(
             paper.word(
                 "views.budget_then",
                 **_totals(paper, then),
@@ -82,11 +89,12 @@ def sentences(paper, supposed):
             )
         )
     if supposed.is_simulated:
-        said.append(paper.word("views.budget_simulated"))
-    return said
+        lines.append(paper.word("views.budget_simulated"))
+    return lines
 
 
 def _totals(paper, budget):
+    """Texts of U, u, k and degrees of freedom of a budget."""
     return {
         "U": paper.number(budget.U_m3, "m3", u=budget.U_m3),
         "u": paper.number(budget.u_m3, "m3", u=budget.u_m3),
@@ -96,13 +104,13 @@ def _totals(paper, budget):
 
 
 def table_html(paper, supposed):
-    """The lines with what each brings then, as HTML."""
+    """HTML table of the lines of the budget with the factors."""
     U = supposed.now.U_m3
     table = budget_table(decimals_of(U) + 1 if U > 0 else UNKNOWN_DECIMALS)
     table = table.only("input", "u", "unit", "how", "dof", "contribution_m3", "share")
     factor = Column("factor", decimals=2, heading="factor_of_u")
     input_, *others = table.columns
     lines = to_plain(budget_lines(supposed.then.lines))
-    rows = [line | {"factor": one} for line, one in zip(lines, supposed.factors, strict=True)]
+    rows = [line | {"factor": value} for line, value in zip(lines, supposed.factors, strict=True)]
     shown = replace(table, columns=(input_, factor, *others))
     return block_html(paper.show(shown, rows, on="budget_what_if").data)
