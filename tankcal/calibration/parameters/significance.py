@@ -65,7 +65,7 @@ def critical_f(parameters, dof, alpha=ALPHA):
 
 
 def f_of_group(values, covariance):
-    """Statistic x' C^-1 x / p of values (p,) and covariance (p, p); nan if not positive definite."""
+    """Statistic x' C^-1 x / p of values (p,) and covariance (p, p); nan if C is not definite."""
     values, covariance = np.asarray(values, dtype=float), np.asarray(covariance, dtype=float)
     lower = cholesky_of(covariance)
     if lower is None:
