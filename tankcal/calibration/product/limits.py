@@ -276,7 +276,7 @@ def _log_disorder(file, limits, sections, log):
         last = before.get(place, (-math.inf, -math.inf))
         now = limit.tolerance_m, limit.sd_m
         if now[0] < last[0] or now[1] < last[1]:
-            section = f"{one.part}.{one.scale}.{one.grade}"
+            section = f"{limit.part}.{limit.scale}.{limit.grade}"
             expected = message(
                 "limits_disorder", "smaller than the class before it; expected the best class first"
             )
