@@ -1,7 +1,8 @@
 """Differences between two bundles of rays after the fit of a rotation or of an orientation.
 
 With (u, v, w) = R (X - S) the ideal image of a point X is -c u / w, -c v / w (see
-tankcal.camera.model). The rotation R, and optionally the projection centre S, are adjusted to image points:
+tankcal.camera.model). The rotation R, and optionally the projection centre S, are adjusted to image
+points:
 
     rotation_between   X: the rays (x, y, -c) of the second bundle; image: that of the first
     resection          X: object points; image: that of the second bundle

@@ -77,7 +77,7 @@ class Edge:
         return float(self.levels[0] - self.levels[1])
 
     def offset(self, place):
-        """Distance of a point (2,) from the edge (px), its gradient (2,), and its variance (px2)."""
+        """Distance of a point (2,) from the edge (px), its gradient (2,) and variance (px2)."""
         q = place - self.start
         t = 2 * (q @ self.along) / self.length_px - 1
         row = np.array([1.0, t, t * t - 1 / 3])
