@@ -12,7 +12,7 @@ from tankcal.errors import reason_of
 from tankcal.messages import message
 
 COARSEST_M = 1e-4  # largest permitted spacing of float32 coordinates, m
-TOLD_EVERY_S = 0.4  # least time between two reports of progress, s
+PROGRESS_PERIOD_S = 0.4  # least time between two reports of progress, s
 
 
 def describe_cloud(path):
@@ -182,17 +182,17 @@ class _Count:
         """Add the records of a piece; raise InputError above the declared count."""
         self.read[piece.scan] += piece.read
         self._compare(piece.scan, is_done=False)
-        if self.progress and time.monotonic() - self.told >= TOLD_EVERY_S:
-            self._tell()
+        if self.progress and time.monotonic() - self.told >= PROGRESS_PERIOD_S:
+            self._report()
 
     def finish(self):
         """Check the final counts; raise InputError below the declared count."""
         for scan in range(len(self.scans)):
             self._compare(scan, is_done=True)
         if self.progress:
-            self._tell()
+            self._report()
 
-    def _tell(self):
+    def _report(self):
         self.told = time.monotonic()
         self.progress(sum(self.read), self.total, self.file.name)
 

@@ -305,19 +305,20 @@ def _summarise(difference_m, names):
     )
 
 
-def _align(one, target, xyz, place, rotation):
+def _align(reference, target, xyz, place, rotation):
     """Align points, projection centres and rotations of a block with the target.
 
-    Only the motions `one.ways` are allowed. The Gauss-Newton step is dX = t + r x X + s X about the
-    centre, where (t, r, s) is a combination of these motions.
+    Only the motions `reference.ways` are allowed. The Gauss-Newton step is dX = t + r x X + s X
+    about the centre, where (t, r, s) is a combination of these motions.
     """
-    centre, is_known = one.centre_m, np.isfinite(target) & np.isfinite(xyz)
+    centre, is_known = reference.centre_m, np.isfinite(target) & np.isfinite(xyz)
     if not is_known.any():
         return xyz, place, rotation
     xyz, place = xyz - centre, place - centre
+    # Rotations and scale are multiplied by the size of the block, so that all steps are lengths.
     size = max(float(np.nanmax(np.abs(target - centre))), 1e-9)
     scale = np.array([1, 1, 1, *(1 / size,) * 4])
-    ways = one.ways / np.linalg.norm(one.ways / scale[:, None], axis=0)
+    ways = reference.ways / np.linalg.norm(reference.ways / scale[:, None], axis=0)
     for _ in range(ROUNDS):
         design = _motion_derivatives(xyz) @ ways
         misclosure = (target - centre - xyz)[is_known]

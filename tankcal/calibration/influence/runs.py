@@ -33,7 +33,7 @@ from tankcal.messages import message
 from tankcal.pipeline.chain import adjust_job
 
 REFERENCE = "reference"
-TOLD = 3  # number of lines kept of the reason why there is no volume
+REASON_LINES = 3  # number of lines kept of the reason why there is no volume
 BAD_END = (TankcalError, np.linalg.LinAlgError)
 
 
@@ -254,7 +254,7 @@ def _adjust_and_record(job, setup, alpha, initial, top):
         try:
             volume = top.of(adjustment)
         except BAD_END as error:
-            failed = "; ".join(str(error).splitlines()[:TOLD])
+            failed = "; ".join(str(error).splitlines()[:REASON_LINES])
     result = replace(
         initial,
         outcome="adjusted",
@@ -278,10 +278,10 @@ def _make_pairs(runs):
     return tuple(_make_pair(i, j, runs[i], runs[j]) for i, j in combinations(numbers, 2))
 
 
-def _make_pair(i, j, one, other):
-    points, photos, aligned = differences(one.block, other.block)
+def _make_pair(i, j, first, second):
+    points, photos, aligned = differences(first.block, second.block)
     volume = percent = None
-    if one.volume is not None and other.volume is not None:
-        volume = other.volume.value_m3 - one.volume.value_m3
-        percent = 100 * volume / one.volume.value_m3
+    if first.volume is not None and second.volume is not None:
+        volume = second.volume.value_m3 - first.volume.value_m3
+        percent = 100 * volume / first.volume.value_m3
     return Pair(i, j, points, photos, aligned, volume, percent)

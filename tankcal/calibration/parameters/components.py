@@ -98,6 +98,7 @@ def components(names, covariance, values=None, *, of="correlation", unscaled=Fal
     lower = cholesky_of(matrix)
     weight = np.ones_like(sd) if of == "correlation" else sd
     eigenvalues, vectors = _decompose(correlations(matrix), lower, weight)
+    # Loadings c_ij sqrt(lambda_j) / sd(x_i)
     root = np.sqrt(np.where(eigenvalues > 0, eigenvalues, np.nan))
     loadings = vectors * root / weight[:, None]
     vectors, loadings = _orient(vectors, loadings, weight)

@@ -84,6 +84,7 @@ def expected_px(parts, design_px, divisor):
     float
     """
     total = 0.0
+    # P = I - Q Q', with an orthonormal basis Q of the design matrix
     basis = None if design_px is None else np.linalg.qr(design_px / _column_norms(design_px))[0]
     for derivatives, covariance in parts:
         projected = derivatives if basis is None else derivatives - basis @ (basis.T @ derivatives)

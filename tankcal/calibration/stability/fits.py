@@ -58,6 +58,7 @@ def rays(ideal_mm, c_mm):
 def nearest_rotation(to, of):
     """Rotation R (3, 3) that minimises |to - R of|^2, with `to` and `of` (n, 3) as unit vectors."""
     to, of = (vectors / np.linalg.norm(vectors, axis=1)[:, None] for vectors in (to, of))
+    # The sign makes the determinant +1, a rotation without reflection.
     left, _, right = np.linalg.svd(to.T @ of)
     sign = np.sign(np.linalg.det(left) * np.linalg.det(right))
     return left @ np.diag([1.0, 1.0, sign]) @ right

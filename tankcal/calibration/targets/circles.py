@@ -205,6 +205,8 @@ def _fit_ellipse(image, centre, axes, turn, blur):
         return None
     unit = 1 / axes[0]
 
+    # Unknowns e: shift of the centre (2), relative changes of L (3), log blur, white, black, and
+    # gradient (2)
     def misclosures(e):
         distance = _distances(places - e[:2], elements * (1 + e[2:5]))
         share = ndtr(-distance / np.exp(np.clip(e[5], -3, 3)))
@@ -231,6 +233,7 @@ def _result_of_fit(fit, centre, elements, count):
     axes = 1 / values
     if np.hypot(*e[:2]) > axes[0]:
         return None
+    # Covariance of the centre, variance (J'J)^-1, from the pseudo-inverse of the scaled Jacobian
     variance = 2 * fit.cost / dof
     scale = np.linalg.norm(fit.jac, axis=0)
     if not (scale > 0).all():

@@ -164,6 +164,7 @@ def _read_cells(image, corners, cells):
     """
     cv2 = opencv()
     n = len(cells)
+    # The homography from cells to pixels gives the positions of the samples in the photo.
     square = np.array([[0, 0], [n, 0], [n, n], [0, n]], dtype=np.float32)
     matrix = cv2.getPerspectiveTransform(square, corners.astype(np.float32))
     middles = np.arange(n)[:, None] + 0.5 + SAMPLES

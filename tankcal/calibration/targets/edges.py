@@ -288,6 +288,7 @@ class _Model:
         k, s, z, inner, outer, dark, out = self._parts(e)
         high, low, gradient, beyond = e[k + 1 :]
         gain = 1 + gradient * self.t
+        # The derivative of F is the normal density; the chain rule applies to each term.
         density, of_code, of_outer = (np.exp(-q * q / 2) / _ROOT for q in (z, inner, outer))
         of_code = self.row_of_code * of_code
         slope = gain * (low - high)
@@ -319,6 +320,7 @@ def _inverse_normal(jacobian):
 def _intersect(before, after, start):
     """Intersection (2,) of two edges, px, and its covariance matrix (2, 2), px2."""
     place = np.array(start, dtype=float)
+    # Newton iteration for the point at distance zero from both curves
     for _ in range(6):
         first, second = before.offset(place), after.offset(place)
         gradient = np.array([first[1], second[1]])

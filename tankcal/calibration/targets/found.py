@@ -69,6 +69,7 @@ class Marker:
 def _diagonals(corners):
     """Intersection of the diagonals of corners (4, 2), and its derivatives (4, 2, 2) by them."""
     first, second = corners[2] - corners[0], corners[3] - corners[1]
+    # corner 0 + s first = corner 1 + t second
     matrix = np.column_stack([first, -second])
     s, t = np.linalg.solve(matrix, corners[1] - corners[0])
     place = corners[0] + s * first

@@ -28,7 +28,7 @@ from tankcal.job.tables import Log, shown
 from tankcal.messages import join_with_or, message
 
 WHAT = ("corners", "centres", "circles")
-CHANCE_TOLD = 1e-4  # probability of a code in random cells above which a warning is given
+WARNED_CHANCE = 1e-4  # probability of a code in random cells above which a warning is given
 
 
 @dataclass(frozen=True)
@@ -347,7 +347,7 @@ def _warn(photos, wanted, names, log):
     _warn_of_names(photos, wanted, names, log)
     if wanted.what != "circles" and names is None:
         chance = dictionary_of(wanted.dictionary).chance
-        if chance > CHANCE_TOLD:
+        if chance > WARNED_CHANCE:
             expected = message(
                 "targets_chance",
                 "by chance, one of {frames:.0f} black frames with anything inside is read as "

@@ -302,6 +302,7 @@ def _find_mirror_images(counts, level, grid):
     bins, number = grid.bins, np.arange(grid.bins)
     at = np.clip(np.floor((level - grid.low_m) / BIN_M), 0, bins - 1).astype(np.int64)[..., None]
     low = np.where(number < at - CLEAR_BINS, counts, 0)
+    # A bin n below the bottom at bin `at` is a mirror image if bin 2 at - n above it has points.
     above = scipy.ndimage.maximum_filter1d(counts, 2 * MIRROR_BINS + 1, axis=2)
     image = np.clip(2 * at - number, 0, bins - 1)
     mirrored = np.where(np.take_along_axis(above, image, axis=2) > 0, low, 0).sum(axis=2)
@@ -371,6 +372,7 @@ def bottom_points(bottom, most=400):
         blocks, place, cells = np.unique(block, return_inverse=True, return_counts=True)
         if len(blocks) <= most:
             break
+    # Blocks of more than one cell have the height of a quadratic at the mean position.
     values = bottom.xyz_m[column, row]
     xyz = np.column_stack([np.bincount(place, value) / cells for value in values.T])
     for i, value in enumerate(blocks) if side > 1 else ():
@@ -378,6 +380,7 @@ def bottom_points(bottom, most=400):
         low, high = np.maximum(first - 1, 0), first + side + 1
         window = np.s_[low[0] : high[0], low[1] : high[1]]
         xyz[i, 2] = _height_at(xyz[i], bottom.xyz_m[window][shown[window]])
+    # The variance is averaged, not reduced: neighbouring cells share errors.
     variance = np.bincount(place, bottom.sd_m[column, row] ** 2) / cells
     of_scans = bottom.by_scan[column, row].astype(float)
     of_scans /= np.maximum(of_scans.sum(axis=1, keepdims=True), 1)

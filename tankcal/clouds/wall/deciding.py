@@ -24,7 +24,7 @@ from tankcal.geometry.outlines import FULL_TURN
 
 LEAST_SD_M = 5e-5  # least standard deviation of the mean of a cell, m
 # Distance of cells without common noise along a scan line, m; least number of values for a scatter
-APART_M, FEWEST_TOLD = 0.4, 20
+APART_M, FEWEST_DIFFERENCES = 0.4, 20
 
 
 @dataclass(frozen=True)
@@ -292,5 +292,7 @@ def _scatter_of_cells(radius, course, row_m, column_m):
                 e = e - np.nanmedian(e, axis=1, keepdims=True)
                 differences.setdefault((direction, lag), []).append(e[np.isfinite(e)])
     scatters = [np.concatenate(item) for item in differences.values()]
-    scatters = [SD_OVER_MEDIAN * np.median(np.abs(e)) for e in scatters if len(e) >= FEWEST_TOLD]
+    scatters = [
+        SD_OVER_MEDIAN * np.median(np.abs(e)) for e in scatters if len(e) >= FEWEST_DIFFERENCES
+    ]
     return float(max(scatters, default=0.0) / np.sqrt(1.5))

@@ -245,6 +245,7 @@ def _join_patches(runs, label, shape, column_m, row_m, bin_m):
     size = np.bincount(label, minlength=1)
     size[0] = 0
     wall = (label == np.argmax(size)) & (label > 0)
+    # A joined patch extends the wall, so that further patches can join in the next iteration.
     waiting = [patch for patch in np.argsort(-size, kind="stable") if size[patch] >= LEAST_PATCH][
         1:
     ]
@@ -314,6 +315,8 @@ def _choose_wall_modes(runs, wall, shape):
     index = np.flatnonzero(wall)
     order = index[np.argsort(runs.count[index], kind="stable")]
     chosen[runs.cell[order]] = order
+    # The fullest mode is the default. Cells with several modes take the mode nearest to the trend
+    # of the cells with a single mode.
     several = np.bincount(runs.cell[index], minlength=cells) > 1
     if not several.any():
         return chosen

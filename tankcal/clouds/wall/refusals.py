@@ -104,6 +104,7 @@ def _median_about_own_axis(distance_m, chosen):
     values, column = distance_m[chosen], np.nonzero(chosen)[1]
     if len(np.unique(column)) < columns * LEAST_TURN:
         return np.median(values)
+    # A shift of the axis changes the distance by a sin t + b cos t.
     turn = column * (FULL_TURN / columns)
     design = np.column_stack([np.sin(turn), np.cos(turn), np.ones(len(turn))])
     near = np.ones(len(values), dtype=bool)
