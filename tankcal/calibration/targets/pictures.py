@@ -93,9 +93,9 @@ def _tags(data):
     return tags
 
 
-MOST_PIXELS = 250_000_000
-LEAST_SIDE_PX = 32
-MOST_BYTES = 1_000_000_000
+MOST_PIXELS = 250_000_000  # largest number of pixels of a picture
+LEAST_SIDE_PX = 32  # least number of columns and of lines
+MOST_BYTES = 1_000_000_000  # largest size of a picture file
 KINDS = message("targets_kinds", "a JPEG, PNG, TIFF or BMP picture")
 PHOTO = Field("photo", "name", "the photo")
 ENCODINGS = ("by_file", "linear", "srgb")
@@ -234,5 +234,6 @@ def _light(image, encoding):
         most = max(float(light.max()), 1.0)  # 12-bit cameras store 16 bits
     light *= np.float32(1 / most)
     if encoding == "srgb":
+        # Inverse of the sRGB transfer function
         light = np.where(light <= 0.04045, light / 12.92, ((light + 0.055) / 1.055) ** 2.4)
     return light.astype(np.float32) * np.float32(255)

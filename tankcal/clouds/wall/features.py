@@ -29,7 +29,7 @@ PIPE_WIDTH_M, RING_ARC, RING_HEIGHT_M, NOZZLE_M = 1.0, np.pi / 3, 0.6, 1.5
 
 @dataclass(frozen=True)
 class Joint:
-    """Step of the radius at a joint of two courses.
+    """Step of the radius between rows, proposed as a joint of two courses.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Obstruction:
     azimuth_rad : tuple of float
         First and last azimuth, clockwise, rad; the last may exceed 2 pi.
     height_m : tuple of float
-        Lowest and highest point in the frame of the points, m.
+        Lower and upper end in the frame of the points, m.
     distance_m : tuple of float
         Quantiles of 5 % and 95 % of the distances seen, from the mean surface, m, positive
         outwards; nan if nothing is seen.
