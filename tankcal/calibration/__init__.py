@@ -1,21 +1,21 @@
-"""Cameras: which parameters belong, are two calibrations the same, what does a wrong one do.
+"""Camera calibration: choice of parameters, stability, and influence on the capacity.
 
-Names are resolved when they are first used.
+Functions are imported when they are first used.
 """
 
 from importlib import import_module
 
-_ROOM_OF = {
+_MODULES = {
     "analyse_job": "calibration.parameters.analysis",
     "analyse_record": "calibration.parameters.analysis",
     "compare": "calibration.stability.comparison",
     "read_cameras": "job.calibrations",
 }
 
-__all__ = [*_ROOM_OF]
+__all__ = [*_MODULES]
 
 
 def __getattr__(name):
-    if name not in _ROOM_OF:
+    if name not in _MODULES:
         raise AttributeError(f"module 'tankcal.calibration' has no attribute {name!r}")
-    return getattr(import_module(f"tankcal.{_ROOM_OF[name]}"), name)
+    return getattr(import_module(f"tankcal.{_MODULES[name]}"), name)

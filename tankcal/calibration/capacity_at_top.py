@@ -1,7 +1,7 @@
-"""The capacity of a tank at the top of its table: what a camera is worth in the end.
+"""Capacity of a tank at the top of its table, for the comparison of camera models.
 
-All adjustments of one survey go through the same points of the wall, those that the first of them
-accepted: else a point more or less would look like an effect of the camera.
+All adjustments of a survey use the points of the wall that the first adjustment accepted. Otherwise
+a different set of points would appear as an effect of the camera.
 """
 
 from dataclasses import dataclass, replace
@@ -13,15 +13,23 @@ from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.survey_warnings import refuse_undetermined
 from tankcal.survey import wall_points
 
-STEP_M = 0.1  # of the table: only its top row is wanted
+STEP_M = 0.1  # step of the table, m; only its top row is used
 
 
 @dataclass(frozen=True)
 class TopVolume:
     """Volume of the tank at the top of its table.
 
-    value_m3, u_m3  with its standard uncertainty       U_m3, k  expanded, and its factor
-    height_m        dip of the top                      points   of the wall; None: not surveyed
+    Attributes
+    ----------
+    value_m3, u_m3 : float
+        Volume and its standard uncertainty, m3.
+    U_m3, k : float
+        Expanded uncertainty, m3, and coverage factor.
+    height_m : float
+        Dip at the top of the table, m.
+    points : int or None
+        Number of points of the wall, or None if the wall was not surveyed.
     """
 
     value_m3: float
@@ -33,30 +41,31 @@ class TopVolume:
 
 
 class TopOfTank:
-    """Volumes at the top of a job's tank, by different adjustments of its survey."""
+    """Volumes at the top of the tank of a job, from different adjustments of its survey."""
 
     def __init__(self, job):
         self.job, self._wall = job, None
 
     def of(self, adjustment):
-        """The TopVolume by a survey.Adjustment; the first one finds the points of the wall.
+        """Return the TopVolume from a survey.Adjustment.
 
-        Raises SolutionError or InputError where there is no capacity.
+        The first call selects the points of the wall for all calls. Raises SolutionError or
+        InputError if the capacity cannot be computed.
         """
         refuse_undetermined(adjustment.datum)
         if self._wall is None:
-            accepted = self._result(adjustment)
+            accepted = self._run(adjustment)
             points = accepted.job.points.names
             if accepted.accepted is not None:
                 self._wall = frozenset(points[i] for i in accepted.accepted)
-        return _top_of(self._result(adjustment))
+        return _top_volume(self._run(adjustment))
 
-    def _result(self, adjustment):
+    def _run(self, adjustment):
         job = self.job
         points = wall_points(adjustment, job.measurements, job.survey.side)
         points, snooping = s_transform(points), job.snooping
         if self._wall is not None:
-            points, snooping = _chosen(points, self._wall), False
+            points, snooping = _select_points(points, self._wall), False
         table = replace(
             job.table, step_m=STEP_M, height_unit="m", fine_step_m=None, fine_zones=(),
             max_interpolation_error_m3=None, other_densities_kg_m3=(),
@@ -65,7 +74,7 @@ class TopOfTank:
         return run(job, simulated=False)
 
 
-def _top_of(result):
+def _top_volume(result):
     height_m = float(result.table.height_m[-1])
     top, accepted = result.at(height_m), result.accepted
     points = None if accepted is None else len(accepted)
@@ -73,9 +82,10 @@ def _top_of(result):
     return TopVolume(*values, height_m, points)
 
 
-def _chosen(points, names):
-    """The job.Points with these names, in their order."""
+def _select_points(points, names):
+    """Select the points with these names from a job.Points."""
     rows = np.array([i for i, name in enumerate(points.names) if name in names], dtype=int)
+    # Columns x, y and z of each point in the covariance matrix
     columns = (3 * rows[:, None] + np.arange(3)).ravel()
     return replace(
         points,
@@ -85,5 +95,5 @@ def _chosen(points, names):
         section=tuple(points.section[i] for i in rows),
         generatrix=tuple(points.generatrix[i] for i in rows),
         rows=tuple(points.rows[i] for i in rows),
-        causes=tuple(replace(one, column_m=one.column_m[columns]) for one in points.causes),
+        causes=tuple(replace(cause, column_m=cause.column_m[columns]) for cause in points.causes),
     )

@@ -1,9 +1,11 @@
-"""Distortion curves of a camera against the radius in the image, with standard deviations.
+"""Distortion curves of a camera as functions of the radius in the image, with standard deviations.
 
-The radial curve is the measured radius less the corrected one, by the radial terms alone, so it
-means the same in every convention; the decentring profile is sqrt(P1^2 + P2^2) r^2 (1 + P3 r^2 +
-P4 r^4): on the circle of radius r it shifts by up to three times that along the radius, and by up
-to once that across. Source: Brown 1971.
+The radial curve is the measured radius less the radius corrected by the radial terms alone. This
+definition is the same in every convention. The decentring profile is
+sqrt(P1^2 + P2^2) r^2 (1 + P3 r^2 + P4 r^4). On the circle of radius r the largest shift is three
+times the profile in the radial direction, and once the profile in the tangential direction.
+
+Source: Brown 1971.
 """
 
 import numpy as np
@@ -18,7 +20,7 @@ DECENTRING = slice(PARAMETERS.index("P1"), PARAMETERS.index("P4") + 1)
 def radial_curve(radius_mm, interior, form, covariance=None):
     """Radial distortion at measured radii, and its standard deviation.
 
-    Linear propagation; the derivatives are those of the image equations.
+    The standard deviation follows from the law of propagation of uncertainty.
 
     Parameters
     ----------
@@ -27,37 +29,42 @@ def radial_curve(radius_mm, interior, form, covariance=None):
     interior : array_like, shape (13,)
         Interior parameters in the order of tankcal.camera.model.PARAMETERS.
     form : tankcal.camera.model.Form
-        How the distortion is written.
+        Form of the distortion model.
     covariance : ndarray, shape (4, 4), optional
-        Of K1, K2, K3, K4.
+        Covariance matrix of K1, K2, K3, K4.
 
     Returns
     -------
     curve_mm : ndarray, shape (n,)
         Radial distortion, mm.
     sd_mm : ndarray, shape (n,), or None
-        Its standard deviation, mm; None without a covariance.
+        Standard deviation of the radial distortion, mm; None without a covariance.
     """
     radius = np.asarray(radius_mm, dtype=float)
     radial = np.zeros(len(PARAMETERS))
     radial[RADIAL] = np.asarray(interior, dtype=float)[RADIAL]
-    along = correct_image_points(np.column_stack([radius, np.zeros_like(radius)]), radial, form)[
-        :, 0
-    ]
+    corrected = correct_image_points(
+        np.column_stack([radius, np.zeros_like(radius)]), radial, form
+    )[:, 0]
     if covariance is None:
-        return radius - along, None
-    of_ideal = form.convention == "distortion_of_ideal"
-    at = along if of_ideal else radius
-    slope = distort(at, 0.0 * at, radial, form.numbers)[2]
-    by_k = np.array(distortion_derivatives(at, 0.0 * at, radial, form.numbers)[0][:4])
-    if of_ideal:
+        return radius - corrected, None
+    # The polynomial is a function of the corrected or of the measured radius, by convention.
+    is_of_ideal = form.convention == "distortion_of_ideal"
+    radius_of_polynomial = corrected if is_of_ideal else radius
+    slope = distort(radius_of_polynomial, 0.0 * radius_of_polynomial, radial, form.numbers)[2]
+    by_k = np.array(
+        distortion_derivatives(
+            radius_of_polynomial, 0.0 * radius_of_polynomial, radial, form.numbers
+        )[0][:4]
+    )
+    if is_of_ideal:  # derivative at a fixed measured radius, by implicit differentiation
         by_k = by_k / (1.0 + slope)
     variance = np.einsum("in,ij,jn->n", by_k, np.asarray(covariance, dtype=float), by_k)
-    return radius - along, np.sqrt(variance)
+    return radius - corrected, np.sqrt(variance)
 
 
 def decentring_profile(radius_mm, interior):
-    """Decentring profile, without sign: a third of the largest shift along the radius.
+    """Magnitude of the decentring profile, a third of the largest radial shift.
 
     Parameters
     ----------
@@ -69,7 +76,7 @@ def decentring_profile(radius_mm, interior):
     Returns
     -------
     ndarray, shape (n,)
-        The profile, mm.
+        Decentring profile, mm.
 
     Examples
     --------

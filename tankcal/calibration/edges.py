@@ -1,16 +1,16 @@
-"""How far a parameter shifts image points, over the frame and at its corners.
+"""Shift of image points by a parameter of the camera, over the frame and at its corners.
 
-Three answers for one parameter:
+Three shifts are computed for a parameter:
 
-    own          the shift that its value makes: distortion with it less distortion without
-    left         what is left of that when it is dropped and the other parameters of the camera take
-                 over: the two bundles of rays, compared at the principal distance of the first,
+    own          distortion with the value of the parameter less distortion without it
+    left         remaining shift if the parameter is dropped and the other parameters compensate it:
+                 difference of the two bundles of rays at the principal distance of the first,
                  corrected(x) - corrected'(x) c / c'
-    left_turned  the same after the second bundle has been turned to fit by three small rotations,
-                 as the photos would turn: a shift of the principal point hardly counts then
+    left_turned  remaining shift after three small rotations of the second bundle; they correspond
+                 to rotations of the photos and absorb most of a shift of the principal point
 
-Frame: the declared format, else the rectangle of the farthest image points; GRID by GRID points.
-Source: Pessoa 2017 (14-19) for the comparison of bundles.
+The frame is the declared format, or else the rectangle of the farthest image points, with GRID by
+GRID points. Source: Pessoa 2017 (14-19) for the comparison of bundles.
 """
 
 from dataclasses import dataclass
@@ -20,25 +20,24 @@ import numpy as np
 from tankcal.camera.imaging import apply_first_affinity, distort
 from tankcal.camera.model import CONVENTIONS, PARAMETERS, correct_image_points
 
-GRID = 21
+GRID = 21  # points along each side of the frame
 
 
 @dataclass(frozen=True)
 class Shift:
-    """Size of a shift over the frame.
-
-    In um and in px; px is nan where the size of a pixel is not known.
+    """Size of a shift over the frame, in um and px; px is nan if the pixel size is not known.
 
     Attributes
     ----------
     corner_um, corner_px : float
-        At the worst corner.
+        Largest shift at a corner.
     largest_um, largest_px : float
-        Largest anywhere.
+        Largest shift in the frame.
     rms_um, rms_px : float
-        Root mean square.
+        Root mean square over the frame.
     seen_um, seen_px : float
-        Largest within the reach of the image points; what lies beyond is extrapolated.
+        Largest shift within the radius of the farthest image point; shifts beyond this radius are
+        extrapolated.
     """
 
     corner_um: float
@@ -53,16 +52,16 @@ class Shift:
 
 @dataclass(frozen=True)
 class Frame:
-    """The frame of an image.
+    """Frame of an image.
 
     Attributes
     ----------
     half_mm : ndarray, shape (2,)
-        Half width and height, from its middle, mm.
+        Half the width and half the height, mm.
     reach_mm : float
-        Distance of the farthest image point from the middle, mm; inf where it is not known.
+        Distance of the farthest image point from the centre, mm; inf if it is not known.
     pixel_mm : ndarray, shape (2,), or None
-        Sides of a pixel, mm.
+        Sides of a pixel, mm; None if they are not known.
     """
 
     half_mm: np.ndarray
@@ -71,12 +70,12 @@ class Frame:
 
     @property
     def corner_mm(self):
-        """Distance of the corners from the middle."""
+        """Distance of the corners from the centre, mm."""
         return float(np.hypot(*self.half_mm))
 
 
 def own_shift(name, interior, form, frame):
-    """The shift that the value of a parameter makes by itself.
+    """Shift of image points by the value of one parameter.
 
     Parameters
     ----------
@@ -85,14 +84,14 @@ def own_shift(name, interior, form, frame):
     interior : array_like, shape (13,)
         Values of the interior parameters.
     form : tankcal.camera.model.Form
-        How the distortion is written.
+        Form of the distortion model.
     frame : Frame
         Frame of the image.
 
     Returns
     -------
     Shift or None
-        None for c, which is scale.
+        None for the principal distance c, which changes only the scale.
     """
     if name == "c":
         return None
@@ -101,59 +100,79 @@ def own_shift(name, interior, form, frame):
     if name in ("x0", "y0"):
         moved = np.zeros_like(points)
         moved[:, number - 1] = q[number]
-        return _shift(moved, points, frame)
-    lacking = np.where(np.arange(len(q)) == number, 0.0, q)
+        return _size_of_shift(moved, points, frame)
+    # Difference of the distortion with the parameter and with the parameter set to zero
+    q_without = np.where(np.arange(len(q)) == number, 0.0, q)
     x, y = (points - q[1:3]).T
     side = CONVENTIONS[form.convention] or 1.0
 
     def shifted(p):
-        """(2, n) shift by an affinity before the distortion, and by the distortion after it."""
-        at = apply_first_affinity(x, y, p, form.numbers)
-        return np.array(at) - (x, y) + side * np.array(distort(*at, p, form.numbers)[:2])
+        """Shift (2, n) by the affinity and then the distortion, with interior parameters p."""
+        transformed = apply_first_affinity(x, y, p, form.numbers)
+        return (
+            np.array(transformed)
+            - (x, y)
+            + side * np.array(distort(*transformed, p, form.numbers)[:2])
+        )
 
-    with_it, without_it = shifted(q), shifted(lacking)
-    return _shift((with_it - without_it).T, points, frame)
+    shift_with, shift_without = shifted(q), shifted(q_without)
+    return _size_of_shift((shift_with - shift_without).T, points, frame)
 
 
 def left_shifts(interior, others, form, frame):
-    """The Shift between two cameras, and the Shift after the second has been turned to fit.
+    """Shift between two cameras, before and after rotating the second to the best fit.
 
-    interior, others  (13,) values with the parameter, and without it
+    Parameters
+    ----------
+    interior, others : array_like, shape (13,)
+        Values of the interior parameters with and without the dropped parameter.
+    form : tankcal.camera.model.Form
+        Form of the distortion model.
+    frame : Frame
+        Frame of the image.
+
+    Returns
+    -------
+    tuple of Shift
+        Shift before and after the rotation.
     """
     q, p = np.array(interior, dtype=float), np.array(others, dtype=float)
     points = frame_points(frame.half_mm)
     ideal = correct_image_points(points, q, form)
-    moved = correct_image_points(points, p, form) * (q[0] / p[0]) - ideal
-    turned = moved.ravel()
-    ways = _rotations(ideal, q[0]).reshape(-1, 3)
-    turned = turned - ways @ np.linalg.lstsq(ways, turned, rcond=None)[0]
-    return _shift(moved, points, frame), _shift(turned.reshape(-1, 2), points, frame)
+    # Compare both bundles at the principal distance of the first camera.
+    difference = correct_image_points(points, p, form) * (q[0] / p[0]) - ideal
+    rotated = difference.ravel()
+    rotations = _rotation_derivatives(ideal, q[0]).reshape(-1, 3)
+    rotated = rotated - rotations @ np.linalg.lstsq(rotations, rotated, rcond=None)[0]
+    return _size_of_shift(difference, points, frame), _size_of_shift(
+        rotated.reshape(-1, 2), points, frame
+    )
 
 
 def frame_points(half_frame_mm):
-    """(GRID GRID, 2) points that cover the frame, its four corners among them, mm."""
+    """Regular points of the frame including its four corners, shape (GRID GRID, 2), mm."""
     axis = np.linspace(-1.0, 1.0, GRID)
     grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
     return grid * np.asarray(half_frame_mm, dtype=float)
 
 
-def _rotations(ideal_mm, c_mm):
-    """(n, 2, 3) change of ideal points by small rotations of the camera about x, y, z."""
+def _rotation_derivatives(ideal_mm, c_mm):
+    """Derivatives (n, 2, 3) of ideal image points by rotations of the camera about x, y, z."""
     x, y = (ideal_mm / c_mm).T
-    one = np.ones_like(x)
-    by_x = np.stack([x * y, one + y * y], axis=1)
-    by_y = np.stack([-one - x * x, -x * y], axis=1)
+    ones = np.ones_like(x)
+    by_x = np.stack([x * y, ones + y * y], axis=1)
+    by_y = np.stack([-ones - x * x, -x * y], axis=1)
     by_z = np.stack([y, -x], axis=1)
     return c_mm * np.stack([by_x, by_y, by_z], axis=2)
 
 
-def _shift(moved_mm, points_mm, frame):
+def _size_of_shift(moved_mm, points_mm, frame):
     corners = [0, GRID - 1, GRID * (GRID - 1), GRID * GRID - 1]
-    seen = np.hypot(*points_mm.T) <= frame.reach_mm
+    is_in_reach = np.hypot(*points_mm.T) <= frame.reach_mm
     unknown = np.full(2, np.nan)
     pixel = unknown if frame.pixel_mm is None else np.asarray(frame.pixel_mm, dtype=float)
     um, px = (
-        (size[corners].max(), size.max(), np.sqrt(np.mean(size**2)), size[seen].max())
+        (size[corners].max(), size.max(), np.sqrt(np.mean(size**2)), size[is_in_reach].max())
         for size in (np.hypot(*(moved_mm / unit).T) for unit in (np.full(2, 1e-3), pixel))
     )
     return Shift(*(float(value) for pair in zip(um, px, strict=True) for value in pair))

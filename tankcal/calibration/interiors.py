@@ -1,6 +1,6 @@
-"""The sets of interior parameters that an adjustment gave, or that a record keeps.
+"""Sets of interior parameters of an adjustment or of a record.
 
-Photos with the same parameters share a set.
+Photos with common parameters belong to one set.
 """
 
 from dataclasses import dataclass
@@ -13,24 +13,38 @@ from tankcal.camera.model import AFFINITIES, CONVENTIONS, PARAMETERS, Form
 from tankcal.errors import InputError, Problem, reason_of
 from tankcal.messages import Message, list_some, message
 
-MOST_NAMES = 20  # in a message
+MOST_NAMES = 20  # largest number of names in a message
 
 
 @dataclass(frozen=True)
 class Interior:
     """One set of interior parameters.
 
-    camera        name                 photos     names of those of the set, None: all of the camera
-    form          camera.Form
-    values        (13,) mm, in the order of PARAMETERS
-    scope, state  (13,) as in network.Camera
-    free          names (k,) of the parameters that were adjusted
-    covariance    (k, k) of these
-    frame         edges.Frame; of the farthest image point where the format is not known
-    frame_known   whether it was declared
-    format_mm     (2,) width and height, or None
-    shared        whether other sets have some of the parameters in common, so that dropping one
-                  changes more than this set
+    Attributes
+    ----------
+    camera : str
+        Name of the camera.
+    photos : tuple of str or None
+        Names of the photos of the set, or None for all photos of the camera.
+    form : tankcal.camera.model.Form
+        Form of the distortion model.
+    values : ndarray, shape (13,)
+        Values in the order of PARAMETERS, with lengths in mm.
+    scope, state : tuple of str
+        Scope and state of each parameter, as in network.Camera.
+    free : tuple of str
+        Names of the k adjusted parameters.
+    covariance : ndarray, shape (k, k)
+        Covariance matrix of the adjusted parameters.
+    frame : Frame
+        Frame of the images, from the farthest image points if the format is not known.
+    frame_known : bool
+        Whether the format was declared.
+    format_mm : ndarray, shape (2,), or None
+        Width and height of the image, mm.
+    shared : bool
+        Whether other sets share some of the parameters. Dropping a parameter then changes more
+        than this set.
     """
 
     camera: str
@@ -48,14 +62,14 @@ class Interior:
 
 
 def interiors_of(adjustment, measurements=None):
-    """Interior orientations of an adjustment, covariances scaled like its own.
+    """Return the interior orientations of an adjustment, with covariances scaled as in it.
 
     Parameters
     ----------
     adjustment : survey.Adjustment
         The adjusted survey.
     measurements : job.Measurements, optional
-        What it was made from: formats of the images.
+        Measurements of the adjustment, for the formats of the images.
 
     Returns
     -------
@@ -68,28 +82,30 @@ def interiors_of(adjustment, measurements=None):
     sets = {}
     for photo, places in enumerate(adjusted.problem.interior_of.tolist()):
         sets.setdefault((int(survey.photos.camera[photo]), tuple(places)), []).append(photo)
-    setups = {one.camera.name: one for one in getattr(measurements, "cameras", ())}
+    setups = {setup.camera.name: setup for setup in getattr(measurements, "cameras", ())}
     return tuple(
-        _interior(adjustment, setups, camera, photos, _several(sets, camera), len(sets) > 1)
+        _make_interior(
+            adjustment, setups, camera, photos, _has_several_sets(sets, camera), len(sets) > 1
+        )
         for (camera, _), photos in sets.items()
     )
 
 
-def _several(sets, camera):
-    return sum(one == camera for one, _ in sets) > 1
+def _has_several_sets(sets, camera):
+    return sum(camera_of_set == camera for camera_of_set, _ in sets) > 1
 
 
-def _interior(adjustment, setups, number, photos, part, others):
+def _make_interior(adjustment, setups, number, photos, part, others):
     adjusted = adjustment.adjusted
     camera = adjusted.survey.cameras[number]
     values, free, cofactors = adjusted.camera(photos[0])
     setup = setups.get(camera.name)
-    size = _of(setup, "format_mm")
+    size = _pair_of_setup(setup, "format_mm")
     common = others and any(scope == "block" for scope in camera.scope)
     images = adjusted.survey.image_points
-    mine = np.isin(images.photo, photos) & images.in_use
-    seen = images.value[mine]
-    half = np.abs(seen).max(axis=0, initial=0.0) if size is None else np.asarray(size) / 2
+    is_used = np.isin(images.photo, photos) & images.in_use
+    measured = images.value[is_used]
+    half = np.abs(measured).max(axis=0, initial=0.0) if size is None else np.asarray(size) / 2
     return Interior(
         camera=camera.name,
         photos=tuple(adjusted.survey.photos.names[i] for i in photos) if part else None,
@@ -99,48 +115,53 @@ def _interior(adjustment, setups, number, photos, part, others):
         state=tuple(camera.state),
         free=tuple(free),
         covariance=adjustment.cov_scale * np.asarray(cofactors),
-        frame=Frame(half, float(np.hypot(*seen.T).max(initial=0.0)), _of(setup, "pixel_mm")),
+        frame=Frame(
+            half, float(np.hypot(*measured.T).max(initial=0.0)), _pair_of_setup(setup, "pixel_mm")
+        ),
         frame_known=size is not None,
         format_mm=size,
         shared=part or common,
     )
 
 
-def _of(setup, name):
-    """(2,) of a CameraSetup; None where it is not known."""
+def _pair_of_setup(setup, name):
+    """Pair of values (2,) of a CameraSetup, or None if it is not known."""
     values = getattr(setup, name, None)
     return None if values is None else np.array(values, dtype=float)
 
 
 def sets_to_be(measurements, camera=None, photo=None):
-    """How many sets of camera parameters an adjustment will give, known before it is run.
+    """Predict the number of sets of interior parameters of an adjustment.
 
     Parameters
     ----------
     measurements : Measurements
+        Measurements with cameras and photos.
     camera, photo : str, optional
-        Only of this camera, of this photo.
+        Names of a camera and a photo to which the count is restricted.
 
     Returns
     -------
     int
-        One for each camera, or one for each photo of a camera that has parameters of its own in
-        each photo.
+        One set per camera, or one set per photo for a camera with separate parameters in each
+        photo.
     """
-    photos = [one for one in measurements.photos if camera in (None, one.camera)]
-    alone = {
-        one.camera.name
-        for one in measurements.cameras
-        if "photo" in [s for s in one.camera.scope if s != "off"]
+    photos = [item for item in measurements.photos if camera in (None, item.camera)]
+    with_photo_scope = {
+        item.camera.name
+        for item in measurements.cameras
+        if "photo" in [s for s in item.camera.scope if s != "off"]
     }
-    own = [one for one in photos if one.camera in alone and photo in (None, one.name)]
-    return len(own) + len({one.camera for one in photos} - alone)
+    separate = [
+        item for item in photos if item.camera in with_photo_scope and photo in (None, item.name)
+    ]
+    return len(separate) + len({item.camera for item in photos} - with_photo_scope)
 
 
 def photos_in(record):
-    """{photo: its camera} of a record (dict); InputError where it does not say them."""
+    """Return {photo: camera} of a record (dict); raise InputError if the list is missing."""
     try:
-        return {one["photo"]: one["camera"] for one in record["adjustment"]["photos"]}
+        return {photo["photo"]: photo["camera"] for photo in record["adjustment"]["photos"]}
     except (KeyError, TypeError) as error:
         raise InputError(
             _problem(
@@ -151,19 +172,21 @@ def photos_in(record):
 
 
 def refuse_unknown(photos, camera=None, photo=None):
-    """Raise InputError for the name of a camera, or of a photo of it, that is not there.
+    """Raise InputError for the name of a camera or photo that is not in `photos`.
 
-    photos  {photo: its camera}
+    `photos` is {photo: camera}.
     """
     cameras = list(dict.fromkeys(photos.values()))
     if camera is not None and camera not in cameras:
-        raise InputError(Problem("--camera", _unknown(camera, cameras)))
-    own = [name for name, of in photos.items() if camera in (None, of)]
-    if photo is not None and photo not in own:
-        raise InputError(Problem("--photo", _unknown(photo, own)))
+        raise InputError(Problem("--camera", _message_unknown(camera, cameras)))
+    known_photos = [
+        name for name, camera_of_photo in photos.items() if camera in (None, camera_of_photo)
+    ]
+    if photo is not None and photo not in known_photos:
+        raise InputError(Problem("--photo", _message_unknown(photo, known_photos)))
 
 
-def _unknown(name, known):
+def _message_unknown(name, known):
     return message(
         "camera_unknown_name",
         "found {found!r}; expected one of {names}",
@@ -173,64 +196,83 @@ def _unknown(name, known):
 
 
 def select_interiors(interiors, photos, camera=None, photo=None):
-    """Those of a camera, and of a photo; all of them without names. InputError: there are none.
-
-    photos  {photo: its camera}
-    """
-    refuse_unknown(photos, camera, photo)
-    return tuple(
-        one
-        for one in interiors
-        if camera in (None, one.camera)
-        and (photo is None or (photos[photo] == one.camera and photo in (one.photos or (photo,))))
-    )
-
-
-def framed_in(record, pixel_mm=None):
-    """Cameras of a record and their covariances.
+    """Select the sets of a camera and of a photo.
 
     Parameters
     ----------
-    record : dict
-        A record as read.
-    pixel_mm : float, optional
-        Side of a pixel, mm, for cameras of which the record knows none (film); None: they stay
-        without pixels.
+    interiors : sequence of Interior
+        Sets of interior parameters.
+    photos : dict
+        {photo: camera}.
+    camera, photo : str, optional
+        Names to select; by default all sets are returned.
 
     Returns
     -------
-    cameras
-        [(name, FramedCamera)].
-    covariances
-        (13, 13) of each, nan on its diagonal for what was not adjusted.
+    tuple of Interior
 
     Raises
     ------
     InputError
-        For cameras without a format.
+        If a name is unknown.
+    """
+    refuse_unknown(photos, camera, photo)
+    return tuple(
+        interior
+        for interior in interiors
+        if camera in (None, interior.camera)
+        and (
+            photo is None
+            or (photos[photo] == interior.camera and photo in (interior.photos or (photo,)))
+        )
+    )
+
+
+def framed_in(record, pixel_mm=None):
+    """Return the cameras of a record and their covariances.
+
+    Parameters
+    ----------
+    record : dict
+        Content of record.json.
+    pixel_mm : float, optional
+        Side of a pixel, mm, for cameras without pixels in the record (film). By default these
+        cameras have no pixels.
+
+    Returns
+    -------
+    cameras : list of (str, FramedCamera)
+        Name and camera.
+    covariances : list of ndarray, shape (13, 13)
+        Covariance matrix of each camera; nan on the diagonal for parameters not adjusted.
+
+    Raises
+    ------
+    InputError
+        If the format of a camera is missing.
     """
     cameras, covariances, problems = [], [], []
-    for one in interiors_in(record):
-        if one.format_mm is None:
+    for interior in interiors_in(record):
+        if interior.format_mm is None:
             problems.append(
                 _problem(
                     message(
                         "camera_format_missing",
                         "camera {camera}: expected its format",
-                        camera=one.camera,
+                        camera=interior.camera,
                     )
                 )
             )
             continue
-        cameras.append((one.camera, _framed(one, pixel_mm)))
-        covariances.append(_among_all(one.free, one.covariance))
+        cameras.append((interior.camera, _make_camera(interior, pixel_mm)))
+        covariances.append(_embed_covariance(interior.free, interior.covariance))
     if problems:
         raise InputError(problems)
     return cameras, covariances
 
 
-def _framed(interior, pixel_mm):
-    """FramedCamera of an Interior with a format; pixel_mm: of a film, or None."""
+def _make_camera(interior, pixel_mm):
+    """Create the FramedCamera of an Interior with a format; `pixel_mm` is used for a film."""
     pixel = interior.frame.pixel_mm
     if pixel is None and pixel_mm is None:
         return make_film_camera(interior.values, interior.form, interior.format_mm)
@@ -239,16 +281,16 @@ def _framed(interior, pixel_mm):
     return make_framed_camera(interior.values, interior.form, pixel, size_px)
 
 
-def _among_all(names, covariance):
-    """(13, 13) with the covariance of some parameters; nan on the diagonal for the others."""
-    found = np.diag([0.0 if name in names else np.nan for name in PARAMETERS])
-    places = [PARAMETERS.index(name) for name in names]
-    found[np.ix_(places, places)] = covariance
-    return found
+def _embed_covariance(names, covariance):
+    """Embed a covariance matrix in (13, 13); nan on the diagonal for the other parameters."""
+    matrix = np.diag([0.0 if name in names else np.nan for name in PARAMETERS])
+    indices = [PARAMETERS.index(name) for name in names]
+    matrix[np.ix_(indices, indices)] = covariance
+    return matrix
 
 
 def interiors_in(record):
-    """A tuple of Interior of a record (dict); InputError where it is no sound record of cameras."""
+    """Return the Interior objects of a record (dict); raise InputError for an invalid record."""
     adjustment = record.get("adjustment") if isinstance(record, dict) else None
     if not isinstance(adjustment, dict):
         raise InputError(
@@ -271,19 +313,20 @@ def interiors_in(record):
                 )
             )
         )
-    found, problems = [], []
-    for number, one in enumerate(cameras):
+    interiors, problems = [], []
+    for number, entry in enumerate(cameras):
         try:
-            found.append(_read(one, cameras))
+            interiors.append(_read_interior(entry, cameras))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            problems.append(_problem(_why(error), f"adjustment.cameras[{number}]"))
+            problems.append(_problem(_message_of_error(error), f"adjustment.cameras[{number}]"))
     if problems:
         raise InputError(problems)
-    return tuple(found)
+    return tuple(interiors)
 
 
-def _refuse_unknown_form(one):
-    convention, affinity = one["convention"], one["affinity"]
+def _refuse_unknown_form(entry):
+    """Raise ValueError for an unknown form of distortion or unknown parameters."""
+    convention, affinity = entry["convention"], entry["affinity"]
     if convention not in CONVENTIONS or affinity not in AFFINITIES:
         raise ValueError(
             message(
@@ -293,7 +336,7 @@ def _refuse_unknown_form(one):
                 affinity=affinity,
             )
         )
-    names, free = one["parameters"], one["free"]
+    names, free = entry["parameters"], entry["free"]
     if not set(names) <= set(PARAMETERS) or not set(free) <= set(names):
         raise ValueError(
             message(
@@ -307,6 +350,7 @@ def _refuse_unknown_form(one):
 
 
 def _refuse_impossible(values, covariance, half):
+    """Raise ValueError for values, variances or a frame that are not possible."""
     if not (np.isfinite(covariance).all() and np.isfinite(values).all() and (half > 0).all()):
         raise ValueError(
             message(
@@ -329,35 +373,38 @@ def _refuse_impossible(values, covariance, half):
         )
 
 
-def _read(one, cameras):
-    _refuse_unknown_form(one)
-    names, free = one["parameters"], tuple(one["free"])
-    given = dict(zip(names, one["values"], strict=True))
-    scope = dict(zip(names, one["scopes"], strict=True))
-    state = dict(zip(names, one["states"], strict=True))
-    covariance = np.array(one["covariance"], dtype=float).reshape(len(free), len(free))
-    values = np.array([given.get(name, 0.0) for name in PARAMETERS], dtype=float)
-    half = np.array(one["edge_mm"], dtype=float).reshape(2)
+def _read_interior(entry, cameras):
+    """Read the Interior of one camera entry of a record."""
+    _refuse_unknown_form(entry)
+    names, free = entry["parameters"], tuple(entry["free"])
+    value_of = dict(zip(names, entry["values"], strict=True))
+    scope = dict(zip(names, entry["scopes"], strict=True))
+    state = dict(zip(names, entry["states"], strict=True))
+    covariance = np.array(entry["covariance"], dtype=float).reshape(len(free), len(free))
+    values = np.array([value_of.get(name, 0.0) for name in PARAMETERS], dtype=float)
+    half = np.array(entry["edge_mm"], dtype=float).reshape(2)
     _refuse_impossible(values, covariance, half)
     common = len(cameras) > 1 and "block" in scope.values()
     return Interior(
-        camera=str(one["camera"]),
-        photos=None if one["photos"] is None else tuple(one["photos"]),
-        form=Form(one["convention"], one["affinity"], float(one["radial_balance_mm"])),
+        camera=str(entry["camera"]),
+        photos=None if entry["photos"] is None else tuple(entry["photos"]),
+        form=Form(entry["convention"], entry["affinity"], float(entry["radial_balance_mm"])),
         values=values,
         scope=tuple(scope.get(name, "off") for name in PARAMETERS),
         state=tuple(state.get(name, "free") for name in PARAMETERS),
         free=free,
         covariance=covariance,
-        frame=Frame(half, _reach(one.get("reach_mm")), _two(one.get("pixel_mm"))),
-        frame_known=bool(one["edge_known"]),
-        format_mm=_two(one.get("format_mm")),
-        shared=one["photos"] is not None or common,
+        frame=Frame(
+            half, _read_reach(entry.get("reach_mm")), _positive_pair(entry.get("pixel_mm"))
+        ),
+        frame_known=bool(entry["edge_known"]),
+        format_mm=_positive_pair(entry.get("format_mm")),
+        shared=entry["photos"] is not None or common,
     )
 
 
-def _two(values):
-    """(2,) of a pair above 0, or None."""
+def _positive_pair(values):
+    """Check a pair of positive numbers; return it as ndarray (2,), or None for None."""
     if values is None:
         return None
     pair = np.array(values, dtype=float).reshape(2)
@@ -370,8 +417,8 @@ def _two(values):
     return pair
 
 
-def _reach(value):
-    """Distance of the farthest image point; inf where a record does not say it."""
+def _read_reach(value):
+    """Distance of the farthest image point, mm; inf if the record does not contain it."""
     reach = np.inf if value is None else float(value)
     if not reach > 0:
         raise ValueError(
@@ -382,7 +429,8 @@ def _reach(value):
     return reach
 
 
-def _why(error):
+def _message_of_error(error):
+    """Message about an error while reading a camera entry."""
     if isinstance(error, KeyError):
         return message("camera_key_missing", "missing key {key!r}", key=str(error.args[0]))
     if error.args and isinstance(error.args[0], Message):

@@ -1,8 +1,8 @@
-"""Point clouds: files of scanners read in pieces, and the wall that they show.
+"""Point clouds: reading of scanner files, and detection of the wall in their points.
 
-`describe_cloud` looks at a file without reading its points, and `read_cloud` gives them a piece at
-a time, each scan in its own frame, of whole files or of pieces of them that are shared out
-(`pieces_of`); `tankcal.clouds.wall` makes cells of the wall of them.
+`describe_cloud` reads the header of a file. `read_cloud` yields the points in chunks, each scan in
+its own frame. `pieces_of` divides a file into pieces that processes can read independently.
+`tankcal.clouds.wall` sums the points in cells of the wall.
 """
 
 from tankcal.clouds.contents import CloudChunk, CloudHeader, CloudPiece, ScanHeader

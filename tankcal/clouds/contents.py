@@ -1,4 +1,4 @@
-"""What a file of scans says that it holds, and a piece of its points."""
+"""Header of a scanner file, pieces of the file, and chunks of its points."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,22 +8,22 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ScanHeader:
-    """One scan of a file, before its points are read.
+    """Header of one scan of a file.
 
     Attributes
     ----------
     name : str
-        Of the scan in its file; "": it has none.
+        Name of the scan in its file, or "" if the file gives no name.
     declared : int or None
-        Points that the file says it holds; None: its format does not say.
+        Number of points that the file declares for the scan, or None if the format has no count.
     pose : ndarray, shape (4, 4), or None
-        From the scan's own frame to the frame of the file, lengths in the unit of the file;
-        None: the file has none, so that its coordinates are those of one frame.
+        Transformation from the frame of the scan to the frame of the file, lengths in the unit of
+        the file. None if the file contains no pose; all its coordinates then refer to one frame.
     warning : Message or None
-        Of a pose in the file that is not used.
+        Warning about a pose of the file that is not used.
     is_placed : bool
-        Whether the file gives a position without a rotation: then the coordinates of several
-        scans are in no common frame.
+        Whether the file gives a position without a rotation. Several such scans have no common
+        frame.
     """
 
     name: str
@@ -35,17 +35,18 @@ class ScanHeader:
 
 @dataclass(frozen=True)
 class CloudHeader:
-    """A file of scans whose header was found sound.
+    """Valid header of a file of scans.
 
     Attributes
     ----------
     path : Path
+        Path of the file.
     format : str
         "las", "laz", "e57", "ply", "ptx", "pts" or "xyz".
     bytes : int
-        Of the file.
+        Size of the file.
     scans : tuple of ScanHeader
-        In the order of the file.
+        Scans in the order of the file.
     """
 
     path: Path
@@ -56,16 +57,16 @@ class CloudHeader:
 
 @dataclass(frozen=True)
 class CloudPiece:
-    """A part of a file that is read on its own, so that a file can be shared out.
+    """Part of a file that can be read independently of the rest.
 
     Attributes
     ----------
     scan : int or None
-        The only scan that is read; None: all.
+        Index of the only scan to read, or None for all scans.
     first : int
-        Records passed over; of text, bytes.
+        Number of records to skip; bytes for text in columns.
     count : int or None
-        Records that are read; of text, bytes; None: to the end.
+        Number of records to read; bytes for text in columns. None: to the end of the file.
     """
 
     scan: int | None = None
@@ -83,10 +84,10 @@ class CloudChunk:
     Attributes
     ----------
     scan : int
-        Place of the scan among those of its file.
+        Index of the scan in its file.
     xyz_m : ndarray of float64, shape (n, 3)
-        In the scan's own frame, m: no pose is applied. Columns are contiguous, so what works
-        column by column is fast.
+        Coordinates in the frame of the scan, m, without its pose. Each column is contiguous, which
+        makes operations by column fast.
     """
 
     scan: int

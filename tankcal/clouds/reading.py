@@ -1,4 +1,4 @@
-"""The doors to files of scanners: what a file holds, and its points, a chunk at a time."""
+"""Reading of scanner files: header, division into pieces, and points in chunks."""
 
 import time
 
@@ -11,17 +11,17 @@ from tankcal.clouds.formats.files import EXTENT_LIMIT, count_mismatch, open_clou
 from tankcal.errors import reason_of
 from tankcal.messages import message
 
-COARSEST_M = 1e-4  # the next float32 after a coordinate may lie this far off
-TOLD_EVERY_S = 0.4
+COARSEST_M = 1e-4  # largest permitted spacing of float32 coordinates, m
+PROGRESS_PERIOD_S = 0.4  # least time between two reports of progress, s
 
 
 def describe_cloud(path):
-    """What a file of a scanner says that it holds, its header checked against its size.
+    """Read the header of a scanner file and check it against the size of the file.
 
     Parameters
     ----------
-    path
-        Of a LAS, LAZ, E57, PLY, PTX, PTS file, or of text with x, y and z in columns.
+    path : path-like
+        LAS, LAZ, E57, PLY, PTX or PTS file, or text file with x, y and z in columns.
 
     Returns
     -------
@@ -30,8 +30,8 @@ def describe_cloud(path):
     Raises
     ------
     InputError
-        With every problem that the header shows: of the file, its format, sizes that do not fit
-        into it, numbers that can be no scale, offset, box or pose, a library that is missing.
+        If the file cannot be read, has an unknown format or an invalid header, or if a library is
+        missing. The error lists all problems of the header.
 
     Examples
     --------
@@ -47,15 +47,15 @@ def describe_cloud(path):
 
 
 def pieces_of(header, points_each):
-    """The pieces of a described file, each read on its own; together they are the file.
+    """Divide a file into pieces that can be read independently.
 
     Parameters
     ----------
-    header
-        `CloudHeader` of `describe_cloud`.
+    header : CloudHeader
+        Result of `describe_cloud`.
     points_each : int
-        About how many points a piece has: LAS, LAZ, PLY of binary numbers and text in columns
-        are cut so; E57 has a piece for each scan, and PTX, PTS and PLY of text are one.
+        Approximate number of points per piece, for LAS, LAZ, binary PLY and text in columns. An
+        E57 file has one piece per scan; a PTX, PTS or text PLY file is a single piece.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def pieces_of(header, points_each):
     Raises
     ------
     InputError
-        As `read_cloud` raises it for a file that changed.
+        If the size of the file has changed since `describe_cloud`, or reading fails.
 
     Examples
     --------
@@ -80,29 +80,29 @@ def pieces_of(header, points_each):
 
 
 def count_about(header):
-    """How many points a described file has: as it declares or, of text, by its first lines."""
+    """Number of points of a file, declared or estimated from the first lines of a text file."""
     declared = [scan.declared for scan in header.scans]
     return rows_about(open_cloud(header.path)) if None in declared else sum(declared)
 
 
 def read_cloud(header, *, piece=WHOLE, unit_m=1.0, chunk=1 << 18, progress=None):
-    """The points of a described file, a chunk at a time; memory does not grow with the file.
+    """Yield the points of a file in chunks, with memory independent of the size of the file.
 
-    Points without a return are counted as read and left out. A pose is not applied.
+    Records without a return are counted and omitted. Poses are not applied.
 
     Parameters
     ----------
-    header
-        `CloudHeader` of `describe_cloud`.
+    header : CloudHeader
+        Result of `describe_cloud`.
     piece : CloudPiece, optional
-        Of `pieces_of`: what is read of it.
-    unit_m : optional
+        Piece to read, from `pieces_of`; by default the whole file.
+    unit_m : float, optional
         Length of one unit of the file, m (0.001 for millimetres).
-    chunk : optional
-        Most points at a time.
+    chunk : int, optional
+        Largest number of records in a chunk.
     progress : callable, optional
-        progress(points read, points in all or None, name of the file), a few times a second and
-        at the end; with a piece, those of the piece.
+        Called as progress(points read, total or None, name of the file), a few times per second
+        and at the end. With a piece, the counts refer to the piece.
 
     Yields
     ------
@@ -111,8 +111,8 @@ def read_cloud(header, *, piece=WHOLE, unit_m=1.0, chunk=1 << 18, progress=None)
     Raises
     ------
     InputError
-        Where the points are not as many as the header says, not finite, too far apart, or in
-        float32 that cannot tell a tenth of a millimetre; where a file cannot be decoded.
+        If the number of points differs from the header, if a point is not finite or too far from
+        the first point, if float32 coordinates are coarser than 0.1 mm, or if decoding fails.
 
     Examples
     --------
@@ -126,17 +126,17 @@ def read_cloud(header, *, piece=WHOLE, unit_m=1.0, chunk=1 << 18, progress=None)
     file = _unchanged(header)
     count = _Count(file, header, piece, progress)
     check = _Check(file, unit_m, piece)
-    parts = iter(read_pieces(file, chunk, piece))
-    while (found := _guarded(file, lambda: next(parts, None))) is not None:
-        count.add(found)
-        xyz = check.metres(found)
+    chunks = iter(read_pieces(file, chunk, piece))
+    while (records := _guarded(file, lambda: next(chunks, None))) is not None:
+        count.add(records)
+        xyz = check.metres(records)
         if len(xyz):
-            yield CloudChunk(found.scan, xyz)
+            yield CloudChunk(records.scan, xyz)
     count.finish()
 
 
 def _unchanged(header):
-    """The `CloudFile` of a header; InputError where it has another size now."""
+    """Open the file of a header; raise InputError if its size has changed."""
     file = open_cloud(header.path)
     if file.bytes != header.bytes:
         raise file.refusal(
@@ -151,17 +151,17 @@ def _unchanged(header):
 
 
 def _guarded(file, task):
-    """The result of a task; a disk that fails meanwhile is the file's problem."""
+    """Run a task and convert an OSError into an InputError of the file."""
     try:
         return task()
     except OSError as error:
         reason = reason_of(error)
-        failed = message("cloud_file_failed", "reading it failed: {reason}", reason=reason)
-        raise file.refusal(failed) from error
+        text = message("cloud_file_failed", "reading it failed: {reason}", reason=reason)
+        raise file.refusal(text) from error
 
 
 class _Count:
-    """Records read of each scan, against what was declared; tells the progress."""
+    """Comparison of the records read with the declared counts, and reports of progress."""
 
     def __init__(self, file, header, piece, progress):
         scans = header.scans
@@ -179,20 +179,20 @@ class _Count:
         self.told = time.monotonic()
 
     def add(self, piece):
-        """Count a piece; InputError when there are more than declared."""
+        """Add the records of a piece; raise InputError above the declared count."""
         self.read[piece.scan] += piece.read
         self._compare(piece.scan, is_done=False)
-        if self.progress and time.monotonic() - self.told >= TOLD_EVERY_S:
-            self._tell()
+        if self.progress and time.monotonic() - self.told >= PROGRESS_PERIOD_S:
+            self._report()
 
     def finish(self):
-        """InputError when a scan has fewer than declared."""
+        """Check the final counts; raise InputError below the declared count."""
         for scan in range(len(self.scans)):
             self._compare(scan, is_done=True)
         if self.progress:
-            self._tell()
+            self._report()
 
-    def _tell(self):
+    def _report(self):
         self.told = time.monotonic()
         self.progress(sum(self.read), self.total, self.file.name)
 
@@ -203,21 +203,21 @@ class _Count:
 
 
 class _Check:
-    """Coordinates that are finite, near each other, fine enough, in metres."""
+    """Checks of the coordinates (finite, close together, sufficient resolution) and conversion."""
 
     def __init__(self, file, unit_m, piece):
         self.file, self.unit_m = file, unit_m
         self.done, self.first = piece.first, None
 
     def metres(self, piece):
-        """float64 (n, 3), m; InputError for what can be no point of a wall."""
+        """Coordinates in metres, float64 (n, 3); raise InputError for invalid coordinates."""
         xyz, before = piece.xyz, self.done
         self.done += piece.read
         if not len(xyz):
             return xyz
         if self.first is None:
             self.first = np.array(xyz[0], dtype=float)
-        far = np.abs(self.first) + EXTENT_LIMIT  # of a first point that is not finite: never near
+        far = np.abs(self.first) + EXTENT_LIMIT  # not finite if the first point is not finite
         low, high = xyz.min(axis=0), xyz.max(axis=0)
         with np.errstate(invalid="ignore", over="ignore"):
             is_near = (low >= self.first - EXTENT_LIMIT) & (high <= self.first + EXTENT_LIMIT)
@@ -262,6 +262,7 @@ class _Check:
         )
 
     def _check_spacing(self, largest):
+        # The resolution of float32 is proportional to the coordinate.
         spacing = float(np.spacing(np.float32(largest))) * self.unit_m
         if spacing > COARSEST_M:
             raise self.file.refusal(
@@ -276,7 +277,7 @@ class _Check:
 
 
 def _place(numbers):
-    """The number of a point, or between which ones it is."""
+    """Number of a point, or its range if records without a return were omitted."""
     if len(numbers) == 1:
         return str(numbers[0])
     first, last = numbers

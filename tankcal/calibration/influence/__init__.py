@@ -1,4 +1,4 @@
-"""What does a wrong calibration do to a survey?"""
+"""Influence of a wrong camera calibration on a survey."""
 
 
 def __getattr__(name):

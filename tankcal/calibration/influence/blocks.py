@@ -1,4 +1,4 @@
-"""An adjusted block as the comparison of calibrations needs it, and how two of them differ."""
+"""Adjusted blocks for the comparison of calibrations, and the differences between two blocks."""
 
 from dataclasses import dataclass, replace
 
@@ -12,15 +12,24 @@ from tankcal.survey.network.assembly import assemble
 from tankcal.survey.network.datum import null_space
 from tankcal.survey.network.results import GlobalTest
 
-ROUNDS = 20
-SETTLED = 1e-13
+ROUNDS = 20  # largest number of iterations of the alignment
+SETTLED = 1e-13  # largest last step of the alignment, relative to the size of the block
 
 
 @dataclass(frozen=True)
 class ImageResiduals:
-    """Residuals of n images of the camera, mm and px (None: the pixel is not known), x and y.
+    """Residuals of n image points of a camera.
 
-    largest  of a single coordinate, with its photo and point
+    Attributes
+    ----------
+    n : int
+        Number of image points.
+    rms_mm, rms_px : ndarray, shape (2,)
+        Root mean square of x and y, mm and px; `rms_px` is None if the pixel size is not known.
+    largest_mm, largest_px : float
+        Largest residual of a coordinate, mm and px (or None).
+    largest_photo, largest_point : str
+        Photo and point of the largest residual.
     """
 
     n: int
@@ -34,7 +43,7 @@ class ImageResiduals:
 
 @dataclass(frozen=True)
 class InteriorValue:
-    """A parameter of the camera: value and sd (0: held) after, start and start_sd before."""
+    """Interior parameter: value and sd (0 if fixed) after, start and start_sd before adjustment."""
 
     parameter: str
     unit: str
@@ -46,15 +55,31 @@ class InteriorValue:
 
 @dataclass(frozen=True)
 class Block:
-    """An adjusted block: what calibrations are compared by.
+    """Results of an adjusted block for the comparison of calibrations.
 
-    points    (n,) names                 xyz_m     (n, 3), nan: held fixed by control
-    photos    (m,) names                 place_m   (m, 3)       rotation  (m, 3, 3)
-    form      camera.Form of the interior parameters
-    interior  tuple of InteriorValue     images    ImageResiduals or None
-    check     ProductCheck of the check points, or None: there are none
-    centre_m  (3,) of the rotations of `ways`
-    ways      (7, d) combinations of translation, rotation and scale that no observation feels
+    Attributes
+    ----------
+    points, photos : tuple of str
+        Names of the n points and m photos.
+    xyz_m : ndarray, shape (n, 3)
+        Coordinates of the points, m; nan for coordinates fixed by control.
+    place_m, rotation : ndarray, shapes (m, 3) and (m, 3, 3)
+        Projection centres, m, and rotation matrices of the photos.
+    sigma0, test : float, GlobalTest
+        Standard deviation of unit weight and its test.
+    form : tankcal.camera.model.Form
+        Form of the distortion model.
+    interior : tuple of InteriorValue
+        Interior parameters.
+    images : ImageResiduals or None
+        Residuals of the image points.
+    check : ProductCheck or None
+        Check points, or None if there are no check points.
+    centre_m : ndarray, shape (3,)
+        Centre of the rotations in `ways`, m.
+    ways : ndarray, shape (7, d)
+        Motions that the observations do not determine, as combinations of translation, rotation and
+        scale.
     """
 
     points: tuple
@@ -73,13 +98,13 @@ class Block:
 
 
 def block_of(adjustment, setup, alpha=ALPHA):
-    """The Block of a survey.Adjustment with the job.CameraSetup that it was made with."""
+    """Create the Block of a survey.Adjustment, for the job.CameraSetup of its camera."""
     adjusted = adjustment.adjusted
     photos = adjusted.survey.photos
     place, _, _ = adjusted.photos
-    found = adjustment.check_points
-    differences = None if found is None else differences_of(adjustment)
-    ways, centre = _ways(adjustment)
+    check_points = adjustment.check_points
+    differences = None if check_points is None else differences_of(adjustment)
+    ways, centre = _undetermined_motions(adjustment)
     return Block(
         points=adjustment.names,
         xyz_m=np.where(adjustment.fixed & (not ways.size), np.nan, adjustment.xyz_m),
@@ -89,8 +114,8 @@ def block_of(adjustment, setup, alpha=ALPHA):
         sigma0=adjustment.sigma0,
         test=adjusted.test(),
         form=setup.camera.form,
-        interior=_interior(adjustment, setup),
-        images=_images(adjustment, setup),
+        interior=_interior_values(adjustment, setup),
+        images=_image_residuals(adjustment, setup),
         check=None
         if differences is None
         else check_product(differences.difference_m, names=differences.names, alpha=alpha),
@@ -99,10 +124,10 @@ def block_of(adjustment, setup, alpha=ALPHA):
     )
 
 
-def _ways(adjustment):
-    """Ways (7, d) in which the block can move without its datum, and their centre (3,), m.
+def _undetermined_motions(adjustment):
+    """Motions (7, d) that the block can make without its datum, and their centre (3,), m.
 
-    None where control acts: then it is the frame, fixed or not.
+    There is no such motion (d = 0) if control points define the frame, fixed or not.
     """
     datum, survey = adjustment.datum, adjustment.adjusted.survey
     if datum.choice == "control" or not datum.defect:
@@ -115,15 +140,15 @@ def _ways(adjustment):
     return null_space(loose), loose.centre_m
 
 
-def _own_photos(adjustment, setup):
+def _photos_of_camera(adjustment, setup):
     survey = adjustment.adjusted.survey
     names = [survey.cameras[i].name for i in survey.photos.camera]
     return [i for i, name in enumerate(names) if name == setup.camera.name]
 
 
-def _interior(adjustment, setup):
-    """InteriorValue of the parameters that are not left out, as the first photo has them."""
-    values, free, cofactors = adjustment.adjusted.camera(_own_photos(adjustment, setup)[0])
+def _interior_values(adjustment, setup):
+    """Return InteriorValue of the parameters in the model, from the first photo of the camera."""
+    values, free, cofactors = adjustment.adjusted.camera(_photos_of_camera(adjustment, setup)[0])
     variance = adjustment.cov_scale * np.diag(cofactors)
     sds = dict(zip(free, np.sqrt(np.maximum(variance, 0.0)).tolist(), strict=True))
     camera = setup.camera
@@ -136,22 +161,22 @@ def _interior(adjustment, setup):
     )
 
 
-def _images(adjustment, setup):
+def _image_residuals(adjustment, setup):
     names = adjustment.adjusted.survey.photos.names
-    own = {names[i] for i in _own_photos(adjustment, setup)}
+    own_photos = {names[i] for i in _photos_of_camera(adjustment, setup)}
     readings = adjustment.readings
     readings = readings.where(
         readings.are("image coordinate") & ~readings.removed & ~readings.check
     )
     readings = readings.where(
-        np.array([ids[0] in own for ids in readings.columns["ids"]], dtype=bool)
+        np.array([ids[0] in own_photos for ids in readings.columns["ids"]], dtype=bool)
     )
     if not len(readings):
         return None
     residual = readings.columns["residual"]
     is_x = readings.columns["element"] == "x"
     worst = readings[int(np.abs(residual).argmax())]
-    rms = np.array([np.sqrt(np.mean(residual[one] ** 2)) for one in (is_x, ~is_x)])
+    rms = np.array([np.sqrt(np.mean(residual[rows] ** 2)) for rows in (is_x, ~is_x)])
     pixel = None if setup.pixel_mm is None else np.broadcast_to(setup.pixel_mm, 2)
     in_px = None if pixel is None else np.abs(residual) / np.where(is_x, *pixel)
     return ImageResiduals(
@@ -167,9 +192,18 @@ def _images(adjustment, setup):
 
 @dataclass(frozen=True)
 class Moved:
-    """Differences of n places, m: (3,) rms and largest magnitude along x, y, z, and of all three.
+    """Differences of n positions, m; nan without positions.
 
-    nan where there are none; largest_name  of the place that differs most
+    Attributes
+    ----------
+    n : int
+        Number of positions.
+    rms_m, largest_m : ndarray, shape (3,)
+        Root mean square and largest magnitude along x, y and z, m.
+    rms_xyz_m, largest_xyz_m : float
+        Root mean square and largest length of the differences, m.
+    largest_name : str or None
+        Name of the position with the largest difference.
     """
 
     n: int
@@ -182,9 +216,16 @@ class Moved:
 
 @dataclass(frozen=True)
 class PhotosMoved(Moved):
-    """The same of photos, and their turns, rad: (3,) rms about the image's axes, and of the whole.
+    """Differences of the positions and orientations of photos.
 
-    largest_turn_name  of the photo that turns most
+    Attributes
+    ----------
+    rms_rad : ndarray, shape (3,)
+        Root mean square of the rotations about the axes of the image, rad.
+    rms_turn_rad, largest_turn_rad : float
+        Root mean square and largest angle of rotation, rad.
+    largest_turn_name : str or None
+        Photo with the largest rotation.
     """
 
     rms_rad: np.ndarray
@@ -194,23 +235,37 @@ class PhotosMoved(Moved):
 
 
 def differences(one, other):
-    """Moved of points and PhotosMoved of photos, other minus one, and the ways taken out before.
+    """Differences between two blocks, other minus one.
 
-    one, other  Block; where no observation feels the whole block move, the other is brought onto
-                the one first, in those ways only, by least squares over the common points
+    Motions that the observations do not determine (`one.ways`) are first removed by a least-squares
+    fit to the common points.
+
+    Parameters
+    ----------
+    one, other : Block
+        Blocks to compare.
+
+    Returns
+    -------
+    points : Moved
+        Differences of the points.
+    photos : PhotosMoved
+        Differences of the photos.
+    aligned : int
+        Number of motions removed.
     """
     points = [name for name in one.points if name in set(other.points)]
     photos = [name for name in one.photos if name in set(other.photos)]
-    a, b = (_rows(block.points, points, block.xyz_m) for block in (one, other))
-    p, q = (_rows(block.photos, photos, block.place_m) for block in (one, other))
-    r, s = (_rows(block.photos, photos, block.rotation) for block in (one, other))
+    a, b = (_select_rows(block.points, points, block.xyz_m) for block in (one, other))
+    p, q = (_select_rows(block.photos, photos, block.place_m) for block in (one, other))
+    r, s = (_select_rows(block.photos, photos, block.rotation) for block in (one, other))
     if one.ways.shape[1]:
-        b, q, s = _brought(one, a, b, q, s)
+        b, q, s = _align(one, a, b, q, s)
     turn = rotation_vector(s @ r.transpose(0, 2, 1)) if photos else np.zeros((0, 3))
     angle = np.linalg.norm(turn, axis=1)
-    of_photos = _moved(q - p, photos)
+    of_photos = _summarise(q - p, photos)
     return (
-        _moved(b - a, points),
+        _summarise(b - a, points),
         PhotosMoved(
             **vars(of_photos),
             rms_rad=_rms(turn),
@@ -222,50 +277,52 @@ def differences(one, other):
     )
 
 
-def _rows(names, wanted, values):
-    place = {name: i for i, name in enumerate(names)}
-    return values[[place[name] for name in wanted]]
+def _select_rows(names, wanted, values):
+    index = {name: i for i, name in enumerate(names)}
+    return values[[index[name] for name in wanted]]
 
 
 def _rms(values):
-    """Root mean square along the first axis, without nan; nan where there is nothing."""
+    """Root mean square along the first axis, without nan; nan without values."""
     count = np.isfinite(values).sum(axis=0)
     with np.errstate(invalid="ignore"):
         return np.sqrt(np.where(count > 0, np.nansum(values**2, axis=0) / count, np.nan))
 
 
-def _moved(difference_m, names):
-    """The Moved of differences (n, 3); nan: held fixed."""
-    there = np.isfinite(difference_m)
-    known = np.flatnonzero(there.any(axis=1))
+def _summarise(difference_m, names):
+    """Summarise differences (n, 3) as Moved; nan for fixed coordinates."""
+    is_known = np.isfinite(difference_m)
+    known = np.flatnonzero(is_known.any(axis=1))
     nan = np.full(3, np.nan)
     if not len(known):
         return Moved(0, nan, nan, np.nan, np.nan, None)
-    away = np.where(there, np.abs(difference_m), 0.0)
-    size = np.linalg.norm(away[known], axis=1)
-    largest = np.where(there.any(axis=0), away.max(axis=0), np.nan)
+    magnitude = np.where(is_known, np.abs(difference_m), 0.0)
+    size = np.linalg.norm(magnitude[known], axis=1)
+    largest = np.where(is_known.any(axis=0), magnitude.max(axis=0), np.nan)
     worst = names[known[int(size.argmax())]]
     return Moved(
         len(known), _rms(difference_m), largest, float(_rms(size)), float(size.max()), worst
     )
 
 
-def _brought(one, target, xyz, place, rotation):
-    """Points, places and rotations of a block after the motion, in one.ways, onto the target.
+def _align(reference, target, xyz, place, rotation):
+    """Align points, projection centres and rotations of a block with the target.
 
-    Gauss-Newton: dX = t + r x X + s X about the centre, with (t, r, s) = ways coefficients.
+    Only the motions `reference.ways` are allowed. The Gauss-Newton step is dX = t + r x X + s X
+    about the centre, where (t, r, s) is a combination of these motions.
     """
-    centre, there = one.centre_m, np.isfinite(target) & np.isfinite(xyz)
-    if not there.any():
+    centre, is_known = reference.centre_m, np.isfinite(target) & np.isfinite(xyz)
+    if not is_known.any():
         return xyz, place, rotation
     xyz, place = xyz - centre, place - centre
+    # Rotations and scale are multiplied by the size of the block, so that all steps are lengths.
     size = max(float(np.nanmax(np.abs(target - centre))), 1e-9)
     scale = np.array([1, 1, 1, *(1 / size,) * 4])
-    ways = one.ways / np.linalg.norm(one.ways / scale[:, None], axis=0)
+    ways = reference.ways / np.linalg.norm(reference.ways / scale[:, None], axis=0)
     for _ in range(ROUNDS):
-        moving = _derivatives(xyz) @ ways
-        left = (target - centre - xyz)[there]
-        step = ways @ np.linalg.lstsq(moving[there], left, rcond=None)[0]
+        design = _motion_derivatives(xyz) @ ways
+        misclosure = (target - centre - xyz)[is_known]
+        step = ways @ np.linalg.lstsq(design[is_known], misclosure, rcond=None)[0]
         turn = apply_small_rotation(np.eye(3)[None], step[None, 3:6])[0]
         xyz, place = (step[:3] + (1 + step[6]) * a @ turn.T for a in (xyz, place))
         rotation = rotation @ turn.T
@@ -274,13 +331,13 @@ def _brought(one, target, xyz, place, rotation):
     return xyz + centre, place + centre, rotation
 
 
-def _derivatives(xyz):
-    """Derivatives (n, 3, 7) of places by translation, small rotation and scale."""
+def _motion_derivatives(xyz):
+    """Derivatives (n, 3, 7) of positions by translation, small rotation and scale."""
     x, y, z = xyz.T
-    found = np.zeros((len(xyz), 3, 7))
-    found[:, :, :3] = np.eye(3)
-    found[:, 0, 4], found[:, 0, 5] = z, -y
-    found[:, 1, 3], found[:, 1, 5] = -z, x
-    found[:, 2, 3], found[:, 2, 4] = y, -x
-    found[:, :, 6] = xyz
-    return found
+    derivatives = np.zeros((len(xyz), 3, 7))
+    derivatives[:, :, :3] = np.eye(3)
+    derivatives[:, 0, 4], derivatives[:, 0, 5] = z, -y
+    derivatives[:, 1, 3], derivatives[:, 1, 5] = -z, x
+    derivatives[:, 2, 3], derivatives[:, 2, 4] = y, -x
+    derivatives[:, :, 6] = xyz
+    return derivatives

@@ -1,4 +1,4 @@
-"""A job with another calibration of its camera, and without the readings that were rejected."""
+"""Replacement of the calibration of a camera in a job, and exclusion of rejected readings."""
 
 from dataclasses import replace
 
@@ -10,19 +10,20 @@ from tankcal.messages import message
 from tankcal.survey.photographs import ELEMENTS, TURNS
 
 STATES = ("fixed", "weighted", "free")
-SAME = 1e-5  # relative difference of formats or pixels that is rounding: 0.05 px of 4608
+SAME = 1e-5  # largest relative rounding difference of formats or pixels: 0.05 px of 4608
 FILE = "cameras.toml"
 
 
 def select_camera(job, camera=None):
-    """The job.CameraSetup that is to be replaced: the only one, or the one named.
+    """Return the job.CameraSetup to replace: the only camera, or the named camera.
 
-    Raises InputError when the job has no photographs, no such camera, or several of them.
+    Raises InputError if the job has no photographs or no such camera, or if several cameras have
+    photos and no name is given.
     """
     measurements = job.measurements
     setups = () if measurements is None else measurements.cameras
-    photographed = set() if measurements is None else {one.camera for one in measurements.photos}
-    known = {one.camera.name: one for one in setups if one.camera.name in photographed}
+    photographed = set() if measurements is None else {item.camera for item in measurements.photos}
+    known = {item.camera.name: item for item in setups if item.camera.name in photographed}
     if measurements is None or measurements.image_points is None or not known:
         raise InputError(
             Problem(
@@ -51,10 +52,16 @@ def select_camera(job, camera=None):
 
 
 def refuse_others(setup, calibrations, file=FILE):
-    """Raise InputError, with all problems, for calibrations that cannot stand for a camera.
+    """Raise InputError, with all problems, for calibrations that cannot replace a camera.
 
-    setup  job.CameraSetup of the job       calibrations  tuple of job.CameraSetup
-    file   what messages call the place where the calibrations stand
+    Parameters
+    ----------
+    setup : job.CameraSetup
+        Camera of the job.
+    calibrations : sequence of job.CameraSetup
+        Calibrations to check.
+    file : str, optional
+        Name of the file of the calibrations in messages.
     """
     problems, seen = [], set()
     if not calibrations:
@@ -63,29 +70,34 @@ def refuse_others(setup, calibrations, file=FILE):
                 file, message("camera_no_calibrations", "no calibrations; expected one or more")
             )
         )
-    for one in calibrations:
-        name = one.camera.name
+    for calibration in calibrations:
+        name = calibration.camera.name
         if name in seen:
             text = message("camera_name_twice", "this name is given twice; expected once")
             problems.append(Problem(file, text, None, name))
         seen.add(name)
-        for what, unit, theirs, ours in (
-            (message("camera_the_format", "the format"), "mm", one.format_mm, setup.format_mm),
-            (message("camera_the_pixel", "the pixel"), "mm", one.pixel_mm, setup.pixel_mm),
+        for quantity, unit, theirs, ours in (
+            (
+                message("camera_the_format", "the format"),
+                "mm",
+                calibration.format_mm,
+                setup.format_mm,
+            ),
+            (message("camera_the_pixel", "the pixel"), "mm", calibration.pixel_mm, setup.pixel_mm),
         ):
-            if _differ(theirs, ours):
+            if _is_different(theirs, ours):
                 text = message(
                     "camera_differs",
                     "{what} is {theirs} {unit}; expected that of the job's camera "
                     "{name}, {ours} {unit}",
-                    what=what,
-                    theirs=_pair(theirs),
+                    what=quantity,
+                    theirs=_format_pair(theirs),
                     unit=unit,
                     name=setup.camera.name,
-                    ours=_pair(ours),
+                    ours=_format_pair(ours),
                 )
                 problems.append(Problem(file, text, None, name))
-        if not (np.isfinite(one.camera.values).all() and one.camera.values[0] > 0):
+        if not (np.isfinite(calibration.camera.values).all() and calibration.camera.values[0] > 0):
             text = message(
                 "camera_not_finite", "expected finite parameters and a principal distance above 0"
             )
@@ -95,50 +107,75 @@ def refuse_others(setup, calibrations, file=FILE):
 
 
 def counted_in(setup, calibrations):
-    """The job.CameraSetup with a pixel to count residuals in: where it has none, that of the
-    calibrations if they have one in common.
+    """Return the setup with a pixel size for the residuals.
+
+    A setup without a pixel size takes the common pixel size of the calibrations, if there is one.
     """
-    known = [one.pixel_mm for one in calibrations if one.pixel_mm is not None]
-    if setup.pixel_mm is not None or not known or any(_differ(one, known[0]) for one in known):
+    known = [item.pixel_mm for item in calibrations if item.pixel_mm is not None]
+    if (
+        setup.pixel_mm is not None
+        or not known
+        or any(_is_different(item, known[0]) for item in known)
+    ):
         return setup
     return replace(setup, pixel_mm=known[0])
 
 
-def _differ(theirs, ours):
+def _is_different(theirs, ours):
     if theirs is None or ours is None:
         return False
     return not np.allclose(theirs, ours, rtol=SAME, atol=0.0)
 
 
-def _pair(values):
+def _format_pair(values):
     return " x ".join(f"{value:.6g}" for value in values)
 
 
 def free_parameters(setup, calibrations):
-    """Names of the parameters that runs "free" adjust: the same for every start.
+    """Names of the parameters adjusted in all runs "free".
 
-    Those that the job does not leave out, and those that a calibration gives.
+    These are the parameters in the model of the job and those with a value in a calibration.
     """
-    given = np.array([one.camera.values != 0 for one in calibrations]).any(axis=0)
+    is_given = np.array([calibration.camera.values != 0 for calibration in calibrations]).any(
+        axis=0
+    )
     return tuple(
         name
-        for name, scope, has_value in zip(PARAMETERS, setup.camera.scope, given, strict=True)
+        for name, scope, has_value in zip(PARAMETERS, setup.camera.scope, is_given, strict=True)
         if name == "c" or scope != "off" or has_value
     )
 
 
 def exchange_calibration(measurements, setup, calibration, state, free):
-    """job.Measurements with another calibration, its job.CameraSetup, names held for want of sds.
+    """Replace the calibration of a camera.
 
-    setup        job.CameraSetup that is replaced
-    calibration  job.CameraSetup whose values, form and sds are taken
-    state        "fixed", "weighted" or "free"     free  names of the parameters of runs "free"
+    Parameters
+    ----------
+    measurements : job.Measurements
+        Measurements of the job.
+    setup : job.CameraSetup
+        Camera to replace.
+    calibration : job.CameraSetup
+        Calibration with the new values, form and standard deviations.
+    state : str
+        "fixed", "weighted" or "free".
+    free : sequence of str
+        Names of the parameters adjusted in runs "free".
+
+    Returns
+    -------
+    measurements : job.Measurements
+        Measurements with the new calibration.
+    setup : job.CameraSetup
+        New camera.
+    held : tuple of str
+        Parameters that are fixed because they have no standard deviation.
     """
     camera, roles, held = calibration.camera, [], []
     for name, value, sd, scope in zip(
         PARAMETERS, camera.values, camera.sd, setup.camera.scope, strict=True
     ):
-        role = _role(name, value, sd, state, free)
+        role = _state_of_parameter(name, value, sd, state, free)
         roles.append(("camera" if scope == "off" else scope, role) if role else ("off", "fixed"))
         if state == "weighted" and role == "fixed" and sd != 0:
             held.append(name)
@@ -151,13 +188,13 @@ def exchange_calibration(measurements, setup, calibration, state, free):
         state=tuple(role for _, role in roles),
     )
     pixel = calibration.pixel_mm if setup.pixel_mm is None else setup.pixel_mm
-    own = replace(setup, camera=changed, pixel_mm=pixel)
-    cameras = tuple(own if one is setup else one for one in measurements.cameras)
-    return replace(measurements, cameras=cameras), own, tuple(held)
+    new_setup = replace(setup, camera=changed, pixel_mm=pixel)
+    cameras = tuple(new_setup if item is setup else item for item in measurements.cameras)
+    return replace(measurements, cameras=cameras), new_setup, tuple(held)
 
 
-def _role(name, value, sd, state, free):
-    """State of a parameter in a run; "" leaves it out."""
+def _state_of_parameter(name, value, sd, state, free):
+    """State of a parameter in a run; "" if the parameter is not in the model."""
     if state == "free":
         return "free" if name in free else ""
     if state == "weighted" and sd > 0:
@@ -171,79 +208,81 @@ def can_be_weighted(calibration):
 
 
 def leave_out_readings(measurements, removed):
-    """job.Measurements in which surveys.Reading rows that were rejected take no part, unsearched.
+    """Exclude rejected readings from job.Measurements, and switch off the search for outliers.
 
-    Rows of image points and readings between points are only compared, known coordinates and
-    orientations become approximations. Of averaged readings all go.
+    Image points and readings between points become check readings. Known coordinates and
+    orientations become approximate values. All readings of a rejected mean are excluded.
     """
     settings = replace(measurements.settings, snooping=False, explain=False)
-    found = replace(measurements, settings=settings)
+    remaining = replace(measurements, settings=settings)
     images = measurements.image_points
-    for one in removed:
-        if images is not None and one.file == images.file:
-            found = _without_image(found, one)
-        elif measurements.control is not None and one.file == measurements.control.file:
-            found = replace(found, control=_without_coordinate(found.control, one))
-        elif one.file == "photos.csv":
-            found = replace(found, photos=tuple(_without_element(p, one) for p in found.photos))
+    for reading in removed:
+        if images is not None and reading.file == images.file:
+            remaining = _exclude_image(remaining, reading)
+        elif measurements.control is not None and reading.file == measurements.control.file:
+            remaining = replace(remaining, control=_release_coordinate(remaining.control, reading))
+        elif reading.file == "photos.csv":
+            remaining = replace(
+                remaining, photos=tuple(_release_element(p, reading) for p in remaining.photos)
+            )
         else:
-            found = replace(
-                found,
+            remaining = replace(
+                remaining,
                 readings=tuple(
-                    _without_reading(table, one) if table.file == one.file else table
-                    for table in found.readings
+                    _exclude_reading(table, reading) if table.file == reading.file else table
+                    for table in remaining.readings
                 ),
             )
-    return found
+    return remaining
 
 
-def _without_image(measurements, one):
+def _exclude_image(measurements, reading):
     images = measurements.image_points
     pairs = zip(images.photo, images.point, strict=True)
-    gone = np.array([pair == tuple(one.ids) for pair in pairs])
-    images = replace(images, check=np.asarray(images.check, dtype=bool) | gone)
+    is_rejected = np.array([pair == tuple(reading.ids) for pair in pairs])
+    images = replace(images, check=np.asarray(images.check, dtype=bool) | is_rejected)
     return replace(measurements, image_points=images)
 
 
-def _without_coordinate(control, one):
-    """Control in which one coordinate of a point, in its system, is an approximation."""
+def _release_coordinate(control, reading):
+    """Make one coordinate of a control point, in its system, an approximate value."""
     systems = control.system or (None,) * len(control.point)
-    mine = [i for i, name in enumerate(control.point) if name == one.ids[0]]
-    if one.row is not None:
-        system = systems[control.rows.index(one.row)]
-        mine = [i for i in mine if systems[i] == system]
+    rows = [i for i, name in enumerate(control.point) if name == reading.ids[0]]
+    if reading.row is not None:
+        system = systems[control.rows.index(reading.row)]
+        rows = [i for i in rows if systems[i] == system]
     sd = np.array(control.sd_m, dtype=float)
-    sd[mine, "xyz".index(one.element)] = np.nan
+    sd[rows, "xyz".index(reading.element)] = np.nan
     return replace(control, sd_m=sd)
 
 
-def _without_element(photo, one):
-    if photo.name != one.ids[0]:
+def _release_element(photo, reading):
+    if photo.name != reading.ids[0]:
         return photo
     sd = np.array(photo.sd, dtype=float)
-    if one.element in TURNS:
+    if reading.element in TURNS:
         sd[3:] = np.nan
     else:
-        sd[ELEMENTS.index(one.element)] = np.nan
+        sd[ELEMENTS.index(reading.element)] = np.nan
     return replace(photo, sd=sd)
 
 
-def _without_reading(table, one):
-    """Readings in which those that were averaged into one are only compared."""
-    keys = _keys(table)
-    own = [i for i, key in enumerate(keys) if key[0] == tuple(one.ids)]
-    if one.row is not None:
-        own = [table.rows.index(one.row)]
-    if one.repeats > 1:  # several readings of the same value
-        same = {_unordered(table, keys[i]) for i in own}
-        own = [i for i, key in enumerate(keys) if _unordered(table, key) in same]
+def _exclude_reading(table, reading):
+    """Make a rejected reading, and all readings averaged in it, check readings."""
+    keys = _reading_keys(table)
+    rows = [i for i, key in enumerate(keys) if key[0] == tuple(reading.ids)]
+    if reading.row is not None:
+        rows = [table.rows.index(reading.row)]
+    if reading.repeats > 1:  # several readings of the same value
+        same_keys = {_key_without_order(table, keys[i]) for i in rows}
+        rows = [i for i, key in enumerate(keys) if _key_without_order(table, key) in same_keys]
     check = np.array(table.check, dtype=bool)
-    check[own] = True
+    check[rows] = True
     return replace(table, check=check)
 
 
-def _keys(table):
-    """What tells the readings of a table apart: names, then set-up, set, instrument and kind."""
+def _reading_keys(table):
+    """Keys that identify the readings of a table: names, set-up, set, instrument and kind."""
     n = len(table.value)
     blank = (None,) * n
     names = zip(table.setup or table.start, table.end, strict=True)
@@ -256,5 +295,5 @@ def _keys(table):
     )  # fmt: skip
 
 
-def _unordered(table, key):
+def _key_without_order(table, key):
     return (frozenset(key[0]), *key[1:]) if table.table == "distances" else key

@@ -1,10 +1,11 @@
-"""What does a wrong calibration do? The same block with each of several calibrations.
+"""Influence of a calibration: adjustments of one block with each of several calibrations.
 
-Every calibration replaces the job's camera three times: fixed, weighted by its standard deviations
-(its correlations are not known), and free, where it gives start values only. Blunders are searched
-once, in the reference (the job's own settings): what is rejected there is left out of all runs, no
-run searches again, and all volumes go through the points of the wall that the reference accepted.
-So differences come from the calibration and not from the observations.
+Each calibration replaces the camera of the job in three ways: fixed; weighted by its standard
+deviations (correlations are not known); and free, as initial values only. Outliers are searched
+once, in the reference run with the settings of the job, and excluded from all runs. All volumes use
+the points of the wall that the reference accepted. Differences therefore result from the
+calibration and not from the observations.
+
 Source: Pessoa 2017.
 """
 
@@ -32,7 +33,7 @@ from tankcal.messages import message
 from tankcal.pipeline.chain import adjust_job
 
 REFERENCE = "reference"
-TOLD = 3  # lines of why there is no volume
+REASON_LINES = 3  # number of lines kept of the reason why there is no volume
 BAD_END = (TankcalError, np.linalg.LinAlgError)
 
 
@@ -40,12 +41,26 @@ BAD_END = (TankcalError, np.linalg.LinAlgError)
 class Run:
     """One adjustment of the block.
 
-    calibration, state  None for the reference, which has the job's own
-    outcome        "adjusted", "failed" or "skipped"
-    message        why it failed, in words    skipped  code why it was left out, or ""
-    held           parameters held for want of an sd, in a run "weighted"
-    block          None unless adjusted
-    volume         None without a tank, or where `volume_failed` says why there is none
+    Attributes
+    ----------
+    label : str
+        Name of the run.
+    calibration, state : str or None
+        Calibration and its state; None for the reference, with the calibration of the job.
+    outcome : str
+        "adjusted", "failed" or "skipped".
+    message : str or None
+        Reason of a failure.
+    skipped : str
+        Code of the reason for skipping the run, or "".
+    held : tuple of str
+        Parameters fixed for lack of a standard deviation in a run "weighted".
+    block : Block or None
+        Results; None unless adjusted.
+    volume : TopVolume or None
+        Volume; None without a tank or after a failure.
+    volume_failed : str or None
+        Reason why the volume cannot be computed.
     """
 
     label: str
@@ -62,10 +77,18 @@ class Run:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two runs, by their numbers: other minus one.
+    """Differences between two runs, other minus one.
 
-    aligned         ways of the datum that nothing observes, taken out of the differences
-    volume_m3       difference of the capacities at the top, volume_percent of that of `one`; None
+    Attributes
+    ----------
+    one, other : int
+        Indices of the runs.
+    points, photos : Moved, PhotosMoved
+        Differences of points and photos.
+    aligned : int
+        Number of motions that the observations do not determine, removed from the differences.
+    volume_m3, volume_percent : float or None
+        Difference of the capacities at the top, m3, and in % of the capacity of `one`.
     """
 
     one: int
@@ -79,13 +102,24 @@ class Pair:
 
 @dataclass(frozen=True)
 class Influence:
-    """The block with all calibrations.
+    """Adjustments of a block with all calibrations.
 
-    camera    name of the camera that was replaced
-    searched  whether blunders were searched in the reference
-    removed   tuple of surveys.Reading rejected there, and left out of all runs
-    free      names of the parameters that runs "free" adjust
-    runs      tuple of Run, the reference first      pairs  tuple of Pair of those adjusted
+    Attributes
+    ----------
+    camera : str
+        Name of the camera that was replaced.
+    states, calibrations : tuple of str
+        States and names of the calibrations.
+    searched : bool
+        Whether outliers were searched in the reference.
+    removed : tuple of surveys.Reading
+        Readings rejected in the reference and excluded from all runs.
+    free : tuple of str
+        Names of the parameters adjusted in runs "free".
+    runs : tuple of Run
+        Runs, the reference first.
+    pairs : tuple of Pair
+        Differences between the adjusted runs.
     """
 
     camera: str
@@ -109,29 +143,29 @@ def influence(
     volume=True,
     file=FILE,
 ):
-    """Influence of calibrations on the block of a job, and on its tank if it has one.
+    """Compute the influence of calibrations on the block of a job, and on its tank, if any.
 
-    A run that fails is a result with its message.
+    A failed run is part of the result, with its message.
 
     Parameters
     ----------
     job : tankcal.job.Job
-        A loaded job.
-    calibrations : tuple of job.CameraSetup
-        As tankcal.job.calibrations.read_cameras gives them.
+        Loaded job.
+    calibrations : sequence of job.CameraSetup
+        Calibrations from tankcal.job.calibrations.read_cameras.
     states : sequence of str, optional
-        Which of "fixed", "weighted", "free".
+        Some of "fixed", "weighted", "free".
     camera : str, optional
-        Name of the job's camera that is replaced; None: its only one.
+        Name of the camera of the job to replace; by default its only camera.
     progress : callable, optional
-        progress(text, done, total) is called before each run and at the end.
+        Called as progress(text, done, total) before each run and at the end.
     alpha : float, optional
-        Level of the tests at check points.
+        Significance level of the tests at check points.
     volume : bool, optional
-        False for a job that was loaded for its adjustment only: it may have courses, but no
-        bottom, deadwood or uncertainties, so its volume would be another one.
+        Whether volumes are computed. Use False for a job that was loaded only for its adjustment,
+        without bottom, deadwood and uncertainties.
     file : str, optional
-        What messages call the place where the calibrations stand.
+        Name of the file of the calibrations in messages.
 
     Returns
     -------
@@ -140,10 +174,10 @@ def influence(
     Raises
     ------
     InputError
-        For a job without photographs, a camera that is not named, calibrations of another format
-        or pixel.
+        If the job has no photographs, if the camera is not uniquely named, or if a calibration has
+        another format or pixel size.
     ValueError
-        For other states.
+        If a state is unknown.
     """
     states = tuple(dict.fromkeys(states))
     if not states or set(states) - set(STATES):
@@ -151,100 +185,103 @@ def influence(
     calibrations = tuple(calibrations)
     setup = select_camera(job, camera)
     refuse_others(setup, calibrations, file)
-    calibrations = tuple(counted_in(one, calibrations) for one in calibrations)
+    calibrations = tuple(counted_in(item, calibrations) for item in calibrations)
     free = free_parameters(setup, calibrations)
     progress = progress or (lambda text, done, total: None)
     total = 1 + len(calibrations) * len(states)
     progress(message("camera_reference_run", "reference"), 0, total)
     top = TopOfTank(job) if volume and _is_whole(job) else None
-    reference, removed = _reference(job, counted_in(setup, calibrations), alpha, top)
+    reference, removed = _run_reference(job, counted_in(setup, calibrations), alpha, top)
     common = leave_out_readings(job.measurements, removed)
     runs = [reference]
-    for one in calibrations:
+    for item in calibrations:
         for state in states:
             progress(
-                message("camera_run", "{name}, {state}", name=one.camera.name, state=state),
+                message("camera_run", "{name}, {state}", name=item.camera.name, state=state),
                 len(runs),
                 total,
             )
-            runs.append(_run(job, common, setup, one, state, free, alpha, top))
+            runs.append(_run_calibration(job, common, setup, item, state, free, alpha, top))
     progress(message("camera_runs_done", "done"), total, total)
     return Influence(
         camera=setup.camera.name,
         states=states,
-        calibrations=tuple(one.camera.name for one in calibrations),
+        calibrations=tuple(item.camera.name for item in calibrations),
         searched=job.measurements.settings.snooping,
         removed=removed,
         free=free,
         runs=tuple(runs),
-        pairs=_pairs(runs),
+        pairs=_make_pairs(runs),
     )
 
 
-def _reference(job, setup, alpha, top):
-    """The Run with the job's own settings, and the readings that its search rejected."""
-    begun = Run(REFERENCE, None, None, "failed")
-    found, adjustment = _adjusted(job, setup, alpha, begun, top)
+def _run_reference(job, setup, alpha, top):
+    """Adjust with the settings of the job; return the Run and the rejected readings.
+
+    If readings are rejected, the run is repeated without them, as all other runs.
+    """
+    initial = Run(REFERENCE, None, None, "failed")
+    result, adjustment = _adjust_and_record(job, setup, alpha, initial, top)
     if adjustment is None or not adjustment.removed:
-        return found, ()
-    again = replace(job, measurements=leave_out_readings(job.measurements, adjustment.removed))
-    found, _ = _adjusted(again, setup, alpha, begun, top)
-    return found, adjustment.removed
+        return result, ()
+    repeated = replace(job, measurements=leave_out_readings(job.measurements, adjustment.removed))
+    result, _ = _adjust_and_record(repeated, setup, alpha, initial, top)
+    return result, adjustment.removed
 
 
-def _run(job, common, setup, calibration, state, free, alpha, top):
-    """The Run with another calibration of the camera."""
+def _run_calibration(job, common, setup, calibration, state, free, alpha, top):
+    """Adjust with another calibration of the camera; return the Run."""
     name = calibration.camera.name
     label = f"{name}, {state}"
     if state == "weighted" and not can_be_weighted(calibration):
         return Run(label, name, state, "skipped", skipped="no_sds")
-    changed, own, held = exchange_calibration(common, setup, calibration, state, free)
-    begun = Run(label, name, state, "failed", held=held)
-    return _adjusted(replace(job, measurements=changed), own, alpha, begun, top)[0]
+    changed, new_setup, held = exchange_calibration(common, setup, calibration, state, free)
+    initial = Run(label, name, state, "failed", held=held)
+    return _adjust_and_record(replace(job, measurements=changed), new_setup, alpha, initial, top)[0]
 
 
-def _adjusted(job, setup, alpha, begun, top):
-    """A Run with what came out of a job, and its survey.Adjustment; None where it failed.
+def _adjust_and_record(job, setup, alpha, initial, top):
+    """Adjust a job and add the results to a Run; return the Run and the Adjustment or None.
 
-    top  capacity_at_top.TopOfTank, or None: no volumes
+    `top` is a TopOfTank, or None if no volumes are computed.
     """
     try:
         adjustment = adjust_job(job)
     except BAD_END as error:
-        return replace(begun, message=str(error)), None
+        return replace(initial, message=str(error)), None
     volume = failed = None
     if top is not None:
         try:
             volume = top.of(adjustment)
         except BAD_END as error:
-            failed = "; ".join(str(error).splitlines()[:TOLD])
-    ended = replace(
-        begun,
+            failed = "; ".join(str(error).splitlines()[:REASON_LINES])
+    result = replace(
+        initial,
         outcome="adjusted",
         block=block_of(adjustment, setup, alpha),
         volume=volume,
         volume_failed=failed,
     )
-    return ended, adjustment
+    return result, adjustment
 
 
 def _is_whole(job):
-    """Whether a job has all of a tank, rather than its survey only."""
+    """Whether a job contains a complete tank, not only its survey."""
     parts = (job.tank, job.survey, job.datum, job.table)
     shell = job.courses or job.horizontal or job.sphere or job.mesh
     return None not in parts and bool(shell)
 
 
-def _pairs(runs):
-    """A Pair for each two runs that were adjusted."""
-    numbers = [i for i, one in enumerate(runs) if one.block is not None]
-    return tuple(_pair(i, j, runs[i], runs[j]) for i, j in combinations(numbers, 2))
+def _make_pairs(runs):
+    """Create a Pair for any two adjusted runs."""
+    numbers = [i for i, run in enumerate(runs) if run.block is not None]
+    return tuple(_make_pair(i, j, runs[i], runs[j]) for i, j in combinations(numbers, 2))
 
 
-def _pair(i, j, one, other):
-    points, photos, aligned = differences(one.block, other.block)
+def _make_pair(i, j, first, second):
+    points, photos, aligned = differences(first.block, second.block)
     volume = percent = None
-    if one.volume is not None and other.volume is not None:
-        volume = other.volume.value_m3 - one.volume.value_m3
-        percent = 100 * volume / one.volume.value_m3
+    if first.volume is not None and second.volume is not None:
+        volume = second.volume.value_m3 - first.volume.value_m3
+        percent = 100 * volume / first.volume.value_m3
     return Pair(i, j, points, photos, aligned, volume, percent)

@@ -1,1 +1,1 @@
-"""Which additional parameters belong in the model of a camera?"""
+"""Choice of the additional parameters in the model of a camera."""

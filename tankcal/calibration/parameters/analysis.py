@@ -1,7 +1,7 @@
-"""Which parameters belong to a camera: all that a job, or a record of it, says about that.
+"""Analysis of the interior parameters of the cameras of a job or of a record.
 
-Tests, components, predictions and rules need only the covariance of the camera, which a record
-keeps. What dropping a parameter does to points and volume needs the job.
+Tests, components, predictions and rules need only the covariance matrix of the camera, which a
+record contains. The effect of dropping a parameter on points and volume requires the job.
 """
 
 from dataclasses import replace
@@ -32,16 +32,16 @@ from tankcal.pipeline.chain import adjust_job
 
 
 def analyse_record(record, choices=None, *, camera=None, photo=None):
-    """Analyse the interior parameters of a record, one result for each set; without dropping.
+    """Analyse each set of interior parameters of a record, without new adjustments.
 
     Parameters
     ----------
     record : dict
-        A record as read.
+        Content of record.json.
     choices : Choices, optional
-        What the user decides.
+        Choices of the user.
     camera, photo : str, optional
-        Names, to have the sets of these only.
+        Names of a camera and a photo to which the analysis is restricted.
 
     Returns
     -------
@@ -50,27 +50,27 @@ def analyse_record(record, choices=None, *, camera=None, photo=None):
     Raises
     ------
     InputError
-        Where it is no record of an adjustment with cameras, holds no parameter that was adjusted,
-        or no such camera or photo.
+        If the record contains no adjustment with cameras, no adjusted parameter, or no such camera
+        or photo.
     """
     interiors = interiors_in(record)
     if camera is not None or photo is not None:
         interiors = select_interiors(interiors, photos_in(record), camera, photo)
-    return _of_all(interiors, _statistics_in(record), choices or Choices(), "record.json")
+    return _judge_all(interiors, _read_statistics(record), choices or Choices(), "record.json")
 
 
-def _statistics_in(record):
-    """The Statistics of a record; InputError where they are missing or no numbers."""
-    found = record["adjustment"]
+def _read_statistics(record):
+    """Read the Statistics of a record; raise InputError if they are missing or invalid."""
+    adjustment = record["adjustment"]
     try:
-        sigma0 = found["sigma0"]
+        sigma0 = adjustment["sigma0"]
         statistics = Statistics(
             sigma0=np.nan if sigma0 is None else float(sigma0),
-            dof=int(found["redundancy"]),
-            cov_scale=float(found["cov_scale"]),
+            dof=int(adjustment["redundancy"]),
+            cov_scale=float(adjustment["cov_scale"]),
             groups=[
-                tuple(one[key] for key in ("kind", "name", "count", "redundancy", "rms"))
-                for one in found["groups"]
+                tuple(group[key] for key in ("kind", "name", "count", "redundancy", "rms"))
+                for group in adjustment["groups"]
             ],
         )
     except (KeyError, TypeError, ValueError) as error:
@@ -93,22 +93,22 @@ def _statistics_in(record):
 def analyse_job(
     job, choices=None, *, camera=None, photo=None, adjustment=None, dropping=True, progress=None
 ):
-    """Analyse the interior parameters of a job, one result for each set.
+    """Analyse each set of interior parameters of a job.
 
     Parameters
     ----------
     job : tankcal.job.Job
-        A loaded job.
+        Loaded job.
     choices : Choices, optional
-        What the user decides.
+        Choices of the user.
     camera, photo : str, optional
-        Names, to have the sets of these only.
+        Names of a camera and a photo to which the analysis is restricted.
     adjustment : survey.Adjustment, optional
-        Of job.measurements, where it is at hand.
+        Adjustment of job.measurements, if it is already known.
     dropping : bool, optional
-        Whether the survey is adjusted again without each candidate.
+        Whether the survey is adjusted again without each candidate parameter.
     progress : callable, optional
-        progress(text, done, total) is called as the work goes on.
+        Called as progress(text, done, total) before each adjustment.
 
     Returns
     -------
@@ -117,10 +117,9 @@ def analyse_job(
     Raises
     ------
     InputError
-        For a job without photographs, without adjusted parameters or without such a camera or
-        photo.
+        If the job has no photographs, no adjusted parameters, or no such camera or photo.
     SolutionError
-        When the survey cannot be adjusted.
+        If the survey cannot be adjusted.
     """
     progress = progress or (lambda text, done, total: None)
     if job.measurements is None or not job.measurements.photos:
@@ -130,7 +129,7 @@ def analyse_job(
                 message("camera_none_to_judge", "no photographs: there is no camera to test"),
             )
         )
-    photos = {one.name: one.camera for one in job.measurements.photos}
+    photos = {item.name: item.camera for item in job.measurements.photos}
     refuse_unknown(photos, camera, photo)
     if adjustment is None:
         progress(message("camera_adjusting_all", "adjusting the survey with all parameters"), 0, 1)
@@ -139,12 +138,12 @@ def analyse_job(
     statistics = Statistics(adjustment.sigma0, adjustment.redundancy, adjustment.cov_scale, groups)
     interiors = interiors_of(adjustment, job.measurements)
     interiors = select_interiors(interiors, photos, camera, photo)
-    found = _of_all(interiors, statistics, choices or Choices(), "cameras.toml", source="job")
-    return _with_outcomes(found, job, adjustment, progress) if dropping else found
+    analyses = _judge_all(interiors, statistics, choices or Choices(), "cameras.toml", source="job")
+    return _run_trials(analyses, job, adjustment, progress) if dropping else analyses
 
 
-def _of_all(interiors, statistics, choices, file, source="record"):
-    judged = [one for one in interiors if len(adjusted_rows(one))]
+def _judge_all(interiors, statistics, choices, file, source="record"):
+    judged = [interior for interior in interiors if len(adjusted_rows(interior))]
     if not judged:
         text = message(
             "camera_nothing_adjusted",
@@ -152,53 +151,58 @@ def _of_all(interiors, statistics, choices, file, source="record"):
         )
         raise InputError(Problem(file, text))
     try:
-        return tuple(judge_parameters(one, statistics, choices, source) for one in judged)
+        return tuple(judge_parameters(interior, statistics, choices, source) for interior in judged)
     except ValueError as error:
         raise InputError(Problem(file, error.args[0])) from error
 
 
-def _with_outcomes(found, job, adjustment, progress):
-    """All CameraParameters with each of their trials adjusted again, then what they advise."""
-    outcomes, total = {}, 1 + sum(len(remove_joint_trial(one).trials) for one in found)
+def _run_trials(analyses, job, adjustment, progress):
+    """Adjust the survey without the parameters of each trial, and update the recommendations."""
+    outcomes, total = {}, 1 + sum(len(remove_joint_trial(analysis).trials) for analysis in analyses)
     progress(message("camera_volume_all", "computing the volume with all parameters"), 0, total)
-    again = Dropping(job, adjustment)
+    dropping = Dropping(job, adjustment)
 
-    def tried(stage):
-        staged = tuple(stage(one) for one in found)
-        for one in staged:
-            for trial in one.trials:
-                key = one.interior.camera, trial.names
+    def with_outcomes_of(stage):
+        staged = tuple(stage(analysis) for analysis in analyses)
+        for analysis in staged:
+            for trial in analysis.trials:
+                key = analysis.interior.camera, trial.names
                 if key not in outcomes:
                     done = len(outcomes) + 1
-                    told = message(
+                    text = message(
                         "camera_adjusting_without",
                         "adjusting without {parameters} of {camera}",
                         parameters=" ".join(trial.names),
                         camera=key[0],
                     )
-                    progress(told, done, max(done, total))
-                    outcomes[key] = again.without(*key)
-        return tuple(advise(_tried(one, outcomes, adjustment, again)) for one in staged)
+                    progress(text, done, max(done, total))
+                    outcomes[key] = dropping.without(*key)
+        return tuple(
+            advise(_add_outcomes(analysis, outcomes, adjustment, dropping)) for analysis in staged
+        )
 
-    found = tried(remove_joint_trial)
-    found = tried(add_joint_trial)
+    # First drop parameters singly or in groups, then all that are recommended together. While
+    # these change the product, hold back one more parameter.
+    analyses = with_outcomes_of(remove_joint_trial)
+    analyses = with_outcomes_of(add_joint_trial)
     while any(
-        fewer is not one for fewer, one in zip(map(hold_one_back, found), found, strict=True)
+        fewer is not analysis
+        for fewer, analysis in zip(map(hold_one_back, analyses), analyses, strict=True)
     ):
-        found = tuple(advise(hold_one_back(one)) for one in found)
-        found = tried(add_joint_trial)
+        analyses = tuple(advise(hold_one_back(analysis)) for analysis in analyses)
+        analyses = with_outcomes_of(add_joint_trial)
     progress("done", total, total)
-    return tuple(advise_together(one) for one in found)
+    return tuple(advise_together(analysis) for analysis in analyses)
 
 
-def _tried(found, outcomes, adjustment, again):
-    """The CameraParameters with what came out of its trials."""
+def _add_outcomes(analysis, outcomes, adjustment, dropping):
+    """Add the outcomes of the trials to a CameraParameters."""
     trials = []
-    for trial in found.trials:
-        outcome, after = outcomes[found.interior.camera, trial.names], None
+    for trial in analysis.trials:
+        outcome, after = outcomes[analysis.interior.camera, trial.names], None
         if outcome.adjustment is not None:
-            values, names, cofactors = interior_after(outcome, found.interior)
-            factor = adjustment.sigma0**2 if found.scale == "a_posteriori" else 1.0
+            values, names, cofactors = interior_after(outcome, analysis.interior)
+            factor = adjustment.sigma0**2 if analysis.scale == "a_posteriori" else 1.0
             after = names, values, factor * cofactors
         trials.append(replace(trial, outcome=outcome, after=after))
-    return replace(found, trials=tuple(trials), base=(again.volume, again.no_volume))
+    return replace(analysis, trials=tuple(trials), base=(dropping.volume, dropping.no_volume))

@@ -1,14 +1,15 @@
-"""Principal components of the parameters of a camera: the program ANALISE.
+"""Principal components of the parameters of a camera, as in the program ANALISE.
 
-With C the eigenvectors and lambda the eigenvalues of the covariance matrix, or of the correlation
-matrix, of parameters x:
+C contains the eigenvectors and lambda the eigenvalues of the covariance or correlation matrix of
+the parameters x:
 
     components  y = C' x        variance of y_j = lambda_j       share = lambda_j / sum of lambda
     loadings    corr(x_i, y_j) = c_ij sqrt(lambda_j) / sd(x_i)
 
-A correlation matrix is that of x over its sds, so those are what C multiplies; its sd(x_i) are 1.
-Source: Silva 1995 (61-79). His program multiplied the eigenvectors of the correlation matrix with
-the values themselves (`unscaled`), and did not sort.
+For a correlation matrix, x is divided by its standard deviations, and sd(x_i) is 1.
+
+Source: Silva 1995 (61-79). His program multiplied the eigenvectors of the correlation matrix by the
+undivided values (`unscaled`), and did not sort the components.
 """
 
 from dataclasses import dataclass
@@ -26,15 +27,26 @@ MATRICES = ("correlation", "covariance")
 class Components:
     """Principal components of k parameters, the largest first.
 
-    names               (k,)
-    of                  "correlation" or "covariance"
-    positive_definite   by Cholesky, before anything else
-    eigenvalues         (k,) descending; negative ones are shown, not mended
-    share_percent       (k,) of their sum          cumulative_percent  (k,)
-    vectors             (k, k) columns C, the largest loading of each positive
-    loadings            (k, k) parameter by component; nan where an eigenvalue is not positive
-    values              (k,) of the components; nan without values of the parameters
-    unscaled            True: `values` multiply the parameters as they are (Silva's program)
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the parameters.
+    of : str
+        Matrix that was analysed, "correlation" or "covariance".
+    positive_definite : bool
+        Whether the matrix has a Cholesky factor.
+    eigenvalues : ndarray, shape (k,)
+        Eigenvalues in descending order; negative eigenvalues are kept.
+    share_percent, cumulative_percent : ndarray, shape (k,)
+        Share of each eigenvalue in their sum, and its cumulative sum, %.
+    vectors : ndarray, shape (k, k)
+        Eigenvectors C in the columns; the largest loading of each column is positive.
+    loadings : ndarray, shape (k, k)
+        Loadings, parameter by component; nan if an eigenvalue is not positive.
+    values : ndarray, shape (k,)
+        Values of the components; nan without values of the parameters.
+    unscaled : bool
+        Whether the parameters were not divided by their standard deviations (Silva's program).
     """
 
     names: tuple
@@ -50,32 +62,46 @@ class Components:
 
     @property
     def smallest_eigenvalue(self):
-        """The last of the eigenvalues."""
+        """Smallest eigenvalue."""
         return float(self.eigenvalues[-1])
 
 
 def components(names, covariance, values=None, *, of="correlation", unscaled=False):
-    """The Components of parameters.
+    """Compute the principal components of parameters.
 
-    names       (k,)
-    covariance  (k, k) symmetric, in the units of the parameters; a correlation matrix will do
-    values      (k,) of the parameters, or None
-    of          which matrix is analysed, "correlation" or "covariance" (then units matter)
-    unscaled    multiply eigenvectors of the correlation matrix with the values as they are
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the k parameters.
+    covariance : array_like, shape (k, k)
+        Covariance matrix in the units of the parameters, or a correlation matrix.
+    values : array_like, shape (k,), optional
+        Values of the parameters.
+    of : str, optional
+        Matrix to analyse, "correlation" or "covariance". The covariance depends on the units.
+    unscaled : bool, optional
+        Whether the eigenvectors of the correlation matrix multiply the undivided values.
 
-    Raises ValueError for a matrix that is not symmetric, not finite or has a variance that is not
-    positive.
+    Returns
+    -------
+    Components
+
+    Raises
+    ------
+    ValueError
+        If the matrix is not symmetric or not finite, or if a variance is not positive.
     """
     if of not in MATRICES:
         raise ValueError(f"of {of!r}: expected one of {', '.join(MATRICES)}")
-    matrix = _checked(names, covariance)
+    matrix = _check_matrix(names, covariance)
     sd = np.sqrt(np.diag(matrix))
     lower = cholesky_of(matrix)
     weight = np.ones_like(sd) if of == "correlation" else sd
-    eigenvalues, vectors = _decomposed(correlations(matrix), lower, weight)
+    eigenvalues, vectors = _decompose(correlations(matrix), lower, weight)
+    # Loadings c_ij sqrt(lambda_j) / sd(x_i)
     root = np.sqrt(np.where(eigenvalues > 0, eigenvalues, np.nan))
     loadings = vectors * root / weight[:, None]
-    vectors, loadings = _signed(vectors, loadings, weight)
+    vectors, loadings = _orient(vectors, loadings, weight)
     share = 100 * eigenvalues / eigenvalues.sum()
     given = np.full(len(sd), np.nan) if values is None else np.asarray(values, dtype=float)
     if of == "correlation" and not unscaled:
@@ -94,12 +120,12 @@ def components(names, covariance, values=None, *, of="correlation", unscaled=Fal
     )
 
 
-def _decomposed(correlation, lower, weight):
+def _decompose(correlation, lower, weight):
     """Eigenvalues (k,), descending, and eigenvectors of W R W, R = L L', W = diag(weight).
 
-    By the singular values of W L: the eigenvalues of a covariance of K1 to K3 in millimetres span
-    thirty powers of ten, of which a decomposition of the matrix itself would keep sixteen. Without
-    L (not positive definite) there is nothing else; negative eigenvalues are then shown.
+    They follow from the singular values of W L. The eigenvalues of a covariance of K1 to K3 in mm
+    span thirty powers of ten, and a decomposition of W R W would resolve only sixteen. Without L
+    (matrix not positive definite), W R W is decomposed, and negative eigenvalues are returned.
     """
     if lower is None:
         values, vectors = np.linalg.eigh(weight[:, None] * correlation * weight)
@@ -108,7 +134,7 @@ def _decomposed(correlation, lower, weight):
     return values**2, vectors
 
 
-def _checked(names, covariance):
+def _check_matrix(names, covariance):
     matrix = np.asarray(covariance, dtype=float)
     if matrix.shape != (len(names), len(names)) or not len(names):
         raise ValueError(f"a matrix of shape {matrix.shape} for {len(names)} parameters")
@@ -120,8 +146,8 @@ def _checked(names, covariance):
     return matrix
 
 
-def _signed(vectors, loadings, sd):
-    """Vectors and loadings with the largest loading of each component positive."""
+def _orient(vectors, loadings, sd):
+    """Change signs of vectors and loadings so that the largest loading is positive."""
     largest = np.argmax(np.abs(vectors) / sd[:, None], axis=0)
     sign = np.where(vectors[largest, np.arange(len(sd))] < 0, -1.0, 1.0)
     return vectors * sign, loadings * sign

@@ -1,12 +1,11 @@
-"""What happens to the survey and to the volume when parameters of a camera are dropped: done again.
+"""New adjustments of a survey without some parameters of a camera, and their effect on the volume.
 
-The survey is adjusted again with the parameters off (held at zero), from the same readings: what
-the search for blunders rejected stays rejected, and nothing else goes. So the figures differ by the
-parameters alone, and a bad model shows in sigma0 rather than in readings that are rejected. For
-the same reason the wall is fitted through the same points each time, without a search for others.
+The dropped parameters are held at zero. The readings are the same: outliers remain rejected, and no
+other reading is rejected. The results therefore differ only by the parameters, and an inadequate
+model appears in sigma0 rather than in rejected readings. The points of the wall are also the same.
 
-Not adjusted by `surveys.adjust_survey`: a camera without a parameter that it needs looks like a
-mistake in the readings, which that would search for.
+`surveys.adjust_survey` is not used, because it searches for outliers: a camera that lacks a
+parameter would produce apparent outliers.
 """
 
 from dataclasses import dataclass, replace
@@ -27,13 +26,22 @@ from tankcal.survey.network_of_survey import gather
 
 @dataclass(frozen=True)
 class Moved:
-    """How far adjusted points moved; fixed coordinates count as not moving, lengths in m.
+    """Change of adjusted points between two adjustments; fixed coordinates have zero change.
 
-    count              points compared
-    rms_m, largest_m   of the distance moved; the point that moved most
-    axis_rms_m         (3,) x, y, z            axis_largest_m  (3,) magnitudes
-    rms_sds            root mean square of each coordinate's change over its own sd
-    largest_sds        largest of these; its point
+    Attributes
+    ----------
+    count : int
+        Number of points compared.
+    rms_m, largest_m : float
+        Root mean square and largest length of the changes, m.
+    largest_point : str
+        Point with the largest change.
+    axis_rms_m, axis_largest_m : ndarray, shape (3,)
+        Root mean square and largest magnitude of the changes of x, y and z, m.
+    rms_sds, largest_sds : float
+        Root mean square and largest change of a coordinate, in its standard deviations.
+    largest_sds_point : str
+        Point with the change `largest_sds`.
     """
 
     count: int
@@ -49,12 +57,22 @@ class Moved:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The survey without some parameters.
+    """Result of an adjustment without some parameters.
 
-    camera, names  which                     failed  why it cannot be adjusted, or None
-    adjustment     survey.Adjustment: points, covariances and statistics, no readings; None: failed
-    moved          Moved, against the survey with them; None: failed
-    volume         TopVolume, or None: no tank, or no capacity
+    Attributes
+    ----------
+    camera : str
+        Name of the camera.
+    names : tuple of str
+        Names of the dropped parameters.
+    failed : str or None
+        Reason of a failure, or None.
+    adjustment : survey.Adjustment or None
+        Points, covariances and statistics, without readings; None if the adjustment failed.
+    moved : Moved or None
+        Change of the points by dropping the parameters; None if the adjustment failed.
+    volume : TopVolume or None
+        Volume, or None if there is no tank or the capacity cannot be computed.
     """
 
     camera: str
@@ -66,11 +84,21 @@ class Outcome:
 
 
 class Dropping:
-    """A survey that is adjusted again and again, each time without some parameters.
+    """Repeated adjustments of a survey, each without some parameters.
 
-    job         job.Job with measurements     adjustment  survey.Adjustment of them
-    volume      TopVolume with all parameters; None: no tank, or none can be computed
-    no_volume   why there is none, or None
+    Parameters
+    ----------
+    job : job.Job
+        Job with measurements.
+    adjustment : survey.Adjustment
+        Adjustment of the measurements with all parameters.
+
+    Attributes
+    ----------
+    volume : TopVolume or None
+        Volume with all parameters; None if there is no tank or the capacity cannot be computed.
+    no_volume : str or None
+        Reason why the volume cannot be computed.
     """
 
     def __init__(self, job, adjustment):
@@ -78,7 +106,7 @@ class Dropping:
         gathered = gather(job.measurements)
         survey = start_from_adjusted(adjustment.adjusted.survey, adjustment.adjusted)
         self._options = make_frame(survey, gathered, job.measurements.settings).options
-        self._survey = replace(survey, cameras=_started_cameras(adjustment.adjusted))
+        self._survey = replace(survey, cameras=_cameras_from_adjusted(adjustment.adjusted))
         self.volume, self.no_volume, self._top = None, None, TopOfTank(job)
         if job.tank is not None:
             try:
@@ -87,41 +115,43 @@ class Dropping:
                 self.no_volume = str(error)
 
     def without(self, camera, names):
-        """The Outcome of dropping parameters (names) of a camera (its name).
+        """Return the Outcome of dropping the parameters `names` of a camera.
 
-        One value for the block is dropped from all cameras that have it. c cannot be dropped.
+        A parameter with one value for the block is dropped from all cameras that share it. The
+        principal distance c cannot be dropped.
         """
         try:
-            found = self.adjusted(_dropped(self._survey.cameras, camera, names))
-            moved = movement(self.adjustment, found)
+            adjusted = self.adjusted(_drop_from_cameras(self._survey.cameras, camera, names))
+            moved = movement(self.adjustment, adjusted)
         except SolutionError as error:
             return Outcome(camera, tuple(names), str(error))
         if self.volume is None:
-            return Outcome(camera, tuple(names), None, found, moved)
+            return Outcome(camera, tuple(names), None, adjusted, moved)
         try:
-            volume = self._top.of(found)
+            volume = self._top.of(adjusted)
         except TankcalError as error:
-            return Outcome(camera, tuple(names), str(error), found, moved)
-        return Outcome(camera, tuple(names), None, found, moved, volume)
+            return Outcome(camera, tuple(names), str(error), adjusted, moved)
+        return Outcome(camera, tuple(names), None, adjusted, moved, volume)
 
     def adjusted(self, cameras):
-        """The survey.Adjustment with other cameras (network.Camera), in the order of the survey.
+        """Adjust the survey with other cameras (network.Camera), in the order of the survey.
 
-        It holds points, covariances and statistics; readings, groups and warnings are empty.
+        The returned survey.Adjustment contains points, covariances and statistics. Its readings,
+        groups and warnings are empty.
         """
-        done = adjust(replace(self._survey, cameras=cameras), **self._options)
+        adjusted = adjust(replace(self._survey, cameras=cameras), **self._options)
         base = self.adjustment
-        scale = 1.0 if base.cov_scale == 1 else done.scale("a_posteriori")
-        there = np.flatnonzero(np.isfinite(done.xyz_m).all(axis=1))
+        scale = 1.0 if base.cov_scale == 1 else adjusted.scale("a_posteriori")
+        is_known = np.flatnonzero(np.isfinite(adjusted.xyz_m).all(axis=1))
         return replace(
             base,
-            adjusted=done,
-            there=there,
+            adjusted=adjusted,
+            there=is_known,
             readings=(),
             removed=(),
             groups=(),
             check_points=None,
-            causes=causes_of(done, there, scale),
+            causes=causes_of(adjusted, is_known, scale),
             cov_scale=scale,
             rounds=1,
             warnings=(),
@@ -130,39 +160,53 @@ class Dropping:
 
 
 def movement(before, after):
-    """The Moved of the points that two Adjustments have in common, in sds of the first."""
+    """Compare the common points of two Adjustments, in standard deviations of the first."""
     places = {name: i for i, name in enumerate(after.names)}
-    both = [(i, places[name]) for i, name in enumerate(before.names) if name in places]
-    if not both:
+    pairs = [(i, places[name]) for i, name in enumerate(before.names) if name in places]
+    if not pairs:
         raise SolutionError(message("camera_no_point_left", "no point is left to compare"))
-    here, there = np.array(both).T
+    here, there = np.array(pairs).T
     change = after.xyz_m[there] - before.xyz_m[here]
     sd = np.sqrt(np.maximum(np.einsum("nii->ni", before.covariance_m2[here]), 0.0))
-    known = sd > 0
+    has_sd = sd > 0
     change = np.where(np.asarray(before.fixed)[here], 0.0, change)
-    relative = np.abs(np.divide(change, sd, out=np.zeros_like(change), where=known))
+    relative = np.abs(np.divide(change, sd, out=np.zeros_like(change), where=has_sd))
     size = np.linalg.norm(change, axis=1)
     far, worst = int(np.argmax(size)), int(np.argmax(relative.max(axis=1)))
     return Moved(
-        count=len(both),
+        count=len(pairs),
         rms_m=float(np.sqrt(np.mean(size**2))),
         largest_m=float(size[far]),
         largest_point=before.names[here[far]],
         axis_rms_m=np.sqrt(np.mean(change**2, axis=0)),
         axis_largest_m=np.abs(change).max(axis=0),
-        rms_sds=float(np.sqrt(np.mean(relative[known] ** 2))) if known.any() else 0.0,
+        rms_sds=float(np.sqrt(np.mean(relative[has_sd] ** 2))) if has_sd.any() else 0.0,
         largest_sds=float(relative.max()),
         largest_sds_point=before.names[here[worst]],
     )
 
 
 def interior_after(outcome, interior):
-    """Values (k,) and cofactors (k, k) of the parameters of a set that an Outcome keeps.
+    """Parameters of a set after an Outcome.
 
-    interior  interiors.Interior of the survey with all parameters. Cofactors are of sigma0 = 1.
+    Parameters
+    ----------
+    outcome : Outcome
+        Adjustment without some parameters.
+    interior : Interior
+        Set of parameters in the adjustment with all parameters.
+
+    Returns
+    -------
+    values : ndarray, shape (k,)
+        Values of the kept parameters.
+    names : tuple of str
+        Names of the kept parameters.
+    cofactors : ndarray, shape (k, k)
+        Covariance matrix for sigma0 = 1.
     """
     adjusted = outcome.adjustment.adjusted
-    names = [one.name for one in adjusted.survey.cameras]
+    names = [camera.name for camera in adjusted.survey.cameras]
     photos = adjusted.survey.photos
     if interior.photos is not None:
         photo = photos.names.index(interior.photos[0])
@@ -172,35 +216,39 @@ def interior_after(outcome, interior):
     return np.array([values[name] for name in free]), tuple(free), np.asarray(cofactors)
 
 
-def _started_cameras(adjusted):
-    """The cameras, with adjusted values to start from where the whole camera has one and free."""
-    survey, found = adjusted.survey, []
+def _cameras_from_adjusted(adjusted):
+    """Set adjusted values as initial values of free parameters that a whole camera shares."""
+    survey, cameras = adjusted.survey, []
     for number, camera in enumerate(survey.cameras):
         values, _, _ = adjusted.camera(int(np.flatnonzero(survey.photos.camera == number)[0]))
         start = [
-            values[name] if scope in ("camera", "block") and state == "free" else given
-            for name, scope, state, given in zip(
+            values[name] if scope in ("camera", "block") and state == "free" else value
+            for name, scope, state, value in zip(
                 PARAMETERS, camera.scope, camera.state, camera.values.tolist(), strict=True
             )
         ]
-        found.append(replace(camera, values=np.array(start)))
-    return tuple(found)
+        cameras.append(replace(camera, values=np.array(start)))
+    return tuple(cameras)
 
 
-def _dropped(cameras, name, parameters):
-    """The cameras with parameters of one of them off, and of all where they share the value."""
+def _drop_from_cameras(cameras, name, parameters):
+    """Switch off parameters of a camera, and in all cameras that share their values."""
     if "c" in parameters:
         raise ValueError("c cannot be dropped: a camera has a principal distance")
-    own = next(one for one in cameras if one.name == name)
-    gone = [PARAMETERS.index(one) for one in parameters]
-    found = []
+    dropped_camera = next(item for item in cameras if item.name == name)
+    dropped_indices = [PARAMETERS.index(item) for item in parameters]
+    new_cameras = []
     for camera in cameras:
-        off = {k for k in gone if camera is own or own.scope[k] == camera.scope[k] == "block"}
-        found.append(
+        off = {
+            k
+            for k in dropped_indices
+            if camera is dropped_camera or dropped_camera.scope[k] == camera.scope[k] == "block"
+        }
+        new_cameras.append(
             replace(
                 camera,
                 values=np.where([k in off for k in range(13)], 0.0, camera.values),
                 scope=tuple("off" if k in off else s for k, s in enumerate(camera.scope)),
             )
         )
-    return tuple(found)
+    return tuple(new_cameras)

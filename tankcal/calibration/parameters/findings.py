@@ -1,4 +1,4 @@
-"""What is found about the parameters of a camera, and what the user decides about it."""
+"""Results of the analysis of the parameters of a camera, and choices of the user."""
 
 from dataclasses import dataclass
 
@@ -16,23 +16,21 @@ from tankcal.survey.network import correlations
 
 @dataclass(frozen=True)
 class Choices:
-    """What the user decides.
+    """Choices of the user.
 
     Attributes
     ----------
     alpha : float
-        Level of the tests.
+        Significance level of the tests.
     groups : tuple of tuple of str, or None
-        Groups of parameters; None: the usual.
+        Groups of parameters to test, or None for the usual groups.
     of : str
-        Matrix that is analysed: "correlation" or "covariance".
+        Matrix of the principal components: "correlation" or "covariance".
     unscaled : bool
-        Values of components as Silva's program made them.
-    limit_px : float or None
-        Image accuracy that effects are compared with, px; None: 0.5 px in Pessoa's rule, and that
-        of the residuals in our recommendation.
-    limit_um : float or None
-        The same in um.
+        Whether the values of the components are computed as in Silva's program.
+    limit_px, limit_um : float or None
+        Image accuracy for comparison with the effect of a parameter, px or um. By default 0.5 px in
+        Pessoa's rule, and the accuracy from the residuals in the recommendation.
     """
 
     alpha: float = ALPHA
@@ -45,13 +43,22 @@ class Choices:
 
 @dataclass(frozen=True)
 class Trial:
-    """A set of parameters that could be dropped.
+    """Set of parameters that could be dropped.
 
-    because     codes: "single", "group", "silva", "pessoa"
-    predicted   conditioning.Without
-    outcome     dropping.Outcome, or None: not adjusted again
-    comparable  False where dropping them changes more than this set of parameters
-    after       (names, values (k,), covariance (k, k) scaled like the prediction), or None
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the parameters.
+    because : tuple of str
+        Reasons of the trial: "single", "group", "silva", "pessoa", "advised".
+    predicted : Without
+        Predicted values and covariance of the kept parameters.
+    comparable : bool
+        Whether dropping the parameters changes only this set of parameters.
+    outcome : Outcome or None
+        Result of a new adjustment, or None without a new adjustment.
+    after : tuple or None
+        Names, values (k,) and covariance (k, k) after the new adjustment, scaled as `predicted`.
     """
 
     names: tuple
@@ -64,16 +71,46 @@ class Trial:
 
 @dataclass(frozen=True)
 class CameraParameters:
-    """Everything about the parameters of one set.
+    """Analysis of one set of interior parameters.
 
-    interior    interiors.Interior             source  "job" or "record"
-    names       (k,) of those adjusted         values  (k,)
-    covariance  (k, k), with sigma0^2 where `scale` is "a_posteriori"
-    dof         of sigma0; inf where it is not estimated; sigma0 nan then
-    limit       recommending.Limit             tests, groups  tuples of significance.AgainstZero
-    own         {name: edges.Shift or None}    left    {name: (Shift, Shift turned to fit)}
-    held_back   names that could go alone, but not with the others that may go
-    base        (TopVolume or None, why there is none or None): with all parameters; None: a record
+    Attributes
+    ----------
+    interior : Interior
+        Set of interior parameters.
+    source : str
+        "job" or "record".
+    choices : Choices
+        Choices of the user.
+    names : tuple of str
+        Names of the k adjusted parameters.
+    values : ndarray, shape (k,)
+        Values of the adjusted parameters.
+    covariance : ndarray, shape (k, k)
+        Covariance matrix, multiplied by sigma0^2 if `scale` is "a_posteriori".
+    scale : str
+        "a_posteriori" or "a_priori".
+    dof, sigma0 : float
+        Degrees of freedom and value of sigma0; inf and nan if sigma0 is not estimated.
+    limit : Limit
+        Image accuracy.
+    tests, groups : tuple of AgainstZero
+        Tests of single parameters and of groups.
+    components : Components
+        Principal components.
+    own : dict
+        {name: Shift or None}, shift by the value of the parameter.
+    left : dict
+        {name: (Shift, Shift after rotation)}, remaining shift if the parameter is dropped.
+    trials : tuple of Trial
+        Sets of parameters that could be dropped.
+    silva, pessoa : SilvaRule, PessoaRule
+        Results of the two rules.
+    recommendation : tuple of Advice
+        Recommendation for each parameter.
+    held_back : tuple of str
+        Parameters that can be dropped alone, but not together with the others.
+    base : tuple or None
+        TopVolume with all parameters or None, and reason of a failure or None; None for a record.
     """
 
     interior: Interior
@@ -100,18 +137,18 @@ class CameraParameters:
 
     @property
     def sds(self):
-        """(k,) standard deviations."""
+        """Standard deviations (k,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def correlation(self):
-        """(k, k) correlations."""
+        """Correlation matrix (k, k)."""
         return correlations(self.covariance)
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """Of the adjustment; groups (kind, name, count, redundancy, rms in mm)."""
+    """Statistics of an adjustment; groups are (kind, name, count, redundancy, rms in mm)."""
 
     sigma0: float
     dof: int
@@ -120,5 +157,5 @@ class Statistics:
 
     @property
     def estimated(self):
-        """Whether sigma0 says anything."""
+        """Whether sigma0 was estimated."""
         return self.dof > 0 and np.isfinite(self.sigma0) and self.sigma0 > 0

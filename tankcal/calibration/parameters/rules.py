@@ -1,13 +1,13 @@
-"""Which parameters to drop: the rules of Silva and of Pessoa, each as its author applied it.
+"""Rules of Silva and of Pessoa for dropping parameters, each as its author applied it.
 
-Silva: as many parameters can go as components have a negligible share (0.7 % in print, so below
-0.75 %); among the parameters that load above 0.8 on the same component those of smallest loading
-go. Loadings that differ by less than `alike` count as equal (his tables reproduce to 0.05), and of
-equal ones the higher order goes: so K2 and K3 go, not K1. Components are taken in the order of
-their share. c, x0 and y0 stay.
+Silva: the number of parameters to drop is the number of components with a negligible share (0.7 %
+in print, hence below 0.75 %). Of the parameters with loadings above 0.8 on the same component,
+those with the smallest loadings are dropped. Loadings that differ by less than `alike` count as
+equal (his tables reproduce to 0.05); of equal loadings the higher order is dropped. K2 and K3 are
+therefore dropped before K1. Components are used in the order of their share. c, x0 and y0 are kept.
 
-Pessoa: a parameter stays when it is significant, and also when it shifts the corner of the frame by
-as much as the image accuracy (0.5 px): so K3 stays, although F rejects it.
+Pessoa: a parameter is kept if it is significant, or if it shifts the corner of the frame by the
+image accuracy (0.5 px) or more. K3 is therefore kept, although F rejects it.
 
 Source: Silva 1995 (61-79 and chapter 5); Pessoa 2017 (11-13 and table 10).
 """
@@ -18,20 +18,26 @@ import numpy as np
 
 from tankcal.camera.model import PARAMETERS
 
-NEGLIGIBLE_PERCENT, LOADING, ALIKE = 0.75, 0.8, 0.05
-LIMIT_PX = 0.5
-BASIC = ("c", "x0", "y0")
+NEGLIGIBLE_PERCENT, LOADING, ALIKE = 0.75, 0.8, 0.05  # limits of Silva's rule
+LIMIT_PX = 0.5  # image accuracy in Pessoa's rule, px
+BASIC = ("c", "x0", "y0")  # parameters that Silva's rule always keeps
 
 
 @dataclass(frozen=True)
 class SilvaRule:
-    """What Silva's rule says.
+    """Result of Silva's rule.
 
-    may_go              number of components with a negligible share
-    drop                names, in the order in which they go; at most `may_go`
-    high                for each component on which two or more load high: (number of the component,
-                        share %, ((name, loading), ...)), the numbers from 0
-    negligible_percent, loading, alike  the limits that were used
+    Attributes
+    ----------
+    may_go : int
+        Number of components with a negligible share.
+    drop : tuple of str
+        Names of the parameters to drop, in order; at most `may_go`.
+    high : tuple
+        Components with two or more high loadings: (index of the component from 0, share in %,
+        ((name, loading), ...)).
+    negligible_percent, loading, alike : float
+        Limits of the rule.
     """
 
     may_go: int
@@ -44,12 +50,17 @@ class SilvaRule:
 
 @dataclass(frozen=True)
 class PessoaRule:
-    """What Pessoa's rule says.
+    """Result of Pessoa's rule.
 
-    limit_px, limit_um  accuracy that the shift of a corner is compared with; the one not used: nan
-    drop                names
-    keep                (name, because): "significant", "edge", "both" or "not_known" (no test, or
-                        no limit to compare the shift with)
+    Attributes
+    ----------
+    limit_px, limit_um : float
+        Accuracy for comparison with the shift of a corner; nan for the unit that is not used.
+    drop : tuple of str
+        Names of the parameters to drop.
+    keep : tuple of (str, str)
+        Name and reason: "significant", "edge", "both" or "not_known" (no test, or no limit for the
+        shift).
     """
 
     limit_px: float
@@ -61,12 +72,24 @@ class PessoaRule:
 def silva_rule(
     components, *, negligible_percent=NEGLIGIBLE_PERCENT, loading=LOADING, alike=ALIKE, stay=BASIC
 ):
-    """The SilvaRule of `components.Components`.
+    """Apply Silva's rule to principal components.
 
-    negligible_percent  share below which a component is negligible
-    loading             above which a parameter loads high on a component
-    alike               loadings that differ by less count as equal; 0: none do
-    stay                names that never go
+    Parameters
+    ----------
+    components : Components
+        Principal components of the parameters.
+    negligible_percent : float, optional
+        Share below which a component is negligible, %.
+    loading : float, optional
+        Loading above which a parameter has a high loading.
+    alike : float, optional
+        Largest difference of loadings that count as equal.
+    stay : sequence of str, optional
+        Parameters that are always kept.
+
+    Returns
+    -------
+    SilvaRule
     """
     names, share = components.names, components.share_percent
     sizes = np.abs(np.nan_to_num(components.loadings))
@@ -80,39 +103,52 @@ def silva_rule(
         high.append(
             (number, float(share[number]), tuple((names[i], float(signed[i])) for i in rows))
         )
-        left = {names[i]: sizes[i, number] for i in rows if names[i] not in drop}
-        while len(drop) < may_go and len(left) > 1:
-            goes = _smallest(left, alike, stay)
-            if goes is None:
+        remaining = {names[i]: sizes[i, number] for i in rows if names[i] not in drop}
+        while len(drop) < may_go and len(remaining) > 1:
+            dropped = _smallest(remaining, alike, stay)
+            if dropped is None:
                 break
-            drop.append(goes)
-            del left[goes]
+            drop.append(dropped)
+            del remaining[dropped]
     return SilvaRule(may_go, tuple(drop), tuple(high), negligible_percent, loading, alike)
 
 
 def _smallest(loadings, alike, stay):
-    """Name of the smallest loading, the highest order of those that are alike; None: all stay."""
-    able = {name: size for name, size in loadings.items() if name not in stay}
-    if not able:
+    """Name of the parameter with the smallest loading, of equal loadings the highest order.
+
+    None if all parameters are kept.
+    """
+    candidates = {name: size for name, size in loadings.items() if name not in stay}
+    if not candidates:
         return None
-    least = min(able.values())
-    near = [name for name, size in able.items() if size - least <= alike]
-    return max(near, key=_order)
+    least = min(candidates.values())
+    equal = [name for name, size in candidates.items() if size - least <= alike]
+    return max(equal, key=_order)
 
 
 def _order(name):
-    """Order of a term, K3 above K2; then its place among the parameters."""
+    """Order of a term (K3 above K2), then its index among the parameters."""
     power = int(name[1]) if name[0] in "KP" else 0
     return power, PARAMETERS.index(name) if name in PARAMETERS else 0
 
 
 def pessoa_rule(tests, shifts, *, limit_px=LIMIT_PX, limit_um=np.nan):
-    """The PessoaRule of single parameters.
+    """Apply Pessoa's rule to single parameters.
 
-    tests     significance.AgainstZero of each parameter
-    shifts    {name: edges.Shift of its value, or None}
-    limit_px  image accuracy that the corner's shift is compared with
-    limit_um  the same where the size of a pixel is not known
+    Parameters
+    ----------
+    tests : sequence of AgainstZero
+        Test of each parameter.
+    shifts : dict
+        {name: Shift by the value of the parameter, or None}.
+    limit_px : float, optional
+        Image accuracy for comparison with the shift of the corner, px.
+    limit_um : float, optional
+        Image accuracy if the pixel size is not known, um.
+
+    Returns
+    -------
+    PessoaRule
     """
     keep, drop, in_px = [], [], True
     for test in tests:

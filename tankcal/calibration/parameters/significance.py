@@ -1,11 +1,11 @@
-"""Is a parameter, or a group of them, different from zero?
+"""Tests of single parameters and of groups of parameters against zero.
 
     one parameter    F = x^2 / s^2                    against F(1 - alpha; 1, dof)
     a group of p     F = x' Q^-1 x / (p sigma0^2)     against F(1 - alpha; p, dof)
 
-The covariance that goes in is sigma0^2 Q. Where sigma0 is not estimated, dof is infinite and p F is
-chi-square. Groups are solved through the Cholesky factor of their correlations, never inverted: the
-units of K1 to K4 differ by many powers of ten.
+The covariance matrix is sigma0^2 Q. If sigma0 is not estimated, dof is infinite and p F has a
+chi-square distribution. Groups are solved with the Cholesky factor of their correlations and not
+inverted, because the units of K1 to K4 differ by many powers of ten.
 
 Source: Pessoa 2017 (11-13); Koch 1999, section 4.2.
 """
@@ -16,20 +16,27 @@ import numpy as np
 import scipy.linalg
 from scipy.special import chdtrc, chdtri, fdtrc, fdtri
 
-ALPHA = 0.05
+ALPHA = 0.05  # significance level of the tests
 GROUPS = (("x0", "y0"), ("P1", "P2"), ("A", "B"), ("K1", "K2", "K3", "K4"))
-WITHOUT_DECISION = ("c",)  # no camera is without it: 0 is nothing to test it against
+WITHOUT_DECISION = ("c",)  # no camera has c = 0, so that a test against 0 is meaningless
 
 
 @dataclass(frozen=True)
 class AgainstZero:
-    """A parameter (names of length 1) or a group against zero.
+    """Test of a parameter or of a group against zero.
 
-    names              as given
-    f                  F; nan for a group that is not positive definite
-    critical           F(1 - alpha; p, dof)
-    p_value            probability of an F as large by chance
-    positive_definite  False: some combination of the group has no variance, no test is possible
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the parameters; one name for a single parameter.
+    f : float
+        Statistic F; nan if the covariance is not positive definite.
+    critical : float
+        Critical value F(1 - alpha; p, dof).
+    p_value : float
+        Probability of a larger F under the hypothesis of zero.
+    positive_definite : bool
+        Whether the covariance is positive definite; if not, no test is possible.
     """
 
     names: tuple
@@ -40,12 +47,12 @@ class AgainstZero:
 
     @property
     def significant(self):
-        """True when F is above its critical value; None when there is no F."""
+        """Whether F exceeds its critical value; None without F."""
         return None if np.isnan(self.f) else bool(self.f > self.critical)
 
     @property
     def decides(self):
-        """False when the test says nothing about whether the parameters belong."""
+        """Whether the test is relevant to the choice of the parameters."""
         return not set(self.names) <= set(WITHOUT_DECISION)
 
 
@@ -58,18 +65,18 @@ def critical_f(parameters, dof, alpha=ALPHA):
 
 
 def f_of_group(values, covariance):
-    """x' C^-1 x / p of values (p,) and their covariance (p, p); nan: not positive definite."""
+    """Statistic x' C^-1 x / p of values (p,) and covariance (p, p); nan if C is not definite."""
     values, covariance = np.asarray(values, dtype=float), np.asarray(covariance, dtype=float)
     lower = cholesky_of(covariance)
     if lower is None:
         return np.nan
     scaled = values / np.sqrt(np.diag(covariance))
-    half = scipy.linalg.solve_triangular(lower, scaled, lower=True)
-    return float(half @ half / len(values))
+    whitened = scipy.linalg.solve_triangular(lower, scaled, lower=True)
+    return float(whitened @ whitened / len(values))
 
 
 def cholesky_of(covariance):
-    """Lower Cholesky factor of the correlations of (p, p); None: not positive definite."""
+    """Lower Cholesky factor (p, p) of the correlations, or None if not positive definite."""
     variance = np.diag(covariance)
     if not (np.isfinite(covariance).all() and (variance > 0).all()):
         return None
@@ -78,12 +85,31 @@ def cholesky_of(covariance):
         lower = np.linalg.cholesky(covariance / np.outer(sd, sd))
     except np.linalg.LinAlgError:
         return None
+    # A pivot of the size of rounding errors is treated as zero.
     rounding = len(sd) * np.finfo(float).eps
     return lower if (np.diag(lower) ** 2 > rounding).all() else None
 
 
 def against_zero(names, chosen, values, covariance, dof, alpha=ALPHA):
-    """The AgainstZero of the parameters `chosen` among names (k,); covariance (k, k)."""
+    """Test some parameters together against zero.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the k parameters.
+    chosen : sequence of str
+        Names of the parameters to test.
+    values, covariance : array_like, shapes (k,) and (k, k)
+        Values and covariance matrix of all parameters.
+    dof : float
+        Degrees of freedom of sigma0; infinite if it is not estimated.
+    alpha : float, optional
+        Significance level.
+
+    Returns
+    -------
+    AgainstZero
+    """
     rows = [names.index(name) for name in chosen]
     f = f_of_group(np.asarray(values)[rows], np.asarray(covariance)[np.ix_(rows, rows)])
     p, critical = len(rows), critical_f(len(rows), dof, alpha)
@@ -94,14 +120,15 @@ def against_zero(names, chosen, values, covariance, dof, alpha=ALPHA):
 
 
 def single_tests(names, values, covariance, dof, alpha=ALPHA):
-    """A tuple of AgainstZero, one for each parameter."""
+    """Test each parameter alone against zero, with the arguments of `against_zero`."""
     return tuple(against_zero(names, (name,), values, covariance, dof, alpha) for name in names)
 
 
 def group_tests(names, values, covariance, dof, alpha=ALPHA, groups=None):
-    """A tuple of AgainstZero of groups; None: those of GROUPS with two or more names there.
+    """Test groups of parameters against zero, with the arguments of `against_zero`.
 
-    groups  names that are not among the parameters raise ValueError
+    By default the groups of GROUPS with two or more of the parameters are tested. Unknown names in
+    `groups` raise ValueError.
     """
     if groups is None:
         groups = groups_among(names)
@@ -115,9 +142,9 @@ def group_tests(names, values, covariance, dof, alpha=ALPHA, groups=None):
 
 
 def groups_among(names):
-    """The groups of GROUPS with two or more of these names."""
-    found = (tuple(name for name in group if name in names) for group in GROUPS)
-    return tuple(group for group in found if len(group) > 1)
+    """Return the groups of GROUPS with two or more of these names."""
+    present = (tuple(name for name in group if name in names) for group in GROUPS)
+    return tuple(group for group in present if len(group) > 1)
 
 
 def _refuse_level(alpha):

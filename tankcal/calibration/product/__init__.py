@@ -1,1 +1,1 @@
-"""Is a product good enough? Check points against a table of limits."""
+"""Accuracy of a product from check points, compared with a table of limits."""

@@ -1,10 +1,10 @@
-"""Is a product good enough? Bias, precision and classes from differences at check points.
+"""Bias, precision and accuracy classes of a product from differences at check points.
 
-With n differences d of mean m and standard deviation s along one axis:
+For n differences d with mean m and standard deviation s along one axis:
 
     bias        t = m / s sqrt(n)                  against t(n-1, alpha/2), two-sided
     precision   chi2 = (n-1) s^2 / sigma^2         against chi2(n-1, alpha), upper
-    RMSE        sqrt(sum(d^2) / n)                 less m where the bias is significant
+    RMSE        sqrt(sum(d^2) / n)                 without m if the bias is significant
     class       a share (90 %) of the points within the tolerance (PEC), and RMSE within the
                 standard error (EP)
 
@@ -20,29 +20,29 @@ from scipy.special import chdtri, stdtrit
 
 from tankcal.calibration.product.limits import LimitTable
 
-ALPHA = 0.05  # two-sided: t(8) = 2.306, as Pessoa 2017 has it for nine points
+ALPHA = 0.05  # significance level, two-sided: t(8) = 2.306, as in Pessoa 2017 for nine points
 AXES = ("x", "y", "z")
 PART_OF = {"x": "plan", "y": "plan", "z": "height"}
-FEWEST = 3  # points of a class: one or two say nothing of the others
-FEW = 10  # points below which 90 % of them are all of them
-ADVISED = 20  # points of a test of accuracy: NSSDA, FGDC-STD-007.3-1998
-ROUNDING = 1e-12
+FEWEST = 3  # least number of points for a class
+FEW = 10  # number of points below which 90 % of the points means all points
+ADVISED = 20  # least number of points of a test of accuracy: NSSDA, FGDC-STD-007.3-1998
+ROUNDING = 1e-12  # relative tolerance for rounding errors
 
 
 @dataclass(frozen=True)
 class Precision:
-    """Whether the scatter along an axis is within an expected standard deviation.
+    """Test whether the scatter along an axis agrees with an expected standard deviation.
 
     Attributes
     ----------
     axis : str
-        The axis.
+        "x", "y" or "z".
     sigma_m : float
-        The expected standard deviation, m.
+        Expected standard deviation, m.
     chi2, limit : float or None
-        (n-1) s^2/sigma^2 and its upper quantile; None with fewer than 2.
+        Statistic (n-1) s^2/sigma^2 and its upper quantile; None for fewer than two points.
     passed : bool or None
-        Is it within? None with fewer than 2.
+        Whether chi2 is at most the limit; None for fewer than two points.
     """
 
     axis: str
@@ -59,22 +59,22 @@ class AxisCheck:
     Attributes
     ----------
     axis, part : str
-        The axis, and the part it belongs to.
+        Axis ("x", "y" or "z") and its part ("plan" or "height").
     n : int
         Number of points.
     mean_m, sd_m : float or None
-        m; None with no point, with fewer than two.
+        Mean and standard deviation, m; None without points, and for fewer than two points.
     t, t_limit : float or None
-        Student's t of the mean and its two-sided limit; None with fewer than two, t None too where
-        nothing scatters.
+        Student's t of the mean and its two-sided limit; None for fewer than two points. t is also
+        None without scatter.
     biased : bool or None
-        The mean is significant; None: cannot be said.
+        Whether the mean is significant; None for fewer than two points.
     rmse_m, rmse_unbiased_m : float or None
-        As they are, and less the mean, where it is significant, m.
-    largest_m, largest_point
+        RMSE of the differences, and RMSE without a significant mean, m.
+    largest_m, largest_point : float, str or None
         Largest magnitude, m, and its point.
     precision : Precision or None
-        Against an expected sd; None: none was given.
+        Test against an expected standard deviation, if given.
     """
 
     axis: str
@@ -93,16 +93,22 @@ class AxisCheck:
 
     @property
     def bias_m(self):
-        """What is taken off: the mean where it is significant, else 0."""
+        """Mean if it is significant, else 0, m."""
         return self.mean_m if self.biased else 0.0
 
 
 @dataclass(frozen=True)
 class PartCheck:
-    """Differences of the plan (x and y together) or of the height, m.
+    """Differences of the plan (x and y together) or of the height.
 
-    n  points with all axes of the part       size_m  (n,) magnitudes, size_unbiased_m  (n,) less
-    the significant means
+    Attributes
+    ----------
+    part : str
+        "plan" or "height".
+    n : int
+        Number of points with all axes of the part.
+    size_m, size_unbiased_m : ndarray, shape (n,)
+        Magnitudes of the differences, with and without significant means, m.
     """
 
     part: str
@@ -112,20 +118,20 @@ class PartCheck:
 
     @property
     def rmse_m(self):
-        """Root of the mean squared magnitude, as the differences are."""
+        """Root mean square of the magnitudes, m."""
         return _rms(self.size_m)
 
     @property
     def rmse_unbiased_m(self):
-        """The same less the significant means."""
+        """Root mean square of the magnitudes without significant means, m."""
         return _rms(self.size_unbiased_m)
 
 
 @dataclass(frozen=True)
 class Reached:
-    """Whether a class is reached: points within the tolerance, their share, RMSE, and both rules.
+    """Result for one class: points within the tolerance, their share, RMSE, and the decision.
 
-    why  () or some of "share_too_small", "rmse_too_large"
+    `why` contains the reasons of a failure: "too_few_points", "share_too_small", "rmse_too_large".
     """
 
     within: int
@@ -137,10 +143,20 @@ class Reached:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One class of one scale: as the differences are, and less the significant means.
+    """Result for one class of one scale, with and without significant means.
 
-    precision  Precision of each axis of the part against the class
-    precise    all of them passed; None: cannot be said
+    Attributes
+    ----------
+    part, scale, grade : str
+        Part, scale and name of the class.
+    tolerance_m, sd_m : float
+        Tolerance and standard error of the class, m.
+    n : int
+        Number of points.
+    as_is, unbiased : Reached
+        Result with the differences, and without significant means.
+    precision : tuple of Precision
+        Test of each axis of the part against the class.
     """
 
     part: str
@@ -155,21 +171,35 @@ class Verdict:
 
     @property
     def precise(self):
-        """Whether every axis passed the test of precision; None: cannot be said."""
-        passed = [one.passed for one in self.precision]
+        """Whether every axis passed the test of precision; None if a test is not possible."""
+        passed = [test.passed for test in self.precision]
         return None if None in passed else all(passed)
 
 
 @dataclass(frozen=True)
 class ProductCheck:
-    """What differences at check points say of a product.
+    """Accuracy of a product from differences at check points.
 
-    names         (n,) points                   axes   k of "x", "y", "z"
-    difference_m  (n, k) product minus truth; nan: not known
-    alpha         of the tests of bias and precision
-    checks        AxisCheck of each axis        parts  PartCheck of "plan", "height" where known
-    table         LimitTable or None            verdicts  tuple of Verdict, in its order
-    notes         tuple of (code, number): "no_points", "few_points", "share_means_all" ...
+    Attributes
+    ----------
+    names : tuple of str
+        Names of the n points.
+    axes : tuple of str
+        The k axes, from "x", "y", "z".
+    difference_m : ndarray, shape (n, k)
+        Product minus reference, m; nan if it is not known.
+    alpha : float
+        Significance level of the tests of bias and precision.
+    checks : tuple of AxisCheck
+        Result for each axis.
+    parts : tuple of PartCheck
+        Result for "plan" and "height", if their axes are known.
+    table : LimitTable or None
+        Table of limits.
+    verdicts : tuple of Verdict
+        Result for each limit of the table.
+    notes : tuple of (str, float)
+        Codes and numbers of limitations, such as "few_points" or "share_means_all".
     """
 
     names: tuple
@@ -183,34 +213,34 @@ class ProductCheck:
     notes: tuple[tuple[str, float], ...]
 
     def best(self, part, scale, unbiased=False):
-        """Name of the best class that a scale reaches; None: none of them."""
-        for one in self.verdicts:
-            if (one.part, one.scale) == (part, scale):
-                found = one.unbiased if unbiased else one.as_is
-                if found.reached:
-                    return one.grade
+        """Name of the best class reached for a part and scale, or None."""
+        for verdict in self.verdicts:
+            if (verdict.part, verdict.scale) == (part, scale):
+                result = verdict.unbiased if unbiased else verdict.as_is
+                if result.reached:
+                    return verdict.grade
         return None
 
 
 def check_product(
     difference_m, axes=AXES, *, names=None, limits=None, alpha=ALPHA, expected_sd_m=None
 ):
-    """Check a product by its differences from the truth.
+    """Check a product by its differences from reference values.
 
     Parameters
     ----------
     difference_m : array_like, shape (n, k)
-        Product minus truth, m; nan where not known.
+        Product minus reference, m; nan if it is not known.
     axes : sequence of k str, optional
-        Of "x", "y", "z": x and y are the plan, z is the height.
+        Some of "x", "y", "z". x and y form the plan; z is the height.
     names : sequence of n str, optional
-        Of the points; None: their numbers from 1 on.
+        Names of the points; by default their numbers from 1.
     limits : LimitTable, optional
-        None: no classes.
+        Table of limits; by default no classes are tested.
     alpha : float, optional
         Significance level of the tests.
     expected_sd_m : array_like, shape (k,), optional
-        Standard deviations that the precision of each axis is tested against, m.
+        Expected standard deviations for the test of precision of each axis, m.
 
     Returns
     -------
@@ -219,7 +249,7 @@ def check_product(
     Raises
     ------
     ValueError
-        For other axes, shapes, levels, or infinite differences.
+        If axes, shapes or level are invalid, or if a difference is infinite.
 
     Examples
     --------
@@ -232,13 +262,15 @@ def check_product(
     _refuse(d, axes, names, alpha, expected_sd_m)
     sigma = (None,) * len(axes) if expected_sd_m is None else expected_sd_m
     checks = tuple(
-        _axis(axis, column, names, alpha, sd)
+        _check_axis(axis, column, names, alpha, sd)
         for axis, column, sd in zip(axes, d.T, sigma, strict=True)
     )
     parts = tuple(
-        part for name in ("plan", "height") if (part := _part(name, d, axes, checks)) is not None
+        part
+        for name in ("plan", "height")
+        if (part := _check_part(name, d, axes, checks)) is not None
     )
-    verdicts = () if limits is None else _verdicts(limits, checks, parts, alpha)
+    verdicts = () if limits is None else _make_verdicts(limits, checks, parts, alpha)
     return ProductCheck(
         names=names,
         axes=tuple(axes),
@@ -282,13 +314,13 @@ def _rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def _axis(axis, column, names, alpha, expected_sd_m):
-    """The AxisCheck of differences (n,) along an axis."""
-    there = np.flatnonzero(np.isfinite(column))
-    d, n = column[there], len(there)
+def _check_axis(axis, column, names, alpha, expected_sd_m):
+    """Check the differences (n,) along one axis."""
+    known = np.flatnonzero(np.isfinite(column))
+    d, n = column[known], len(known)
     if not n:
         return AxisCheck(axis, PART_OF[axis], 0, *(None,) * 9)
-    mean, worst = float(d.mean()), there[np.abs(d).argmax()]
+    mean, worst = float(d.mean()), known[np.abs(d).argmax()]
     sd = t = limit = biased = None
     if n > 1:
         sd, limit = float(d.std(ddof=1)), t_limit(n, alpha)
@@ -297,7 +329,7 @@ def _axis(axis, column, names, alpha, expected_sd_m):
         biased = bool(mean != 0 if t is None else abs(t) > limit)
     precision = None
     if expected_sd_m is not None:
-        precision = _precision(axis, sd, n, float(expected_sd_m), alpha)
+        precision = _test_precision(axis, sd, n, float(expected_sd_m), alpha)
     return AxisCheck(
         axis=axis, part=PART_OF[axis], n=n, mean_m=mean, sd_m=sd, t=None if t is None else float(t),
         t_limit=limit, biased=biased, rmse_m=_rms(d), rmse_unbiased_m=_rms(d - mean * bool(biased)),
@@ -305,41 +337,42 @@ def _axis(axis, column, names, alpha, expected_sd_m):
     )  # fmt: skip
 
 
-def _precision(axis, sd_m, n, sigma_m, alpha):
+def _test_precision(axis, sd_m, n, sigma_m, alpha):
     if sd_m is None:
         return Precision(axis, sigma_m, None, None, None)
     chi2, limit = (n - 1) * (sd_m / sigma_m) ** 2, chi2_limit(n, alpha)
     return Precision(axis, sigma_m, float(chi2), limit, bool(chi2 <= limit))
 
 
-def _part(name, d, axes, checks):
-    """The PartCheck of the plan or the height; None where an axis of it is missing."""
+def _check_part(name, d, axes, checks):
+    """Check the plan or the height; None if an axis or all points are missing."""
     wanted = [axis for axis in AXES if PART_OF[axis] == name]
     if not all(axis in axes for axis in wanted):
         return None
     columns = [axes.index(axis) for axis in wanted]
-    own = d[:, columns]
-    own = own[np.isfinite(own).all(axis=1)]
-    if not len(own):
+    values = d[:, columns]
+    values = values[np.isfinite(values).all(axis=1)]
+    if not len(values):
         return None
     bias = np.array([checks[k].bias_m for k in columns])
-    size, unbiased = (np.linalg.norm(a, axis=1) for a in (own, own - bias))
-    return PartCheck(name, len(own), size, unbiased)
+    size, unbiased = (np.linalg.norm(a, axis=1) for a in (values, values - bias))
+    return PartCheck(name, len(values), size, unbiased)
 
 
-def _verdicts(table, checks, parts, alpha):
-    """A Verdict for each limit of a part that is known."""
+def _make_verdicts(table, checks, parts, alpha):
+    """Create a Verdict for each limit of a known part."""
     known = {part.part: part for part in parts}
     return tuple(
-        _verdict(limit, table.share, known[limit.part], checks, alpha)
+        _make_verdict(limit, table.share, known[limit.part], checks, alpha)
         for limit in table.limits
         if limit.part in known
     )
 
 
-def _verdict(limit, share, part, checks, alpha):
-    own = [one for one in checks if one.part == limit.part]
-    sigma = limit.sd_m / np.sqrt(len(own))
+def _make_verdict(limit, share, part, checks, alpha):
+    part_checks = [axis_check for axis_check in checks if axis_check.part == limit.part]
+    # The standard error of the plan applies to both coordinates together.
+    sigma = limit.sd_m / np.sqrt(len(part_checks))
     return Verdict(
         part=limit.part,
         scale=limit.scale,
@@ -347,14 +380,17 @@ def _verdict(limit, share, part, checks, alpha):
         tolerance_m=limit.tolerance_m,
         sd_m=limit.sd_m,
         n=part.n,
-        as_is=_reached(part.size_m, limit, share),
-        unbiased=_reached(part.size_unbiased_m, limit, share),
-        precision=tuple(_precision(one.axis, one.sd_m, one.n, float(sigma), alpha) for one in own),
+        as_is=_compare_with_limit(part.size_m, limit, share),
+        unbiased=_compare_with_limit(part.size_unbiased_m, limit, share),
+        precision=tuple(
+            _test_precision(axis_check.axis, axis_check.sd_m, axis_check.n, float(sigma), alpha)
+            for axis_check in part_checks
+        ),
     )
 
 
-def _reached(size_m, limit, share):
-    """The Reached of magnitudes (n,)."""
+def _compare_with_limit(size_m, limit, share):
+    """Compare magnitudes (n,) with a limit."""
     within, rmse = int(np.sum(size_m <= limit.tolerance_m)), _rms(size_m)
     enough, small = within >= share * len(size_m) - ROUNDING * len(size_m), rmse <= limit.sd_m
     rules = (
@@ -367,10 +403,14 @@ def _reached(size_m, limit, share):
 
 
 def _notes(table, checks, parts):
-    """(code, number) of what limits what can be said."""
-    notes, fewest = [], min(one.n for one in checks)
+    """Return (code, number) of the limitations of the result."""
+    notes, fewest = [], min(axis_check.n for axis_check in checks)
     if fewest == 0:
-        notes += [("axis_without_points", AXES.index(one.axis)) for one in checks if not one.n]
+        notes += [
+            ("axis_without_points", AXES.index(axis_check.axis))
+            for axis_check in checks
+            if not axis_check.n
+        ]
     if fewest < 2:
         notes.append(("no_tests", fewest))
     if fewest < ADVISED:

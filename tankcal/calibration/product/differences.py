@@ -1,4 +1,4 @@
-"""Differences at check points: of an adjustment, of a record, or of a table of one's own."""
+"""Differences at check points from an adjustment, from a record, or from a CSV file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from tankcal.job.tables import Log, nearest, read_bytes
 from tankcal.messages import message
 
 AXES = "xyz"
-FARTHEST_M = 1e8  # keeps nonsense out
+FARTHEST_M = 1e8  # largest accepted length, m
 _POINT = Field(
     "point", "name", message("check_note_point", "name of the check point"), required=True
 )
@@ -29,13 +29,13 @@ FORMS = "point, dx_m, dy_m, dz_m or point, x_m, y_m, z_m, x_ref_m, y_ref_m, z_re
 
 @dataclass(frozen=True)
 class Differences:
-    """Product minus truth of n points, m; nan: not known."""
+    """Product minus reference at n points, shape (n, 3), m; nan if it is not known."""
 
     names: tuple
     difference_m: np.ndarray
 
     def of_known_axes(self):
-        """Axes that any point has, and the differences (n, k) along these."""
+        """Return the k axes with at least one known value, and their differences (n, k), m."""
         known = np.isfinite(self.difference_m).any(axis=0)
         return tuple(axis for axis, has in zip(AXES, known, strict=True) if has), (
             self.difference_m[:, known]
@@ -43,12 +43,12 @@ class Differences:
 
 
 def differences_of(adjustment):
-    """Differences at the check points of an adjustment or of a record.
+    """Return the differences at the check points of an adjustment or of a record.
 
     Parameters
     ----------
     adjustment : survey.Adjustment or dict
-        A record may be whole or its part "adjustment".
+        Adjustment, record, or the part "adjustment" of a record.
 
     Returns
     -------
@@ -57,12 +57,12 @@ def differences_of(adjustment):
     Raises
     ------
     InputError
-        When there are none.
+        If there are no check points.
     """
     if isinstance(adjustment, Mapping):
         part = adjustment.get("adjustment") or adjustment
-        found = part.get("check_points") if isinstance(part, Mapping) else None
-        rows = found.get("points") if isinstance(found, Mapping) else None
+        check_points = part.get("check_points") if isinstance(part, Mapping) else None
+        rows = check_points.get("points") if isinstance(check_points, Mapping) else None
         if not rows:
             raise InputError(
                 Problem(
@@ -74,26 +74,26 @@ def differences_of(adjustment):
         return Differences(
             tuple(str(row["point"]) for row in rows), np.array(values, dtype=float).reshape(-1, 3)
         )
-    found = adjustment.check_points
-    if found is None:
+    check_points = adjustment.check_points
+    if check_points is None:
         raise InputError(
             Problem(
                 "check.csv",
                 message("check_no_points", "no check points; expected one or more"),
             )
         )
-    return Differences(tuple(found.names), np.array(found.difference_m, dtype=float))
+    return Differences(tuple(check_points.names), np.array(check_points.difference_m, dtype=float))
 
 
 def read_differences(path, separator=",", decimal="."):
-    """Read the differences of a CSV file, with the columns of FORMS; axes may be left out or blank.
+    """Read differences from a CSV file with the columns of FORMS; axes may be missing or blank.
 
     Parameters
     ----------
-    path : path
-        The file.
+    path : path-like
+        Path of the file.
     separator, decimal : str, optional
-        Marks of the file, such as ";" and ",".
+        Column separator and decimal sign of the file, such as ";" and ",".
 
     Returns
     -------
@@ -102,7 +102,7 @@ def read_differences(path, separator=",", decimal="."):
     Raises
     ------
     InputError
-        With every problem of the file.
+        If the file is invalid; the error lists all problems.
     """
     path, log = Path(path), Log()
     data = read_bytes(path, log)
@@ -110,9 +110,9 @@ def read_differences(path, separator=",", decimal="."):
     if table is None:
         log.stop_if_problems()
     fields = {field.name: field for field in (_POINT, *_NUMBERS)}
-    columns = _columns(table, fields, log)
-    rows = [_row(table, i, columns, fields, log) for i in range(len(table.rows))]
-    _tell_repeated(table, rows, log)
+    columns = _find_columns(table, fields, log)
+    rows = [_read_row(table, i, columns, fields, log) for i in range(len(table.rows))]
+    _log_repeated_points(table, rows, log)
     if not (table.rows or table.skipped):
         log.problem(
             table.file,
@@ -124,8 +124,8 @@ def read_differences(path, separator=",", decimal="."):
     return Differences(tuple(row["point"] for row in rows), values)
 
 
-def _columns(table, fields, log):
-    """{heading: place} of the columns that are known; what is wrong with them goes to the log."""
+def _find_columns(table, fields, log):
+    """Return {heading: index} of the known columns; problems are added to the log."""
     columns = {}
     for place, heading in enumerate(table.headings):
         if heading in fields:
@@ -173,9 +173,9 @@ def _columns(table, fields, log):
     return columns
 
 
-def _row(table, number, columns, fields, log):
-    """{"point": name, "dx_m": ...} of a row; what is wrong with it goes to the log."""
-    given, row = {}, table.row_numbers[number]
+def _read_row(table, number, columns, fields, log):
+    """Return {"point": name, "dx_m": ...} of a row; problems are added to the log."""
+    values, row = {}, table.row_numbers[number]
     for name, place in columns.items():
         raw = table.rows[number][place]
         if is_blank(raw):
@@ -188,17 +188,17 @@ def _row(table, number, columns, fields, log):
                 )
             continue
         try:
-            given[name] = read_value(fields[name], raw, table.decimal)
+            values[name] = read_value(fields[name], raw, table.decimal)
         except Refused as refusal:
             log.problem(table.file, refusal.text, row, name)
-            given[name] = None if name == "point" else np.nan
+            values[name] = None if name == "point" else np.nan
     for difference, pair in zip(_DIFFERENCES, _PAIRS, strict=True):
-        both = [name in given for name in pair]
-        if all(both):
-            given[difference] = given[pair[0]] - given[pair[1]]
-        elif any(both):
-            lacking = pair[both.index(False)]
-            if lacking in columns:
+        is_given = [name in values for name in pair]
+        if all(is_given):
+            values[difference] = values[pair[0]] - values[pair[1]]
+        elif any(is_given):
+            missing = pair[is_given.index(False)]
+            if missing in columns:
                 log.problem(
                     table.file,
                     message(
@@ -206,20 +206,21 @@ def _row(table, number, columns, fields, log):
                         "missing; the other value of its pair is given, expected both",
                     ),
                     row,
-                    lacking,
+                    missing,
                 )
-    if not any(name in given for name in _DIFFERENCES) and not any(
-        name in given for pair in _PAIRS for name in pair
+    if not any(name in values for name in _DIFFERENCES) and not any(
+        name in values for pair in _PAIRS for name in pair
     ):
         log.problem(
             table.file,
             message("check_row_without", "no difference in this row; expected at least one"),
             row,
         )
-    return given
+    return values
 
 
-def _tell_repeated(table, rows, log):
+def _log_repeated_points(table, rows, log):
+    """Add a problem to the log for each repeated point."""
     seen = {}
     for row, number in zip(rows, table.row_numbers, strict=True):
         name = row.get("point")

@@ -1,4 +1,4 @@
-"""Limit tables of products as data: the shipped one of the Brazilian standard, or one's own file.
+"""Tables of limits for products: the included table of the Brazilian standard, or a TOML file.
 
 A table is a TOML file:
 
@@ -16,7 +16,7 @@ A table is a TOML file:
     [height.1000]
     A = {tolerance_m = 0.50, sd_m = 0.33}
 
-Classes stand from the best to the worst.
+The classes are listed from the best to the worst.
 """
 
 import math
@@ -58,11 +58,20 @@ _DEFAULT_SHARE = 0.9
 
 @dataclass(frozen=True)
 class Limit:
-    """What one class of one scale asks for.
+    """Limits of one class of one scale.
 
-    part         "plan" or "height"      scale  as the file names it, such as "1000"
-    grade        name of the class       tolerance_m  that a share of the points must keep (PEC)
-    sd_m         bound of the RMSE (EP); in plan it is that of both coordinates together
+    Attributes
+    ----------
+    part : str
+        "plan" or "height".
+    scale : str
+        Name of the scale in the file, such as "1000".
+    grade : str
+        Name of the class.
+    tolerance_m : float
+        Tolerance for a share of the points (PEC), m.
+    sd_m : float
+        Largest RMSE (EP), m; in plan of both coordinates together.
     """
 
     part: str
@@ -74,11 +83,20 @@ class Limit:
 
 @dataclass(frozen=True)
 class LimitTable:
-    """A limit table: its limits by part and scale, the best class first.
+    """Table of limits by part and scale, the best class first.
 
-    verified  whether the numbers were read in the legal or technical text itself; None: not said
-    share     of the points that must lie within the tolerance, 0 to 1
-    code      of a table that ships with tankcal: its source and remark have words; None: one's own
+    Attributes
+    ----------
+    name, source, remark : str
+        Name, source and remark of the table.
+    limits : tuple of Limit
+        Limits in the order of the file.
+    share : float
+        Share of the points that must lie within the tolerance, 0 to 1.
+    verified : bool or None
+        Whether the numbers were read in the legal or technical text itself; None if not stated.
+    code : str or None
+        Code of a table that is part of tankcal, or None for a file of the user.
     """
 
     name: str
@@ -91,13 +109,13 @@ class LimitTable:
 
 
 def limits_of_scale(table, scale):
-    """The limits of one scale only.
+    """Restrict a table to the limits of one scale.
 
     Parameters
     ----------
     table : LimitTable
-        All limits.
-    scale : number
+        Table of limits.
+    scale : float
         Denominator of the scale.
 
     Returns
@@ -107,7 +125,7 @@ def limits_of_scale(table, scale):
     Raises
     ------
     InputError
-        When the table has no such scale.
+        If the table has no such scale.
 
     Examples
     --------
@@ -115,9 +133,9 @@ def limits_of_scale(table, scale):
     Limit(part='plan', scale='2000', grade='A', tolerance_m=0.56, sd_m=0.34)
     """
     name = f"{scale:g}"
-    chosen = tuple(one for one in table.limits if one.scale == name)
+    chosen = tuple(limit for limit in table.limits if limit.scale == name)
     if not chosen:
-        known = ", ".join(dict.fromkeys(one.scale for one in table.limits))
+        known = ", ".join(dict.fromkeys(limit.scale for limit in table.limits))
         raise InputError(
             Problem(
                 table.name,
@@ -133,7 +151,7 @@ def limits_of_scale(table, scale):
 
 
 def shipped_limits(name=SHIPPED):
-    """A table of limits that ships: "pec_pcd", the Brazilian standard of digital maps.
+    """Read a table of limits of tankcal: "pec_pcd", the Brazilian standard of digital maps.
 
     Parameters
     ----------
@@ -154,12 +172,12 @@ def shipped_limits(name=SHIPPED):
 
 
 def read_limits(path):
-    """Read the table of limits of a TOML file.
+    """Read a table of limits from a TOML file.
 
     Parameters
     ----------
-    path : path
-        The file.
+    path : path-like
+        Path of the file.
 
     Returns
     -------
@@ -168,7 +186,7 @@ def read_limits(path):
     Raises
     ------
     InputError
-        With every problem of the file.
+        If the file is invalid; the error lists all problems.
     """
     path, log = Path(path), Log()
     data = read_bytes(path, log, MAX_BYTES)
@@ -177,8 +195,8 @@ def read_limits(path):
         settings, sections = read_toml(path.name, data, log)
     log.stop_if_problems()
     given = settings.pop("table", {})
-    values = _values(path.name, "table", _TABLE, given, sections.get("table"), log)
-    limits = _limits(path.name, settings, sections, log)
+    values = _read_values(path.name, "table", _TABLE, given, sections.get("table"), log)
+    limits = _read_limit_sections(path.name, settings, sections, log)
     log.stop_if_problems()
     return LimitTable(
         name=values["name"],
@@ -190,8 +208,8 @@ def read_limits(path):
     )
 
 
-def _values(file, section, fields, given, row, log):
-    """{key: value or None} of a section; what is wrong goes to the log."""
+def _read_values(file, section, fields, given, row, log):
+    """Return {key: value or None} of a section; problems are added to the log."""
     for key in given.keys() - fields.keys():
         known = ", ".join(fields)
         expected = message(
@@ -217,10 +235,10 @@ def _values(file, section, fields, given, row, log):
     return values
 
 
-def _limits(file, settings, sections, log):
-    """The limits of all sections such as plan.1000.A, in the order of the file."""
-    found = []
-    for section, given in settings.items():
+def _read_limit_sections(file, settings, sections, log):
+    """Read the limits of all sections such as plan.1000.A, in the order of the file."""
+    limits = []
+    for section, entries in settings.items():
         part, _, rest = section.partition(".")
         scale, _, grade = rest.partition(".")
         row = sections.get(section)
@@ -233,32 +251,32 @@ def _limits(file, settings, sections, log):
             )
             log.problem(file, expected, row, f"[{section}]")
         elif grade and "." not in grade:
-            values = _values(file, section, _LIMIT, given, row, log)
+            values = _read_values(file, section, _LIMIT, entries, row, log)
             if None not in values.values():
-                found.append(Limit(part, scale, grade, **values))
-        elif given:
+                limits.append(Limit(part, scale, grade, **values))
+        elif entries:
             expected = message(
                 "limits_no_classes",
                 "expected classes such as A = {{tolerance_m = 0.28, sd_m = 0.17}}",
             )
             log.problem(file, expected, row, f"[{section}]")
-    if not (found or log.problems):
+    if not (limits or log.problems):
         log.problem(
             file, message("limits_none", "no limits; expected sections such as [plan.1000]")
         )
-    _tell_disorder(file, found, sections, log)
-    return tuple(found)
+    _log_disorder(file, limits, sections, log)
+    return tuple(limits)
 
 
-def _tell_disorder(file, limits, sections, log):
-    """A problem for each class that asks for more than the one before it."""
+def _log_disorder(file, limits, sections, log):
+    """Add a problem to the log for each class with smaller limits than the class before it."""
     before = {}
-    for one in limits:
-        place = one.part, one.scale
+    for limit in limits:
+        place = limit.part, limit.scale
         last = before.get(place, (-math.inf, -math.inf))
-        now = one.tolerance_m, one.sd_m
+        now = limit.tolerance_m, limit.sd_m
         if now[0] < last[0] or now[1] < last[1]:
-            section = f"{one.part}.{one.scale}.{one.grade}"
+            section = f"{limit.part}.{limit.scale}.{limit.grade}"
             expected = message(
                 "limits_disorder", "smaller than the class before it; expected the best class first"
             )

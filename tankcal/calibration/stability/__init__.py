@@ -1,1 +1,1 @@
-"""Are two calibrations of a camera the same?"""
+"""Stability of a camera: comparison of its calibrations."""

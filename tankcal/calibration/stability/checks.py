@@ -1,16 +1,18 @@
-"""Can these calibrations be compared? One frame, one pixel, points enough, a method that is one."""
+"""Checks before a comparison of calibrations: options, common frame and pixel, number of points."""
 
 import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
-SAME_PIXEL = 2e-3  # programs with two focal lengths give calibrations pixels that differ a little
-MOST_DIFFERENCES = 20_000_000  # pairs times grid points
+# Largest relative difference of pixel sizes; programs with two focal lengths give slightly
+# different pixels for each calibration
+SAME_PIXEL = 2e-3
+MOST_DIFFERENCES = 20_000_000  # largest number of pairs times grid points
 
 
 def check_options(method, methods, threshold_px, seed):
-    """Raises InputError for a method, a threshold or a seed that is none."""
+    """Raise InputError for an invalid method, threshold (px) or seed."""
     problems = []
     if method not in methods:
         expected = message(
@@ -41,7 +43,19 @@ def check_options(method, methods, threshold_px, seed):
 
 
 def check_size(cameras, grid, unknowns, file):
-    """Neither too few points for the unknowns nor more differences than memory holds."""
+    """Raise InputError for too few points for the unknowns, or too many differences for memory.
+
+    Parameters
+    ----------
+    cameras : int
+        Number of calibrations.
+    grid : Grid
+        Grid of image points.
+    unknowns : int
+        Number of unknowns of the method.
+    file : str
+        Name of the file of the calibrations in messages.
+    """
     if 2 * grid.size <= unknowns:
         expected = message(
             "compare_few_points",
@@ -62,7 +76,7 @@ def check_size(cameras, grid, unknowns, file):
 
 
 def common_frame(setups, file):
-    """(columns, lines) of all the setups; raises InputError where they are not of one frame."""
+    """Return the common frame (columns, lines); raise InputError if the frames differ."""
     if len(setups) < 2:
         expected = message(
             "compare_too_few",
@@ -78,37 +92,37 @@ def common_frame(setups, file):
         raise InputError([Problem(file, expected, None, name) for name in lacking])
     first, frame = setups[0], setups[0].format_px
     problems = []
-    for one in setups[1:]:
-        complaint = _complaint(one, first, frame)
+    for setup_to_check in setups[1:]:
+        complaint = _why_not_comparable(setup_to_check, first, frame)
         if complaint:
-            problems.append(Problem(file, complaint, None, one.camera.name))
+            problems.append(Problem(file, complaint, None, setup_to_check.camera.name))
     if problems:
         raise InputError(problems)
     return int(frame[0]), int(frame[1])
 
 
-def _complaint(one, first, frame):
-    """What keeps a setup from being compared with the first, in words; None: nothing."""
-    of_first = first.camera.name
-    if np.any(one.format_px != frame):
+def _why_not_comparable(setup, first, frame):
+    """Message why a setup cannot be compared with the first, or None."""
+    first_name = first.camera.name
+    if np.any(setup.format_px != frame):
         return message(
             "compare_frame",
             "a frame of {found} px; expected {frame}, as {first} has",
-            found=_sides(one.format_px),
-            frame=_sides(frame),
-            first=of_first,
+            found=_format_sides(setup.format_px),
+            frame=_format_sides(frame),
+            first=first_name,
         )
-    if np.all(np.abs(one.pixel_mm / first.pixel_mm - 1) <= SAME_PIXEL):
+    if np.all(np.abs(setup.pixel_mm / first.pixel_mm - 1) <= SAME_PIXEL):
         return None
     return message(
         "compare_pixel",
         "a pixel of {found} micrometres; expected that of {first}, {pixel}, within {percent:g} %",
-        found=_sides(1000 * one.pixel_mm),
-        first=of_first,
-        pixel=_sides(1000 * first.pixel_mm),
+        found=_format_sides(1000 * setup.pixel_mm),
+        first=first_name,
+        pixel=_format_sides(1000 * first.pixel_mm),
         percent=100 * SAME_PIXEL,
     )
 
 
-def _sides(two):
-    return f"{two[0]:.8g} x {two[1]:.8g}"
+def _format_sides(pair):
+    return f"{pair[0]:.8g} x {pair[1]:.8g}"

@@ -1,24 +1,25 @@
-"""Are two calibrations of a camera the same? Four tests of their bundles of rays.
+"""Four tests whether two calibrations of a camera give the same bundle of rays.
 
-A grid of image points is corrected by both sets. With (x1, y1), (x2, y2) the ideal points and
-c1, c2 the focal lengths the figure of a pair, in pixels, is
+A grid of image points is corrected with both calibrations. With the ideal points (x1, y1), (x2, y2)
+and the focal lengths c1, c2, the figure of a pair, in pixels, is
 
-    mis   sqrt(mean(dx^2 + dy^2)) of (x2, y2) - (x1, y1). Nothing is given away; c does not count
-    zrot  the same of (x2, y2) c1/c2 - (x1, y1). Nothing is given away but the distance of the
-          image: it is zero when both are the same bundle in space
-    rot   sigma0 = sqrt(v'v/(2n - 3)) after the second bundle was rotated onto the first: a turn of
-          the whole bundle, and most of a shift of the principal point, does not count
-    spr   sigma0 = sqrt(v'v/(2n - 6)) of a resection by the second bundle of points that the first
-          one sees on a terrain, pooled over ten random ones: a turn and a shift of the camera do
-          not count, nor does c on flat ground. What is left is what an adjustment with free
-          orientation would feel
+    mis   sqrt(mean(dx^2 + dy^2)) of (x2, y2) - (x1, y1). No unknowns; c has no influence
+    zrot  sqrt(mean(dx^2 + dy^2)) of (x2, y2) c1/c2 - (x1, y1). Both at the image distance of the
+          first; the figure is zero if both bundles are equal in space
+    rot   sigma0 = sqrt(v'v/(2n - 3)) after rotation of the second bundle onto the first. A rotation
+          of the bundle, and most of a shift of the principal point, has no influence
+    spr   sigma0 = sqrt(v'v/(2n - 6)) of a resection with the second bundle, for points that the
+          first bundle sees on a terrain; pooled over ten random terrains. Rotation and shift of the
+          camera have no influence, nor has c on flat ground. The remaining difference is the
+          effect on an adjustment with free orientation
 
-mis is the same for both orders of a pair; the others, to first order, but for the factor c1/c2 of
-the image in which they are counted: the first one's (spr: the second one's). Two calibrations are
-similar when the figure is below the accuracy of image coordinates (Pessoa: 0.5 or 0.33 px).
+mis does not depend on the order of a pair. To first order the other figures change only by the
+factor c1/c2 of the image in which they are computed: the first image (spr: the second). Two
+calibrations are similar if the figure is below the accuracy of image coordinates (Pessoa: 0.5 or
+0.33 px).
 
-as_published follows Pessoa instead: zrot is the mean of hypot(dx, dy); rot gives both bundles the
-focal length of the first. Source: Pessoa 2017 (14-19); Habib et al. 2006.
+With as_published, Pessoa's definitions are used: zrot is the mean of hypot(dx, dy), and rot uses
+the focal length of the first for both bundles. Source: Pessoa 2017 (14-19); Habib et al. 2006.
 """
 
 from collections.abc import Mapping
@@ -38,16 +39,16 @@ from tankcal.messages import message
 from tankcal.survey.measurements import CameraSetup
 
 METHODS = ("mis", "zrot", "rot", "spr")
-THRESHOLDS_PX = (0.5, 0.33)  # Pessoa's
-UNKNOWNS = {"mis": 0, "zrot": 0, "rot": 3, "spr": 6}
-UNDONE_MM = 1e-9  # of a measured point that is corrected and distorted again
+THRESHOLDS_PX = (0.5, 0.33)  # thresholds of Pessoa
+UNKNOWNS = {"mis": 0, "zrot": 0, "rot": 3, "spr": 6}  # number of unknowns of each method
+UNDONE_MM = 1e-9  # tolerance of a point after correction and renewed distortion, mm
 
 
 @dataclass(frozen=True)
 class Convention:
-    """One choice that a figure depends on: a code and its values (tankcal.record.camera_stability).
+    """Convention of a figure: a code and its values (tankcal.record.camera_stability).
 
-    code, values  such as "focal_same", {"of": "first"}
+    Example: "focal_same", {"of": "first"}.
     """
 
     code: str
@@ -56,20 +57,31 @@ class Convention:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two calibrations against each other; n grid points.
+    """Comparison of two calibrations at n grid points.
 
-    a, b           names; a stands before b in the file and is the first set
-    figure_px      figure of the method; of spr the root of the mean square over the terrains
-    scatter_px     standard deviation of that figure from terrain to terrain, spr; else None
-    similar        whether it is below the threshold
-    difference_px  (n, 2) second minus first, x to the right and y up, after the method's fit
-    expected_px    figure that the declared standard deviations alone would make (root of the mean
-                   square, whatever the figure), first order; None: not declared
-                   (what follows is of spr on the first terrain)
-    scale          factor of the second set, zrot; else None
-    rotation_rad   (3,) omega, phi, kappa of R with ray in second = R ray in first; rot, spr; else
-                   None
-    shift_m        (3,) second projection centre minus first, spr; else None
+    For spr, `difference_px`, `rotation_rad` and `shift_m` refer to the first terrain.
+
+    Attributes
+    ----------
+    a, b : str
+        Names of the first and the second calibration, in the order of the file.
+    figure_px : float
+        Figure of the method, px; for spr the root mean square over the terrains.
+    similar : bool
+        Whether the figure is below the threshold.
+    difference_px : ndarray, shape (n, 2)
+        Second minus first after the fit of the method, px, x to the right and y upwards.
+    expected_px : float or None
+        Root mean square expected from the declared standard deviations alone, to first order, px;
+        None if they are not declared.
+    scale : float or None
+        Scale factor of the second calibration (zrot only).
+    rotation_rad : ndarray, shape (3,), or None
+        omega, phi, kappa of R, where ray in second = R ray in first (rot and spr only).
+    shift_m : ndarray, shape (3,), or None
+        Second projection centre minus first, m (spr only).
+    scatter_px : float or None
+        Standard deviation of the figure between terrains, px (spr only).
     """
 
     a: str
@@ -86,16 +98,30 @@ class Pair:
 
 @dataclass(frozen=True)
 class Stability:
-    """All pairs of some calibrations, by one method.
+    """Comparison of all pairs of calibrations by one method.
 
-    method        one of METHODS
-    as_published  whether Pessoa's conventions are followed
-    conventions   tuple of Convention
-    grid          Grid of image points        format_px  (columns, lines) of the frame
-    threshold_px  similar when the figure is below it
-    terrain       Terrain of spr, else None   seed  of its heights
-    setups        tuple of CameraSetup, as they were given
-    pairs         tuple of Pair: (2, 1), (3, 1), (3, 2), (4, 1) ... as the published tables' rows
+    Attributes
+    ----------
+    method : str
+        One of METHODS.
+    as_published : bool
+        Whether Pessoa's conventions are followed.
+    conventions : tuple of Convention
+        Conventions of the figures.
+    grid : Grid
+        Grid of image points.
+    format_px : tuple of int
+        Columns and lines of the frame.
+    threshold_px : float
+        Threshold below which two calibrations are similar, px.
+    terrain : Terrain or None
+        Terrain of spr.
+    seed : int
+        Seed of the heights of the terrain.
+    setups : tuple of CameraSetup
+        Calibrations in the given order.
+    pairs : tuple of Pair
+        Pairs (2, 1), (3, 1), (3, 2), (4, 1) ..., the order of the rows in the published tables.
     """
 
     method: str
@@ -121,28 +147,29 @@ def compare(
     covariances=None,
     file="cameras.toml",
 ):
-    """Compare all pairs of calibrations by one of METHODS (see above).
+    """Compare all pairs of calibrations by one of METHODS (see the module docstring).
 
     Parameters
     ----------
     setups : sequence of CameraSetup
-        Two or more with pixels, of one frame.
+        Two or more calibrations with pixels, of one frame.
     method : str
         One of METHODS.
     grid : Grid, optional
-        None: Pessoa's in the proportions of the frame.
+        Grid of image points; by default the grid of Pessoa in the proportions of the frame.
     threshold_px : float, optional
-        Similar below it, px.
+        Threshold below which two calibrations are similar, px.
     terrain : Terrain, optional
-        For spr; None: TERRAINS["I"].
+        Terrain of spr; by default TERRAINS["I"].
     as_published : bool, optional
-        Pessoa's conventions.
+        Whether Pessoa's conventions are followed.
     seed : int, optional
-        Of the terrain's heights.
+        Seed of the heights of the terrain.
     covariances : dict, optional
-        {name: (13, 13)} of PARAMETERS where more is known than standard deviations.
+        {name: covariance matrix (13, 13) of PARAMETERS} of cameras for which correlations are
+        known.
     file : str, optional
-        What messages call the place where the calibrations stand.
+        Name of the file of the calibrations in messages.
 
     Returns
     -------
@@ -151,9 +178,9 @@ def compare(
     Raises
     ------
     InputError
-        For calibrations that cannot be compared.
+        If the calibrations cannot be compared.
     SolutionError
-        For a pair whose adjustment has no solution.
+        If the adjustment of a pair has no solution.
     """
     setups = tuple(setups)
     check_options(method, METHODS, threshold_px, seed)
@@ -161,11 +188,11 @@ def compare(
     grid = grid or default_grid(format_px)
     check_size(len(setups), grid, UNKNOWNS[method], file)
     terrain = (terrain or TERRAINS["I"]) if method == "spr" else None
-    sets = [_corrected(setup, grid, format_px) for setup in setups]
+    sets = [_correct_grid(setup, grid, format_px) for setup in setups]
     depths_m = terrain and [terrain.depths_m(grid.size, seed, i) for i in range(terrain.drawn)]
     known = covariances or {}
     pairs = tuple(
-        _pair((first, second), method, as_published, threshold_px, (terrain, depths_m), known)
+        _make_pair((first, second), method, as_published, threshold_px, (terrain, depths_m), known)
         for i, second in enumerate(sets)
         for first in sets[:i]
     )
@@ -184,8 +211,8 @@ def compare(
 
 
 @dataclass(frozen=True)
-class _Set:
-    """One calibration on the grid: ideal points (n, 2), mm."""
+class _CorrectedSet:
+    """One calibration, with the ideal points (n, 2) of the grid, mm."""
 
     setup: CameraSetup
     ideal_mm: np.ndarray
@@ -203,17 +230,17 @@ class _Set:
         return self.setup.pixel_mm
 
     def in_pixels_of(self, other):
-        """Ideal points (n, 2), mm, as if its pixels were those of another set.
+        """Ideal points (n, 2), mm, scaled to the pixels of another set.
 
-        For what compares images rather than rays: programs with two focal lengths in pixels give
-        each calibration pixels of its own.
+        For comparisons of images rather than rays. Programs with two focal lengths in pixels give
+        each calibration different pixels.
         """
         return self.ideal_mm * (other.pixel_mm / self.pixel_mm)
 
 
 @dataclass(frozen=True)
-class _Found:
-    """What a method finds of a pair; designs_px: what its fits took out, each (2n, u) or None."""
+class _MethodResult:
+    """Result of a method for a pair; `designs_px` are the design matrices (2n, u) of its fits."""
 
     figure_px: float
     difference_px: np.ndarray
@@ -224,7 +251,7 @@ class _Found:
     scatter_px: float | None = None
 
 
-def _corrected(setup, grid, format_px):
+def _correct_grid(setup, grid, format_px):
     camera = setup.camera
     points_mm = grid.image_points_mm(format_px, setup.pixel_mm)
     with np.errstate(all="ignore"):
@@ -242,31 +269,31 @@ def _corrected(setup, grid, format_px):
                 name=camera.name,
             )
         )
-    return _Set(setup, ideal)
+    return _CorrectedSet(setup, ideal)
 
 
-def _pair(pair, method, as_published, threshold_px, ground, known):
-    found = _compared(pair, method, as_published, *ground)
+def _make_pair(pair, method, as_published, threshold_px, ground, known):
+    result = _compare_pair(pair, method, as_published, *ground)
     return Pair(
         a=pair[0].name,
         b=pair[1].name,
-        figure_px=found.figure_px,
-        similar=found.figure_px < threshold_px,
-        difference_px=found.difference_px,
-        expected_px=_expected(pair, method, as_published, found, known),
-        scale=found.scale,
-        rotation_rad=found.rotation_rad,
-        shift_m=found.shift_m,
-        scatter_px=found.scatter_px,
+        figure_px=result.figure_px,
+        similar=result.figure_px < threshold_px,
+        difference_px=result.difference_px,
+        expected_px=_expected_figure(pair, method, as_published, result, known),
+        scale=result.scale,
+        rotation_rad=result.rotation_rad,
+        shift_m=result.shift_m,
+        scatter_px=result.scatter_px,
     )
 
 
-def _compared(pair, method, as_published, terrain, depths_m):
+def _compare_pair(pair, method, as_published, terrain, depths_m):
     try:
         if method == "rot":
-            return _by_rotation(*pair, as_published)
+            return _compare_rotation(*pair, as_published)
         if method == "spr":
-            return _by_resections(*pair, terrain, depths_m)
+            return _compare_resections(*pair, terrain, depths_m)
     except SolutionError as error:
         text = message(
             "compare_of_pair",
@@ -276,47 +303,47 @@ def _compared(pair, method, as_published, terrain, depths_m):
             error=error.texts[0],
         )
         raise SolutionError(text) from error
-    return _by_coordinates(*pair, method, as_published)
+    return _compare_coordinates(*pair, method, as_published)
 
 
-def _by_coordinates(first, second, method, as_published):
-    """mis and zrot: image points against each other."""
+def _compare_coordinates(first, second, method, as_published):
+    """Compare image points without a fit (mis and zrot)."""
     scale = first.c_mm / second.c_mm if method == "zrot" else None
     second_mm = second.in_pixels_of(first) if scale is None else second.ideal_mm * scale
     difference = (second_mm - first.ideal_mm) / first.pixel_mm
     squares = np.sum(difference**2, axis=1)
     is_mean = as_published and method == "zrot"
     figure = np.mean(np.sqrt(squares)) if is_mean else np.sqrt(np.mean(squares))
-    return _Found(float(figure), difference, scale=scale)
+    return _MethodResult(float(figure), difference, scale=scale)
 
 
-def _by_rotation(first, second, as_published):
+def _compare_rotation(first, second, as_published):
     second_mm, second_c = second.ideal_mm, second.c_mm
     if as_published:
         second_mm, second_c = second.in_pixels_of(first), first.c_mm
     fit = rotation_between(first.ideal_mm, first.c_mm, second_mm, second_c, first.pixel_mm)
-    return _Found(
+    return _MethodResult(
         fit.sigma0_px, fit.residuals_px, (fit.design_px,), rotation_rad=angles_of(fit.rotation.T)
     )
 
 
-def _by_resections(first, second, terrain, depths_m):
-    """spr: on each of the terrains; everything but the figure is that of the first."""
-    found = [_by_resection(first, second, terrain, depth_m) for depth_m in depths_m]
-    figures = [one.figure_px for one in found]
+def _compare_resections(first, second, terrain, depths_m):
+    """Compare by resections on all terrains (spr); all but the figure is from the first terrain."""
+    results = [_compare_resection(first, second, terrain, depth_m) for depth_m in depths_m]
+    figures = [result.figure_px for result in results]
     scatter = float(np.std(figures, ddof=1)) if len(figures) > 1 else 0.0
     return replace(
-        found[0],
+        results[0],
         figure_px=float(np.sqrt(np.mean(np.square(figures)))),
-        designs_px=tuple(design for one in found for design in one.designs_px),
+        designs_px=tuple(design for result in results for design in result.designs_px),
         scatter_px=scatter,
     )
 
 
-def _by_resection(first, second, terrain, depth_m):
+def _compare_resection(first, second, terrain, depth_m):
     object_m = terrain.object_points_m(first.ideal_mm, first.c_mm, depth_m)
     fit = resection(object_m, second.ideal_mm, second.c_mm, first.pixel_mm, terrain.position_m)
-    return _Found(
+    return _MethodResult(
         fit.sigma0_px,
         -fit.residuals_px,
         (fit.design_px,),
@@ -329,17 +356,23 @@ def _has_own_focal_lengths(method, as_published):
     return method in ("zrot", "spr") or (method == "rot" and not as_published)
 
 
-def _expected(pair, method, as_published, found, known):
-    """expected_px of a pair, or None: a set has no standard deviations."""
+def _expected_figure(pair, method, as_published, result, known):
+    """Expected figure of a pair, px, or None if a calibration has no standard deviations."""
     needs_c = _has_own_focal_lengths(method, as_published)
-    covariances = [covariance_of(one.setup.camera, known.get(one.name), needs_c) for one in pair]
-    if any(one is None for one in covariances):
+    covariances = [
+        covariance_of(calibration.setup.camera, known.get(calibration.name), needs_c)
+        for calibration in pair
+    ]
+    if any(calibration is None for calibration in covariances):
         return None
     first, second = pair
     parts = [
-        ideal_derivatives(one.ideal_mm, one.setup.camera.values, one.setup.camera.form)
-        for one in pair
+        ideal_derivatives(
+            calibration.ideal_mm, calibration.setup.camera.values, calibration.setup.camera.form
+        )
+        for calibration in pair
     ]
+    # The figures of these methods depend on both focal lengths, at the scale of the first.
     if needs_c:
         parts[0][:, :, 0] = -first.ideal_mm / first.c_mm
         parts[1][:, :, 0] = -second.ideal_mm / second.c_mm
@@ -348,11 +381,11 @@ def _expected(pair, method, as_published, found, known):
     points = len(first.ideal_mm)
     unknowns = UNKNOWNS[method]
     divisor = 2 * points - unknowns if unknowns else points
-    of_terrains = [
+    figures = [
         expected_px(zip(in_pixels, covariances, strict=True), design, divisor)
-        for design in found.designs_px
+        for design in result.designs_px
     ]
-    return float(np.sqrt(np.mean(np.square(of_terrains))))
+    return float(np.sqrt(np.mean(np.square(figures))))
 
 
 def _conventions(method, as_published, sets, grid, terrain, seed, pairs, known):
@@ -384,7 +417,7 @@ def _conventions(method, as_published, sets, grid, terrain, seed, pairs, known):
             )
         )
     if any(pair.expected_px is not None for pair in pairs):
-        full = [one.name for one in sets if one.name in known]
+        full = [calibration.name for calibration in sets if calibration.name in known]
         sds = Convention("covariance_known", {"cameras": full}) if full else None
         listed.append(sds or Convention("sds_uncorrelated"))
     return tuple(listed)

@@ -1,12 +1,12 @@
-"""What the standard deviations of two calibrations alone would make of a figure of stability.
+"""Figure of stability that is expected from the standard deviations of two calibrations alone.
 
-The ideal point xi of a measured one moves by d xi = -(d m / d xi)^-1 (d m / d q) dq with the
-interior parameters q, where m(xi, q) is the measured point. With J those derivatives over the grid,
-in pixels, and P the projection that takes out what the fit of the method takes out,
+The ideal point xi of a measured point m(xi, q) depends on the interior parameters q:
+d xi = -(d m / d xi)^-1 (d m / d q) dq. J contains these derivatives over the grid, in pixels. P is
+the projection that removes the parameters fitted by the method. To first order,
 
     expected = sqrt(trace(P (J1 C1 J1' + J2 C2 J2') P) / divisor)
 
-to first order. Source: JCGM 100; imaging formulas as in tankcal.camera.imaging.
+Source: JCGM 100; imaging equations as in tankcal.camera.imaging.
 """
 
 import numpy as np
@@ -15,27 +15,49 @@ from tankcal.camera.imaging import image_point_derivatives
 
 
 def ideal_derivatives(ideal_mm, interior, form):
-    """(n, 2, 13) derivatives of ideal image points at fixed measured ones, by PARAMETERS.
+    """Derivatives of ideal image points by PARAMETERS, for fixed measured points.
 
-    ideal_mm  (n, 2) from the principal point        interior  (13,)
-    Of c they are zero: the point is counted in mm, not as a direction.
+    Parameters
+    ----------
+    ideal_mm : ndarray, shape (n, 2)
+        Ideal image points relative to the principal point, mm.
+    interior : array_like, shape (13,)
+        Interior parameters.
+    form : tankcal.camera.model.Form
+        Form of the distortion model.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 13)
+        Derivatives; zero for c, because the points are in mm and not directions.
     """
-    of_ideal = form.convention == "distortion_of_ideal"
+    is_of_ideal = form.convention == "distortion_of_ideal"
     q = tuple(np.asarray(interior, dtype=float))
     rays = (*(ideal_mm.T / q[0]), -np.ones(len(ideal_mm)))
-    rows = image_point_derivatives(rays, np.eye(3).ravel(), q, form.numbers, of_ideal)[2:]
-    by_all = np.stack([np.column_stack(np.broadcast_arrays(*row)) for row in rows], axis=1)
-    slope, measured = by_all[:, :, :2] / q[0], by_all[:, :, 6:]
-    measured[:, :, 0] = 0.0
-    return -np.linalg.solve(slope, measured)
+    rows = image_point_derivatives(rays, np.eye(3).ravel(), q, form.numbers, is_of_ideal)[2:]
+    derivatives = np.stack([np.column_stack(np.broadcast_arrays(*row)) for row in rows], axis=1)
+    by_point, by_parameters = derivatives[:, :, :2] / q[0], derivatives[:, :, 6:]
+    by_parameters[:, :, 0] = 0.0
+    return -np.linalg.solve(by_point, by_parameters)
 
 
 def covariance_of(camera, known=None, needs_c=True):
-    """(13, 13) covariance of a camera's parameters; None where it is not known.
+    """Covariance matrix of the parameters of a camera.
 
-    known    (13, 13) or None: from the sds, uncorrelated. A parameter that is 0 and has no sd is no
-             part of the model
-    needs_c  False: c does not bear on the figure, and may lack an sd
+    Parameters
+    ----------
+    camera : network.Camera
+        Camera with values and standard deviations. A parameter with value 0 and without standard
+        deviation is not in the model.
+    known : array_like, shape (13, 13), optional
+        Covariance matrix; by default the parameters are uncorrelated.
+    needs_c : bool, optional
+        Whether the figure depends on c. If not, c needs no standard deviation.
+
+    Returns
+    -------
+    ndarray, shape (13, 13), or None
+        None if a standard deviation is missing.
     """
     if known is not None:
         return np.asarray(known, dtype=float)
@@ -46,18 +68,29 @@ def covariance_of(camera, known=None, needs_c=True):
 
 
 def expected_px(parts, design_px, divisor):
-    """The figure (see above), px.
+    """Expected figure of stability (see the module docstring), px.
 
-    parts      ((2n, 13) derivatives, (13, 13) covariance) of each set
-    design_px  (2n, u) what the fit takes out, or None
+    Parameters
+    ----------
+    parts : iterable of tuple
+        Derivatives (2n, 13) and covariance matrix (13, 13) of each calibration.
+    design_px : ndarray, shape (2n, u), or None
+        Design matrix of the fit of the method.
+    divisor : float
+        Degrees of freedom of the fit, or number of points without a fit.
+
+    Returns
+    -------
+    float
     """
     total = 0.0
-    basis = None if design_px is None else np.linalg.qr(design_px / _lengths(design_px))[0]
+    # P = I - Q Q', with an orthonormal basis Q of the design matrix
+    basis = None if design_px is None else np.linalg.qr(design_px / _column_norms(design_px))[0]
     for derivatives, covariance in parts:
-        left = derivatives if basis is None else derivatives - basis @ (basis.T @ derivatives)
-        total += float(np.sum((left @ covariance) * left))
+        projected = derivatives if basis is None else derivatives - basis @ (basis.T @ derivatives)
+        total += float(np.sum((projected @ covariance) * projected))
     return float(np.sqrt(max(total, 0.0) / divisor))
 
 
-def _lengths(design):
+def _column_norms(design):
     return np.linalg.norm(design, axis=0)

@@ -1,6 +1,6 @@
-"""Grids of image points at which calibrations of one camera are compared.
+"""Grids of image points for the comparison of calibrations of a camera.
 
-Column C and line L, counted from the centre of the first pixel, stand at
+The image coordinates of column C and line L, counted from the centre of the first pixel, are
 
     x = (C - (columns - 1) / 2) pixel      y = -(L - (lines - 1) / 2) pixel
 
@@ -16,8 +16,8 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
-STEPS_ON_LONGEST_SIDE = 46.08  # Pessoa: 4608 px in steps of 100
-MOST_POINTS = 250_000
+STEPS_ON_LONGEST_SIDE = 46.08  # Pessoa: 4608 px in steps of 100 px
+MOST_POINTS = 250_000  # largest number of points of a grid
 _NUMBER = r"([0-9]{1,6}(?:\.[0-9]{1,6})?)"
 _FORM = re.compile(rf"([0-9]{{1,6}})[xX]([0-9]{{1,6}}),{_NUMBER},{_NUMBER},{_NUMBER}")
 EXPECTED = message(
@@ -28,11 +28,16 @@ EXPECTED = message(
 
 @dataclass(frozen=True)
 class Grid:
-    """A square grid of image points, row by row from the first line down.
+    """Square grid of image points, row by row from the first line downwards.
 
-    columns, rows  number of points
-    start_px       (column, line) of its first point
-    step_px        between neighbours, along and down
+    Attributes
+    ----------
+    columns, rows : int
+        Number of points in each direction.
+    start_px : tuple of float
+        Column and line of the first point, px.
+    step_px : float
+        Distance between neighbours in both directions, px.
     """
 
     columns: int
@@ -47,16 +52,29 @@ class Grid:
 
     @property
     def places_px(self):
-        """(size, 2) column and line of each point."""
+        """Column and line of each point, shape (size, 2), px."""
         column = self.start_px[0] + self.step_px * np.arange(self.columns)
         line = self.start_px[1] + self.step_px * np.arange(self.rows)
         return np.column_stack([part.ravel() for part in np.meshgrid(column, line)])
 
     def image_points_mm(self, format_px, pixel_mm):
-        """(size, 2) the points in the image, mm, x to the right and y up from its middle.
+        """Image coordinates of the points from the centre, mm, x to the right and y upwards.
 
-        format_px  (columns, lines)        pixel_mm  (2,) sides of a pixel
-        Raises InputError where the grid leaves the frame.
+        Parameters
+        ----------
+        format_px : tuple of int
+            Columns and lines of the frame.
+        pixel_mm : ndarray, shape (2,)
+            Sides of a pixel, mm.
+
+        Returns
+        -------
+        ndarray, shape (size, 2)
+
+        Raises
+        ------
+        InputError
+            If a point is outside the frame.
         """
         first = np.array(self.start_px)
         last = first + self.step_px * np.array([self.columns - 1, self.rows - 1])
@@ -87,10 +105,10 @@ class Grid:
 
 
 def default_grid(format_px):
-    """Pessoa's grid in the proportions of a frame (columns, lines): exactly his on 4608 x 3456.
+    """Create the grid of Pessoa in the proportions of a frame (columns, lines).
 
-    Step = longest side / 46.08, first point half a step from the corner, as many as there is room;
-    a frame narrower than that has one row along its middle.
+    On 4608 x 3456 px it equals his grid. The step is the longest side / 46.08, and the first point
+    is half a step from the corner. A frame narrower than one step has one row along its middle.
     """
     size = np.array(format_px, dtype=float)
     step = float(size.max()) / STEPS_ON_LONGEST_SIDE
@@ -100,12 +118,12 @@ def default_grid(format_px):
 
 
 def parse(text):
-    """The grid of a text such as 46x35,50,50,100.
+    """Parse a grid from a text such as 46x35,50,50,100.
 
     Raises
     ------
     InputError
-        For any other text.
+        If the text has another form.
 
     Examples
     --------

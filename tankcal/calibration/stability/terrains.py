@@ -1,11 +1,12 @@
-"""The random ground over which a resection compares two calibrations.
+"""Random terrain for the comparison of two calibrations by resections.
 
-A camera looks down from a position; each image point sees the ground at its own height
+The camera looks down from a position. Each image point sees the terrain at a random height
 
     Z = low + U(0, 1) range
 
-Only ratios of depths bear on a resection's residuals, not their size. Source: Pessoa 2017, section
-of the method SPR: position (300, 300, 450) m, Z = 200 + U(0, 1) 100 (terrain I) or 20 (terrain II).
+Only ratios of depths affect the residuals of a resection, not their size. Source: Pessoa 2017,
+section of the method SPR: position (300, 300, 450) m, Z = 200 + U(0, 1) 100 (terrain I) or 20
+(terrain II).
 """
 
 import re
@@ -16,18 +17,22 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
-SEED = 1
-DRAWN = 10  # terrains that a figure is pooled over
+SEED = 1  # default seed of the heights
+DRAWN = 10  # number of random terrains for one figure
 _NUMBER = r"(-?[0-9]{1,6}(?:\.[0-9]{1,6})?)"
 _PAIR = re.compile(rf"{_NUMBER},{_NUMBER}")
 
 
 @dataclass(frozen=True)
 class Terrain:
-    """Random ground below a camera.
+    """Random terrain below a camera that looks down.
 
-    position_m  (3,) x, y, z of the projection centre of the first bundle, looking down
-    low_m       lowest height             range_m  of the heights above it; 0: flat
+    Attributes
+    ----------
+    position_m : tuple of float
+        Projection centre (x, y, z) of the first bundle, m.
+    low_m, range_m : float
+        Lowest height, and range of the heights above it, m; a range of 0 is flat.
     """
 
     position_m: tuple[float, float, float] = (300.0, 300.0, 450.0)
@@ -36,16 +41,16 @@ class Terrain:
 
     @property
     def drawn(self):
-        """How many terrains a figure is pooled over: flat ground is always the same."""
+        """Number of random terrains for one figure; one for flat terrain."""
         return DRAWN if self.range_m else 1
 
     def depths_m(self, points, seed, number=0):
-        """(points,) of the ground below the camera; the same for the same seed and number."""
+        """Depths (points,) of the terrain below the camera, m, reproducible by seed and number."""
         rng = np.random.default_rng((seed, number) if number else seed)
         return self.position_m[2] - self.low_m - rng.random(points) * self.range_m
 
     def object_points_m(self, ideal_mm, c_mm, depth_m):
-        """(n, 3) where the rays of ideal image points (n, 2) meet the ground, depths (n,) below."""
+        """Object points (n, 3), m, of ideal image points (n, 2) at depths (n,) below the camera."""
         along = np.column_stack([ideal_mm / c_mm, np.full(len(ideal_mm), -1.0)])
         return np.asarray(self.position_m) + along * depth_m[:, None]
 
@@ -54,12 +59,12 @@ TERRAINS = {"I": Terrain(), "II": Terrain(range_m=20.0)}
 
 
 def parse_terrain(text):
-    """The terrain of a text: I, II, or LOW,RANGE in metres.
+    """Parse a terrain from a text: I, II, or LOW,RANGE in metres.
 
     Raises
     ------
     InputError
-        For any other text.
+        If the text has another form.
 
     Examples
     --------

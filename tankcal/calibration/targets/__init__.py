@@ -1,4 +1,4 @@
-"""Targets in photographs: coded squares (ArUco, AprilTag) and white circles, to sub-pixels."""
+"""Measurement of targets in photographs: coded squares (ArUco, AprilTag) and white circles."""
 
 from tankcal.calibration.targets.circles import eccentricity_px, read_circles
 from tankcal.calibration.targets.coded import read_coded

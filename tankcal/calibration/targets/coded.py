@@ -1,8 +1,8 @@
-"""Coded targets (ArUco, AprilTag) in a photograph: found by OpenCV, measured by their edges.
+"""Coded targets (ArUco, AprilTag) in a photograph: detection by OpenCV, measurement of the edges.
 
-OpenCV proposes squares and their codes. Everything else is ours: the code is read again through
-the fitted corners, cell by cell; corners come from `edges`; what is in doubt is refused with a
-reason. OpenCV's own corners lie 0.2 to 1 px beside the truth (blur rounds a corner inwards).
+OpenCV proposes squares and their codes. The module `edges` measures the corners, and the code is
+read again, cell by cell, from the fitted corners. Doubtful targets are refused with a reason. The
+corners of OpenCV have errors of 0.2 to 1 px, because blur rounds a corner inwards.
 """
 
 from dataclasses import dataclass, replace
@@ -14,21 +14,21 @@ from tankcal.calibration.targets.edges import NoEdge, corners_of
 from tankcal.calibration.targets.found import Found, Marker, Refused
 from tankcal.calibration.targets.opencv import opencv
 
-CELL_PX = 2.5  # least mean width of a cell
-LEAST_CLARITY = 0.7
-LEAST_CONTRAST = 12.0  # grey values of 255
-LEAST_TO_NOISE = 4.0  # contrast, in rms of the edges' residuals
-BORDER_PX = 3.0
-MOST_SLANTED = 0.2  # sine of the sharpest corner
-SD_FLOOR_PX = 0.015  # lens within a target, print, pixels that are no points, odd blur
-NEAR = 0.5  # of a side: two squares nearer than that are in one place
-DETECTION_ERRORS = 0.6  # what OpenCV may repair: such codes are told, not accepted
-SAMPLES = np.linspace(-0.25, 0.25, 3)  # within a cell
+CELL_PX = 2.5  # least mean width of a cell, px
+LEAST_CLARITY = 0.7  # least correlation of the cells with the code
+LEAST_CONTRAST = 12.0  # least contrast, grey values of 255
+LEAST_TO_NOISE = 4.0  # least contrast, as a multiple of the rms of the residuals of the edges
+BORDER_PX = 3.0  # least distance from the edge of the photo, px
+MOST_SLANTED = 0.2  # least sine of a corner angle
+SD_FLOOR_PX = 0.015  # effects of distortion in a target, print, pixel size and irregular blur, px
+NEAR = 0.5  # distance below which two squares are in one place, as a share of a side
+DETECTION_ERRORS = 0.6  # rate of errors that OpenCV may correct; such codes are reported as refused
+SAMPLES = np.linspace(-0.25, 0.25, 3)  # positions of the samples within a cell
 
 
 @dataclass(frozen=True)
 class _Reading:
-    """The photograph, its dictionary and the limits."""
+    """Photograph, dictionary of its targets, and limits."""
 
     image: np.ndarray
     dictionary: object
@@ -37,44 +37,52 @@ class _Reading:
 
 
 def read_coded(image, dictionary="DICT_4X4_50", listed=None, bit_errors=0, smallest_px=None):
-    """Coded targets of a photograph: Found with Markers.
+    """Measure coded targets in a photograph.
 
     Parameters
     ----------
     image : ndarray, shape (lines, columns)
         Grey values, uint8 or float up to 255.
-    dictionary : optional
-        Its name in OpenCV, with or without "DICT_".
-    listed : optional
-        Ids that there are, or None: all of the dictionary.
-    bit_errors : optional
-        Cells that may be wrong; 0: none.
-    smallest_px : optional
-        Least mean side; None: 2.5 px a cell.
+    dictionary : str, optional
+        Name of the dictionary in OpenCV, with or without "DICT_".
+    listed : collection of int, optional
+        Ids in use; by default all ids of the dictionary.
+    bit_errors : int, optional
+        Largest number of wrong cells.
+    smallest_px : float, optional
+        Least mean side, px; by default 2.5 px per cell.
+
+    Returns
+    -------
+    Found
+        Markers in the order of their ids, and refused candidates.
 
     Raises
     ------
     InputError
-        For a dictionary that is not known, or without OpenCV.
+        If the dictionary is unknown or OpenCV is missing.
     """
     known = dictionary_of(dictionary)
     smallest = CELL_PX * known.cells.shape[1] if smallest_px is None else smallest_px
     reading = _Reading(np.asarray(image), known, bit_errors, smallest)
-    measured = [_measured(reading, number, corners) for number, corners in _squares(reading, False)]
-    targets = [one for one in measured if isinstance(one, Marker)]
-    refused = [one for one in measured if isinstance(one, Refused)]
-    targets, doubled = _apart(targets)
-    refused += doubled + _mirrored(reading, targets + refused)
-    targets, doubts = _without_doubts(reading, targets, refused, listed)
+    measured = [
+        _measure_marker(reading, number, corners)
+        for number, corners in _propose_squares(reading, False)
+    ]
+    targets = [target for target in measured if isinstance(target, Marker)]
+    refused = [target for target in measured if isinstance(target, Refused)]
+    targets, doubled = _separate(targets)
+    refused += doubled + _find_mirrored(reading, targets + refused)
+    targets, doubts = _refuse_doubtful(reading, targets, refused, listed)
     size = reading.image.shape[::-1]
-    doubtful = tuple(one.id for one in targets if one.id in known.mirrored)
+    doubtful = tuple(target.id for target in targets if target.id in known.mirrored)
     return Found(
-        tuple(sorted(targets, key=lambda one: one.id)), (*refused, *doubts), size, doubtful
+        tuple(sorted(targets, key=lambda target: target.id)), (*refused, *doubts), size, doubtful
     )
 
 
-def _squares(reading, is_flipped):
-    """[(id, (4, 2) corners)] as OpenCV proposes them, of the photo or of its mirror image."""
+def _propose_squares(reading, is_flipped):
+    """Squares [(id, corners (4, 2))] that OpenCV proposes, in the photo or its mirror image."""
     cv2 = opencv()
     aruco, image = cv2.aruco, reading.image
     if image.dtype != np.uint8:
@@ -94,10 +102,10 @@ def _squares(reading, is_flipped):
     return list(zip((int(number) for number in np.ravel(numbers)), places, strict=True))
 
 
-def _measured(reading, number, corners):
-    """Marker, or Refused."""
+def _measure_marker(reading, number, corners):
+    """Measure a proposed square; return a Marker, or Refused with the reason."""
     cells = reading.dictionary.cells[number]
-    code, detail = _unfit(reading, corners)
+    code, detail = _check_shape(reading, corners)
     if code:
         return Refused(code, corners.mean(axis=0), number, detail)
     try:
@@ -109,7 +117,7 @@ def _measured(reading, number, corners):
     if contrast < max(LEAST_CONTRAST, LEAST_TO_NOISE * rms):
         detail = {"contrast": contrast, "rms": rms}
         return Refused("contrast", fitted.mean(axis=0), number, detail)
-    code, detail = _unfit(reading, fitted)
+    code, detail = _check_shape(reading, fitted)
     if code:
         return Refused(code, fitted.mean(axis=0), number, detail)
     errors, clarity = _read_cells(reading.image, fitted, cells)
@@ -126,8 +134,8 @@ def _side(corners):
     return float(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T).mean())
 
 
-def _unfit(reading, corners):
-    """(code, detail) of a shape that is refused, or (None, None)."""
+def _check_shape(reading, corners):
+    """Return (code, detail) for a shape to refuse, or (None, None)."""
     sides = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(*sides.T)
     if not lengths.min() > 0:
@@ -141,20 +149,22 @@ def _unfit(reading, corners):
     if turns.min() < MOST_SLANTED:
         return "shape", {"sine": float(turns.min())}
     last = np.array(reading.image.shape[::-1]) - 1
-    room = float(min(corners.min(), (last - corners).min()))
-    if room < BORDER_PX:
-        return "at_border", {"room_px": room}
+    distance = float(min(corners.min(), (last - corners).min()))
+    if distance < BORDER_PX:
+        return "at_border", {"room_px": distance}
     return None, None
 
 
 def _read_cells(image, corners, cells):
-    """Cells that differ from the code, and how black and white they are (clarity, up to 1).
+    """Count the cells that differ from the code, and compute the clarity (at most 1).
 
-    Each cell is the mean of nine places of its middle half; black and white are the means of the
-    cells that should be. Clarity is the correlation of the cells with the code.
+    The grey value of a cell is the mean of nine samples in its middle half. Black and white are the
+    means of the black and of the white cells of the code. Clarity is the correlation of the cells
+    with the code.
     """
     cv2 = opencv()
     n = len(cells)
+    # The homography from cells to pixels gives the positions of the samples in the photo.
     square = np.array([[0, 0], [n, 0], [n, n], [0, n]], dtype=np.float32)
     matrix = cv2.getPerspectiveTransform(square, corners.astype(np.float32))
     middles = np.arange(n)[:, None] + 0.5 + SAMPLES
@@ -170,66 +180,69 @@ def _read_cells(image, corners, cells):
     return errors, clarity
 
 
-def _apart(targets):
-    """(targets, Refused): one square proposed twice is one; two codes in one place are none."""
+def _separate(targets):
+    """Merge squares proposed twice, and refuse different codes in one place."""
     kept, refused = [], []
-    for one in targets:
+    for target in targets:
         twins = [
             i
             for i, other in enumerate(kept)
-            if other.id == one.id and np.abs(other.corners_px - one.corners_px).max() < 1.0
+            if other.id == target.id and np.abs(other.corners_px - target.corners_px).max() < 1.0
         ]
         if not twins:
-            kept.append(one)
-    middles = np.array([one.centre_px for one in kept]).reshape(-1, 2)
-    for i, one in enumerate(kept):
-        near = np.hypot(*(middles - middles[i]).T) < NEAR * one.side_px
+            kept.append(target)
+    middles = np.array([target.centre_px for target in kept]).reshape(-1, 2)
+    for i, target in enumerate(kept):
+        near = np.hypot(*(middles - middles[i]).T) < NEAR * target.side_px
         if near.sum() > 1:
-            refused.append(Refused("overlap", middles[i], one.id, {"targets": int(near.sum())}))
-    bad = {tuple(one.place_px) for one in refused}
-    return [one for one in kept if tuple(one.centre_px) not in bad], refused
+            refused.append(Refused("overlap", middles[i], target.id, {"targets": int(near.sum())}))
+    bad = {tuple(target.place_px) for target in refused}
+    return [target for target in kept if tuple(target.centre_px) not in bad], refused
 
 
-def _mirrored(reading, known):
-    """Refused for the codes that can be read in the mirror image only."""
+def _find_mirrored(reading, known):
+    """Refuse codes that can be read in the mirror image only."""
     places = np.array(
-        [one.centre_px if isinstance(one, Marker) else one.place_px for one in known]
+        [target.centre_px if isinstance(target, Marker) else target.place_px for target in known]
     ).reshape(-1, 2)
     last = reading.image.shape[1] - 1
     flipped = replace(reading, image=reading.image[:, ::-1], bit_errors=0)
     refused = []
-    for number, corners in _squares(reading, True):
-        one = _measured(flipped, number, corners)
-        if isinstance(one, Refused):
+    for number, corners in _propose_squares(reading, True):
+        target = _measure_marker(flipped, number, corners)
+        if isinstance(target, Refused):
             continue
-        place = one.centre_px * [-1, 1] + [last, 0]
-        if len(places) and np.hypot(*(places - place).T).min() < NEAR * one.side_px:
+        place = target.centre_px * [-1, 1] + [last, 0]
+        if len(places) and np.hypot(*(places - place).T).min() < NEAR * target.side_px:
             continue
-        refused.append(Refused("mirrored", place, number, {"side_px": one.side_px}))
+        refused.append(Refused("mirrored", place, number, {"side_px": target.side_px}))
     return refused
 
 
-def _without_doubts(reading, targets, refused, listed):
-    """(targets, Refused): codes that are not listed, seen twice, or without a turn of their own."""
+def _refuse_doubtful(reading, targets, refused, listed):
+    """Refuse codes that are not listed, occur twice, or have no unique orientation."""
     known = reading.dictionary
     counts = {}
-    seen = [*targets, *(one for one in refused if one.code in ("overlap", "at_border", "edges"))]
-    for one in seen:
-        counts[one.id] = counts.get(one.id, 0) + 1
-    is_flipped = any(one.code == "mirrored" for one in refused)
+    seen = [
+        *targets,
+        *(target for target in refused if target.code in ("overlap", "at_border", "edges")),
+    ]
+    for target in seen:
+        counts[target.id] = counts.get(target.id, 0) + 1
+    is_flipped = any(target.code == "mirrored" for target in refused)
     kept, doubts = [], []
-    for one in targets:
+    for target in targets:
         code, detail = None, {}
-        if listed is not None and one.id not in listed:
+        if listed is not None and target.id not in listed:
             code = "not_listed"
-        elif counts[one.id] > 1:
-            code, detail = "duplicate", {"times": counts[one.id]}
-        elif one.id in known.turning:
+        elif counts[target.id] > 1:
+            code, detail = "duplicate", {"times": counts[target.id]}
+        elif target.id in known.turning:
             code = "turn_doubt"
-        elif is_flipped and one.id in known.mirrored:
+        elif is_flipped and target.id in known.mirrored:
             code = "mirror_doubt"
         if code is None:
-            kept.append(one)
+            kept.append(target)
         else:
-            doubts.append(Refused(code, one.centre_px, one.id, detail))
+            doubts.append(Refused(code, target.centre_px, target.id, detail))
     return kept, doubts

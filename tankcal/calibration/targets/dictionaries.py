@@ -1,4 +1,4 @@
-"""Dictionaries of coded targets: their cells, and what can be mistaken for what."""
+"""Dictionaries of coded targets: their cells and their ambiguous codes."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -9,25 +9,25 @@ from tankcal.calibration.targets.opencv import opencv
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
-BORDER_CELLS = 1
+BORDER_CELLS = 1  # width of the black border, cells
 
 
 @dataclass(frozen=True)
 class Dictionary:
-    """The codes of a dictionary.
+    """Codes of a dictionary.
 
     Attributes
     ----------
     name : str
-        As OpenCV has it.
+        Name in OpenCV.
     cells : ndarray, shape (codes, n, n)
-        0 and 1, as printed, the black border included.
+        Cells as printed, including the black border: 0 black, 1 white.
     mirrored : frozenset
-        Ids whose mirror image is a code, too.
+        Ids whose mirror image is also a code.
     turning : frozenset
-        Ids that look the same after a quarter or half turn.
+        Ids that are unchanged by a rotation of 90 or 180 degrees.
     chance : float
-        Probability that random cells inside a black border are one of the codes.
+        Probability that random cells inside a black border form a code.
     """
 
     name: str
@@ -38,12 +38,12 @@ class Dictionary:
 
 
 def names_of_dictionaries():
-    """Names that `dictionary` takes; raises InputError without OpenCV."""
+    """Return the names of the dictionaries of OpenCV; raise InputError if OpenCV is missing."""
     names = {name.upper() for name in dir(opencv().aruco) if name.startswith("DICT_")}
     return tuple(sorted(names))
 
 
-def _name(name):
+def _full_name(name):
     known = names_of_dictionaries()
     wanted = str(name).upper()
     wanted = wanted if wanted.startswith("DICT_") else f"DICT_{wanted}"
@@ -60,9 +60,9 @@ def _name(name):
 
 @lru_cache(maxsize=4)
 def dictionary_of(name):
-    """Dictionary by its name, with or without "DICT_". Raises InputError."""
+    """Return the Dictionary of a name, with or without "DICT_"; raise InputError if unknown."""
     aruco = opencv().aruco
-    full = _name(name)
+    full = _full_name(name)
     codes = aruco.getPredefinedDictionary(getattr(aruco, full))
     inside = int(codes.markerSize)
     n = inside + 2 * BORDER_CELLS
@@ -72,24 +72,35 @@ def dictionary_of(name):
             for number in range(len(codes.bytesList))
         ]
     ).astype(np.uint8)
-    plain = {one.tobytes() for one in cells}
+    known_codes = {code.tobytes() for code in cells}
     flipped, turned = set(), set()
-    for number, one in enumerate(cells):
-        if any(np.rot90(one[:, ::-1], k).tobytes() in plain for k in range(4)):
+    for number, code in enumerate(cells):
+        if any(np.rot90(code[:, ::-1], k).tobytes() in known_codes for k in range(4)):
             flipped.add(number)
-        if any(np.array_equal(np.rot90(one, k), one) for k in (1, 2, 3)):
+        if any(np.array_equal(np.rot90(code, k), code) for k in (1, 2, 3)):
             turned.add(number)
     chance = min(4.0 * len(cells) / 2.0 ** (inside**2), 1.0)
     return Dictionary(full, cells, frozenset(flipped), frozenset(turned), chance)
 
 
 def target_image(dictionary, number, side_px, quiet_cells=1):
-    """Grey values (m, m) uint8 of a target to print, whole pixels a cell, white zone around it.
+    """Create the image of a target for printing, with a white zone around it.
 
     Parameters
     ----------
-    side_px
-        Of the black square; the next multiple of the number of cells is taken.
+    dictionary : str
+        Name of the dictionary.
+    number : int
+        Id of the target.
+    side_px : float
+        Side of the black square, px, rounded up to a multiple of the number of cells.
+    quiet_cells : int, optional
+        Width of the white zone, cells.
+
+    Returns
+    -------
+    ndarray of uint8, shape (m, m)
+        Grey values.
     """
     known = dictionary_of(dictionary)
     if not 0 <= number < len(known.cells):

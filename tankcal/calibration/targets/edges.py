@@ -1,4 +1,4 @@
-"""The four edges of a black square to sub-pixels, and the corners where they meet.
+"""Edges of a black square with sub-pixel accuracy, and its corners as their intersections.
 
 Along an edge with t from -1 to 1, at a signed distance d from the straight line through its ends
 (positive towards the inside), a pixel of a blurred photograph has the grey value
@@ -6,12 +6,12 @@ Along an edge with t from -1 to 1, at a signed distance d from the straight line
     (1 + g t) { hi + (lo - hi) [F((d - e(t)) / s) - B(t) F((d - i) / s)]
                    + (out - hi) F((-i - d) / s) }
 
-with F the normal distribution, s the blur, e(t) = e0 + e1 t + e2 (t2 - 1/3) the edge, B the blurred
-row of code cells that begins at the distance i, and `out` what lies beyond a quiet zone of one
-cell. i and B are known from the corners and the code: without them a cell that is only a few blurs
-wide drags the edge along. e0, e1, e2, s, hi, lo, g and `out` are found by least squares of the
-pixels themselves, not of interpolated profiles, and i and B renewed until the corners stand still.
-Corners are intersections of two edges: nothing is measured next to a corner, where blur rounds it.
+F is the normal distribution, s the blur, and e(t) = e0 + e1 t + e2 (t2 - 1/3) the edge. B is the
+blurred row of code cells, which begins at the distance i, and `out` the grey value beyond a quiet
+zone of one cell. i and B follow from the corners and the code; without them, cells only a few blurs
+wide would shift the edge. e0, e1, e2, s, hi, lo, g and `out` are estimated by least squares from
+the pixels, not from interpolated profiles. i and B are updated until the corners converge. Corners
+are intersections of two edges. Pixels next to a corner are not used, because blur rounds it.
 """
 
 from dataclasses import dataclass
@@ -20,36 +20,45 @@ import numpy as np
 import scipy
 from scipy.special import ndtr
 
-CURVED_FROM_PX = 40.0  # a shorter edge is taken as straight: a lens bends it by less than its noise
-BAND_PX = 6.0  # most half-width of the pixels that are used
-CELL_SHARE = 0.95  # of a cell, on either side of the edge
-BEYOND_WEIGHT = 0.02  # of `beyond = high`: what the quiet zone ends in is hardly known
-MOST_ROUNDS = 20
-SAME_PIXELS_FROM = 3  # rounds: else a pixel that comes and goes keeps the corners moving
-NEARLY_STILL_PX = 0.05
-STANDS_STILL_PX, STANDS_STILL = 0.002, 0.1  # px; standard deviations
-MOST_MOVED_PX = 6.0
-SHORTEST_PX = 5.0  # of what is left between the corners' neighbourhoods
-START_BLUR_PX = 1.2
-SHARPEST_PX, SOFTEST_PX = 0.15, 12.0
-_ROOT = np.sqrt(2 * np.pi)
+CURVED_FROM_PX = 40.0  # length from which a curvature is estimated; below, noise exceeds distortion
+BAND_PX = 6.0  # largest half-width of the band of pixels used, px
+CELL_SHARE = 0.95  # largest half-width of the band, as a share of a cell
+BEYOND_WEIGHT = 0.02  # weight of the weak condition `beyond = high`
+MOST_ROUNDS = 20  # largest number of iterations
+SAME_PIXELS_FROM = 3  # iteration from which the pixels are fixed; changes would prevent convergence
+NEARLY_STILL_PX = 0.05  # largest accepted last change of a corner, px
+STANDS_STILL_PX, STANDS_STILL = 0.002, 0.1  # change at convergence, px, and in standard deviations
+MOST_MOVED_PX = 6.0  # largest change in one iteration, px
+SHORTEST_PX = 5.0  # least length of an edge between the excluded ends, px
+START_BLUR_PX = 1.2  # initial blur, px
+SHARPEST_PX, SOFTEST_PX = 0.15, 12.0  # least and largest blur, px
+_ROOT = np.sqrt(2 * np.pi)  # normalisation of the normal density
 
 
 class NoEdge(Exception):
-    """No edge could be fitted where one was expected."""
+    """An expected edge could not be fitted."""
 
 
 @dataclass(frozen=True)
 class Edge:
-    """One fitted edge.
+    """Fitted edge.
 
-    start, along, inward  (2,) px, first end of the line that it is counted from, unit vectors
-    length_px             of that line
-    curve                 (3,) e0, e1, e2, px
-    cofactor_px2          (3, 3) their covariance; zero where e2 is not an unknown
-    blur_px               s
-    levels                (4,) hi, lo, g, out
-    rms                   of the residuals, grey values
+    Attributes
+    ----------
+    start, along, inward : ndarray, shape (2,)
+        First end of the reference line, px; unit vectors along the line and inwards.
+    length_px : float
+        Length of the reference line, px.
+    curve : ndarray, shape (3,)
+        e0, e1, e2, px.
+    cofactor_px2 : ndarray, shape (3, 3)
+        Covariance matrix of `curve`, px2; zero for e2 if it is not estimated.
+    blur_px : float
+        Blur s, px.
+    levels : ndarray, shape (4,)
+        hi, lo, g, out.
+    rms : float
+        Root mean square of the residuals, grey values.
     """
 
     start: np.ndarray
@@ -68,7 +77,7 @@ class Edge:
         return float(self.levels[0] - self.levels[1])
 
     def offset(self, place):
-        """Distance of a place (2,) from the edge, its gradient (2,), and its variance, px2."""
+        """Distance of a point (2,) from the edge (px), its gradient (2,) and variance (px2)."""
         q = place - self.start
         t = 2 * (q @ self.along) / self.length_px - 1
         row = np.array([1.0, t, t * t - 1 / 3])
@@ -78,21 +87,38 @@ class Edge:
 
 
 def corners_of(image, corners, cells):
-    """Corners (4, 2), their covariances (4, 2, 2) px2 and the four Edges of a marker.
+    """Measure the corners of a marker as intersections of its fitted edges.
 
-    image    (lines, columns) grey values, float
-    corners  (4, 2) px to a pixel or two, clockwise from the top left as printed
-    cells    (n, n) 0 and 1, as printed, with the black border
+    Parameters
+    ----------
+    image : ndarray, shape (lines, columns)
+        Grey values.
+    corners : array_like, shape (4, 2)
+        Corners with an accuracy of one or two pixels, clockwise from the top left as printed, px.
+    cells : ndarray, shape (n, n)
+        Cells as printed, including the black border: 0 black, 1 white.
 
-    Raises NoEdge.
+    Returns
+    -------
+    places : ndarray, shape (4, 2)
+        Corners, px.
+    covariance : ndarray, shape (4, 2, 2)
+        Covariance matrices of the corners, px2.
+    edges : list of Edge
+        The four edges.
+
+    Raises
+    ------
+    NoEdge
+        If an edge cannot be fitted, or the corners do not converge.
     """
     places, blur = np.asarray(corners, dtype=float), START_BLUR_PX
     edges, pixels = [None] * 4, [None] * 4
-    for again in range(MOST_ROUNDS):
-        lines = [_line(places, side, len(cells)) for side in range(4)]
-        if again <= SAME_PIXELS_FROM:
-            margin = 2.5 * max(blur, 0.7) + (0.5 if again else 1.5)
-            reach = [_band(line, blur, again > 0) for line in lines]
+    for iteration in range(MOST_ROUNDS):
+        lines = [_reference_line(places, side, len(cells)) for side in range(4)]
+        if iteration <= SAME_PIXELS_FROM:
+            margin = 2.5 * max(blur, 0.7) + (0.5 if iteration else 1.5)
+            reach = [_band(line, blur, iteration > 0) for line in lines]
             pixels = [
                 _pixels(image, line, margin, band) for line, band in zip(lines, reach, strict=True)
             ]
@@ -101,14 +127,14 @@ def corners_of(image, corners, cells):
             for side in range(4)
         ]
         blur = float(np.median([edge.blur_px for edge in edges]))
-        meeting = [_meet(edges[k - 1], edges[k], places[k]) for k in range(4)]
+        meeting = [_intersect(edges[k - 1], edges[k], places[k]) for k in range(4)]
         before, places = places, np.array([place for place, _ in meeting])
         covariance = np.array([spread for _, spread in meeting])
         moved = np.abs(places - before).max()
         if not moved < MOST_MOVED_PX:
             break
         sd = np.sqrt(np.trace(covariance, axis1=1, axis2=2).min() / 2)
-        if again > 1 and moved < max(STANDS_STILL_PX, STANDS_STILL * sd):
+        if iteration > 1 and moved < max(STANDS_STILL_PX, STANDS_STILL * sd):
             break
     if not moved < NEARLY_STILL_PX:
         raise NoEdge("unsteady")
@@ -117,9 +143,10 @@ def corners_of(image, corners, cells):
 
 @dataclass(frozen=True)
 class _Line:
-    """The straight line of an edge, and the line that ends the border's cells.
+    """Straight line of an edge, and the inner line of the border.
 
-    inner  (2, 2) px, the inner ends of the border's cells     cells  in the edge's length
+    `inner` (2, 2) contains the inner ends of the cells of the border, px. `cells` is the number of
+    cells along the edge.
     """
 
     start: np.ndarray
@@ -131,11 +158,11 @@ class _Line:
 
     @property
     def depths(self):
-        """(2,) px from the edge to `inner`: the width of the border."""
+        """Width of the border at both ends of `inner`, shape (2,), px."""
         return (self.inner - self.start) @ self.inward
 
 
-def _line(corners, side, cells):
+def _reference_line(corners, side, cells):
     corners = np.roll(corners, -side, axis=0)
     start, end = corners[:2]
     length = float(np.hypot(*(end - start)))
@@ -147,7 +174,7 @@ def _line(corners, side, cells):
 
 
 def _fit(image, line, pixels, bits, before, blur):
-    """Edge along a _Line by the pixels (lines, columns); starts where the one `before` ended."""
+    """Fit an Edge along a _Line to pixels (lines, columns), starting from the edge `before`."""
     x, y = pixels[1] - line.start[0], pixels[0] - line.start[1]
     t = x * line.along[0] + y * line.along[1]
     d = x * line.inward[0] + y * line.inward[1]
@@ -163,15 +190,15 @@ def _fit(image, line, pixels, bits, before, blur):
 
 
 def _band(line, blur, is_final):
-    """Half-width of the pixels that are used, px."""
+    """Half-width of the band of pixels used, px."""
     wanted = min(3.5 * blur + 0.5 if is_final else BAND_PX, BAND_PX)
     return max(min(wanted, CELL_SHARE * float(line.depths.min())), 2.0)
 
 
 def _inner_line(corners, count):
-    """(2, 2) images of the inner ends of the border's cells next to the first edge."""
+    """Images (2, 2) of the inner ends of the cells of the border at the first edge, px."""
     p0, p1, p2, p3 = corners
-    # w of the homography of the unit square, from the parallelogram's defect
+    # Third row of the homography of the unit square, from the deviation from a parallelogram
     defect = p0 - p1 + p2 - p3
     g, h = np.linalg.solve(np.column_stack([p1 - p2, p3 - p2]), defect)
     across, down = p1 - p0 + g * p1, p3 - p0 + h * p3
@@ -181,7 +208,7 @@ def _inner_line(corners, count):
 
 
 def _pixels(image, line, margin, band):
-    """(lines, columns) of the pixels about an edge, without those next to its ends."""
+    """Lines and columns of the pixels near an edge, except near its ends."""
     margin = min(margin, max(line.length / 4, (line.length - SHORTEST_PX) / 2))
     ends = line.start + np.outer([0, line.length], line.along)
     low = np.maximum(np.floor(ends.min(axis=0) - band - 1), 0).astype(int)
@@ -193,14 +220,14 @@ def _pixels(image, line, margin, band):
     x, y = column - line.start[0], row - line.start[1]
     t = x * line.along[0] + y * line.along[1]
     d = x * line.inward[0] + y * line.inward[1]
-    used = (t >= margin) & (t <= line.length - margin) & (np.abs(d) <= band)
-    if used.sum() < 20:
+    is_used = (t >= margin) & (t <= line.length - margin) & (np.abs(d) <= band)
+    if is_used.sum() < 20:
         raise NoEdge("short")
-    return row[used], column[used]
+    return row[is_used], column[is_used]
 
 
 class _Model:
-    """Grey values of the pixels about an edge, and their derivatives."""
+    """Model of the grey values of the pixels near an edge, with derivatives."""
 
     def __init__(self, t, d, grey, depth, columns, bits, cells_per_px):
         self.t, self.d, self.grey, self.depth = t, d, grey, depth
@@ -208,7 +235,7 @@ class _Model:
         self.rows = np.column_stack([np.ones_like(t), t, t * t - 1 / 3])
 
     def solved(self, blur, levels, is_curved):
-        """curve (3,), its cofactor, blur, levels, rms of the residuals; see Edge."""
+        """Fit the model; return curve, cofactor, blur, levels and rms as in Edge."""
         self.degree = k = 3 if is_curved else 2
         self.row_of_code = self._row_of_code(blur)
         if levels is None:
@@ -235,7 +262,7 @@ class _Model:
         return np.array([high, low, 0.0, high])
 
     def _row_of_code(self, blur):
-        """(n,) the row of code cells next to the border, blurred along it."""
+        """Row of code cells next to the border, blurred along the edge, at each pixel (n,)."""
         s = max(blur, 0.3) * self.cells_per_px
         steps = ndtr((self.columns[:, None] - np.arange(len(self.bits) + 1)) / s)
         return (steps[:, :-1] - steps[:, 1:]) @ self.bits
@@ -249,18 +276,19 @@ class _Model:
         return k, s, z, inner, outer, ndtr(z) - self.row_of_code * ndtr(inner), ndtr(outer)
 
     def residuals(self, e):
-        """Computed minus measured grey values, and the weak condition on what lies beyond."""
+        """Computed minus measured grey values, and the weak condition `beyond = high`."""
         k, *_, dark, out = self._parts(e)
         high, low, gradient, beyond = e[k + 1 :]
         grey = high + (low - high) * dark + (beyond - high) * out
-        found = (1 + gradient * self.t) * grey - self.grey
-        return np.append(found, BEYOND_WEIGHT * (beyond - high))
+        misclosure = (1 + gradient * self.t) * grey - self.grey
+        return np.append(misclosure, BEYOND_WEIGHT * (beyond - high))
 
     def jacobian(self, e):
-        """(n + 1, parameters) of the residuals."""
+        """Derivatives of the residuals by the parameters, shape (n + 1, parameters)."""
         k, s, z, inner, outer, dark, out = self._parts(e)
         high, low, gradient, beyond = e[k + 1 :]
         gain = 1 + gradient * self.t
+        # The derivative of F is the normal density; the chain rule applies to each term.
         density, of_code, of_outer = (np.exp(-q * q / 2) / _ROOT for q in (z, inner, outer))
         of_code = self.row_of_code * of_code
         slope = gain * (low - high)
@@ -278,7 +306,7 @@ class _Model:
 
 
 def _inverse_normal(jacobian):
-    """(J'J)^-1 with the columns scaled alike."""
+    """(J'J)^-1, computed with columns of equal norm."""
     scale = np.linalg.norm(jacobian, axis=0)
     if not (scale > 0).all():
         raise NoEdge("flat")
@@ -289,14 +317,15 @@ def _inverse_normal(jacobian):
     return np.linalg.inv(normal) / np.outer(scale, scale)
 
 
-def _meet(before, after, start):
-    """Intersection (2,) of two edges, and its covariance (2, 2) px2."""
+def _intersect(before, after, start):
+    """Intersection (2,) of two edges, px, and its covariance matrix (2, 2), px2."""
     place = np.array(start, dtype=float)
+    # Newton iteration for the point at distance zero from both curves
     for _ in range(6):
         first, second = before.offset(place), after.offset(place)
         gradient = np.array([first[1], second[1]])
         if abs(np.linalg.det(gradient)) < 0.05:
             raise NoEdge("parallel")
         place = place - np.linalg.solve(gradient, [first[0], second[0]])
-    spread = np.linalg.inv(gradient)
-    return place, spread @ np.diag([first[2], second[2]]) @ spread.T
+    inverse = np.linalg.inv(gradient)
+    return place, inverse @ np.diag([first[2], second[2]]) @ inverse.T

@@ -1,4 +1,4 @@
-"""What reading a photograph gives: targets, and what was refused with the reason."""
+"""Results of the measurement of a photograph: targets, and refused candidates with reasons."""
 
 from dataclasses import dataclass, field
 
@@ -25,25 +25,25 @@ REASONS = {
 
 @dataclass(frozen=True)
 class Marker:
-    """A coded square.
+    """Coded square target.
 
     Attributes
     ----------
     id : int
-        Of the dictionary.
+        Id in the dictionary.
     corners_px : ndarray, shape (4, 2)
-        Column and line, clockwise from the top left of the marker as printed; the centre of the
-        photo's first pixel is (0, 0).
+        Column and line of the corners, px, clockwise from the top left as printed. The centre of
+        the first pixel of the photo is (0, 0).
     sd_px : ndarray, shape (4,)
-        Standard deviation of both coordinates of each corner.
+        Standard deviation of each coordinate of each corner, px.
     bit_errors : int
-        Cells that differ from the code, border included.
+        Number of cells that differ from the code, including the border.
     side_px : float
-        Mean length of the four sides.
+        Mean length of the four sides, px.
     blur_px : float
-        Mean blur of the edges, as a standard deviation.
+        Mean blur of the edges as a standard deviation, px.
     clarity : float
-        How black and white the cells are: 1, as printed; 0, all of the same grey.
+        Correlation of the cells with the code; 1 as printed, 0 if all cells have the same grey.
     """
 
     id: int
@@ -56,24 +56,25 @@ class Marker:
 
     @property
     def centre_px(self):
-        """(2,) where the diagonals meet: the image of the centre, whatever the perspective."""
+        """Intersection of the diagonals (2,), the image of the centre in any perspective, px."""
         return _diagonals(self.corners_px)[0]
 
     @property
     def centre_sd_px(self):
-        """Standard deviation of both coordinates of the centre, corners taken as independent."""
+        """Standard deviation of each coordinate of the centre, px, for independent corners."""
         by_corner = _diagonals(self.corners_px)[1]
         return float(np.sqrt(((by_corner * self.sd_px[:, None, None]) ** 2).sum() / 2))
 
 
 def _diagonals(corners):
-    """Where the diagonals of (4, 2) meet, and its derivatives (4, 2, 2) by the corners."""
-    one, other = corners[2] - corners[0], corners[3] - corners[1]
-    matrix = np.column_stack([one, -other])
+    """Intersection of the diagonals of corners (4, 2), and its derivatives (4, 2, 2) by them."""
+    first, second = corners[2] - corners[0], corners[3] - corners[1]
+    # corner 0 + s first = corner 1 + t second
+    matrix = np.column_stack([first, -second])
     s, t = np.linalg.solve(matrix, corners[1] - corners[0])
-    place = corners[0] + s * one
-    # moving a corner moves its diagonal across itself; the other diagonal is where we stay
-    normals = np.array([[-one[1], one[0]], [-other[1], other[0]]])
+    place = corners[0] + s * first
+    # A change of a corner moves its diagonal; the intersection then moves along the other diagonal.
+    normals = np.array([[-first[1], first[0]], [-second[1], second[0]]])
     spread = np.linalg.inv(normals)
     shares = ((1 - s, 0), (1 - t, 1), (s, 0), (t, 1))
     return place, np.array([share * np.outer(spread[:, k], normals[k]) for share, k in shares])
@@ -81,24 +82,25 @@ def _diagonals(corners):
 
 @dataclass(frozen=True)
 class Circle:
-    """A white circle on a dark ground.
+    """White circle on a dark background.
 
     Attributes
     ----------
     centre_px : ndarray, shape (2,)
-        Of the ellipse; the circle's own centre is a little beside it, see eccentricity_px.
+        Centre of the ellipse, px. The image of the centre of the circle differs slightly; see
+        eccentricity_px.
     sd_px : float
-        Standard deviation of both coordinates.
+        Standard deviation of each coordinate, px.
     semi_axes_px : ndarray, shape (2,)
-        Larger and smaller half axis.
+        Major and minor semi-axis, px.
     turn_rad : float
-        Of the larger one, from the columns towards the lines.
+        Direction of the major axis, from the columns towards the lines, rad.
     blur_px : float
-        Blur of the edge.
+        Blur of the edge, px.
     contrast : float
         White minus black, grey values.
     rms_grey : float
-        Of the residuals of the fit.
+        Root mean square of the residuals of the fit, grey values.
     """
 
     centre_px: np.ndarray
@@ -112,18 +114,18 @@ class Circle:
 
 @dataclass(frozen=True)
 class Refused:
-    """Something that looks like a target and was not accepted.
+    """Candidate for a target that was refused.
 
     Attributes
     ----------
     code : str
-        One of REASONS.
+        Reason, one of REASONS.
     place_px : ndarray, shape (2,)
-        Its middle.
+        Centre of the candidate, px.
     id : int or None
-        Of the dictionary, or None.
+        Id in the dictionary, or None.
     detail : dict
-        {what: number} that the reason rests on.
+        {quantity: number} that explains the reason.
     """
 
     code: str
@@ -134,19 +136,19 @@ class Refused:
 
 @dataclass(frozen=True)
 class Found:
-    """What one photograph holds.
+    """Targets of one photograph.
 
     Attributes
     ----------
-    targets : tuple
-        Markers in the order of their ids, or Circles from top to bottom.
-    refused : tuple
-        Refused.
-    size_px : tuple
-        (columns, lines).
-    doubtful : tuple
-        Ids among the targets whose mirror image is a code of the same dictionary: a flipped
-        photo would not be noticed by them.
+    targets : tuple of Marker or of Circle
+        Markers in the order of their ids, or circles from top to bottom.
+    refused : tuple of Refused
+        Refused candidates.
+    size_px : tuple of int
+        Columns and lines of the photo.
+    doubtful : tuple of int
+        Ids whose mirror image is also a code of the dictionary. These targets do not reveal a
+        mirrored photo.
     """
 
     targets: tuple

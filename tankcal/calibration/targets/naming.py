@@ -1,4 +1,4 @@
-"""Names of targets: ids of codes by a list, circles by approximate places."""
+"""Names of targets: coded targets by a list of ids, circles by approximate positions."""
 
 from dataclasses import dataclass
 
@@ -44,9 +44,20 @@ CORNERS = ("-1", "-2", "-3", "-4")  # top left of the marker as printed, then cl
 
 
 def read_names(path, log, suffixes=()):
-    """{id: name} of a CSV file with the columns id and point; what is wrong goes to `log`.
+    """Read {id: name} from a CSV file with the columns id and point; problems are logged.
 
-    suffixes  that names get, and must still be names with
+    Parameters
+    ----------
+    path : Path
+        Path of the file.
+    log : Log
+        Receives the problems.
+    suffixes : sequence of str, optional
+        Suffixes with which each name must also be valid.
+
+    Returns
+    -------
+    dict
     """
     names, first = {}, {}
     for file, row, (number, point) in _rows(path, NAMES, log):
@@ -90,7 +101,7 @@ def read_names(path, log, suffixes=()):
 
 @dataclass(frozen=True)
 class Place:
-    """Where a point is about to be found in a photo; row of the file that says so."""
+    """Approximate position of a point in a photo, px, and its row in the file."""
 
     point: str
     place_px: np.ndarray
@@ -98,7 +109,7 @@ class Place:
 
 
 def read_places(path, log):
-    """{photo: [Place]} of a CSV file with photo, point, column_px, line_px."""
+    """Read {photo: [Place]} from a CSV file with photo, point, column_px, line_px."""
     places, first = {}, {}
     for file, row, (photo, point, column, line) in _rows(path, PLACES, log):
         if (photo, point) in first:
@@ -116,9 +127,18 @@ def read_places(path, log):
 
 
 def warn_of_unused(places, photos, file, log):
-    """Warn of each photo in read_places that is not among the photos (names) that are read.
+    """Log a warning for each photo of `places` that is not among the given photos.
 
-    file  that the places stand in
+    Parameters
+    ----------
+    places : dict
+        {photo: [Place]} from `read_places`.
+    photos : sequence of str
+        Names of the given photos.
+    file : str
+        Name of the file of the positions.
+    log : Log
+        Receives the warnings.
     """
     for photo in places:
         if photo not in photos:
@@ -133,18 +153,18 @@ def warn_of_unused(places, photos, file, log):
 
 
 def _rows(path, fields, log):
-    """(file, row, values) of the sound rows."""
+    """Yield (file, row, values) of the valid rows; problems are logged."""
     data = read_bytes(path, log, MAX_FILE_BYTES)
     table = None if data is None else read_csv(path.name, data, ",", ".", log)
     if table is None:
         return
-    lacking = [field for field in fields if field.name not in table.headings]
-    for field in lacking:
+    missing = [field for field in fields if field.name not in table.headings]
+    for field in missing:
         expected = message(
             "targets_missing_column", "missing column; expected {wanted}", wanted=field.wanted()
         )
         log.problem(table.file, expected, table.heading_row, field.name)
-    if lacking:
+    if missing:
         return
     places = [table.headings.index(field.name) for field in fields]
     for row, cells in zip(table.row_numbers, table.rows, strict=True):
@@ -167,24 +187,41 @@ def _rows(path, fields, log):
 
 
 def match_circles_to_places(circles, places, reach_px):
-    """([(point, Circle)], [(code, Circle)], [points not found]): each circle and place once.
+    """Assign circles to approximate positions, each at most once.
 
-    reach_px  how far a circle may be from its approximate place; a place with two circles within
-              reach, or a circle with two places, is ambiguous
+    A position with two circles within reach, or a circle with two positions, is ambiguous.
+
+    Parameters
+    ----------
+    circles : sequence of Circle
+        Circles of a photo.
+    places : sequence of Place
+        Approximate positions in the photo.
+    reach_px : float
+        Largest distance of a circle from its approximate position, px.
+
+    Returns
+    -------
+    named : list of (str, Circle)
+        Point and circle.
+    refused : list of (str, Circle)
+        Code of the reason and circle.
+    missing : list of str
+        Points without a circle.
     """
     if not circles or not places:
-        return [], [("unnamed", one) for one in circles], [place.point for place in places]
-    middles = np.array([one.centre_px for one in circles])
-    wanted = np.array([place.place_px for place in places])
-    near = np.hypot(*(middles[:, None] - wanted).transpose(2, 0, 1)) <= reach_px
+        return [], [("unnamed", circle) for circle in circles], [place.point for place in places]
+    middles = np.array([circle.centre_px for circle in circles])
+    approximate = np.array([place.place_px for place in places])
+    near = np.hypot(*(middles[:, None] - approximate).transpose(2, 0, 1)) <= reach_px
     per_circle, per_place = near.sum(axis=1), near.sum(axis=0)
     named, refused = [], []
-    for i, one in enumerate(circles):
+    for i, circle in enumerate(circles):
         if per_circle[i] == 0:
-            refused.append(("unnamed", one))
+            refused.append(("unnamed", circle))
         elif per_circle[i] > 1 or per_place[near[i]].max() > 1:
-            refused.append(("ambiguous", one))
+            refused.append(("ambiguous", circle))
         else:
-            named.append((places[int(np.argmax(near[i]))].point, one))
-    lacking = [place.point for place, count in zip(places, per_place, strict=True) if not count]
-    return named, refused, lacking
+            named.append((places[int(np.argmax(near[i]))].point, circle))
+    missing = [place.point for place, count in zip(places, per_place, strict=True) if not count]
+    return named, refused, missing

@@ -1,4 +1,4 @@
-"""OpenCV, which only reading photographs needs: the extra `tankcal[images]`."""
+"""Import of OpenCV (extra `tankcal[images]`), required only to measure photographs."""
 
 import importlib
 
@@ -6,14 +6,14 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.version import install_command
 
-OLDEST = (4, 7)  # the first one with ArucoDetector
+OLDEST = (4, 7)  # oldest supported version, the first with ArucoDetector
 
 
 def opencv():
-    """The module cv2. Raises InputError where it is missing or too old."""
+    """Return the module cv2; raise InputError if it is missing or too old."""
     try:
-        found = importlib.import_module("cv2")
-        is_usable = tuple(int(part) for part in found.__version__.split(".")[:2]) >= OLDEST
+        cv2 = importlib.import_module("cv2")
+        is_usable = tuple(int(part) for part in cv2.__version__.split(".")[:2]) >= OLDEST
     except ImportError:
         raise InputError(
             Problem(
@@ -25,12 +25,12 @@ def opencv():
                 ),
             )
         ) from None
-    if not (is_usable and hasattr(found, "aruco")):
+    if not (is_usable and hasattr(cv2, "aruco")):
         expected = message(
             "targets_old_opencv",
             "found version {version}; expected 4.7 or later: {command}",
-            version=found.__version__,
+            version=cv2.__version__,
             command=install_command("images"),
         )
         raise InputError(Problem("OpenCV", expected))
-    return found
+    return cv2

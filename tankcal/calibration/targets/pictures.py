@@ -1,4 +1,4 @@
-"""Photographs from files: grey values as stored, never turned, never of a size that bursts."""
+"""Reading of photographs: grey values in proportion to light, not rotated, of limited size."""
 
 import os
 import struct
@@ -16,24 +16,24 @@ from tankcal.job.fields import Field
 from tankcal.job.tables import read_bytes
 from tankcal.messages import message
 
-# Size and orientation of a picture file from its header alone, before a pixel is decoded.
+# Size and orientation are read from the header alone, before the picture is decoded.
 
 JPEG_SIZES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # start of frame
-JPEG_ALONE = frozenset({0x01, *range(0xD0, 0xD9)})
+JPEG_ALONE = frozenset({0x01, *range(0xD0, 0xD9)})  # markers without a length
 TIFF_WIDTH, TIFF_HEIGHT, TIFF_TURN = 256, 257, 274
-MOST_ENTRIES = 1000
+MOST_ENTRIES = 1000  # largest number of directory entries that are read
 
 
 @dataclass(frozen=True)
 class Header:
-    """size_px (columns, lines) as stored; orientation of its EXIF or TIFF tag, 1: as stored."""
+    """Size (columns, lines) as stored, and orientation from the EXIF or TIFF tag (1: as stored)."""
 
     size_px: tuple
     orientation: int = 1
 
 
 def header_of(data):
-    """Header of a JPEG, PNG, TIFF or BMP file (bytes), or None where it is none of them."""
+    """Return the Header of a JPEG, PNG, TIFF or BMP file (bytes), or None for other files."""
     try:
         if data[:8] == b"\x89PNG\r\n\x1a\n" and data[12:16] == b"IHDR":
             return Header(struct.unpack(">II", data[16:24]))
@@ -74,11 +74,11 @@ def _tiff(data):
 
 
 def _tags(data):
-    """{tag: number} of the first directory of a TIFF structure, of short and long numbers."""
+    """Return {tag: number} of the first directory of a TIFF structure, for short and long tags."""
     order = {b"II": "<", b"MM": ">"}.get(data[:2])
     if order is None:
         return {}
-    found = {}
+    tags = {}
     try:
         (start,) = struct.unpack(order + "I", data[4:8])
         (count,) = struct.unpack(order + "H", data[start : start + 2])
@@ -87,15 +87,15 @@ def _tags(data):
             tag, kind = struct.unpack(order + "HH", data[place : place + 4])
             form, length = {3: ("H", 2), 4: ("I", 4)}.get(kind, (None, 0))
             if form:
-                (found[tag],) = struct.unpack(order + form, data[place + 8 : place + 8 + length])
+                (tags[tag],) = struct.unpack(order + form, data[place + 8 : place + 8 + length])
     except struct.error:
         pass
-    return found
+    return tags
 
 
-MOST_PIXELS = 250_000_000
-LEAST_SIDE_PX = 32
-MOST_BYTES = 1_000_000_000
+MOST_PIXELS = 250_000_000  # largest number of pixels of a picture
+LEAST_SIDE_PX = 32  # least number of columns and of lines
+MOST_BYTES = 1_000_000_000  # largest size of a picture file
 KINDS = message("targets_kinds", "a JPEG, PNG, TIFF or BMP picture")
 PHOTO = Field("photo", "name", "the photo")
 ENCODINGS = ("by_file", "linear", "srgb")
@@ -104,11 +104,16 @@ JPEG_START = b"\xff\xd8"
 
 @dataclass(frozen=True)
 class Picture:
-    """A photograph.
+    """Photograph.
 
-    image        (lines, columns) float32, 0 to 255, in proportion to light
-    encoding     how its grey values were taken: "linear" or "srgb"
-    orientation  what the file says about turning it, 1: nothing; never applied
+    Attributes
+    ----------
+    image : ndarray of float32, shape (lines, columns)
+        Grey values in proportion to light, 0 to 255.
+    encoding : str
+        Interpretation of the stored grey values: "linear" or "srgb".
+    orientation : int
+        Orientation tag of the file (1: no rotation). It is not applied.
     """
 
     image: np.ndarray
@@ -117,15 +122,27 @@ class Picture:
 
 
 def photo_name(path):
-    """Name of the photo: that of its file without the ending. Raises Refused."""
+    """Return the name of a photo, its file name without extension; raise Refused if invalid."""
     return read_value(PHOTO, Path(path).stem)
 
 
 def read_picture(path, log, encoding="by_file"):
-    """Picture of a file, or None after telling `log`.
+    """Read a picture from a file.
 
-    encoding  "linear": grey values as stored; "srgb": brought back to amounts of light first;
-              "by_file": srgb for JPEG, as cameras write it, else linear
+    Parameters
+    ----------
+    path : path-like
+        Path of the file.
+    log : Log
+        Receives problems and warnings.
+    encoding : str, optional
+        "linear" for grey values as stored; "srgb" for conversion from sRGB to amounts of light;
+        "by_file" for sRGB in JPEG files, as cameras write them, and linear in other files.
+
+    Returns
+    -------
+    Picture or None
+        None after a problem.
     """
     path = Path(path)
     data = read_bytes(path, log, MOST_BYTES)
@@ -207,7 +224,7 @@ def _captured_error_stream():
 
 
 def _light(image, encoding):
-    """Grey values 0 to 255, float32; of 16-bit pictures the range that is used."""
+    """Grey values from 0 to 255, float32; pictures of 16 bits are scaled to their maximum."""
     most = {"uint8": 255.0, "uint16": 65535.0}.get(str(image.dtype))
     light = image.astype(np.float32)
     if most is None:
@@ -217,5 +234,6 @@ def _light(image, encoding):
         most = max(float(light.max()), 1.0)  # 12-bit cameras store 16 bits
     light *= np.float32(1 / most)
     if encoding == "srgb":
+        # Inverse of the sRGB transfer function
         light = np.where(light <= 0.04045, light / 12.92, ((light + 0.055) / 1.055) ** 2.4)
     return light.astype(np.float32) * np.float32(255)

@@ -1,4 +1,4 @@
-"""Photographs in, image_points.csv out: the whole way, for any number of photos."""
+"""Measurement of targets in photographs, from picture files to image_points.csv."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -28,34 +28,34 @@ from tankcal.job.tables import Log, shown
 from tankcal.messages import join_with_or, message
 
 WHAT = ("corners", "centres", "circles")
-CHANCE_TOLD = 1e-4  # that random cells are a code
+WARNED_CHANCE = 1e-4  # probability of a code in random cells above which a warning is given
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to read.
+    """Settings of the measurement.
 
     Attributes
     ----------
     what : str
-        "corners" of coded targets (name-1 .. name-4), their "centres", or "circles".
+        "corners" of coded targets (name-1 to name-4), their "centres", or "circles".
     dictionary : str
-        Of coded targets, as OpenCV calls it.
+        Name of the dictionary of coded targets in OpenCV.
     names : Path or None
-        Path of a CSV file with id and point, or None: the number is the name, and every id of
-        the dictionary is accepted.
+        CSV file with id and point. If None, the id is the name, and all ids of the dictionary are
+        accepted.
     places : Path or None
-        Of circles: path of a CSV file with photo, point, column_px, line_px.
+        CSV file with photo, point, column_px, line_px, for circles.
     reach_px : float
-        Of circles: how far one may be from its approximate place.
+        Largest distance of a circle from its approximate position, px.
     smallest_px : float or None
-        Least side, or diameter; None: 2.5 px a cell, or 6.
+        Least side or diameter, px; by default 2.5 px per cell, or 6 px for circles.
     largest_px : float or None
-        Of circles: largest diameter; None: a tenth of the photo.
+        Largest diameter of circles, px; by default a tenth of the photo.
     bit_errors : int
-        Cells of a code that may be wrong.
+        Largest number of wrong cells of a code.
     encoding : str
-        One of pictures.ENCODINGS: how grey values stand for light.
+        Relation of grey values to light, one of pictures.ENCODINGS.
     """
 
     what: str = "corners"
@@ -71,20 +71,20 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Reading:
-    """What was read and written.
+    """Result of the measurement of several photos.
 
     Attributes
     ----------
-    photos : tuple
-        PhotoReadings.
+    photos : tuple of PhotoReading
+        Result for each photo.
     path, refused_path : Path
-        Files that were written.
+        Files of the image points and of the refused candidates.
     targets, points : int
-        How many, over all photos.
+        Number of targets and of image points in all photos.
     refused : dict
-        {reason code: how many}.
+        {code of the reason: number of candidates}.
     warnings : tuple
-        Problems that stop nothing.
+        Warnings.
     """
 
     photos: tuple
@@ -97,31 +97,37 @@ class Reading:
 
 
 def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
-    """Read targets in photographs and write image_points.csv: a Reading. All or nothing.
+    """Measure targets in photographs and write image_points.csv.
+
+    No file is written if there is a problem.
 
     Parameters
     ----------
-    paths
-        Of the pictures; a photo's name is that of its file, without the ending.
-    out_csv
-        Path of image_points.csv; what was refused goes to ..._refused.csv beside it.
+    paths : sequence of path-like
+        Picture files; the name of a photo is its file name without extension.
+    out_csv : path-like
+        Path of image_points.csv; refused candidates are written to ..._refused.csv in its folder.
     wanted : Wanted, optional
-        What to read; None: the corners of coded targets.
-    replace : optional
-        Whether files that are there may be overwritten.
+        Settings; by default the corners of coded targets are measured.
+    replace : bool, optional
+        Whether existing files may be overwritten.
     progress : callable, optional
         Called as progress(text, done, total) before each photo and at the end.
+
+    Returns
+    -------
+    Reading
 
     Raises
     ------
     InputError
-        With everything that is wrong with files, names and settings.
+        If files, names or settings are invalid; the error lists all problems.
     """
     wanted, log = wanted or Wanted(), Log()
     opencv()
-    names, places = _lists(wanted, log)
+    names, places = _read_settings(wanted, log)
     check_free(out_csv, replace, log)
-    titles = _titles(paths, log)
+    titles = _name_photos(paths, log)
     if places:
         warn_of_unused(places, [title for _, title in titles], Path(wanted.places).name, log)
     photos, encodings = [], Counter()
@@ -132,7 +138,7 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
         if picture is not None:
             encodings[picture.encoding] += 1
         if picture is not None and not log.problems:
-            photos.append(_photo(title, picture, wanted, names, places, log))
+            photos.append(_measure_photo(title, picture, wanted, names, places, log))
     log.stop_if_problems()
     _warn(photos, wanted, names, log)
     if encodings["srgb"] and wanted.encoding == "by_file":
@@ -151,13 +157,13 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
         *written,
         sum(len(photo.targets) for photo in photos),
         sum(len(photo.points) for photo in photos),
-        dict(Counter(one.code for photo in photos for one in photo.refused)),
+        dict(Counter(candidate.code for photo in photos for candidate in photo.refused)),
         tuple(log.warnings),
     )
 
 
-def _lists(wanted, log):
-    """({id: name} or None, {photo: [Place]}); what is wrong with the settings goes to `log`."""
+def _read_settings(wanted, log):
+    """Return {id: name} or None, and {photo: [Place]}; problems of the settings are logged."""
     for value, known, name in (
         (wanted.what, WHAT, "what"),
         (wanted.encoding, ENCODINGS, "encoding"),
@@ -224,9 +230,9 @@ def _names(wanted, log):
     return names, {}
 
 
-def _titles(paths, log):
-    """[(path, name of the photo)]; names that cannot be used go to `log`."""
-    found, seen = [], {}
+def _name_photos(paths, log):
+    """Return [(path, name of the photo)]; invalid names are logged."""
+    titles, file_of_title = [], {}
     for path in map(Path, paths):
         try:
             title = photo_name(path)
@@ -236,39 +242,41 @@ def _titles(paths, log):
                 message("targets_photo_name", "as the name of a photo: {refusal}", refusal=refusal),
             )
             continue
-        if title in seen:
+        if title in file_of_title:
             expected = message(
                 "targets_photo_twice",
                 "photo {photo!r} is already read from {file}; expected another file name",
                 photo=title,
-                file=seen[title],
+                file=file_of_title[title],
             )
             log.problem(path.name, expected)
-        seen.setdefault(title, path.name)
-        found.append((path, title))
-    if not seen and not log.problems:
+        file_of_title.setdefault(title, path.name)
+        titles.append((path, title))
+    if not file_of_title and not log.problems:
         log.problem(
             "photographs",
             message("targets_none_given", "no photograph given; expected one or more"),
         )
-    return found
+    return titles
 
 
-def _photo(title, picture, wanted, names, places, log):
-    """PhotoReading of one picture."""
+def _measure_photo(title, picture, wanted, names, places, log):
+    """Measure one picture; return a PhotoReading."""
     if wanted.what == "circles":
-        return _photo_of_circles(title, picture, wanted, places.get(title, []), log)
+        return _measure_circles(title, picture, wanted, places.get(title, []), log)
     found = read_coded(
         picture.image, wanted.dictionary, names, wanted.bit_errors, wanted.smallest_px
     )
-    named = [(one, str(one.id) if names is None else names[one.id]) for one in found.targets]
+    named = [
+        (target, str(target.id) if names is None else names[target.id]) for target in found.targets
+    ]
     if wanted.what == "centres":
-        points = [ImagePoint(name, one.centre_px, one.centre_sd_px) for one, name in named]
+        points = [ImagePoint(name, target.centre_px, target.centre_sd_px) for target, name in named]
     else:
         points = [
             ImagePoint(name + corner, place, float(sd))
-            for one, name in named
-            for corner, place, sd in zip(CORNERS, one.corners_px, one.sd_px, strict=True)
+            for target, name in named
+            for corner, place, sd in zip(CORNERS, target.corners_px, target.sd_px, strict=True)
         ]
     targets = tuple(name for _, name in named)
     if found.doubtful:
@@ -284,23 +292,23 @@ def _photo(title, picture, wanted, names, places, log):
     )
 
 
-def _photo_of_circles(title, picture, wanted, places, log):
+def _measure_circles(title, picture, wanted, places, log):
     found = read_circles(picture.image, wanted.smallest_px or 6.0, wanted.largest_px)
-    named, refused, lacking = match_circles_to_places(found.targets, places, wanted.reach_px)
-    if lacking:
-        listed = ", ".join(repr(name) for name in lacking[:5])
+    named, refused, missing = match_circles_to_places(found.targets, places, wanted.reach_px)
+    if missing:
+        listed = ", ".join(repr(name) for name in missing[:5])
         expected = message(
             "targets_no_circle",
             "no circle within {reach:g} px of {count} places: {names}",
             reach=wanted.reach_px,
-            count=len(lacking),
+            count=len(missing),
             names=listed,
         )
         log.warning(title, expected)
-    points = tuple(ImagePoint(name, one.centre_px, one.sd_px) for name, one in named)
+    points = tuple(ImagePoint(name, circle.centre_px, circle.sd_px) for name, circle in named)
     refused = [
-        Refused(code, one.centre_px, None, {"half_axis_px": float(one.semi_axes_px[0])})
-        for code, one in refused
+        Refused(code, circle.centre_px, None, {"half_axis_px": float(circle.semi_axes_px[0])})
+        for code, circle in refused
     ]
     return PhotoReading(
         title,
@@ -313,7 +321,7 @@ def _photo_of_circles(title, picture, wanted, places, log):
 
 
 def _warn(photos, wanted, names, log):
-    """Tell what deserves a look."""
+    """Log warnings about photos without targets, rotation tags, sizes, names and chance codes."""
     for photo in photos:
         if not photo.targets:
             log.warning(photo.photo, message("targets_none_found", "no targets found"))
@@ -339,7 +347,7 @@ def _warn(photos, wanted, names, log):
     _warn_of_names(photos, wanted, names, log)
     if wanted.what != "circles" and names is None:
         chance = dictionary_of(wanted.dictionary).chance
-        if chance > CHANCE_TOLD:
+        if chance > WARNED_CHANCE:
             expected = message(
                 "targets_chance",
                 "by chance, one of {frames:.0f} black frames with anything inside is read as "
@@ -350,7 +358,7 @@ def _warn(photos, wanted, names, log):
 
 
 def _warn_of_names(photos, wanted, names, log):
-    """Targets in one photo only, and names of the list in none."""
+    """Log warnings about targets in a single photo, and listed names in no photo."""
     times = Counter(name for photo in photos for name in photo.targets)
     once = [name for name, count in times.items() if count == 1]
     if once and len(photos) > 1:

@@ -1,4 +1,4 @@
-"""image_points.csv and the list of what was refused, both or none."""
+"""Writing of image_points.csv and of the list of refused candidates, both or neither."""
 
 import io
 import os
@@ -18,7 +18,7 @@ REFUSED_HEADINGS = ("photo", "code", "id", "column_px", "line_px", "detail", "re
 
 @dataclass(frozen=True)
 class ImagePoint:
-    """A measured image point: name, (2,) column and line, standard deviation of both, px."""
+    """Measured image point: name, column and line (2,), standard deviation of each, px."""
 
     point: str
     place_px: np.ndarray
@@ -27,22 +27,22 @@ class ImagePoint:
 
 @dataclass(frozen=True)
 class PhotoReading:
-    """What was read in one photo.
+    """Result of the measurement of one photo.
 
     Attributes
     ----------
     photo : str
-        Its name.
-    size_px : tuple
-        (columns, lines).
+        Name of the photo.
+    size_px : tuple of int
+        Columns and lines.
     orientation : int
-        What its file says about turning it, 1: nothing; never applied.
-    targets : tuple
-        Names of the targets, before corners.
-    points : tuple
-        ImagePoints.
-    refused : tuple
-        Refused.
+        Orientation tag of the file (1: no rotation). It is not applied.
+    targets : tuple of str
+        Names of the targets, without suffixes of corners.
+    points : tuple of ImagePoint
+        Image points.
+    refused : tuple of Refused
+        Refused candidates.
     """
 
     photo: str
@@ -54,12 +54,12 @@ class PhotoReading:
 
 
 def refused_path(path):
-    """Where the list of the refused goes: image_points_refused.csv for image_points.csv."""
+    """Path of the list of refused candidates: image_points_refused.csv for image_points.csv."""
     path = Path(path)
     return path.with_name(f"{path.stem}_refused.csv")
 
 
-def _there_already():
+def _message_exists():
     return message(
         "targets_there_already",
         "already exists; expected another name, or the choice to replace it",
@@ -67,43 +67,50 @@ def _there_already():
 
 
 def check_free(path, replace, log):
-    """Tell `log` of what stands in the way of writing."""
-    for one in (Path(path), refused_path(path)):
-        if not one.parent.is_dir():
-            log.problem(one.name, message("targets_no_folder", "its folder does not exist"))
+    """Log a problem if the folder is missing, or if a file exists and `replace` is false."""
+    for file in (Path(path), refused_path(path)):
+        if not file.parent.is_dir():
+            log.problem(file.name, message("targets_no_folder", "its folder does not exist"))
             return
-        if one.exists() and not replace:
-            log.problem(one.name, _there_already())
+        if file.exists() and not replace:
+            log.problem(file.name, _message_exists())
 
 
 def write_image_points(photos, path, replace=False):
-    """Write image_points.csv and the list of the refused beside it: (2,) their paths.
+    """Write image_points.csv and the list of refused candidates.
 
     Parameters
     ----------
-    photos
-        PhotoReadings; rows in their order.
-    replace : optional
-        Whether files that are there may be overwritten.
+    photos : sequence of PhotoReading
+        Results of the photos, in the order of the rows.
+    path : path-like
+        Path of image_points.csv.
+    replace : bool, optional
+        Whether existing files may be overwritten.
+
+    Returns
+    -------
+    tuple of Path
+        Paths of both files.
 
     Raises
     ------
     InputError
-        For files that are there already, or cannot be written; then none is.
+        If a file exists or cannot be written. No file is then written.
     """
-    taken = [one.name for one in (Path(path), refused_path(path)) if one.exists()]
-    if taken and not replace:
-        expected = _there_already()
-        raise InputError([Problem(name, expected) for name in taken])
+    existing = [item.name for item in (Path(path), refused_path(path)) if item.exists()]
+    if existing and not replace:
+        expected = _message_exists()
+        raise InputError([Problem(name, expected) for name in existing])
     rows = [
-        (photo.photo, one.point, *(f"{x:.4f}" for x in one.place_px), f"{one.sd_px:.4f}")
+        (photo.photo, item.point, *(f"{x:.4f}" for x in item.place_px), f"{item.sd_px:.4f}")
         for photo in photos
-        for one in photo.points
+        for item in photo.points
     ]
-    refused = [_refused_row(photo.photo, one) for photo in photos for one in photo.refused]
+    refused = [_refused_row(photo.photo, item) for photo in photos for item in photo.refused]
     texts = {
-        refused_path(path): _text(REFUSED_HEADINGS, refused),
-        Path(path): _text(HEADINGS, rows),
+        refused_path(path): _format_csv(REFUSED_HEADINGS, refused),
+        Path(path): _format_csv(HEADINGS, rows),
     }
     drafts = {target: target.with_name(f".{target.name}.part") for target in texts}
     try:
@@ -125,15 +132,23 @@ def write_image_points(photos, path, replace=False):
     return Path(path), refused_path(path)
 
 
-def _refused_row(photo, one):
-    column, line = one.place_px
-    detail = "; ".join(f"{key} {value:.3g}" for key, value in one.detail.items())
-    number = "" if one.id is None else one.id
-    return photo, one.code, number, f"{column:.1f}", f"{line:.1f}", detail, REASONS[one.code]
+def _refused_row(photo, refused):
+    column, line = refused.place_px
+    detail = "; ".join(f"{key} {value:.3g}" for key, value in refused.detail.items())
+    number = "" if refused.id is None else refused.id
+    return (
+        photo,
+        refused.code,
+        number,
+        f"{column:.1f}",
+        f"{line:.1f}",
+        detail,
+        REASONS[refused.code],
+    )
 
 
-def _text(headings, rows):
-    """CSV; a comma within a cell is quoted, a line break cannot be there."""
+def _format_csv(headings, rows):
+    """Format rows as CSV; a cell with a comma is quoted, and no cell contains a line break."""
     stream = io.StringIO()
     write_guarded(stream, [headings, *rows])
     return stream.getvalue()

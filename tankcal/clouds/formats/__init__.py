@@ -1,4 +1,4 @@
-"""Files of scanners, a module for each format: their headers checked, their points in pieces."""
+"""File formats of scanners, one module per format: check of the header, reading of the points."""
 
 from tankcal.clouds.contents import WHOLE
 from tankcal.clouds.formats import columns, counted_text, e57, las, ply
@@ -24,25 +24,25 @@ _SHARES = {"las": las.shares, "e57": e57.shares, "ply": ply.shares, "xyz": colum
 
 
 def describe_file(file):
-    """Format and `ScanHeader`s of a `CloudFile`; InputError with the problems of its header."""
+    """Return format and scan headers of a `CloudFile`; raise InputError for an invalid header."""
     return _DESCRIBE[_kind(file)](file)
 
 
 def read_pieces(file, chunk, share=WHOLE):
-    """The records of a share of a `CloudFile` as `Piece`s of at most `chunk` of them."""
+    """Yield the records of a share of a file as `Piece` objects of at most `chunk` records."""
     read = _PIECES[_kind(file)]
     return read(file, chunk) if share == WHOLE else read(file, chunk, share)
 
 
 def share_out(file, points_each):
-    """`CloudPiece`s that make up a `CloudFile`, of about so many points where its format allows.
+    """Divide a `CloudFile` into `CloudPiece` objects of about `points_each` points.
 
-    Each record is in one of them.
+    Each record belongs to exactly one piece. A format that cannot be divided gives one piece.
     """
     kind = _kind(file)
     return _SHARES[kind](file, points_each) if kind in _SHARES else (WHOLE,)
 
 
 def _kind(file):
-    found = find_format(file)
-    return columns.find_kind(file) if found == "text" else found
+    kind = find_format(file)
+    return columns.find_kind(file) if kind == "text" else kind

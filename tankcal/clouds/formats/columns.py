@@ -1,4 +1,4 @@
-"""XYZ, ASC, TXT and CSV: rows of numbers, their separator and columns told by the first lines."""
+"""XYZ, ASC, TXT and CSV: rows of numbers; the first lines determine separator and columns."""
 
 import re
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from tankcal.clouds.formats.lines import (
 from tankcal.errors import InputError
 from tankcal.messages import message
 
-JUDGED = 50  # lines that tell separator and columns
+JUDGED = 50  # rows that determine separator and columns
 NAMES = {
     "x": "x", "east": "x", "easting": "x", "y": "y", "north": "y", "northing": "y",
     "z": "z", "height": "z", "elevation": "z",
@@ -33,7 +33,7 @@ WITH_COMMA = re.compile(rb"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def find_kind(file):
-    """ "ptx", "pts" or "xyz" of a text file; InputError where its ending says another thing."""
+    """Return "ptx", "pts" or "xyz"; raise InputError for a .ptx file of another format."""
     lines = [line for line in _first_lines(file) if line]
     if looks_as_ptx(lines):
         return "ptx"
@@ -50,7 +50,7 @@ def find_kind(file):
 
 
 def describe(file):
-    """The one scan of a file; its number of points is known where a line before them states it."""
+    """Return format and scan header, with the count if a line before the points states it."""
     _, heading, count = _find_layout(file)
     if count is not None:
         _check_count(file, heading, count)
@@ -58,27 +58,28 @@ def describe(file):
 
 
 def _check_count(file, heading, count):
-    """InputError where a file has not as many points as the line before them states."""
-    found = 0
-    for count_of in (count_lines, count_rows):  # without comments only where these matter
+    """Raise InputError if the number of points differs from the stated count."""
+    rows = 0
+    # Counting lines is fast; comments are excluded only if the fast count does not match.
+    for count_of in (count_lines, count_rows):
         with file.path.open("rb") as stream:
             lines = Lines(file, stream)
             lines.take(heading)
-            found = 0
-            while (block := lines.take(1 << 20)[0]) and found <= count:
-                found += count_of(block)
-        if found == count:
+            rows = 0
+            while (block := lines.take(1 << 20)[0]) and rows <= count:
+                rows += count_of(block)
+        if rows == count:
             return
-    raise count_mismatch(file, count, found)
+    raise count_mismatch(file, count, rows)
 
 
 def rows_about(file):
-    """About how many rows a file of text has, by those at its start."""
+    """Estimate the number of rows of a text file from its first lines."""
     return file.bytes * max(file.start.count(b"\n"), 1) / len(file.start)
 
 
 def shares(file, points_each):
-    """Ranges of bytes that end with a line, about so many rows each; the first has the heading."""
+    """Divide a file into byte ranges of whole lines; the first range contains the heading."""
     _, heading, _ = _find_layout(file)
     each = max(1, round(points_each * file.bytes / rows_about(file)))
     edges = [0]
@@ -96,12 +97,12 @@ def shares(file, points_each):
 
 
 def pieces(file, chunk, share=WHOLE):
-    """Points of a share of a file."""
+    """Yield the points of a share of a file as `Piece` objects."""
     layout, heading, _ = _find_layout(file)
     is_empty = share == WHOLE
     with file.path.open("rb") as stream:
         stream.seek(share.first)
-        lines = Lines(file, stream if share.count is None else _Part(stream, share.count))
+        lines = Lines(file, stream if share.count is None else _LimitedStream(stream, share.count))
         if heading and not share.first:
             lines.take(heading)
         while True:
@@ -110,7 +111,7 @@ def pieces(file, chunk, share=WHOLE):
                 break
             try:
                 xyz = parse_rows(file, block, row, layout)
-            except InputError:  # its row counts from the start of the file
+            except InputError:  # repeat with the row number counted from the start of the file
                 parse_rows(file, block, row + _lines_before(file, share.first), layout)
                 raise
             if len(xyz):
@@ -120,40 +121,40 @@ def pieces(file, chunk, share=WHOLE):
         raise no_points(file)
 
 
-class _Part:
-    """A stream that ends after so many bytes."""
+class _LimitedStream:
+    """Stream that ends after a given number of bytes."""
 
     def __init__(self, stream, left):
         self.stream, self.left = stream, left
 
     def read(self, size):
-        """At most so many bytes."""
-        found = self.stream.read(min(size, self.left))
-        self.left -= len(found)
-        return found
+        """Read at most `size` bytes."""
+        data = self.stream.read(min(size, self.left))
+        self.left -= len(data)
+        return data
 
 
 def _lines_before(file, place):
-    """Lines that end before a place."""
+    """Number of lines before a byte position."""
     with file.path.open("rb") as stream:
-        part, count = _Part(stream, place), 0
+        part, count = _LimitedStream(stream, place), 0
         while block := part.read(BLOCK):
             count += block.count(b"\n")
     return count
 
 
 def _first_lines(file):
-    """Whole lines from the start of a file, stripped."""
+    """Complete lines at the start of a file, without surrounding blanks."""
     start = file.start.removeprefix(b"\xef\xbb\xbf")
     if len(file.start) < file.bytes:
         start = start[: start.rfind(b"\n") + 1]
     elif b"\n" not in start and b"\r" in start.strip():
-        start = b""  # ends of lines of no system that is in use
+        start = b""  # lines end with a carriage return only, which is not supported
     return [line.strip() for line in start.split(b"\n")]
 
 
 def _find_layout(file):
-    """(`Layout` of the rows, number of the lines before them, stated number of points or None).
+    """Return layout of the rows, number of lines before them, and stated number of points or None.
 
     CloudCompare can write a line of titles, and below it a line with the number of points.
     """
@@ -165,22 +166,24 @@ def _find_layout(file):
             if count is None and _is_count(line, [*filter(None, lines[first + 1 :])], heading):
                 count = whole_number(line)
                 continue
-            return _judge(file, rows[:JUDGED], heading, first), first, count
+            return _check_layout(file, rows[:JUDGED], heading, first), first, count
         if line:
-            found = _read_heading(line.lstrip(b"#/% ") if is_comment else line, first, is_comment)
-            if found is None and not is_comment:
+            new_heading = _read_heading(
+                line.lstrip(b"#/% ") if is_comment else line, first, is_comment
+            )
+            if new_heading is None and not is_comment:
                 raise _bad_heading(file, line, first)
-            heading = found or heading
+            heading = new_heading or heading
     raise no_points(file)
 
 
 def _is_count(line, below, heading):
-    """Whether a line is the number of points: alone in it, above titles, or below them."""
+    """Whether a line contains only the number of points, above or below the titles."""
     if whole_number(line) is None or not below:
         return False
     if heading is None:
         return _read_heading(below[0].lstrip(b"#/% "), 0, False) is not None
-    row = next((one for one in below if not one.startswith(COMMENTS)), b"")
+    row = next((line_below for line_below in below if not line_below.startswith(COMMENTS)), b"")
     return len(re.split(rb"[\s;,]+", row)) >= 3
 
 
@@ -203,7 +206,7 @@ def _begins_with_number(line):
 
 @dataclass(frozen=True)
 class _Heading:
-    """A line that names x, y and z: their places among so many names, the mark between these."""
+    """Heading that names x, y and z, with their columns and the number of names."""
 
     line: bytes
     at: int
@@ -214,7 +217,7 @@ class _Heading:
 
 
 def _read_heading(line, at, is_comment):
-    """The `_Heading` of a line; None where it does not name x, y and z."""
+    """Return the `_Heading` of a line, or None if the line does not name x, y and z."""
     text = line.decode("utf-8", errors="replace").lower()
     for mark in (";", "\t", ",", None):
         if mark is not None and mark not in text:
@@ -230,8 +233,8 @@ def _read_heading(line, at, is_comment):
     return None
 
 
-def _judge(file, rows, heading, first):
-    """The `Layout` of rows of numbers."""
+def _check_layout(file, rows, heading, first):
+    """Return the `Layout` of rows of numbers, checked against the heading."""
     layout = _separated(file, rows, heading, first)
     count = len(layout.cells(rows[0]))
     if heading is not None and count != heading.names:
@@ -284,7 +287,7 @@ def _separated(file, rows, heading, first):
             raise _mixed(file, first)
         return Layout("blank", ",", columns)
     if not has_point and heading is None and len(rows[0].split(b",")) >= 6:
-        raise _mixed(file, first)  # 1,5,2,5,3,5 may be three numbers or six
+        raise _mixed(file, first)  # "1,5,2,5,3,5" may be three numbers or six
     return Layout(",", ".", columns)
 
 

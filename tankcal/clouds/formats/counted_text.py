@@ -1,8 +1,8 @@
-"""PTX and PTS: text in which a count goes before the points of each scan, several in a file.
+"""PTX and PTS: text files with a count before the points of each scan.
 
-PTX: columns, rows, the scanner's position, its three axes, and a matrix of 4 x 4 that is applied
-from the right to rows (x, y, z, 1); "0 0 0" is a direction without a return. PTS: a count, then
-its points, all in one frame.
+PTX: a scan begins with columns, rows, position and three axes of the scanner, and a 4 x 4 matrix.
+The matrix is applied from the right to rows (x, y, z, 1). "0 0 0" is a direction without a return.
+PTS: each block has a count and its points; all blocks are in one frame.
 """
 
 import numpy as np
@@ -21,22 +21,22 @@ from tankcal.clouds.formats.lines import (
 from tankcal.messages import message
 
 MOST_SCANS = 10_000
-RIGID = 1e-3  # of a rotation that is written with few digits
+RIGID = 1e-3  # tolerance of an orthonormal matrix, for rotations written with few digits
 LAYOUT = Layout()
 
 
 def describe_ptx(file):
-    """Scans of a PTX file, whose lines are counted."""
+    """Return format and scan headers of a PTX file; the lines of each scan are counted."""
     return "ptx", tuple(_describe(file, _ptx_header))
 
 
 def describe_pts(file):
-    """Blocks of a PTS file, whose lines are counted."""
+    """Return format and scan headers of a PTS file, one per block; the lines are counted."""
     return "pts", tuple(_describe(file, _pts_header))
 
 
 def ptx_pieces(file, chunk):
-    """Points of a PTX file; directions without a return are left out."""
+    """Yield the points of a PTX file, without directions that have no return."""
     for piece in _pieces(file, chunk, _ptx_header):
         x, y, z = piece.xyz.T
         has_return = (x != 0) | (y != 0) | (z != 0)
@@ -45,19 +45,19 @@ def ptx_pieces(file, chunk):
 
 
 def pts_pieces(file, chunk):
-    """Points of a PTS file."""
+    """Yield the points of a PTS file."""
     return _pieces(file, chunk, _pts_header)
 
 
 def looks_as_ptx(lines):
-    """Whether the first lines of a file (without blank ones) begin a scan of PTX."""
+    """Whether the first lines that are not blank are the header of a PTX scan."""
     counts = [whole_number(line) for line in lines[:2]]
     cells = [len(line.split()) for line in lines[2:10]]
     return None not in counts and cells == [3, 3, 3, 3, 4, 4, 4, 4]
 
 
 def looks_as_pts(lines):
-    """Whether they are a count and then rows of points."""
+    """Whether the first lines that are not blank are a count and a row of points."""
     return len(lines) > 1 and whole_number(lines[0]) is not None and len(lines[1].split()) >= 3
 
 
@@ -66,10 +66,10 @@ def _describe(file, header_of):
     with file.path.open("rb") as stream:
         lines = Lines(file, stream)
         while (scan := header_of(file, lines)) is not None:
-            _check_room(file, scan, lines.row)
-            there = skip_lines(lines, scan.declared)
-            if there < scan.declared:
-                raise _scan_mismatch(file, len(scans), scan, there)
+            _check_size(file, scan, lines.row)
+            lines_read = skip_lines(lines, scan.declared)
+            if lines_read < scan.declared:
+                raise _scan_mismatch(file, len(scans), scan, lines_read)
             scans.append(scan)
             if len(scans) > MOST_SCANS:
                 raise file.refusal(
@@ -84,7 +84,7 @@ def _describe(file, header_of):
     return scans
 
 
-def _check_room(file, scan, row):
+def _check_size(file, scan, row):
     if scan.declared * LEAST_ROW > file.bytes + LEAST_ROW:
         raise file.refusal(
             message(
@@ -98,9 +98,9 @@ def _check_room(file, scan, row):
         )
 
 
-def _scan_mismatch(file, number, scan, there):
+def _scan_mismatch(file, number, scan, points_read):
     return (
-        count_mismatch(file, scan.declared, there)
+        count_mismatch(file, scan.declared, points_read)
         if number == 0
         else file.refusal(
             message(
@@ -109,7 +109,7 @@ def _scan_mismatch(file, number, scan, there):
                 "number: is the file cut or damaged?",
                 number=number + 1,
                 declared=scan.declared,
-                found=there,
+                found=points_read,
             )
         )
     )
@@ -131,7 +131,7 @@ def _pieces(file, chunk, header_of):
 
 
 def _ptx_header(file, lines):
-    """The `ScanHeader` that stands next; None at the end of the file."""
+    """Read the next `ScanHeader`; None at the end of the file."""
     columns = lines.next_line()
     if columns is None:
         return None
@@ -161,13 +161,14 @@ def _ptx_header(file, lines):
 
 
 def _numbers(line, wanted):
-    """So many finite numbers of a line; None where it holds another thing."""
+    """Read `wanted` finite numbers from a line; None if the line has other contents."""
     cells = [] if line is None else LAYOUT.cells(line)
     numbers = [LAYOUT.number(cell) for cell in cells]
     return None if len(numbers) != wanted or None in numbers else numbers
 
 
 def _is_rigid(pose):
+    # A rotation is orthonormal with a positive determinant.
     turn = pose[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):
         error = np.abs(turn @ turn.T - np.eye(3)).max()

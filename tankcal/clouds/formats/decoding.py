@@ -1,6 +1,7 @@
-"""What runs in the child: LAZ by lazrs and E57 by libe57, under limits, a frame for each chunk.
+"""Decoder that runs in a child process: LAZ by lazrs and E57 by libe57, one frame per chunk.
 
-It stands apart from the checks: here nothing is judged, and whatever fails is said in one frame.
+Memory and processor time are limited. This module checks nothing; a failure is reported in one
+frame.
 """
 
 import contextlib
@@ -9,17 +10,18 @@ import struct
 
 HEAD = struct.Struct("<BIQQ")  # kind, scan, records read, bytes that follow
 DATA, DONE, FAILURE = 1, 2, 3
-MEMORY = "memory"  # the reason of a failure that asked for too much
-MEMORY_LIMIT = 3 << 30  # bytes of address space
-LEAST_CPU_S, CPU_S_OF_MILLION = 4, 30  # of processor for one chunk: some forty times what it takes
-OUT_OF_TIME = (24,)  # SIGXCPU
-LONGEST_REASON = 160
+MEMORY = "memory"  # reason of a failure by lack of memory
+MEMORY_LIMIT = 3 << 30  # largest address space of the child, bytes
+# Processor time for one chunk, s: at least, and per million points (about 40 times the usual time)
+LEAST_CPU_S, CPU_S_OF_MILLION = 4, 30
+OUT_OF_TIME = (24,)  # signals of exhausted processor time: SIGXCPU
+LONGEST_REASON = 160  # letters of a reason that are sent
 
 
 def main(request):
     """Write the frames of a request (see `isolation`) to the standard output."""
     out = os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)  # what a library prints is no frame
+    os.dup2(2, 1)  # output that a library prints must not mix with the frames
     try:
         _limit_memory()
         for scan, read, data in {"laz": laz_chunks, "e57": e57_chunks}[request["kind"]](request):
@@ -27,9 +29,9 @@ def main(request):
         _send(out, DONE)
     except MemoryError:
         _send(out, FAILURE, data=MEMORY.encode())
-    except BrokenPipeError:  # the parent wants no more
+    except BrokenPipeError:  # the parent has stopped reading
         pass
-    except BaseException as error:  # a panic of Rust is no Exception
+    except BaseException as error:  # a panic of Rust is not derived from Exception
         words = next(iter(f"{error}".strip().splitlines()), type(error).__name__)
         shown = "".join(c if c.isprintable() else "?" for c in words)[:LONGEST_REASON]
         _send(out, FAILURE, data=shown.encode())
@@ -38,6 +40,7 @@ def main(request):
 
 
 def _send(out, kind, scan=0, read=0, data=b""):
+    # An unbuffered write may write only a part of the bytes.
     view = memoryview(data).cast("B")
     for part in (memoryview(HEAD.pack(kind, scan, read, len(view))), view):
         done = 0
@@ -53,7 +56,7 @@ def _limit_memory():
 
 
 def _allow_time(points):
-    """So much time of processor for the next chunk; the system ends what takes more."""
+    """Set the limit of processor time for the next chunk; the system ends a slower process."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource
 
@@ -64,7 +67,7 @@ def _allow_time(points):
 
 
 def laz_chunks(request):
-    """(0, points, int32 (points, 3)) of a LAZ file."""
+    """Yield (0, number of points, int32 coordinates (points, 3)) of a LAZ file."""
     _allow_time(0)
     import lazrs
     import numpy as np
@@ -91,24 +94,24 @@ def laz_chunks(request):
 
 
 def e57_chunks(request):
-    """(scan, records, coordinates (3, points)) of an E57 file, without points of no return."""
+    """Yield (scan, records, coordinates (3, points)) of an E57 file, without invalid points."""
     _allow_time(0)
     import numpy as np
     from pye57 import libe57
 
     image = libe57.ImageFile(request["path"], "r")
     scans = image.root()["data3D"]
-    for number, asked in enumerate(request["scans"]):
-        if not asked["count"]:
+    for number, wanted in enumerate(request["scans"]):
+        if not wanted["count"]:
             continue
         points = scans[number]["points"]
-        # a scan of few points may be read with small buffers
-        size = min(request["chunk"], asked["count"])
-        columns = np.zeros((3, size), asked["type"])
+        # A scan of few points needs small buffers only.
+        size = min(request["chunk"], wanted["count"])
+        columns = np.zeros((3, size), wanted["type"])
         state = np.zeros(size, np.int8)
         buffers = libe57.VectorSourceDestBuffer()
-        fields = [*zip(asked["fields"], columns, strict=True)]
-        fields += [(asked["state"], state)] if asked["state"] else []
+        fields = [*zip(wanted["fields"], columns, strict=True)]
+        fields += [(wanted["state"], state)] if wanted["state"] else []
         for name, array in fields:
             buffers.append(libe57.SourceDestBuffer(image, name, array, size, True, True))
         reader = points.reader(buffers)
@@ -117,18 +120,18 @@ def e57_chunks(request):
             read = reader.read()
             if not read:
                 break
-            found = columns[:, :read]
-            if asked["state"] and state[:read].any():
-                found = found[:, state[:read] == 0]
-            if asked["is_spherical"]:
-                found = _cartesian(found)
-            yield number, read, np.ascontiguousarray(found)
+            coordinates = columns[:, :read]
+            if wanted["state"] and state[:read].any():
+                coordinates = coordinates[:, state[:read] == 0]
+            if wanted["is_spherical"]:
+                coordinates = _cartesian(coordinates)
+            yield number, read, np.ascontiguousarray(coordinates)
         reader.close()
     image.close()
 
 
 def _cartesian(columns):
-    """x, y, z of range, azimuth from +x and elevation, rad, each of shape (n,)."""
+    """Convert range, azimuth from +x and elevation (rad), each of shape (n,), to x, y, z."""
     import numpy as np
 
     distance, azimuth, elevation = columns

@@ -1,4 +1,4 @@
-"""E57 (ASTM E2807): header and XML checked here, points by libe57 in a child."""
+"""E57 (ASTM E2807): check of header and XML; libe57 reads the points in a child process."""
 
 import math
 import struct
@@ -13,18 +13,18 @@ from tankcal.clouds.formats.isolation import decoded_frames
 from tankcal.messages import message
 
 HEADER = struct.Struct("<8sIIQQQQ")  # signature, version, length, place and length of XML, page
-PAGE, DATA = 1024, 1020  # bytes of a page, and of it what is no checksum
-LONGEST_XML = 1 << 26
-SECTION = struct.Struct("<B7xQQQ")  # of points: id, length, places of data and of index
+PAGE, DATA = 1024, 1020  # bytes of a page, and bytes of a page without its checksum
+LONGEST_XML = 1 << 26  # bytes
+SECTION = struct.Struct("<B7xQQQ")  # section of points: id, length, places of data and of index
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
-LARGEST = 1 << 63
-UNIT_QUATERNION = 1e-3  # from 1, of the length of a quaternion
+LARGEST = 1 << 63  # bound of an integer field without a declared range
+UNIT_QUATERNION = 1e-3  # tolerance of the length of a quaternion, from 1
 
 
 @dataclass
 class _Scan:
-    """One Data3D: what is needed to read it, and what is wrong with it."""
+    """One Data3D node: header, fields to read (`state` marks invalid points), and problems."""
 
     header: ScanHeader
     fields: tuple[str, ...] = ()
@@ -34,20 +34,20 @@ class _Scan:
 
 
 def describe(file):
-    """The scans of a file; InputError with every problem of its XML."""
+    """Return format and scans of a file; raise InputError with all problems of its XML."""
     scans = read_scans(file)
     return "e57", tuple(scan.header for scan in scans)
 
 
 def shares(file, points_each):
-    """A scan each: libe57 cannot begin within one."""
+    """Divide a file into one piece per scan; libe57 cannot begin within a scan."""
     return tuple(
         CloudPiece(number) for number, scan in enumerate(read_scans(file)) if scan.header.declared
     )
 
 
 def pieces(file, chunk, share=WHOLE):
-    """The points of a share of a file as `Piece`s."""
+    """Yield the points of a share of a file as `Piece` objects."""
     scans = read_scans(file)
     request = {
         "kind": "e57",
@@ -70,7 +70,7 @@ def pieces(file, chunk, share=WHOLE):
 
 
 def read_scans(file):
-    """A `_Scan` of each Data3D, all of them sound."""
+    """Read a `_Scan` from each Data3D node; raise InputError if any node is invalid."""
     root = parse_xml(file, _xml_of(file))
     nodes = root.child("data3D").children
     scans = [_scan_of(file, number, node) for number, node in enumerate(nodes, start=1)]
@@ -84,7 +84,7 @@ def read_scans(file):
 
 
 def _xml_of(file):
-    """The bytes of the XML, its checksums left out; InputError for a header that is not sound."""
+    """Read the XML without its checksums; raise InputError for an invalid header."""
     if len(file.start) < HEADER.size:
         header = message("cloud_file_e57_header", "the header")
         raise file.refusal(cut_short(file, header, HEADER.size, file.bytes))
@@ -129,11 +129,12 @@ def _xml_of(file):
 
 
 def _logical(place):
+    # Logical places do not count the checksums at the end of each page.
     return place // PAGE * DATA + place % PAGE
 
 
 def _read_logical(file, first, size):
-    """Bytes from a logical place on, pages without their checksums."""
+    """Read `size` bytes from a logical place, without the checksums of the pages."""
     page = first // DATA
     with file.path.open("rb") as stream:
         stream.seek(page * PAGE)
@@ -143,11 +144,11 @@ def _read_logical(file, first, size):
 
 
 def _scan_of(file, number, node):
-    """The `_Scan` of a node of data3D."""
+    """Create the `_Scan` of a Data3D node."""
     points = node.child("points")
     prototype, problems = points.child("prototype"), []
     count = points.whole("recordCount", -1)
-    names = {one.name: one for one in prototype.children}
+    names = {child.name: child for child in prototype.children}
     is_cartesian = {*CARTESIAN} <= {*names}
     fields = CARTESIAN if is_cartesian else SPHERICAL
     state = "cartesianInvalidState" if is_cartesian else "sphericalInvalidState"
@@ -177,13 +178,13 @@ def _scan_of(file, number, node):
 
 
 def _bits(node):
-    """Bits of one record of a field, as the standard packs it."""
+    """Number of bits of a field in one record, packed according to the standard."""
     if node.kind == "Float":
         return 32 if node.is_single else 64
     if node.kind in ("Integer", "ScaledInteger"):
         low, high = node.whole("minimum", -LARGEST), node.whole("maximum", LARGEST - 1)
         return max(high - low, 0).bit_length()
-    return 8  # a text: its length at least
+    return 8  # a text has at least its length
 
 
 def _count_problems(file, number, points, count, bits):
@@ -235,22 +236,23 @@ def _field_problems(number, nodes):
 
 
 def _pose(number, node, problems):
-    """(4, 4) of the rotation (a quaternion w, x, y, z) and translation; None: no pose.
+    """Pose (4, 4) from the quaternion (w, x, y, z) and the translation of a scan.
 
-    The rotation is zero for a quaternion of zeros.
+    None without a pose or for an invalid pose, whose problem is appended to `problems`. The
+    rotation is a zero matrix for a quaternion of zeros.
     """
     pose = node.find("pose")
     if pose is None:
         return None
-    turn, shift = pose.find("rotation"), pose.find("translation")
-    w, x, y, z = (turn.number_of(name) for name in "wxyz") if turn else (1.0, 0.0, 0.0, 0.0)
-    found = np.eye(4)
-    found[:3, 3] = [shift.number_of(name) for name in "xyz"] if shift else 0.0
-    if w == x == y == z == 0 and np.isfinite(found).all():
-        found[:3, :3] = 0.0
-        return found
+    rotation, translation = pose.find("rotation"), pose.find("translation")
+    w, x, y, z = (rotation.number_of(name) for name in "wxyz") if rotation else (1.0, 0.0, 0.0, 0.0)
+    pose_matrix = np.eye(4)
+    pose_matrix[:3, 3] = [translation.number_of(name) for name in "xyz"] if translation else 0.0
+    if w == x == y == z == 0 and np.isfinite(pose_matrix).all():
+        pose_matrix[:3, :3] = 0.0
+        return pose_matrix
     length = math.sqrt(w * w + x * x + y * y + z * z) if max(map(abs, (w, x, y, z))) < 2 else 0.0
-    if not (abs(length - 1) <= UNIT_QUATERNION and np.isfinite(found).all()):
+    if not (abs(length - 1) <= UNIT_QUATERNION and np.isfinite(pose_matrix).all()):
         problems.append(
             message(
                 "cloud_file_e57_pose",
@@ -261,18 +263,19 @@ def _pose(number, node, problems):
         )
         return None
     w, x, y, z = (value / length for value in (w, x, y, z))
-    found[:3, :3] = [
+    pose_matrix[:3, :3] = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return found
+    return pose_matrix
 
 
 def _no_rotation(number):
-    """Warning about a quaternion of zeros, which some programs write where they have no rotation.
+    """Create the warning about a quaternion of zeros, which some programs write for no rotation.
 
-    Older versions of libE57Format and pye57 do so; CloudCompare reads such a file without its pose.
+    Older versions of libE57Format and pye57 write it. CloudCompare reads such a file without its
+    pose.
     """
     return message(
         "cloud_file_e57_zero_pose",

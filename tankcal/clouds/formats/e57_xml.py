@@ -1,4 +1,4 @@
-"""The XML of an E57 file as a tree of few kinds of nodes; what would stop a parser is refused."""
+"""XML of an E57 file as a tree of nodes, with limits against harmful input."""
 
 import math
 import re
@@ -7,9 +7,9 @@ from xml.parsers import expat
 
 from tankcal.messages import message
 
-DEEPEST = 40  # elements in each other; scanners write about ten
-MOST_ELEMENTS = 200_000
-LONGEST_TEXT = 1000  # letters that are kept of the text of an element
+DEEPEST = 40  # largest depth of nested elements; files of scanners have about ten
+MOST_ELEMENTS = 200_000  # largest number of elements
+LONGEST_TEXT = 1000  # letters kept from the text of an element
 NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
 
 
@@ -24,34 +24,34 @@ class Node:
 
     @property
     def kind(self):
-        """Its type, such as "Float"."""
+        """Type of the element, such as "Float"."""
         return self.attributes.get("type", "")
 
     @property
     def is_single(self):
-        """Whether it is a number of 32 bits."""
+        """Whether the element is a 32-bit float."""
         return self.kind == "Float" and self.attributes.get("precision") == "single"
 
     def find(self, name):
-        """The child of a name; None: there is none."""
-        return next((one for one in self.children if one.name == name), None)
+        """First child of that name, or None."""
+        return next((child for child in self.children if child.name == name), None)
 
     def child(self, name):
-        """The same; without one an empty node."""
+        """First child of that name, or an empty node."""
         return self.find(name) or Node(name, {})
 
     def whole(self, attribute, default):
-        """An attribute as int; the default where it is left out, or no whole number."""
+        """Attribute as int; the default if it is missing or not a whole number."""
         text = self.attributes.get(attribute, "").strip()
         return int(text) if re.fullmatch(r"[+-]?\d{1,20}", text) else default
 
     def real(self, attribute, default):
-        """An attribute as float, nan where it is no number."""
+        """Attribute as float; the default if it is missing, nan if it is not a number."""
         text = self.attributes.get(attribute)
         return default if text is None else _real(text)
 
     def number_of(self, name):
-        """The number of a child, 0 where it is left out or empty, nan where it is none."""
+        """Number in a child; 0 if it is missing or empty, nan if it is not a number."""
         text = self.child(name).text.strip()
         return _real(text) if text else 0.0
 
@@ -62,7 +62,7 @@ def _real(text):
 
 
 def parse_xml(file, data):
-    """The root `Node`; InputError for XML that is not well formed, or built to harm."""
+    """Parse the XML to its root `Node`; raise InputError for malformed or harmful XML."""
     builder = _Builder(file)
     parser = expat.ParserCreate()
     parser.buffer_text = True

@@ -1,4 +1,4 @@
-"""The file of a cloud: opened with care, its format by signature first, then by ending."""
+"""Opening of a scanner file, and its format from the signature or the file extension."""
 
 import importlib.util
 import stat
@@ -14,21 +14,22 @@ from tankcal.version import install_command
 
 TEXT_ENDINGS = (".ptx", ".pts", ".xyz", ".asc", ".txt", ".csv")
 ENDINGS = (".las", ".laz", ".e57", ".ply", *TEXT_ENDINGS)
-SNIFFED = 1 << 16  # bytes from the start of a file that tell its format
-EXTENT_LIMIT = 1e7  # units of the file: more is damage, or no cloud of a tank
+SNIFFED = 1 << 16  # bytes at the start of a file that are read to determine its format
+EXTENT_LIMIT = 1e7  # largest extent of a cloud, in units of the file; a larger one is damage
 
 
 @dataclass(frozen=True)
 class CloudFile:
-    """A regular file with something in it.
+    """Regular file that is not empty.
 
     Attributes
     ----------
     path : Path
+        Path of the file.
     bytes : int
-        Its size.
+        Size of the file.
     start : bytes
-        At most the first `SNIFFED` of it.
+        The first bytes of the file, at most `SNIFFED`.
     """
 
     path: Path
@@ -37,30 +38,32 @@ class CloudFile:
 
     @property
     def name(self):
-        """As messages name it."""
+        """Name of the file in messages."""
         return self.path.name
 
     @property
     def ending(self):
-        """In small letters, with its point."""
+        """File extension in lower case, with its point."""
         return self.path.suffix.lower()
 
     def refusal(self, *texts, row=None):
-        """The InputError of what is wrong with the file."""
+        """Create an InputError with one problem per text."""
         return InputError([Problem(self.name, text, row) for text in texts])
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Some records of one scan as their format gives them.
+    """Some records of one scan.
 
     Attributes
     ----------
     scan : int
+        Index of the scan in its file.
     xyz : ndarray, shape (n, 3)
-        In the unit of the file, each column contiguous; float32 where the file has no more.
+        Coordinates in the unit of the file, each column contiguous; float32 if the file contains
+        float32.
     read : int
-        Records read for it, n and those without a return.
+        Number of records read: n, plus the records without a return.
     """
 
     scan: int
@@ -69,14 +72,14 @@ class Piece:
 
 
 def ranges_of(count, each):
-    """`CloudPiece`s of so many records each, the last of what is left."""
+    """Divide `count` records into pieces of `each` records; the last may be shorter."""
     return tuple(
         CloudPiece(None, first, min(each, count - first)) for first in range(0, count, each)
     )
 
 
 def open_cloud(path):
-    """The `CloudFile` at a path; InputError where there is none that can be read."""
+    """Open a path as a `CloudFile`; raise InputError if it is not a readable, non-empty file."""
     path = Path(path)
     try:
         status = path.stat()
@@ -98,10 +101,10 @@ def open_cloud(path):
 
 
 def find_format(file):
-    """ "las" (of "laz", too), "e57", "ply", or "text"; InputError for a file of another kind."""
-    for signature, found in ((b"LASF", "las"), (b"ASTM-E57", "e57"), (b"ply", "ply")):
+    """Return "las" (LAS and LAZ), "e57", "ply" or "text"; raise InputError for other files."""
+    for signature, kind in ((b"LASF", "las"), (b"ASTM-E57", "e57"), (b"ply", "ply")):
         if file.start.startswith(signature):
-            return found
+            return kind
     start = file.start
     if start.startswith((b"\xff\xfe", b"\xfe\xff")):
         wide = message(
@@ -120,7 +123,7 @@ def find_format(file):
 
 
 def require_library(file, module):
-    """InputError where a library of the extra `tankcal[clouds]` is missing."""
+    """Raise InputError if a library of the extra `tankcal[clouds]` is missing."""
     if importlib.util.find_spec(module) is None:
         missing = message(
             "cloud_file_no_library",
@@ -132,7 +135,7 @@ def require_library(file, module):
 
 
 def count_mismatch(file, declared, found):
-    """The refusal of a file that holds fewer or more points than it says."""
+    """Create the InputError for a file whose number of points differs from the declared number."""
     return file.refusal(
         message(
             "cloud_file_count",
@@ -145,7 +148,7 @@ def count_mismatch(file, declared, found):
 
 
 def cut_short(file, what, needed, there):
-    """The text of a part that a file of this size cannot hold."""
+    """Create the message for a part of the file that ends beyond the end of the file."""
     return message(
         "cloud_file_short",
         "{what} ends at byte {needed} of a file of {there} bytes: is it cut or damaged?",
@@ -156,5 +159,5 @@ def cut_short(file, what, needed, there):
 
 
 def no_points(file):
-    """The refusal of a file without any point."""
+    """Create the InputError for a file without points."""
     return file.refusal(message("cloud_file_no_points", "holds no points"))

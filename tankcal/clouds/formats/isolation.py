@@ -1,8 +1,8 @@
-"""Libraries of compressed files at work in a child: what kills the child, the parent survives.
+"""Decoding of compressed files in a child process, so that a crash does not end the parent.
 
-The child (`decoding`) writes frames to its standard output: a head of kind, scan, records read and
-bytes, then the bytes of coordinates. It limits its own memory and time of processor; the parent
-ends it when it gives nothing for long.
+The child (`decoding`) writes frames to its standard output. A frame has a head (kind, scan, records
+read, bytes) and the bytes of the coordinates. The child limits its own memory and processor time.
+The parent ends a child that sends no frame for a long time.
 """
 
 import contextlib
@@ -19,9 +19,9 @@ import numpy as np
 from tankcal.clouds.formats.decoding import DONE, FAILURE, HEAD, MEMORY, OUT_OF_TIME
 from tankcal.messages import message
 
-SILENT_S = 60  # the most that a child may take for a chunk, by the clock
-PIPE_BYTES = 1 << 20
-F_SETPIPE_SZ = 1031  # of Linux: the size of a pipe
+SILENT_S = 60  # longest time that a child may take for a chunk, s
+PIPE_BYTES = 1 << 20  # size of the pipe from the child
+F_SETPIPE_SZ = 1031  # fcntl command of Linux that sets the size of a pipe
 CODE = (
     "import json, sys; request = json.loads(sys.argv[1]); sys.path[:] = request['sys_path']; "
     "from tankcal.clouds.formats.decoding import main; main(request)"
@@ -30,7 +30,7 @@ CODE = (
 
 @dataclass(frozen=True)
 class Frame:
-    """Some records of a scan: `data` is uint8, as the child laid it out, of `read` records."""
+    """Some records of a scan: `data` contains the bytes (uint8) of `read` records."""
 
     scan: int
     read: int
@@ -38,7 +38,7 @@ class Frame:
 
 
 def decoded_frames(file, request):
-    """Frames that a child makes of a file; InputError where it cannot, or dies, or hangs."""
+    """Yield the frames of a file from a child; raise InputError if the child fails or hangs."""
     request = {**request, "sys_path": sys.path}
     child = subprocess.Popen(
         [sys.executable, "-c", CODE, json.dumps(request)],
@@ -60,7 +60,7 @@ def decoded_frames(file, request):
 
 
 def _next_frame(file, child, watch):
-    """The next `Frame`, None at the end; InputError for whatever else ends a child."""
+    """Read the next `Frame`, None at the end; raise InputError if the child ended early."""
     with watch.waiting():
         head = _read_exactly(child.stdout, HEAD.size)
         data = None
@@ -75,14 +75,14 @@ def _next_frame(file, child, watch):
 
 
 def _read_exactly(stream, size):
-    """So many bytes as an array of uint8; None where the stream ends before."""
+    """Read `size` bytes as an array of uint8; None if the stream ends before."""
     data = np.empty(size, np.uint8)
     view, done = memoryview(data), 0
     while done < size:
-        got = stream.readinto(view[done:])
-        if not got:
+        count = stream.readinto(view[done:])
+        if not count:
             return None
-        done += got
+        done += count
     return data
 
 
@@ -94,7 +94,7 @@ def _widen(stream):
 
 
 class _Watch:
-    """Ends a child that gives nothing while it is waited for."""
+    """Thread that ends a child if it sends nothing for SILENT_S while the parent waits."""
 
     def __init__(self, child):
         self.child, self.since, self.ended_it = child, None, False
@@ -103,7 +103,7 @@ class _Watch:
 
     @contextlib.contextmanager
     def waiting(self):
-        """While the child is waited for."""
+        """Context in which the parent waits for the child."""
         self.since = time.monotonic()
         try:
             yield
@@ -111,7 +111,7 @@ class _Watch:
             self.since = None
 
     def stop(self):
-        """No watch any more."""
+        """Stop the thread."""
         self._over.set()
 
     def _run(self):
@@ -124,7 +124,7 @@ class _Watch:
 
 
 def _death(file, child, watch):
-    """Why a child ended without a word."""
+    """Create the InputError for a child that ended without a failure frame."""
     status = child.wait()
     if watch.ended_it or -status in OUT_OF_TIME:
         text = message(
@@ -146,7 +146,7 @@ def _death(file, child, watch):
 
 
 def _failure(file, reason):
-    """What the child said of the file."""
+    """Create the InputError for a failure that the child reported."""
     if reason == MEMORY:
         return file.refusal(
             message(

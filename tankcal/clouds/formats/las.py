@@ -1,7 +1,7 @@
-"""LAS and LAZ: the header checked byte by byte, records of LAS read here, of LAZ in a child.
+"""LAS and LAZ: check of the header; LAS records are read here, LAZ records in a child process.
 
-The layout is that of the LAS specification 1.4 R15 (ASPRS), little-endian; that of the LASzip
-record and of the chunk table is of the LASzip library.
+The layout follows the LAS specification 1.4 R15 (ASPRS), little-endian. The layout of the LASzip
+record and of the chunk table follows the LASzip library.
 """
 
 import struct
@@ -22,18 +22,34 @@ from tankcal.clouds.formats.files import (
 from tankcal.clouds.formats.isolation import decoded_frames
 from tankcal.messages import message
 
-LEAST_HEADER = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375}  # bytes, by the minor version
-LEAST_RECORD = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # bytes, by the point format
-VLR, EVLR = 54, 60  # least bytes of a variable length record
-LASZIP_ID = 22204
-FARTHEST = 1e11  # an offset: 1e8 m in mm
+LEAST_HEADER = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375}  # least size in bytes, by minor version
+LEAST_RECORD = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # least bytes, by point format
+VLR, EVLR = 54, 60  # least bytes of a variable length record, and of an extended record
+LASZIP_ID = 22204  # record ID of the LASzip record
+FARTHEST = 1e11  # largest offset in units of the file: 1e8 m in mm
 ONE_STREAM = 1  # compressor of LASzip 1: all points in one stream, without chunks
-VARIABLE = 0xFFFFFFFF  # the size of a chunk that the chunk table tells
+VARIABLE = 0xFFFFFFFF  # chunk size that marks chunks of variable size
 
 
 @dataclass(frozen=True)
 class LasHeader:
-    """What reading needs of a sound header; shapes (3,) in the unit of the file."""
+    """Values of a valid header that are needed to read the points.
+
+    Attributes
+    ----------
+    count : int
+        Number of points.
+    first : int
+        Byte at which the points begin.
+    record : int
+        Size of a record, bytes.
+    scale, offset : ndarray, shape (3,)
+        Scale factors and offsets of the integer coordinates, in the unit of the file.
+    low, high : ndarray, shape (3,)
+        Smallest and largest coordinates, in the unit of the file.
+    laszip : bytes or None
+        LASzip record of a LAZ file, or None for a LAS file.
+    """
 
     count: int
     first: int
@@ -51,13 +67,13 @@ class LasHeader:
 
 
 def describe(file):
-    """Format and scans of a file; InputError with every problem of its header."""
+    """Return format and scans of a file; raise InputError with all problems of its header."""
     header = read_header(file)
     return header.format, (ScanHeader("", header.count),)
 
 
 def shares(file, points_each):
-    """Ranges of points; of LAZ they begin with its chunks, for these alone can be sought."""
+    """Divide the points into ranges; ranges of LAZ begin at chunks, the only seekable places."""
     header = read_header(file)
     if header.laszip is None:
         return ranges_of(header.count, points_each)
@@ -68,14 +84,14 @@ def shares(file, points_each):
 
 
 def pieces(file, chunk, share=WHOLE):
-    """The points of a share of a file as `Piece`s."""
+    """Yield the points of a share of a file as `Piece` objects."""
     header = read_header(file)
     first = share.first
     count = header.count - first if share.count is None else share.count
     box = _Box(file, header, first)
     blocks = _las_blocks if header.laszip is None else _laz_blocks
     for integers in blocks(file, header, chunk, first, count):
-        columns = np.empty((3, len(integers)))  # contiguous: several times as fast as rows
+        columns = np.empty((3, len(integers)))  # contiguous columns are several times faster
         for i, column in enumerate(columns):
             np.multiply(integers[:, i], header.scale[i], out=column)
             column += header.offset[i]
@@ -84,7 +100,7 @@ def pieces(file, chunk, share=WHOLE):
 
 
 def read_header(file):
-    """The `LasHeader` of a file, checked against its size; InputError with every problem."""
+    """Read the `LasHeader` and check it against the file; raise InputError with all problems."""
     start = file.start
     minor = start[25] if len(start) > 25 else 0
     least = LEAST_HEADER.get(minor)
@@ -125,7 +141,7 @@ def read_header(file):
 
 
 class _Parts:
-    """The numbers of a header, as they stand."""
+    """Unchecked numbers of a header."""
 
     def __init__(self, start, minor):
         def at(place, form):
@@ -146,7 +162,7 @@ class _Parts:
 
 
 def _layout_problems(file, parts, least):
-    """Texts of sizes that do not fit into the file, or into each other."""
+    """Yield messages about sizes that are inconsistent with the file or with each other."""
     if not least <= parts.size <= file.bytes:
         yield message(
             "cloud_file_las_size",
@@ -205,8 +221,8 @@ def _layout_problems(file, parts, least):
 
 
 def _number_problems(parts):
-    """Texts of a scale, an offset or a box that is no such thing."""
-    if not np.all((parts.scale > 0) & (parts.scale <= 1)):  # nan, too
+    """Yield messages about an invalid scale, offset or bounding box."""
+    if not np.all((parts.scale > 0) & (parts.scale <= 1)):  # also true for nan
         yield message(
             "cloud_file_las_scale",
             "scale factors {found}; expected three numbers above 0, at most 1",
@@ -237,7 +253,10 @@ def _written(numbers):
 
 
 def _check_what_follows(file, parts):
-    """A count that is too small leaves whole records that nothing accounts for."""
+    """Raise InputError if the points do not fill the space up to the next part of the file.
+
+    A count that is too small leaves complete records unread.
+    """
     end = parts.first + parts.count * parts.record
     stop = parts.evlr_start if parts.evlrs else file.bytes
     if stop < end or (stop - end >= parts.record and not parts.waveforms):
@@ -247,10 +266,10 @@ def _check_what_follows(file, parts):
 
 
 def _laszip_record(file, parts):
-    """The bytes of the LASzip record, found among the records before the points."""
+    """Read the LASzip record from the variable length records before the points."""
     with file.path.open("rb") as stream:
         place = parts.size
-        for _ in range(parts.vlrs):  # so many have room, as was checked
+        for _ in range(parts.vlrs):  # the number was checked against the space before the points
             stream.seek(place)
             head = stream.read(VLR)
             if len(head) < VLR:
@@ -271,7 +290,7 @@ def _laszip_record(file, parts):
 
 
 def _check_laszip(file, parts, data):
-    """Items of the record add up to a point, chunks have a size."""
+    """Raise InputError if the LASzip record does not describe a point or has no chunk size."""
     is_sound = len(data) >= 34
     if is_sound:
         compressor, coder, major, minor = struct.unpack_from("<HHBB", data)
@@ -304,9 +323,10 @@ def _check_laszip(file, parts, data):
 
 
 def _with_chunk_size(data, count):
-    """The LASzip record for lazrs: one stream of points, as LASzip 1 writes it, has no chunk size.
+    """Set a chunk size that lazrs accepts in the LASzip record of a single stream.
 
-    LASzip 1.2 leaves 0 or the value for variable sizes there; lazrs takes any other number.
+    A single stream of LASzip 1 has no chunk size. LASzip 1.2 writes 0 or the value for variable
+    sizes, both of which lazrs refuses. lazrs accepts any other number.
     """
     if _chunks_in(data)[0] != ONE_STREAM:
         return data
@@ -314,12 +334,12 @@ def _with_chunk_size(data, count):
 
 
 def _chunks_in(data):
-    """The compressor of a LASzip record, and the points of its chunks."""
+    """Return the compressor of a LASzip record and the number of points in a chunk."""
     return struct.unpack_from("<H", data)[0], struct.unpack_from("<I", data, 12)[0]
 
 
 def _check_chunk_table(file, parts, data):
-    """The table lies in the file, and has as many chunks as points and bytes have room for."""
+    """Raise InputError if the chunk table is outside the file or its size is implausible."""
     compressor, size = _chunks_in(data)
     if compressor == ONE_STREAM:
         return
@@ -340,7 +360,7 @@ def _check_chunk_table(file, parts, data):
                 size=file.bytes,
             )
         )
-    room = (place - parts.first - 8) // parts.record  # each chunk begins with a whole point
+    room = (place - parts.first - 8) // parts.record  # each chunk begins with an uncompressed point
     least, most = (0, min(parts.count, room)) if size == VARIABLE else _chunks_of(parts.count, size)
     if version != 0 or not least <= chunks <= min(most, room, file.bytes - place - 8 + least):
         raise file.refusal(
@@ -357,30 +377,33 @@ def _check_chunk_table(file, parts, data):
 
 
 def _chunks_of(count, size):
-    """Fewest and most chunks of one size; some writers end with an empty one."""
+    """Least and largest number of chunks of one size; some programs add an empty last chunk."""
     full = -(-count // size)
     return full, full + 1
 
 
 class _Box:
-    """Points lie in the box of their header; a changed scale or offset moves them out."""
+    """Check that points lie in the bounding box of the header.
+
+    A damaged scale or offset moves the points out of the box.
+    """
 
     def __init__(self, file, header, done):
         self.file, self.done = file, done
         slack = (
             10 * header.scale
             + 1e-9 * np.maximum(np.abs(header.low), np.abs(header.high))
-            + 1e-3 * (header.high - header.low)  # some writers round the box
+            + 1e-3 * (header.high - header.low)  # some programs round the box
         )
         self.low, self.high = header.low - slack, header.high + slack
-        self.is_blank = not (header.low.any() or header.high.any())  # some leave zeros
+        self.is_blank = not (header.low.any() or header.high.any())  # some programs write zeros
 
     def check(self, xyz):
-        """InputError for a point outside."""
+        """Raise InputError for a point outside the box."""
         is_inside = np.all(xyz.min(axis=0) >= self.low) and np.all(xyz.max(axis=0) <= self.high)
         if not (self.is_blank or is_inside):
-            out = ((xyz < self.low) | (xyz > self.high)).any(axis=1)
-            i = int(np.flatnonzero(out)[0])
+            outside = ((xyz < self.low) | (xyz > self.high)).any(axis=1)
+            i = int(np.flatnonzero(outside)[0])
             raise self.file.refusal(
                 message(
                     "cloud_file_las_outside",
@@ -401,10 +424,10 @@ def _las_blocks(file, header, chunk, first, count):
         stream.seek(header.first + first * header.record)
         for done in range(0, count, chunk):
             wanted = min(chunk, count - done)
-            found = np.fromfile(stream, record, wanted)
-            if len(found) < wanted:
-                raise count_mismatch(file, header.count, first + done + len(found))
-            yield found["xyz"]
+            records = np.fromfile(stream, record, wanted)
+            if len(records) < wanted:
+                raise count_mismatch(file, header.count, first + done + len(records))
+            yield records["xyz"]
 
 
 def _laz_blocks(file, header, chunk, first, count):

@@ -1,4 +1,4 @@
-"""Numbers in text, a block of whole lines at a time, by the parser of pandas."""
+"""Reading of numbers from text in blocks of whole lines, with the parser of pandas."""
 
 import csv
 import io
@@ -14,21 +14,21 @@ BLOCK = 1 << 22  # bytes read at a time
 LONGEST_LINE = 1 << 20  # bytes
 COMMENTS = (b"#", b"//", b"%")
 NUMBER = re.compile(rb"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?")
-LEAST_ROW = 6  # bytes of the shortest row of three numbers
+LEAST_ROW = 6  # length of the shortest row of three numbers, bytes
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How three numbers stand in a row.
+    """Separator, decimal sign and columns of the coordinates in a row.
 
     Attributes
     ----------
     separator : str
-        "," or ";" or "tab" or "blank" (blanks and tabs, any number of them).
+        ",", ";", "tab" or "blank" (any number of blanks and tabs).
     decimal : str
         "." or ",".
     columns : tuple of int
-        Of x, y and z, from 0.
+        Columns of x, y and z, from 0.
     """
 
     separator: str = "blank"
@@ -36,16 +36,16 @@ class Layout:
     columns: tuple[int, int, int] = (0, 1, 2)
 
     def cells(self, line):
-        """The cells of a line of bytes, without blanks about them."""
+        """Split a line of bytes into cells, without surrounding blanks."""
         if self.separator == "blank":
             return line.split()
         mark = b"\t" if self.separator == "tab" else self.separator.encode()
         return [cell.strip() for cell in line.split(mark)]
 
     def number(self, cell):
-        """The number of a cell as float; None where it is none, or not finite."""
+        """Convert a cell to float; None if it is not a finite number."""
         if self.decimal == ",":
-            cell = cell.replace(b".", b"x").replace(b",", b".")
+            cell = cell.replace(b".", b"x").replace(b",", b".")  # a point makes the number invalid
         if NUMBER.fullmatch(cell) is None:
             return None
         value = float(cell)
@@ -53,12 +53,12 @@ class Layout:
 
 
 class Lines:
-    """The lines of a text file, one or a block at a time, memory independent of its length.
+    """Lines of a text file, read singly or in blocks, with memory independent of its length.
 
     Attributes
     ----------
     row : int
-        Of the line last given, counted as an editor shows it.
+        Number of the last line that was read, counted from 1.
     """
 
     def __init__(self, file, stream):
@@ -69,7 +69,7 @@ class Lines:
             self._at = 3
 
     def next_line(self):
-        """The next line with anything in it, without blanks about it; None at the end."""
+        """Read the next line that is not blank, without surrounding blanks; None at the end."""
         while True:
             end = self._text.find(b"\n", self._at)
             if end < 0:
@@ -82,7 +82,7 @@ class Lines:
                 return line
 
     def take(self, most):
-        """At most so many lines as one block of bytes, b"" at the end; the row of its first."""
+        """Read a block of at most `most` lines; return its bytes (b"" at the end) and first row."""
         end = self._text.rfind(b"\n", self._at)
         while end < 0:
             if not self._fill():
@@ -98,7 +98,7 @@ class Lines:
         return block, first
 
     def _fill(self):
-        """More text; False at the end of the file. The last line gets its end."""
+        """Read more text; False at the end of the file. An unfinished last line gets its end."""
         rest = self._text[self._at :]
         if len(rest) > LONGEST_LINE and b"\n" not in rest:
             raise self.file.refusal(
@@ -117,7 +117,7 @@ class Lines:
 
 
 def count_lines(block):
-    """Lines of a block with anything in them."""
+    """Number of lines of a block that are not blank."""
     lines = block.count(b"\n")
     if block.startswith((b"\n", b"\r\n")) or b"\n\n" in block or b"\n\r\n" in block:
         lines = sum(1 for line in block.split(b"\n") if line.strip())
@@ -125,12 +125,12 @@ def count_lines(block):
 
 
 def count_rows(block):
-    """Lines of a block that are neither blank nor a comment."""
-    return sum(not _is_idle(line) for line in block.split(b"\n"))
+    """Number of lines of a block that are neither blank nor a comment."""
+    return sum(not _is_blank_or_comment(line) for line in block.split(b"\n"))
 
 
 def skip_lines(lines, wanted):
-    """Pass over so many lines with anything in them; how many there were."""
+    """Skip `wanted` lines that are not blank; return the number of lines skipped."""
     done = 0
     while done < wanted:
         block, _ = lines.take(wanted - done)
@@ -141,29 +141,51 @@ def skip_lines(lines, wanted):
 
 
 def parse_rows(file, block, first_row, layout):
-    """(rows, 3) finite float64 of the lines of a block; InputError naming the first bad row.
+    """Read the coordinates of a block of lines.
 
-    Blank lines count for nothing, nor do those that begin as a comment does.
+    Blank lines and comments are ignored.
+
+    Parameters
+    ----------
+    file : CloudFile
+        File that the error names.
+    block : bytes
+        Whole lines.
+    first_row : int
+        Number of the first line in the file.
+    layout : Layout
+        Separator, decimal sign and columns.
+
+    Returns
+    -------
+    ndarray, shape (rows, 3)
+        Finite coordinates in the unit of the file.
+
+    Raises
+    ------
+    InputError
+        If a row does not contain three numbers; the error names the first such row.
     """
+    # A carriage return within a line would be read as the end of the line.
     if b"\r" not in block or block.count(b"\r") == block.count(b"\r\n"):
-        found = _parse(block, layout)
-        if found is None:
-            kept = [line for line in block.split(b"\n") if not _is_idle(line)]
-            found = _parse(b"\n".join(kept) + b"\n", layout) if kept else np.empty((0, 3))
-            if found is not None and len(found) != len(kept):
-                found = None
-        if found is not None:
-            return found
+        numbers = _parse(block, layout)
+        if numbers is None:
+            rows = [line for line in block.split(b"\n") if not _is_blank_or_comment(line)]
+            numbers = _parse(b"\n".join(rows) + b"\n", layout) if rows else np.empty((0, 3))
+            if numbers is not None and len(numbers) != len(rows):
+                numbers = None
+        if numbers is not None:
+            return numbers
     raise _bad_row(file, block, first_row, layout)
 
 
-def _is_idle(line):
+def _is_blank_or_comment(line):
     line = line.strip()
     return not line or line.startswith(COMMENTS)
 
 
 def _parse(block, layout):
-    """The numbers, or None where anything in the block is none."""
+    """Read the numbers of a block; None if a cell is not a finite number."""
     import pandas as pd
 
     separator = {"blank": r"\s+", "tab": "\t"}.get(layout.separator, layout.separator)
@@ -183,17 +205,17 @@ def _parse(block, layout):
                 skipinitialspace=True,
                 encoding="latin-1",
             )
-    except (ValueError, OverflowError, pd.errors.ParserError):  # empty data, too
+    except (ValueError, OverflowError, pd.errors.ParserError):  # also for empty data
         return None
-    order = np.argsort(np.argsort(layout.columns))  # pandas gives columns as they stand
+    order = np.argsort(np.argsort(layout.columns))  # pandas keeps the order of the file
     numbers = table.to_numpy().T[order].T
     return numbers if np.isfinite(numbers.sum()) and np.isfinite(numbers).all() else None
 
 
 def _bad_row(file, block, first_row, layout):
-    """The refusal that names the first row without three numbers."""
+    """Create the InputError that names the first row without three numbers."""
     for i, line in enumerate(block.split(b"\n")):
-        if _is_idle(line):
+        if _is_blank_or_comment(line):
             continue
         cells = layout.cells(line)
         for name, column in zip("xyz", layout.columns, strict=True):
@@ -214,11 +236,11 @@ def _bad_row(file, block, first_row, layout):
 
 
 def shown(cell):
-    """Bytes of a file as a message shows them: a few letters that can be printed."""
+    """First printable letters of a cell, for a message."""
     text = cell[:40].decode("utf-8", errors="replace")
     return "".join(c if c.isprintable() else "?" for c in text)
 
 
 def whole_number(line):
-    """The count that stands alone in a line of bytes; None where there is another thing."""
+    """Whole number in a line of bytes; None if the line has other contents."""
     return int(line) if line is not None and re.fullmatch(rb"\d{1,18}", line) else None

@@ -1,4 +1,4 @@
-"""PLY: the vertices of a file of text or of binary numbers of either order; faces are passed by."""
+"""PLY: vertices of text files and of binary files of either byte order; faces are ignored."""
 
 import re
 from dataclasses import dataclass
@@ -20,29 +20,32 @@ ORDERS = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
 
 @dataclass(frozen=True)
 class _Element:
+    """Element of a PLY header, with names and types of its properties ("" marks a list)."""
+
     name: str
     count: int
     names: tuple[str, ...]
-    types: tuple[str, ...]  # "": a list
+    types: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class PlyHeader:
-    """Where and how the vertices stand.
+    """Header of a PLY file: position and format of the vertices.
 
     Attributes
     ----------
     order : str or None
-        "<" or ">" of binary numbers; None: text.
+        Byte order of binary numbers, "<" or ">"; None for text.
     before : tuple of _Element
-        What stands before the vertices.
+        Elements before the vertices.
     vertex : _Element
+        Element of the vertices.
     is_last : bool
-        Whether nothing follows the vertices.
+        Whether the vertices are the last element.
     first : int
-        Bytes of the header.
+        Length of the header, bytes.
     lines : int
-        Lines of it.
+        Number of lines of the header.
     """
 
     order: str | None
@@ -54,33 +57,35 @@ class PlyHeader:
 
     @property
     def start(self):
-        """Byte at which binary vertices begin."""
-        return self.first + sum(one.count * self.record(one).itemsize for one in self.before)
+        """Byte at which the binary vertices begin."""
+        return self.first + sum(
+            element.count * self.record(element).itemsize for element in self.before
+        )
 
     def record(self, element):
-        """The dtype of one row of an element without lists."""
+        """Data type of one row of an element without lists."""
         fields = [(f"f{i}", self.order + kind) for i, kind in enumerate(element.types)]
         return np.dtype(fields)
 
     @property
     def columns(self):
-        """Places of x, y and z among the properties of a vertex."""
+        """Indices of x, y and z among the properties of a vertex."""
         return tuple(self.vertex.names.index(name) for name in "xyz")
 
 
 def describe(file):
-    """The one scan of a file."""
+    """Return the format and the single scan of a file."""
     return "ply", (ScanHeader("", read_header(file).vertex.count),)
 
 
 def shares(file, points_each):
-    """Ranges of binary vertices; text is read as a whole."""
+    """Divide binary vertices into ranges; a text file is a single piece."""
     header = read_header(file)
     return (WHOLE,) if header.order is None else ranges_of(header.vertex.count, points_each)
 
 
 def pieces(file, chunk, share=WHOLE):
-    """The vertices of a share of a file."""
+    """Yield the vertices of a share of a file as `Piece` objects."""
     header = read_header(file)
     return (
         _text_pieces(file, header, chunk)
@@ -90,9 +95,9 @@ def pieces(file, chunk, share=WHOLE):
 
 
 def read_header(file):
-    """The `PlyHeader`, checked against the size of the file."""
-    found = re.search(rb"\nend_header[ \t]*\r?\n", file.start)
-    if found is None or not re.match(rb"ply[ \t]*\r?\n", file.start):
+    """Read the `PlyHeader` and check it against the size of the file."""
+    header_end = re.search(rb"\nend_header[ \t]*\r?\n", file.start)
+    if header_end is None or not re.match(rb"ply[ \t]*\r?\n", file.start):
         raise file.refusal(
             message(
                 "cloud_file_ply_end",
@@ -100,19 +105,19 @@ def read_header(file):
                 bytes=len(file.start),
             )
         )
-    text = file.start[: found.end()]
+    text = file.start[: header_end.end()]
     order, elements = _parse_header(file, text)
-    at = next((i for i, one in enumerate(elements) if one.name == "vertex"), None)
-    vertex = elements[at] if at is not None else _Element("vertex", 0, (), ())
+    index = next((i for i, element in enumerate(elements) if element.name == "vertex"), None)
+    vertex = elements[index] if index is not None else _Element("vertex", 0, (), ())
     header = PlyHeader(
-        order, elements[:at], vertex, at == len(elements) - 1, len(text), text.count(b"\n")
+        order, elements[:index], vertex, index == len(elements) - 1, len(text), text.count(b"\n")
     )
     _check_vertices(file, header)
     return header
 
 
 def _parse_header(file, text):
-    """Order of bytes and elements; InputError with the row that is of another kind."""
+    """Return byte order and elements; raise InputError with the first row that is invalid."""
     order, elements = "", []
     for row, line in enumerate(text.split(b"\n"), start=1):
         words = line.decode("utf-8", errors="replace").split()
@@ -152,7 +157,7 @@ def _with_property(element, name, kind):
 
 def _check_vertices(file, header):
     vertex = header.vertex
-    has_lists = "" in vertex.types or any("" in one.types for one in header.before)
+    has_lists = "" in vertex.types or any("" in element.types for element in header.before)
     if {*"xyz"} - {*vertex.names} or len({*vertex.names}) < len(vertex.names) or has_lists:
         raise file.refusal(
             message(
@@ -165,16 +170,16 @@ def _check_vertices(file, header):
         raise no_points(file)
     if header.order is None:
         least = 2 * len(vertex.names)
-        room = (file.bytes - header.first + 1) // least
-        is_sound = vertex.count <= room
-        before = sum(one.count for one in header.before)
-        is_sound = is_sound and before <= file.bytes
+        most = (file.bytes - header.first + 1) // least
+        is_valid = vertex.count <= most
+        before = sum(element.count for element in header.before)
+        is_valid = is_valid and before <= file.bytes
     else:
         size = header.record(vertex).itemsize
-        room = max(file.bytes - header.start, 0) // size
-        is_sound = vertex.count == room or (vertex.count < room and not header.is_last)
-    if not is_sound:
-        raise count_mismatch(file, vertex.count, room)
+        most = max(file.bytes - header.start, 0) // size
+        is_valid = vertex.count == most or (vertex.count < most and not header.is_last)
+    if not is_valid:
+        raise count_mismatch(file, vertex.count, most)
 
 
 def _binary_pieces(file, header, chunk, share):
@@ -189,10 +194,10 @@ def _binary_pieces(file, header, chunk, share):
             rows = np.fromfile(stream, record, min(chunk, count - done))
             if len(rows) < min(chunk, count - done):
                 raise count_mismatch(file, header.vertex.count, first + done + len(rows))
-            found = np.empty((3, len(rows)), kind)
-            for row, column in zip(found, columns, strict=True):
+            columns_xyz = np.empty((3, len(rows)), kind)
+            for row, column in zip(columns_xyz, columns, strict=True):
                 row[:] = rows[column]
-            yield Piece(0, found.T, len(rows))
+            yield Piece(0, columns_xyz.T, len(rows))
 
 
 def _text_pieces(file, header, chunk):
@@ -202,7 +207,7 @@ def _text_pieces(file, header, chunk):
         lines = Lines(file, stream)
         for _ in range(header.lines):
             lines.take(1)
-        skip_lines(lines, sum(one.count for one in header.before))
+        skip_lines(lines, sum(element.count for element in header.before))
         left = vertex.count
         while left:
             block, row = lines.take(min(chunk, left))
@@ -210,7 +215,7 @@ def _text_pieces(file, header, chunk):
                 raise count_mismatch(file, vertex.count, vertex.count - left)
             xyz = parse_rows(file, block, row, layout)
             left -= len(xyz)
-            # what a writer printed of float32 has no more digits than that
+            # A program that prints float32 gives no more digits, so that float32 is exact.
             single = xyz.astype(np.float32) if is_single else xyz
             yield Piece(0, single if np.array_equal(single, xyz) else xyz, len(xyz))
         if header.is_last and lines.next_line() is not None:

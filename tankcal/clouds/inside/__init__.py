@@ -1,4 +1,4 @@
-"""What scans from inside show beside the wall: the bottom, and what stands in the tank."""
+"""Scans from inside the tank: points of the bottom, and objects that may be deadwood."""
 
 from tankcal.clouds.inside.bottom import (
     BottomPoints,

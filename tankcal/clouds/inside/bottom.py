@@ -1,8 +1,9 @@
-"""The bottom of an upright tank in points of scans from inside.
+"""Bottom of an upright tank in scans from inside.
 
-Over cells of the plan the heights are counted; what hangs together from cell to cell is a surface,
-and the largest that meets the foot of the shell is the bottom. What a film of liquid mirrors lies
-under it, at the height below that it has above; what stands out of the bottom is left out.
+Heights are counted in cells of the plan. Heights that connect from cell to cell form a surface. The
+largest surface is the bottom, and it must meet the foot of the shell. A film of liquid gives mirror
+images; each lies as far below the bottom as its object lies above. Objects on the bottom are
+excluded.
 """
 
 from dataclasses import dataclass
@@ -30,24 +31,28 @@ from tankcal.clouds.wall.screens import FILE
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
-LEAST_SHARE = 0.4  # of the plan that must be seen as bottom
-EDGE_CELLS, FOOT_M, FOOT_SHARE = 3, 0.25, 0.01  # ring at the shell, how far off its foot (radius)
-LEAST_SD_M = 1e-4  # no height of a cell is told better
-CLEAR_BINS = 5  # under the bottom, from which on something is another thing
-LEAST_PIT_CELLS, LEAST_PIT_M = 2, 0.05
-FEWEST_OF_BLOCK = 9  # cells that a quadratic is laid through
-MIRROR_BINS, MIRRORED = 3, 0.5  # how near the thing above, and how much of what is below
-ROOF_POINTS, ROOF_SHARE = 3, 0.3  # of a cell over the shell; of the plan, from which it is a roof
+LEAST_SHARE = 0.4  # least share of the plan that must show the bottom
+# Width of the ring at the shell where the bottom is compared with the foot of the shell, cells;
+# largest distance between them, m, and as a share of the radius
+EDGE_CELLS, FOOT_M, FOOT_SHARE = 3, 0.25, 0.01
+LEAST_SD_M = 1e-4  # least standard deviation of the height of a cell, m
+CLEAR_BINS = 5  # bins about the bottom that belong to it; lower points belong to another object
+LEAST_PIT_CELLS, LEAST_PIT_M = 2, 0.05  # least number of cells and least depth of a pit
+FEWEST_OF_BLOCK = 9  # least number of cells for the fit of a quadratic
+# Tolerance of the height of a mirror image, bins; least share of the lower points that are mirrored
+MIRROR_BINS, MIRRORED = 3, 0.5
+# Least points of a cell above the shell; least share of the plan with such cells for a roof
+ROOF_POINTS, ROOF_SHARE = 3, 0.3
 
 
 @dataclass(frozen=True)
 class RoofSeen:
-    """What closes the tank over its shell; no part of a table.
+    """Roof over the shell; it has no part in the capacity table.
 
     Attributes
     ----------
     share : float
-        Of the plan that shows it.
+        Share of the plan in which the roof is seen.
     low_m, high_m : float
         Heights between which 90 % of its points lie, in the frame of the points, m.
     """
@@ -59,16 +64,16 @@ class RoofSeen:
 
 @dataclass(frozen=True)
 class Pit:
-    """Cells that hang together whose ground lies lower than the bottom, such as a sump.
+    """Connected cells whose ground is lower than the bottom, such as a sump.
 
     Attributes
     ----------
     x_m, y_m : float
-        Middle, in the frame of the points.
+        Centre of the pit, in the frame of the points, m.
     bottom_m, top_m : float
-        Height of its ground and of the bottom round it.
+        Heights of the ground of the pit and of the bottom around it, m.
     area_m2, u_area_m2 : float
-        Of its ground, by whole cells, and how well cells tell it.
+        Area of the ground, from whole cells, and its standard uncertainty due to the cell size, m2.
     """
 
     x_m: float
@@ -81,7 +86,7 @@ class Pit:
 
     @property
     def deadwood_row(self):
-        """name, bottom, top (heights in the frame of the points, m), volume and u, m3."""
+        """Row of deadwood: name, heights of bottom and top (m), volume and its u (m3)."""
         deep = self.top_m - self.bottom_m
         name = f"pit {self.x_m:.2f} {self.y_m:.2f}"
         return name, self.bottom_m, self.top_m, self.area_m2 * deep, self.u_area_m2 * deep
@@ -89,33 +94,36 @@ class Pit:
 
 @dataclass(frozen=True)
 class CloudBottom:
-    """The bottom in cells of the plan; the first axis is along x.
+    """Bottom of a tank in cells of the plan; the first axis is along x.
 
     Attributes
     ----------
     grid : FloorGrid
+        Cells of the plan.
     xyz_m : ndarray, shape (across, across, 3)
-        Mean place of the points of the bottom in each cell, in the frame of the points, m; nan:
-        the cell does not show the bottom.
+        Mean position of the points of the bottom in each cell, in the frame of the points, m; nan
+        if the cell does not show the bottom.
     sd_m : ndarray, shape (across, across)
-        Of its height, by the points and by what neighbouring cells differ by.
+        Standard deviation of the height, from the points and from neighbouring cells, m.
     is_bottom, in_plan : ndarray of bool, shape (across, across)
-        Cells that show it; cells whose middle lies in the shell.
+        Cells that show the bottom; cells whose centre lies in the shell.
     mirror : ndarray of bool, shape (across, across)
-        Cells under which something is seen upside down: a film of liquid lies there.
+        Cells with a mirror image below the bottom, which shows a film of liquid.
     mirrored : int
-        Points that lie under bottom and wall, as in a mirror: liquid stands on the bottom, whose
-        surface is taken for it where it gave points.
+        Number of points below bottom and wall, as in a mirror. They show that liquid stands on the
+        bottom. Its surface is taken as the bottom where it has points.
     scatter_m : float
-        Sd of the height of one cell as its neighbours show it.
+        Standard deviation of the height of a cell, from its neighbours, m.
     seen_share : float
-        Of the cells of the plan.
+        Share of the cells of the plan that show the bottom.
     pits : tuple of Pit
+        Pits in the bottom, the largest first.
     by_scan : ndarray, shape (across, across, scans)
-        Points of each scan about the bottom in each cell.
+        Number of points of each scan near the bottom in each cell.
     roof : RoofSeen or None
-        None: hardly anything is seen over the shell.
+        Roof over the shell, or None if no roof is seen.
     cells : FloorCells
+        Sums from which the bottom was found.
     """
 
     grid: object
@@ -134,16 +142,16 @@ class CloudBottom:
 
 
 def find_cloud_bottom(passes, cloud_wall, sides=None, *, below_m=None, above_m=None, cell_m=None):
-    """The bottom that the points of scans from inside show.
+    """Find the bottom of a tank in the points of scans from inside.
 
     Parameters
     ----------
-    passes : callable, or an object as `passes.Passes` is
+    passes : callable or Passes
         As for `find_cloud_wall`.
     cloud_wall : CloudWall
-        Of an upright tank.
+        Wall of an upright tank.
     sides : sequence of str, optional
-        "inside" or "outside" for each scan: others than those from inside are passed over.
+        "inside" or "outside" for each scan; scans from outside are ignored.
     below_m, above_m, cell_m : float, optional
         As for `floor_grid`.
 
@@ -154,34 +162,37 @@ def find_cloud_bottom(passes, cloud_wall, sides=None, *, below_m=None, above_m=N
     Raises
     ------
     InputError
-        Where no surface, or one that does not meet the foot of the shell, is seen.
+        If no surface is found, or if the surface does not meet the foot of the shell.
     """
     joints = cloud_wall.joints_m
     sizes = {"below_m": below_m, "above_m": above_m, "cell_m": cell_m}
     grid = floor_grid(cloud_wall.surface, joints[0], joints[-1], **sizes)
-    inside = [one != "outside" for one in sides or cloud_wall.sides]
+    inside = [side != "outside" for side in sides or cloud_wall.sides]
     passes = Passes(passes) if callable(passes) else passes
     return bottom_of_cells(passes.gather(floor_cells_of, grid, inside))
 
 
 def bottom_of_cells(cells):
-    """`CloudBottom` of the sums in cells."""
+    """Find the bottom in the sums of `FloorCells`; return a `CloudBottom`."""
+    # The largest surface that connects from cell to cell is the candidate for the bottom.
     grid, counts = cells.grid, cells.counts()
     in_plan, rim = _plan(grid)
     width = np.full(grid.across, grid.cell_m)
     grown = grow_wall(counts, column_m=width, row_m=grid.cell_m, bin_m=BIN_M)
-    number = np.arange(grid.bins)
-    within = (number >= grown.low[..., None]) & (number <= grown.high[..., None])
+    bin_number = np.arange(grid.bins)
+    within = (bin_number >= grown.low[..., None]) & (bin_number <= grown.high[..., None])
     within &= (grown.why == WALL)[..., None]
     x, y, z, spread, count = cells.means(within)
+    # Cells that deviate from the trend of their neighbours show objects on the bottom. The slope
+    # within a cell is removed first.
     is_bottom = (grown.why == WALL) & (count >= FEWEST)
-    is_bottom &= ~off_trend(_flattened(x, y, z, is_bottom, grid), spread, is_bottom)
-    seen = float(np.mean(is_bottom[in_plan]))
-    _refuse(z, is_bottom, rim, seen, grid)
-    even = np.where(is_bottom, _flattened(x, y, z, is_bottom, grid), np.nan)
+    is_bottom &= ~off_trend(_reduce_to_centres(x, y, z, is_bottom, grid), spread, is_bottom)
+    seen_share = float(np.mean(is_bottom[in_plan]))
+    _check_bottom(z, is_bottom, rim, seen_share, grid)
+    even = np.where(is_bottom, _reduce_to_centres(x, y, z, is_bottom, grid), np.nan)
     scatter = max(_scatter(even), LEAST_SD_M)
     level = level_everywhere(z, is_bottom)
-    mirror, low, share, mirrored = _what_lies_below(counts, level, grid)
+    mirror, low, share, mirrored = _find_mirror_images(counts, level, grid)
     mirror |= cells.under.reshape(mirror.shape) >= FEWEST
     return CloudBottom(
         grid=grid,
@@ -192,15 +203,16 @@ def bottom_of_cells(cells):
         mirror=mirror,
         mirrored=mirrored + int(cells.under.sum()) + cells.wall_below,
         scatter_m=scatter,
-        seen_share=seen,
-        pits=_pits(np.where(mirror, np.nan, low), share, level, grid),
+        seen_share=seen_share,
+        pits=_find_pits(np.where(mirror, np.nan, low), share, level, grid),
         by_scan=cells.counts_of_scans(grown.low, grown.high),
-        roof=_roof(cells, in_plan),
+        roof=_find_roof(cells, in_plan),
         cells=cells,
     )
 
 
-def _roof(cells, in_plan):
+def _find_roof(cells, in_plan):
+    """Return `RoofSeen`, or None if too small a share of the plan has points above the shell."""
     share = float(np.mean(cells.over.reshape(in_plan.shape)[in_plan] >= ROOF_POINTS))
     if share < ROOF_SHARE:
         return None
@@ -210,15 +222,15 @@ def _roof(cells, in_plan):
 
 
 def _plan(grid):
-    """Cells whose middle lies in the shell, and those of them at its foot."""
+    """Return cells whose centre lies in the shell, and the ring of these cells at its foot."""
     middle = (np.arange(grid.across) + 0.5 - grid.across / 2) * grid.cell_m
-    away = np.hypot(middle[:, None], middle[None, :])
-    in_plan = away < grid.surface.radius_m - grid.cell_m / 2
-    return in_plan, in_plan & (away > grid.surface.radius_m - EDGE_CELLS * grid.cell_m)
+    distance = np.hypot(middle[:, None], middle[None, :])
+    in_plan = distance < grid.surface.radius_m - grid.cell_m / 2
+    return in_plan, in_plan & (distance > grid.surface.radius_m - EDGE_CELLS * grid.cell_m)
 
 
-def _flattened(x, y, z, known, grid):
-    """Heights carried to the middle of their cells along the slope of the cells beside them."""
+def _reduce_to_centres(x, y, z, known, grid):
+    """Reduce heights to the centres of their cells, with the slope between the adjacent cells."""
     seen, carried = np.where(known, z, np.nan), z.copy()
     for axis, place in enumerate((x, y)):
         before, after = np.roll(seen, 1, axis=axis), np.roll(seen, -1, axis=axis)
@@ -231,19 +243,20 @@ def _flattened(x, y, z, known, grid):
 
 
 def _scatter(values):
-    """Sd of a cell by the second differences along both directions, the larger of them."""
-    parts = [values[1:-1] - (values[:-2] + values[2:]) / 2]
-    parts.append(values[:, 1:-1] - (values[:, :-2] + values[:, 2:]) / 2)
-    return max(spread_between(one) for one in parts)
+    """Standard deviation of a cell from second differences, the larger of both directions."""
+    differences = [values[1:-1] - (values[:-2] + values[2:]) / 2]
+    differences.append(values[:, 1:-1] - (values[:, :-2] + values[:, 2:]) / 2)
+    return max(spread_between(values_of_direction) for values_of_direction in differences)
 
 
 def level_everywhere(z, is_bottom):
-    """(across, across) height of the bottom in every cell; where it is not seen, of the nearest."""
+    """Height of the bottom in each cell (across, across), from the nearest cell that shows it."""
     nearest = scipy.ndimage.distance_transform_edt(~is_bottom, return_indices=True)[1]
     return np.where(is_bottom, z, np.nan)[tuple(nearest)]
 
 
-def _refuse(z, is_bottom, rim, seen, grid):
+def _check_bottom(z, is_bottom, rim, seen, grid):
+    """Raise InputError if the bottom is too small or does not meet the foot of the shell."""
     foot = z[rim & is_bottom]
     if seen < LEAST_SHARE or not len(foot):
         text = message(
@@ -270,15 +283,26 @@ def _refuse(z, is_bottom, rim, seen, grid):
         raise InputError(Problem(FILE, text))
 
 
-def _what_lies_below(counts, level, grid):
-    """Cells that a film mirrors; height of what else lies lower (across, across), nan: none;
-    the share of the points that it has; and the number of points that are mirrored.
+def _find_mirror_images(counts, level, grid):
+    """Separate the points below the bottom into mirror images and lower ground.
 
-    A mirror image lies as deep under the film as the thing stands above it, at the same place.
+    A mirror image lies as far below the film of liquid as the object above it, in the same cell.
+
+    Returns
+    -------
+    mirror : ndarray of bool, shape (across, across)
+        Cells with mirror images.
+    height : ndarray, shape (across, across)
+        Height of lower ground, m; nan if there is none.
+    share : ndarray, shape (across, across)
+        Share of the lower points among the points near or below the bottom; nan without points.
+    mirrored : int
+        Number of mirrored points.
     """
     bins, number = grid.bins, np.arange(grid.bins)
     at = np.clip(np.floor((level - grid.low_m) / BIN_M), 0, bins - 1).astype(np.int64)[..., None]
     low = np.where(number < at - CLEAR_BINS, counts, 0)
+    # A bin n below the bottom at bin `at` is a mirror image if bin 2 at - n above it has points.
     above = scipy.ndimage.maximum_filter1d(counts, 2 * MIRROR_BINS + 1, axis=2)
     image = np.clip(2 * at - number, 0, bins - 1)
     mirrored = np.where(np.take_along_axis(above, image, axis=2) > 0, low, 0).sum(axis=2)
@@ -293,35 +317,40 @@ def _what_lies_below(counts, level, grid):
     return mirror, height, share, int(mirrored[mirror].sum())
 
 
-def _pits(low, share, level, grid):
+def _find_pits(low, share, level, grid):
+    """Return a tuple of `Pit`, the largest first, from the height of lower ground in cells."""
     label, count = scipy.ndimage.label(np.isfinite(low), np.ones((3, 3)))
-    found = []
-    for one in range(1, count + 1):
-        mine = label == one
-        deep, top = float(np.median(low[mine])), float(np.median(level[mine]))
-        whole = scipy.ndimage.binary_fill_holes(scipy.ndimage.binary_closing(mine, np.ones((3, 3))))
-        area = float(np.nansum(np.where(np.isnan(share), 1.0, share)[whole])) * grid.cell_m**2
-        if np.count_nonzero(mine) < LEAST_PIT_CELLS or top - deep < LEAST_PIT_M:
+    pits = []
+    for pit_number in range(1, count + 1):
+        in_pit = label == pit_number
+        deep, top = float(np.median(low[in_pit])), float(np.median(level[in_pit]))
+        filled = scipy.ndimage.binary_fill_holes(
+            scipy.ndimage.binary_closing(in_pit, np.ones((3, 3)))
+        )
+        area = float(np.nansum(np.where(np.isnan(share), 1.0, share)[filled])) * grid.cell_m**2
+        if np.count_nonzero(in_pit) < LEAST_PIT_CELLS or top - deep < LEAST_PIT_M:
             continue
-        x, y = grid.corner_m + (np.argwhere(whole).mean(axis=0) + 0.5) * grid.cell_m
+        x, y = grid.corner_m + (np.argwhere(filled).mean(axis=0) + 0.5) * grid.cell_m
+        # The edge of a circle of this area, uncertain by a rectangular distribution of one cell
         edge = 2 * np.sqrt(np.pi * area) * grid.cell_m / np.sqrt(12)
-        found.append(Pit(float(x), float(y), deep, top, area, float(edge)))
-    return tuple(sorted(found, key=lambda pit: -pit.area_m2))
+        pits.append(Pit(float(x), float(y), deep, top, area, float(edge)))
+    return tuple(sorted(pits, key=lambda pit: -pit.area_m2))
 
 
 @dataclass(frozen=True)
 class BottomPoints:
-    """Points of a bottom as bottom.csv takes them.
+    """Points of a bottom for the file bottom.csv.
 
     Attributes
     ----------
     xyz_m : ndarray, shape (n, 3)
-        Means of cells, in the frame of the points.
+        Means of cells, in the frame of the points, m.
     sd_m : ndarray, shape (n,)
-        Of the height: that of one cell, however many it is the mean of.
+        Standard deviation of the height, m: the value of a single cell, not reduced by averaging.
     cells : ndarray of int, shape (n,)
+        Number of cells of each point.
     share : ndarray, shape (n, scans)
-        Of each scan in the height.
+        Share of each scan in the height.
     """
 
     xyz_m: np.ndarray
@@ -331,34 +360,39 @@ class BottomPoints:
 
 
 def bottom_points(bottom, most=400):
-    """`BottomPoints` of a `CloudBottom`: one for each square block of cells, at most so many.
+    """Reduce a `CloudBottom` to at most `most` points, one for each square block of cells.
 
-    The height is that of a quadratic through the cells of the block and those beside it, so that a
-    dish is not taken for as deep as the mean of its parts.
+    The height is the value of a quadratic fit to the cells of the block and the adjacent cells. The
+    mean of the cells would be biased where the bottom is curved.
     """
     shown = bottom.is_bottom & bottom.in_plan
     column, row = np.nonzero(shown)
     for side in range(1, bottom.grid.across + 1):
         block = (column // side) * bottom.grid.across + row // side
-        taken, place, cells = np.unique(block, return_inverse=True, return_counts=True)
-        if len(taken) <= most:
+        blocks, place, cells = np.unique(block, return_inverse=True, return_counts=True)
+        if len(blocks) <= most:
             break
+    # Blocks of more than one cell have the height of a quadratic at the mean position.
     values = bottom.xyz_m[column, row]
-    xyz = np.column_stack([np.bincount(place, one) / cells for one in values.T])
-    for i, one in enumerate(taken) if side > 1 else ():
-        first = np.array(divmod(int(one), bottom.grid.across)) * side
+    xyz = np.column_stack([np.bincount(place, value) / cells for value in values.T])
+    for i, value in enumerate(blocks) if side > 1 else ():
+        first = np.array(divmod(int(value), bottom.grid.across)) * side
         low, high = np.maximum(first - 1, 0), first + side + 1
         window = np.s_[low[0] : high[0], low[1] : high[1]]
         xyz[i, 2] = _height_at(xyz[i], bottom.xyz_m[window][shown[window]])
+    # The variance is averaged, not reduced: neighbouring cells share errors.
     variance = np.bincount(place, bottom.sd_m[column, row] ** 2) / cells
     of_scans = bottom.by_scan[column, row].astype(float)
     of_scans /= np.maximum(of_scans.sum(axis=1, keepdims=True), 1)
-    share = np.column_stack([np.bincount(place, one) / cells for one in of_scans.T])
+    share = np.column_stack([np.bincount(place, value) / cells for value in of_scans.T])
     return BottomPoints(xyz, np.sqrt(variance), cells, share)
 
 
 def _height_at(middle, xyz):
-    """Height at a place by a quadratic through cells (n, 3); their mean where they are too few."""
+    """Height at a position from a quadratic fit to cells (n, 3).
+
+    Too few cells, or cells on a line, do not determine the quadratic; the height is then unchanged.
+    """
     x, y, z = (xyz - middle).T
     design = np.column_stack([np.ones(len(z)), x, y, x * x, x * y, y * y])
     scale = np.max(np.abs(design), axis=0)

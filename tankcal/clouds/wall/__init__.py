@@ -1,4 +1,4 @@
-"""From points of scans to cells of the wall: what is wall, what stands before it."""
+"""Wall of a tank from points of scans: decision by cells, obstructions, and readings."""
 
 from tankcal.clouds.wall.deciding import CloudWall
 from tankcal.clouds.wall.finding import find_cloud_wall

@@ -1,7 +1,7 @@
-"""Cells of a wall: for each scan and cell a histogram of the distances, in integers that add.
+"""Cells of a wall: histogram of the distances in each cell, for each scan, as integer sums.
 
-Distances are counted in units of a 256th of a bin, so that means know nothing of the bins' width,
-and sums are the same to the last bit in whatever order and pieces the points come.
+Distances are counted in units of 1/256 of a bin, so that means do not depend on the width of a bin.
+Integer sums are identical for any order and division of the points.
 """
 
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from tankcal.errors import InputError, Problem
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 
-PIECE = 1 << 15  # points at a time: their arrays stay in the cache
+PIECE = 1 << 15  # points added at a time, so that their arrays fit into the processor cache
 FINE_BITS = 8  # a bin is 2**8 units wide
-FINE = 1 << FINE_BITS
-COUNT = 1 << 32  # in one int64: the count above, the sum of units within the bin below
-MOST_IN_BIN = 1 << 24  # beyond, the sum of units would run into the count
-PLACE = 1 << 16  # parts of a cell that places in it are counted in
-FAR_M, FAR_BINS = 1.2, 48  # what stands before and behind the wall: reach and number of bins
-GRID_LIMIT = 1 << 20  # places of the table that looks rows up; beyond, by bisection
+FINE = 1 << FINE_BITS  # units in a bin
+COUNT = 1 << 32  # one int64 has the count in its upper half, the sum of units in its lower half
+MOST_IN_BIN = 1 << 24  # with more points the sum of units could overflow into the count
+PLACE = 1 << 16  # units of a position within a cell, per width or height of the cell
+FAR_M, FAR_BINS = 1.2, 48  # range on both sides of the wall for obstructions, m; number of bins
+GRID_LIMIT = 1 << 20  # largest size of the table of rows; above it, rows are found by bisection
 SUMMED = ("sums", "turn", "along", "far", "delivered", "outside", "beyond")
 
 
@@ -30,13 +30,14 @@ class CellGrid:
     Attributes
     ----------
     edges_m : ndarray, shape (rows + 1,)
-        u between the rows, ascending; a row holds its lower edge, the last one also its upper, m.
+        Coordinate u of the edges of the rows, ascending, m. A row contains its lower edge; the last
+        row also contains its upper edge.
     columns : int
-        Cells round a row; the first begins at turn 0.
+        Number of cells around a row; the first begins at azimuth 0.
     band_m : float
-        Distances up to this, inwards and outwards, are told apart, m.
+        Half-width of the band of distances, inwards and outwards, m.
     bins : int
-        Over the whole band.
+        Number of bins over the whole band.
     """
 
     edges_m: np.ndarray
@@ -51,7 +52,7 @@ class CellGrid:
 
     @property
     def unit_m(self):
-        """The unit that distances are counted in, m."""
+        """Unit of the sums of distances, m."""
         return 2 * self.band_m / self.bins / FINE
 
     @property
@@ -60,7 +61,7 @@ class CellGrid:
         return 2 * self.band_m / self.bins
 
     def bytes_of(self, scans):
-        """Memory that so many scans need in these cells."""
+        """Memory of the sums of `scans` scans, bytes."""
         cells = self.rows * self.columns
         return cells * (scans * (self.bins + 2) * 8 + FAR_BINS * 4)
 
@@ -71,7 +72,7 @@ class WallCells:
     Parameters
     ----------
     surface : CylinderSurface or SphereSurface
-        What the cells lie about.
+        Approximate surface of the wall, from which distances are measured.
     grid : CellGrid
     scans : int
         Number of scans.
@@ -81,11 +82,12 @@ class WallCells:
     sums : ndarray of int64, shape (scans, rows * columns, bins)
         Count times 2**32, plus the sum of the units within the bin.
     turn, along : ndarray of int64, shape (scans, rows * columns)
-        Sums of the places within the cell, in 2**16th of its width and height.
+        Sums of the positions within the cell, in 1/2**16 of its width and height.
     far : ndarray of uint32, shape (rows * columns, FAR_BINS)
-        Counts within FAR_M of the surface, of all scans.
+        Counts outside the band, within FAR_M of the surface, of all scans together.
     delivered, outside, beyond : ndarray of int64, shape (scans,)
-        Points that came; above, below or over FAR_M off; within FAR_M, but not in the band.
+        Number of points received; above, below or more than FAR_M from the surface; within FAR_M,
+        but outside the band.
 
     Examples
     --------
@@ -116,24 +118,24 @@ class WallCells:
             self._add(xyz_m[start : start + PIECE], scan)
 
     def packed(self):
-        """{name: places and values of what is not 0}: a piece of a file fills few of the bins."""
-        found = {}
+        """Sums in sparse form, {name: (indices, values)}; a piece of a file fills few bins."""
+        packed = {}
         for name in SUMMED:
             flat = getattr(self, name).ravel()
-            places = np.flatnonzero(flat)
-            found[name] = (
-                places.astype(np.uint32 if len(flat) <= 1 << 32 else np.int64),
-                flat[places],
+            indices = np.flatnonzero(flat)
+            packed[name] = (
+                indices.astype(np.uint32 if len(flat) <= 1 << 32 else np.int64),
+                flat[indices],
             )
-        return found
+        return packed
 
     def add_packed(self, packed):
-        """Add what `packed` gave of the sums of other points: same surface, grid and scans."""
-        for name, (places, values) in packed.items():
-            getattr(self, name).reshape(-1)[places] += values
+        """Add sums in the form of `packed`, of the same surface, grid and number of scans."""
+        for name, (indices, values) in packed.items():
+            getattr(self, name).reshape(-1)[indices] += values
 
     def merged(self, other):
-        """The sums of the points of both: same surface, grid and scans."""
+        """Return the sums of both sets of points, of the same surface, grid and number of scans."""
         both = WallCells(self.surface, self.grid, self.scans)
         for name in SUMMED:
             np.add(getattr(self, name), getattr(other, name), out=getattr(both, name))
@@ -142,12 +144,12 @@ class WallCells:
     __add__ = merged
 
     def counts(self, scan):
-        """(rows, columns, bins) points of one scan."""
+        """Number of points of one scan in each bin, shape (rows, columns, bins)."""
         self._check_counts(scan)
         return (self.sums[scan] >> 32).reshape(self.grid.rows, self.grid.columns, -1)
 
     def units(self, scan):
-        """(rows, columns, bins) sums of units within each bin, of one scan."""
+        """Sum of units of one scan within each bin, shape (rows, columns, bins)."""
         return (self.sums[scan] & (COUNT - 1)).reshape(self.grid.rows, self.grid.columns, -1)
 
     def _add(self, xyz_m, scan):
@@ -158,17 +160,19 @@ class WallCells:
             self.outside[scan] += len(u) - np.count_nonzero(inside)
             u, turn, distance = u[inside], turn[inside], distance[inside]
         row = self._row_of(u)
-        around = turn * (grid.columns / FULL_TURN)
+        around = turn * (grid.columns / FULL_TURN)  # azimuth in widths of a cell
         column = np.minimum(around.astype(np.int64), grid.columns - 1)
         cell = row * grid.columns + column
+        # Points outside the band are only counted, to show obstructions.
         near = np.abs(distance) < grid.band_m
-        away = ~near
-        if away.any():
-            self.beyond[scan] += np.count_nonzero(away)
-            bins = ((distance[away] + FAR_M) * (FAR_BINS / (2 * FAR_M))).astype(np.int64)
-            np.add.at(self.far.ravel(), cell[away] * FAR_BINS + bins, np.uint32(1))
+        is_far = ~near
+        if is_far.any():
+            self.beyond[scan] += np.count_nonzero(is_far)
+            bins = ((distance[is_far] + FAR_M) * (FAR_BINS / (2 * FAR_M))).astype(np.int64)
+            np.add.at(self.far.ravel(), cell[is_far] * FAR_BINS + bins, np.uint32(1))
             u, around, distance = u[near], around[near], distance[near]
             row, column, cell = row[near], column[near], cell[near]
+        # One addition adds both the count (upper half) and the units (lower half).
         fine = ((distance + grid.band_m) / grid.unit_m).astype(np.int64)
         np.clip(fine, 0, grid.bins * FINE - 1, out=fine)
         np.add.at(
@@ -195,22 +199,23 @@ class WallCells:
 
 
 def _row_finder(edges):
-    """A function from u between the first and the last edge to the index of its row.
+    """Create a function that returns the index of the row of u, between first and last edge.
 
-    A table over an even grid, two places or more in the narrowest row, is off by one at most.
+    A table over an even grid, with two or more entries in the narrowest row, is wrong by at most
+    one row; two comparisons correct it.
     """
     last, span = len(edges) - 2, edges[-1] - edges[0]
     narrowest = np.diff(edges).min()
     if 2.5 * span > GRID_LIMIT * narrowest:
         return lambda u: np.minimum(np.searchsorted(edges, u, side="right") - 1, last)
-    places = np.ceil(2.5 * span / narrowest)
-    grid = edges[0] + np.arange(int(places) + 1) / places * span
+    entries = np.ceil(2.5 * span / narrowest)
+    grid = edges[0] + np.arange(int(entries) + 1) / entries * span
     table = np.clip(np.searchsorted(edges, grid, side="right") - 1, 0, last)
     lower, upper = edges[:-1].copy(), edges[1:].copy()
     upper[-1] = np.inf
 
     def row_of(u):
-        row = table.take(((u - edges[0]) / span * places).astype(np.int64))
+        row = table.take(((u - edges[0]) / span * entries).astype(np.int64))
         row += u >= upper.take(row)
         row -= u < lower.take(row)
         return row

@@ -1,6 +1,6 @@
-"""What is wall in the cells of scans, and its distance for each scan.
+"""Decision which cells show the wall, and the distance of the wall in each scan.
 
-All scans of one side decide together what is wall; the distance of it is then told for each scan.
+The scans of one side are decided together. The distance is then determined for each scan.
 """
 
 from dataclasses import dataclass, replace
@@ -22,45 +22,51 @@ from tankcal.clouds.wall.refusals import refuse_no_wall, two_surfaces_in
 from tankcal.errors import InputError
 from tankcal.geometry.outlines import FULL_TURN
 
-LEAST_SD_M = 5e-5  # no mean of a cell is told better
-APART_M, FEWEST_TOLD = 0.4, 20  # cells that noise along a line does not tie; that a scatter needs
+LEAST_SD_M = 5e-5  # least standard deviation of the mean of a cell, m
+# Distance of cells without common noise along a scan line, m; least number of values for a scatter
+APART_M, FEWEST_DIFFERENCES = 0.4, 20
 
 
 @dataclass(frozen=True)
 class CloudWall:
-    """The wall that scans show, in cells.
+    """Wall in cells, as seen by several scans.
 
     Attributes
     ----------
     surface : CylinderSurface or SphereSurface
-        What distances count from.
+        Approximate surface from which distances are measured.
     grid : CellGrid
+        Rows and columns of the cells.
     joints_m : tuple of float
-        u of the ends of the courses, from the bottom up; of a lying cylinder or a sphere two.
+        Coordinate u of the ends of the courses, from the bottom up, m; two for a lying cylinder or
+        a sphere.
     sides : tuple of str
-        Of each scan.
+        Side of each scan.
     radius_m : ndarray, shape (scans, rows, columns)
-        Mean distance of the wall from the axis (of a sphere: its centre) about its mode; nan where
-        a scan does not see the wall.
+        Mean distance of the wall from the axis (sphere: from the centre), from the points near the
+        mode of the cell, m; nan where the scan does not show the wall.
     sd_m : ndarray, shape (scans, rows, columns)
-        Of that mean, by its points and by the scatter between neighbouring cells.
+        Standard deviation of `radius_m`, from the points and from the scatter between neighbouring
+        cells, m.
     count : ndarray of int, shape (scans, rows, columns)
-        Points of that mean.
+        Number of points in the mean.
     turn_rad, along_m : ndarray, shape (scans, rows, columns)
-        Mean azimuth and height (turn and u of the surface) of the points near the wall.
+        Mean azimuth (rad) and coordinate u (m) of the points near the wall.
     is_wall : ndarray of bool, shape (scans, rows, columns)
+        Whether the scan shows the wall in the cell.
     why : dict of str to ndarray of uint8, shape (rows, columns)
-        For each side why a cell is wall or not: `growing.WALL`, `EMPTY`, `FEW` ...
+        Class of each cell for each side: `growing.WALL`, `EMPTY`, `FEW` ...
     scatter_m : ndarray, shape (scans,)
-        Sd of the mean of one cell as neighbouring cells of the same scan show it.
+        Standard deviation of the mean of a cell, from neighbouring cells of the same scan, m.
     masked_share : ndarray, shape (courses,)
-        Of the cells of each course, those that no scan shows as wall.
+        Share of the cells of each course that no scan shows as wall.
     joints, welds, obstructions : tuple
-        What was found, as proposals.
+        Proposed joints, welds and obstructions.
     delivered, outside, beyond, of_wall : ndarray of int, shape (scans,)
-        Points that came; beside the shell; near it, but not in the band; averaged in cells of wall.
+        Number of points received; outside the shell; near the shell but outside the band; in the
+        means of cells of the wall.
     are_apart : bool
-        Whether scans show the wall at distances so different that each was decided alone.
+        Whether the scans show the wall at such different distances that each was decided alone.
     """
 
     surface: object
@@ -87,55 +93,60 @@ class CloudWall:
 
 
 def wall_of_cells(cells, joints_m, sides):
-    """`CloudWall` of the sums in cells: what is wall, and its distance for each scan.
+    """Decide which cells show the wall, and determine its distance for each scan.
 
     Parameters
     ----------
     cells : WallCells
+        Sums over the points in cells.
     joints_m : sequence of float
-        u of the ends of the courses.
+        Coordinate u of the ends of the courses, m.
     sides : sequence of str
-        Of each scan.
+        Side of each scan.
+
+    Returns
+    -------
+    CloudWall
     """
     joints_m, column_m = np.asarray(joints_m, dtype=float), _column_widths(cells)
-    found = _Found(cells)
+    wall_values = _ScanValues(cells)
     grown_of = {}
     for side in dict.fromkeys(sides):
-        mine = [i for i, one in enumerate(sides) if one == side]
-        grown_of[side] = found.decide(mine, joints_m, column_m)
-    seen = np.any(found.is_wall, axis=0)
-    course = np.searchsorted(joints_m[1:-1], _middles(cells.grid), side="right")
+        side_scans = [i for i, item in enumerate(sides) if item == side]
+        grown_of[side] = wall_values.decide(side_scans, joints_m, column_m)
+    is_seen = np.any(wall_values.is_wall, axis=0)
+    course = np.searchsorted(joints_m[1:-1], _row_centres(cells.grid), side="right")
     courses = np.arange(len(joints_m) - 1)
-    count = np.where(found.is_wall, found.count, 0)
-    best = _together(found.radius, found.sd, count)[0]
-    one_side = len(grown_of) == 1
+    count = np.where(wall_values.is_wall, wall_values.count, 0)
+    best = _weighted_mean(wall_values.radius, wall_values.sd, count)[0]
+    is_one_side = len(grown_of) == 1
     return CloudWall(
         surface=cells.surface,
         grid=cells.grid,
         joints_m=tuple(joints_m.tolist()),
         sides=tuple(sides),
-        radius_m=found.radius,
-        sd_m=np.where(found.is_wall, found.sd, np.nan),
+        radius_m=wall_values.radius,
+        sd_m=np.where(wall_values.is_wall, wall_values.sd, np.nan),
         count=count,
-        turn_rad=found.turn,
-        along_m=found.along,
-        is_wall=found.is_wall,
+        turn_rad=wall_values.turn,
+        along_m=wall_values.along,
+        is_wall=wall_values.is_wall,
         why={side: grown.why for side, grown in grown_of.items()},
-        scatter_m=found.scatter,
-        masked_share=np.array([1 - seen[course == one].mean() for one in courses]),
-        joints=find_joints(best, _middles(cells.grid), joints_m) if one_side else (),
-        welds=find_welds(best, course, column_m) if one_side else (),
-        obstructions=find_obstructions(seen, list(grown_of.values()), cells, column_m),
+        scatter_m=wall_values.scatter,
+        masked_share=np.array([1 - is_seen[course == item].mean() for item in courses]),
+        joints=find_joints(best, _row_centres(cells.grid), joints_m) if is_one_side else (),
+        welds=find_welds(best, course, column_m) if is_one_side else (),
+        obstructions=find_obstructions(is_seen, list(grown_of.values()), cells, column_m),
         delivered=cells.delivered,
         outside=cells.outside,
         beyond=cells.beyond,
         of_wall=count.sum(axis=(1, 2)),
-        are_apart=found.are_apart,
+        are_apart=wall_values.are_apart,
     )
 
 
-class _Found:
-    """What is told of each scan and cell (scans, rows, columns), side by side filled in."""
+class _ScanValues:
+    """Results for each scan and cell (scans, rows, columns), filled one side after the other."""
 
     def __init__(self, cells):
         self.cells, grid = cells, cells.grid
@@ -145,10 +156,10 @@ class _Found:
         self.scatter = np.full(cells.scans, np.nan)
         self.are_apart = False
 
-    def decide(self, mine, joints_m, column_m):
-        """`Grown` of the scans of one side; their means are filled in."""
+    def decide(self, side_scans, joints_m, column_m):
+        """Decide the scans of one side and fill in their means; return `Grown`."""
         cells, grid = self.cells, self.cells.grid
-        total = sum(cells.counts(i) for i in mine)
+        total = sum(cells.counts(i) for i in side_scans)
         grown = grow_wall(
             total,
             column_m=column_m,
@@ -157,37 +168,41 @@ class _Found:
             joined_rows=np.searchsorted(grid.edges_m, joints_m[1:-1] - 1e-9),
         )
         refuse_no_wall(grown, cells)
+        # Scans that do not overlap can show a single wall as two surfaces.
         second = two_surfaces_in(grown, total, cells)
         if second is not None:
-            return self._apart(mine, joints_m, column_m, grown, second)
-        for i in mine:
+            return self._apart(side_scans, joints_m, column_m, grown, second)
+        for i in side_scans:
             mean, self.sd[i], self.count[i] = _means(cells, i, grown)
             self.radius[i] = cells.surface.radius_m + mean
-            self.turn[i], self.along[i] = _places(cells, i)
-        values, sds = _together(self.radius[mine], self.sd[mine], self.count[mine])
+            self.turn[i], self.along[i] = _mean_places(cells, i)
+        # The mean over scans has the least noise, so that the trend test is applied to it.
+        values, sds = _weighted_mean(
+            self.radius[side_scans], self.sd[side_scans], self.count[side_scans]
+        )
         grown.why[off_trend(values, sds, grown.why == WALL)] = OFF_TREND
-        for i in mine:
+        for i in side_scans:
             self.is_wall[i] = (grown.why == WALL) & (self.count[i] >= 3)
             self.radius[i][~self.is_wall[i]] = np.nan
-            course = np.searchsorted(joints_m[1:-1], _middles(grid), side="right")
+            course = np.searchsorted(joints_m[1:-1], _row_centres(grid), side="right")
             width, row_m = float(np.median(column_m)), float(np.median(np.diff(grid.edges_m)))
-            self.scatter[i] = _scatter(self.radius[i], course, row_m, width)
+            self.scatter[i] = _scatter_of_cells(self.radius[i], course, row_m, width)
             least = max(LEAST_SD_M, self.scatter[i])
             self.sd[i] = np.maximum(self.sd[i], least)
         return grown
 
-    def _apart(self, mine, joints_m, column_m, grown, second):
-        """`Grown` where two surfaces are one wall in scans that do not meet; else raise `second`.
+    def _apart(self, side_scans, joints_m, column_m, grown, second):
+        """Decide each scan alone where scans that do not overlap show one wall as two surfaces.
 
-        Each scan then decides alone. It must show a single surface itself: a wall with another
-        surface before a part of it has two in the scan that sees both.
+        Each scan must show a single surface. Otherwise another surface hides a part of the wall,
+        and `second` is raised. The result is a `Grown`.
         """
-        if len(mine) == 1:
+        if len(side_scans) == 1:
             raise second
         why = grown.why.copy()
-        for one in mine:
+        for scan in side_scans:
             try:
-                alone = self.decide([one], joints_m, column_m)
+                alone = self.decide([scan], joints_m, column_m)
             except InputError:
                 raise second from None
             why[alone.why == WALL] = WALL
@@ -195,18 +210,24 @@ class _Found:
         return replace(grown, why=why)
 
 
-def _middles(grid):
+def _row_centres(grid):
     return (grid.edges_m[:-1] + grid.edges_m[1:]) / 2
 
 
 def _column_widths(cells):
-    """(rows,) width of a cell, m."""
-    return FULL_TURN * cells.surface.width_m(_middles(cells.grid)) / cells.grid.columns
+    """Width of a cell in each row (rows,), m."""
+    return FULL_TURN * cells.surface.width_m(_row_centres(cells.grid)) / cells.grid.columns
 
 
 def _means(cells, scan, grown):
-    """Mean and its sd by the points alone (rows, columns), m, and their count, of one scan, over
-    the bins of the wall; nan where there is none.
+    """Mean distance of the points of one scan over the bins of the wall.
+
+    Returns
+    -------
+    mean, spread : ndarray, shape (rows, columns)
+        Mean and its standard deviation from the points alone, m; nan without points.
+    count : ndarray of int, shape (rows, columns)
+        Number of points.
     """
     grid = cells.grid
     number = np.arange(grid.bins)
@@ -214,7 +235,7 @@ def _means(cells, scan, grown):
     within &= (grown.why == WALL)[..., None]
     counts = np.where(within, cells.counts(scan), 0)
     count = counts.sum(axis=2)
-    # exact: whole numbers of units, and half a unit for what was cut off
+    # The sum of whole units is exact; half a unit compensates their truncation.
     units = np.where(within, cells.units(scan), 0).sum(axis=2) + counts @ (number << FINE_BITS)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = (units / count + 0.5) * grid.unit_m - grid.band_m
@@ -224,8 +245,8 @@ def _means(cells, scan, grown):
     return mean, spread, count
 
 
-def _places(cells, scan):
-    """Mean turn and u (rows, columns) of the points of one scan in the band."""
+def _mean_places(cells, scan):
+    """Mean azimuth (rad) and u (m), each (rows, columns), of the points of one scan in the band."""
     grid = cells.grid
     shape = grid.rows, grid.columns
     count = cells.counts(scan).sum(axis=2)
@@ -239,8 +260,8 @@ def _places(cells, scan):
     )
 
 
-def _together(radius, sd, count):
-    """Mean over scans (rows, columns) by their counts, and its sd."""
+def _weighted_mean(radius, sd, count):
+    """Mean over scans, weighted by counts, and its standard deviation, each (rows, columns), m."""
     weight = np.where(np.isfinite(radius), count, 0).astype(float)
     total = weight.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -249,24 +270,29 @@ def _together(radius, sd, count):
         return mean, np.sqrt((np.nan_to_num(sd) ** 2 * share**2).sum(axis=0))
 
 
-def _scatter(radius, course, row_m, column_m):
-    """Sd of the mean of a cell as its neighbours show it: the largest of those told along rows and
-    along columns, by cells side by side and by cells that noise along a line does not tie.
+def _scatter_of_cells(radius, course, row_m, column_m):
+    """Standard deviation of the mean of a cell, from second differences between cells, m.
 
-    m2 - (m1 + m3) / 2 has the variance 1.5 s2. What all of a row or of a column show alike is the
-    form of the wall, such as a bulge, and taken off. Columns are not followed over a joint.
+    The result is the largest of up to four estimates: along rows and along columns, for adjacent
+    cells and for cells so far apart that they share no noise of a scan line.
+
+    The second difference m2 - (m1 + m3) / 2 has the variance 1.5 s2. Its median over a row or a
+    column is the form of the wall, such as a bulge, and is subtracted. Columns end at each joint.
     """
-    parts = [(np.vstack([radius.T, radius.T]), column_m, "round")]  # columns go on round
-    parts += [(radius[course == one], row_m, "up") for one in np.unique(course)]
-    found = {}
-    for values, size_m, way in parts:
+    # Rows are closed: they are repeated, so that differences extend over the last column.
+    parts = [(np.vstack([radius.T, radius.T]), column_m, "round")]
+    parts += [(radius[course == item], row_m, "up") for item in np.unique(course)]
+    differences = {}
+    for values, size_m, direction in parts:
         most = (len(values) - 1) // 2
         for lag in {1, min(max(1, round(APART_M / size_m)), most)} - {0}:
             e = values[lag:-lag] - (values[: -2 * lag] + values[2 * lag :]) / 2
             e = e[np.isfinite(e).any(axis=1)]
             if len(e):
                 e = e - np.nanmedian(e, axis=1, keepdims=True)
-                found.setdefault((way, lag), []).append(e[np.isfinite(e)])
-    told = [np.concatenate(one) for one in found.values()]
-    told = [SD_OVER_MEDIAN * np.median(np.abs(e)) for e in told if len(e) >= FEWEST_TOLD]
-    return float(max(told, default=0.0) / np.sqrt(1.5))
+                differences.setdefault((direction, lag), []).append(e[np.isfinite(e)])
+    scatters = [np.concatenate(item) for item in differences.values()]
+    scatters = [
+        SD_OVER_MEDIAN * np.median(np.abs(e)) for e in scatters if len(e) >= FEWEST_DIFFERENCES
+    ]
+    return float(max(scatters, default=0.0) / np.sqrt(1.5))

@@ -1,6 +1,6 @@
-"""What the cells of a wall show beside its form: joints, welds, and what stands before it.
+"""Joints, welds and obstructions in the cells of a wall.
 
-All of it is proposed: joints of the job stay true, and no volume is known of what hides the wall.
+All are proposals. The joints of the job remain valid. The volume of an obstruction is not known.
 """
 
 from dataclasses import dataclass
@@ -13,28 +13,32 @@ from tankcal.clouds.wall.cells import FAR_BINS, FAR_M
 from tankcal.clouds.wall.growing import EMPTY, WALL, spread_between
 from tankcal.geometry.outlines import FULL_TURN
 
-JOINT_ROWS, LEAST_STEP_M, SURE_STEP = 4, 0.002, 5.0  # rows on each side of a step; its size
-WELD_M, WELD_REACH_M, LEAST_WELD_M = 0.6, 1.5, 0.003  # width, of what is level beside it, depth
-SURE_WELD = 5.0
-# of a weld: width at half its depth, cells that it is looked for in, depth in a third of its course
+# Rows on each side of a step; least step, m, and as a multiple of the scatter
+JOINT_ROWS, LEAST_STEP_M, SURE_STEP = 4, 0.002, 5.0
+# Distance between welds; half-width of the wall that the depth refers to; least depth, m
+WELD_M, WELD_REACH_M, LEAST_WELD_M = 0.6, 1.5, 0.003
+SURE_WELD = 5.0  # least depth of a weld as a multiple of the noise
+# Largest width of a weld at half its depth, m; cells in which the width is determined; least share
+# of the depth in each third of the course
 HALF_DEPTH_M, WELD_CELLS, RUNS_ON = 0.3, 12, 0.6
-CLOSED_CELLS = 2  # between parts of one obstruction
-SMALLEST_CELLS, LEAST_FAR = 6, 3
+CLOSED_CELLS = 2  # largest gap between parts of one obstruction, cells
+SMALLEST_CELLS, LEAST_FAR = 6, 3  # least cells of an obstruction; least points of a distant bin
+# Largest width of a pipe, m; least arc and largest height of a ring, m; largest size of a nozzle, m
 PIPE_WIDTH_M, RING_ARC, RING_HEIGHT_M, NOZZLE_M = 1.0, np.pi / 3, 0.6, 1.5
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A step of the radius.
+    """Step of the radius between rows, proposed as a joint of two courses.
 
     Attributes
     ----------
     height_m : float
-        In the frame of the points, m.
+        Height of the step in the frame of the points, m.
     step_m : float
-        Mean radius above less that below, m.
+        Mean radius above the step less the mean radius below the step, m.
     nearest_m : float
-        Height of the nearest joint of the job, m; nan: it has none.
+        Height of the nearest joint of the job, m; nan if the job has no joint.
     """
 
     height_m: float
@@ -44,15 +48,16 @@ class Joint:
 
 @dataclass(frozen=True)
 class Weld:
-    """A narrow valley (negative depth: a ridge) over a course, such as a vertical weld.
+    """Narrow valley or ridge over the height of a course, such as a vertical weld.
 
     Attributes
     ----------
     course : int
-        From the bottom, 0 is the first.
+        Index of the course from the bottom, from 0.
     azimuth_rad : float
+        Azimuth of the weld, rad.
     depth_m : float
-        Of the wall beside it, inwards positive, m.
+        Displacement from the adjacent wall, m, positive inwards.
     """
 
     course: int
@@ -62,20 +67,21 @@ class Weld:
 
 @dataclass(frozen=True)
 class Obstruction:
-    """Cells that hang together where something hides the wall.
+    """Connected cells in which an object hides the wall.
 
     Attributes
     ----------
     azimuth_rad : tuple of float
-        First and last, clockwise; the last may pass 2 pi.
+        First and last azimuth, clockwise, rad; the last may exceed 2 pi.
     height_m : tuple of float
-        In the frame of the points, m.
+        Lower and upper end in the frame of the points, m.
     distance_m : tuple of float
-        From the mean surface, outwards positive: 5 and 95 % of what is seen there; nan: nothing
-        is, the wall is out of sight.
+        Quantiles of 5 % and 95 % of the distances seen, from the mean surface, m, positive
+        outwards; nan if nothing is seen.
     cells : int
+        Number of cells.
     guess : str
-        "pipe", "stairs", "ring", "nozzle" or "unseen".
+        Probable kind: "pipe", "stairs", "ring", "nozzle" or "unseen".
     """
 
     azimuth_rad: tuple[float, float]
@@ -86,113 +92,161 @@ class Obstruction:
 
     @property
     def deadwood_row(self):
-        """name, bottom_m, top_m of a row of deadwood; its volume cannot be known from a mask."""
+        """Row of deadwood without volume: name, bottom_m, top_m."""
         return f"{self.guess} {np.degrees(self.azimuth_rad[0]):.0f} deg", *self.height_m
 
 
 def find_joints(radius_m, middle_m, joints_m):
-    """`Joint` tuple: steps of the median radius (rows, columns) of neighbouring rows.
+    """Find joints as steps of the median radius between neighbouring rows.
 
-    middle_m  (rows,) height of the rows; joints_m  of the ends of the courses of the job
+    Parameters
+    ----------
+    radius_m : ndarray, shape (rows, columns)
+        Radius of the wall, m; nan where it is not seen.
+    middle_m : ndarray, shape (rows,)
+        Heights of the centres of the rows, m.
+    joints_m : ndarray, shape (courses + 1,)
+        Heights of the ends of the courses of the job, m.
+
+    Returns
+    -------
+    tuple of Joint
+        Joints in ascending height.
     """
     with np.errstate(invalid="ignore"):
         steps = radius_m[1:] - radius_m[:-1]
     rows = len(radius_m)
     if rows < 2 * JOINT_ROWS + 1:
         return ()
-    between = _medians(steps)  # from cell to cell: what the form does round a row cancels
+    between = _medians(steps)  # steps within a column are independent of the form along the row
     scatter = max(spread_between(between[1:-1] - (between[:-2] + between[2:]) / 2), 1e-5)
     height, inner = np.diff(middle_m), joints_m[1:-1]
-    found = []
+    joints = []
     for i in np.argsort(-np.nan_to_num(np.abs(between)), kind="stable"):
-        beside = np.delete(between[max(0, i - JOINT_ROWS) : i + JOINT_ROWS + 1], min(i, JOINT_ROWS))
-        step = between[i] - np.nanmedian(beside) if np.isfinite(beside).any() else 0.0
+        neighbours = np.delete(
+            between[max(0, i - JOINT_ROWS) : i + JOINT_ROWS + 1], min(i, JOINT_ROWS)
+        )
+        step = between[i] - np.nanmedian(neighbours) if np.isfinite(neighbours).any() else 0.0
         if not abs(step) > max(LEAST_STEP_M, SURE_STEP * scatter):
             break
-        at = middle_m[i] + height[i] / 2
-        if all(abs(at - one.height_m) > JOINT_ROWS * height[i] for one in found):
-            nearest = inner[np.argmin(np.abs(inner - at))] if len(inner) else np.nan
-            found.append(Joint(float(at), float(step), float(nearest)))
-    return tuple(sorted(found, key=lambda one: one.height_m))
+        height_m = middle_m[i] + height[i] / 2
+        if all(abs(height_m - joint.height_m) > JOINT_ROWS * height[i] for joint in joints):
+            nearest = inner[np.argmin(np.abs(inner - height_m))] if len(inner) else np.nan
+            joints.append(Joint(float(height_m), float(step), float(nearest)))
+    return tuple(sorted(joints, key=lambda joint: joint.height_m))
 
 
 def find_welds(radius_m, course, column_m):
-    """`Weld` tuple: narrow valleys and ridges in the median profile of each course.
+    """Find welds as narrow valleys and ridges in the median profile of each course.
 
-    course  (rows,) of each row; column_m  (rows,) width of a cell
+    Parameters
+    ----------
+    radius_m : ndarray, shape (rows, columns)
+        Radius of the wall, m; nan where it is not seen.
+    course : ndarray of int, shape (rows,)
+        Course of each row.
+    column_m : ndarray, shape (rows,)
+        Width of a cell, m.
+
+    Returns
+    -------
+    tuple of Weld
     """
-    found = []
-    for one in np.unique(course):
-        mine = course == one
-        width = float(np.median(column_m[mine]))
+    welds = []
+    for item in np.unique(course):
+        rows = course == item
+        width = float(np.median(column_m[rows]))
         reach = max(2, round(WELD_REACH_M / width))
-        beside = radius_m[mine] - _medians(radius_m[mine])[:, None]
-        depth = _depths(beside, reach)
-        thirds = [_depths(part, reach) for part in np.array_split(beside, 3) if len(part)]
+        deviation = radius_m[rows] - _medians(radius_m[rows])[:, None]
+        depth = _weld_depths(deviation, reach)
+        thirds = [_weld_depths(part, reach) for part in np.array_split(deviation, 3) if len(part)]
         is_empty = not np.isfinite(depth).any()
         noise = 1.0 if is_empty else max(SD_OVER_MEDIAN * np.nanmedian(np.abs(depth)), 1e-4)
         apart = max(1, round(WELD_M / width))
-        left = np.nan_to_num(np.abs(depth))
-        while left.max() > max(LEAST_WELD_M, SURE_WELD * noise):
-            i = int(np.argmax(left))
-            if _is_narrow(depth, i, width) and all(_runs_on(one, i, depth[i]) for one in thirds):
+        # Take the deepest column first, then exclude its neighbours.
+        remaining = np.nan_to_num(np.abs(depth))
+        while remaining.max() > max(LEAST_WELD_M, SURE_WELD * noise):
+            i = int(np.argmax(remaining))
+            if _is_narrow(depth, i, width) and all(
+                _extends_to(item, i, depth[i]) for item in thirds
+            ):
                 turn = (i + 0.5) * FULL_TURN / len(depth)
-                found.append(Weld(int(one), float(turn), float(depth[i])))
-            left[np.arange(i - apart, i + apart + 1) % len(left)] = 0.0
-    return tuple(found)
+                welds.append(Weld(int(item), float(turn), float(depth[i])))
+            remaining[np.arange(i - apart, i + apart + 1) % len(remaining)] = 0.0
+    return tuple(welds)
 
 
-def _depths(beside_m, reach):
-    """(columns,) how far the median of some rows lies inside of the columns beside it."""
-    profile = _medians(beside_m.T)
+def _weld_depths(deviation_m, reach):
+    """Depth (columns,) of the median profile below the adjacent columns, m, positive inwards."""
+    profile = _medians(deviation_m.T)
     return _moving_median(profile, reach) - profile
 
 
 def _is_narrow(depth, i, width):
-    """Is what is deep here no wider than a weld at half of its depth?"""
-    there = depth[(i + np.arange(-WELD_CELLS, WELD_CELLS + 1)) % len(depth)] / depth[i]
-    wide = 0.0
-    for side in (there[WELD_CELLS::-1], there[WELD_CELLS:]):
-        under = np.flatnonzero(~(side > 0.5))
-        if not len(under):
+    """Whether the width at half the depth is at most the width of a weld."""
+    relative_depth = depth[(i + np.arange(-WELD_CELLS, WELD_CELLS + 1)) % len(depth)] / depth[i]
+    total_width = 0.0
+    for side in (relative_depth[WELD_CELLS::-1], relative_depth[WELD_CELLS:]):
+        below_half = np.flatnonzero(~(side > 0.5))
+        if not len(below_half):
             return False
-        k = under[0]
-        part = (side[k - 1] - 0.5) / (side[k - 1] - side[k]) if np.isfinite(side[k]) else 1.0
-        wide += (k - 1 + part) * width
-    return wide < max(HALF_DEPTH_M, 1.5 * width)
+        k = below_half[0]
+        fraction = (side[k - 1] - 0.5) / (side[k - 1] - side[k]) if np.isfinite(side[k]) else 1.0
+        total_width += (k - 1 + fraction) * width
+    return total_width < max(HALF_DEPTH_M, 1.5 * width)
 
 
-def _runs_on(depth, i, whole):
-    """Does a part of the course show it, too, here or in the column beside? A buckle ends."""
+def _extends_to(depth, i, whole):
+    """Whether a part of the course shows the weld in this or an adjacent column.
+
+    A buckle does not extend over the whole course.
+    """
     near = depth[(i + np.arange(-1, 2)) % len(depth)] / whole
     return not np.isfinite(near).any() or np.nanmax(near) > RUNS_ON
 
 
 def find_obstructions(seen, grown, cells, column_m):
-    """`Obstruction` tuple, the largest first, of masked cells that hang together.
+    """Find obstructions as connected cells in which no scan shows the wall.
 
-    seen  (rows, columns) cells that are wall for some scan; grown  `Grown` of each side
+    Parameters
+    ----------
+    seen : ndarray of bool, shape (rows, columns)
+        Cells in which a scan shows the wall.
+    grown : list of Grown
+        Decision of each side.
+    cells : WallCells
+        Sums over the points in cells.
+    column_m : ndarray, shape (rows,)
+        Width of a cell, m.
+
+    Returns
+    -------
+    tuple of Obstruction
+        The largest first.
     """
     masked, columns = ~seen, seen.shape[1]
-    around = CLOSED_CELLS + 1
-    closed = np.pad(masked, ((0, 0), (around, around)), mode="wrap")
+    margin = CLOSED_CELLS + 1
+    # Parts with small gaps form one obstruction; rows are closed, so that the mask is wrapped.
+    closed = np.pad(masked, ((0, 0), (margin, margin)), mode="wrap")
     closed = scipy.ndimage.binary_closing(closed, np.ones((3, 3)), CLOSED_CELLS - 1)
-    closed = closed[:, around:-around] | masked
+    closed = closed[:, margin:-margin] | masked
     label, count = scipy.ndimage.label(closed, np.ones((3, 3)))
-    label = _joined_round(label, count)
+    label = _join_across_first_column(label, count)
     row, column = np.nonzero(masked)
     number = label[row, column]
-    found = []
-    for one in np.flatnonzero(np.bincount(number, minlength=1) >= SMALLEST_CELLS):
-        mine = number == one
-        found.append(
-            _obstruction(row[mine], _unwound(column[mine], columns), grown, cells, column_m)
+    obstructions = []
+    for item in np.flatnonzero(np.bincount(number, minlength=1) >= SMALLEST_CELLS):
+        members = number == item
+        obstructions.append(
+            _describe_obstruction(
+                row[members], _unwrap_columns(column[members], columns), grown, cells, column_m
+            )
         )
-    return tuple(sorted(found, key=lambda one: -one.cells))
+    return tuple(sorted(obstructions, key=lambda item: -item.cells))
 
 
-def _joined_round(label, count):
-    """Labels where those that meet between the last and the first column are one."""
+def _join_across_first_column(label, count):
+    """Unite the labels that touch between the last and the first column."""
     number = np.arange(count + 1)
     for step in (-1, 0, 1):
         first, last = label[max(0, step) :, 0], label[: len(label) - max(0, step), -1]
@@ -204,47 +258,51 @@ def _joined_round(label, count):
     return number[label]
 
 
-def _unwound(column, columns):
-    """Columns that run on beyond the last, from the first after the widest gap."""
+def _unwrap_columns(column, columns):
+    """Number columns consecutively from the end of the widest gap, beyond the last column."""
     known = np.unique(column)
     gaps = np.diff(np.append(known, known[0] + columns))
     begin = known[(np.argmax(gaps) + 1) % len(known)]
     return begin + (column - begin) % columns
 
 
-def _obstruction(row, column, grown, cells, column_m):
+def _describe_obstruction(row, column, grown, cells, column_m):
     grid = cells.grid
     turn = FULL_TURN / grid.columns
     index = row * grid.columns + column % grid.columns
     azimuth = column.min() * turn, min((column.max() + 1) * turn, column.min() * turn + FULL_TURN)
     height = float(grid.edges_m[row.min()]), float(grid.edges_m[row.max() + 1])
-    distances = _distances(row, column % grid.columns, index, grown, cells)
+    distances = _distances_of_others(row, column % grid.columns, index, grown, cells)
     wide = float((azimuth[1] - azimuth[0]) / turn * np.median(column_m[row]))
-    guess = _guess(row, column, azimuth, height, distances, wide)
+    guess = _guess_kind(row, column, azimuth, height, distances, wide)
     reach = np.percentile(distances, [5, 95]) if len(distances) else (np.nan, np.nan)
     return Obstruction(
-        tuple(float(one) for one in azimuth),
+        tuple(float(value) for value in azimuth),
         height,
-        tuple(float(one) for one in reach),
+        tuple(float(value) for value in reach),
         len(row),
         guess,
     )
 
 
-def _distances(row, column, index, grown, cells):
-    """Distances that are seen in some cells, from their other modes and from far points."""
+def _distances_of_others(row, column, index, grown, cells):
+    """Distances of other surfaces in some cells, from second modes and from distant points, m."""
     grid = cells.grid
     parts = []
-    for one in grown:
-        other = one.other[row, column]
-        known = (other >= 0) & (one.why[row, column] != WALL) & (one.why[row, column] != EMPTY)
+    for side_grown in grown:
+        other = side_grown.other[row, column]
+        known = (
+            (other >= 0)
+            & (side_grown.why[row, column] != WALL)
+            & (side_grown.why[row, column] != EMPTY)
+        )
         parts.append((other[known] + 0.5) * grid.bin_m - grid.band_m)
     _, far = np.nonzero(cells.far[index] >= LEAST_FAR)
     parts.append((far + 0.5) * (2 * FAR_M / FAR_BINS) - FAR_M)
     return np.concatenate(parts)
 
 
-def _guess(row, column, azimuth, height, distances, wide):
+def _guess_kind(row, column, azimuth, height, distances, wide):
     tall = height[1] - height[0]
     if len(distances) < 3:
         return "unseen"
@@ -260,15 +318,15 @@ def _guess(row, column, azimuth, height, distances, wide):
 
 
 def _medians(values):
-    """(n,) medians of rows; nan of rows without a value."""
-    found = np.full(len(values), np.nan)
+    """Medians of rows (n,); nan for a row without values."""
+    medians = np.full(len(values), np.nan)
     known = np.isfinite(values).any(axis=1)
     if known.any():
-        found[known] = np.nanmedian(values[known], axis=1)
-    return found
+        medians[known] = np.nanmedian(values[known], axis=1)
+    return medians
 
 
 def _moving_median(profile, reach):
-    """(n,) median of the neighbours up to `reach` cells on both sides, round the row."""
+    """Median (n,) of the neighbours up to `reach` cells on both sides, around a closed row."""
     window = np.stack([np.roll(profile, step) for step in range(-reach, reach + 1)])
     return _medians(window.T)

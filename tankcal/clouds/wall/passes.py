@@ -1,9 +1,9 @@
-"""The two passes over the points of scans: what is taken of them, here or shared out.
+"""Passes over the points of scans, in one process or divided among several.
 
-`find_cloud_wall` asks an object for `sample(most)` and `cells(surface, grid, scans)`, who looks for
-more for `gather(taken_of, ...)`; `Passes` goes over all points in this process. Whoever shares
-points out makes these of parts, with `sample_of` and `cells_of`, and adds them: samples and sums
-are the same whatever the parts and their order.
+`find_cloud_wall` calls `sample(most)` and `cells(surface, grid, scans)` of an object; the search
+for the bottom and for objects calls `gather(taken_of, ...)`. `Passes` reads all points in this
+process. Other processes can apply `sample_of` and `cells_of` to parts of the points and merge the
+results. Samples and sums do not depend on the parts or their order.
 """
 
 from dataclasses import dataclass
@@ -16,52 +16,52 @@ from tankcal.clouds.wall.screens import FILE
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
-FARTHEST_M = 1e8  # of coordinates: doubles tell 15 nm there
+FARTHEST_M = 1e8  # largest coordinate, m; the resolution of float64 is 15 nm there
 
 
 @dataclass(frozen=True)
 class Passes:
-    """Both passes in this process.
+    """Passes over the points in this process.
 
     Attributes
     ----------
     points : callable
-        Gives a fresh iterator of (scan number, xyz (n, 3) in the frame of the tank, m).
+        Returns a new iterator of (scan number, xyz (n, 3) in the frame of the tank, m).
     """
 
     points: object
 
     def sample(self, most):
-        """`PointSample` of at most so many points."""
+        """Return a `PointSample` of at most `most` points."""
         return sample_of(self.points(), most)
 
     def cells(self, surface, grid, scans):
-        """`WallCells` of all points."""
+        """Return the `WallCells` of all points."""
         return cells_of(self.points(), surface, grid, scans)
 
     def gather(self, taken_of, *sizes):
-        """What `taken_of` takes of all points and these sizes; two of it have `merged`."""
+        """Apply `taken_of` to all points and the other arguments; the result must have `merged`."""
         return taken_of(self.points(), *sizes)
 
 
 def sample_of(points, most):
-    """`PointSample` of an iterator of points; InputError for those that cannot be."""
+    """Sample an iterator of (scan, points); raise InputError for invalid coordinates."""
     sample = PointSample(most)
     for scan, xyz in points:
-        sample.add(_checked(xyz, scan), scan)
+        sample.add(_check_points(xyz, scan), scan)
     return sample
 
 
 def cells_of(points, surface, grid, scans):
-    """`WallCells` of an iterator of points."""
+    """Sum an iterator of (scan, points) in `WallCells`."""
     cells = WallCells(surface, grid, scans)
     for scan, xyz in points:
         cells.add(xyz, scan)
     return cells
 
 
-def _checked(xyz_m, scan):
-    """Points as float64 (n, 3), all finite."""
+def _check_points(xyz_m, scan):
+    """Convert points to float64 (n, 3); raise InputError if a coordinate is too large or nan."""
     xyz_m = np.asarray(xyz_m, dtype=float)
     if xyz_m.ndim != 2 or xyz_m.shape[1] != 3:
         raise ValueError(f"points of scan {scan} have shape {xyz_m.shape}; expected (n, 3)")

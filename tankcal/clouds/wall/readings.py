@@ -1,8 +1,8 @@
-"""Readings of a wall from its cells: so many that a job can carry them, spread evenly.
+"""Reduction of the cells of a wall to a limited number of evenly spread readings.
 
-Cells of one scan in a sector of a low band of rows are one reading: their mean. Its sd is that of
-one cell as neighbouring cells show it; that many cells (or points) lie in it does not make it
-smaller, for what neighbours share (mixed pixels, noise along a scan line) does not average out.
+A reading is the mean of the cells of one scan in a sector of a few rows. Its standard deviation is
+that of a single cell and does not decrease with the number of cells or points. Neighbouring cells
+share errors (mixed pixels, noise along a scan line), which do not average out.
 """
 
 from dataclasses import dataclass
@@ -10,27 +10,28 @@ from itertools import pairwise
 
 import numpy as np
 
-LEVELS = 5  # of a course
-TALLEST = 0.1  # of a course: 0.2 of half of it
-ENOUGH_SECTORS = 24  # before a place that several scans show is told by all of them
-LEVELS_OF_BODY = 24  # rows of readings of a lying cylinder or a sphere
+LEVELS = 5  # levels of readings in a course
+TALLEST = 0.1  # largest height of a level as a share of its course
+ENOUGH_SECTORS = 24  # least number of sectors before several scans are kept at one position
+LEVELS_OF_BODY = 24  # levels of readings of a lying cylinder or a sphere
 
 
 @dataclass(frozen=True)
 class CloudReadings:
-    """Points of the wall, each the mean of cells of one scan; n of them.
+    """Readings of the wall, each the mean of cells of one scan.
 
     Attributes
     ----------
     scan : ndarray of int, shape (n,)
+        Scan of each reading.
     xyz_m : ndarray, shape (n, 3)
-        At the mean radius, in the frame of the tank.
+        Point at the mean radius, in the frame of the tank, m.
     sd_m : ndarray, shape (n,)
-        Of the radius, of what is independent between readings.
+        Standard deviation of the radius, from errors independent between readings, m.
     course, level, sector : ndarray of int, shape (n,)
-        Which they are of; levels count from the bottom of the shell.
+        Course, level and sector of each reading; levels count from the bottom of the shell.
     cells : ndarray of int, shape (n,)
-        Cells that were averaged.
+        Number of cells in the mean.
     """
 
     scan: np.ndarray
@@ -43,30 +44,30 @@ class CloudReadings:
 
 
 def readings_of(cloud_wall, most=1200):
-    """`CloudReadings` of a `CloudWall`, at most so many.
+    """Reduce a `CloudWall` to at most `most` readings (`CloudReadings`).
 
-    Levels are spread evenly over each course; where `most` does not suffice for all scans that
-    show a place, those with the most cells there are kept.
+    Levels are spread evenly over each course. If `most` does not suffice for all scans at a
+    position, the scans with the most cells at that position are kept.
     """
-    level, course = _levels(cloud_wall)
+    level, course = _assign_levels(cloud_wall)
     columns, scans = cloud_wall.grid.columns, len(cloud_wall.sides)
-    lines = level.max() + 1
-    kept = cloud_wall.is_wall & (level >= 0)[None, :, None]
-    scan, row, column = np.nonzero(kept)
+    levels = level.max() + 1
+    is_used = cloud_wall.is_wall & (level >= 0)[None, :, None]
+    scan, row, column = np.nonzero(is_used)
     for ranked in range(scans, 0, -1):
-        sectors = _most_sectors(scan, level[row], column, columns, lines, ranked, most)
+        sectors = _most_sectors(scan, level[row], column, columns, levels, ranked, most)
         if sectors >= ENOUGH_SECTORS or ranked == 1:
             break
-    group = _groups(scan, level[row], column, columns, lines, sectors)
-    taken, cells = _ranked(*np.unique(group, return_counts=True), lines * sectors, ranked)
-    taken, cells = taken[:most], cells[:most]
-    place = np.searchsorted(taken, group)
-    mine = (place < len(taken)) & (taken[np.minimum(place, len(taken) - 1)] == group)
-    return _means(
+    group = _group_numbers(scan, level[row], column, columns, levels, sectors)
+    groups, cells = _keep_largest(*np.unique(group, return_counts=True), levels * sectors, ranked)
+    groups, cells = groups[:most], cells[:most]
+    place = np.searchsorted(groups, group)
+    in_reading = (place < len(groups)) & (groups[np.minimum(place, len(groups) - 1)] == group)
+    return _mean_readings(
         cloud_wall,
-        (scan[mine], row[mine], column[mine]),
-        place[mine],
-        taken,
+        (scan[in_reading], row[in_reading], column[in_reading]),
+        place[in_reading],
+        groups,
         cells,
         level,
         course,
@@ -74,32 +75,35 @@ def readings_of(cloud_wall, most=1200):
     )
 
 
-def _levels(cloud_wall):
-    """(rows,) level of each row, -1: of none, and (levels,) its course."""
+def _assign_levels(cloud_wall):
+    """Level of each row (rows,), -1 for none, and course of each level (levels,)."""
     edges, joints = cloud_wall.grid.edges_m, np.array(cloud_wall.joints_m)
     middle = (edges[:-1] + edges[1:]) / 2
     level, course = np.full(len(middle), -1), []
-    per = LEVELS if len(joints) > 2 or cloud_wall.grid.rows < LEVELS_OF_BODY else LEVELS_OF_BODY
-    tallest = TALLEST if per == LEVELS else 1 / per
-    for one, (low, high) in enumerate(pairwise(joints)):
+    count_per_course = (
+        LEVELS if len(joints) > 2 or cloud_wall.grid.rows < LEVELS_OF_BODY else LEVELS_OF_BODY
+    )
+    tallest = TALLEST if count_per_course == LEVELS else 1 / count_per_course
+    for course_number, (low, high) in enumerate(pairwise(joints)):
         rows = np.flatnonzero((middle > low) & (middle < high))
         height = (high - low) / len(rows)
-        thick = max(1, int(tallest * (high - low) / height + 1e-9))
-        count = min(per, len(rows) // thick)
+        rows_of_level = max(1, int(tallest * (high - low) / height + 1e-9))
+        count = min(count_per_course, len(rows) // rows_of_level)
         for k in range(count):
-            begin = round((k + 0.5) * len(rows) / count - thick / 2)
-            begin = min(max(begin, 0), len(rows) - thick)
-            level[rows[begin : begin + thick]] = len(course)
-            course.append(one)
+            begin = round((k + 0.5) * len(rows) / count - rows_of_level / 2)
+            begin = min(max(begin, 0), len(rows) - rows_of_level)
+            level[rows[begin : begin + rows_of_level]] = len(course)
+            course.append(course_number)
     return level, np.array(course)
 
 
-def _groups(scan, level, column, columns, lines, sectors):
-    return (scan * lines + level) * sectors + column * sectors // columns
+def _group_numbers(scan, level, column, columns, levels, sectors):
+    """Number of the reading to which each cell belongs, unique for scan, level and sector."""
+    return (scan * levels + level) * sectors + column * sectors // columns
 
 
-def _ranked(groups, cells, places, ranked):
-    """The groups whose scan is among those of the most cells at its place."""
+def _keep_largest(groups, cells, places, ranked):
+    """Keep at each position the `ranked` groups with the most cells; return groups and cells."""
     if not len(groups):
         return groups, cells
     order = np.lexsort((groups, -cells, groups % places))
@@ -110,30 +114,31 @@ def _ranked(groups, cells, places, ranked):
     return groups[chosen], cells[chosen]
 
 
-def _most_sectors(scan, level, column, columns, lines, ranked, most):
-    """The largest number of sectors that gives no more readings than `most`; at least 3."""
+def _most_sectors(scan, level, column, columns, levels, ranked, most):
+    """Largest number of sectors, at least 3, that gives at most `most` readings, by bisection."""
     low, high = 3, columns
     while low < high:
         sectors = (low + high + 1) // 2
-        groups = _groups(scan, level, column, columns, lines, sectors)
-        found = np.unique(groups, return_counts=True)
-        count = len(_ranked(*found, lines * sectors, ranked)[0])
+        groups = _group_numbers(scan, level, column, columns, levels, sectors)
+        group_cells = np.unique(groups, return_counts=True)
+        count = len(_keep_largest(*group_cells, levels * sectors, ranked)[0])
         low, high = (sectors, high) if count <= most else (low, sectors - 1)
     return low
 
 
-def _means(wall, index, place, taken, cells, level, course, sectors):
+def _mean_readings(wall, index, place, groups, cells, level, course, sectors):
+    """Average the cells of each reading; `place` is the reading of each cell."""
     turn, along = wall.turn_rad[index], wall.along_m[index]
     distance = wall.radius_m[index] - wall.surface.radius_m
-    places, lines = len(taken), len(course)
+    places, levels = len(groups), len(course)
 
     def mean(values):
         return np.bincount(place, values, places) / cells
 
     first = np.full(places, 0.0)
-    first[place] = turn  # a sector does not pass the first column
+    first[place] = turn  # azimuths relative to the first cell; no sector crosses azimuth 0
     u, azimuth = mean(along), first + mean(turn - first[place])
-    scan, rest = np.divmod(taken, lines * sectors)
+    scan, rest = np.divmod(groups, levels * sectors)
     row, sector = np.divmod(rest, sectors)
     return CloudReadings(
         scan=scan,

@@ -1,22 +1,25 @@
-"""A random sample of points that hangs on the points alone, not on their order or pieces.
+"""Random sample of points that does not depend on the order or division of the points.
 
-Each point gets a number by a hash of its coordinates and its scan; the points of the smallest
-numbers are the sample, so that samples of parts make the sample of the whole.
+Each point has a number, a hash of its coordinates and its scan. The sample consists of the points
+with the smallest numbers, so that samples of parts merge to the sample of all points.
 """
 
 import numpy as np
 
 SEED = np.uint64(0x2011_7507_0000_0001)
-MIX = tuple(np.uint64(one) for one in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB))
+MIX = tuple(
+    np.uint64(word) for word in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
+)
 PIECE = 1 << 16
 
 
 class PointSample:
-    """At most `most` points of all that were added, and how many there were of each scan.
+    """Sample of the added points, and the number of points added of each scan.
 
     Parameters
     ----------
     most : int
+        Largest number of points in the sample.
     """
 
     def __init__(self, most):
@@ -40,7 +43,7 @@ class PointSample:
                 self.reduce()
 
     def merged(self, other):
-        """The sample of the points of both."""
+        """Return the sample of both sets of points."""
         both = PointSample(self.most)
         both._xyz, both._key = self._xyz + other._xyz, self._key + other._key
         both._scan = self._scan + other._scan
@@ -51,22 +54,22 @@ class PointSample:
         return both
 
     def points(self):
-        """(k, 3) points, in the order of their numbers."""
+        """Sampled points (k, 3), in the order of their numbers."""
         order = self._order()
         return self._xyz[0][order]
 
     def scans(self):
-        """(k,) scan of each of the points."""
+        """Scan (k,) of each point of `points`."""
         order = self._order()
         return self._scan[0][order]
 
     def _order(self):
-        """(k,) order of the numbers, after the reduction."""
+        """Reduce the sample and return the order (k,) of the numbers."""
         self.reduce()
         return np.lexsort((*self._xyz[0].T, self._key[0]))
 
     def reduce(self):
-        """Let go of points that are not in the sample."""
+        """Discard points that do not belong to the sample."""
         xyz, key, scan = np.vstack(self._xyz), *map(np.concatenate, (self._key, self._scan))
         if len(key) > self.most:
             best = np.argpartition(key, self.most - 1)[: self.most]
@@ -76,11 +79,11 @@ class PointSample:
 
 
 def _hash(xyz_m, scan):
-    """(n,) numbers of points, by splitmix64 over the bits of x, y and z."""
+    """Numbers (n,) of points, from splitmix64 over the bits of x, y and z."""
     bits = np.ascontiguousarray(xyz_m, dtype=float).view(np.uint64).reshape(-1, 3).T
     number = np.full(bits.shape[1], SEED ^ np.uint64(scan), dtype=np.uint64)
-    for one in bits:
-        number = (number ^ one) * MIX[0]
+    for word in bits:
+        number = (number ^ word) * MIX[0]
         number = (number ^ (number >> np.uint64(30))) * MIX[1]
         number = (number ^ (number >> np.uint64(27))) * MIX[2]
         number ^= number >> np.uint64(31)

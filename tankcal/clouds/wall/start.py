@@ -1,8 +1,8 @@
-"""Where the wall is, roughly, from a sample of a cloud: its surface, or in words why there is none.
+"""Approximate surface of the wall from a sample of a cloud, or the probable cause of a failure.
 
-A wall seen along its axis is a line: squares of that view whose points stand at many heights are
-what the circle is looked for among, floors and roofs are not. `geometry.shell.find_shell` gives the
-axis. A lying cylinder is turned upright for it.
+In the view along its axis a wall is a line. Squares of this view with points at many heights
+belong to walls, not to floors or roofs; the circle is searched among them. `find_shell` of
+`geometry.shell` determines the axis. A lying cylinder is first rotated to the upright position.
 """
 
 import numpy as np
@@ -22,50 +22,55 @@ from tankcal.geometry.primitives import fit_sphere
 from tankcal.geometry.shell import consensus_circle, find_shell
 from tankcal.messages import message
 
-LEVELS, LEAST_LEVELS = 24, 0.3  # heights that squares of the view are told by, and how many of them
-SQUARE, LEAST_SQUARES = 1 / 75, 20  # of the radius; of them, with points at many heights
-CLEAR_BAND, MOST_OF_THEM = 0.01, 0.6  # of the radius; of the points of another shape
-DIAGNOSED = 60_000  # points that a cause is looked for with
-AROUND, FITTED_LEVELS = 72, 24  # cells of the points that the axis is fitted to
-WIDE = 0.03  # of the radius: how far from the first circle points may be of the wall
-FEWEST = 500  # points between the ends of the shell
-UNITS = {"mm": 1000.0, "cm": 100.0, "ft": 1 / 0.3048, "in": 1 / 0.0254}
-LEAST_ON_SPHERE = 0.3  # of the points
+LEVELS, LEAST_LEVELS = 24, 0.3  # levels of height; least share of levels with points in a square
+SQUARE, LEAST_SQUARES = 1 / 75, 20  # side of a square as a share of the radius; least number
+# Band of a surface as a share of the radius; share of the points in the band of another shape
+CLEAR_BAND, MOST_OF_THEM = 0.01, 0.6
+DIAGNOSED = 60_000  # points used to search the cause of a failure
+AROUND, FITTED_LEVELS = 72, 24  # columns and rows of cells that give points for the fit of the axis
+WIDE = 0.03  # tolerance of the nominal radius, and of points about the first circle, as a share
+FEWEST = 500  # least number of points between the ends of the shell
+UNITS = {"mm": 1000.0, "cm": 100.0, "ft": 1 / 0.3048, "in": 1 / 0.0254}  # units in one metre
+LEAST_ON_SPHERE = 0.3  # least share of the points on a sphere
+# Random samples of four points; bands of successive fits as shares of the radius
 SPHERE_TRIES, SPHERE_BANDS = 400, (0.03, 0.02, 0.01, 0.006, 0.006)
 
 
 def find_surface(
     xyz_m, *, kind, ends_m, radius_m, azimuth_rad=0.0, outwards=None, is_unit_defined=False
 ):
-    """The surface that a sample of points shows, near a nominal radius.
+    """Find the surface of a wall near a nominal radius in a sample of points.
 
     Parameters
     ----------
     xyz_m : ndarray, shape (n, 3)
+        Sample of points, m.
     kind : str
         "vertical", "horizontal" or "sphere".
     ends_m : tuple of float or None
-        Heights of bottom and top of an upright shell, m; along a lying one, from the middle of the
-        points (None: as far as they go).
+        Heights of bottom and top of an upright shell, m. For a lying shell, its ends relative to
+        the centre of the points; None for the extent of the points.
     radius_m : float
-        Nominal, on the side that the scans saw.
+        Nominal radius on the scanned side, m.
     azimuth_rad : float, optional
-        Of the axis of a lying cylinder.
+        Azimuth of the axis of a lying cylinder, rad.
     outwards : ndarray of int, shape (n,), optional
-        1 of points seen from inside, -1 from outside; None: not known, and no screen is looked for.
+        1 for points seen from inside, -1 for points seen from outside. By default the side is not
+        known, and no screen is searched.
     is_unit_defined : bool, optional
         As for `find_cloud_wall`.
 
     Returns
     -------
     surface : CylinderSurface or SphereSurface
+        Approximate surface of the wall.
     ends_m : tuple of float
-        u of its first and last row.
+        Coordinate u of the ends of the surface, m.
 
     Raises
     ------
     InputError
-        Where there is no such wall, with the likely cause.
+        If the points show no such wall; the error states the probable cause.
     """
     xyz_m = np.asarray(xyz_m, dtype=float)
     if len(xyz_m) < FEWEST:
@@ -78,9 +83,9 @@ def find_surface(
             )
         )
     try:
-        surface, ends_m_found = _surface(xyz_m, kind, ends_m, radius_m, azimuth_rad)
+        surface, ends_m_found = _fit_surface(xyz_m, kind, ends_m, radius_m, azimuth_rad)
         if outwards is not None and not (kind == "horizontal" and np.any(outwards < 0)):
-            surface = _rear_surface(surface, ends_m_found, xyz_m, outwards, radius_m)
+            surface = _choose_surface(surface, ends_m_found, xyz_m, outwards, radius_m)
         _refuse_radius(surface, radius_m)
         return surface, ends_m_found
     except SolutionError as error:
@@ -89,22 +94,22 @@ def find_surface(
         raise _problem(cause or error.args[0]) from None
 
 
-def _surface(xyz_m, kind, ends_m, radius_m, azimuth_rad):
+def _fit_surface(xyz_m, kind, ends_m, radius_m, azimuth_rad):
     if kind == "sphere":
-        surface = _sphere(xyz_m, radius_m)
+        surface = _fit_sphere(xyz_m, radius_m)
         low, high = surface.centre_m[2] - radius_m, surface.centre_m[2] + radius_m
         return surface, (low, high)
     if kind == "horizontal":
-        return _lying(xyz_m, ends_m, radius_m, azimuth_rad)
-    return _standing(xyz_m, ends_m, radius_m, np.eye(3)), ends_m
+        return _fit_lying_cylinder(xyz_m, ends_m, radius_m, azimuth_rad)
+    return _fit_cylinder(xyz_m, ends_m, radius_m, np.eye(3)), ends_m
 
 
-def _standing(xyz_m, ends_m, radius_m, frame):
-    """`CylinderSurface` along the third vector of a frame, between two places along it."""
+def _fit_cylinder(xyz_m, ends_m, radius_m, frame):
+    """Find a `CylinderSurface` along the third vector of a frame, between two ends (m)."""
     xyz = xyz_m @ frame.T
     inside = xyz[(xyz[:, 2] > ends_m[0]) & (xyz[:, 2] < ends_m[1])]
     if len(inside) < FEWEST:
-        raise _beside_shell(xyz, ends_m, len(inside))
+        raise _error_beside_shell(xyz, ends_m, len(inside))
     middle = np.array([*np.median(inside[:, :2], axis=0), (ends_m[0] + ends_m[1]) / 2])
     local, joints = inside - middle, np.array(ends_m) - middle[2]
     squares = _upright_squares(local, joints, radius_m)
@@ -121,42 +126,42 @@ def _standing(xyz_m, ends_m, radius_m, frame):
     x, y, r = consensus_circle(squares, radius_m)
     distance = np.hypot(local[:, 0] - x, local[:, 1] - y) - r
     near = local[np.abs(distance) < WIDE * radius_m]
-    return _through(_spread(near, x, y, joints), joints, radius_m, middle, frame)
+    return _fit_axis(_sample_evenly(near, x, y, joints), joints, radius_m, middle, frame)
 
 
-def _through(some, joints_m, radius_m, middle, frame):
-    """`CylinderSurface` through points (k, 3) of a wall, about a middle in a frame."""
-    shell = find_shell(some, joints_m, radius_m, snooping=False)
+def _fit_axis(sampled, joints_m, radius_m, middle, frame):
+    """Fit a `CylinderSurface` to points (k, 3) of a wall, relative to `middle` in a frame."""
+    shell = find_shell(sampled, joints_m, radius_m, snooping=False)
     axis = np.array([*shell.axis_m, shell.z_m])
-    found = CylinderSurface(axis, 0.0, shell.slope)
+    centred_surface = CylinderSurface(axis, 0.0, shell.slope)
     return CylinderSurface(
         (axis + middle) @ frame,
-        float(np.median(found.places(some[shell.reason == ""])[2])),
+        float(np.median(centred_surface.places(sampled[shell.reason == ""])[2])),
         shell.slope,
         frame,
     )
 
 
-def _rear_surface(first, ends_m, xyz_m, outwards, radius_m):
-    """The wall where the surface that was found first may be a screen before it.
+def _choose_surface(first, ends_m, xyz_m, outwards, radius_m):
+    """Choose between the first surface, which may be a screen, and a surface behind it.
 
-    Raises InputError for several surfaces of which none is clearly the wall.
+    Raises InputError if no surface is clearly the wall.
     """
     cells = [
         CoarseCells(first, xyz_m[outwards == side], outwards[outwards == side], ends_m)
         for side in np.unique(outwards)
     ]
-    worst = max(cells, key=lambda one: (not one.is_clear, one.rear_share))
+    worst = max(cells, key=lambda candidate: (not candidate.is_clear, candidate.rear_share))
     is_clear = worst.is_clear
     is_cylinder = isinstance(first, CylinderSurface) and len(worst.cell) >= LEAST_SQUARES
     if (is_clear and worst.wall_share > CLEAR_SHARE) or not is_cylinder:
         second = None
     else:
-        second = _behind(first, ends_m, worst, radius_m)
+        second = _fit_rear_cylinder(first, ends_m, worst, radius_m)
     if second is not None:
-        found = CoarseCells(second, worst.xyz_m, worst.outwards, ends_m)
-        is_better = not is_clear or found.wall_share > worst.wall_share + BETTER_SHARE
-        is_wall = found.is_clear and found.wall_share >= LEAST_WALL_SHARE
+        rear_cells = CoarseCells(second, worst.xyz_m, worst.outwards, ends_m)
+        is_better = not is_clear or rear_cells.wall_share > worst.wall_share + BETTER_SHARE
+        is_wall = rear_cells.is_clear and rear_cells.wall_share >= LEAST_WALL_SHARE
         if is_better and is_wall and abs(second.radius_m / radius_m - 1) < WIDE:
             return second
     if is_clear:
@@ -164,25 +169,25 @@ def _rear_surface(first, ends_m, xyz_m, outwards, radius_m):
     raise undecided(worst)
 
 
-def _behind(first, ends_m, cells, radius_m):
-    """`CylinderSurface` through the rearmost distances of coarse cells; None: they show none."""
+def _fit_rear_cylinder(first, ends_m, cells, radius_m):
+    """Fit a `CylinderSurface` to the rearmost distances of coarse cells; None if this fails."""
     middle = np.array([*(first.frame @ first.centre_m)[:2], (ends_m[0] + ends_m[1]) / 2])
     near = cells.xyz_m[cells.near_rear()] @ first.frame.T - middle
     joints = np.array(ends_m) - middle[2]
     try:
-        some = _spread(near, 0.0, 0.0, joints)
-        return _through(some, joints, radius_m, middle, first.frame)
+        sampled = _sample_evenly(near, 0.0, 0.0, joints)
+        return _fit_axis(sampled, joints, radius_m, middle, first.frame)
     except SolutionError:
         return None
 
 
 def _refuse_radius(surface, radius_m):
-    """Raise SolutionError where the wall departs from its nominal radius by more than 3 %."""
+    """Raise SolutionError if the radius differs from the nominal radius by more than 3 %."""
     if abs(surface.radius_m / radius_m - 1) > WIDE:
-        raise SolutionError(_other_radius(radius_m, surface.radius_m))
+        raise SolutionError(_message_other_radius(radius_m, surface.radius_m))
 
 
-def _other_radius(nominal_m, found_m):
+def _message_other_radius(nominal_m, found_m):
     return message(
         "cloud_of_other_radius",
         "no wall near the nominal radius {nominal_m:.3f} m, but one of {radius_m:.3f} m: check "
@@ -192,7 +197,7 @@ def _other_radius(nominal_m, found_m):
     )
 
 
-def _beside_shell(xyz, ends_m, count):
+def _error_beside_shell(xyz, ends_m, count):
     low, high = np.percentile(xyz[:, 2], [0.5, 99.5])
     return SolutionError(
         message(
@@ -211,21 +216,22 @@ def _beside_shell(xyz, ends_m, count):
 
 
 def _upright_squares(local, joints_m, radius_m):
-    """(k, 2) middles of the squares of the view along z whose points stand at many heights."""
+    """Centres (k, 2) of the squares in the view along z that have points at many heights."""
     size = SQUARE * radius_m
     reach = 4 * radius_m
     local = local[np.all(np.abs(local[:, :2]) < reach, axis=1)]
     width = int(np.ceil(2 * reach / size)) + 1
     square = ((local[:, :2] + reach) / size).astype(np.int64)
     level = ((local[:, 2] - joints_m[0]) * (LEVELS / (joints_m[1] - joints_m[0]))).astype(np.int64)
+    # A key identifies square and level; unique keys count the levels of each square.
     key = (square[:, 0] * width + square[:, 1]) * LEVELS + np.clip(level, 0, LEVELS - 1)
     squares, heights = np.unique(np.unique(key) // LEVELS, return_counts=True)
     chosen = squares[heights >= LEAST_LEVELS * LEVELS]
     return (np.column_stack(np.divmod(chosen, width)) + 0.5) * size - reach
 
 
-def _spread(near, x, y, joints_m):
-    """Points even over the wall: of each cell that of the median distance from the circle."""
+def _sample_evenly(near, x, y, joints_m):
+    """Select evenly distributed points: in each cell the point at the median distance."""
     dx, dy = near[:, 0] - x, near[:, 1] - y
     column = (np.arctan2(dx, dy) % FULL_TURN * (AROUND / FULL_TURN)).astype(np.int64) % AROUND
     share = (near[:, 2] - joints_m[0]) / (joints_m[1] - joints_m[0])
@@ -235,23 +241,26 @@ def _spread(near, x, y, joints_m):
     return near[order[first + count // 2]]
 
 
-def _lying(xyz_m, ends_m, radius_m, azimuth_rad):
+def _fit_lying_cylinder(xyz_m, ends_m, radius_m, azimuth_rad):
+    """Find a lying `CylinderSurface` in a frame whose third vector is the nominal axis."""
     along = np.array([np.sin(azimuth_rad), np.cos(azimuth_rad), 0.0])
     frame = np.array([[along[1], -along[0], 0.0], [0.0, 0.0, -1.0], along])
     place = xyz_m @ along
     low, high = np.percentile(place, [1.0, 99.0])
     if ends_m is not None:
         low, high = np.add(ends_m, (place.min() + place.max()) / 2)
-    return _standing(xyz_m, (low, high), radius_m, frame), (float(low), float(high))
+    return _fit_cylinder(xyz_m, (low, high), radius_m, frame), (float(low), float(high))
 
 
-def _sphere(xyz_m, radius_m):
+def _fit_sphere(xyz_m, radius_m):
+    """Find a `SphereSurface` by consensus of spheres through four points, then by fits."""
     rng = np.random.default_rng(20_11)
     middle = np.median(xyz_m, axis=0)
     local = xyz_m - middle
-    judges = local[rng.choice(len(local), min(len(local), 4000), replace=False)]
+    test_points = local[rng.choice(len(local), min(len(local), 4000), replace=False)]
     best = -1.0, None
     for four in local[rng.integers(len(local), size=(SPHERE_TRIES, 4))]:
+        # |p - c|^2 = r^2 for four points; differences give linear equations for the centre c.
         a = 2 * (four[1:] - four[0])
         b = np.sum(four[1:] ** 2 - four[0] ** 2, axis=1)
         if abs(np.linalg.det(a)) < 1e-9 * radius_m**3:
@@ -259,23 +268,25 @@ def _sphere(xyz_m, radius_m):
         centre = np.linalg.solve(a, b)
         if abs(np.linalg.norm(four[0] - centre) / radius_m - 1) > WIDE:
             continue
-        away = np.abs(np.linalg.norm(judges - centre, axis=1) - radius_m)
-        best = max(best, (float(np.mean(away < WIDE * radius_m)), tuple(centre)))
+        deviation = np.abs(np.linalg.norm(test_points - centre, axis=1) - radius_m)
+        best = max(best, (float(np.mean(deviation < WIDE * radius_m)), tuple(centre)))
     if best[1] is None or best[0] < LEAST_ON_SPHERE:
-        raise _no_sphere(radius_m, best[0], WIDE)
+        raise _error_no_sphere(radius_m, best[0], WIDE)
     centre, radius = np.array(best[1]), radius_m
     for band in SPHERE_BANDS:
-        away = np.abs(np.linalg.norm(judges - centre, axis=1) - radius)
-        chosen = judges[away < band * radius_m]
+        deviation = np.abs(np.linalg.norm(test_points - centre, axis=1) - radius)
+        chosen = test_points[deviation < band * radius_m]
         fit = fit_sphere(chosen, np.ones(3 * len(chosen)))
         centre, radius = fit.centre_m, fit.radius_m
-    share = np.mean(np.abs(np.linalg.norm(judges - centre, axis=1) - radius) < CLEAR_BAND * radius)
+    share = np.mean(
+        np.abs(np.linalg.norm(test_points - centre, axis=1) - radius) < CLEAR_BAND * radius
+    )
     if share < LEAST_ON_SPHERE:
-        raise _no_sphere(radius_m, share, CLEAR_BAND)
+        raise _error_no_sphere(radius_m, share, CLEAR_BAND)
     return SphereSurface(centre + middle, radius)
 
 
-def _no_sphere(radius_m, share, band):
+def _error_no_sphere(radius_m, share, band):
     return SolutionError(
         message(
             "no_sphere_in_cloud",
@@ -289,7 +300,11 @@ def _no_sphere(radius_m, share, band):
 
 
 def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad, units):
-    """What would explain that no wall is found; None: nothing that was tried."""
+    """Return a message about the probable cause of a failure, or None.
+
+    The causes are tried in this order: another unit, a sphere, a lying cylinder of another azimuth,
+    another radius.
+    """
     middle = np.median(xyz_m, axis=0)
     for unit, factor in units.items():
         for origin in (np.zeros(3), middle):
@@ -305,32 +320,32 @@ def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad, units):
     if kind != "sphere":
         for factor in (1.0, 1.3, 0.8):
             try:
-                sphere = _sphere(xyz_m, radius_m * factor)
+                sphere = _fit_sphere(xyz_m, radius_m * factor)
             except SolutionError:
                 continue
-            off = np.abs(sphere.places(xyz_m)[2])
-            if np.mean(off < CLEAR_BAND * sphere.radius_m) > MOST_OF_THEM:
+            deviation = np.abs(sphere.places(xyz_m)[2])
+            if np.mean(deviation < CLEAR_BAND * sphere.radius_m) > MOST_OF_THEM:
                 return message(
                     "cloud_of_sphere",
                     "the points lie on a sphere of a radius of about {radius_m:.3f} m, not on a "
                     "cylinder: check tank.kind",
                     radius_m=sphere.radius_m,
                 )
-    for other, turns, code in _other_kinds(kind, azimuth_rad):
-        if any(shows_wall(xyz_m, other, None, radius_m, turn) for turn in turns):
+    for trial, turns, code in _alternative_kinds(kind, azimuth_rad):
+        if any(shows_wall(xyz_m, trial, None, radius_m, turn) for turn in turns):
             return code
     for factor in np.geomspace(0.4, 2.5, 33):
-        other = radius_m * factor
+        trial = radius_m * factor
         try:
-            found, _ = _surface(xyz_m, kind, ends_m, other, azimuth_rad)
+            surface, _ = _fit_surface(xyz_m, kind, ends_m, trial, azimuth_rad)
         except SolutionError:
             continue
-        return _other_radius(radius_m, found.radius_m)
+        return _message_other_radius(radius_m, surface.radius_m)
     return None
 
 
-def _other_kinds(kind, azimuth_rad):
-    """Lying cylinders to try: kind, azimuths, and what it would mean."""
+def _alternative_kinds(kind, azimuth_rad):
+    """Return other kinds of tank to try: (kind, azimuths, message if the wall is found)."""
     turns = azimuth_rad + np.arange(0, np.pi, np.radians(3))
     if kind == "horizontal":
         elsewhere = message(
@@ -345,11 +360,11 @@ def _other_kinds(kind, azimuth_rad):
 
 
 def shows_wall(xyz_m, kind, ends_m, radius_m, azimuth_rad=0.0):
-    """Whether points show a wall; arguments as of `find_surface`."""
+    """Whether points (n, 3) show a wall, with the parameters of `find_surface`."""
     if len(xyz_m) < FEWEST:
         return False
     try:
-        _surface(xyz_m, kind, ends_m, radius_m, azimuth_rad)
+        _fit_surface(xyz_m, kind, ends_m, radius_m, azimuth_rad)
     except SolutionError:
         return False
     return True
