@@ -91,10 +91,10 @@ def test_warnings_of_a_workbook_name_it_and_its_words_are_read(tmp_path):
     assert str(told).startswith("tanque.xlsx, sheet job, tank.nominal_volume_m3: ")
     assert asked_language(path) == "pt-BR"
     record = translate_record(load_words("pt-BR"), record_of(result))
-    assert {one["file"] for one in record["warnings"]} <= {"planilha job", "planilha uncertainty"}
+    assert {one["file"] for one in record["warnings"]} <= {"aba job", "aba uncertainty"}
     speak("pt-BR")
     assert say_in_language(told.text).startswith(
-        "tanque.xlsx, planilha job, tank.nominal_volume_m3: a capac"
+        "tanque.xlsx, aba job, tank.nominal_volume_m3: a capac"
     )
 
 

@@ -123,7 +123,7 @@ def test_one_reading_is_counted_like_many(paper):
     group = {"kind": "azimuth", "name": "", "count": 1}
     adjustment = {"instruments": [], "photos": [], "groups": [group], "sigma0": 1.0, "points": []}
     measured.record["adjustment"] = adjustment
-    assert items(certificate.calibration(measured))["Points from"].startswith("azimuths: 1; ")
+    assert items(certificate.calibration(measured))["Survey method"].startswith("azimuths: 1; ")
 
 
 @pytest.mark.parametrize(
@@ -298,7 +298,7 @@ def test_the_field_table_has_every_row_without_uncertainty(example_record):
         "bottom of the first course",
         "Dip point",
         "RECONSTRUCTION-1",
-        "the certificate alone counts",
+        "only the certificate is authoritative",
     ):
         assert words in said
 
