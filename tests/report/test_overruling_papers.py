@@ -139,4 +139,4 @@ def test_the_digital_certificate_states_each(record):
 
     text = certificate_xml(record, digest="0" * 64).decode("utf-8")
     assert text.count("tankcal_overruling") == 2
-    assert "dent: mantido, independentemente d a busca" in text
+    assert "dent: mantido, independentemente da busca" in text
