@@ -125,7 +125,7 @@ def test_parameters_of_a_record(record, capsys):
     assert [one["name"] for one in found["parameters"]][:3] == ["c", "x0", "y0"]
     assert found["with_all"] is None
     assert run("parameters", record) == 0
-    assert "Nothing was adjusted again" in " ".join(capsys.readouterr().out.split())
+    assert "No adjustment was repeated" in " ".join(capsys.readouterr().out.split())
 
 
 def in_spanish(folder):
@@ -254,7 +254,7 @@ def test_influence_prints_calibrations_against_each_other(tmp_path, capsys):
     arguments = ("--cameras", tmp_path / "cameras.toml", "--states", "fixed")
     assert run("influence", PHOTOS, *arguments) == 0
     printed = capsys.readouterr().out
-    assert "calibrations against each other" in printed
+    assert "calibrations compared with each other" in printed
     assert "longer, fixed  shorter, fixed" in printed
 
 

@@ -39,7 +39,7 @@ def plain_terminal(monkeypatch):
 @pytest.mark.parametrize("kind", ["vertical", "horizontal", "sphere", "mesh"])
 def test_an_empty_form_is_refused_in_its_language(tmp_path, capsys, language, kind):
     write_starter(tmp_path / "job", kind, None, language)
-    sheet = {"pt-BR": "planilha", "es": "hoja"}[language]
+    sheet = {"pt-BR": "aba", "es": "hoja"}[language]
     book = write_input_workbook(tmp_path / "book" / "job.xlsx", kind, None, language)
     for source in (book, tmp_path / "job"):
         assert asked_language(source) == language
@@ -91,10 +91,10 @@ def test_warnings_of_a_workbook_name_it_and_its_words_are_read(tmp_path):
     assert str(told).startswith("tanque.xlsx, sheet job, tank.nominal_volume_m3: ")
     assert asked_language(path) == "pt-BR"
     record = translate_record(load_words("pt-BR"), record_of(result))
-    assert {one["file"] for one in record["warnings"]} <= {"planilha job", "planilha uncertainty"}
+    assert {one["file"] for one in record["warnings"]} <= {"aba job", "aba uncertainty"}
     speak("pt-BR")
     assert say_in_language(told.text).startswith(
-        "tanque.xlsx, planilha job, tank.nominal_volume_m3: a capac"
+        "tanque.xlsx, aba job, tank.nominal_volume_m3: a capac"
     )
 
 
@@ -133,7 +133,7 @@ def test_unknown_word_is_refused_with_expected_ones():
     assert say_in_language(told.value.text) == "encontrado 'talvez'; esperado 'fora' ou 'dentro'"
 
 
-@pytest.mark.parametrize(("language", "said"), [("pt-BR", "planilha"), ("es", "hoja")])
+@pytest.mark.parametrize(("language", "said"), [("pt-BR", "aba"), ("es", "hoja")])
 def test_a_sheet_inside_a_text_is_named_in_words(tmp_path, language, said):
     """A register that is not there, told of the sheet that refers to it."""
     parts = survey_parts()

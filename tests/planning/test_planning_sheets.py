@@ -87,15 +87,15 @@ def test_unseen_targets_are_marked(hidden):
     assert ties == rows.lost_ties(hidden) != set()
     paper = PlanPaper(hidden)
     text = texts_of(sheets(paper))
-    assert "Targets not seen" in text
-    assert "Without effect, because one end is not seen" in text
-    assert "end not seen" in text
-    assert "not seen" in labels_of(sketches.wall(paper))
+    assert "Targets not visible" in text
+    assert "Without effect, because an end is not visible" in text
+    assert "end not visible" in text
+    assert "not visible" in labels_of(sketches.wall(paper))
 
 
 @pytest.mark.slow
 def test_where_all_is_seen_nothing_is_said_of_it(prediction):
-    assert "not seen" not in texts_of(sheets(PlanPaper(prediction)))
+    assert "not visible" not in texts_of(sheets(PlanPaper(prediction)))
 
 
 def test_only_set_ups_that_can_be_seen_are_to_be_sighted(stationed):
@@ -129,7 +129,7 @@ def test_a_plumb_line_is_no_tape(hidden):
     assert line["value"] in ("on_one_line", "unseen_end")
     assert line["temperature"] == ""
     paper = PlanPaper(hidden)
-    assert "mark both its targets on one line" in texts_of(sheets(paper))
+    assert "mark both its targets on a freely hanging line" in texts_of(sheets(paper))
     tie = Tie("1-1-1-5", "plumb_lines", "1-1", "1-5", 0.002)
     plan = replace(hidden.plan, ties=(tie,))
     paper = PlanPaper(replace(hidden, plan=plan))
@@ -150,7 +150,7 @@ def test_field_readings_have_a_column(prediction):
     text = texts_of(sheets(PlanPaper(prediction)))
     assert "Temp. °C" in text
     assert "'heading': 'File'" in text
-    assert "with these names they go into image_points.csv" in text
+    assert "these names are used in image_points.csv" in text
 
 
 @pytest.mark.slow
@@ -188,7 +188,7 @@ def test_the_sketch_of_the_stations_shows_all_of_a_neighbour(prediction):
 def test_the_unrolled_wall_shows_welds_and_the_names_of_tapes(prediction):
     figure = sketches.wall(PlanPaper(prediction))
     assert {"V1", "H1", "M1"} <= names_in(figure)
-    assert {"reference weld", "other upright welds", "tapes", "marks"} <= labels_of(figure)
+    assert {"reference weld", "other vertical welds", "tapes", "marks"} <= labels_of(figure)
 
 
 # ---- the prediction
@@ -206,7 +206,7 @@ def test_additions_have_a_place(prediction, effects, tmp_path):
     assert place["arc_m"] == pytest.approx(east_of_weld, abs=1e-9)
     assert place["height_m"] == pytest.approx(0.05 * 9.5)
     paper = PlanPaper(prediction, effects=effects)
-    assert paper.change(tape) == "one more upright tape of 8.6\N{NO-BREAK SPACE}m, N-V1"
+    assert paper.change(tape) == "additional vertical tape of 8.6\N{NO-BREAK SPACE}m, N-V1"
     files.write(paper, tmp_path, [])
     with open(tmp_path / "changes.csv", encoding="utf-8") as file:
         listed = {row["name"]: row for row in csv.DictReader(file) if row["action"] == "add"}
@@ -223,10 +223,13 @@ def test_spared_items_are_listed_with_helpful_ones(prediction, effects):
     paper = PlanPaper(prediction, effects=(*effects, needed, idle))
     tables = {one.data.get("caption"): one.data for one in outlook(paper)}
     drops = [one for one in effects if one.change.action == "drop"]
-    assert len(tables["What is lost by less"]["rows"]) == min(30, len(drops))
-    assert len(tables["What is gained by more"]["rows"]) == min(30, len(effects) - len(drops))
+    assert len(tables["Effect of omissions"]["rows"]) == min(30, len(drops))
+    assert len(tables["Effect of additions"]["rows"]) == min(30, len(effects) - len(drops))
     text = texts_of(outlook(paper))
-    assert f"{paper.change(drop.change)}: what is left would not determine all unknowns" in text
+    assert (
+        f"{paper.change(drop.change)}: the remaining observations would not determine all unknowns"
+        in text
+    )
     assert f"{paper.change(add.change)}: see changes.csv" not in text
     assert "Weak or lost" in text
 
@@ -245,7 +248,7 @@ def test_effect_of_uncontrolled_error(tmp_path):
     volume = found.table.volume_m3[-1]
     assert tape.per_unit_m3 == pytest.approx(2 * volume / 6.9, rel=0.02)
     text = texts_of(outlook(PlanPaper(found)))
-    assert "Readings that nothing controls" in text
+    assert "Uncontrolled readings" in text
     assert "'0.37', 'mm', 'H1a – H1b'" in text
 
 
@@ -263,6 +266,6 @@ def test_every_printed_page_has_its_headings(hidden, tmp_path):
     headings = [cell.value for cell in book["Targets"][4]]
     assert headings[:3] == ["Point", "Line", "Row"]
     done = {row[0].value: row[-1].value for row in book["Targets"].iter_rows(min_row=5)}
-    assert {name for name, mark in done.items() if mark == "not seen"} == {
+    assert {name for name, mark in done.items() if mark == "not visible"} == {
         one["point"] for one in rows.targets(hidden) if one["done"]
     }

@@ -40,15 +40,15 @@ def product_case(code, density, celsius, **more):
 
 
 HOSTILE_PRODUCTS = [
-    ({"product_chosen": "Beer"}, "product_state", "choose one of the list."),
-    ({"product_chosen": 3}, "product_state", "choose one of the list."),
+    ({"product_chosen": "Beer"}, "product_state", "choose an item of the list."),
+    ({"product_chosen": 3}, "product_state", "choose an item of the list."),
     ({"density_at_base": None}, "density_state", "type the density at 15 °C."),
-    ({"density_at_base": "dense"}, "density_state", "this is not a number."),
+    ({"density_at_base": "dense"}, "density_state", "not a number."),
     ({"density_at_base": 0.85}, "density_state", "outside the densities of that table."),
     ({"density_at_base": 640.0}, "density_state", "outside the densities of that table."),
     ({"liquid_temperature": None}, "liquid_state", "type the temperature of the liquid."),
     ({"liquid_temperature": 104.0}, "liquid_state", "expected -40 °C to 90 °C."),
-    ({"liquid_temperature": "30 °C"}, "liquid_state", "this is not a number."),
+    ({"liquid_temperature": "30 °C"}, "liquid_state", "not a number."),
     ({"product_chosen": PRODUCTS["own_factor"]}, "factor_state", "type the factor."),
     (
         {"product_chosen": PRODUCTS["own_factor"], "own_factor": 98.5},
@@ -56,7 +56,7 @@ HOSTILE_PRODUCTS = [
         "too far from 1",
     ),
     ({"product_chosen": PRODUCTS["own_factor"], "own_factor": "-"}, "factor_state", "not a number"),
-    ({"shell_temperature": "warm"}, "shell_state", "this is not a number."),
+    ({"shell_temperature": "warm"}, "shell_state", "not a number."),
 ]
 
 OWN = {"dip_m": 4.75, "product_chosen": PRODUCTS["own_factor"], "own_factor": 0.9951}

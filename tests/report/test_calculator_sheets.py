@@ -85,9 +85,9 @@ OLD = {"IF", "AND", "OR", "NOT", "ISBLANK", "ISNUMBER", "ISLOGICAL", "INDEX", "M
 
 
 WITHOUT_READING = {
-    "en": "without what reading the table adds",
-    "pt-BR": "sem o que a leitura da tabela acrescenta",
-    "es": "sin lo que añade la lectura de la tabla",
+    "en": "without the uncertainty of reading the table",
+    "pt-BR": "sem a incerteza da leitura da tabela",
+    "es": "sin la incertidumbre de la lectura de la tabla",
 }
 
 

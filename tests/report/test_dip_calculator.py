@@ -39,13 +39,13 @@ REFUSED_DIPS = {
     "above": (lambda h: h[-1] + 0.01, "above the table, which ends at"),
     "just above": (lambda h: max(h[-1], round(h[-1], 3)) + 0.0001, "above the table"),
     "far above": (lambda h: 1e9, "above the table"),
-    "text": (lambda h: "4.75 m", "this is not a number."),
-    "text like a number": (lambda h: "4.75", "this is not a number."),
-    "NaN": (lambda h: "NaN", "this is not a number."),
-    "an error": (lambda h: "=1/0", "this is not a number."),
-    "not available": (lambda h: "=NA()", "this is not a number."),
-    "truth value": (lambda h: True, "this is not a number."),
-    "spaces": (lambda h: "  ", "this is not a number."),
+    "text": (lambda h: "4.75 m", "not a number."),
+    "text like a number": (lambda h: "4.75", "not a number."),
+    "NaN": (lambda h: "NaN", "not a number."),
+    "an error": (lambda h: "=1/0", "not a number."),
+    "not available": (lambda h: "=NA()", "not a number."),
+    "truth value": (lambda h: True, "not a number."),
+    "spaces": (lambda h: "  ", "not a number."),
     "blank": (lambda h: None, "type a dip in metres."),
 }
 
@@ -80,7 +80,7 @@ def cases(record):
 WANTED = {
     "below": (lambda volumes: -1.0, "below the table"),
     "above": (lambda volumes: volumes[-1] + 1, "above the table"),
-    "text": (lambda volumes: "12", "this is not a number."),
+    "text": (lambda volumes: "12", "not a number."),
     "blank": (lambda volumes: None, "type a volume in m³."),
 }
 

@@ -175,7 +175,7 @@ def test_how_many_checks_came_out_how():
     )
     assert counts(InspectionPaper(unjudged())) == "5 without a limit"
     assert counts(InspectionPaper(few())) == "6 not determined; 4 passed"
-    assert counts(InspectionPaper(plain() | {"checks": []})) == "no check could be made"
+    assert counts(InspectionPaper(plain() | {"checks": []})) == "no check was possible"
 
 
 def test_a_largest_reading_is_shown_beside_its_estimate():
@@ -212,7 +212,7 @@ def test_a_file_of_version_1_keeps_its_verdicts_and_its_rule(language):
 
 
 def test_how_the_tank_was_built_is_said_unless_an_earlier_epoch_takes_it_out():
-    built = "include how the tank was built"
+    built = "include the as-built shape of the tank"
     assert any(built in text for text in texts_of(reading(InspectionPaper(few()))))
     assert not any(built in text for text in texts_of(reading(InspectionPaper(plain()))))
 
@@ -378,7 +378,7 @@ def test_a_pdf_says_what_was_found(written):
     said = text_of_pdf(written / "plain" / "inspection.pdf")
     for text in (
         *("Inspection of shell and bottom", "Tank T-12", "1 check beyond its limit"),
-        *("EXAMPLE", "CONDITIONAL PASS", "FAILED", "no part of the capacity certificate"),
+        *("EXAMPLE", "CONDITIONAL PASS", "FAILED", "not part of the capacity certificate"),
         *("2026 - 2019", "Change from 2019 to 2026", "88.5 %", "not read in the text"),
         *("121.8 °", "+26.9 mm", "≤ 119 mm *"),
     ):

@@ -113,4 +113,4 @@ def test_what_was_assumed_is_said(plumbed):
     said = " ".join(Paper(load_record(plumbed[1] / "record.json")).choices())
     assert "vertical lines of sight" in said
     assert "surface of revolution" in said
-    assert "takes the shell as upright" in said
+    assert "takes the shell as vertical" in said

@@ -226,7 +226,7 @@ def found(record, tmp_path_factory):
 
 def test_the_paper_says_the_numbers_of_the_record(record, found):
     told = record["liquid"]
-    rows = table_of(found, "Each step against the geometry")
+    rows = table_of(found, "Each step compared with the geometry")
     assert len(rows) == len(told["steps"])
     for row, one in zip(rows, told["steps"], strict=True):
         assert int(row[0]) == one["row"]

@@ -1,4 +1,4 @@
-"""Decisions against the search for blunders on paper, in three languages, and in the record."""
+"""Decisions that override the search for blunders in the documents, in three languages."""
 
 from dataclasses import replace
 
@@ -131,7 +131,7 @@ def test_all_papers(folder, result, tmp_path):
     assert any(one.startswith("dent: kept, whatever the search") for one in cells)
     html = (out / "report.html").read_text(encoding="utf-8")
     assert "<b>&quot;seen" not in html
-    assert "Decisions against the search for blunders" in html
+    assert "Decisions that override the search for blunders" in html
 
 
 def test_the_digital_certificate_states_each(record):
@@ -139,4 +139,4 @@ def test_the_digital_certificate_states_each(record):
 
     text = certificate_xml(record, digest="0" * 64).decode("utf-8")
     assert text.count("tankcal_overruling") == 2
-    assert "dent: mantido, diga o que disser a busca" in text
+    assert "dent: mantido, independentemente da busca" in text

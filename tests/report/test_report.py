@@ -88,7 +88,7 @@ def test_certificate_has_required_statements(example):
     texts = pages(example / "certificate.pdf")
     whole = " ".join(texts)
     for words in (
-        "Certificate No. RECONSTRUCTION-1", "coverage probability 95 %", "What was assumed",
+        "Certificate No. RECONSTRUCTION-1", "coverage probability 95 %", "Assumptions",
         "Authorised by", "reproduced only in full", "Capacity table",
     ):  # fmt: skip
         assert words in whole

@@ -47,7 +47,7 @@ def test_missing_entries_are_lines_to_write_on(paper):
 
 def test_entries_without_a_line_are_named_as_missing(paper):
     said = certificate.statements(paper(method="ISO 7507-3")).data["items"]
-    assert said[-1].endswith("requires it: Traceability, Conditions, Condition of the tank.")
+    assert said[-1].endswith("7.8.4): Traceability, Conditions, Condition of the tank.")
     given = dict.fromkeys(("method", "traceability", "conditions", "condition_of_tank"), "x")
     assert len(certificate.statements(paper(**given)).data["items"]) == 2
 
@@ -98,7 +98,7 @@ def test_instruments_are_listed_with_certificates(paper):
     adjustment = {"instruments": tools, "photos": [], "groups": [], "sigma0": 1.0, "points": []}
     measured.record["adjustment"] = adjustment
     found = items(certificate.calibration(measured))
-    assert found["Instruments, as declared"] == "tape 1: C-1; edm: no certificate named"
+    assert found["Instruments, as declared"] == "tape 1: C-1; edm: no certificate stated"
 
 
 @pytest.mark.slow
@@ -123,7 +123,7 @@ def test_one_reading_is_counted_like_many(paper):
     group = {"kind": "azimuth", "name": "", "count": 1}
     adjustment = {"instruments": [], "photos": [], "groups": [group], "sigma0": 1.0, "points": []}
     measured.record["adjustment"] = adjustment
-    assert items(certificate.calibration(measured))["Points from"].startswith("azimuths: 1; ")
+    assert items(certificate.calibration(measured))["Survey method"].startswith("azimuths: 1; ")
 
 
 @pytest.mark.parametrize(
@@ -298,7 +298,7 @@ def test_the_field_table_has_every_row_without_uncertainty(example_record):
         "bottom of the first course",
         "Dip point",
         "RECONSTRUCTION-1",
-        "the certificate alone counts",
+        "only the certificate is authoritative",
     ):
         assert words in said
 

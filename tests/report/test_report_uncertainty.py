@@ -125,7 +125,7 @@ def test_the_sentence_counts_the_rows(found, of_example, record, example):
     for blocks, one in ((found, record), (of_example, example)):
         codes = one["capacity"]["interval"]
         assert codes.count("gum") == one["monte_carlo"]["validated"]
-        said = f"is validated by that in {codes.count('gum')} of {len(codes)} rows"
+        said = f"is thereby validated in {codes.count('gum')} of {len(codes)} rows"
         assert any(said in text for text in texts(blocks))
 
 
@@ -133,7 +133,7 @@ def test_the_sentence_counts_the_rows(found, of_example, record, example):
 @pytest.mark.parametrize(
     ("code", "said", "caption"),
     [
-        ("gum", "is validated by that in every row.", "with k = 1.96 in every row"),
+        ("gum", "is thereby validated in every row.", "with k = 1.96 in every row"),
         ("monte_carlo", "was not validated in any row", "not validated in any row"),
     ],
 )
@@ -159,7 +159,7 @@ def test_rows_with_an_uneven_interval_are_listed_with_its_ends(found, record):
             digits = max(decimals_of(U), 3)
             uneven.append([f"{height:.3f}", *(fixed(one, digits) for one in (volume, low, high))])
     assert uneven
-    assert table_of(found, "Rows whose interval does not lie evenly") == uneven
+    assert table_of(found, "Rows with an interval that is not symmetric") == uneven
     even = changed(record, low_m3=[0.0] * 25, high_m3=[2 * v for v in capacity["volume_m3"]])
     assert uneven_rows(even["capacity"]) == []
 
@@ -249,7 +249,7 @@ def test_the_worst_delivery_of_each_minimum_height_is_reported(found, record):
     worst = table_of(found, "The worst deliveries")
     at_minimum = [one["at_minimum"] for one in record["deliveries"]]
     ends = [[f"{one[key]:.3f}" for key in ("high_m", "low_m")] for one in at_minimum]
-    assert [row[2:4] for row in worst if row[1] == "U/V, of exactly that height"] == ends
+    assert [row[2:4] for row in worst if row[1] == "U/V, at exactly this height"] == ends
     assert len(worst) == len({tuple(row) for row in worst})
 
 
@@ -261,19 +261,19 @@ def test_inputs_are_separated(of_example, example):
     words, said = load_words(), facts(of_example)
     defaults = [line["input"] for line in lines if line["is_default"]]
     assert defaults == ["expansion", "interpolation", "rounding"]
-    by_default = said["Inputs whose u is a default, not declared"]
+    by_default = said["Inputs with a default u (not declared)"]
     assert by_default.startswith("Coefficient of thermal expansion: u\xa0=\xa05.8")
     assert by_default.endswith("rectangular")
-    assert "(default)" in said["Of each reading of the table"]
+    assert "(default)" in said["Inputs from reading the table"]
     declared = [line["input"] for line in lines if line["u"] is not None and not line["is_default"]]
     assert said["Inputs declared"].count("u\xa0=\xa0") == len(declared)
-    told = said["NOT in U, because nothing was declared"]
+    told = said["NOT included in U (not declared)"]
     assert told == words["texts"]["nothing_missing"]  # the example declares everything
 
 
 def test_undeclared_inputs_are_named(found, record):
     (missing,) = (one["value"] for one in record["choices"] if one["code"] == "not_in_budget")
-    names = facts(found)["NOT in U, because nothing was declared"].split("; ")
+    names = facts(found)["NOT included in U (not declared)"].split("; ")
     assert names == [load_words()["inputs"][name] for name in missing]
     assert names
 
@@ -294,7 +294,7 @@ def test_a_budget_is_the_record_with_its_defaults_marked(found, of_example, exam
 
 
 def test_contributions_of_every_stated_volume_are_the_record(found, record):
-    rows = table_of(found, "Contributions of each input")
+    rows = table_of(found, "Contribution of each input")
     for place, one in enumerate(record["budgets"], 1):
         digits = decimals_of(one["u_m3"])
         expected = [fixed(line["contribution_m3"], digits + 1) for line in one["lines"]]
@@ -310,7 +310,7 @@ def test_many_stated_volumes_are_set_in_even_tables(record):
 
 
 def test_most_useful_input_comes_first(found, record):
-    rows = table_of(found, "What U would be")
+    rows = table_of(found, "U, in percent of its present value")
     other = copy.deepcopy(record)
     other["budget"].reverse()
     assert budget.improvements(Paper(other))[0].data["rows"] == rows
@@ -340,7 +340,7 @@ def test_every_name_has_words():
     line = {"input": "diameter & length", "unit": "m3", "note": "", "is_default": True}
     assert input_name(words, line) == "Diameter & Length of the cylinder (default)"
     shared = {"input": "deadwood", "unit": "%", "note": "my note", "is_default": False}
-    assert input_name(words, shared) == "Volume of the deadwood without its own u"
+    assert input_name(words, shared) == "Deadwood volumes without a declared u"
     item = shared | {"unit": "m3", "note": "coil {x}"}
     assert input_name(words, item) == "Volume of the deadwood: coil {x}"
 
@@ -389,7 +389,7 @@ def test_ranges_are_all_rows_with_their_largest_difference(found, record):
         largest = max(*rows["d_low"][of_range], *rows["d_high"][of_range])
         assert max(one["d_low"], one["d_high"]) == largest
         start += one["count"]
-    assert [row[3] for row in table_of(found, "Rows one after the other")] == [
+    assert [row[3] for row in table_of(found, "Consecutive rows")] == [
         "validated" if one["validated"] else "NOT validated" for one in ranges
     ]
 
@@ -455,7 +455,7 @@ def test_the_verdict_of_the_rule_in_words(found, record):
     said = facts(found)
     assert said["Rule"] == HOSTILE
     assert said["Verdict"] == "DOES NOT CONFORM."
-    assert said["Its values were"] == "NOT read in the text itself"
+    assert said["Its values"] == "NOT read in the original text"
     holds_from = record["rule"]["uncertainty"][0]
     assert holds_from["code"] == "holds_from"
     whole = " ".join(texts(found)).replace("\xa0", " ")
@@ -464,14 +464,16 @@ def test_the_verdict_of_the_rule_in_words(found, record):
     assert "U of deliveries of 0.5 m or more: at most 0.25 % of the volume. NOT kept" in whole
     assert "U of deliveries of 1 m or more: to be stated, not limited. The largest" in whole
     assert "at most 1 % of the volume: B.2 (read in the text itself)." in whole
-    assert "± 0.3 % of the stated volume: B.4 (NOT read in the text itself)." in whole
+    assert "± 0.3 % of the stated volume: B.4 (NOT read in the original text)." in whole
     top, steps = record["rule"]["deviation"]
     assert (top["code"], steps["code"]) == ("fails", "guard_band")
     in_guard = "limit ± 0.9 m³, guard band U: NOT accepted: in the guard band."
     assert f"{in_guard} Probability of conformity {100 * steps['probability']:.2f} %." in whole
     assert "Probability of conformity below 0.01 %." in whole
-    simulated = "it and some deliveries down to the lowest dip are simulated by Monte Carlo."
-    assert f"The worst delivery is sought by the law of propagation; {simulated}" in whole
+    simulated = (
+        "this delivery and some deliveries down to the lowest dip are simulated by Monte Carlo."
+    )
+    assert f"The worst delivery is determined by the law of propagation; {simulated}" in whole
 
 
 def test_verdict_of_unread_rule_is_not_on_certificate(found, record):
@@ -482,7 +484,7 @@ def test_verdict_of_unread_rule_is_not_on_certificate(found, record):
     for words in ("DOES NOT CONFORM", "Probability of conformity", "at most 1\xa0% of the volume"):
         assert words not in certificate
         assert words in papers
-    assert "no statement of conformity, and it is not on the certificate" in papers
+    assert "not a statement of conformity, and it is not on the certificate" in papers
 
 
 def test_verdict_of_verified_rule_is_on_certificate(record):

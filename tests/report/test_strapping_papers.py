@@ -109,8 +109,8 @@ def test_what_was_assumed_is_said(strapped):
     paper = Paper(load_record(strapped[1] / "record.json"))
     said = " ".join(paper.choices())
     assert "measured by tape" in said
-    assert "departures of 5 mm" in said
-    assert "cylinder of the mean radius" in said
+    assert "deviations of 5 mm" in said
+    assert "cylinder with the mean radius" in said
     assert "offset" not in next(
         one["value"] for one in paper.record["choices"] if one["code"] == "not_in_budget"
     )

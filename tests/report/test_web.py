@@ -238,7 +238,7 @@ def test_view_that_cannot_be_drawn_states_why(without_courses):
     data = tank_view(Paper(other)).data
     assert data["solid"] is None
     written = page([blocks.document(title="t").data, data])
-    assert "holds no form that could be drawn" in written
+    assert "contains no form that can be drawn" in written
     assert "<canvas" not in written
 
 

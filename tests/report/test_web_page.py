@@ -146,7 +146,7 @@ def test_a_delivery_has_its_own_uncertainty(browser, report, example_result):
             f"{fixed(found.U_m3, decimals)} m³ (k = {fixed(found.k, 2)}, 95 %)"
         )
     browser.type("#other_dip", "1.895")
-    assert browser.text("#delivery") == "Refused: both dips are the same."
+    assert browser.text("#delivery") == "Refused: both dips are equal."
     browser.type("#other_dip", "12")
     assert browser.text("#delivery").startswith("Refused: above the table")
 
@@ -164,7 +164,7 @@ def test_deliveries_of_few_degrees_of_freedom(browser, tmp_path):
         browser.type("#other_dip", repr(one["high_m"]))
         answer = browser.text("#delivery")
         assert answer.startswith(f"V = {fixed(one['volume_m3'], 3)} m³")
-        stated = "as the certificate states it" in browser.text("#delivery-more")
+        stated = "as stated in the certificate" in browser.text("#delivery-more")
         seen.add(stated)
         if not stated:
             assert f"(k = {fixed(one['k'], 2)}," in answer
@@ -307,7 +307,7 @@ def test_points_are_labelled(browser, report):
 def test_page_without_webgl_has_a_note(report):
     with Browser("--disable-3d-apis") as browser:
         browser.open(report)
-        assert "shows no three-dimensional pictures" in browser.text("#view")
+        assert "does not support three-dimensional pictures" in browser.text("#view")
         assert browser.run("document.querySelector('canvas').offsetHeight") == 0
         assert browser.text("#volume").startswith("V = ")
 

@@ -63,7 +63,7 @@ def test_every_budget_is_on_its_sheet(book, record):
             ("u of the input", "u"),
             ("Contribution (m³)", "contribution_m3"),
             ("Share of variance", "share"),
-            ("U with half of that u", "halved"),
+            ("U with half of this u", "halved"),
         ):
             assert list(table[heading]) == or_dash(line[key] for line in lines), name
         marked = [text.endswith("(default)") for text in table["Input"]]
@@ -91,7 +91,7 @@ def test_stated_volumes_and_worst_deliveries_are_the_record(book, record):
     worst = table_of(book, "worst_deliveries")
     found = [one["at_minimum"] for one in record["deliveries"]]
     at_minimum = [
-        place for place, text in enumerate(worst["Largest"]) if "exactly that height" in text
+        place for place, text in enumerate(worst["Largest"]) if "exactly this height" in text
     ]
     for heading, key in (("U (m³)", "U_m3"), ("U over volume", "relative")):
         assert [worst[heading][place] for place in at_minimum] == or_dash(one[key] for one in found)
@@ -125,13 +125,13 @@ def test_the_decision_rule_is_the_record(book, record):
     limits = table_of(book, "limits")
     for heading, key in (
         ("At most", "limit"),
-        ("Kept from (m)", "from_m"),
-        ("Kept from (m³)", "from_m3"),
-        ("U there (m³)", "worst_U_m3"),
+        ("Met from (m)", "from_m"),
+        ("Met from (m³)", "from_m3"),
+        ("Worst: U (m³)", "worst_U_m3"),
     ):
         assert list(limits[heading]) == or_dash(one[key] for one in verdict["uncertainty"])
-    assert list(limits["Read in the text"]) == ["yes", "no", "no"]
-    assert list(limits["Verdict"]) == ["kept from there on", "NOT kept", "stated"]
+    assert list(limits["Read in the original text"]) == ["yes", "no", "no"]
+    assert list(limits["Verdict"]) == ["met from there upwards", "NOT met", "stated"]
     deviations = table_of(book, "deviations")
     for heading, key in (("Stated (m³)", "stated_m3"), ("Conformity", "probability")):
         assert list(deviations[heading]) == or_dash(one[key] for one in verdict["deviation"])
