@@ -206,8 +206,8 @@ CONTRADICTIONS = [
     (("sd", None, "t", 2.0), [("dof", "found 2; expected above 2")]),
     (("standard", None, "t", 9.0), [("u_is", "found standard; expected scale or sd")]),
     (("expanded", 2.0, "t", 9.0), [("u_is", "found expanded; expected scale or sd")]),
-    (("scale",), [("u_is", "this one is normal")]),
-    (("sd", None, "rectangular", 9.0), [("u_is", "this one is rectangular")]),
+    (("scale",), [("u_is", "the distribution is normal")]),
+    (("sd", None, "rectangular", 9.0), [("u_is", "the distribution is rectangular")]),
 ]
 
 

@@ -632,7 +632,7 @@ def test_field_sheets_tell_of_the_other_face_where_it_is_read(tmp_path, faces, t
     path.write_text(path.read_text(encoding="utf-8") + "u_collimation_arcsec = 10\n")
     paper = WallPaper(predict(load_plan(folder)), "en")
     text = " ".join(str(block.data) for block in wall_sheets(paper))
-    assert ("other face" in text) == told
+    assert ("second face" in text) == told
     assert "Hits" not in str([block.data for block in wall_outlook(paper)])
 
 
