@@ -53,7 +53,7 @@ def test_sentences_with_portuguese_marks(paper, words):
     assert percent(words, 0.995) == "99,5\N{NO-BREAK SPACE}%"
     choice = {"code": "head", "value": 1025.5}
     assert "of 1.025,5 kg/m³" in choice_sentence(words, choice)
-    assert "exceeded 3,29 was" in choice_sentence(words, {"code": "snooping", "value": 3.29053})
+    assert "above 3,29 were" in choice_sentence(words, {"code": "snooping", "value": 3.29053})
     assert sentence({**words, "g": {"c": "{value} m"}}, "g", "c", 1.5) == "1,5 m"
     assert "50 of 1.370 rows" in paper.word("texts.only_worst", shown=50, all=1370)
 
