@@ -31,7 +31,7 @@ test-all: test test-slow ## every test but the studies at full size
 study: $(VENV)/full ## the statistical studies and what else takes long (ten minutes)
 	$(BIN)/pytest -m study --dist worksteal --durations 25
 
-test-rest: $(VENV)/full ## what make test leaves out, in one run that shares its papers; PART=1/8: an eighth of it
+test-rest: $(VENV)/full ## what make test leaves out, in one run that shares its papers; PART=1/6: a sixth of it
 	$(BIN)/pytest -m '$(if $(PART),slow,(slow and not twentieth)) or study' --dist worksteal --durations 25 $(if $(PART),--part $(PART))
 
 study-full: export TANKCAL_STUDIES := full

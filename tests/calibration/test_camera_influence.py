@@ -172,6 +172,7 @@ def test_the_check_points_are_those_of_the_record():
         assert expected.difference_m == pytest.approx(d, abs=1e-9)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_wrong_k1_lifts_or_sinks_the_points(side):
     # the correction is subtracted: a larger K1 makes rays steeper, parallaxes smaller, points lower
@@ -250,6 +251,7 @@ def test_a_calibration_without_sds_is_not_weighted():
     assert as_json(found)["runs"][2]["skipped"] == {"code": "no_sds"}
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_is_a_result():
     # vertical photos of known stations over unknown ground: c and the heights stand for one another
     found = influence(flight(1.0, held=False), (setup_of(FLIGHT, "same"),), ("fixed", "free"))

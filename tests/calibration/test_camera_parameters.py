@@ -451,6 +451,7 @@ def test_trials_keep_the_readings_set_aside(a_tank):
     assert {"significant", "product_moves"} <= {reason["code"] for reason in told.reasons}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("datum", ["inner", "minimal", "fixed_photo"])
 def test_any_datum_can_be_kept(a_tank, datum):
     """Property: a parameter that is next to nothing moves next to nothing, in any datum."""
@@ -490,6 +491,7 @@ def test_each_camera_has_its_own_analysis(a_tank):
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), trial.predicted.sds, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_a_value_of_the_block_goes_from_all_cameras(a_tank):
     job = job_of(a_tank, two_cameras("block"))
     base = adjust_survey(job.measurements)
@@ -499,6 +501,7 @@ def test_a_value_of_the_block_goes_from_all_cameras(a_tank):
     assert [camera.scope[3] for camera in survey.cameras] == ["off", "off"]
 
 
+@pytest.mark.slow
 def test_a_value_of_each_photo_makes_a_set_of_each_photo(a_tank):
     job = job_of(a_tank, two_cameras("photo"))
     base = adjust_survey(job.measurements)
@@ -510,6 +513,7 @@ def test_a_value_of_each_photo_makes_a_set_of_each_photo(a_tank):
     assert names == ("c", "x0", "y0")
 
 
+@pytest.mark.slow
 def test_a_weighted_parameter_is_judged_and_dropped(a_tank):
     measured, _ = by_photographs(1, settings=QUIET)
     camera = measured.cameras[0].camera
@@ -621,6 +625,7 @@ def test_record_without_photographs_or_sound_camera_is_refused(silva_result):
             analyse_record({**record, "adjustment": {**record["adjustment"], key: value}})
 
 
+@pytest.mark.slow
 def test_survey_without_free_camera_parameters_is_refused(a_tank):
     measured, _ = by_photographs(1, settings=QUIET)
     camera = measured.cameras[0].camera
@@ -641,6 +646,7 @@ def test_an_older_record_that_does_not_know_the_pixel_will_do(silva_result, silv
     assert as_json(found)["image_accuracy"] == {"um": 3.0, "px": None, "from": "given"}
 
 
+@pytest.mark.slow
 def test_effects_in_pixels_follow_the_declared_pixel(a_tank):
     """Closed form: 10 um pixels, 100 px to the millimetre."""
     measured, _ = by_photographs(1, settings=QUIET)

@@ -896,6 +896,7 @@ def test_a_job_takes_both_spellings(tmp_path):
         load(write_folder(tmp_path / "both", parts))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_correlations_count_with_their_sign(method):
     """Second method: an uncertainty along one direction gives the figure of a step along it."""

@@ -174,6 +174,7 @@ def test_diagonals_meet_in_the_centre():
     assert marker.centre_sd_px == pytest.approx(np.sqrt(np.var(moved, axis=0).sum() / 2), rel=0.05)
 
 
+@pytest.mark.slow
 def test_an_id_twice_is_never_accepted():
     image = np.hstack([one_scene(7), one_scene(9), one_scene(7)])
     found = read_coded(image)
@@ -193,6 +194,7 @@ def test_a_mirrored_target_is_reported():
     assert [(one.code, one.id) for one in found.refused] == [("mirrored", 7)]
 
 
+@pytest.mark.slow
 def test_a_code_that_is_its_own_mirror_image_is_doubtful():
     """Some codes of the small dictionaries are symmetric: in a flipped photo they are refused."""
     number = min(dictionary_of(ARUCO).mirrored)
@@ -204,12 +206,14 @@ def test_a_code_that_is_its_own_mirror_image_is_doubtful():
     assert sorted(codes(beside)) == ["mirror_doubt", "mirrored"]
 
 
+@pytest.mark.slow
 def test_codes_without_a_top_are_refused():
     number = min(dictionary_of("ARUCO_ORIGINAL").turning)
     found = read_coded(one_scene(number, "ARUCO_ORIGINAL"), "ARUCO_ORIGINAL")
     assert codes(found) == ["turn_doubt"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [ARUCO, APRILTAG])
 def test_a_damaged_code_is_refused(name):
     """One cell of the other colour: never that id, unless bit errors were allowed."""
@@ -239,6 +243,7 @@ def test_unmeasurable_target_is_reported(corners, code):
     assert codes(found) in ([code], [])
 
 
+@pytest.mark.slow(after=5)
 @pytest.mark.parametrize("name", ["DICT_4X4_1000", APRILTAG])
 @pytest.mark.parametrize("kind", ["grey", "noise", "clouds", "cells"])
 def test_nothing_is_read_where_nothing_is(name, kind):
@@ -257,6 +262,7 @@ def test_nothing_is_read_where_nothing_is(name, kind):
     assert not found.targets
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["grey", "noise"])
 def test_no_circles_in_an_empty_photo(kind):
     """Truth: there is none."""

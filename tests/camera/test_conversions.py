@@ -145,6 +145,7 @@ def metashape_image(rays, camera):
     return u, height * 0.5 + camera.cy + ys * camera.f
 
 
+@pytest.mark.slow
 @QUICK
 @given(documented(), st.floats(-0.003, 0.003), parts(-0.5, 0.5, 2))
 def test_metashape_as_documented(camera, affinity, more):
@@ -183,6 +184,7 @@ def test_metashape_skew_states_its_error(figure):
     assert (back.b1, back.b2, back.error_px) == pytest.approx((1.5, 4.0, 0), abs=1e-7)
 
 
+@pytest.mark.slow
 @QUICK
 @given(documented())
 def test_pix4d_as_documented(camera):

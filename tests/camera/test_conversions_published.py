@@ -97,6 +97,7 @@ def test_every_form_into_every_other(to_form):
             assert found.rms_px < found.error_px
 
 
+@pytest.mark.slow(after=7)
 @pytest.mark.parametrize("form", FORMS, ids=str)
 def test_derivatives_of_the_fit(form):
     """Finite differences: by 13 parameters, scale and skew after the distortion, and a turn."""

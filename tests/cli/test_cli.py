@@ -108,6 +108,7 @@ def done(example_run, tmp_path_factory):
     return shutil.copytree(example_run, tmp_path_factory.mktemp("cli") / "job")
 
 
+@pytest.mark.slow
 def test_a_run_writes_everything(done, capsys):
     names = {path.name for path in (done / "results").iterdir()}
     assert names == {
@@ -326,6 +327,7 @@ def test_nominal_sizes_are_above_zero(number, tmp_path, capsys):
     assert "expected a number above 0" in capsys.readouterr().err
 
 
+@pytest.mark.slow(after=8)
 @pytest.mark.parametrize(
     ("command", "option"),
     [
@@ -387,6 +389,7 @@ def test_tank_without_uncertainty_is_reported(tmp_path, capsys):
     assert "U = 0" not in said
 
 
+@pytest.mark.slow
 def test_implausible_inputs_are_told_before_the_time_is_spent_on_them(tmp_path, capsys):
     """And once more at the end, where nobody misses them."""
     write_job(tmp_path / "job", kind="sphere", settings={"sphere.diameter_m": 70.0})

@@ -117,6 +117,7 @@ def test_compare_writes_its_papers_and_refuses_foreign_folders(tmp_path, capsys)
     assert "notes.txt" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_parameters_of_a_record(record, capsys):
     assert run("parameters", record, "--json", "--alpha", "0.1") == 0
     found = json.loads(capsys.readouterr().out)
@@ -217,6 +218,7 @@ def test_several_sets_are_refused_before_the_work(tmp_path, capsys, monkeypatch)
     assert "there are 11 sets of parameters" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_parameters_of_a_job_without_trials(capsys):
     assert run("parameters", PHOTOS, "--no-trials", "--json") == 0
     assert len(json.loads(capsys.readouterr().out)["without"]) > 10
@@ -295,6 +297,7 @@ def test_check_of_a_record_without_check_points(record, capsys):
     assert "no check points" in capsys.readouterr().err
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("form", ["opencv", "opencv-json", "metashape", "aicon", "colmap", "pix4d"])
 def test_convert_there_and_back(form, tmp_path, capsys):
     """Property: a camera that another program can hold comes back as the same images."""

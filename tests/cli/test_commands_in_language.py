@@ -167,6 +167,7 @@ def text_of(node):
     return ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", [["compare", "RECORD", "RECORD", "--quiet"], ["verify", "FOLDER"], ["read-table",
      "RECORD"], ["export", "FOLDER", "--profile", "nobody"]]

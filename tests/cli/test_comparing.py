@@ -73,6 +73,7 @@ def test_input_to_be_mended(tables, capsys, more, words):
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("junk", ["", "x", "height_m,volume_m3\n", "\0" * 50, "{}", "[1"])
 def test_what_is_no_table(tables, capsys, junk, tmp_path):
     pdf = ("junk.pdf",) if junk == "x" else ()  # a child looks at each

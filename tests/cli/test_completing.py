@@ -94,6 +94,7 @@ def completed(shell, program, folder, script):
     return dict(zip(LINES, done.stdout.split("\n"), strict=False))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shell", "program"), [("bash", BASH), ("fish", FISH)])
 def test_words_that_a_shell_completes(shell, program, folder, scripts):
     found = completed(shell, program, folder, scripts[shell])

@@ -113,6 +113,7 @@ def test_the_words_of_argparse_are_english_again_afterwards(in_language, capsys)
     assert "options:" in argparse.ArgumentParser().format_help()
 
 
+@pytest.mark.slow
 def test_help_in_another_language_loads_nothing_heavy():
     code = (
         "import sys; from tankcal.cli import main\n"

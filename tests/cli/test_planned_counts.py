@@ -18,6 +18,7 @@ def english_afterwards():
     speak("en")
 
 
+@pytest.mark.slow(after=27)
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_is_told_otherwise_than_two(language, kind):
@@ -32,6 +33,7 @@ def test_one_is_told_otherwise_than_two(language, kind):
     assert said(1).removeprefix("1 ") != said(2).removeprefix("2 ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("language", "words"),
     [("en", "1 set-up, "), ("pt-BR", "1 estacionamento, "), ("es", "1 estacionamiento, ")],

@@ -168,6 +168,7 @@ def test_want_of_memory_has_its_line(monkeypatch, capsys, error):
     assert "not enough memory" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
 def test_output_of_any_encoding(tmp_path, encoding):
     """In the language of a person whose terminal or file lacks a letter; JSON stays JSON."""

@@ -43,6 +43,7 @@ def _grow(counts):
     return grow_wall(counts, column_m=np.full(len(counts), 0.13), row_m=0.05, bin_m=0.004)
 
 
+@pytest.mark.slow
 def test_buckle_is_wall_and_a_pipe_is_not():  # closed form: 60 mm over 2 m; a step of 50 mm
     z, arc = np.meshgrid(0.05 * np.arange(60), 0.13 * np.arange(90), indexing="ij")
     away = np.minimum(np.hypot(z - 1.5, arc - 4.0), 1.0)
@@ -81,6 +82,7 @@ def test_off_trend_finds_a_single_cell():  # closed form
     assert_array_equal(np.argwhere(off), [[7, 30]])
 
 
+@pytest.mark.slow
 def test_round_cylinder():  # closed form
     wall = _find(_cylinder(), _cylinder(seed=2))
     assert_allclose(np.nanmean(wall.radius_m, axis=(1, 2)), 3.0, atol=1e-4)

@@ -35,6 +35,7 @@ def refusal(path):
     return problem.expected.code
 
 
+@pytest.mark.slow(after=9)
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 @pytest.mark.parametrize("separator", [" ", ";", ",", "\t"])
 @pytest.mark.parametrize("head", ["{titles}\n{count}\n", "{count}\n{titles}\n",
@@ -61,6 +62,7 @@ def laszip_record(data):
     return data.find(b"laszip encoded") + 52, struct.unpack_from("<I", data, 96)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chunk", [0, 50_000, 0xFFFFFFFF])
 def test_one_stream_of_laszip_1(tmp_path, chunk):
     """Points of LASzip 1.2: compressor 1, no table of chunks, any size of a chunk."""
@@ -107,6 +109,7 @@ def zeros(path, *positions):
               poses=[((0.0, 0.0, 0.0, 0.0), one) for one in positions])  # fmt: skip
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("position", [(0, 0, 0), (1, 2, 3)])
 def test_a_quaternion_of_zeros_is_no_pose(tmp_path, position):
     path = tmp_path / "scan.e57"

@@ -88,6 +88,7 @@ LAS_CASES = [
 ]
 
 
+@pytest.mark.slow(after=32)
 @pytest.mark.parametrize(("name", "changes", "said"), LAS_CASES)
 def test_las(tmp_path, sound, name, changes, said):
     assert said in refused_header(tmp_path, name, patched(sound[name], *changes))
@@ -192,6 +193,7 @@ def test_e57(tmp_path, sound, change, said):
     assert any(part in found for part in said.split("|"))
 
 
+@pytest.mark.slow
 def test_changed_xml_is_read_when_it_is_sound(tmp_path, sound):
     """The helper of these cases makes sound files of its own accord."""
     path = tmp_path / "a.e57"
@@ -207,6 +209,7 @@ def test_pose_of_e57(tmp_path, quaternion):
     assert "quaternion of length 1" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["old.las", "new.laz"])
 @pytest.mark.parametrize(
     ("place", "value", "said"),
@@ -255,6 +258,7 @@ def test_an_end_before_the_last_point(tmp_path, monkeypatch):
     assert "ended with status 3" in died(tmp_path, monkeypatch, "raise SystemExit(3)")
 
 
+@pytest.mark.slow
 def test_a_child_that_sleeps(tmp_path, monkeypatch):
     monkeypatch.setattr(isolation, "SILENT_S", 1)
     assert "was stopped" in died(tmp_path, monkeypatch, "import time; time.sleep(100)")

@@ -20,6 +20,7 @@ def read(header, **settings):
     return np.concatenate(found) if found else np.zeros((0, 3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [*SOUGHT, "laz", "e57", "ptx", "pts"])
 @pytest.mark.parametrize("each", [1, 7, 100, 10**6])
 def test_pieces_are_the_file(tmp_path, kind, each):  # invariance

@@ -41,6 +41,7 @@ def refusal(path, **settings):
     return str(caught.value)
 
 
+@pytest.mark.slow(after=3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_round_trip_at_coordinates_of_utm(tmp_path, kind):
     xyz = some_wall(centre=UTM)
@@ -49,6 +50,7 @@ def test_round_trip_at_coordinates_of_utm(tmp_path, kind):
     assert_allclose(found, xyz, rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("kind", KINDS)
 def test_chunks_and_unit(tmp_path, kind):
     xyz = some_wall(103)
@@ -58,6 +60,7 @@ def test_chunks_and_unit(tmp_path, kind):
     assert_allclose(np.concatenate(parts), 0.3048 * xyz, rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize("kind", KINDS)
 def test_progress_ends_with_all_points(tmp_path, kind):
     told = []
@@ -79,6 +82,7 @@ def test_point_formats_of_las(tmp_path, version, form, ending):
     assert_allclose(read_all(path), xyz, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("kind", "atol"), [("double", 0), ("single", 1e-6), ("scaled", 5.1e-6), ("integer", 0)]
 )
@@ -130,6 +134,7 @@ def test_orders_of_ply(tmp_path, order, faces):
         assert_allclose(read_all(path), xyz, rtol=0, atol=atol)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["ascii", "binary_little_endian"])
 def test_float32_that_cannot_tell_a_tenth_of_a_millimetre(tmp_path, order):
     path = tmp_path / "wall.ply"
@@ -196,6 +201,7 @@ def test_comments_between_rows_and_a_last_line_without_end(tmp_path):
     assert read_all(path).tolist() == [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -88,6 +88,7 @@ def test_wall_without_a_screen_is_that_of_the_first_fit():
     assert found_surface(xyz, 6.0, "inside").radius_m == first.radius_m
 
 
+@pytest.mark.slow
 def test_radius_beyond_three_percent_is_refused():
     xyz, _ = screened(6.0, "inside", 0.0, 0.6)
     with pytest.raises(InputError) as refused:

@@ -571,6 +571,7 @@ def test_six_stations_with_a_shared_scale(figure):
     figure("the same with a shared tenth", f"{with_2:.4f}, {with_t:.4f} +- {error:.4f}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tanks", [400, pytest.param(8000, marks=pytest.mark.study)])
 def test_simultaneous_readings_cover(figure, tanks):
     """Simulation: c'x of three correlated means of five readings, covered as 4 dof promise."""

@@ -81,6 +81,7 @@ def assert_bound_holds(export, volume, top, dips, seed):
     assert np.abs(system_reads(export, dips) - volume(dips)).max() <= export.error_m3 + 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["lying", "deadwood"])
 def test_the_bound_holds_at_any_dip(shape, tmp_path):
     """Simulation whose truth is the closed form, not the table: rounding and rows included."""
@@ -122,6 +123,7 @@ def test_spline_bound_holds(lying_record):
     assert "export_spline" in [one.code for one in export.lines]
 
 
+@pytest.mark.slow
 def test_zero_row_offsets_order_and_marks(lying_record):
     profile = replace(
         find_profile("csv"), level_offset_m=0.25, volume_offset_m3=-0.5, order="descending",
@@ -139,6 +141,7 @@ def test_zero_row_offsets_order_and_marks(lying_record):
     assert read_rows(without.data, ",")[0][0] == 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("code", ["aveva-centimetres", "jd-edwards"])
 def test_a_highest_row_off_the_marks_is_left_out(tmp_path, code):
     """At the next centimetre it would say 4 mm of the tank too little there: some 30 L."""
@@ -153,6 +156,7 @@ def test_a_highest_row_off_the_marks_is_left_out(tmp_path, code):
     assert "export_top_left_out" in [one.code for one in export.lines]
 
 
+@pytest.mark.slow
 def test_increments_of_volume_add_up(lying_record):
     """Property: the increments, summed, are the rounded volumes of the rows."""
     export = export_record(lying_record, find_profile("jd-edwards-increments"))
@@ -162,6 +166,7 @@ def test_increments_of_volume_add_up(lying_record):
     assert np.abs(np.cumsum(found[:, 1]) - exact).max() <= 0.5 + 1e-6
 
 
+@pytest.mark.slow
 def test_ullages(tmp_path):
     record = record_with(*rows(lying, 2.4, 0.05))
     record["job"]["datum"]["reference_height_m"] = 2.6
@@ -180,6 +185,7 @@ def test_feet_and_inches(tmp_path):
     assert "1' 0 1/2\";3.1750\n" in text
 
 
+@pytest.mark.slow
 def test_provenance(lying_record, tmp_path):
     import hashlib
 
@@ -201,6 +207,7 @@ def test_critical_zone_stands(tmp_path):
     assert {1.0, 1.8} <= set(export.dip_m.round(6))
 
 
+@pytest.mark.slow(after=3)
 @pytest.mark.parametrize(
     ("change", "given", "code"),
     [
@@ -241,6 +248,7 @@ def test_tables_that_cannot_be_exported(height, volume, code, tmp_path):
     assert codes(error) == [code]
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize("column", ["u_m3", "U_m3", "k", "area_m2"])
 @pytest.mark.parametrize("change", [lambda values: values[:-1], lambda values: [-1.0, *values[1:]]])
 def test_columns_that_do_not_fit_their_table(column, change, lying_record, tmp_path):
@@ -253,6 +261,7 @@ def test_columns_that_do_not_fit_their_table(column, change, lying_record, tmp_p
     assert codes(error) == ["record_column"]
 
 
+@pytest.mark.slow
 def test_levels_that_coincide_are_left_out(tmp_path):
     """Rows of 25 mm by a profile of centimetres: every second one stands as it is."""
     path = exact_record(tmp_path, lying, rows(lying, 2.4, 0.025)[0])
@@ -285,6 +294,7 @@ def test_the_command_as_json_and_list(lying_record, tmp_path, capsys):
     assert len(capsys.readouterr().out.splitlines()) == len(shipped_profiles())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -303,6 +313,7 @@ def test_refusals_leave_what_was_there(arguments, lying_record, capsys):
     assert lying_record.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_both_files_or_none(lying_record, tmp_path):
     """A report that cannot be written leaves no new table behind."""
     export = export_record(lying_record, find_profile("csv"))

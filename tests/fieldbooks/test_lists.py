@@ -47,6 +47,7 @@ def list_of(known, path, headings, separator=";", decimal=",", encoding="utf-8",
     return path
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
 @pytest.mark.parametrize("language", [*HEADINGS])
 def test_a_list_becomes_the_points_of_the_job(job, tmp_path, capsys, language, encoding):
@@ -142,6 +143,7 @@ def test_a_job_in_a_workbook_gets_no_files_beside_it(tmp_path, capsys):
 # ---- headings of files in the folder itself
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("language", [*HEADINGS])
 def test_foreign_headings_in_the_folder_are_read_and_told(job, language):
     _, folder = job
@@ -163,6 +165,7 @@ def test_a_heading_in_another_unit_is_refused(job):
     assert ["is x_m in mm" in one for one in said] == [True]
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize(
     ("table", "heading", "column"),
     [

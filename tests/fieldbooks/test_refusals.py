@@ -217,6 +217,7 @@ def test_a_file_twice_and_a_name_that_no_job_takes(tmp_path, capsys):
     ]  # fmt: skip
 
 
+@pytest.mark.slow(after=17)
 @pytest.mark.parametrize("data", WHOLE)
 def test_what_is_no_field_book_is_refused(tmp_path, data):
     (tmp_path / "profile.toml").write_text(PROFILE, encoding="utf-8")

@@ -63,6 +63,7 @@ def test_each_format_gives_what_was_measured(tmp_path, name, arcsec, mm):
         np.testing.assert_allclose(xyz, [[0.2, 0.1, 0], [-1, 1.2, 0.05]], rtol=0, atol=6e-6)
 
 
+@pytest.mark.slow(after=8)
 @pytest.mark.parametrize("width", [8, 16])
 @pytest.mark.parametrize(
     ("length", "mm"), [("0", 0.5), ("1", 0.1524), ("6", 0.05), ("7", 0.01524), ("8", 0.005)]
@@ -81,6 +82,7 @@ def test_units_of_gsi(tmp_path, width, length, mm, angle, arcsec):
     assert len(tables["control_readings"]) == 8
 
 
+@pytest.mark.slow(after=5)
 @pytest.mark.parametrize("options", [
     {"wide": False}, {"angle": "2"}, {"angle": "4"}, {"length": "2"}, {"order": "2"},
     {"zero": "2"}, {"wide": False, "angle": "2", "length": "2", "order": "2", "zero": "2"},

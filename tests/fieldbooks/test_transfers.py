@@ -48,6 +48,7 @@ def read(folder, data, name, **choices):
     return {one.name: one.read_bytes() for one in found.paths}, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRITERS)
 def test_a_transfer_changes_no_table(tmp_path, name):
     data = WRITERS[name](one_stand()).encode()
@@ -75,6 +76,7 @@ def test_zeros_at_the_end_are_reported(tmp_path):
 FILLERS = ("-----", "?????", "*****", "     ", ".....")
 
 
+@pytest.mark.slow(after=7)
 @pytest.mark.parametrize("width", [8, 16])
 @pytest.mark.parametrize("filler", [*FILLERS, "all"])
 @pytest.mark.parametrize("index", ["83", "86", "87", "88"])

@@ -87,6 +87,7 @@ def seams_at(depth_m, width_m, shape="cosine", course=None):
     return wall_of([Seam(at, depth_m, width_m, shape, course) for at in (1.0, 3.7)])
 
 
+@pytest.mark.slow
 def test_the_table_lies_halfway(tmp_path):
     """Second method: the same field with the columns rejected, and with all of them kept."""
     rng, shape = np.random.default_rng(1), seams_at(-0.04, 0.8)

@@ -26,6 +26,7 @@ def covariance_of(sizes, steps):
     return found.reshape(2, 3, len(steps), 2, 3, len(steps))[:, :, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shape", "draws"), [("mean", 900), ("oval", 300), ("seam", 100)])
 def test_covariance_of_drawn_walls(shape, draws):
     """Simulation, pooled over all azimuths; of unit variance, known to 0.05 or so."""

@@ -170,6 +170,7 @@ def test_seams_hide_from_columns_alone():
     assert hidden_seams_m(both_ends, 7.5) == pytest.approx(hidden_seams_m(even, 7.5))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [0.0, 0.2, 0.5])
 def test_courses_err_alike_as_far_as_their_columns_do(turned):
     """Simulation: two seams at 40 000 random places, seen by two courses of 60 columns."""
@@ -366,6 +367,7 @@ def test_the_average_curvature_is_half_of_what_the_readings_add():
     assert 2 * average == pytest.approx(added, rel=1e-9, abs=1e-9 * np.abs(added).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", EXACT)
 def test_exact_shapes_without_noise(shape, figure):
     """Closed form: three rings of 24 points a course, volumes of courses within 2 ppm."""
@@ -380,6 +382,7 @@ def test_exact_shapes_without_noise(shape, figure):
     assert abs(ppm) < 2.0
 
 
+@pytest.mark.slow
 def test_a_barrel_of_three_rings_is_within_its_doubt(figure):
     """5 mm, noise-free: what is drawn in at the joints cannot be told from it beyond the rings."""
     sites = sites_of(4, [-0.7, 0.0, 0.7], 24)
@@ -393,6 +396,7 @@ def test_a_barrel_of_three_rings_is_within_its_doubt(figure):
     assert abs(ppm) < min(2 * u, 100)
 
 
+@pytest.mark.slow
 def test_a_buckle_is_wall(figure):
     """60 mm over one course, 3 m wide, 24 to 72 points a ring: at most the circle's 18 ppm."""
     for points in (24, 48, 72):

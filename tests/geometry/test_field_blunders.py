@@ -65,6 +65,7 @@ def test_covariances_are_the_sum_of_the_components():
     assert total == pytest.approx(written_out(sites, variances), rel=1e-9, abs=1e-15)
 
 
+@pytest.mark.slow(after=7)
 @pytest.mark.parametrize("index", range(len(COMPONENTS)), ids=[one.name for one in COMPONENTS])
 def test_the_spread_of_functionals_by_one_component(index):
     sites = some_sites()
@@ -142,6 +143,7 @@ def test_the_search_finds_the_very_top_and_its_curvature():
     assert near_by[1] == pytest.approx(covariance, rel=1e-4, abs=1e-5)
 
 
+@pytest.mark.slow(after=3)
 @pytest.mark.parametrize("seed", [36, 37, 55, 58])
 def test_the_search_goes_on_to_the_top(seed):
     """Begun beside it: on these walls steps that only became shorter ended on the way up."""
@@ -159,6 +161,7 @@ def test_the_search_goes_on_to_the_top(seed):
     assert np.abs(evidence.misfit(best)[1][free]).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_a_matrix_that_is_larger_than_a_piece_is_inverted_whole():
     columns = np.random.default_rng(1).normal(size=(3 * MIRRORED + 5, 300))
     covariance = columns @ columns.T

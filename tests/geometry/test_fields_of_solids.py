@@ -137,6 +137,7 @@ def circle_of(normal, count=400):
     return np.outer(np.cos(turn), first) + np.outer(np.sin(turn), np.cross(normal, first))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one", OF_GREAT_CIRCLES[1:3])
 def test_means_over_great_circles(one):
     """Second method: the covariance between places, less its degree 2, averaged over circles."""
@@ -264,6 +265,7 @@ def test_a_reading_far_off_is_found_and_a_dent_of_two_is_not():
     assert SolidField(*given, estimate_sizes(*given)).far_off(5.0, 0.05).tolist() == []
 
 
+@pytest.mark.slow
 def test_many_points_become_means_of_neighbours():
     rng = np.random.default_rng(9)
     xyz = rng.uniform(0, 1, (5000, 3))

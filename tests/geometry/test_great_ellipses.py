@@ -180,6 +180,7 @@ def _of_prior(found):
     )
 
 
+@pytest.mark.slow
 def test_intervals_of_random_ellipsoids(figure):
     """Simulation: three perpendicular circles with 5 mm; a part of the study."""
     held = random_intervals(np.random.default_rng(7), THREE, 400, 0.005).mean()

@@ -321,6 +321,7 @@ def test_cylinders_of_any_direction_and_coverage_are_found(span_deg, figure):
     assert worst < 5
 
 
+@pytest.mark.slow
 def test_cylinder_of_flat_patch_or_one_ring_is_refused():
     for seed in range(8):
         rng = np.random.default_rng(seed)
@@ -335,6 +336,7 @@ def test_cylinder_of_flat_patch_or_one_ring_is_refused():
             fit_cylinder(ring, variances(ring))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fit", "points", "message"),
     [

@@ -83,6 +83,7 @@ def test_a_repeated_place_counts_once():
     assert shell.reason[3] == ""
 
 
+@pytest.mark.slow
 def test_perfect_points_are_all_accepted():
     shell = find_shell(wall(np.random.default_rng(11), noise=0.0), JOINTS, 6.5)
     assert np.all(shell.reason == "")
@@ -221,6 +222,7 @@ def test_nozzle_and_stair_are_rejected_with_unequal_rings():
     assert np.sum(found.reason[:-12] != "") <= 2
 
 
+@pytest.mark.slow
 def test_what_was_decided_beforehand():
     """Property: a kept point stays and is still tested, one left out is none of the search's."""
     xyz = wall(np.random.default_rng(3))
@@ -243,6 +245,7 @@ def test_what_was_decided_beforehand():
     assert left.residual_m[:-1] == pytest.approx(without.residual_m, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_nothing_decided_is_the_search_alone():
     xyz = wall(np.random.default_rng(4))
     nothing = np.zeros(len(xyz), dtype=int)

@@ -60,6 +60,7 @@ def at(*places):
     return lambda sites: np.isin(np.round(sites.azimuth_rad / FULL_TURN * POINTS), places)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off_m", [-0.08, -0.04, 0.06])
 def test_a_column_that_stands_off_alone_is_marked(off_m):
     found, off = marked(lambda sites: off_m * at(5)(sites))
@@ -82,6 +83,7 @@ FORMS = {
 }
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", FORMS)
 def test_form_is_not_marked(form):
     assert not np.any(marked(FORMS[form])[0])

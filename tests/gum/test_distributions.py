@@ -60,6 +60,7 @@ def test_quantiles_and_sd_are_those_of_scipy(one):
     assert one.sd == pytest.approx(other.std(), rel=1e-12)
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("dof", [1.5, 3.0, 3.7, 5.0, 30.0, 1e5])
 def test_many_quantiles_of_students_t(dof):
     """Property: many at once are those one by one, to the last tail, and the cdf undoes them."""
@@ -121,6 +122,7 @@ def test_hardly_inexact_limits_are_exact_ones():
     assert np.abs(difference).max() < 1e-9
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("one", [one for one in ALL if not isinstance(one, StudentT)])
 def test_the_characteristic_function_is_the_mean_cosine(one):
     """Second method: the mean of cos(t x) over evenly spread quantiles, 2e5 of them."""

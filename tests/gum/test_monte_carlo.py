@@ -290,6 +290,7 @@ def test_law_of_an_input_that_acts_alone_is_its_own(one):
     assert law.density == pytest.approx(1 / np.outer([2.0, 0.5], steps), rel=1e-3)
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("share", [0.001, 0.004, 0.01, 0.1])
 @pytest.mark.parametrize("one", ALONE, ids=lambda one: one.name)
 def test_law_of_an_input_with_little_beside_it(one, share):
@@ -336,6 +337,7 @@ def test_linear_rows_with_heavy_tails_u_and_ends(figure):
     assert np.all(np.abs(found.high - law.quantile[:, 1]) < plain)
 
 
+@pytest.mark.slow
 def test_two_degrees_of_freedom_have_no_u_but_an_interval():
     """Closed form: t of 2 degrees of freedom, quantile 4.303; its sd does not exist."""
     found = simulate(total, [StudentT(1.0, dof=2), Normal(1e-6)], goal=SOME)
@@ -432,6 +434,7 @@ def test_normals_that_are_one_leave_other_inputs_alone(r):
         assert found.high == pytest.approx(0.95 * np.sqrt(3) * 0.1, abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dof", "size", "bend", "probability"), [(5, 0.3, 0.02, 0.999), (2, 0.3, 0.003, 0.99)]
 )

@@ -64,6 +64,7 @@ def check_exact(found, model, inputs):
     return np.abs(off).max()
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("factor", "count"), [(1.0, INPUTS), (20.0, INPUTS), (60.0, INPUTS), (20.0, MANY)]
 )
@@ -74,6 +75,7 @@ def test_ends_of_quadratic_rows_are_those_of_the_exact_law(factor, count, figure
     figure(f"{count} inputs, u x {factor:g}, largest error of an end by u", worst)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_correlated_inputs_in_any_order_have_the_exact_law(seed, figure):
     """Second method, invariance: 130 inputs, all correlated, those of the forms anywhere."""

@@ -64,6 +64,7 @@ def test_what_cells_miss_of_a_cusp_is_told(wide_m):
     assert missed < 1.96 * np.sqrt(found.missed_m2[MIDDLE])
 
 
+@pytest.mark.slow
 def test_noise_of_a_gap():  # truth: the spread of 4000 simulated profiles
     rng = np.random.default_rng(1)
     e, sd = _means_of_cusp(0.15, 0.008), rng.uniform(1e-4, 4e-4, len(CELLS_M))

@@ -39,6 +39,7 @@ def test_a_sum_of_squares_is_extrapolated_exactly():
     assert_allclose(found.value, reading - (N - 3) * 1e-6, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_level_tanks_keep_a_known_part_of_the_largest_error():
     """Closed form: E max grows with the sd, so that 3 - 3 sqrt 2 + sqrt 3 of it is left: 0.489."""
     rng = np.random.default_rng(1)

@@ -51,6 +51,7 @@ def refused(capsys, *arguments):
     return error.splitlines()
 
 
+@pytest.mark.slow
 def test_a_record_is_inspected_as_its_job(kept):
     """Second way: the job computed anew, and what the record kept of it."""
     job, record = (inspect_files(Asked(one)) for one in (EXAMPLE, kept))
@@ -67,6 +68,7 @@ def test_a_record_is_inspected_as_its_job(kept):
     assert not job.rule.verified
 
 
+@pytest.mark.slow
 def test_an_older_record_says_why_it_cannot_be_inspected(kept, tmp_path, capsys):
     record = json.loads((kept / "record.json").read_text(encoding="utf-8"))
     del record["wall_shape"]
@@ -82,6 +84,7 @@ def test_an_older_record_says_why_it_cannot_be_inspected(kept, tmp_path, capsys)
     assert any(one.code == "inspect_older_record_alone" for one in found.warnings)
 
 
+@pytest.mark.slow
 def test_levellings_beside_a_job_are_taken(tmp_path):
     folder = write_job(tmp_path / "job", settings={"inspection.yield_mpa": 250.0})
     for name in ("settlement.csv", "edge_profiles.csv"):
@@ -94,6 +97,7 @@ def test_levellings_beside_a_job_are_taken(tmp_path):
     assert change.verdict == "guard_band"
 
 
+@pytest.mark.slow
 def test_a_rule_of_the_job_and_one_of_the_house(tmp_path):
     folder = write_job(tmp_path / "job", settings={"inspection.rule": "house.toml"})
     (folder / "house.toml").write_text(HOUSE, encoding="utf-8")
@@ -182,6 +186,7 @@ def test_a_line_for_each_check(capsys, kept):
     assert "Verticalidad, eje: +29,1 mm, U 14,3 mm, límite ≤ 95 mm" in out[2]
 
 
+@pytest.mark.slow
 def test_it_speaks_the_language_of_its_job_or_record(tmp_path, capsys):
     job = write_job(tmp_path / "job", settings={"table.language": "es"})
     assert main(["inspect", str(job), "--quiet", "--out", str(tmp_path / "out")]) == 0

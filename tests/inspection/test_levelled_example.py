@@ -88,6 +88,7 @@ def test_edges_of_the_example(truth):
     assert bulge.azimuth_deg == 200.0
 
 
+@pytest.mark.slow
 def test_both_files_by_one_door():
     """Second method: the same as each file by itself."""
     rule = {"settlement": section("settlement", SETTLEMENT), "edge": section("edge", EDGE)}

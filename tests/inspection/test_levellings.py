@@ -223,6 +223,7 @@ def test_more_than_anyone_levels_is_told(tmp_path):
     ]
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("whole", WHOLE)
 def test_what_is_no_table_is_told(tmp_path, whole):
     for reader in (read_settlement, read_edge_profiles):
@@ -239,6 +240,7 @@ def test_spoilt_files_are_told_or_computed(tmp_path):
             assess_settlement(found, TANK_A, LIMITS, Log())
 
 
+@pytest.mark.slow
 def test_spoilt_profiles_are_told_or_computed(tmp_path):
     rng, base = np.random.default_rng(98), EDGE_HEAD + edge_rows() + edge_rows(90, end="1,45")
     for _ in range(150):
@@ -284,6 +286,7 @@ def test_too_few_points_for_the_tank_are_told(tmp_path):
     assert codes == ["levels_fewer_than_asked", "levels_wide_gaps"]
 
 
+@pytest.mark.slow
 def test_two_epochs_of_different_points(tmp_path):
     other = {f"Q{n[1:]}": (t + 5, z) for n, (t, z) in POINTS.items()}
     assert warned({"a": POINTS, "b": other})(tmp_path) == (["levels_no_difference"], {"a", "b"})

@@ -149,6 +149,7 @@ def test_readings_of_a_dense_levelling_are_beyond_the_limit(figure):
     assert failed == 0
 
 
+@pytest.mark.slow
 def test_without_errors_every_spacing_says_the_same():
     """Closed form: a wave cos 2t has S = A (1 - cos 2d), curvature 4 A / R^2 at its top."""
     for count in (16, 32, 64, 128):
@@ -263,6 +264,7 @@ def test_uncertainty_of_out_of_plane_settlement_by_simulation():
     assert_allclose(1000 * assessed.u_S_m, S.std(0), rtol=0.02)
 
 
+@pytest.mark.slow
 def test_uncertainty_of_curvature_tilt_and_r2_by_simulation():
     """Second method: 1500 levellings of a planted tank; first order holds where it is not small."""
     azimuth, rng = uneven(16, 3), np.random.default_rng(7)
@@ -380,6 +382,7 @@ def test_a_difference_takes_out_how_the_tank_was_built():
     assert log.warnings == []
 
 
+@pytest.mark.slow
 def test_three_epochs():
     made = levelled(*(epoch_of(A_MM, name=name) for name in ("a", "b", "c")))
     saved, _ = assess_settlement(made, TANK_A, LIMITS, Log())

@@ -38,6 +38,7 @@ def checks_of(job, wall, rule):
     return {one.code: judged(one) for one in figures}
 
 
+@pytest.mark.slow
 def test_lean_of_the_page(monkeypatch, folder):
     """Closed form: (2.10, -1.30) mm/m is 2.470 mm/m or 1/405 towards azimuth 121.76 deg."""
     monkeypatch.setattr(generated_walls, "LEAN", LEAN_OF_PAGE)
@@ -54,6 +55,7 @@ def test_lean_of_the_page(monkeypatch, folder):
         assert (axis.verdict, axis.limit.verified) == ("passed", False)
 
 
+@pytest.mark.slow
 def test_plumb_and_radii_of_a_known_wall(folder):
     """Truth: the functions that made the wall, no model of the package; readings of 1 um.
 
@@ -100,6 +102,7 @@ def test_u_of_what_was_read_is_that_of_readings(folder):
     np.testing.assert_allclose(1e3 * high.u_m, np.sqrt(1 - 2 / 24), rtol=0.03)
 
 
+@pytest.mark.slow
 def test_outside_survey_is_judged_inside_the_plates(folder):
     """Closed form: plate and paint off the radius; no part of the plumb where all are alike."""
     wall = cylinder()
@@ -115,6 +118,7 @@ def test_outside_survey_is_judged_inside_the_plates(folder):
     )
 
 
+@pytest.mark.slow
 def test_head_of_the_survey_is_taken_off(folder):
     """Closed form: thin hoop, dr = g rho (h - z) r^2 / (E t)."""
     wall = cylinder()

@@ -82,6 +82,7 @@ def found(shell, scanned):
     return gaps_of_cloud(passes, wall, _welds(shell), LIMITS)
 
 
+@pytest.mark.slow
 def test_peaks_are_recovered(shell, found, figure):  # truth: the page's formula of the form
     off = []
     for peak, gap in zip(PEAKS, _upright(found), strict=True):
@@ -126,12 +127,14 @@ def test_profiles_are_kept_of_the_largest(found):  # property; a profile has its
         assert max(near, key=abs) == pytest.approx(one.gap_mm, abs=0.005)
 
 
+@pytest.mark.slow
 def test_turns_in_memory_give_the_same(shell, scanned, found):  # second method: weld by weld
     wall, passes = scanned
     again = gaps_of_cloud(passes, wall, _welds(shell), LIMITS, memory_bytes=1)
     assert again == found
 
 
+@pytest.mark.slow
 def test_points_in_parts_give_the_same(shell, scanned):  # property: whole numbers that add
     wall, _ = scanned
     strips = [(one, 0.5) for one in _welds(shell)]
@@ -313,6 +316,7 @@ def test_sparse_cloud_determines_nothing():  # 250 points in each square metre
     assert [one.remark_values["welds"] for one in found.figures] == [5, 1]
 
 
+@pytest.mark.slow
 def test_gap_that_is_too_uncertain(shell, scanned, found):  # u over a quarter of the limit
     wall, passes = scanned
     again = gaps_of_cloud(passes, wall, _welds(shell), {"peaking": 0.4})

@@ -31,6 +31,7 @@ def asked_of(manifest):
     return {one["tank"]: (one["heights_m"], methods) for one in manifest["tanks"]}
 
 
+@pytest.mark.slow
 def test_a_round_trip(world):
     log = Log()
     found = read_answers(world["folder"], asked_of(world["manifest"]), log)
@@ -120,6 +121,7 @@ SPOILT = {
 }
 
 
+@pytest.mark.slow(after=8)
 @pytest.mark.parametrize(
     ("file", "old", "new", "said"),
     [(file, *one) for file, some in SPOILT.items() for one in some],

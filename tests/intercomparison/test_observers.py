@@ -67,6 +67,7 @@ def test_hits_lie_on_the_wall(tank):
     assert_allclose(on_wall(parts, tank, places, middle), 0, atol=U_READ_M)
 
 
+@pytest.mark.slow
 def test_a_tape_reads_the_mean_width_of_the_hull(tank):
     """Second method: Cauchy's formula, the perimeter of a hull is the integral of its support."""
     z = 0.2 * tank.courses_m[0]
@@ -150,6 +151,7 @@ def test_laspy_reads_the_scans(tank):
     assert_allclose([read.header.mins, read.header.maxs], [read.xyz.min(0), read.xyz.max(0)])
 
 
+@pytest.mark.slow
 def test_batches_are_the_mass_in_the_tank(tank):
     """The masses of all batches, by the declared water and meter, fill the tank to its dips."""
     parts = perfect(tank, "liquid")
@@ -197,6 +199,7 @@ def test_photographs_are_those_of_the_camera(tank):
     assert_allclose(image[seen], expected, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_what_is_declared_holds_the_errors():
     """Simulation: zero and heights of courses of many crews scatter as uncertainty.csv says."""
     tank = draw_tank(np.random.default_rng(8), "T1", "round")

@@ -38,6 +38,7 @@ def test_the_public_part_says_nothing_of_the_truth():
         assert secret.encode() not in text
 
 
+@pytest.mark.slow
 def test_seed_and_secret_make_the_same_again():
     again = make_package(2, 1, METHODS, secret=SECRET, nonce=NONCE)
     assert again == made_package()
@@ -45,6 +46,7 @@ def test_seed_and_secret_make_the_same_again():
     assert other.files["T01/points/points.csv"] != again.files["T01/points/points.csv"]
 
 
+@pytest.mark.slow
 def test_methods_do_not_hang_on_each_other():
     """A package of fewer tanks and methods has the same files of them."""
     fewer = make_package(1, 1, METHODS[1:], secret=SECRET, nonce=NONCE)

@@ -74,6 +74,7 @@ BAD_SETTINGS = [
 ]
 
 
+@pytest.mark.slow(after=8)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("key", "value", "words"), BAD_SETTINGS)
 def test_bad_setting_is_reported_with_its_row_and_key(tmp_path, form, key, value, words):
@@ -324,6 +325,7 @@ def test_courses_against_shell_height(tmp_path, nominal, accepted):
         assert places(problems_of(path)) == [("courses.csv", None, "height_m")]
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(
     ("scale", "column", "words"),

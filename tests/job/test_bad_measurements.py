@@ -595,6 +595,7 @@ def test_directions_between_known_points(tmp_path, factor):
         assert "if they are in gon" in problem.expected
 
 
+@pytest.mark.slow(after=10)
 @pytest.mark.parametrize(
     ("change", "words"),
     [

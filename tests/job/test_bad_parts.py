@@ -83,6 +83,7 @@ SETTINGS_OF_VERTICAL = [
 ]
 
 
+@pytest.mark.slow(after=7)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("changes", "key", "words"), SETTINGS_OF_VERTICAL)
 def test_settings_of_a_vertical_tank(tmp_path, form, changes, key, words):
@@ -109,6 +110,7 @@ ZONES = [
 ]
 
 
+@pytest.mark.slow(after=7)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("zones", "words"), ZONES)
 def test_fine_zones(tmp_path, form, zones, words):
@@ -181,6 +183,7 @@ ROWS_OF_VERTICAL = [
 ]
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("option", "rows", "row", "column", "words"), ROWS_OF_VERTICAL)
 def test_rows_of_a_vertical_tank(tmp_path, form, option, rows, row, column, words):
@@ -194,6 +197,7 @@ def test_rows_of_a_vertical_tank(tmp_path, form, option, rows, row, column, word
     assert not others or (option, column) == ("deadwood", "top_m")  # 500 is no dip, either
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_a_bottom_that_does_not_fit_its_form(tmp_path, form):
     file = table_file(form, "bottom")
@@ -236,6 +240,7 @@ ROOFS = [
 ]
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("changes", "key", "words"), ROOFS)
 def test_floating_roofs(tmp_path, form, changes, key, words):
@@ -334,6 +339,7 @@ SETTINGS_OF_KINDS = [
 ]
 
 
+@pytest.mark.slow(after=14)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("kind", "changes", "key", "words"), SETTINGS_OF_KINDS)
 def test_settings_of_other_kinds(tmp_path, form, kind, changes, key, words):
@@ -386,6 +392,7 @@ def test_torispherical_ends(tmp_path, dish, knuckle, key, words):
     assert words in problem.expected
 
 
+@pytest.mark.slow(after=12)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(
     ("kind", "points", "changes", "key", "words"),
@@ -426,6 +433,7 @@ def test_scans(tmp_path, form, kind, points, column, words):
     assert words in problem.expected
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(
     ("kind", "table"),
@@ -486,6 +494,7 @@ USELESS = [
 ]
 
 
+@pytest.mark.slow(after=11)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("kind", "changes", "declared", "words"), USELESS)
 def test_inputs_without_effect(tmp_path, form, kind, changes, declared, words):

@@ -163,6 +163,7 @@ def test_an_adjustment_alone_assumes_nothing(tmp_path):
 # --- what u is
 
 
+@pytest.mark.slow(after=8)
 @pytest.mark.parametrize(
     ("row", "u"),
     [
@@ -211,6 +212,7 @@ CONTRADICTIONS = [
 ]
 
 
+@pytest.mark.slow(after=7)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("cells", "told"), CONTRADICTIONS)
 def test_cells_that_contradict_one_another(tmp_path, form, cells, told):
@@ -276,6 +278,7 @@ USELESS = [
 ]
 
 
+@pytest.mark.slow(after=8)
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(("changes", "row", "words"), USELESS)
 def test_inputs_without_effect(tmp_path, form, changes, row, words):
@@ -397,6 +400,7 @@ def test_a_stated_volume_that_is_refused(tmp_path, row, column, words):
     assert words in problem.expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_stated_dip_outside_table_is_reported(tmp_path, form):
     job = load(write(tmp_path, stated((9.0, 2.0, None, None)), form))

@@ -76,6 +76,7 @@ def problems_of(path):
     return refused.value.problems
 
 
+@pytest.mark.slow
 def test_a_filled_workbook_beside_blank_files_is_read(both):
     fill_book(both / "job.xlsx")
     job = tankcal.load(both)
@@ -91,6 +92,7 @@ def test_filled_files_beside_a_blank_workbook_are_read(both):
     assert (job.tank.id, job.source, job.warnings) == ("T-1", "job", ())
 
 
+@pytest.mark.slow
 def test_two_filled_forms_that_differ_are_one_problem(both):
     fill_book(both / "job.xlsx")
     settings = both / "job.toml"
@@ -101,6 +103,7 @@ def test_two_filled_forms_that_differ_are_one_problem(both):
     assert tankcal.load(both / "job.xlsx").tank.id == "T-1"  # named by the user: no doubt
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fuller", "said"), [
     ("texts", "is not read, because the text files beside it are further filled in"),
     ("book", "is read, because it is further filled in than the text files beside it"),
@@ -117,6 +120,7 @@ def test_of_two_forms_that_agree_the_fuller_one_is_read(both, fuller, said):
     assert [str(one) for one in job.warnings] == [f"job.xlsx: {said}"]
 
 
+@pytest.mark.slow
 def test_two_forms_of_the_same_content_are_read_as_text(both):
     fill_book(both / "job.xlsx")
     fill_texts(both)
@@ -128,6 +132,7 @@ def test_two_blank_forms_are_told_once_and_as_text(both):
     assert sorted(columns) == sorted(BLANKS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_form_filled_in_another_language_is_recognised(tmp_path, language):
     """Words of choices and flags of the form do not count as typed."""
@@ -141,6 +146,7 @@ def test_a_form_filled_in_another_language_is_recognised(tmp_path, language):
 # ---- a folder with a workbook alone
 
 
+@pytest.mark.slow
 def test_a_folder_with_a_workbook_alone_is_a_job(tmp_path, capsys):
     folder = tmp_path / "tk-21"
     fill_book(write_input_workbook(folder))
@@ -156,6 +162,7 @@ def test_a_folder_with_a_workbook_alone_is_a_job(tmp_path, capsys):
 # ---- tankcal new
 
 
+@pytest.mark.slow
 def test_new_writes_one_form_and_exchanges_an_untouched_one(tmp_path, capsys):
     folder = tmp_path / "tk 1"
     arguments = ["new", str(folder), "--survey", "strapping"]
@@ -169,6 +176,7 @@ def test_new_writes_one_form_and_exchanges_an_untouched_one(tmp_path, capsys):
     assert not list(folder.glob("*.xlsx"))
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("change", ["typed", "another file", "another form"])
 def test_new_keeps_what_the_user_typed(tmp_path, change, capsys):
     folder = tmp_path / "tk"
@@ -183,6 +191,7 @@ def test_new_keeps_what_the_user_typed(tmp_path, change, capsys):
     assert "is left as it is" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("locale", "language"), [("pt_BR.UTF-8", "pt-BR"), ("es_ES.UTF-8", "es"),
                                                   ("C.UTF-8", "en")])  # fmt: skip
 def test_new_follows_the_language_of_the_environment(tmp_path, monkeypatch, capsys, locale,

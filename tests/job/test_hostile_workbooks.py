@@ -129,6 +129,7 @@ PART_OF_ANOTHER_FILE = [
 ]
 
 
+@pytest.mark.slow(after=7)
 @pytest.mark.parametrize(("name", "words"), PART_OF_ANOTHER_FILE)
 def test_unneeded_workbook_parts_are_refused(book, name, words):
     said = refusal(book, packed(book, {name: b"<x/>"}))
@@ -136,6 +137,7 @@ def test_unneeded_workbook_parts_are_refused(book, name, words):
     assert "save it" in said
 
 
+@pytest.mark.slow(after=9)
 @pytest.mark.parametrize(
     "content",
     [

@@ -84,6 +84,7 @@ def form(filled, tmp_path):
 # ---- the words
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", LANGUAGES[1:])
 def test_a_language_has_every_text_and_every_note(language):
     english, words = load_words("en")["input"], load_words(language)["input"]
@@ -322,6 +323,7 @@ TEXT_NUMBERS = {
 }
 
 
+@pytest.mark.slow
 def test_a_number_typed_as_text(form):
     def change(book):
         sheet = book["points"]
@@ -412,6 +414,7 @@ def test_each_mistake_names_its_sheet_and_cell(form, change, place, words):
     assert len(here) == 1, told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("value", "words"),
     [

@@ -337,6 +337,7 @@ def test_a_sphere_and_a_mesh(tmp_path):
     assert job.files[-1] == tankcal.job.InputFile("tank.stl", digest, 10)
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize(
     "changes", [VERTICAL, MEASURED, DRY, HORIZONTAL, ELLIPTICAL, SCAN, BALL, MESH]
 )
@@ -484,6 +485,7 @@ def test_covariances_that_are_refused(tmp_path, matrix, words):
     assert words in problem.expected
 
 
+@pytest.mark.slow(after=5)
 @pytest.mark.parametrize(
     ("arrays", "column", "words"),
     [

@@ -85,6 +85,7 @@ def test_exact_marks_give_the_same_points(tmp_path, plain):
     assert found.sigma0 == pytest.approx(plain.sigma0, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_read_on_a_comparator_the_points_agree_within_their_sds(film, plain, figure):
     """Property: marks read five times with 2 um move the points by less than their sds."""
     job, found = film
@@ -350,6 +351,7 @@ PROBLEMS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_impossible_values_are_reported(tmp_path, name):
     change, file, row, words = PROBLEMS[name]

@@ -482,6 +482,7 @@ def test_every_slip_of_a_run_comes_in_one_go(tmp_path):
                      "dip_missing_in_run", "no_such_meter"}  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", LANGUAGES[1:])
 def test_slips_are_told_in_every_language(tmp_path, language):
     """No English is left, and each value stands in the sentence."""

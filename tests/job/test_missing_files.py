@@ -46,6 +46,7 @@ def told_without(folder, name, spoil):
         path.write_text(text, encoding="utf-8")
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("how", SPOILT)
 @pytest.mark.parametrize("survey", SURVEYS)
 def test_one_file_is_one_line(tmp_path, survey, how):

@@ -27,6 +27,7 @@ def rewritten(folder, separator, decimal, encoding):
     return folder
 
 
+@pytest.mark.slow(after=10)
 @pytest.mark.parametrize("encoding", ENCODINGS)
 @pytest.mark.parametrize(
     ("separator", "decimal"), [(";", ","), (";", "."), ("\t", ","), (",", ".")]

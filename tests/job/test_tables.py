@@ -100,6 +100,7 @@ BROKEN_TOML = (
 )  # fmt: skip
 
 
+@pytest.mark.slow(after=24)
 @pytest.mark.parametrize("language", ["pt-BR", "es"])
 @pytest.mark.parametrize("text", BROKEN_TOML, ids=range(len(BROKEN_TOML)))
 def test_every_error_of_toml_is_told_in_the_language(text, language):
@@ -321,6 +322,7 @@ def test_blank_and_comment_rows_of_a_sheet(tmp_path):
     assert raw.tables["points"].row_numbers[:4] == (4, 5, 8, 9)
 
 
+@pytest.mark.slow
 def test_formatted_blank_rows_and_a_wrong_dimension_cost_nothing(book):
     # property: neither what the sheet declares nor cells with a format only are read
     def fill(name, content):

@@ -40,6 +40,7 @@ def assert_quarters(folder, heading, labels, separator=","):
     assert rows.volume_m3 == pytest.approx([AREA_M2 * h for h in heights], abs=2e-5)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("form", ["{} {}/4", "{}-{}/4", "{}{}", "{} {}"])
 def test_inches_with_fractions(form, tmp_path):
     part = (lambda n: n) if "/" in form else VULGAR.get
@@ -48,6 +49,7 @@ def test_inches_with_fractions(form, tmp_path):
     assert_quarters(tmp_path, "Medição (1/4 pol),galões (EUA)", labels)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "form", ["{}' {} {}/4\"", "{}'-{} {}/4\"", "{} ft {} {}/4 in", "{}' {}{}\""]
 )
@@ -86,6 +88,7 @@ def test_a_heading_of_feet_and_inches_over_plain_numbers_is_refused(tmp_path):
         lint(write(tmp_path, text))
 
 
+@pytest.mark.slow(after=3)
 @pytest.mark.parametrize(
     ("heading", "cells", "step_m"),
     [
@@ -141,6 +144,7 @@ def test_parts_of_a_height_that_are_too_large(tmp_path):
         lint(write(tmp_path, columns("FT,IN,BBLS", *zip(*cells, strict=True))))
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize(
     ("heading", "bases", "labels_m", "base_m", "rows"),
     [

@@ -92,6 +92,7 @@ def test_exact_tables_of_every_step_and_rounding_have_no_faults(shape, tmp_path)
             assert_clean(tmp_path, shape, step, decimals)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["lying", "five courses", "barrels", "sphere"])
 def test_unrounded_tables_have_no_faults(shape):
     """A workbook holds all digits: then the table's own roughness is the measure."""
@@ -514,6 +515,7 @@ def page(columns=5, lines=50, by_row=False):
     return text
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("by_row", [False, True])
 def test_pairs_of_columns_across_printed_pages(by_row, tmp_path):
     assert found(lint_text(tmp_path, page(by_row=by_row))) == {}
@@ -642,6 +644,7 @@ def leaning(diameter, length, tilt, place):
     return litres
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("tank", LEANING)
 def test_a_leaning_tank_dipped_near_its_low_end_is_sound(tank, tmp_path):
     rows = [f"{k / 10:.1f},{v:.0f}" for k, v in enumerate(leaning(*tank))]
@@ -764,6 +767,7 @@ def test_suggestions(text, expected, found_text, slip):
 # the whole table
 
 
+@pytest.mark.slow(after=5)
 @pytest.mark.parametrize(
     ("nominal", "severity", "words"),
     [
@@ -909,6 +913,7 @@ def test_records(tmp_path):
         lint(tmp_path / "record.json")
 
 
+@pytest.mark.slow
 def test_our_own_record_is_clean(example_record):
     assert lint(example_record).findings == ()
 

@@ -39,6 +39,7 @@ def assert_refused(folder, text, *words):
         assert word in str(error.value)
 
 
+@pytest.mark.slow(after=21)
 @pytest.mark.parametrize(
     ("heading", "size"),
     [
@@ -101,6 +102,7 @@ def test_volumes_of_every_unit_are_exact(heading, size, tmp_path):
     assert rows.volume_m3 == pytest.approx(truth, rel=1e-9)
 
 
+@pytest.mark.slow(after=16)
 @pytest.mark.parametrize(
     ("heading", "size"),
     [

@@ -22,6 +22,7 @@ def inside(radius, plate_mm=8.0):
     return np.pi * (radius - plate_mm / 1000) ** 2
 
 
+@pytest.mark.slow
 def test_a_cylinder_comes_out_exactly(tmp_path):
     found = result_of(tmp_path)
     heights = found.capacity.height_m.to_numpy()
@@ -232,6 +233,7 @@ def test_a_course_left_without_wall_points_is_refused(tmp_path):
         run(replace(job, points=replace(job.points, xyz_m=xyz)))
 
 
+@pytest.mark.slow
 def test_progress_is_reported(tmp_path):
     write_job(tmp_path / "job")
     steps = []

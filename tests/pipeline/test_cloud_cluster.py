@@ -94,11 +94,13 @@ def assert_same_passes(one, other):
     assert one.left_out.min() > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("each", [300, 4999, 10**6])
 def test_workers_and_pieces_change_no_byte(client, placing, each):  # invariance
     assert_same_passes(passes_by(client, placing, each), JobPasses(placing))
 
 
+@pytest.mark.slow
 def test_workers_change_no_byte_of_the_inside(client, placing):  # invariance
     floor = floor_grid(SURFACE, 0.0, 4.0)
     inside = (True, True, False, True)
@@ -228,11 +230,13 @@ def test_without_the_library(placing, monkeypatch):
         assert isinstance(passes, JobPasses)
 
 
+@pytest.mark.slow
 def test_a_scheduler_without_workers(placing, quick):
     with distributed.LocalCluster(n_workers=0, protocol="tcp", **THREADS) as it:
         assert refusal(placing, it.scheduler_address) == "cluster_no_workers"
 
 
+@pytest.mark.slow
 def test_workers_that_all_go(placing, quick, monkeypatch):
     with (
         distributed.LocalCluster(n_workers=0, **THREADS) as cluster,

@@ -1,6 +1,7 @@
 """The wall where the dip of a lying tank meets it: told when unseen, and what points there do."""
 
 import numpy as np
+import pytest
 from generated_solids import LyingShell, job_of
 
 from tankcal.geometry.outlines import FULL_TURN
@@ -43,18 +44,21 @@ def computed(shell, folder, *, at_foot):
     return codes, (volumes - shell.volume_below(dip))[0], table.U_m3[0]
 
 
+@pytest.mark.slow
 def test_a_foot_that_nobody_measured_is_told(tmp_path):
     codes, error, expanded = computed(dented(), tmp_path, at_foot=False)
     assert codes.count("dip_foot_unseen") == 1
     assert abs(error) > expanded  # the dent, 12 mm, is that of the zero
 
 
+@pytest.mark.slow
 def test_three_points_at_it_tell_the_zero(tmp_path):
     codes, error, expanded = computed(dented(), tmp_path / "dented", at_foot=True)
     assert "dip_foot_unseen" not in codes
     assert abs(error) < expanded
 
 
+@pytest.mark.slow
 def test_they_make_u_smaller(tmp_path):
     sound = LyingShell(RADIUS_M, LENGTH_M, LENGTH_M / 2, 0.0)
     without, having = (

@@ -14,6 +14,7 @@ def a_wall(family, radius_m):
     return make_wall(np.random.default_rng(0), family, radius_m=radius_m, courses=5)
 
 
+@pytest.mark.slow
 @EVERY
 @SIZES
 def test_areas_are_those_of_the_radii(family, radius_m):
@@ -26,6 +27,7 @@ def test_areas_are_those_of_the_radii(family, radius_m):
         assert area == pytest.approx(FULL_TURN * np.mean(radii**2) / 2, rel=RIGHT)
 
 
+@pytest.mark.slow(after=6)
 @EVERY
 @SIZES
 def test_volumes_are_those_of_the_areas(family, radius_m):
@@ -53,6 +55,7 @@ def rises(wall):
     return middle - (low + high) / 2
 
 
+@pytest.mark.slow(after=2)
 @EVERY
 def test_courses_bulge_outward_unless_told_not_to(family):
     """1 to 8 mm in the mean of the courses, which the scatter of a fifth moves by 9 %."""

@@ -97,6 +97,7 @@ def codes_of(result):
     return {(one.file, one.column) for one in result.warnings}
 
 
+@pytest.mark.slow
 def test_one_setup_gives_the_table(tmp_path):
     result = run(tmp_path, parts_of())
     assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=2e-6)
@@ -108,6 +109,7 @@ def test_one_setup_gives_the_table(tmp_path):
     assert abs(offset.contribution) == pytest.approx(2 * 5e-4 / 6.5 * 1063, rel=0.12)
 
 
+@pytest.mark.slow
 def test_a_turned_circle_of_one_set_up_changes_nothing(tmp_path):
     """Property: the zero of a single set-up's directions is a choice; U to 1e-9."""
     first = run(tmp_path / "first", parts_of(tool=NOISY, seed=1))
@@ -248,6 +250,7 @@ def told_codes(result):
     return {one.expected.code for one in result.warnings}
 
 
+@pytest.mark.slow
 def test_an_offset_of_no_bare_wall_is_told(tmp_path):
     """The constant of a reflector: the straps tell it, and the table is right all the same."""
     for offset_m, is_told in ((0.0344, True), (0.002, False)):
@@ -258,6 +261,7 @@ def test_an_offset_of_no_bare_wall_is_told(tmp_path):
         assert result.table.volume_m3[-1] == pytest.approx(volume_of(oval), rel=2e-5)
 
 
+@pytest.mark.slow
 def test_a_wall_unlike_the_nominal_one_is_told(tmp_path):
     """Nothing else shows an offset that was declared: 1 in 500 of the radius is 13 mm."""
     for offset_m, is_told in ((0.0344, True), (0.002, False)):
@@ -265,6 +269,7 @@ def test_a_wall_unlike_the_nominal_one_is_told(tmp_path):
         assert ("wall_unlike_nominal" in told_codes(result)) == is_told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn_deg", [0.0, 0.5])
 def test_a_set_up_whose_circle_was_turned_before_its_hits_is_named(tmp_path, turn_deg):
     """Two set-ups: that one of them moved is told, either may be it."""
@@ -319,6 +324,7 @@ def test_straps_tell_an_unknown_offset(tmp_path):
     assert np.abs(result.straps.w).max() < 1
 
 
+@pytest.mark.slow
 def test_straps_and_hits_are_one_least_squares_solution(tmp_path):
     """Second method: the offset as an unknown with its certificate as an observation."""
     parts = strapped(parts_of(tool=replace(NOISY, offset_m=4e-4), seed=2))
@@ -418,6 +424,7 @@ def test_hits_beside_welds_are_left_out(tmp_path):
     assert len(result.accepted) == len(clear.accepted) - 2
 
 
+@pytest.mark.slow
 def test_hits_that_are_only_compared(tmp_path):
     parts = parts_of()
     headings, *rows = parts.tables["wall_hits"]
@@ -435,6 +442,7 @@ def test_hits_that_are_only_compared(tmp_path):
     assert one["departure_m"] == pytest.approx(0.004, abs=4e-4)
 
 
+@pytest.mark.slow
 def test_points_taken_keep_their_covariance(tmp_path):
     result = run(tmp_path, parts_of(tool=NOISY, seed=1))
     whole = sight(result.job.hits, result.sighting.poses).points
@@ -761,6 +769,7 @@ def test_an_offset_of_another_reflector_is_named(tmp_path):
     assert ("instruments.toml", "TS.u_offset_mm") in codes_of(result)
 
 
+@pytest.mark.slow
 def test_control_targets_that_moved_are_named(tmp_path):
     parts = parts_of()
     first = ["I", "K", 10.0, 80.0, 5.0, "2026-01-05T10:00"]
@@ -778,6 +787,7 @@ def test_control_targets_that_moved_are_named(tmp_path):
     assert ("control_readings.csv", "distance_m") in moved
 
 
+@pytest.mark.slow
 def test_hits_of_another_course_are_named(tmp_path):
     parts = parts_of()
     headings, *rows = parts.tables["wall_hits"]
@@ -800,6 +810,7 @@ def test_angles_in_another_unit_are_named(tmp_path, column, factor):
     assert problems_of(tmp_path, parts) == [("wall_hits.csv", 2, column)]
 
 
+@pytest.mark.slow
 def test_straps_that_are_only_compared(tmp_path):
     parts = strapped(parts_of(tool=NOISY, seed=1))
     headings, *rows = parts.tables["circumferences"]

@@ -56,6 +56,7 @@ def test_examples_hold_what_is_true(example):
         assert abs(found.value_m3 - volume) < found.U_m3
 
 
+@pytest.mark.slow
 def test_what_hides_is_what_an_error_of_that_size_does_to_the_table(upright):
     """Second way: the job again with a hundredth of the error, of the meter and by a leak."""
 
@@ -83,6 +84,7 @@ def moment(text):
     return datetime.datetime.fromisoformat(str(text))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("w", "named", "told"),
     [(3.5, False, True), (-3.5, False, True), (3.2, False, False), (4.5, True, False)],
@@ -95,6 +97,7 @@ def test_a_drift_with_time_has_a_test_of_its_own(upright, w, named, told):
     assert ("liquid_drifts" in [one.expected.code for one in problems]) is told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("proved", [False, True])
 def test_a_meter_that_nothing_checks_is_told(tmp_path, proved):
     """One meter, by liquid alone: told in the run and on page 1, unless it was proved again."""
@@ -247,6 +250,7 @@ def test_a_geometry_of_one_adjustment_is_linear():
     assert_allclose(volumes[0], volumes[1], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_dip_that_is_only_compared(upright):
     """A dip 20 mm off changes nothing, and its difference is told."""
     metering, survey = upright.liquid, find_survey(upright, lambda text: None).survey
@@ -277,6 +281,7 @@ def named_causes(job):
     return [one for one in result.causes if one.is_named]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["dip", "batch"])
 def test_a_planted_fault_is_named(tmp_path, fault):
     dips = [None, *np.round(np.arange(0.3, 2.2, 0.3), 2).tolist()]
@@ -289,6 +294,7 @@ def test_a_planted_fault_is_named(tmp_path, fault):
     assert abs(first.size - lacking) < 4 * first.sd
 
 
+@pytest.mark.slow
 def test_no_run_from_empty_is_told(tmp_path):
     job = metered_job("vertical", tmp_path / "job", dips=[0.3, 0.6, 0.9, 1.2])
     job = fill(np.random.default_rng(2), job, NOMINAL["vertical"], 9.5)

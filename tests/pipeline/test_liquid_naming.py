@@ -125,6 +125,7 @@ def name_causes_of(found):
     return name_causes(found.adjusted, alternatives_of(found))
 
 
+@pytest.mark.slow
 def test_hours_at_rest_separate_a_leak_from_the_meter(tmp_path):
     """Simulation: 0.1 m3/h beside liquid alone, steps of one duration; 12 h at rest, twice a run.
 

@@ -123,6 +123,7 @@ def test_all_courses_measured_with_a_vast_change_is_the_survey_alone(tmp_path):
     assert_allclose(both.table.u_m3[rows], alone.table.u_m3[rows], rtol=0.01)
 
 
+@pytest.mark.slow
 def test_a_course_without_a_former_radius_is_as_it_was_found(tmp_path):
     parts = partial_parts()
     del parts.tables["radii"][1]
@@ -133,6 +134,7 @@ def test_a_course_without_a_former_radius_is_as_it_was_found(tmp_path):
     assert record["former_radius_m"] is record["w"] is None
 
 
+@pytest.mark.slow
 def test_a_tape_that_both_shared(tmp_path):
     apart = computed(tmp_path / "job", partial_parts()).radii
     one = computed(tmp_path / "one", partial_parts(change__shared_mm=0.1)).radii

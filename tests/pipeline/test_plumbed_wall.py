@@ -60,6 +60,7 @@ def cones(sd_m=0.0, faces=(1, 2), inside=False, count=12, lean=LEAN, levels=(0.2
     return parts
 
 
+@pytest.mark.slow
 def test_case_b(tmp_path):
     """The page's radii, but for the eccentricity of the levels, which the page leaves out."""
     result = tankcal.run(tankcal.load(write_folder(tmp_path, plumbed_parts())), simulated=False)
@@ -73,6 +74,7 @@ def test_case_b(tmp_path):
     assert budget >= {"straps", "offsets", "instrument_scale", "bulge", "seams", "ovality"}
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("inside", [False, True])
 def test_leaning_courses_come_back(tmp_path, inside):
     """Exact geometry of a shell that leans by 2 %, read by a plummet that leans by 20 arcsec."""
@@ -361,6 +363,7 @@ def test_reference_levels_that_are_read_again_are_not_doubted(tmp_path):
     assert "line_moved" not in told_of(parts, tmp_path)
 
 
+@pytest.mark.slow
 def test_a_shell_that_leans_too_much_is_told(tmp_path):
     assert "leans_too_much" in told_of(cones(lean=(0.03, 0.02)), tmp_path)
 

@@ -75,6 +75,7 @@ def test_radii_of_another_temperature(tmp_path):
     assert_allclose(warm.table.volume_m3, larger * cold.table.volume_m3, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_side_plates_and_liquid_of_the_survey_take_nothing_off(tmp_path):
     empty = computed(tmp_path / "job", radii_parts()).table.volume_m3
     job = tankcal.load(tmp_path / "job")

@@ -27,6 +27,7 @@ def codes(result):
     return {one.expected.code for one in result.warnings if one.file == "circumferences.csv"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("radii", "litres", "capacity"),
     [
@@ -44,6 +45,7 @@ def test_table_of_three_rings(tmp_path, radii, litres, capacity):
     assert codes(result) == set()
 
 
+@pytest.mark.slow
 def test_equal_rings_are_the_cylinder_of_one_diameter(tmp_path):
     """Truth: a job of one diameter, to 1e-9 m3."""
     ends = {
@@ -69,6 +71,7 @@ def test_equal_rings_are_the_cylinder_of_one_diameter(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_straps_in_the_budget_are_derivatives_by_readings(tmp_path):
     """Truth: volumes with each reading 0.1 mm longer; the zero goes with the ring of the dip."""
     job = tankcal.load(write_folder(tmp_path, ringed_parts()))
@@ -88,6 +91,7 @@ def test_straps_in_the_budget_are_derivatives_by_readings(tmp_path):
         assert source.columns_m3[:, i] / sd == pytest.approx(by_difference, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_every_cause_stands_in_the_budget(tmp_path):
     parts = ringed_parts(shell__shape_sd_mm=3.0, strapping__wave_mm=20.0)
     parts.tables["uncertainty"] = [
@@ -128,6 +132,7 @@ def test_ovality_moves_the_middle_and_hardly_the_top(tmp_path):
     assert top < 1e-6
 
 
+@pytest.mark.slow
 def test_a_tape_on_a_warm_shell_nearly_cancels(tmp_path):
     """Truth: the closed form of both expansions, (1 + a_t dT)^2 / (1 + a_s dT)^2 nearly 1."""
     cold = result_of(ringed_parts(), tmp_path / "cold")
@@ -151,6 +156,7 @@ def test_sag_under_the_tank_is_taken_off(tmp_path):
     assert result.rings.reduced[0].circumference_m == pytest.approx(2 * np.pi * 1.208, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("apart_mm", "told"), [(2.5, False), (3.5, True)])
 def test_repeats_within_3_mm(tmp_path, apart_mm, told):
     parts = ringed_parts()
@@ -160,6 +166,7 @@ def test_repeats_within_3_mm(tmp_path, apart_mm, told):
     assert ("repeats_apart" in codes(result_of(parts, tmp_path))) is told
 
 
+@pytest.mark.slow
 def test_exchanged_rings_are_named(tmp_path):
     """Of five lapped rings the readings of the second and the third are exchanged."""
     result = result_of(ringed_parts((1.2, 1.2, 1.192, 1.192, 1.2), length_m=1.8), tmp_path)
@@ -167,6 +174,7 @@ def test_exchanged_rings_are_named(tmp_path):
     assert "(2 - 3)" in str(told)
 
 
+@pytest.mark.slow
 def test_inner_and_outer_confused_are_told_by_laps(tmp_path):
     laps = ("outer", "inner", "outer")
     assert codes(result_of(ringed_parts(laps=laps), tmp_path / "sound")) == set()
@@ -174,6 +182,7 @@ def test_inner_and_outer_confused_are_told_by_laps(tmp_path):
     assert codes(result_of(confused, tmp_path / "confused")) == {"laps_reversed"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_exchanges_are_found_and_sound_orders_left_alone(seed):
     """Simulation: radii of sound lapped and flush rings scatter by 0.7 mm; truth: who exchanged."""
@@ -206,6 +215,7 @@ def test_two_pairs_are_named_where_both_fit():
     assert pairs == [(0, 1), (2, 3)] or pairs == [(2, 3), (0, 1)]
 
 
+@pytest.mark.slow
 def test_record_states_rings_and_what_no_dip_reads(tmp_path):
     """Truth: the specification's 2.274 L, and the radii that were strapped."""
     record = record_of(result_of(ringed_parts(), tmp_path))
@@ -223,12 +233,14 @@ def test_a_single_reading_is_told(tmp_path):
     assert "rings_controlled_by_nothing" in codes(result_of(parts, tmp_path))
 
 
+@pytest.mark.slow
 def test_nominal_diameter_is_compared(tmp_path):
     parts = ringed_parts(tank__nominal_diameter_m=2.5)
     assert "rings_unlike_nominal" in codes(result_of(parts, tmp_path))
     assert reading_of(1.2) == pytest.approx(7.5908, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_example_holds_its_truth():
     """Truth: polygons of the sections of a simulated tank (examples/rings/truth.json)."""
     truth = json.loads((ROOT / "examples" / "rings" / "truth.json").read_text(encoding="utf-8"))

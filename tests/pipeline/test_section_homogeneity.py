@@ -66,6 +66,7 @@ def test_the_record_keeps_the_tests(example_result):
     assert [one["compared"] for one in kept["sections"]] == [True] * 5
 
 
+@pytest.mark.slow
 def test_an_estimated_covariance_is_compared_with_nothing(tmp_path):
     """Where the sd of the points is estimated, sections can still differ from each other."""
     job = without_points(tmp_path / "job", ())

@@ -23,6 +23,7 @@ def told(folder, is_left, points=24):
     return [(one.expected.code, one.text) for one in found if "section" in one.expected.code]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("courses", "codes"),
     [(1, ["section_gap"] * 2), (COURSES, ["sections_gap"])],

@@ -63,6 +63,7 @@ def test_tangents_to_a_settled_shell_are_within_U(tmp_path, seed, figure):
     assert WIDEST * truth > U
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_valid_stations_round_a_settled_shell_are_taken(tmp_path, seed):
     """The waves of settlement are a part of the surface that stations are compared on."""

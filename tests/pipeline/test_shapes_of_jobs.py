@@ -60,6 +60,7 @@ ENDS = {
 }
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("name", ENDS)
 def test_lying_tanks_with_ends_run_to_the_table(tmp_path, name):
     sizes, end, inputs = ENDS[name]
@@ -160,6 +161,7 @@ def test_upright_tanks_with_heads_on_top_run_to_the_table(tmp_path, form):
         assert not np.any(lines[one][table.height_m < HEIGHT])
 
 
+@pytest.mark.slow
 def test_a_head_that_is_switched_off_is_told_and_not_taken(tmp_path):
     settings = {"top.form": "dish", "top.depth_m": 1.0, "corrections.top": False}
     found = upright(tmp_path / "job", settings)

@@ -116,6 +116,7 @@ def test_linear_u_against_monte_carlo(tmp_path, figure):
         assert ratio == pytest.approx(1.0, abs=0.1)  # 500 draws: 0.032 standard
 
 
+@pytest.mark.slow
 def test_what_both_tables_share_cancels_in_a_correction(tmp_path):
     """Property: a scale moves a volume and hardly its correction; trim moves both."""
     by_scale = result_of(tmp_path / "scale", uncertainty=[("scale", 1000, "ppm")]).ship
@@ -126,6 +127,7 @@ def test_what_both_tables_share_cancels_in_a_correction(tmp_path):
     assert by_trim.u_correction_m[place] == pytest.approx(5.35 * 0.020 / 100, rel=0.05)
 
 
+@pytest.mark.slow
 def test_contraction_shrinks_the_tank(tmp_path):
     """Closed form: of a uniform contraction by c the full tank holds (1 - c)^3 as much."""
     plain = result_of(tmp_path / "plain")
@@ -145,6 +147,7 @@ def test_inputs_that_only_corrections_have_are_named(tmp_path):
         assert name in undeclared
 
 
+@pytest.mark.slow
 def test_the_soundings_end_with_the_full_tank_or_the_pipe(tmp_path):
     settings = {"ship.pipe_top_m": [-5.5, -2.5, 5.0], "ship.correction_step_m": 0.2}
     ship = result_of(tmp_path / "job", settings=settings).ship
@@ -216,6 +219,7 @@ def test_the_mesh_of_the_example_is_that_of_its_script(tmp_path):
     assert (tmp_path / "tank.off").read_bytes() == (EXAMPLE / "tank.off").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_example_against_trimesh(example):
     """Second program: the mesh, warmed by hand, turned and cut level by trimesh."""
     ship, job = example.ship, example.job

@@ -182,6 +182,7 @@ def assert_outcome(tmp_path, example, slip, expected):
     assert expected == "refused" or error > 2  # else the case proves little
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("example", "name", "slip", "expected"), QUICK)
 def test_a_slip_beyond_two_u_is_refused_or_marked(tmp_path, example, name, slip, expected):
     assert_outcome(tmp_path, example, slip, expected)

@@ -235,6 +235,7 @@ def test_a_workbook_in_portuguese_is_the_same_job(tmp_path, kind):
     assert record_of(said).keys() == record_of(result).keys()
 
 
+@pytest.mark.slow
 def test_sound_courses_seldom_stand_apart():
     """Second method: of normal radii one in twenty shells has one so far off, as it says."""
     rng = np.random.default_rng(4)

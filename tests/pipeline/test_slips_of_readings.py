@@ -29,6 +29,7 @@ def problems_of(folder, book):
     return [(one.expected.code, one.row, one.column) for one in told.value.problems]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "table", "column"), IN_METRES)
 def test_standard_deviations_in_metres_are_refused(tmp_path, kind, table, column):
     book = book_of(kind, 1002)
@@ -37,6 +38,7 @@ def test_standard_deviations_in_metres_are_refused(tmp_path, kind, table, column
     assert problems_of(tmp_path, book) == [("sd_below_any_mm", 2, column)]
 
 
+@pytest.mark.slow
 def test_standard_deviations_that_nobody_reads_are_asked_about(tmp_path):
     """Readings may be made up without errors, to check a formula."""
     book = book_of("strapping", 1002)
@@ -73,6 +75,7 @@ def packed(degrees):
     return seconds // 3600 + seconds // 60 % 60 / 100 + seconds % 60 / 10000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "table"), [("hits", "wall_hits"), ("tangents", "tangents")])
 def test_packed_degrees_minutes_and_seconds_are_refused(tmp_path, kind, table):
     book = book_of(kind, 1002)
@@ -95,6 +98,7 @@ def test_decimal_degrees_are_rarely_as_packed_ones():
     assert chance_of_packed(np.arange(0.5, 40)) == 1.0  # says nothing
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("half", [(0, 180), (90, 270), (180, 360)])
 def test_hits_over_half_a_circle_are_in_the_unit_that_they_are_in(tmp_path, half):
     book = book_of("hits", 1002)
@@ -114,6 +118,7 @@ def test_degrees_in_a_column_of_gon_are_refused_by_name(tmp_path):
     assert [one.expected.code for one in told.value.problems] == ["hits_in_degrees"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "table"), [("hits", "wall_hits"), ("tangents", "tangents")])
 def test_a_file_that_was_pasted_twice_is_told(tmp_path, kind, table):
     book = book_of(kind, 1002)
@@ -156,6 +161,7 @@ def test_a_sound_line_of_hits_is_taken():
     refuse_misread_lines(line_of_hits(lambda zenith, distance: (zenith, distance)))
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("kind", ["hits", "three set-ups"])
 def test_hits_in_feet_are_refused_by_the_heights_of_their_courses(tmp_path, kind):
     book = book_of(kind, 1002)
@@ -166,6 +172,7 @@ def test_hits_in_feet_are_refused_by_the_heights_of_their_courses(tmp_path, kind
     assert [one[0] for one in found] == ["hits_of_other_length"]
 
 
+@pytest.mark.slow
 def test_a_correction_in_parts_in_a_million_is_mended_to_what_it_is(tmp_path):
     book = book_of("strapping", 1002)
     book.instruments["T-88"]["correction"] = "35 ppm"
@@ -174,6 +181,7 @@ def test_a_correction_in_parts_in_a_million_is_mended_to_what_it_is(tmp_path):
     assert "write 3.5e-05 without" in str(told.value)
 
 
+@pytest.mark.slow
 def test_a_negative_length_is_asked_for_its_sign(tmp_path):
     book = book_of("strapping", 1002)
     book.tables["circumferences"][1]["reading_m"] *= -1
@@ -183,6 +191,7 @@ def test_a_negative_length_is_asked_for_its_sign(tmp_path):
     assert len(told.value.problems) == 1
 
 
+@pytest.mark.slow
 def test_a_row_that_is_short_gives_one_line(tmp_path):
     """The obstructions of its circumference are not told, too."""
     folder = write_folder(tmp_path, book_of("strapping", 1002).parts())
@@ -196,6 +205,7 @@ def test_a_row_that_is_short_gives_one_line(tmp_path):
     assert {one.file for one in told.value.problems} == {"circumferences.csv"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sd_mm", "is_refused"),
     [(1e-7, True), (0.0005, False)],  # that of 0.5 mm in metres is asked

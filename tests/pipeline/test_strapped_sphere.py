@@ -157,6 +157,7 @@ def test_dip_plate_above_the_bottom(tmp_path):
     assert high.at(4.0).value_m3 == pytest.approx(low.at(4.25).value_m3, abs=1e-9)
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize(
     ("circles", "code"),
     [
@@ -179,6 +180,7 @@ def test_equator_alone_overstates_within_u(tmp_path):
     assert abs(found.body.parts[0].capacity_m3 - 4189.6273) < expanded < 3e-3 * volume
 
 
+@pytest.mark.slow
 def test_slips_are_told(tmp_path):
     """Truth: what was slipped: a reading, a nominal diameter of the outside, repeats copied."""
     slip = dict(FOUR) | {"M60": (60, 62.9287), "M30": (30, 62.82871), "M90": (90, 62.82871),

@@ -28,6 +28,7 @@ def codes(result):
     return {one.expected.code for one in result.warnings if one.file == "circumferences.csv"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("density", [0, 850])
 def test_tank_s_1(tmp_path, density):
     """Worked numbers: volumes to 1e-5 m3, with and without the head."""

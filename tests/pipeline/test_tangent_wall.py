@@ -369,6 +369,7 @@ def _not_in_network(parts):
 BAD = [one for name, one in list(globals().items()) if name.startswith("_") and callable(one)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", BAD, ids=lambda one: one.__name__.strip("_"))
 def test_bad_input_is_one_line_each(tmp_path, spoil):
     parts = parts_of(sights(levels=(1.0, 3.0, 5.0, 7.0)))

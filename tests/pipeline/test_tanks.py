@@ -410,6 +410,7 @@ def stl(radius=2.0, height=5.0, scale=1.0, lid=True):
     return file.getvalue()
 
 
+@pytest.mark.slow
 def test_a_closed_mesh_is_a_tank(tmp_path):
     found = result_of(
         tmp_path / "job", kind="mesh", mesh=stl(scale=1000.0), settings={"mesh.unit": "mm"}
@@ -472,6 +473,7 @@ def test_a_second_wall_of_half_as_many_points_is_refused(tmp_path, count):
         run(tankcal.load(job))
 
 
+@pytest.mark.slow
 def test_a_scan_gives_diameter_and_tilt_of_a_lying_tank(tmp_path):
     points = scanned_points(2.4, 0.01, np.random.default_rng(3))
     found = result_of(tmp_path / "job", kind="horizontal", settings=SCANNED, extra_points=points)
@@ -557,6 +559,7 @@ def test_deadwood_and_a_dip_plate_in_a_lying_tank(tmp_path):
 # ---- no table falls
 
 
+@pytest.mark.slow
 def test_no_table_that_falls_leaves_the_house(tmp_path):
     """A slab of 4.1 m3 where 3 cm of the tank hold 3.98 m3, between two rows."""
     deadwood = [("pipe", 1.0, 1.0, 0.02), ("slab", 0.5, 0.53, -4.1)]
@@ -567,6 +570,7 @@ def test_no_table_that_falls_leaves_the_house(tmp_path):
     assert "deadwood slab" in problem.expected
 
 
+@pytest.mark.slow
 def test_no_table_of_another_density_falls(tmp_path):
     """A roof that the table's liquid carries and a lighter one does not."""
     settings = {"table.step_m": 0.1, "table.other_densities_kg_m3": [500.0]}

@@ -23,6 +23,7 @@ CERTIFICATES = {  # keys of a tape that are in another unit or misread, and what
 }
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("code", CERTIFICATES)
 def test_a_certificate_of_no_tape_is_named(tmp_path, code):
     parts = strapped_parts()
@@ -37,6 +38,7 @@ def test_a_correction_that_class_ii_allows_is_quiet(tmp_path):
     assert "tape_correction_strange" not in told(parts, tmp_path)
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize(
     ("given", "is_told"),
     [
@@ -70,6 +72,7 @@ def compared(apart_m):
     return parts
 
 
+@pytest.mark.slow
 def test_comparisons_with_a_master_that_contradict_each_other_are_named(tmp_path):
     """Closed form: of two with 0.3 mm each, 3.29 sqrt(2) 0.3 mm = 1.4 mm by one chance of 1000."""
     for apart_m, is_told in ((0.020, True), (1.5e-3, True), (1.3e-3, False)):
@@ -78,6 +81,7 @@ def test_comparisons_with_a_master_that_contradict_each_other_are_named(tmp_path
     assert "2 after" in told(compared(0.020), tmp_path)["comparisons_apart"]
 
 
+@pytest.mark.slow
 def test_seams_that_no_plates_have_are_named(tmp_path):
     for count, is_told in ((4.0, False), (30.0, False), (40.0, True)):
         parts = strapped_parts()
@@ -85,6 +89,7 @@ def test_seams_that_no_plates_have_are_named(tmp_path):
         assert ("plates_too_short" in told(parts, tmp_path)) == is_told
 
 
+@pytest.mark.slow
 def test_a_shell_of_no_temperature_is_told_where_the_tape_was_warm(tmp_path):
     """Closed form: 2 a (T - T_table) of volume, 11 K: 242 ppm."""
     for celsius, is_told in ((31.0, True), (24.0, False)):
@@ -110,6 +115,7 @@ def plates_off(rows, place):
         row[place["reading_m"]] -= 2 * np.pi * (plate + 0.25) / 1000
 
 
+@pytest.mark.slow
 def test_circumferences_of_the_inside_are_named_by_steps_of_plates(tmp_path):
     """A build that is as drawn: 14.408 m inside; its plates step outside, not inside."""
     of_inside = straps_with(plates_off)
@@ -129,6 +135,7 @@ def book(rng, copied=0, digits=4, pairs=12):
     return found
 
 
+@pytest.mark.slow
 def test_repeats_are_equal_by_chance_now_and_then(figure):
     """Simulation: books of a sound crew, to 0.1 mm and to 1 mm, are told in less than 2 %."""
     rng = np.random.default_rng(3)
@@ -152,6 +159,7 @@ def courses_read_once(rng, digits, copied=False):
     return found
 
 
+@pytest.mark.slow
 def test_circumferences_of_one_course_are_equal_by_chance_now_and_then(figure):
     """Simulation: sound books of courses that are round alike are told in less than 2 %."""
     rng = np.random.default_rng(4)

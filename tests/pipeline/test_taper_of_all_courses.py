@@ -53,12 +53,14 @@ def miss(wall, job):
     return float((table.volume_m3 - wall.volume_below([wall.height_m]))[0] / table.U_m3[0])
 
 
+@pytest.mark.slow
 def test_one_height_off_the_middle_is_told_for_it_is_beyond_u(wall, tmp_path):
     job = job_at(wall, tmp_path, 0.75)
     assert miss(wall, job) > 1
     assert told(job) == ["taper_unseen"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heights", [(0.5,), (0.55,), (0.2, 0.8)])
 def test_heights_about_the_middle_are_not(wall, tmp_path, heights):
     """Of courses that were measured below and above their middles in turn the taper cancels."""
@@ -67,6 +69,7 @@ def test_heights_about_the_middle_are_not(wall, tmp_path, heights):
     assert told(job) == []
 
 
+@pytest.mark.slow
 def test_two_heights_and_a_declared_taper_are_not(wall, tmp_path):
     two = survey(np.random.default_rng(2), wall, rings=2, points=24, noise_m=1e-3)
     assert told(job_of(wall, two, tmp_path / "two")) == []
@@ -76,6 +79,7 @@ def test_two_heights_and_a_declared_taper_are_not(wall, tmp_path):
     assert miss(wall, declared) < 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("taper_m", [-2e-3, 2e-3])
 def test_a_taper_that_all_courses_share_is_in_u(taper_m, tmp_path):
     """U does not average it out over the courses; tapers of each by itself were 1.07 U here."""

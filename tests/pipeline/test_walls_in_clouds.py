@@ -374,6 +374,7 @@ def test_bad_registration_is_warned_of(tmp_path, few, monkeypatch):
     assert "expected at most 26.2 with 12 degrees of freedom" in text
 
 
+@pytest.mark.slow
 def test_a_format_that_defines_its_unit_has_no_other(tmp_path):
     """Points of a wall in feet: text is asked for its unit, E57 is in metres by its standard."""
     parts = scanned_parts(np.random.default_rng(6), with_tool(TOOL), columns=120, rows=25)

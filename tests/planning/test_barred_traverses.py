@@ -115,6 +115,7 @@ BAD = [  # what is changed in the plan, in instruments.toml; where it is told
 ]
 
 
+@pytest.mark.slow(after=3)
 @pytest.mark.parametrize(("in_plan", "in_register", "place"), BAD)
 def test_bad_bar_is_one_line(tmp_path, in_plan, in_register, place, capsys):
     folder = with_bar(tmp_path)

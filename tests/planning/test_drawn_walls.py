@@ -36,6 +36,7 @@ def outline_of(wall, course, level, *, inside=False, count=40_000):
     return azimuth, np.column_stack([radius * np.sin(azimuth), radius * np.cos(azimuth)])
 
 
+@pytest.mark.slow(after=2)
 def test_a_wall_without_departures_is_the_round_one(plan):
     """Closed form; but for the hull, which the round one has as walls have it on average."""
     still, job = drawn_on(plan, 0.0), plan.job
@@ -48,6 +49,7 @@ def test_a_wall_without_departures_is_the_round_one(plan):
     np.testing.assert_allclose(still.more_m3([0.5, 3.0]), 0.0, atol=1e-9)
 
 
+@pytest.mark.slow(after=1)
 def test_girth_and_limbs_are_those_of_the_outline(plan):
     wall = drawn_on(plan)
     for course, level in sorted(levels_read(plan.job))[::7]:
@@ -136,6 +138,7 @@ def test_errors_of_a_cause_are_shared_and_seeded(plan):
             assert first != third
 
 
+@pytest.mark.slow
 def test_readings_between_stations_are_off_by_their_sds():
     """Simulation: rms of the errors over their sds, the scale of the instrument among them."""
     given, found = load_plan(TANGENTS).job.measurements, []

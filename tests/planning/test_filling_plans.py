@@ -285,6 +285,7 @@ def test_liquid_alone_is_the_job_that_is_run(tmp_path):
     assert 0.25 < np.sqrt(np.mean(np.square(off))) < 0.9  # of U, which is two of them
 
 
+@pytest.mark.slow
 def test_an_expected_run_effect_is_shown_by_the_runs(tmp_path):
     """What a job would find of runs that differ as expected, with its few degrees of freedom."""
     more = "[filling]\nexpected_run_ppm = 300"
@@ -385,6 +386,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow(after=5)
 @pytest.mark.parametrize("name", BAD)
 def test_bad_input_is_one_line_each(tmp_path, name, capsys):
     old, new, place = BAD[name]
@@ -397,6 +399,7 @@ def test_bad_input_is_one_line_each(tmp_path, name, capsys):
     assert "Traceback" not in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_dips_that_the_table_does_not_have_are_refused(tmp_path):
     plan = load_plan(plan_of(tmp_path / "plan", FILLING, ("2.0, 9.6]", "2.0, 9.7]")))
     with pytest.raises(InputError, match=r"filling\.dips_m: found 9\.7; expected 0 to 9\.6 m"):
@@ -456,6 +459,7 @@ def test_u_of_jobs_by_liquid_over_that_of_their_plan_study(figure):
     assert 0.75 < np.median(ratios) < 1.1
 
 
+@pytest.mark.slow
 def test_geometry_alone_is_the_plan_without_runs(tmp_path):
     """Invariance: what stands as geometry alone is the prediction of the same straps alone."""
     found = predict(load_plan(FILLING)).filling

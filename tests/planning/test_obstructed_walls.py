@@ -63,6 +63,7 @@ def test_a_line_without_its_reference_level_is_left_out(tmp_path):
     assert wall_count(plan)["line"] == 11
 
 
+@pytest.mark.slow
 def test_limbs_behind_a_bund(tmp_path):
     """A wall round the tank hides the lowest level from all stations, and nothing above."""
     plan = planned(tmp_path, TANGENTS, PILLAR.format([0.0, 0.0], 8.0, 0.0, 1.2))

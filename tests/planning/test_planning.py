@@ -49,6 +49,7 @@ def test_the_plan_is_the_network_of_the_dissertation(prediction):
     assert not prediction.weak
 
 
+@pytest.mark.slow
 def test_filled_job_adjusts_as_predicted(prediction, filled):
     """Second method: the whole adjustment of the survey, from readings without errors."""
     adjustment = adjust_survey(filled)

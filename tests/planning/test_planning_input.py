@@ -111,6 +111,7 @@ def test_undefined_names(changed):
     assert any("pattern.generatrices: missing" in line for line in lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["plan-silva", "plan-tangents"])
 def test_day_of_the_survey_lies_ahead(tmp_path, source):
     """Nobody plans what has been measured; ten years ahead are enough."""

@@ -185,6 +185,7 @@ def test_other_names_of_keys_and_marks_come_along(tmp_path):
     assert 'marks.1 = "-80.0; 0.5"' in text
 
 
+@pytest.mark.slow
 def test_a_fixed_photo_keeps_its_place(tmp_path):
     """Where the frame is that of a photograph, its planned place and angles are the start."""
     pairs = [

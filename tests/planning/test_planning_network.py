@@ -46,6 +46,7 @@ def pair(request):
     return adjusted, network.predict(survey)
 
 
+@pytest.mark.slow(after=1)
 def test_predicted_sds_are_those_of_the_adjustment(pair, figure):
     """Second method: the adjustment itself, linearised at the values that it found."""
     adjusted, predicted = pair

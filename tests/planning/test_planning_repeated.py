@@ -90,6 +90,7 @@ def test_lines_that_are_taped_again(tmp_path, monkeypatch):
     assert_told(found, adjust_survey(filled(found, tmp_path / "job")), "distance")
 
 
+@pytest.mark.slow
 def test_images_that_are_read_again(tmp_path):
     """Closed form: the mean's redundancy r, 1 - (1 - r)/4 of each of four."""
     found = predict(

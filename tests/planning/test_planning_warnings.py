@@ -58,6 +58,7 @@ def test_on_the_terminal_on_paper_and_in_plan_json(prediction, tmp_path, capsys)
     assert found[0]["text"] in said[0]
 
 
+@pytest.mark.slow
 def test_unseen_targets_and_undetermined_heights(tmp_path):
     """Four of six set-ups leave a part of the turn unseen; nothing measured holds the frame."""
     folder = with_setups(tmp_path)
@@ -77,6 +78,7 @@ def test_unseen_targets_and_undetermined_heights(tmp_path):
     assert (heights.file, heights.column) == ("plan.toml", "datum.bottom_z_m")
 
 
+@pytest.mark.slow
 def test_a_tape_with_a_hidden_end(prediction):
     """It counts for nothing, and says so."""
     plan = prediction.plan
@@ -105,6 +107,7 @@ def afloat(prediction):
     )
 
 
+@pytest.mark.slow
 def test_a_tape_that_nothing_controls(prediction, afloat):
     found = predict(replace(afloat, ties=(*afloat.ties, prediction.plan.ties[0])))
     (told,) = (one for one in lines(found.warnings) if "no other observation checks" in one)

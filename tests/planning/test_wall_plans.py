@@ -56,6 +56,7 @@ def prediction(request):
     return predict(load_plan(request.param))
 
 
+@pytest.mark.slow(after=2)
 def test_limbs_and_untied_setups_leave_sizes_that_tell_nothing_of_each_other(prediction):
     """As of the jobs, so that a plan foretells their U."""
     plan, covariance = prediction.plan, prediction.plan.amplitudes.log_covariance
@@ -411,6 +412,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow(after=7)
 @pytest.mark.parametrize("name", BAD)
 def test_bad_input_is_one_line_each(tmp_path, name, capsys):
     source, old, new, place = BAD[name]
@@ -546,6 +548,7 @@ def test_files_of_a_plan(tmp_path, capsys):
     assert main(["plan", str(LINES), "--out", str(out), "--quiet"]) == 2
 
 
+@pytest.mark.slow
 def test_plain_data_have_what_the_prediction_has(prediction):
     found = plain_of_wall(prediction)
     assert found["table"]["U_m3"] == prediction.table.U_m3.tolist()
@@ -572,6 +575,7 @@ SHEETS = {  # of a plan: sheets of its workbook, and how many rows they have
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", SHEETS, ids=lambda one: one.name)
 def test_field_sheets_as_a_workbook(folder, tmp_path):
     """A sheet for each table of the paper, a row for each reading."""
@@ -585,6 +589,7 @@ def test_field_sheets_as_a_workbook(folder, tmp_path):
         assert len(set(headings)) == len(headings)
 
 
+@pytest.mark.slow
 def test_a_workbook_of_the_same_plan_has_the_same_bytes(tmp_path):
     paper = WallPaper(predict(load_plan(HITS)), "pt-BR")
     for name in ("one.xlsx", "two.xlsx"):
@@ -612,6 +617,7 @@ def test_offsets_have_a_row_for_each_level_of_each_line(tmp_path):
     assert {"face_1", "face_2"} <= {one.key for one in columns}
 
 
+@pytest.mark.slow
 def test_only_instruments_that_read_something_are_certified_anew(tmp_path):
     """A tape that nothing is strapped with would not help; a master does, and is taken along."""
     plan = load_plan(TANGENTS)  # its instruments.toml has a tape, too
@@ -625,6 +631,7 @@ def test_only_instruments_that_read_something_are_certified_anew(tmp_path):
     assert instruments_read(job) == {"T-12", "ZL-3", "M-1"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("faces", "told"), [(2, True), (1, False)])
 def test_field_sheets_tell_of_the_other_face_where_it_is_read(tmp_path, faces, told):
     folder = plan_of(tmp_path / "plan", LINES, ("faces = 2", f"faces = {faces}"))

@@ -66,6 +66,7 @@ def test_blunders_are_set_aside(tmp_path):
     assert spoilt.volume_ratio < 3
 
 
+@pytest.mark.slow
 def test_files_of_a_simulation(tmp_path, capsys):
     out = tmp_path / "out"
     asked = ["--simulate", "2", "--out", str(out), "--language", "pt-BR", "--quiet"]

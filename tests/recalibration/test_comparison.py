@@ -187,6 +187,7 @@ def test_tables_of_the_same_name_are_told_apart_by_their_folders(tmp_path):
     assert "but old/results/table.csv is of a vertical one" in said
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("end", ["\r\n", "\r"])
 def test_former_with_the_line_ends_of_any_system(tmp_path, end):
     asked = write_tables(tmp_path)
@@ -221,6 +222,7 @@ def test_all_problems_at_once(tmp_path):
     assert "france_2020_recalibration" in str(caught.value)
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("text", ["", "course,height_m,thickness_mm\n", "x\n", "\0", "a;b\n1;2\n"])
 def test_courses_that_are_none(text, tmp_path):
     asked = write_tables(tmp_path, **{"courses.csv": text})

@@ -117,6 +117,7 @@ def test_feet_inches_and_sixteenths(kind, tmp_path):
     assert former.volume_m3[1] == pytest.approx(10.5 * 0.158987294928)
 
 
+@pytest.mark.slow(after=3)
 @pytest.mark.parametrize(
     ("digit", "factor"), [(1, 0.001), (2, 0.002), (5, 0.005), (10, 0.01), (100, 0.1)]
 )
@@ -302,6 +303,7 @@ def test_a_record_is_not_contradicted(example_record, tmp_path):
     assert "but the record has 20" in said[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "data",
     [b"", b"\0\1\2", b"%PDF-1.4\njunk", b"PK\3\4junk", b"{", b"[" * 100_000, b"height_m,volume_m3",

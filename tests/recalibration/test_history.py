@@ -86,6 +86,7 @@ def test_successive_changes_are_those_of_compare():
             assert course.u_m == pytest.approx(np.linalg.norm(parts), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_order_of_the_files_does_not_matter():
     tables = drawn_tables(4)
     assert history_of(tables) == history_of(tables[::-1])

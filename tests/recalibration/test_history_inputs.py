@@ -208,6 +208,7 @@ def test_dips_that_are_none_are_refused(archive, dips, capsys):
     assert "expected dips in metres" in capsys.readouterr().err
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("column", ["volume_m3", "stated_U_m3", "k", "factor_m3"])
 def test_columns_of_unequal_length_are_told(archive, column):
     path = archive / "2019" / "T-1" / "record.json"

@@ -66,6 +66,7 @@ def uneven_bottom(table, height_m=0.1, share=0.12):
     return replace(table, volume_m3=np.round(table.volume_m3 - lowest, 3))
 
 
+@pytest.mark.slow
 def test_rows_from_a_centimetre_on_an_uneven_bottom_make_a_job_that_runs(tmp_path):
     table = uneven_bottom(table_of(tank(), first_m=0.01))
     found = read(tmp_path, table)
@@ -103,6 +104,7 @@ def test_a_thing_in_a_tank_with_proportional_parts(tmp_path):
     assert_job_gives_the_table(tmp_path, found, computed)
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("seed", range(5))
 def test_rows_that_were_all_computed_are_not_taken_for_interpolated(seed):
     """A seam or its absence: the rounding of exact rows leaves half a digit of their chords."""
@@ -115,6 +117,7 @@ def test_rows_that_were_all_computed_are_not_taken_for_interpolated(seed):
     assert parts.step_m == 0.1
 
 
+@pytest.mark.slow
 def test_rows_that_were_all_computed_are_all_read(tmp_path):
     """Seams near rows of 2 dm: these rows alone would place the zero 4 mm off."""
     heights, plates = np.array([1.9, 2.0, 1.8, 1.65]), np.array([0.010, 0.008, 0.006, 0.006])
@@ -146,6 +149,7 @@ def test_bulging_courses_without_a_declared_density(tmp_path, bulge):
     assert_radii(found)
 
 
+@pytest.mark.slow
 def test_a_course_of_several_plates_is_named(tmp_path):
     heights = np.array([4.95, 1.65, 1.65, 1.65])
     with pytest.raises(InputError) as refused:

@@ -49,6 +49,7 @@ def test_an_old_table_is_measured_again():
     assert found.reasons[0].values["age"] == pytest.approx(11.78, abs=0.01)
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize(
     ("name", "date", "verdicts"),
     [

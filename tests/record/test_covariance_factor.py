@@ -86,6 +86,7 @@ def test_an_input_without_effect_has_none():
     assert {0, *begins} <= {0, *np.cumsum([one.rows for one in blocks_of(factor)])}
 
 
+@pytest.mark.slow
 def test_the_record_of_the_example_holds_the_factor_of_its_table(example_result, example_record):
     """Second way: the factor of the table itself; what a delivery takes of it, too."""
     table, record = example_result.table, load(example_record)
@@ -100,6 +101,7 @@ def test_the_record_of_the_example_holds_the_factor_of_its_table(example_result,
     )
 
 
+@pytest.mark.slow(after=7)
 @pytest.mark.parametrize("path", [*kept_files(1), *kept_records()], ids=lambda path: path.name)
 def test_kept_records_have_their_whole_factor_bit_for_bit(path):
     """Of version 1 and of drafts of version 2."""

@@ -93,6 +93,7 @@ def test_a_record_of_each_example_is_kept_of_this_version():
     assert names == {"silva-1995", "silva-1995-photos", "total-station"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ALL, ids=lambda path: f"{path.parent.name}-{path.name}")
 def test_a_kept_record_of_an_example_is_read(path, tmp_path):
     source = tmp_path / "record.json"

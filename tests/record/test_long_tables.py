@@ -138,6 +138,7 @@ def test_what_needs_no_long_table_needs_no_file(split, short):
         list(found["points"])
 
 
+@pytest.mark.slow
 def test_an_export_needs_no_file(split, tmp_path_factory):
     """Second way: the file beside it."""
     out = tmp_path_factory.mktemp("exports")
@@ -164,6 +165,7 @@ def spoilt(path, **arrays):
     (path / "record.json").write_text(json.dumps(record), encoding="utf-8")
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize(
     ("spoil", "line"),
     [

@@ -185,6 +185,7 @@ def spoilt(record, paths):
     return record, names
 
 
+@pytest.mark.slow
 def test_null_in_place_of_a_number_is_one_line_with_its_key():
     """Every number that no record is without, the first two of each list; the others may be."""
     seen, schema = set(), RECORD.schema()

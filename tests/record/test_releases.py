@@ -54,6 +54,7 @@ def test_a_release_without_kept_files_is_missed(monkeypatch):
         test_every_released_version_keeps_one_of_each_kind(tankcal.__version__)
 
 
+@pytest.mark.slow(after=3)
 @pytest.mark.parametrize("path", kept_records(), ids=of)
 def test_a_kept_record_is_read(path, tmp_path):
     kept = read(path)

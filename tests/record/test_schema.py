@@ -166,6 +166,7 @@ def places(value, path=()):
             yield from places(item, (*path, one))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "every"),
     [
@@ -213,6 +214,7 @@ def test_a_record_cut_short_is_refused_in_one_line(cut, tmp_path):
 # ---- the schemas that are shipped
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("saved_format", "kind", "cls"), SAVED, ids=lambda one: getattr(one, "__name__", None)
 )
@@ -222,6 +224,7 @@ def test_a_schema_is_that_of_its_dataclass(saved_format, kind, cls):
     jsonschema.Draft202012Validator.check_schema(saved_format.schema(kind))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", kept_files(), ids=lambda path: f"{path.parent.name}-{path.name}")
 def test_another_program_finds_a_record_valid(path):
     """Other program: jsonschema, by the schema that is shipped."""
@@ -230,6 +233,7 @@ def test_another_program_finds_a_record_valid(path):
     jsonschema.Draft202012Validator(saved_format.schema(kind)).validate(record)
 
 
+@pytest.mark.slow(after=5)
 @pytest.mark.parametrize("row", kept_results(), ids=lambda row: str(row[2])[-30:])
 def test_another_program_finds_a_result_valid(row):
     """Other program: jsonschema, by the schema that is shipped."""

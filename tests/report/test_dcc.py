@@ -58,6 +58,7 @@ def test_certificates_of_every_kind_have_the_structure_of_the_schema(structure, 
     assert problems(structure, certificate_of(records[kind])) == []
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_structure_of_the_example_in_every_language(structure, example, language):
     xml = certificate_of(example, language)
@@ -68,6 +69,7 @@ def test_structure_of_the_example_in_every_language(structure, example, language
     assert sorted(used) == ["en", "es", "pt"]
 
 
+@pytest.mark.slow
 def test_the_structure_refuses_what_the_schema_refuses(structure, example):
     """Otherwise the tests above could not fail: order, a missing element, k below 1, a language."""
     whole = certificate_of(example).decode()
@@ -171,6 +173,7 @@ def test_what_the_job_gives_is_there(example):
     assert "notStated" not in xml
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("where", ["certificate", "details", "names"])
 def test_no_text_of_a_user_breaks_it(structure, example, where):
     record = copy.deepcopy(example)
@@ -203,6 +206,7 @@ def test_record_and_input_files_are_named_by_their_hashes(example):
     assert found == expected | {"record.json": "sha256:" + "0" * 64}
 
 
+@pytest.mark.slow
 def test_words_that_it_takes_are_all_that_it_needs(example):
     """A part of the words is read where the record has no survey: the same bytes by all of them."""
     told = copy.deepcopy(example)

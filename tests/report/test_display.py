@@ -56,6 +56,7 @@ def test_reading_the_table_adds_to_a_budget(example_result):
     }
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize(
     "what", [None, "capacity", "budget", "sections", "residuals", "wall", "field"]
 )
@@ -73,6 +74,7 @@ def test_the_drawn_residuals_are_those_of_the_record(example_result, example_rec
         assert y == pytest.approx([1e3 * r for r in section["residual_m"]], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_drawing_that_does_not_exist_is_refused(example_result, adjusted):
     with pytest.raises(ValueError, match="expected one of capacity"):
         example_result.plot("spectrum")

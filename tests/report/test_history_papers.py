@@ -116,6 +116,7 @@ def test_papers_are_made_again_from_the_file_alone(written, tmp_path):
     assert [one.expected.code for one in verify(folder).problems] == ["verify_other_paper"]
 
 
+@pytest.mark.slow
 def test_a_long_history_has_its_first_rows_in_the_pdf():
     found = plain()
     found["volumes"] = 20 * found["volumes"]
@@ -143,6 +144,7 @@ def test_what_is_no_history_is_refused(tmp_path, text, said):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("change", [{"certificates": []}, {"tank": 7}])
 def test_a_damaged_history_is_told_in_one_line(tmp_path, change):
     path = tmp_path / "history.json"

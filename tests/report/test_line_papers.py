@@ -30,6 +30,7 @@ def plumbed(tmp_path_factory):
     return result, folder / "results"
 
 
+@pytest.mark.slow
 def test_the_record_has_every_offset(plumbed):
     result, folder = plumbed
     found = read(folder / "record.json").lines

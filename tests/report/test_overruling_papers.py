@@ -45,6 +45,7 @@ def record(result):
     return record_of(result)
 
 
+@pytest.mark.slow
 def test_the_record_keeps_them(record, result, tmp_path):
     save(record, tmp_path / "record.json")
     kept = load(tmp_path / "record.json")
@@ -59,6 +60,7 @@ def test_the_record_keeps_them(record, result, tmp_path):
     assert ("a", "overruled") in [(one["point"], one["reason"]) for one in kept["rejected"]]
 
 
+@pytest.mark.slow
 def test_without_decisions_there_is_no_key(folder):
     job = replace(tankcal.load(folder), overrulings=())
     record = record_of(tankcal.run(job, simulated=False))
@@ -84,6 +86,7 @@ def test_the_certificate_states_each(record, language):
     assert paper.number(abs(record["overrulings"]["moved_m3"]), "m3", decimals=3) in together
 
 
+@pytest.mark.slow
 def test_a_single_decision_is_told_once(folder):
     job = tankcal.load(folder)
     record = record_of(tankcal.run(replace(job, overrulings=job.overrulings[:1]), simulated=False))
@@ -107,6 +110,7 @@ def test_the_working_papers_list_them(record, language):
     assert rows[0][2] == WHY
 
 
+@pytest.mark.slow
 def test_only_adjusted_readings_are_told():
     decided = (
         Overruling(None, "directions", 7, "leave_out", "bumped", row=2),

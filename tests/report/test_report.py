@@ -77,6 +77,7 @@ def test_every_page_has_notice_and_number(example):
             assert f"Page {number} of {len(texts)}" in text
 
 
+@pytest.mark.slow
 def test_report_is_certificate_and_working_papers(example):
     counts = {name: len(pages(example / f"{name}.pdf")) for name in (
         "certificate", "working-papers", "report")}  # fmt: skip

@@ -46,6 +46,7 @@ def rows_of(page):
     return len(re.findall(r"row \d+", page))
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("above", range(20, 40, 2))
 def test_a_long_table_has_no_lone_rows(printed, above):
     rows = [[f"row {n}"] for n in range(20)]
@@ -55,6 +56,7 @@ def test_a_long_table_has_no_lone_rows(printed, above):
     assert min(found) >= TOGETHER
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("above", range(38, 46))
 def test_caption_is_above_its_table(printed, above):
     rows = [[f"row {n}"] for n in range(20)]
@@ -134,6 +136,7 @@ LETTERHEAD = {
 ADDRESS = "Avenida do Porto 1200, third floor, Harbour District, 59000-000 Natal, Brazil"
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize(("parties", "facts"), [(3, 10), (6, 13), (9, 13), (10, 14)])
 def test_sketch_is_on_the_first_page(tmp_path, parties, facts):
     """However many addresses and facts there are above it."""
@@ -198,6 +201,7 @@ def test_the_papers_of_the_example_have_full_pages(example_record, tmp_path, lan
         assert lone_headings(pages, headings) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mark", ["", "*"])
 def test_even_rows_stand_where_measured_ones_do(monkeypatch, mark):
     """Second method: the typesetter measures each row by itself."""

@@ -256,6 +256,7 @@ def test_the_worst_delivery_of_each_minimum_height_is_reported(found, record):
 # ---- inputs and budgets
 
 
+@pytest.mark.slow
 def test_inputs_are_separated(of_example, example):
     lines = example["budgets"][0]["lines"]
     words, said = load_words(), facts(of_example)

@@ -31,6 +31,7 @@ def record(result):
     return record_of(result)
 
 
+@pytest.mark.slow
 def test_the_record_holds_what_was_computed(result, record, tmp_path):
     said, found = record["ship"], result.ship
     assert len(said["cells"]) == 35

@@ -126,6 +126,7 @@ def dark_runs(svg):
             x += found[0]
 
 
+@pytest.mark.slow
 def test_the_code_is_on_the_page_with_its_digits(example_record):
     (block,) = (one for one in paper_blocks(example_record) if one["kind"] == "hash_code")
     from tankcal.report.attachments import sha256

@@ -28,6 +28,7 @@ def written(tmp_path_factory):
     return result, folder
 
 
+@pytest.mark.slow
 def test_the_record_has_every_reading(written):
     result, folder = written
     found = read(folder / "record.json").great_circles

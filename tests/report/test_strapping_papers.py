@@ -33,6 +33,7 @@ def strapped(tmp_path_factory):
     return result, folder / "results"
 
 
+@pytest.mark.slow
 def test_the_record_has_every_reading(strapped):
     result, folder = strapped
     found = read(folder / "record.json").strapping

@@ -38,6 +38,7 @@ def test_no_table_of_a_report_in_litres_has_cubic_metres(example_record):
     assert not [one for one in units if one in ("m³", "m³/unit")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("unit", "factor"), [("m3", 1.0), ("L", 1e3), ("bbl", 1 / 0.158987294928)])
 def test_the_first_sheet_has_volume_and_u_in_the_unit_of_the_job(
     example_record, tmp_path, unit, factor

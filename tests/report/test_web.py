@@ -49,6 +49,7 @@ def block_of(found, kind):
     return one
 
 
+@pytest.mark.slow
 def test_content_policy_has_hashes_of_scripts_and_style(text):
     policy = re.search(r'Content-Security-Policy" content="([^"]*)"', text)[1]
     assert "default-src 'none'" in policy

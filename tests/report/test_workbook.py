@@ -101,6 +101,7 @@ def row_of(sheet, label):
 # what it says
 
 
+@pytest.mark.slow
 def test_every_row_of_the_table_is_the_record(book, record):
     for key, name in NAMES.items():
         values = [cell.value for cell in named(book, name)]

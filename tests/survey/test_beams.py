@@ -41,6 +41,7 @@ def mean_radius(normal):
     return (np.linalg.pinv(design)[2][:, None] * normal).ravel()
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize("scans", CLOSED_FORM)
 @pytest.mark.parametrize("per", [60, 120])
 def test_radius_of_independent_shifts(scans, per):

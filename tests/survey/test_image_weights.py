@@ -43,6 +43,7 @@ def again(survey, found):
     return weighed(replace(nearer, cameras=(replace(camera, values=values),)), camera.form.weights)
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("affinity", ["both_y", "before_distortion"])
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("weights", ["measured", "ideal"])

@@ -48,6 +48,7 @@ def told(figure, what, differences):
     return differences
 
 
+@pytest.mark.slow(after=1)
 def test_coordinates_as_large_as_utm(surveyed, figure):
     measurements, before = surveyed
     far = with_control(measurements, lambda xyz: xyz + UTM)
@@ -102,6 +103,7 @@ def shuffled(measurements, rng):
     )
 
 
+@pytest.mark.slow
 def test_the_order_of_rows(surveyed, figure):
     measurements, before = surveyed
     after = adjust_survey(shuffled(measurements, np.random.default_rng(0)))
@@ -175,6 +177,7 @@ def all_around(name):
     return replace(measurements, settings=AdjustmentSettings(snooping=False))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param("photographs", marks=pytest.mark.study), "instruments"]
 )

@@ -15,6 +15,7 @@ from tankcal.solver.model import Normals
 PHOTOS, POINTS, RAYS = 3, 40, 210  # more of a photo than are computed side by side
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("in_ideal", [False, True])
 @pytest.mark.parametrize(
     "form",
@@ -115,6 +116,7 @@ def test_blocks_eliminated_together_give_what_they_give_one_by_one(monkeypatch):
         assert one == pytest.approx(other, abs=1e-11)
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize(
     ("panel", "wide", "side"),
     [(2, 3, 1), (2, 3, 3), (loops.PANEL, loops.WIDE, loops.SIDE)],

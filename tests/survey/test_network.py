@@ -456,6 +456,7 @@ def test_a_blunder_is_found_and_a_false_alarm_comes_back(survey, adjusted):
     assert again.adjusted.xyz_m == pytest.approx(adjusted.xyz_m, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_ten_percent_of_blunders_are_survived(survey, adjusted, figure):
     """Property: with 10 % of 20-sigma blunders the points stay as good as their sds say."""
     images, rng = survey.image_points, np.random.default_rng(7)

@@ -104,6 +104,7 @@ def test_reading_set_aside_has_no_influence():
     assert (np.delete(table.effect_m, place, axis=0) > 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("datum", CASES)
 def test_effect_of_an_unknown_known_beforehand(datum, figure):
     """Second method: adjusted again with the value known beforehand shifted."""

@@ -152,6 +152,7 @@ def test_covariance_is_that_of_the_null_space(survey):
     assert redundancy.sum() == pytest.approx(found.dof, rel=1e-9)
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("phi_deg", [89.0, 89.999, 90.0])
 @pytest.mark.parametrize("element", [3, 4, 5])
 def test_a_single_angle_near_phi_90(survey, element, phi_deg):
@@ -195,6 +196,7 @@ def test_three_angles_of_a_photo_are_one_rotation(survey):
     assert found.dof == other.dof
 
 
+@pytest.mark.slow
 def test_a_datum_of_conditions_only(survey):
     """Second method: six coordinates and a distance held exactly, against the same held fixed."""
     xyz = TRUTH.xyz_m
@@ -252,6 +254,7 @@ def test_contradictions_are_reported(survey):
         adjust(replace(survey, observations=(*survey.observations, triangle)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("away_m", [100.0, 1000.0, 5000.0])
 def test_exact_values_hold_to_rounding_however_far_they_reach(away_m):
     """Closed form: an azimuth to a far mark, held exactly, moves a station across the sight alone.
@@ -280,6 +283,7 @@ def test_impossible_exact_values_are_refused(survey):
         adjust(replace(survey, observations=(*survey.observations, half)))
 
 
+@pytest.mark.slow
 def test_snooping_keeps_exact_values(survey):
     """A fixed distance 5 cm wrong shows in its test quantity, and is not rejected."""
     one = exactly(Distances, **ENDS, instrument=np.array([-1, -1]))

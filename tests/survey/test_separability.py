@@ -53,6 +53,7 @@ def test_image_point_agrees_only_without_the_named_reading():
     assert others
 
 
+@pytest.mark.slow
 def test_unknowns_are_solved_once_per_observation_set_aside(monkeypatch):
     """Asked again for every candidate, a block of 26 321 points took two minutes more."""
     measurements = by_photographs(3, photos=8)[0]
@@ -68,6 +69,7 @@ def test_unknowns_are_solved_once_per_observation_set_aside(monkeypatch):
     assert len(asked) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 4])
 def test_bound_of_the_test_leaves_out_no_alternative(seed, monkeypatch, figure):
     """Second method: without the bound, every reading that stands out is tested in full."""

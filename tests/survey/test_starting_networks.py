@@ -282,6 +282,7 @@ def test_free_network_starts_at_its_first_station():
     assert sides(ours.xyz_m) == pytest.approx(sides(theirs.xyz_m), abs=1e-8)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize("known", [[0, 1], [0, 4], [0, 25], [24, 26], [3, 12, 20]])
 def test_a_few_known_points_place_the_whole_network(known):
     survey, truth = by_total_station()

@@ -267,6 +267,7 @@ def test_the_wall_decides_between_the_poses_of_three_points():
     assert decided >= 4
 
 
+@pytest.mark.slow
 def test_photographs_hang_on_a_total_station_without_control():
     """Set-ups give frame, scale and vertical; the photos follow from the points that both see."""
     shot, truth = photographed(photos=12)

@@ -161,6 +161,7 @@ def test_vertical_and_scale_are_judged_by_given_values(photos):
     assert (report.defect, report.vertical, report.scale) == (4, True, True)
 
 
+@pytest.mark.slow
 def test_fixed_control_is_held_exactly(photos):
     names = [int(name[1:]) for name in photos.control.point]
     _, truth = by_photographs()

@@ -70,6 +70,7 @@ def test_a_control_point_of_photographs_held_at_a_wrong_place(photos):
     assert f"x of {name} is held fixed" in text
 
 
+@pytest.mark.slow
 def test_sound_control_is_not_doubted(stations, photos):
     for measurements in (stations, photos):
         text = told(held(measurements))
@@ -278,6 +279,7 @@ def test_a_fixed_principal_distance_that_is_wrong_is_named(photos, factor):
     assert f"instead of {values[0]:.3f} mm" in text
 
 
+@pytest.mark.slow
 def test_a_check_point_that_disagrees_is_reported(stations):
     name, place = "P0", TRUTH[1][0] + [0.0, 0.05, 0.0]
     text = told(replace(stations, check=known([name], [place], 0.001, file="check.csv")))

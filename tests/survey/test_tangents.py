@@ -121,6 +121,7 @@ def test_tangents_touch_the_wall():
     np.testing.assert_allclose(xyz[:, 2], tangents.level_m, atol=0.01)
 
 
+@pytest.mark.slow
 def test_what_a_pose_moves():
     """Differences: the covariance by one unknown of a pose is the square of what it does."""
     tangents, poses = known()
@@ -164,6 +165,7 @@ def amplitudes_of(**sizes_m):
     return Amplitudes(variances, np.zeros((len(variances),) * 2), np.ones(len(variances)))
 
 
+@pytest.mark.slow
 def test_excess_of_convex_walls_is_that_of_the_perimeter():
     """Closed form: mean of p - R is sum k^2 c_k^2 / (4 R) where the wall is convex."""
     share = OVALITY_MODES**-3.0 / np.sum(OVALITY_MODES**-3.0)
@@ -185,6 +187,7 @@ def test_excess_of_settlement_grows_with_the_square_of_the_height():
     np.testing.assert_allclose(mean, mean[-1] * up**2, atol=1e-3 * mean[-1])
 
 
+@pytest.mark.slow
 def test_rings_bound_what_is_expected_beyond_them():
     """A property: the likeliest outline of many exact radii has all of the excess."""
     turn = 2 * np.pi * np.arange(96) / 96
@@ -195,6 +198,7 @@ def test_rings_bound_what_is_expected_beyond_them():
     assert beyond < 0.02 * tangent_excess(known, 6.5, [0.5])[0, 0]
 
 
+@pytest.mark.slow
 def test_no_wall_is_drawn_rougher_than_the_limbs_allow():
     """A bound: amplitudes of 300 mm with limbs that show 3 mm give the excess of 3 mm."""
     rough, bounded = amplitudes_of(common_ovality=0.3), amplitudes_of(common_ovality=3e-3)
@@ -202,6 +206,7 @@ def test_no_wall_is_drawn_rougher_than_the_limbs_allow():
     assert found == pytest.approx(tangent_excess(bounded, 6.5, [0.5]), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_excess_over_valleys_is_less_than_that_of_convex_walls():
     """A property: the hull bridges valleys, so the quadratic formula is too much of them."""
     found = [

@@ -88,6 +88,7 @@ def test_printed_digits_with_the_blunders_in():
     assert sd < 2 * SD_MM  # 1194.2647 mm, printed as 1194.27: that iteration ended earlier, too
 
 
+@pytest.mark.slow
 def test_published_blunders_are_found():
     """Published: two distances of this network are known to be false."""
     wanted = measured(BLUNDERS)

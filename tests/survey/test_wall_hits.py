@@ -112,6 +112,7 @@ def test_the_bias_by_incidence_is_one_cause_of_each_surface():
     np.testing.assert_allclose(-cause.column_m, away.ravel(), atol=3e-5)
 
 
+@pytest.mark.slow(after=1)
 @pytest.mark.parametrize(
     ("outside", "strapped", "u_first", "u_last", "u_mean", "r", "u_offset"),
     [

@@ -125,6 +125,7 @@ def test_an_offset_widens_every_radius(tmp_path):
     assert found == pytest.approx(slope, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_deadwood_of_unknown_uncertainty_shares_one_error(tmp_path):
     items = [("coil", 0.5, 1.0, -0.4), ("pipe", 1.0, 3.0, -0.2), ("box", 0.0, 1.0, -1.0, 0.05)]
     settings = {"table.step_m": 0.5, "survey.side": "inside"}

@@ -283,6 +283,7 @@ def test_least_delivery_height_is_where_limit_holds(few_dof):
     assert (least_delivery_m(table, 0.99 * U, False) is None) == (U > 0)
 
 
+@pytest.mark.slow
 def test_a_full_table_takes_no_matrix(figure):
     """9 501 rows of 30 columns: a matrix of all pairs would be 722 MB."""
     for few_dof in (False, True):

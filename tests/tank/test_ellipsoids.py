@@ -38,6 +38,7 @@ def test_full_ellipsoid_is_the_published_one():
     assert found.volume_m3([found.top_m])[0] == pytest.approx(found.capacity_m3, rel=1e-14)
 
 
+@pytest.mark.slow
 def test_against_a_mesh():
     """Second method: a mesh of an ellipsoid, cut at each dip: one inside it, and one round it."""
     ball = trimesh.creation.icosphere(subdivisions=5)

@@ -39,6 +39,7 @@ def test_the_order_of_the_items_does_not_matter(items):
     )
 
 
+@pytest.mark.slow
 @given(st.lists(st.sampled_from(ITEMS), min_size=1), st.lists(st.sampled_from(ITEMS), min_size=1))
 def test_items_add_however_they_overlap(some, others):
     """Property: the part of all items is the sum of the parts of some and others."""

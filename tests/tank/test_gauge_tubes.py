@@ -58,6 +58,7 @@ def test_a_plumb_tube_beside_the_axis_starts_above_the_lowest_point_closed_form(
     assert tank.top_m == pytest.approx(1.8)
 
 
+@pytest.mark.slow(after=6)
 @pytest.mark.parametrize("tilt", [0.0, 0.06])
 @pytest.mark.parametrize("direction", ["square", "plumb"])
 @pytest.mark.parametrize(("angle", "offset"), PLACES)

@@ -12,6 +12,7 @@ from tankcal.tank.liquid import RunEffect
 NO_RUNS = RunEffect(0.0, np.inf, 0.0)
 
 
+@pytest.mark.slow
 def test_intervals_hold_in_a_twentieth():
     """500 jobs: 95 % within three standard deviations of such a count."""
     survey = Survey(steps=8)

@@ -51,6 +51,7 @@ def test_volumes_of_three_rings(tank, litres, capacity):
     assert 1000 * tank.capacity_m3 == pytest.approx(capacity, abs=0.01)
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize("direction", ["plumb", "square"])
 @pytest.mark.parametrize("tilt", [0.0, 0.013, -0.04])
 def test_equal_rings_are_one_cylinder(tilt, direction):
@@ -147,6 +148,7 @@ def _by_quadrature(tank, dip):
     return whole
 
 
+@pytest.mark.slow(after=4)
 @pytest.mark.parametrize(
     ("name", "field"), [("ring_radii", "radii_m"), ("ring_lengths", "lengths_m")]
 )

@@ -240,6 +240,7 @@ def columns_m3(tank, dip):
     )[0]
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize(
     ("a", "b", "tilt", "dip"),
     [
@@ -478,6 +479,7 @@ def sized(tank, inputs):
 NAMES = ["diameter", "length", "end_depth", "tilt", "dip_position", "plate_thickness"]
 
 
+@pytest.mark.slow(after=5)
 @pytest.mark.parametrize("direction", ["plumb", "square"])
 @pytest.mark.parametrize(("a", "b"), [("conical", "flat"), ("spherical", "ellipsoidal")])
 @pytest.mark.parametrize("tilt", [0.0, 0.07, -0.16])
@@ -487,6 +489,7 @@ def test_derivatives_by_every_input(a, b, tilt, direction, width, height, roll):
     check_derivatives(tank, NAMES)
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("tilt", [0.0, 0.07])
 @pytest.mark.parametrize("inward", [False, True])
 def test_derivatives_with_torispherical_and_inward_ends(tilt, inward):

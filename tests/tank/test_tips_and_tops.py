@@ -106,6 +106,7 @@ def profile_of(form, x, h):
     return np.where(x < k * (f - h) / (f - k), knuckle, dish)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", HEADS)
 def test_heads_against_a_mesh(form, figure):
     """Truth: a mesh of 360 sides; these lack 5.1e-5 of the areas, and its rings a little."""

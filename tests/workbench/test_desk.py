@@ -64,6 +64,7 @@ def test_what_is_shown_can_be_typed_again(text, in_file, mark):
 # ---- what is shown
 
 
+@pytest.mark.slow(after=2)
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_every_table_is_shown_in_every_language(language):
     made = open_job(EXAMPLES / "total-station", language=language, live=False)
@@ -227,6 +228,7 @@ def test_a_desk_with_problems_does_not_run(folder):
     assert "abc" not in (folder / "points.csv").read_text()
 
 
+@pytest.mark.slow
 def test_run_saves_and_writes_the_record_of_the_files(folder, tmp_path):
     made = open_job(folder, out=tmp_path / "out", live=False)
     made.enter("courses", 0, "thickness_mm", "9.9")
@@ -245,6 +247,7 @@ def test_run_saves_and_writes_the_record_of_the_files(folder, tmp_path):
     assert made.is_stale
 
 
+@pytest.mark.slow
 def test_overruling_is_noted_in_the_job(folder, tmp_path):
     made = open_job(folder, out=tmp_path / "out", live=False)
     made.run(papers=False)
@@ -281,6 +284,7 @@ def test_overruling_in_a_new_job_of_decimal_commas(folder):
     assert open_job(folder, live=False).problems[:] == ()
 
 
+@pytest.mark.slow
 def test_warnings_of_a_run_stand_with_its_results(folder, tmp_path):
     """What only the run knows: the certificate lacks what ISO/IEC 17025 requires."""
     made = open_job(folder, out=tmp_path / "out", live=False, language="pt-BR")
@@ -300,6 +304,7 @@ def insert_rows_of_two(draft, *names):
             draft.insert_rows(name, 0)
 
 
+@pytest.mark.slow
 def test_nothing_is_computed_but_what_is_shown(folder, tmp_path):
     made = open_job(folder, out=tmp_path / "out", live=False)
     path = folder / "courses.csv"
@@ -358,6 +363,7 @@ def test_results_of_somebody_else_are_not_replaced(folder, tmp_path):
     assert (tmp_path / "out" / "mine.txt").exists()
 
 
+@pytest.mark.slow
 def test_progress_tells_parts_and_shares(folder, tmp_path):
     heard = []
     run = Run(folder, tmp_path / "out", lambda *one: heard.append(one), papers=False)
@@ -386,6 +392,7 @@ def test_an_app_ends_what_a_closed_page_leaves_and_keeps_an_open_one(monkeypatch
     assert not manager["cull_connected"]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_written_is_told_without_a_traceback(folder, monkeypatch):
     def refuse(*_args, **_options):
         raise OSError(30, "Read-only file system")

@@ -211,6 +211,7 @@ def test_an_entry_that_may_be_two_numbers_stops_everything(folder):
         draft.save()
 
 
+@pytest.mark.slow(after=10)
 @pytest.mark.parametrize(
     "spoil",
     [
@@ -254,6 +255,7 @@ def test_a_workbook_is_the_same_job(book, folder):
     assert [cells[0][1], len(cells)] == ["1.9", 5]
 
 
+@pytest.mark.slow
 def test_a_cell_of_a_workbook_is_saved_and_the_rest_stays(book):
     before = load_workbook(book)
     before.create_sheet("# notes")["B2"] = "=1+1"
@@ -280,6 +282,7 @@ def test_a_cell_of_a_workbook_is_saved_and_the_rest_stays(book):
         assert len(differing) == {"courses": 2, "job": 0}.get(sheet.title, 0)
 
 
+@pytest.mark.slow
 def test_rows_of_a_workbook_come_and_go(book):
     count = len(tankcal.load(book).points.names)
     draft = Draft.open(book)

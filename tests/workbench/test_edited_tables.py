@@ -108,6 +108,7 @@ ROWS = st.lists(st.tuples(CELL.filter(lambda one: one and one[0] != '"'), CELL, 
 EDITS = st.lists(st.tuples(st.integers(0, 4), st.integers(1, 2), CELL), max_size=6)
 
 
+@pytest.mark.slow
 @given(ROWS, EDITS, st.sampled_from([",", ";", "\t"]), st.sampled_from(["\n", "\r\n"]))
 def test_what_is_read_back_is_the_state(rows, edits, separator, ending):
     """Property: after any edits the reader of jobs finds the cells that the state has."""

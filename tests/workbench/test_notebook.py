@@ -43,6 +43,7 @@ def test_notebook_is_valid_and_in_the_language(folder, language):
     assert tankcal.load(folder)  # the notebook in its folder is no file of the job
 
 
+@pytest.mark.slow
 def test_notebook_of_a_workbook_lies_beside_it(tmp_path):
     book = write_workbook(tmp_path / "T 1.xlsx", rings=2)
     assert main(["notebook", str(book), "--no-open"]) == 0

@@ -65,6 +65,7 @@ def english(record):
 # ---- calculators
 
 
+@pytest.mark.slow(after=2)
 def test_every_row_is_that_of_the_certificate(result, paper):
     # to the digit: the cells that the certificate prints
     table, rows = capacity_table(paper.record), capacity_rows(paper.record)
