@@ -266,7 +266,7 @@ def test_input_that_changes_meanwhile_is_computed_again(tmp_path, monkeypatch, c
     with monkeypatch.context() as patched:
         patched.setitem(doing._DOING, "run", meddle)
         assert main(batch_of(tmp_path)) == 2
-    assert "changed while" in errors(capsys)[0]
+    assert "changed during" in errors(capsys)[0]
     assert main(batch_of(tmp_path)) == 0
 
 

@@ -413,7 +413,7 @@ def test_the_workbook_of_a_survey_alone(only):
     assert {HARD_NAME, HARD_TEXT} <= {cell.value for cell in cells}
 
 
-@pytest.mark.parametrize(("language", "said"), [("en", "sheet"), ("pt-BR", "planilha")])
+@pytest.mark.parametrize(("language", "said"), [("en", "sheet"), ("pt-BR", "aba")])
 def test_sheets_that_readings_stand_in_are_named_in_words(station, tmp_path, language, said):
     record = copy.deepcopy(station[1])
     residuals = record["adjustment"]["residuals"]
@@ -517,7 +517,7 @@ def test_the_papers_of_a_survey_alone(only):
     text = " ".join(text_of(folder / "working-papers.pdf").split())
     found = record["adjustment"]
     for words in (
-        "The adjustment", "Observations rejected", "Datum", "Instruments", "Cameras",
+        "The adjustment", "Rejected observations", "Datum", "Instruments", "Cameras",
         "Photographs", "Adjusted points", "Check points", "passed: v′Pv", "tape 1", HARD_TEXT,
         "The network from above", HARD_NAME, f"{found['sigma0']:.3f}",
         f"{1000 * found['check_points']['r_xyz_m']:.3g} mm",

@@ -201,5 +201,5 @@ def test_a_volume_of_more_than_one_dip_is_refused(example, calculated):
 @pytest.mark.slow
 def test_a_table_that_falls_gives_no_dip(calculated):
     (said,) = calculated["falling"].sentences("wanted_state")
-    assert said == "Refused: volumes of this table fall somewhere: no single dip."
+    assert said == "Refused: volumes of this table decrease in places: no single dip."
     assert calculated["falling"].line("dip_of_volume") == [NONE]

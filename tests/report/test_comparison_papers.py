@@ -153,7 +153,9 @@ def test_what_nobody_declared_is_called_so():
 def test_what_is_lacking_and_what_was_read_is_said():
     texts = texts_of(pages(ComparisonPaper(without_uncertainty())))
     assert any("former.reference_temperature_c" in one for one in texts)
-    assert any("made with the head of 853.1\N{NO-BREAK SPACE}kg/m³" in one for one in texts)
+    assert any(
+        "includes the head of a liquid of 853.1\N{NO-BREAK SPACE}kg/m³" in one for one in texts
+    )
     assert any("does not include liquid head" in one for one in texts)
 
 

@@ -85,13 +85,13 @@ def test_an_epoch_says_plane_limits_and_verdicts():
         *("R² = 0.9675", "6.28 mm for 16 points, 4.18 m apart", "8 points, it is 25.12 mm"),
     ):
         assert number in said
-    verdicts = {row[0]: row[1:] for row in table_of(blocks, "2026: the verdicts")}
+    verdicts = {row[0]: row[1:] for row in table_of(blocks, "2026: verdicts")}
     assert verdicts["Settlement: S, all points"][-1] == "CONDITIONAL PASS"
     assert verdicts["Settlement: S, spaced points"][-1] == "passed"
     assert verdicts["Settlement: curvature"][2:5] == [
         f"+0.380{SPACE}mm/m²", f"0.090{SPACE}mm/m²", f"≤{SPACE}0.718{SPACE}mm/m²{SPACE}*",
     ]  # fmt: skip
-    of_point = {row[0]: row for row in table_of(points(paper), "2026: the points")}
+    of_point = {row[0]: row for row in table_of(points(paper), "2026: points")}
     published = (-0.23, 1.38, -2.69, -1.22, 4.81, -0.46, -2.35, -0.24, 1.98, 0.87, -4.26, 1.42,
                  0.84, 1.01, 0.10, -0.96)  # fmt: skip
     shown = [float(of_point[f"P{n}"][4].replace(MINUS, "-")) for n in range(1, 17)]
@@ -181,13 +181,13 @@ def test_how_many_checks_came_out_how():
 def test_a_largest_reading_is_shown_beside_its_estimate():
     paper = InspectionPaper(plain())
     said = settlement(paper, paper.found["settlements"][1])
-    rows = {row[0]: row for row in table_of(said, "2026: the verdicts")}
+    rows = {row[0]: row for row in table_of(said, "2026: verdicts")}
     assert rows["Settlement: S, all points"][2:4] == [f"+5.31{SPACE}mm", f"+4.81{SPACE}mm"]
     old = plain()
     for one in old["checks"]:
         one |= {"reading": None, "U_reading": None}
     said = settlement(InspectionPaper(old), old["settlements"][1])
-    assert table_of(said, "2026: the verdicts")[1][2] == f"+4.81{SPACE}mm"
+    assert table_of(said, "2026: verdicts")[1][2] == f"+4.81{SPACE}mm"
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -212,7 +212,7 @@ def test_a_file_of_version_1_keeps_its_verdicts_and_its_rule(language):
 
 
 def test_how_the_tank_was_built_is_said_unless_an_earlier_epoch_takes_it_out():
-    built = "include the as-built shape of the tank"
+    built = "The deviations include the as-built shape of the tank"
     assert any(built in text for text in texts_of(reading(InspectionPaper(few()))))
     assert not any(built in text for text in texts_of(reading(InspectionPaper(plain()))))
 
@@ -285,7 +285,8 @@ def test_a_remark_says_its_values_in_their_units():
     values = {"low_m": 0.3, "high_m": 11.6171, "mm_per_m": 2.4698, "one_in": 404.9, "over_m": 11.9}
     said = paper.remark(one | {"remark": "plumb_between", "remark_values": values})
     assert said.replace(SPACE, " ") == (
-        "Medido entre 0,30 m y 11,62 m: 2,47 mm/m, uno en 405; el valor es el de 11,90 m."
+        "Medido entre 0,30 m y 11,62 m: 2,47 mm/m, pendiente de 1:405; el valor es el "
+        "de esta pendiente en 11,90 m."
     )
     said = paper.remark(one | {"remark": "gap_partly_seen", "remark_values": {"seen": 0.734}})
     assert "en 73 % de la longitud" in said.replace(SPACE, " ")

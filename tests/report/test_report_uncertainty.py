@@ -579,4 +579,4 @@ def test_certificate_without_monte_carlo_states_it(record, tmp_path):
     path.write_text(json.dumps(off), encoding="utf-8")
     said = texts(paper_blocks(path))
     assert "No Monte Carlo simulation was made." in said
-    assert not any("that of the law of propagation" in text for text in said)
+    assert not any("this budget is by the law of propagation" in text for text in said)

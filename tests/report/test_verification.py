@@ -300,7 +300,7 @@ def test_what_was_not_compared_is_named(job, capsys):
     assert main(["verify", str(job / "results"), "--hashes-only"]) == 0
     said = capsys.readouterr().out
     assert "all agree" not in said
-    assert "hash in SHA256SUMS alone" in said
+    assert "hash in SHA256SUMS only" in said
     results = shutil.move(job / "results", job.parent / "alone")
     assert main(["verify", str(results), "--quiet"]) == 0
     assert "all agree" not in capsys.readouterr().out
