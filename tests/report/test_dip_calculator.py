@@ -183,7 +183,7 @@ def test_each_volume_is_refused_in_words(calculated):
 
 
 def test_the_lower_dip_must_be_below_the_higher(calculated):
-    swapped = "Refused: the lower dip must be below the higher one."
+    swapped = "Refused: the lower dip must be below the higher dip."
     assert calculated["swapped"].sentences("delivery_state") == [swapped] * 2
     assert calculated["swapped"].line("delivered") == [NONE] * 2
 

@@ -132,7 +132,7 @@ def test_all_papers(folder, result, tmp_path):
     tankcal.write(result, out)
     sheet = openpyxl.load_workbook(out / "capacity.xlsx").worksheets[0]
     cells = [str(cell.value) for line in sheet.iter_rows() for cell in line if cell.value]
-    assert any(one.startswith("dent: kept, whatever the search") for one in cells)
+    assert any(one.startswith("dent: kept, regardless of the search") for one in cells)
     html = (out / "report.html").read_text(encoding="utf-8")
     assert "<b>&quot;seen" not in html
     assert "Decisions that override the search for blunders" in html

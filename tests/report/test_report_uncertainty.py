@@ -243,10 +243,10 @@ def test_the_worst_delivery_of_each_minimum_height_is_reported(found, record):
     rows = table_of(found, "Stated volumes")
     assert len(rows) == len(record["budgets"])
     assert [row[-1] for row in rows[-2:]] == [
-        f"of all deliveries of {least}\xa0m or more, the one with the largest U/V"
+        f"the largest U/V of all deliveries of {least}\xa0m or more"
         for least in ("0.5", "1")
     ]  # fmt: skip
-    worst = table_of(found, "The worst deliveries")
+    worst = table_of(found, "Worst deliveries")
     at_minimum = [one["at_minimum"] for one in record["deliveries"]]
     ends = [[f"{one[key]:.3f}" for key in ("high_m", "low_m")] for one in at_minimum]
     assert [row[2:4] for row in worst if row[1] == "U/V, at exactly this height"] == ends
@@ -443,7 +443,7 @@ def test_note_on_validation_is_below_deliveries(record):
         one["monte_carlo"] |= {"validated": False, "d_low": 0.014, "d_high": 0.002}
         one["U_m3"] = 0.5
     _, why = monte_carlo.delivery_blocks(paper)
-    assert "at most 0.014\xa0m³ away, 2.8\xa0% of U" in why.data["text"]
+    assert "the difference is at most 0.014\xa0m³, 2.8\xa0% of U" in why.data["text"]
     for one in plain:
         one["monte_carlo"]["validated"] = True
     assert len(monte_carlo.delivery_blocks(paper)) == 1
@@ -461,10 +461,10 @@ def test_the_verdict_of_the_rule_in_words(found, record):
     assert holds_from["code"] == "holds_from"
     whole = " ".join(texts(found)).replace("\xa0", " ")
     level, volume = f"{holds_from['from_m']:.3f} m", f"{holds_from['from_m3']:.3f} m³"
-    assert f"at most 1 % of the volume. Kept from a level of {level} ({volume}) on" in whole
-    assert "U of deliveries of 0.5 m or more: at most 0.25 % of the volume. NOT kept" in whole
-    assert "U of deliveries of 1 m or more: to be stated, not limited. The largest" in whole
-    assert "at most 1 % of the volume: B.2 (read in the text itself)." in whole
+    assert f"at most 1 % of the volume. Met from a level of {level} ({volume}) upwards" in whole
+    assert "U of deliveries of 0.5 m or more: at most 0.25 % of the volume. NOT met" in whole
+    assert "U of deliveries of 1 m or more: to be stated, not limited. Largest value" in whole
+    assert "at most 1 % of the volume: B.2 (read in the original text)." in whole
     assert "± 0.3 % of the stated volume: B.4 (NOT read in the original text)." in whole
     top, steps = record["rule"]["deviation"]
     assert (top["code"], steps["code"]) == ("fails", "guard_band")
