@@ -242,7 +242,7 @@ def test_rows_are_found_by_dip_or_number(browser, report, record):
     browser.type(".finder input", f"{capacity['volume_m3'][row]:.3f}")
     assert browser.run(texts) == ["4.750"]
     browser.type(".finder input", "north")
-    assert browser.text(".finder output") == "No row has north."
+    assert browser.text(".finder output") == "No row contains north."
     browser.type(".finder input", "8.88")
     browser.press("Enter", 13)
     assert browser.run(f"{visible}.length") == 951
