@@ -197,7 +197,7 @@ def refuse_others(table, column, known, log):
         if name is not None and name not in known:
             expected = message(
                 "no_such_name",
-                "found {name!r}; expected one of those that are there{hint}",
+                "found {name!r}; expected a name defined in the job{hint}",
                 name=name,
                 hint=nearest(name, known),
             )
