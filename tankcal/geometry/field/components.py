@@ -280,7 +280,7 @@ def wave_columns(azimuth_rad):
 def seam_correlation(difference_rad, radius_m, length_m=SEAM_LENGTH_M):
     """Return c for azimuth differences: sum over k >= 2 of (1 + (k/k0)^2)^-2, over its value at 0.
 
-    k0 = R / length_m. All modes are summed in closed form,
+    k0 = R / length_m. All modes are summed in closed form::
 
         sum over all k of exp(i k x) / (k^2 + b^2)^2
             = pi / (2 b^2) (C / b - (pi - x) S + pi C coth(pi b)),  0 <= x <= pi,
