@@ -78,18 +78,16 @@ def count_long_sentences(text):
     return sum(len(re.findall(r"\w[\w'-]*", one)) > LONGEST_SENTENCE for one in sentences)
 
 
-def prose_of_module(source):
-    """Comments, docstrings and texts of a module."""
-    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
-    kinds = (tokenize.COMMENT, tokenize.STRING)
-    return "\n".join(token.string for token in tokens if token.type in kinds)
+def count_module(source):
+    """Counter of PHRASES in comments, docstrings and texts of a module, and of its names.
 
-
-def count_names(source):
-    """Counter of NAMES as identifiers, and of functions whose first word is no verb."""
-    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+    Names are NAMES as identifiers, and functions whose first word is no verb.
+    """
+    tokens = list(tokenize.generate_tokens(io.StringIO(source).readline))
+    texts = (token.string for token in tokens if token.type in (tokenize.COMMENT, tokenize.STRING))
+    counts = count_phrases("\n".join(texts))
     names = Counter(token.string for token in tokens if token.type == tokenize.NAME)
-    counts = Counter({f"name {name}": names[name] for name in NAMES})
+    counts.update({f"name {name}": names[name] for name in NAMES})
     for node in ast.parse(source).body:
         if isinstance(node, ast.FunctionDef):
             first = node.name.strip("_").split("_")[0]
@@ -106,8 +104,7 @@ def count_file(path):
         counts = count_phrases(prose)
         counts[f"sentences of more than {LONGEST_SENTENCE} words"] = count_long_sentences(prose)
         return Counter({f"docs: {name}": count for name, count in counts.items()})
-    counts = count_phrases(prose_of_module(text)) + count_names(text)
-    return Counter({f"package: {name}": count for name, count in counts.items()})
+    return Counter({f"package: {name}": count for name, count in count_module(text).items()})
 
 
 def list_files():
