@@ -19,9 +19,9 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.recalibration.densities import Density, densities_of
 from tankcal.recalibration.difference import adjust_difference, slopes_m2
-from tankcal.recalibration.upright_shell import Rings
+from tankcal.recalibration.tank_facts import Density, find_densities
+from tankcal.recalibration.upright_shell import Rings, estimate_radii
 from tankcal.record.comparison import BasisStep, ZeroShift
 from tankcal.tank.fittings import floating_roof
 
@@ -69,7 +69,7 @@ class OneBasis:
     steps : dict
         {name: Step}, in order.
     zero : ZeroShift
-    for_use : (rows,) ndarray of bool
+    usable : (rows,) ndarray of bool
         False where a roof is partly afloat.
     interpolation_m3 : float
         Largest interpolation error in the former table.
@@ -84,7 +84,7 @@ class OneBasis:
     new_m3: np.ndarray
     steps: dict
     zero: ZeroShift
-    for_use: np.ndarray
+    usable: np.ndarray
     interpolation_m3: float
     densities: tuple[Density, Density]
 
@@ -112,7 +112,7 @@ def bring_to_one_basis(former, new, facts):
         If the tables have fewer than two rows in common.
     """
     zero = _declared_zero(former, new)
-    densities = densities_of(former, new, facts)
+    densities = find_densities(former, new, facts)
     fitted = _fitted_zero(former, new, facts, densities)
     if zero is None and fitted is not None:
         least = max(NOTICED * fitted[1], LEAST_ZERO_M)
@@ -129,7 +129,7 @@ def bring_to_one_basis(former, new, facts):
         new_m3=new.volume_m3[rows],
         steps=steps,
         zero=shift,
-        for_use=_for_use(former, new, zero or 0.0, new.height_m[rows]),
+        usable=_usable_rows(former, new, zero or 0.0, new.height_m[rows]),
         interpolation_m3=interpolation_error_m3(former, new.height_m[rows] + (zero or 0.0)),
         densities=densities,
     )
@@ -210,7 +210,7 @@ def _fitted_zero(former, new, facts, densities):
             return None
         _, _, basis = _steps(former, new, facts, densities, zero, rows, until="roof")
         dips, volumes = new.height_m[rows], new.volume_m3[rows]
-        usable = _for_use(former, new, zero, dips)
+        usable = _usable_rows(former, new, zero, dips)
         difference = adjust_difference(facts, dips, volumes - basis, volumes, quanta, usable)
         if difference is None:
             return None
@@ -321,55 +321,10 @@ def _head(former, new, facts, densities, zero, dips, basis):
     rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
     zone = former.roof and former.roof.critical_m
     zone = zone and tuple(edge - zero for edge in zone)
-    radii = radii_of_rows(rings, dips, basis, was.kg_m3, zone)
+    radii = estimate_radii(rings, dips, basis, was.kg_m3, zone)
     added = rings.volume_m3(dips, radii, is_now.kg_m3) - rings.volume_m3(dips, radii, was.kg_m3)
     source = "read" if "read" in (was.source, is_now.source) else "declared"
     return Step(added, "done", source, **values)
-
-
-def radii_of_rows(rings, dips, volumes, density, zone=None):
-    """Unloaded radii (courses,) of the rings, from the rise of the volumes within them, m.
-
-    A ring between two rows takes the radius of the next ring below. Over the critical zone of a
-    roof, the rows rise by less than the ring holds. The ring is then evaluated on one side of the
-    zone.
-
-    Parameters
-    ----------
-    rings : Rings
-    dips, volumes : (rows,) ndarray
-        Dips, m, and volumes, m3.
-    density : float
-        Density of the head in the volumes, kg/m3.
-    zone : (float, float), optional
-        Lower and upper dip of the critical zone.
-    """
-    radii, edges = np.empty(len(rings.thickness_m)), rings.edges_m.copy()
-    edges[-1] = max(edges[-1], dips[-1])
-    head = np.zeros(len(dips))
-    for _ in range(2):  # first without, then with the head in rings of these radii
-        for k in range(len(radii)):
-            inside = np.flatnonzero((dips >= edges[k] - 1e-9) & (dips <= edges[k + 1] + 1e-9))
-            # The lower half of the first ring may contain the bottom.
-            inside = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
-            inside = _beside(zone, inside, dips)
-            radii[k] = radii[k - 1] if k else np.sqrt(volumes[-1] / np.pi / dips[-1])
-            if len(inside) > 1:
-                first, last = inside[0], inside[-1]
-                # pi r^2 times the height equals the rise without the effect of the head
-                rise = volumes[last] - head[last] - volumes[first] + head[first]
-                radii[k] = np.sqrt(max(rise, 1e-9) / np.pi / (dips[last] - dips[first]))
-        head = rings.volume_m3(dips, radii, density) - rings.volume_m3(dips, radii, 0.0)
-    return radii
-
-
-def _beside(zone, inside, dips):
-    """Indices of the rows on one side of a critical zone, the side with more rows."""
-    if zone is None:
-        return inside
-    above = inside[dips[inside] >= zone[1] - 1e-9]
-    below = inside[dips[inside] <= zone[0] + 1e-9]
-    return above if len(above) >= len(below) else below
 
 
 def _roof(former, new, facts, densities, zero, dips, basis):
@@ -406,13 +361,13 @@ def _rounding(former, new, facts, densities, zero, dips, basis):
     return Step(added, state, "declared" if state == "done" else None, **values)
 
 
-def _for_use(former, new, zero, dips):
-    for_use = np.full(len(dips), True)
+def _usable_rows(former, new, zero, dips):
+    usable = np.full(len(dips), True)
     for table, shift in ((former, zero), (new, 0.0)):
         if table.roof is not None and table.roof.critical_m is not None:
             low, high = table.roof.critical_m
-            for_use &= (dips + shift <= low + 1e-9) | (dips + shift >= high - 1e-9)
-    return for_use
+            usable &= (dips + shift <= low + 1e-9) | (dips + shift >= high - 1e-9)
+    return usable
 
 
 def _saved(name, step, dips):

@@ -9,24 +9,24 @@ from tankcal.job.rule_files import named_rule
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.recalibration.agreement import (
-    coverage_factor_of,
+    compare_deliveries,
+    coverage_factor,
     critical_correlation,
-    deliveries_between,
+    find_worst_by_error,
+    find_worst_by_share,
+    interpolate_uncertainty,
     normalized_error,
-    uncertainty_at,
-    worst_by_error,
-    worst_by_share,
 )
 from tankcal.recalibration.basis import bring_to_one_basis
-from tankcal.recalibration.courses_of_tables import compared_courses
-from tankcal.recalibration.tank_facts import facts_of
+from tankcal.recalibration.difference import compare_courses
+from tankcal.recalibration.tank_facts import collect_facts
 from tankcal.recalibration.verdict import (
     WorstError,
-    ages_of,
     decide,
-    legal_numbers,
-    tank_of_rules,
-    zero_limit_of,
+    find_zero_limit,
+    judge_ages,
+    judge_limits,
+    tank_kind_of_rules,
 )
 from tankcal.record.comparison import (
     ComparedDelivery,
@@ -106,25 +106,25 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     """
     c = _common(former, new)
     _refuse_other_kinds(former, new)
-    facts = facts_of(former, new, courses)
+    facts = collect_facts(former, new, courses)
     chosen, file = rule or named_rule(DEFAULT_RULE, Log())
     basis = bring_to_one_basis(former, new, facts)
     _refuse_other_tanks(former, new, basis)
     agreement = _agreement(former, new, basis, c)
     deliveries = _deliveries(basis, agreement)
     from_m, worst = _worst(basis, agreement, deliveries)
-    tank = tank_of_rules(facts, former, new)
+    tank = tank_kind_of_rules(facts, former, new)
     of_rule = (chosen, tank, former, new)
-    legal = legal_numbers(*of_rule, basis, agreement.former_U, agreement.new_U)
-    ages = ages_of(*of_rule)
-    verdict = decide(legal, ages, basis, worst, c, zero_limit_of(chosen, tank))
+    legal = judge_limits(*of_rule, basis, agreement.former_U, agreement.new_U)
+    ages = judge_ages(*of_rule)
+    verdict = decide(legal, ages, basis, worst, c, find_zero_limit(chosen, tank))
     is_default = rule is None
     return ComparisonFile(
         tank=_tank_id(former, new),
         notice=_notice(former, new),
         former=_table(former, fingerprints[0], agreement.former_U),
         new=_table(new, fingerprints[1], agreement.new_U),
-        material=Material(facts.expansion_per_k, facts.modulus_pa, facts.material_is),
+        material=Material(facts.expansion_per_k, facts.modulus_pa, facts.material_source),
         low_m=float(basis.height_m[0]),
         high_m=float(basis.height_m[-1]),
         interpolation_m3=basis.interpolation_m3,
@@ -133,7 +133,7 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
         rows=_rows(basis, agreement),
         waterfall=_waterfall(basis),
         deliveries=deliveries,
-        courses=compared_courses(
+        courses=compare_courses(
             facts, basis, agreement.former_U, agreement.new_U, agreement.used_c, _sd(former, new)
         ),
         correlation=_correlation(agreement, worst),
@@ -153,7 +153,7 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
 
 
 def _common(former, new):
-    """Declared correlation of the tables, or None."""
+    """FormerFacts correlation of the tables, or None."""
     of_former, of_new = former.common, new.common
     if of_former is not None and of_new is not None and of_former != of_new:
         expected = message(
@@ -204,12 +204,12 @@ def _sd(former, new):
 
 
 def _agreement(former, new, basis, c):
-    k = coverage_factor_of(new if new.U_m3 is not None else former)
+    k = coverage_factor(new if new.U_m3 is not None else former)
     dips = basis.height_m
-    former_U = uncertainty_at(
+    former_U = interpolate_uncertainty(
         former, dips + basis.zero.height_m, basis.on_basis_m3, k, basis.interpolation_m3
     )
-    new_U = uncertainty_at(new, dips, basis.new_m3, k)
+    new_U = interpolate_uncertainty(new, dips, basis.new_m3, k)
     d = basis.new_m3 - basis.on_basis_m3
     of_rows = d, new_U.rows(), former_U.rows()
     return _Agreement(
@@ -221,14 +221,14 @@ def _agreement(former, new, basis, c):
 def _deliveries(basis, agreement):
     deliveries = []
     U = agreement.former_U, agreement.new_U, agreement.used_c
-    use = np.flatnonzero(basis.for_use)
+    use = np.flatnonzero(basis.usable)
     for minimum in MINIMUM_M:
-        pair = worst_by_share(basis, minimum)
+        pair = find_worst_by_share(basis, minimum)
         if pair is None:
             continue
-        one = deliveries_between(basis, *U, *pair)
+        one = compare_deliveries(basis, *U, *pair)
         deliveries.append(_delivery(basis, minimum, "relative", one))
-        worst = worst_by_error(basis, *U, minimum, also=(pair, (use[0], use[-1])))
+        worst = find_worst_by_error(basis, *U, minimum, also=(pair, (use[0], use[-1])))
         if worst is not None:
             deliveries.append(_delivery(basis, minimum, "E_n", worst))
     return deliveries
@@ -258,7 +258,7 @@ def _worst(basis, agreement, deliveries):
     dips = basis.height_m
     reach = dips[-1] - dips[0]
     from_m = float(dips[0] + (MINIMUM_M[0] if reach > 2 * MINIMUM_M[0] else JUDGED_PART * reach))
-    judged = np.flatnonzero(basis.for_use & (dips >= from_m - 1e-9))
+    judged = np.flatnonzero(basis.usable & (dips >= from_m - 1e-9))
     candidates = []
     if len(judged) and not np.isnan(agreement.E_n[judged]).all():
         row = int(judged[np.nanargmax(np.abs(agreement.E_n[judged]))])
@@ -314,13 +314,13 @@ def _rows(basis, agreement):
         U_new_m3=agreement.new_U.rows(),
         E_n=agreement.E_n,
         c_limit=agreement.c_limit,
-        for_use=basis.for_use,
+        for_use=basis.usable,
     )
 
 
 def _waterfall(basis):
     """Return rows at given parts of the range, each the nearest row for use."""
-    use = np.flatnonzero(basis.for_use)
+    use = np.flatnonzero(basis.usable)
     dips = basis.height_m[use]
     at = [dips[0] + part * (dips[-1] - dips[0]) for part in PARTS_OF_HEIGHT]
     chosen = dict.fromkeys(int(use[np.argmin(np.abs(dips - index))]) for index in at)

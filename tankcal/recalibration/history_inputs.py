@@ -25,7 +25,7 @@ TABLES = (".csv", ".xlsx", ".pdf", ".toml")
 
 
 @dataclass
-class Found:
+class HistoryArchive:
     """Content of an archive.
 
     Attributes
@@ -76,14 +76,14 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=Non
         With every unreadable file; for several tanks without `tanks`; and for tables that cannot be
         of one tank.
     """
-    archive = Found()
+    archive = HistoryArchive()
     files = find_files(paths, progress)
     seen = {}
-    for done, (path, name, is_sought) in enumerate(files):
+    for done, (path, name, is_searched) in enumerate(files):
         if progress is not None:
             progress(message("history_reading", "reading the files"), done, len(files))
         try:
-            _read(archive, path, name, tanks, seen, is_sought)
+            _read(archive, path, name, tanks, seen, is_searched)
         except InputError as error:
             archive.problems += [
                 replace(problem, file=name) if problem.file in (path.name, RECORD) else problem
@@ -96,7 +96,7 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=Non
         raise InputError(archive.problems)
     _refuse_several(archive, tanks, paths)
     if not archive.tables:
-        raise InputError(_nothing(archive, tanks, paths))
+        raise InputError(_no_table_problems(archive, tanks, paths))
     return history_of(
         archive.tables,
         archive.inspections,
@@ -176,29 +176,29 @@ def _files_below(folder, problems):
                 yield Path(place, name)
 
 
-def _read(archive, path, name, tanks, seen, is_sought):
+def _read(archive, path, name, tanks, seen, is_searched):
     """Read one file and add it to the archive."""
     if path.suffix.lower() in TABLES:
-        _take_former(archive, path, name, seen)
+        _add_former(archive, path, name, seen)
         return
     data = path.read_bytes()
-    content = data if find_encoding(data) == "utf-8" else _in_utf8(data, path)
-    if is_sought and tanks and not any(_may_name(content, tank) for tank in tanks):
+    content = data if find_encoding(data) == "utf-8" else _to_utf8(data, path)
+    if is_searched and tanks and not any(_may_name(content, tank) for tank in tanks):
         if content.rstrip()[-1:] != b"}":
             text = message("history_cut_off", "is cut off: of which tank it was is not known")
             archive.left_out.append(Problem(name, text))
         return
-    saved = _parsed(content, path)
+    saved = _parse_json(content, path)
     kind = str(saved.get("format") or "") if isinstance(saved, dict) else ""
-    if is_sought and not kind.startswith("tankcal-"):
+    if is_searched and not kind.startswith("tankcal-"):
         text = message("history_not_ours", "no file of tankcal: passed over")
         archive.left_out.append(Problem(name, text))
         return
     digest = hashlib.sha256(data).hexdigest()
     if kind.startswith(f"{INSPECTION.name}/"):
-        _take_inspection(archive, INSPECTION.migrated(saved, path.name), name, digest, tanks, seen)
+        _add_inspection(archive, INSPECTION.migrated(saved, path.name), name, digest, tanks, seen)
     else:
-        _take_record(archive, records.migrated(saved, path.name), path, name, digest, tanks, seen)
+        _add_record(archive, records.migrated(saved, path.name), path, name, digest, tanks, seen)
 
 
 def _may_name(content, tank):
@@ -209,14 +209,14 @@ def _may_name(content, tank):
     )
 
 
-def _in_utf8(data, path):
+def _to_utf8(data, path):
     try:
         return decode_text(data).encode("utf-8")
     except ValueError as error:
         raise _unreadable(error, path) from None
 
 
-def _parsed(content, path):
+def _parse_json(content, path):
     try:
         return json.loads(content)
     except (ValueError, RecursionError) as error:
@@ -228,7 +228,7 @@ def _unreadable(error, path):
     return InputError(Problem(path.name, text))
 
 
-def _is_again(archive, name, digest, seen):
+def _is_repeated(archive, name, digest, seen):
     """Whether the file was read before; then a warning is added."""
     if digest not in seen:
         seen[digest] = name
@@ -240,11 +240,11 @@ def _is_again(archive, name, digest, seen):
     return True
 
 
-def _take_record(archive, record, path, name, digest, tanks, seen):
+def _add_record(archive, record, path, name, digest, tanks, seen):
     tank = ((record["job"] or {}).get("tank") or {}).get("id")
     if tanks and tank not in tanks:
         return
-    if _is_again(archive, name, digest, seen):
+    if _is_repeated(archive, name, digest, seen):
         return
     if tank is not None:
         archive.ids[tank] = archive.ids.get(tank, 0) + 1
@@ -255,10 +255,10 @@ def _take_record(archive, record, path, name, digest, tanks, seen):
     _add_table(archive, replace(read_former(path), name=name), digest)
 
 
-def _take_former(archive, path, name, seen):
+def _add_former(archive, path, name, seen):
     table = replace(read_former(path), name=name)
     digest = hashlib.sha256(rows_file(path).read_bytes()).hexdigest()
-    if not _is_again(archive, name, digest, seen):
+    if not _is_repeated(archive, name, digest, seen):
         _add_table(archive, table, digest)
 
 
@@ -282,11 +282,11 @@ def _day(text):
         return None
 
 
-def _take_inspection(archive, saved, name, digest, tanks, seen):
+def _add_inspection(archive, saved, name, digest, tanks, seen):
     tank = saved["tank"]
     if tanks and tank["id"] not in tanks:
         return
-    if _is_again(archive, name, digest, seen):
+    if _is_repeated(archive, name, digest, seen):
         return
     archive.ids[tank["id"]] = archive.ids.get(tank["id"], 0) + 1
     day = _day(tank["survey_date"])
@@ -343,7 +343,7 @@ def _refuse_several(archive, tanks, paths):
     raise InputError(Problem(Path(paths[0]).name or str(paths[0]), text))
 
 
-def _nothing(archive, tanks, paths):
+def _no_table_problems(archive, tanks, paths):
     """Message that no table was found, with the files found instead."""
     name = Path(paths[0]).name or str(paths[0])
     text = message(

@@ -12,7 +12,7 @@ from tankcal.job.rule_files import named_rule
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.recalibration.comparison import compare
-from tankcal.recalibration.read_courses import read_courses
+from tankcal.recalibration.declared import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.record.comparison import ComparisonFile
 

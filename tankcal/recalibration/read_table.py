@@ -7,21 +7,25 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 from tankcal.job.tables import Log
 from tankcal.messages import message
-from tankcal.recalibration.bulges import largest_bulge_m
 from tankcal.recalibration.computed_rows import find_computed_rows
-from tankcal.recalibration.read_courses import read_courses
+from tankcal.recalibration.declared import read_courses
 from tankcal.recalibration.reading import read_former
-from tankcal.recalibration.recorded_radii import read_recorded
-from tankcal.recalibration.rounding import sd_of_rows
+from tankcal.recalibration.rounding import row_sds
 from tankcal.recalibration.seams import find_seams, find_seams_within
 from tankcal.recalibration.solid_geometry import fit_lying, fit_sphere
-from tankcal.recalibration.table_job import job_of_geometry, job_of_record, job_of_solid
+from tankcal.recalibration.table_job import (
+    make_record_job,
+    make_solid_job,
+    make_upright_job,
+    read_recorded,
+)
 from tankcal.recalibration.upright_geometry import (
     DECLARED_SD_KG_M3,
     STEEL_PA,
     is_possible,
     read_upright,
 )
+from tankcal.recalibration.upright_shell import largest_bulge_m
 
 FEWEST_ROWS = 8
 SOLIDS = "horizontal", "sphere"
@@ -43,7 +47,7 @@ class TableRead:
     geometry : UprightGeometry, RecordedRadii, LyingGeometry or SolidFit
     names : tuple of str
         Names of the courses.
-    job : JobOfTable
+    job : JobFiles
     warnings : tuple of Message
     """
 
@@ -110,7 +114,7 @@ def read_table(
     if former is not None and former.record is not None:
         log.stop_if_problems()
         radii = read_recorded(former)
-        job = job_of_record(former, radii, tank_id=_tank_of(former))
+        job = make_record_job(former, radii, tank_id=_tank_of(former))
         return TableRead(former, radii, radii.names, job, tuple(_of_job(former, 0.0)))
     courses = None
     if courses_path is None:
@@ -136,7 +140,7 @@ def _check_heights(former, courses):
     heights = courses.heights_m
     if np.isnan(heights).any():
         return
-    within = find_seams_within(former.height_m, former.volume_m3, sd_of_rows(former), heights)
+    within = find_seams_within(former.height_m, former.volume_m3, row_sds(former), heights)
     problems = []
     for number, seams in within.items():
         expected = message(
@@ -160,7 +164,7 @@ def _read_computed(former, computed, courses, e_pa, bottom_m):
         if computed.is_certain:
             raise
         return None
-    if not computed.is_confirmed(former, read.geometry.state, sd_of_rows(former)):
+    if not computed.is_confirmed(former, read.geometry.state, row_sds(former)):
         return None
     text = message(
         "read_proportional_parts",
@@ -196,7 +200,7 @@ def _read_solid(former, kind):
                 kind=kind,
             )
         )
-    job = job_of_solid(former, fit, tank_id=_tank_of(former))
+    job = make_solid_job(former, fit, tank_id=_tank_of(former))
     return TableRead(former, geometry, (), job, (*_of_solid(geometry), *_of_job(former, 0.0)))
 
 
@@ -209,14 +213,14 @@ def _of_solid(geometry):
             "is by what they leave",
             rms=1000 * fit.rms_m3,
         )
-    if fit.below_bottom_m:
+    if fit.zero_depth_m:
         yield message(
             "read_below_bottom",
             "dips of the table count from {below:.3g} mm below the inside bottom; those of the job "
             "count from the bottom: they are less by that",
-            below=1000 * fit.below_bottom_m,
+            below=1000 * fit.zero_depth_m,
         )
-    others = getattr(geometry, "not_told_apart", ())
+    others = getattr(geometry, "equally_good_ends", ())
     if others:
         yield message(
             "read_other_ends",
@@ -302,7 +306,7 @@ def _slack(former):
 def _with_seams(former, courses):
     """Return the courses with heights from the seams that the table shows."""
     count = len(courses.names)
-    seams = find_seams(former.height_m, former.volume_m3, sd_of_rows(former), count - 1)
+    seams = find_seams(former.height_m, former.volume_m3, row_sds(former), count - 1)
     if len(seams) < count - 1:
         expected = message(
             "read_seams_missing",
@@ -327,7 +331,7 @@ def _read(former, chosen, courses, e_pa, bottom_m):
         seams_known=seams_known,
     )
     u_common = _u_common_m(former, geometry)
-    job = job_of_geometry(
+    job = make_upright_job(
         former, geometry, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
     )
     if seams_known:
@@ -346,7 +350,7 @@ def _other_seams(former, courses, geometry, e_pa, bottom_m):
     ]
     is_bulged = geometry.state.bulges_m is not None  # profiles absorb the effect of displaced seams
     is_doubtful = is_bulged or doubtful or geometry.roughness > 1
-    if geometry.seams_are == "found" or not is_doubtful:
+    if geometry.seams_source == "found" or not is_doubtful:
         return
     try:
         alternative = read_upright(
@@ -419,7 +423,7 @@ def _of_geometry(former, geometry, seams_known):
             "courses are estimated, too, and less is known of head, zero and things in the tank",
             largest=1000 * largest_bulge_m(geometry.state.bulges_m),
         )
-    if geometry.seams_are == "found" and seams_known:
+    if geometry.seams_source == "found" and seams_known:
         yield message(
             "read_other_seams",
             "the seams are not where courses.csv has them; the radii are for the seams that were "

@@ -9,7 +9,7 @@ from tankcal.errors import InputError
 from tankcal.job.tables import Log
 from tankcal.linter.rows import read_rows
 from tankcal.messages import message
-from tankcal.recalibration.declared import Declared, read_declared
+from tankcal.recalibration.declared import FormerFacts, read_former_facts
 from tankcal.recalibration.former import FormerRoof, FormerTable
 from tankcal.record import load
 from tankcal.record.covariance_factor import factor_of
@@ -60,13 +60,13 @@ def read_former(path, former_toml=None) -> FormerTable:
     ([0.0, 0.1, 0.2, 0.3], [0.0, 1.629, 3.259, 4.889], 0.001)
     """
     path, log = Path(path), Log()
-    declared = Declared()
+    declared = FormerFacts()
     if former_toml is None and path.suffix.lower() == ".toml":
         former_toml = path
-        declared = read_declared(path, log)
+        declared = read_former_facts(path, log)
         path = _named_file(declared, path, log)
     elif former_toml is not None:
-        declared = read_declared(former_toml, log)
+        declared = read_former_facts(former_toml, log)
         _check_name(declared, path, log)
     rows, warnings = _rows(path, declared, log)
     if rows is None:

@@ -11,9 +11,8 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
-from tankcal.recalibration.bulges import bulge_derivatives, bulge_volume_m3, prior_sds
 from tankcal.recalibration.fittings import Fitting
-from tankcal.recalibration.upright_shell import Rings
+from tankcal.recalibration.upright_shell import Rings, bulge_derivatives, bulge_volume_m3, prior_sds
 
 ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # weak priors, which prevent singularity
 BULGED_ZERO_SD_M = 0.03  # prior of the zero with profiles, which hide the joints
@@ -263,7 +262,9 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     now, w = state, misclosure(state)
     for _ in range(MOST_ROUNDS):
         design = np.vstack([now.design(dips_m)[:, moving], rows])
-        adjusted = adjust(_tangent(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances)
+        adjusted = adjust(
+            _linear_model(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances
+        )
         before, cost = now, w @ (w / variances)
         step = np.zeros(len(now.unknowns))
         step[moving] = adjusted.unknowns
@@ -280,11 +281,11 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     cofactor[np.ix_(moving, moving)] = adjusted.cofactor
     left = volumes_m3 - now.volume_m3(dips_m)
     chi2 = float(np.sum((left / sd_m3) ** 2))
-    bulges = _expected_bulges(now)
+    bulges = _bulge_prior(now)
     return Fit(now, cofactor, left, sd_m3, now.design(dips_m), chi2, bulges)
 
 
-def _expected_bulges(state):
+def _bulge_prior(state):
     """Derivatives, discrepancies and sds of the bulges as prior observations."""
     part = np.eye(len(state.unknowns))[state.layout["bulges"]]
     if not len(part):
@@ -292,7 +293,7 @@ def _expected_bulges(state):
     return part, -state.bulges_m.ravel(), prior_sds(state.bulges_m).ravel()
 
 
-def _tangent(w, design):
+def _linear_model(w, design):
     """Linear model of a step, for `adjust`."""
     return lambda x, l: (w + design @ x - l, design, None)
 
@@ -310,7 +311,7 @@ def _priors(state):
         sds |= dict(zip(places, prior_sds(state.bulges_m).ravel(), strict=True))
     for k, fitting in enumerate(state.fittings):
         place = layout["fittings"].start + 3 * k
-        for edge, is_held in enumerate(held_kinks(state, fitting)):
+        for edge, is_held in enumerate(are_kinks_fixed(state, fitting)):
             if is_held:
                 held.append(place + edge)
             else:
@@ -325,7 +326,7 @@ def _priors(state):
     return np.array(held, dtype=int), known, about, np.array(list(sds.values()))
 
 
-def held_kinks(state, fitting):
+def are_kinks_fixed(state, fitting):
     """Whether (bottom, top) kinks of a fitting lie outside the rows and are therefore fixed."""
     if "kinks" not in state.free:
         return True, True
@@ -346,19 +347,19 @@ class Rows:
     volume_m3: np.ndarray
     sd_m3: np.ndarray
 
-    def above(self, dip_m):
+    def select_above(self, dip_m):
         """Return the rows from a dip upwards."""
-        return self.of(self.dip_m >= dip_m - 1e-9)
+        return self.select(self.dip_m >= dip_m - 1e-9)
 
-    def of(self, mask):
+    def select(self, mask):
         """Return the rows of a mask."""
         return Rows(self.dip_m[mask], self.volume_m3[mask], self.sd_m3[mask])
 
-    def thinned(self, most):
+    def thin(self, most):
         """Return at most `most` evenly chosen rows, including the first and the last."""
         chosen = np.zeros(len(self.dip_m), dtype=bool)
         chosen[np.unique(np.linspace(0, len(self.dip_m) - 1, most).round().astype(int))] = True
-        return self.of(chosen)
+        return self.select(chosen)
 
     def adjust(self, state):
         """Return the Fit of a State to the rows."""
@@ -367,7 +368,7 @@ class Rows:
         return fit(state, self.dip_m, self.volume_m3, self.sd_m3)
 
 
-def tried(rows, state):
+def try_fit(rows, state):
     """Return the Fit of a State to Rows, or None if the rows do not determine it."""
     try:
         return rows.adjust(state)
