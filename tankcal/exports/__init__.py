@@ -1,6 +1,6 @@
 """Exports of a table to gauging and inventory systems.
 
-profiles      description of a file for a system (TOML), and the shipped profiles
+profiles      description of a file for a system (TOML), and the shipped profiles with their texts
 marks         rows as whole numbers of last digits, each rounded once
 chords, breakpoints, splines   rows selected for a polyline or a spline of few points
 choosing      rows of a record for a profile, or the reasons why the profile does not fit

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from tankcal import record as records
-from tankcal.exports.choosing import Asked
-from tankcal.exports.facts import facts_of, report_of
+from tankcal.exports.choosing import RowRequest
+from tankcal.exports.facts import provenance_lines, report_lines
 from tankcal.exports.marks import ON_THE_MARK_M
 from tankcal.exports.shell_movement import GaugeCorrection, gauge_correction
-from tankcal.exports.writing import body_of, file_text, read_back
+from tankcal.exports.writing import file_text, make_body, read_back
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.text.naming import file_name
@@ -34,10 +34,10 @@ class Export:
     rows : int
         Number of rows of the table in the record.
     error_m3 : float
-        Bound of the error at any dip: rounding, line or spline, and `own_m3`.
+        Bound of the error at any dip: rounding, line or spline, and `interpolation_m3`.
     at_m : float
-        Dip of the largest error (without own_m3).
-    own_m3 : float
+        Dip of the largest error (without interpolation_m3).
+    interpolation_m3 : float
         Largest error of linear interpolation in the record, as stated in the record.
     rounded_levels : int
         Number of rows whose level is rounded to a mark of the profile.
@@ -58,7 +58,7 @@ class Export:
     rows: int
     error_m3: float
     at_m: float
-    own_m3: float
+    interpolation_m3: float
     rounded_levels: int
     gauge: GaugeCorrection | None
     facts: tuple
@@ -68,7 +68,7 @@ class Export:
     @property
     def lines(self):
         """Messages of the report."""
-        return report_of(self)
+        return report_lines(self)
 
 
 def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_shell=False,
@@ -99,18 +99,18 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     _check_table(path.name, record, log)
     log.stop_if_problems()
-    asked = Asked(path.name, record, profile, points, max_error_m3, log)
-    marks, fixed = asked.marks()
+    request = RowRequest(record, profile, points, max_error_m3, log)
+    marks, required = request.marks()
     gauge = _gauge(path.name, record, log) if hangs_on_shell else None
     log.stop_if_problems()
-    rows, error, at = asked.chosen(marks, fixed)
+    rows, error, at = request.select_rows(marks, required)
     log.stop_if_problems()
-    listed = rows[1:] if asked.is_zero_left_out else rows
-    asked.refuse_limits(marks, listed)
+    listed = rows[1:] if request.is_zero_left_out else rows
+    request.refuse_limits(marks, listed)
     log.stop_if_problems()
-    height, reference = asked.height, record.job.datum.reference_height_m
-    body = body_of(listed.tolist(), height, marks, profile, reference)
-    facts, words = facts_of(record, digest), load_words(language)
+    height, reference = request.height, record.job.datum.reference_height_m
+    body = make_body(listed.tolist(), height, marks, profile, reference)
+    facts, words = provenance_lines(record, digest), load_words(language)
     values = {
         "tank": record.job.tank.id, "number": str(record.job.certificate.get("number") or ""),
         "date": record.job.survey.date or "", "points": str(len(listed)),
@@ -119,19 +119,30 @@ def export_record(source, profile, *, points=None, max_error_m3=None, hangs_on_s
     }  # fmt: skip
     text = file_text(body, profile, [say(words, fact) for fact in facts], values)
     data = text.encode(profile.encoding)
-    own_errors, off_mark = asked.own_m3, np.abs(marks.at_m[listed] - height[listed]) > ON_THE_MARK_M
+    is_off_mark = np.abs(marks.at_m[listed] - height[listed]) > ON_THE_MARK_M
+    rounded_levels = int(is_off_mark.sum())
     read_back(
         data,
         body,
         profile,
-        len(listed) == len(height) and not np.any(off_mark),
-        int(off_mark.sum()),
+        is_even=len(listed) == len(height) and not rounded_levels,
+        rounded=rounded_levels,
     )
     return Export(
-        profile, record.job.tank.id, marks.at_m[listed], marks.written_m3[listed], len(height),
-        error + own_errors, at, own_errors, int(off_mark.sum()), gauge, tuple(facts), data,
-        None if rows[-1] == len(height) - 1 else float(height[-1]),
-    )  # fmt: skip
+        profile=profile,
+        tank=record.job.tank.id,
+        dip_m=marks.at_m[listed],
+        volume_m3=marks.written_m3[listed],
+        rows=len(height),
+        error_m3=error + request.interpolation_m3,
+        at_m=at,
+        interpolation_m3=request.interpolation_m3,
+        rounded_levels=rounded_levels,
+        gauge=gauge,
+        facts=tuple(facts),
+        data=data,
+        left_out_m=None if rows[-1] == len(height) - 1 else float(height[-1]),
+    )
 
 
 def default_name(export):

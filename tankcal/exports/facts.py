@@ -5,7 +5,7 @@ from tankcal.messages import message
 _SURVEYS = ("strapping", "lines", "clouds", "hits", "tangents", "liquid", "adjustment")
 
 
-def facts_of(record, sha256):
+def provenance_lines(record, sha256):
     """Return lines of provenance: the table, its references, its uncertainty; a tuple of Message.
 
     record: record.making.Record; sha256: SHA-256 of its file.
@@ -24,7 +24,7 @@ def facts_of(record, sha256):
     return [
         _tank(record),
         provenance,
-        *([] if was_surveyed(record) else [theoretical]),
+        *([] if is_surveyed(record) else [theoretical]),
         temperature,
         _density(record),
         _zero(record),
@@ -35,7 +35,7 @@ def facts_of(record, sha256):
     ]
 
 
-def report_of(export):
+def report_lines(export):
     """Return the lines of the report of an `Export`: its errors and further facts, as Messages."""
     profile, litres = export.profile, 1000 * export.error_m3
     rows = message(
@@ -46,7 +46,8 @@ def report_of(export):
     error = message(
         "export_error", "largest error of what is read there: {error:.4g} L, worst at the dip "
         "{at:.6g} m; rounding included, and {own:.4g} L that straight lines between the rows of "
-        "the table err themselves", error=litres, at=export.at_m, own=1000 * export.own_m3,
+        "the table err themselves", error=litres, at=export.at_m,
+        own=1000 * export.interpolation_m3,
     )  # fmt: skip
     lines = [rows, error, message("export_error_delivery", "of a delivery up to twice that: "
                                   "{twice:.4g} L", twice=2 * litres)]  # fmt: skip
@@ -98,7 +99,7 @@ def _hytd(gauge):
     )  # fmt: skip
 
 
-def was_surveyed(record):
+def is_surveyed(record):
     """Whether any quantity of the tank was measured, not only declared."""
     if record.job.tank.kind == "mesh":
         return True

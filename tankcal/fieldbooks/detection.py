@@ -1,9 +1,10 @@
 """Detection of the format of a file from its content, and decoding of its text."""
 
 import re
+from collections import Counter
+from statistics import median
 
 from tankcal.fieldbooks import gsi, jobxml, profile, rw5, sdr
-from tankcal.fieldbooks.cutting import tell_cut_numbers
 from tankcal.job.folder import has_too_many_lines
 from tankcal.job.tables import Log
 from tankcal.messages import message
@@ -31,6 +32,8 @@ _FOREIGN = {  # unsupported formats: regular expressions of their lines
     "Topcon GTS": r"GTS-\d+ v|(STN|BKB|XYZ|HV|SD)\t",
     "LandXML": r"<LandXML\b|<\?xml.*<LandXML\b",
 }
+FEWER = 3  # missing decimals of a truncated number; fields with a smaller median are not tested
+OFTEN, SHARE = 3, 0.1  # count and share of a field that make a number of decimals regular
 
 
 def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
@@ -170,3 +173,56 @@ def _first_lines(text):
     """Return the first non-blank lines."""
     lines = [line for line in text[: LOOKED_AT * MAX_LINE].split("\n") if line.strip()]
     return lines[:LOOKED_AT]
+
+
+# ---- truncated numbers
+
+
+def tell_cut_numbers(book, log):
+    """Report each truncated number among the texts of `FieldBook.keep_text`."""
+    reported_rows = {problem.row for problem in log.problems if problem.file == book.file}
+    for column, texts in book.texts.items():
+        decimals = [_decimals(text) for text, _ in texts]
+        usual = median(decimals)
+        if usual < FEWER or _is_without_zeros(texts, decimals, usual):
+            continue
+        counts = Counter(decimals)
+        ways = {count for count, times in counts.items() if times >= max(OFTEN, SHARE * len(texts))}
+        short = [count for count in sorted(ways) if count <= usual - FEWER]
+        if short:
+            text = message(
+                "ways_of_writing",
+                "numbers of {column} with {short} and with {usual:.0f} decimals, each frequent: "
+                "read as written",
+                column=column,
+                short=", ".join(map(str, short)),
+                usual=usual,
+            )
+            book.note(text)
+        for (text, row), count in zip(texts, decimals, strict=True):
+            if count <= usual - FEWER and count not in ways and row not in reported_rows:
+                expected = message(
+                    "cut_short",
+                    "found {text!r} with {count} decimals; expected {usual:.0f}: {many} of the "
+                    "{all} numbers of this field have at least that many (truncated? If the "
+                    "number is correct, add its zeros)",
+                    text=text[:40],
+                    count=count,
+                    usual=usual,
+                    many=sum(number >= usual for number in decimals),
+                    all=len(texts),
+                )
+                log.problem(book.file, expected, row, column)
+
+
+def _decimals(text):
+    """Return the number of digits after the last decimal mark."""
+    _, mark, behind = text.replace(",", ".").rpartition(".")
+    return sum(character.isdigit() for character in behind) if mark else 0
+
+
+def _is_without_zeros(texts, decimals, usual):
+    """Return whether the file omits final zeros: some numbers are short, none ends with 0."""
+    whole = [text for (text, _), count in zip(texts, decimals, strict=True) if count >= usual]
+    are_uneven = any(usual - FEWER < count < usual for count in decimals)
+    return are_uneven and not any(re.search(r"0\D*$", text) for text in whole)

@@ -11,8 +11,7 @@ from tankcal.fieldbooks.detection import MAX_BYTES, read_book
 from tankcal.fieldbooks.faces import reduce_faces
 from tankcal.fieldbooks.gsi import Custom
 from tankcal.fieldbooks.profile import read_profile
-from tankcal.fieldbooks.rows import check_rows, make_rows
-from tankcal.fieldbooks.sorting import sort_readings
+from tankcal.fieldbooks.rows import check_rows, make_rows, sort_readings
 from tankcal.fieldbooks.summary import summarise, warn_of
 from tankcal.fieldbooks.writing import write_tables
 from tankcal.job.tables import Log, read_bytes

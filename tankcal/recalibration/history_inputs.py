@@ -13,7 +13,7 @@ from tankcal.errors import InputError, Problem, reason_of
 from tankcal.job.tables import Log
 from tankcal.messages import list_some, message
 from tankcal.recalibration.history import DatedTable, history_of
-from tankcal.recalibration.inputs import read_shell, rows_file
+from tankcal.recalibration.inputs import read_course_sizes, rows_file
 from tankcal.recalibration.reading import read_former
 from tankcal.record.history import CheckInHistory, InspectionInHistory
 from tankcal.record.inspection import INSPECTION, VERDICTS
@@ -90,7 +90,7 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=Non
                 for problem in error.problems
             ]
     log = Log()
-    shell = None if courses is None else read_shell(Path(courses), log)
+    shell = None if courses is None else read_course_sizes(Path(courses), log)
     archive.problems += log.problems
     if archive.problems:
         raise InputError(archive.problems)

@@ -106,7 +106,7 @@ def read_table(
     ([6.0, 6.0], 'without')
     """
     log = Log()
-    former = _former(path, former_toml, log)
+    former = _read_former(path, former_toml, log)
     kind = kind or (former.kind if former else None) or "vertical"
     if former is not None and kind in SOLIDS:
         log.stop_if_problems()
@@ -114,8 +114,10 @@ def read_table(
     if former is not None and former.record is not None:
         log.stop_if_problems()
         radii = read_recorded(former)
-        job = make_record_job(former, radii, tank_id=_tank_of(former))
-        return TableRead(former, radii, radii.names, job, tuple(_of_job(former, 0.0)))
+        job = make_record_job(former, radii, tank_id=_tank_id(former))
+        return TableRead(
+            former, radii, radii.names, job, tuple(_missing_value_warnings(former, 0.0))
+        )
     courses = None
     if courses_path is None:
         expected = message("read_no_courses_file", "missing; expected --courses courses.csv")
@@ -129,10 +131,10 @@ def read_table(
     _check_heights(former, courses)
     computed = find_computed_rows(former)
     if computed is not None:
-        read = _read_computed(former, computed, courses, e_pa, bottom_m)
+        read = _read_computed_rows(former, computed, courses, e_pa, bottom_m)
         if read is not None:
             return read
-    return _read(former, former, courses, e_pa, bottom_m)
+    return _read_rows(former, former, courses, e_pa, bottom_m)
 
 
 def _check_heights(former, courses):
@@ -156,10 +158,10 @@ def _check_heights(former, courses):
         raise InputError(problems)
 
 
-def _read_computed(former, computed, courses, e_pa, bottom_m):
+def _read_computed_rows(former, computed, courses, e_pa, bottom_m):
     """Return the TableRead of computed rows; None if each row may have been computed."""
     try:
-        read = _read(former, computed.table(former), courses, e_pa, bottom_m)
+        read = _read_rows(former, computed.table(former), courses, e_pa, bottom_m)
     except TankcalError:
         if computed.is_certain:
             raise
@@ -177,7 +179,7 @@ def _read_computed(former, computed, courses, e_pa, bottom_m):
     return replace(read, warnings=(text, *read.warnings))
 
 
-def _former(path, former_toml, log):
+def _read_former(path, former_toml, log):
     try:
         return read_former(path, former_toml)
     except InputError as error:
@@ -200,11 +202,17 @@ def _read_solid(former, kind):
                 kind=kind,
             )
         )
-    job = make_solid_job(former, fit, tank_id=_tank_of(former))
-    return TableRead(former, geometry, (), job, (*_of_solid(geometry), *_of_job(former, 0.0)))
+    job = make_solid_job(former, fit, tank_id=_tank_id(former))
+    return TableRead(
+        former,
+        geometry,
+        (),
+        job,
+        (*_solid_warnings(geometry), *_missing_value_warnings(former, 0.0)),
+    )
 
 
-def _of_solid(geometry):
+def _solid_warnings(geometry):
     fit = getattr(geometry, "best", geometry)
     if fit.variance_factor > 1:
         yield message(
@@ -260,7 +268,7 @@ def _check_bottom(former, bottom_m, log):
         log.problem("--bottom", expected)
 
 
-def _fitting(former, courses):
+def _select_courses(former, courses):
     """Return the courses within the table, warnings, and whether the seams are known."""
     heights = courses.heights_m
     unknown = np.isnan(heights)
@@ -272,7 +280,7 @@ def _fitting(former, courses):
         )
         raise InputError(Problem(courses.file, expected, None, "height_m"))
     if unknown.all():
-        return _with_seams(former, courses), (), False
+        return _find_course_heights(former, courses), (), False
     total = float(np.sum(heights))
     if total < last - _slack(former):
         expected = message(
@@ -303,7 +311,7 @@ def _slack(former):
     return 0.35 + ABOVE_M if former.height_m[0] == 0 else ABOVE_M
 
 
-def _with_seams(former, courses):
+def _find_course_heights(former, courses):
     """Return the courses with heights from the seams that the table shows."""
     count = len(courses.names)
     seams = find_seams(former.height_m, former.volume_m3, row_sds(former), count - 1)
@@ -319,9 +327,9 @@ def _with_seams(former, courses):
     return replace(courses, heights_m=np.diff(edges))
 
 
-def _read(former, chosen, courses, e_pa, bottom_m):
+def _read_rows(former, chosen, courses, e_pa, bottom_m):
     """Return the TableRead of a FormerTable from selected rows, given as a FormerTable."""
-    courses, warnings, seams_known = _fitting(chosen, courses)
+    courses, warnings, seams_known = _select_courses(chosen, courses)
     geometry = read_upright(
         chosen,
         courses.heights_m,
@@ -332,15 +340,19 @@ def _read(former, chosen, courses, e_pa, bottom_m):
     )
     u_common = _u_common_m(former, geometry)
     job = make_upright_job(
-        former, geometry, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
+        former, geometry, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_id(former)
     )
     if seams_known:
-        warnings = (*warnings, *_other_seams(chosen, courses, geometry, e_pa, bottom_m))
-    messages = (*warnings, *_of_geometry(former, geometry, seams_known), *_of_job(former, u_common))
+        warnings = (*warnings, *_seam_warnings(chosen, courses, geometry, e_pa, bottom_m))
+    messages = (
+        *warnings,
+        *_geometry_warnings(former, geometry, seams_known),
+        *_missing_value_warnings(former, u_common),
+    )
     return TableRead(former, geometry, courses.names, job, messages)
 
 
-def _other_seams(former, courses, geometry, e_pa, bottom_m):
+def _seam_warnings(former, courses, geometry, e_pa, bottom_m):
     """Warn if other seams explain the residuals with fewer fittings than the declared seams."""
     declared = np.cumsum(geometry.heights_m)[:-1]
     doubtful = [
@@ -355,7 +367,7 @@ def _other_seams(former, courses, geometry, e_pa, bottom_m):
     try:
         alternative = read_upright(
             former,
-            _with_seams(former, courses).heights_m,
+            _find_course_heights(former, courses).heights_m,
             courses.thickness_m,
             modulus_pa=e_pa,
             lowest_m=bottom_m,
@@ -397,13 +409,13 @@ def _u_common_m(former, geometry):
     return float(relative * np.mean(geometry.radii_m) / 2)
 
 
-def _tank_of(former):
+def _tank_id(former):
     if former.record is not None:
         return former.record["job"]["tank"]["id"]
     return str(former.name).partition(",")[0].rpartition(".")[0] or "tank"
 
 
-def _of_geometry(former, geometry, seams_known):
+def _geometry_warnings(former, geometry, seams_known):
     """Messages about the geometry that the user must consider before using the radii."""
     if geometry.roughness > 1:
         yield message(
@@ -415,7 +427,7 @@ def _of_geometry(former, geometry, seams_known):
             expected=1000 * geometry.expected_m3,
             factor=geometry.roughness,
         )
-    yield from _of_density(former.liquid_density_kg_m3, geometry)
+    yield from _density_warnings(former.liquid_density_kg_m3, geometry)
     if geometry.state.bulges_m is not None:
         yield message(
             "read_bulges",
@@ -442,7 +454,7 @@ def _of_geometry(former, geometry, seams_known):
             )
 
 
-def _of_density(declared, geometry):
+def _density_warnings(declared, geometry):
     """Compare the estimated density of the head with liquids and with the declared density."""
     density = geometry.density_kg_m3
     held = geometry.state.density_kg_m3
@@ -479,7 +491,7 @@ def _of_density(declared, geometry):
     )
 
 
-def _of_job(former, u_common):
+def _missing_value_warnings(former, u_common):
     """Messages about values that the job lacks because they are not declared."""
     if former.record is None and u_common == 0:
         yield message(

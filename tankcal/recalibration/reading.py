@@ -68,15 +68,15 @@ def read_former(path, former_toml=None) -> FormerTable:
     elif former_toml is not None:
         declared = read_former_facts(former_toml, log)
         _check_name(declared, path, log)
-    rows, warnings = _rows(path, declared, log)
+    rows, warnings = _read_rows(path, declared, log)
     if rows is None:
         log.stop_if_problems()
         raise AssertionError("no rows, and nothing told")
-    record = _record(path)
+    record = _load_record(path)
     if record is None:
-        former = _of_rows(path, rows, declared, log)
+        former = _table_from_rows(path, rows, declared, log)
     else:
-        former = _of_record(path, record, declared, log)
+        former = _table_from_record(path, record, declared, log)
     log.stop_if_problems()
     return replace(former, warnings=warnings + tuple(log.warnings))
 
@@ -111,7 +111,7 @@ def _check_name(declared, path, log):
         declared.tell(log, "file", expected)
 
 
-def _rows(path, declared, log):
+def _read_rows(path, declared, log):
     """Return (TableRows or None, warnings); errors of the linter are reported to `log`."""
     try:
         rows, report = read_rows(
@@ -134,14 +134,14 @@ def _rows(path, declared, log):
     return rows, tuple(finding.problem for finding in report.findings)
 
 
-def _record(path):
+def _load_record(path):
     """Return the record in a file, migrated to the latest version; None for any other file."""
     with path.open("rb") as file:
         start = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")
     return load(path) if path.suffix.lower() == ".json" or start[:1] == b"{" else None
 
 
-def _of_rows(path, rows, declared, log):
+def _table_from_rows(path, rows, declared, log):
     """Return the FormerTable of rows and of declared facts."""
     height = rows.height_m
     if rows.is_ullage:
@@ -220,9 +220,9 @@ def _uncertainty(rows, declared, log):
     return (value if key.startswith("U") else k * value) * scale, k
 
 
-def _of_record(path, record, declared, log):
+def _table_from_record(path, record, declared, log):
     """Return the FormerTable of a record; declared facts must not contradict it."""
-    factor_m3 = _factor_of(record["capacity"], path, log)
+    factor_m3 = _covariance_factor(record["capacity"], path, log)
     table, job = record["capacity"], record["job"]
     certificate, choices = job.get("certificate") or {}, _choices(record)
     density = choices.get("head", job["table"].get("liquid_density_kg_m3"))
@@ -242,7 +242,7 @@ def _of_record(path, record, declared, log):
         stated = declared[key]
         if values[key] is None:
             values[key] = stated
-        elif stated is not None and not _same(stated, values[key]):
+        elif stated is not None and not _are_equal(stated, values[key]):
             expected = message(
                 "former_against_record",
                 "found {found}, but the record has {has}; expected no such key: it is taken from "
@@ -265,14 +265,14 @@ def _of_record(path, record, declared, log):
         U_m3=np.array(table["stated_U_m3"], dtype=float),
         k=float(np.median(table["k"])),
         common=declared["common"],
-        roof=_roof_of(record) or declared.roof,
+        roof=_roof_of_record(record) or declared.roof,
         factor_m3=factor_m3,
         record=record,
         **values,
     )
 
 
-def _factor_of(table, path, log):
+def _covariance_factor(table, path, log):
     """Return the covariance factor of a record's table.
 
     Raise InputError for inconsistent lengths.
@@ -306,13 +306,13 @@ def _choices(record):
     return {choice["code"]: choice["value"] for choice in record["choices"]}
 
 
-def _same(stated, has):
+def _are_equal(stated, has):
     if isinstance(stated, int | float) and isinstance(has, int | float):
         return abs(stated - has) <= 1e-9 * max(abs(stated), abs(has))
     return stated == has
 
 
-def _roof_of(record):
+def _roof_of_record(record):
     """Return the FormerRoof deducted in the record's table, or None."""
     details = {roof["code"]: roof["value"] for roof in record.get("roof") or ()}
     if not details or _choices(record).get("roof") == "off":

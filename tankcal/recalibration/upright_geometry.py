@@ -191,6 +191,7 @@ def _start(rows, heights, plates, modulus, zone):
     """Return the initial State, with radii from the mean area of each ring."""
     edges = np.concatenate([[0.0], np.cumsum(heights)])
     radii = np.zeros(len(heights))
+    # Mean area of each ring: the rise of the volume over the rise of the dip.
     for k in range(len(heights)):
         inside = np.flatnonzero((rows.dip_m >= edges[k]) & (rows.dip_m <= edges[k + 1]))
         if len(inside) < FEWEST_ROWS:
@@ -203,6 +204,7 @@ def _start(rows, heights, plates, modulus, zone):
                     fewest=FEWEST_ROWS,
                 )
             )
+        # The lower half of the first ring may contain the bottom.
         upper = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
         rise = rows.volume_m3[upper[-1]] - rows.volume_m3[upper[0]]
         area = rise / (rows.dip_m[upper[-1]] - rows.dip_m[upper[0]])
@@ -223,50 +225,50 @@ def _start(rows, heights, plates, modulus, zone):
 
 
 def _geometry(former, solution, rows, used, seams_known):
-    chosen = rows.select(used)
-    quantum = former.volume_quantum_m3
+    """Decide on zero, head, seams and fittings of a Fit, and return the UprightGeometry."""
+    chosen, quantum = rows.select(used), former.volume_quantum_m3
     solution = _fix_known_zero(chosen, former, solution)
     is_bulged = solution.state.bulges_m is not None
+    # Profiles absorb the order of the head and small shifts of the seams, so both are kept.
     other_order = seams = None
     if not is_bulged:
-        solution, other_order = _choose_order(
-            chosen, drop_insignificant_fittings(chosen, solution, quantum)
-        )
-        seams = solution if "seams" in solution.state.free else _free_seams(chosen, solution)
+        solution = drop_insignificant_fittings(chosen, solution, quantum)
+        solution, other_order = _choose_order(chosen, solution)
+        seams = solution if "seams" in solution.state.free else _fit_free_seams(chosen, solution)
     if seams is not None and (not seams_known or _do_seams_differ(solution, seams)):
         solution = seams = drop_phantom_fittings(chosen, seams, quantum)
     seams_source = "found" if "seams" in solution.state.free else "declared"
-    scale = u_factors(solution, chosen, quantum)
-    layout, order_effect = solution.state.layout, _order_effect(solution, other_order)
-    u_density = float(
-        np.hypot((solution.sd("density") * scale[layout["density"]])[0], order_effect[0])
+    # The density decides on the head. Its u includes rounding and the unknown order of the head.
+    layout, factors = solution.state.layout, u_factors(solution, chosen, quantum)
+    u_density = np.hypot(
+        (solution.sd("density") * factors[layout["density"]])[0],
+        _order_effect(solution, other_order)[0],
     )
-    t = solution.state.density_kg_m3 / u_density
-    density = TableEstimate(solution.state.density_kg_m3, u_density)
+    density = TableEstimate(solution.state.density_kg_m3, float(u_density))
     is_rough = is_bulged or roughness(solution, chosen) > 1
-    head, without = _decide_head(density, former.liquid_density_kg_m3, is_rough), None
+    head = _decide_head(density, former.liquid_density_kg_m3, is_rough)
     # for independent rounding of each row, before the factors of u
-    independent = float(solution.sd("density")[0]), solution.sd("radii")
-    dry = _fit_without_head(chosen, solution)
+    independent_u = float(solution.sd("density")[0]), solution.sd("radii")
+    # Without a determined density, the radii are those of a usual density, or of no head.
+    dry, without_head = _fit_without_head(chosen, solution), None
     if head != "without":
-        without = (*_rms_and_largest(dry.left_m3), dry.state.radii_m)
+        without_head = (*_rms_and_largest(dry.left_m3), dry.state.radii_m)
     if head == "undecided":
         solution, other_order = _fit_usual_density(chosen, former, solution, dry), None
     if head == "without":
         solution, other_order = dry, None
     solution = drop_phantom_fittings(chosen, solution, quantum)
-    scale = u_factors(solution, chosen, quantum)
-    u_seams = (
-        seams.sd("seams") * u_factors(seams, chosen, quantum)[seams.state.layout["seams"]]
-        if seams
-        else None
-    )
+    u_seams = None
+    if seams is not None:
+        factors = u_factors(seams, chosen, quantum)
+        u_seams = seams.sd("seams") * factors[seams.state.layout["seams"]]
     return _make_geometry(
         former, solution, rows, used,
-        scale=scale, density=density, head=head, t=t, without=without,
+        factors=u_factors(solution, chosen, quantum), density=density, head=head,
+        without_head=without_head,
         seams=_seam_estimates(seams.state if seams else solution.state, u_seams),
         seams_source=seams_source, order_effect=_order_effect(solution, other_order)[1],
-        independent=independent,
+        independent_u=independent_u,
     )  # fmt: skip
 
 
@@ -275,17 +277,19 @@ def _choose_order(rows, solution):
 
     The first order is used if both fit equally. The second Fit is None if it is clearly worse.
     """
-    try:
-        second = rows.adjust(replace(solution.state, is_first_order=False))
-    except SolutionError:
+    second = try_fit(rows, replace(solution.state, is_first_order=False))
+    if second is None:
         return solution, None
-    better = solution.chi2 - second.chi2
-    first, last = (second, solution) if better > BY_ORDER else (solution, second)
-    return first, last if abs(better) < ORDER_IS_CLEAR else None
+    gain = solution.chi2 - second.chi2
+    best, other = (second, solution) if gain > BY_ORDER else (solution, second)
+    return best, other if abs(gain) < ORDER_IS_CLEAR else None
 
 
 def _order_effect(solution, other_order):
-    """Contribution of the unknown order of the head to the sds of density and radii (n,)."""
+    """Contribution of the unknown order of the head to the sds of density and radii (n,).
+
+    The difference d of the two orders is the half width of a rectangular distribution: d / sqrt(3).
+    """
     if other_order is None:
         return 0.0, np.zeros(len(solution.state.radii_m))
     density = abs(solution.state.density_kg_m3 - other_order.state.density_kg_m3)
@@ -297,23 +301,20 @@ def _fix_known_zero(rows, former, solution):
     if not (rows.dip_m[0] == 0 and rows.volume_m3[0] == 0) or former.volume_quantum_m3 == 0:
         return solution
     free = solution.state.free - {"zero", "base"}
-    try:
-        held = rows.adjust(replace(solution.state, zero_m=0.0, base_m3=0.0, free=free))
-    except SolutionError:
-        return solution
-    return held if held.chi2 - solution.chi2 < SAME_ZERO**2 + 2 else solution
+    fixed = try_fit(rows, replace(solution.state, zero_m=0.0, base_m3=0.0, free=free))
+    # two unknowns fewer raise chi2 by 2 on average
+    is_as_good = fixed is not None and fixed.chi2 - solution.chi2 < SAME_ZERO**2 + 2
+    return fixed if is_as_good else solution
 
 
-def _free_seams(rows, solution):
+def _fit_free_seams(rows, solution):
     """Return the Fit with separately estimated seams; None if it has no solution."""
     if not len(solution.state.seams_m):
         return None
     free = (solution.state.free | {"seams"}) - {"zero"}
-    try:
-        seams = rows.adjust(replace(solution.state, free=free))
-    except SolutionError:
-        return None
-    return seams if np.all(np.diff(seams.state.rings.edges_m) > 0) else None
+    seams = try_fit(rows, replace(solution.state, free=free))
+    is_rising = seams is not None and np.all(np.diff(seams.state.rings.edges_m) > 0)
+    return seams if is_rising else None
 
 
 def _do_seams_differ(solution, seams):
@@ -383,29 +384,29 @@ def _rms_and_largest(residuals):
     return float(np.sqrt(np.mean(residuals**2))), float(np.abs(residuals).max())
 
 
-def _make_geometry(former, solution, rows, used, *, scale, density, head, t, without, seams,
-                 seams_source, order_effect, independent):  # fmt: skip
+def _make_geometry(former, solution, rows, used, *, factors, density, head, without_head, seams,
+                   seams_source, order_effect, independent_u):  # fmt: skip
+    """Return the UprightGeometry of a Fit, with standard deviations multiplied by `factors`."""
     state, layout = solution.state, solution.state.layout
     radii = layout["radii"]
-    covariance = solution.cofactor[radii, radii] * np.outer(scale[radii], scale[radii])
+    covariance = solution.cofactor[radii, radii] * np.outer(factors[radii], factors[radii])
     covariance = covariance + np.outer(order_effect, order_effect)
-    sd = {name: solution.sd(name) * scale[part] for name, part in layout.items()}
+    sd = {name: solution.sd(name) * factors[part] for name, part in layout.items()}
     rms, largest = _rms_and_largest(solution.left_m3)
     chosen = rows.select(used)
-    edges = state.rings.edges_m
     return UprightGeometry(
         name=former.name,
         radii_m=state.radii_m,
         u_m=np.sqrt(np.diag(covariance)),
         covariance_m2=covariance,
-        heights_m=np.diff(edges),
+        heights_m=np.diff(state.rings.edges_m),
         thickness_m=state.thickness_m,
         zero_m=_zero_estimate(state, sd["zero"]),
         seams_m=seams,
         seams_source=seams_source,
         density_kg_m3=density,
         head=head,
-        t=float(t),
+        t=float(density.value / density.u),
         fittings=_fitting_estimates(state, sd["fittings"]),
         roof_m3=TableEstimate(state.roof_m3, *sd["roof"]) if state.roof_zone_m else None,
         base_m3=TableEstimate(state.base_m3, *sd["base"])
@@ -417,10 +418,10 @@ def _make_geometry(former, solution, rows, used, *, scale, density, head, t, wit
         rms_m3=rms,
         largest_m3=largest,
         expected_m3=float(np.sqrt(np.mean(chosen.sd_m3**2))),
-        without_head=without,
+        without_head=without_head,
         roughness=roughness(solution, chosen),
         state=state,
-        independent_u=independent,
+        independent_u=independent_u,
     )
 
 

@@ -146,7 +146,7 @@ def estimate_radii(rings, dips, volumes, density, zone=None):
             inside = np.flatnonzero((dips >= edges[k] - 1e-9) & (dips <= edges[k + 1] + 1e-9))
             # The lower half of the first ring may contain the bottom.
             inside = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
-            inside = _beside(zone, inside, dips)
+            inside = _rows_beside_zone(zone, inside, dips)
             radii[k] = radii[k - 1] if k else np.sqrt(volumes[-1] / np.pi / dips[-1])
             if len(inside) > 1:
                 first, last = inside[0], inside[-1]
@@ -157,7 +157,7 @@ def estimate_radii(rings, dips, volumes, density, zone=None):
     return radii
 
 
-def _beside(zone, inside, dips):
+def _rows_beside_zone(zone, inside, dips):
     """Indices of the rows on one side of a critical zone, the side with more rows."""
     if zone is None:
         return inside
