@@ -1,4 +1,4 @@
-"""Detection of the format of a file from its content, and decoding of its text."""
+"""Format of a file from its content, decoding of its text, and detection of truncated numbers."""
 
 import re
 from collections import Counter
@@ -18,13 +18,18 @@ NAMES = {
     "sdr": "Sokkia SDR",
     "csv": "CSV",
 }
-MAX_BYTES, MAX_LINES, MAX_LINE, LOOKED_AT = 50_000_000, 100_000, 4000, 60  # of a file, characters
+MAX_BYTES, MAX_LINES, MAX_LINE, MOST_LINES_OF_TEST = (
+    50_000_000,
+    100_000,
+    4000,
+    60,
+)  # of a file, characters
 _JOBXML = re.compile(r"<(\w+:)?JOBFile[\s>]")
 # Serial transfers add control characters (STX, ETX, Ctrl-Z, zero bytes) around lines and flow
 # control characters (XON, XOFF) anywhere.
-_AROUND_BYTES = bytes((*range(0x09), *range(0x0B, 0x20), 0x7F))
-_AROUND = _AROUND_BYTES.decode("ascii") + "\ufeff"
-_FLOW = str.maketrans(dict.fromkeys("\x11\x13"))
+_CONTROL_BYTES = bytes((*range(0x09), *range(0x0B, 0x20), 0x7F))
+_CONTROL_CHARACTERS = _CONTROL_BYTES.decode("ascii") + "\ufeff"
+_WITHOUT_FLOW_CONTROL = str.maketrans(dict.fromkeys("\x11\x13"))
 _FOREIGN = {  # unsupported formats: regular expressions of their lines
     "Nikon RAW": r"CO,\s*Nikon RAW|(MP|CC|ST|CP|SS|F[12]|UP)(,[^,]*){4,}$",
     "Trimble DC": r"00NMSC|10NM.*SCV",
@@ -36,7 +41,7 @@ FEWER = 3  # missing decimals of a truncated number; fields with a smaller media
 OFTEN, SHARE = 3, 0.1  # count and share of a field that make a number of decimals regular
 
 
-def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
+def read_book(file, data, log, wanted=None, described=None, custom=gsi.NO_CODES):
     """Return the FieldBook of a file, or None after adding a problem to the log.
 
     Parameters
@@ -70,7 +75,7 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
             find_encoding(data) == "utf-8"
         )  # bytes of UTF-16 letters may be control characters
         if is_plain:
-            return jobxml.read(data.strip(_AROUND_BYTES + b"\r\n\t "), file, log)
+            return jobxml.read(data.strip(_CONTROL_BYTES + b"\r\n\t "), file, log)
         # An editor that writes UTF-16 leaves encoding="UTF-8" in the declaration.
         return jobxml.read(text.strip().encode(errors="replace"), file, log, "utf-8")
     if has_too_many_lines(
@@ -98,7 +103,7 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
                 count=count,
             )
         )
-    tell_cut_numbers(book, log)
+    report_truncated_numbers(book, log)
     return book
 
 
@@ -119,8 +124,13 @@ def _text(file, data, log):
             text = decode_text(data, name)
         except UnicodeDecodeError:
             continue
-        lines = text.replace("\r\n", "\n").replace("\r", "\n").translate(_FLOW).split("\n")
-        lines = [line.strip(_AROUND) for line in lines]
+        lines = (
+            text.replace("\r\n", "\n")
+            .replace("\r", "\n")
+            .translate(_WITHOUT_FLOW_CONTROL)
+            .split("\n")
+        )
+        lines = [line.strip(_CONTROL_CHARACTERS) for line in lines]
         row = next((row for row, line in enumerate(lines, 1) if "\0" in line), None)
         if row is None and (any(lines) or "\0" not in text):
             return "\n".join(lines)
@@ -171,24 +181,31 @@ def _format_of(text, described):
 
 def _first_lines(text):
     """Return the first non-blank lines."""
-    lines = [line for line in text[: LOOKED_AT * MAX_LINE].split("\n") if line.strip()]
-    return lines[:LOOKED_AT]
+    lines = [line for line in text[: MOST_LINES_OF_TEST * MAX_LINE].split("\n") if line.strip()]
+    return lines[:MOST_LINES_OF_TEST]
 
 
 # ---- truncated numbers
+#
+# An instrument writes each kind of number with a constant number of decimals, including zeros. A
+# number with at least FEWER decimals less than the median of its kind is therefore truncated. Only
+# the text counts: 290.0000 is complete, 290. is not. Files of two programs, or with records in two
+# forms, have two frequent numbers of decimals. Such numbers are read as written.
 
 
-def tell_cut_numbers(book, log):
-    """Report each truncated number among the texts of `FieldBook.keep_text`."""
+def report_truncated_numbers(book, log):
+    """Report each truncated number among the texts of `FieldBook.add_text`."""
     reported_rows = {problem.row for problem in log.problems if problem.file == book.file}
     for column, texts in book.texts.items():
         decimals = [_decimals(text) for text, _ in texts]
         usual = median(decimals)
-        if usual < FEWER or _is_without_zeros(texts, decimals, usual):
+        if usual < FEWER or _omits_final_zeros(texts, decimals, usual):
             continue
         counts = Counter(decimals)
-        ways = {count for count, times in counts.items() if times >= max(OFTEN, SHARE * len(texts))}
-        short = [count for count in sorted(ways) if count <= usual - FEWER]
+        regular = {
+            count for count, times in counts.items() if times >= max(OFTEN, SHARE * len(texts))
+        }
+        short = [count for count in sorted(regular) if count <= usual - FEWER]
         if short:
             text = message(
                 "ways_of_writing",
@@ -200,7 +217,7 @@ def tell_cut_numbers(book, log):
             )
             book.note(text)
         for (text, row), count in zip(texts, decimals, strict=True):
-            if count <= usual - FEWER and count not in ways and row not in reported_rows:
+            if count <= usual - FEWER and count not in regular and row not in reported_rows:
                 expected = message(
                     "cut_short",
                     "found {text!r} with {count} decimals; expected {usual:.0f}: {many} of the "
@@ -221,7 +238,7 @@ def _decimals(text):
     return sum(character.isdigit() for character in behind) if mark else 0
 
 
-def _is_without_zeros(texts, decimals, usual):
+def _omits_final_zeros(texts, decimals, usual):
     """Return whether the file omits final zeros: some numbers are short, none ends with 0."""
     whole = [text for (text, _), count in zip(texts, decimals, strict=True) if count >= usual]
     are_uneven = any(usual - FEWER < count < usual for count in decimals)

@@ -22,7 +22,7 @@ DEGREE = math.pi / HALF_TURN
 
 
 @dataclass(frozen=True)
-class Reading:
+class Pointing:
     """Result of pointings to one point on face 1: one face, or the mean of both.
 
     Attributes
@@ -62,7 +62,7 @@ class FaceReport:
 
 
 def reduce_faces(shots, log):
-    """Return the Readings in the order of the shots, and a FaceReport for each set-up.
+    """Return the pointings in the order of the shots, and a FaceReport for each set-up.
 
     The second face of a point is the next shot with its name on the other face of the same set-up.
     """
@@ -82,10 +82,10 @@ def reduce_faces(shots, log):
             pair = sorted((shot, shots[mates[place]]), key=lambda member: member.face)
             mean = _mean(*pair, tally, log)
             if mean is not None:
-                readings.append(Reading(replace(mean, row=shot.row, time=shot.time), "both"))
+                readings.append(Pointing(replace(mean, row=shot.row, time=shot.time), "both"))
         else:
             tally[str(shot.face)] += 1
-            readings.append(Reading(_convert_to_face_1(shot), str(shot.face)))
+            readings.append(Pointing(_convert_to_face_1(shot), str(shot.face)))
     reports = {setup: _report(setup, tally) for setup, tally in errors.items()}
     return [_correct_single(reading, reports[reading.shot.setup]) for reading in readings], [
         *reports.values()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from tankcal.fieldbooks.writing import refuse_standing, tables_with_rows, write_grids
+from tankcal.fieldbooks.writing import find_filled_tables, refuse_filled, write_grids
 from tankcal.job.contract import COLUMNS
 from tankcal.job.decimals import has_two_meanings, settle_decimal
 from tankcal.job.entries import read_columns
@@ -183,8 +183,8 @@ def write_list(foreign_list, folder, *, replace=False):
     """
     folder, log = Path(folder), Log()
     refuse_missing(foreign_list)
-    standing = [] if replace else tables_with_rows(folder, [foreign_list.name])
-    refuse_standing(folder, standing)
+    filled_tables = [] if replace else find_filled_tables(folder, [foreign_list.name])
+    refuse_filled(folder, filled_tables)
     table = _convert_table(foreign_list, log)
     log.stop_if_problems()
     read_columns(foreign_list.name, table, log)

@@ -1,4 +1,7 @@
-"""Rows of the tables of a job from readings on face 1."""
+"""Classification of readings on face 1, and the rows of the tables of a job.
+
+Readings are hits of the wall, control targets, or targets that tie set-ups.
+"""
 
 import re
 from collections import Counter
@@ -27,14 +30,14 @@ CONTRACT = {
     "control": CONTROL,
 }
 ANGLE_DECIMALS, LENGTH_DECIMALS = 7, 6  # 0.0004 seconds of arc, a micrometre
-SAID = ("WALL", "HIT", "PAREDE", "PARED")  # initial letters of codes and names of hits
-SHOWN = 8
+HIT_PREFIXES = ("WALL", "HIT", "PAREDE", "PARED")  # of names and codes of hits
+MOST_NAMES = 8  # largest number of names in a message
 _RANGE = re.compile(r"(\d{1,9})-(\d{1,9})")
 
 
 @dataclass(frozen=True)
-class Sorted:
-    """Readings by kind; each a tuple of Reading.
+class SortedReadings:
+    """Readings by kind; each a tuple of Pointing.
 
     Attributes
     ----------
@@ -51,7 +54,7 @@ class Sorted:
     ties: tuple
 
 
-def is_meant(shot, patterns):
+def matches_pattern(shot, patterns):
     """Return whether a pattern (1-200, or with * and ?) matches the name or code of a shot."""
     for pattern in patterns:
         limits = _RANGE.fullmatch(pattern)
@@ -63,33 +66,33 @@ def is_meant(shot, patterns):
     return False
 
 
-def says_hit(shot):
+def _is_named_hit(shot):
     """Return whether the name or the code identifies a shot as a hit."""
-    return any(text.upper().startswith(SAID) for text in (shot.point, shot.code))
+    return any(text.upper().startswith(HIT_PREFIXES) for text in (shot.point, shot.code))
 
 
 def sort_readings(readings, choices, known, log, leave_out):
-    """Return the Sorted readings of all books.
+    """Return the SortedReadings readings of all books.
 
     Parameters
     ----------
-    readings : list of Reading
+    readings : list of Pointing
     choices : Choices
     known : set of str
         Points with known coordinates.
     log : Log
     leave_out : callable
-        leave_out(what, Reading), called for each reading that is not used.
+        leave_out(what, Pointing), called for each reading that is not used.
     """
     hits, control, others = [], [], []
     for reading in readings:
         shot = reading.shot
-        if is_meant(shot, choices.leave):
+        if matches_pattern(shot, choices.leave):
             leave_out(message("left_by_choice", "left out by choice"), reading)
-        elif is_meant(shot, choices.control):
+        elif matches_pattern(shot, choices.control):
             control.append(reading)
-        elif is_meant(shot, choices.check) or (
-            is_meant(shot, choices.hits) if choices.hits else says_hit(shot)
+        elif matches_pattern(shot, choices.check) or (
+            matches_pattern(shot, choices.hits) if choices.hits else _is_named_hit(shot)
         ):
             hits.append(reading)
         else:
@@ -103,7 +106,7 @@ def sort_readings(readings, choices, known, log, leave_out):
                       reading)  # fmt: skip
     setups_of_hits = {reading.shot.setup for reading in whole}
     targets = _targets(control, others, setups_of_hits, choices, known, leave_out)
-    return Sorted(tuple(whole), *targets)
+    return SortedReadings(tuple(whole), *targets)
 
 
 def _values(shot):
@@ -119,7 +122,7 @@ def _targets(control, others, of_hits, choices, known, leave_out):
     targets = sorted(
         (*others, *control), key=lambda reading: (reading.shot.setup, reading.shot.row)
     )
-    setups, asked = {}, {id(reading) for reading in control}
+    setups, selected = {}, {id(reading) for reading in control}
     for reading in targets:
         setups.setdefault(reading.shot.point, set()).add(reading.shot.setup)
     times = Counter((reading.shot.setup, reading.shot.point) for reading in targets)
@@ -128,7 +131,7 @@ def _targets(control, others, of_hits, choices, known, leave_out):
     for reading in targets:
         name = reading.shot.point
         is_tie = choices.no_hits or (are_several and (len(setups[name]) > 1 or name in known))
-        is_again = id(reading) in asked or (
+        is_again = id(reading) in selected or (
             times[reading.shot.setup, name] > 1 and not (choices.control or choices.no_hits)
         )
         if is_tie:
@@ -147,7 +150,7 @@ def _targets(control, others, of_hits, choices, known, leave_out):
 def _refuse_without_hits(readings, choices, log):
     """Report that no reading is a hit."""
     names = _join_ranges([reading.shot.point for reading in readings])
-    shown = [*names[:SHOWN], *(["..."] if len(names) > SHOWN else [])]
+    shown = [*names[:MOST_NAMES], *(["..."] if len(names) > MOST_NAMES else [])]
     text = message(
         "which_are_hits",
         "none of the points {names} is identified as a hit; expected --hits with names or "
@@ -187,23 +190,23 @@ class Row:
     row: int
 
 
-def make_rows(stands, names, stations, sorted_readings, choices):
+def make_rows(setups, names, stations, sorted_readings, choices):
     """Return {table: list of Row}, without empty tables.
 
     Parameters
     ----------
-    stands : dict
+    setups : dict
         {index: (SetUp, file)}
     names : dict
         {index: name of the set-up in the job}
     stations : dict
         {point: (xyz, file, row)} for control.csv.
-    sorted_readings : Sorted
+    sorted_readings : SortedReadings
     choices : Choices
     """
     tables = {name: [] for name in CONTRACT}
     for place, name in names.items():
-        setup, file = stands[place]
+        setup, file = setups[place]
         cells = {
             "setup": name,
             "station": setup.station,
@@ -213,14 +216,14 @@ def make_rows(stands, names, stations, sorted_readings, choices):
         tables["setups"].append(Row(cells, file, setup.row))
     for reading in sorted_readings.hits:
         cells = _both_angles(reading.shot)
-        if is_meant(reading.shot, choices.check):
+        if matches_pattern(reading.shot, choices.check):
             cells["use"] = "check"
         tables["wall_hits"].append(_row(reading, names, cells, distance=True, time=True))
     for reading in sorted_readings.control:
         cells = {"target": reading.shot.point} | _both_angles(reading.shot)
         tables["control_readings"].append(_row(reading, names, cells, distance=True, time=True))
     for reading in sorted_readings.ties:
-        _tie(tables, reading, names, choices)
+        _add_tie_rows(tables, reading, names, choices)
     for point, (xyz, file, row) in stations.items():
         cells = {"point": point} | dict(zip(("x_m", "y_m", "z_m"), map(_length, xyz), strict=True))
         tables["control"].append(Row(cells, file, row))
@@ -246,7 +249,7 @@ def _both_angles(shot):
     }
 
 
-def _tie(tables, reading, names, choices):
+def _add_tie_rows(tables, reading, names, choices):
     """Add the rows of a reading that ties set-ups."""
     shot = reading.shot
     height = _length(shot.target_height_m)
@@ -307,7 +310,7 @@ def _refuse(log, row, table, field):
     log.problem(row.file, expected, row.row, f"{table}.{field.name}")
 
 
-def columns_of(table, rows):
+def needed_columns(table, rows):
     """Return the columns that a table needs, in the order of the job format."""
     return [
         field.name
