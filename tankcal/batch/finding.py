@@ -348,7 +348,7 @@ def _assign_names(named_jobs, options, known):
         if source not in known and (counts[label.casefold()] > 1 or owner != source):
             name = f"{label}~{sha256(source.encode(errors='replace')).hexdigest()[:DIGITS]}"
         overrides = {key: value for key, value in job.overrides.items() if key in LIST_OPTIONS}
-        jobs.append(BatchJob(name, label, source, options.with_overrides(overrides)))
+        jobs.append(BatchJob(name, label, source, options.override(overrides)))
     _refuse_doubles(jobs)
     return sorted(jobs, key=lambda job: job.name)
 

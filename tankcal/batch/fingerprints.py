@@ -148,9 +148,9 @@ def _digest_content(named):
 def _digest(path):
     """Return the SHA-256 of a file, cached by size and modification time."""
     status = os.stat(path)
-    return _digest_as_of(str(path), status.st_size, status.st_mtime_ns)
+    return _cached_digest(str(path), status.st_size, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=4096)
-def _digest_as_of(path, size, mtime_ns):
+def _cached_digest(path, size, mtime_ns):
     return digest_of(path)

@@ -48,7 +48,7 @@ class Options:
     inspect_by: str | None = None
     profile: str | None = None
 
-    def with_overrides(self, overrides):
+    def override(self, overrides):
         """Return a copy with the options of one job, {name: text}; blank texts are ignored."""
         return replace(self, **{name: text for name, text in overrides.items() if text})
 

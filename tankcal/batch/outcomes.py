@@ -81,7 +81,7 @@ class Outcome:
         problems = [problem for step in reached for problem in step.problems]
         return self.status(steps), problems[:1], sum(step.problem_count for step in reached)
 
-    def is_settled_for(self, keys):
+    def is_complete(self, keys):
         """Return whether all steps of {step: key} have current results."""
         for step, key in keys.items():
             if not self.is_settled(step, key):

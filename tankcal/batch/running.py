@@ -127,13 +127,13 @@ def run_batch(arguments, options, out, *, workers="local", worker_bytes=WORKER_B
         waiting = list(_select_tasks(jobs, journal, batch, callbacks))
         if waiting:
             _run_tasks(
-                waiting, journal, batch, callbacks, _workers_for(workers, waiting), worker_bytes
+                waiting, journal, batch, callbacks, _choose_workers(workers, waiting), worker_bytes
             )
         batch.rows, batch.files = write_summary(out, jobs, language)
         return batch
 
 
-def _workers_for(workers, waiting):
+def _choose_workers(workers, waiting):
     """Return the number of workers on this machine (0: none), or an address."""
     if workers == "local":
         return min(count_cores(), len(waiting)) if is_installed() and len(waiting) > 1 else 0
@@ -156,7 +156,7 @@ def _select_tasks(jobs, journal, batch, callbacks):
             callbacks.ended(job.name, *failure)
             continue
         known = load_outcome(journal.out, job.name)
-        if known is not None and known.is_settled_for(task.keys):
+        if known is not None and known.is_complete(task.keys):
             status, problems, count = known.result(job.options.steps)
             batch.skipped += 1
             batch.counts[status] += 1

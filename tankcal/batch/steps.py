@@ -99,7 +99,7 @@ def _do_steps(task):
     """Run the steps of a job that have no current result, with an entry of each in the journal."""
     name, steps = task.job.name, task.job.options.steps
     outcome = load_outcome(task.out, name) or Outcome(name, task.job.source)
-    if not outcome.is_settled_for(task.keys):  # settled if a worker died before its answer
+    if not outcome.is_complete(task.keys):  # settled if a worker died before its answer
         journal, clock = Journal(task.out, task.run), Clock()
         journal.note("begun", name)
         outcome = _run_steps(replace(outcome, source=task.job.source), task, clock)
@@ -336,7 +336,7 @@ def read_values(step, folder):
     return _READERS[saved.name](results), results["warnings"]
 
 
-def _of_record(record):
+def _read_record(record):
     job, table, adjustment = record["job"], record["capacity"], record["adjustment"]
     tank = job["tank"] or {}
     values = {
@@ -371,7 +371,7 @@ def _read_inspection(inspection):
     return {"tank": inspection["tank"]["id"], "inspection_verdict": worst}
 
 
-_READERS = dict(zip(SAVED, (_of_record, _read_comparison, _read_inspection), strict=True))
+_READERS = dict(zip(SAVED, (_read_record, _read_comparison, _read_inspection), strict=True))
 
 
 def find_inspection_source(job, results):

@@ -86,22 +86,22 @@ class RoundedTable:
         fewest, before = np.full(count, chords.NEVER), np.full(count, -1)
         if self.loops is chords:
             fewest, before = fewest.tolist(), before.tolist()
-        arrays = self._for_loops(*self.lines, self.last, is_open)
+        arrays = self._loop_arguments(*self.lines, self.last, is_open)
         self.loops.fewest_chords(*arrays, eps, most, fewest, before)
         return np.asarray(fewest), np.asarray(before)
 
     def longest_chords(self, is_open, eps):
         """Rows of the path of longest chords within eps; empty if there is none."""
         rows = np.zeros(len(self.height), dtype=int)
-        arrays = self._for_loops(*self.lines, self.last, is_open)
+        arrays = self._loop_arguments(*self.lines, self.last, is_open)
         return rows[: self.loops.longest_chords(*arrays, eps, rows)]
 
     def largest_error(self, rows):
         """Largest error of chords at rows between, and of the rows themselves."""
-        between = self.loops.largest_error(*self._for_loops(*self.lines, rows))
+        between = self.loops.largest_error(*self._loop_arguments(*self.lines, rows))
         return max(float(between), float(self.rounding_error[rows].max()))
 
-    def _for_loops(self, *arrays):
+    def _loop_arguments(self, *arrays):
         """Arrays for compiled loops, lists for plain loops, which access lists faster."""
         return [array.tolist() for array in arrays] if self.loops is chords else arrays
 

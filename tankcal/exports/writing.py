@@ -236,7 +236,7 @@ def _is_caused_by_profile(finding, rows, profile):
     return (
         (code == "lint_written_in_all" and bool(profile.thousands))
         or (code == "lint_few_rows" and rows < _FEW)
-        or (code in _OF_UNITS and not _has_units_read(profile))
+        or (code in _OF_UNITS and not _are_units_known(profile))
     )
 
 
@@ -251,7 +251,7 @@ def _concerns_tank(finding, is_even):
     return code == "lint_proportions" or (code in _BY_NEIGHBOURS and (is_warning or not is_even))
 
 
-def _has_units_read(profile):
+def _are_units_known(profile):
     """Whether the linter knows the units of both columns.
 
     It knows neither cubic feet nor 1/16 in.

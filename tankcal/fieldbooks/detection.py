@@ -60,7 +60,7 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.NO_CODES)
     text = _text(file, data, log)
     if text is None:
         return None
-    format_name = wanted or _format_of(text, described)
+    format_name = wanted or _detect_format(text, described)
     if format_name is None:
         log.problem(file, _refusal(text))
         return None
@@ -110,7 +110,7 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.NO_CODES)
 def is_field_book(data):
     """Return whether the content of a file is a field book in a known format."""
     text = _text("", data, Log())
-    return text is not None and _format_of(text, None) is not None
+    return text is not None and _detect_format(text, None) is not None
 
 
 def _text(file, data, log):
@@ -165,7 +165,7 @@ def _refusal(text):
     )
 
 
-def _format_of(text, described):
+def _detect_format(text, described):
     """Return the format of a text, or None."""
     lines = _first_lines(text)
     if lines and lines[0].lstrip().startswith("<"):

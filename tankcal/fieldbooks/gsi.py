@@ -279,7 +279,8 @@ def _value(book, log, row, index, unit, text):
     name, parts = known
     sign, number = (-1.0 if text[0] == "-" else 1.0), int(digits)
     if not is_angle:
-        _add_length_unit(book, name, parts)
+        last = f"{1000 / parts:g} mm" if name == "m" else f"1/{parts:.0f} ft"
+        book.add_units(length=name, last=last)
         return sign * number / parts * METRES[name]
     book.add_units(angle=name)
     if name != "dms":
@@ -290,12 +291,6 @@ def _value(book, log, row, index, unit, text):
         refuse_minutes(log, book.file, row, text)
         return None
     return sign * (degrees + minutes / 60 + tenths / 36000)
-
-
-def _add_length_unit(book, name, parts):
-    """Add the unit of a length."""
-    last = f"{1000 / parts:g} mm" if name == "m" else f"1/{parts:.0f} ft"
-    book.add_units(length=name, last=last)
 
 
 def _take_times(words_by_index, state):
@@ -339,9 +334,8 @@ def _take_station(book, row, name, values, is_reading, state):
         return
     if book.setups:
         now = book.setups[-1]
-        same_name = (
-            is_reading or name == now.station
-        )  # in a block with a reading, the name is the target
+        # In a block with a reading, the name is that of the target.
+        same_name = is_reading or name == now.station
         same_place = None in (xyz, now.xyz_m) or all(map(_are_same, xyz, now.xyz_m))
         same_height = _are_same(height, now.height_m)
         if same_name and same_place and (same_height or not book.has_shots):

@@ -33,7 +33,10 @@ def summarise(books, chosen, unused, names, setups, reports, coordinates, filled
     lines = []
     for book in books:
         lines += _describe_book(book)
-    shown = [_describe_setup(name, setups[place][0].station) for place, name in names.items()]
+    shown = []
+    for place, name in names.items():
+        station = setups[place][0].station
+        shown.append(name if name == station else f"{name} ({station})")
     lines.append(message("import_setups", "set-ups: {names}", names=list_some(shown, SHOWN)))
     reports = [report for report in reports if report.setup in names]
     for report in reports:
@@ -71,11 +74,6 @@ def summarise(books, chosen, unused, names, setups, reports, coordinates, filled
             )
         )
     return lines
-
-
-def _describe_setup(name, station):
-    """Return the name of a set-up, with its station if different."""
-    return name if name == station else f"{name} ({station})"
 
 
 def _describe_book(book):

@@ -145,13 +145,13 @@ def interpolate_uncertainty(table, dips_m, volume_m3, k, error_m3=0.0):
     stated = scale * np.interp(dips_m, table.height_m, table.U_m3)
     factor, by = None, "independent_rows"
     if table.factor_m3 is not None:
-        factor, by = _factor_at(table, dips_m, stated), "record"
+        factor, by = _interpolate_factor(table, dips_m, stated), "record"
     elif _is_in_percent(table):
         by = "proportional"
     return TableUncertainty(k, volume_m3, np.hypot(stated, rounding), rounding, factor, by)
 
 
-def _factor_at(table, dips, stated):
+def _interpolate_factor(table, dips, stated):
     """Covariance factor (rows, inputs) at dips; each row has the norm of the stated U."""
     upper = np.clip(np.searchsorted(table.height_m, dips), 1, len(table.height_m) - 1)
     below = table.height_m[upper - 1]

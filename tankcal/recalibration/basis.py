@@ -159,13 +159,13 @@ def rows_in_both(former, new, zero_m):
     return rows
 
 
-def volume_at(table, dips_m):
+def interpolate_volume(table, dips_m):
     """Volumes (n,) of a table at dips, by linear interpolation as in a gauge, m3."""
     return np.interp(dips_m, table.height_m, table.volume_m3)
 
 
 def interpolation_error_m3(table, dips_m):
-    """Bound of the error of `volume_at`, from distances of rows to chords of their neighbours.
+    """Bound of the error of `interpolate_volume`, from distances of rows to chords beside them.
 
     The error is 0 at rows of the table; distances within one digit are ignored. On a smooth curve,
     a row is V'' s^2 / 2 off the chord, and the middle between rows a fourth of it. A kink between
@@ -264,8 +264,8 @@ def _steps(former, new, facts, densities, zero, rows, until="rounding"):
     the last step.
     """
     dips = new.height_m[rows]
-    before = volume_at(former, dips)
-    basis = volume_at(former, dips + zero)
+    before = interpolate_volume(former, dips)
+    basis = interpolate_volume(former, dips + zero)
     steps = {"zero": Step(basis - before, "done")}
     for name, make in (
         ("temperature", _temperature_step),

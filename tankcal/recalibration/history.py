@@ -98,7 +98,7 @@ def history_of(
     progress = progress or (lambda text, done, total: None)
     on_newest, successive = _comparisons(ordered, courses, progress)
     k = coverage_factor(_newest_with_U(ordered))
-    rows = _shown_rows(on_newest, dips_m)
+    rows = _select_dips(on_newest, dips_m)
     newest = ordered[-1].table
     problems = [*warnings, *_table_warnings(ordered)]
     return HistoryFile(
@@ -218,7 +218,7 @@ def _certificates(ordered):
     return certificates
 
 
-def _shown_rows(on_newest, dips_m):
+def _select_dips(on_newest, dips_m):
     """Dips of the newest table, for use in all comparisons, at which volumes are shown."""
     common = None
     for comparison in on_newest:

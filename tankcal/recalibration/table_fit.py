@@ -140,7 +140,7 @@ class State:
             [values[name][: part.stop - part.start] for name, part in self.layout.items()]
         )
 
-    def with_unknowns(self, unknowns):
+    def replace_unknowns(self, unknowns):
         """Return the state with other values of the unknowns."""
         values = {name: unknowns[part] for name, part in self.layout.items()}
         changes = {"radii_m": values["radii"]}
@@ -270,7 +270,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
         step[moving] = adjusted.unknowns
         # Gauss-Newton step, halved until the cost does not rise.
         for _ in range(MOST_HALVINGS):
-            now = before.with_unknowns(before.unknowns + step)
+            now = before.replace_unknowns(before.unknowns + step)
             w = misclosure(now)
             if w @ (w / variances) <= cost + SETTLED:
                 break

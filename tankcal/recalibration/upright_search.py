@@ -102,7 +102,7 @@ def _search_straight(rows, state, lowest_m):
             whole = _fit_fittings(rows, more, at_most=len(solution.state.fittings) + 1)
         except SolutionError:
             return solution
-        if _is_within_rounding(whole) and _is_enough(rows, solution, whole):
+        if _is_within_rounding(whole) and _is_gain_large_enough(rows, solution, whole):
             return whole
     return solution
 
@@ -200,7 +200,7 @@ def _try_moved_seams(rows, solution):
     return _add_lower_rows(rows, candidate) if is_better else solution
 
 
-def _is_enough(rows, solution, larger):
+def _is_gain_large_enough(rows, solution, larger):
     """Whether the reduction of chi2 is large for the number of new unknowns."""
     return len(rows.dip_m) - len(solution.left_m3) > 10 * (
         len(larger.state.unknowns) - len(solution.state.unknowns)

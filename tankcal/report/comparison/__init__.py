@@ -167,7 +167,7 @@ class ComparisonPaper(SavedPaper):
         decimals = DECIMALS.get(unit, 4) if decimals is None else decimals
         return self.number(value, UNITS.get(unit, unit), decimals=decimals)
 
-    def chosen(self, value, unit):
+    def declared_value(self, value, unit):
         """Return a declared or printed value without final zeros; None for None."""
         return self.plain(value, unit_symbol(unit))
 
@@ -200,7 +200,7 @@ class ComparisonPaper(SavedPaper):
         if key == "value":
             return self.measure(value, values["unit"])
         if key == "most":
-            return self.chosen(value, values["unit"])
+            return self.declared_value(value, values["unit"])
         if key.endswith("_m"):
             return self.height(value)
         if key.endswith("_m3"):

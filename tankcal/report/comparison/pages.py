@@ -62,7 +62,7 @@ def pages(paper, folder=None, whole=False):
         *_differences(paper),
         *_deliveries(paper),
         *_courses(paper),
-        *_read_out(paper),
+        *_estimated_values(paper),
         *_rows(paper, whole),
     ]
 
@@ -126,7 +126,7 @@ def _legal_rows(paper):
             "number": paper.word(f"numbers.{entry['code']}"),
             "value": _limited_value(paper, entry["value"], entry["unit"]),
             "as_printed": _limited_value(paper, entry["as_printed"], entry["unit"]),
-            "limit": f"±\N{NO-BREAK SPACE}{paper.chosen(entry['limit'], entry['unit'])}",
+            "limit": f"±\N{NO-BREAK SPACE}{paper.declared_value(entry['limit'], entry['unit'])}",
             "verdict": paper.word(f"limits.{entry['verdict']}"),
         }
         for entry in paper.found["legal"]
@@ -206,10 +206,10 @@ def _table_facts(paper, table):
         "top_volume": paper.number(table["top_volume_m3"], "m3", decimals=3),
         "quantum_dip": _quantum(paper, table["height_quantum_m"], "m"),
         "quantum_volume": _quantum(paper, table["volume_quantum_m3"], "m3"),
-        "reference_temperature": paper.chosen(table["reference_temperature_c"], "C"),
+        "reference_temperature": paper.declared_value(table["reference_temperature_c"], "C"),
         "head_density": paper.word("texts.without_head")
         if table["liquid_density_kg_m3"] == 0
-        else paper.chosen(table["liquid_density_kg_m3"], "kg/m3"),
+        else paper.declared_value(table["liquid_density_kg_m3"], "kg/m3"),
         "roof": _roof(paper, table["roof"]),
         "reference_height": paper.height(table["reference_height_m"]),
         "U_top": _stated_U(paper, table),
@@ -233,15 +233,15 @@ def _stated_U(paper, table):
 
 def _quantum(paper, value, unit):
     """Return the value of the last digit, or "not rounded"."""
-    return paper.chosen(value, unit) if value else paper.word("texts.not_rounded")
+    return paper.declared_value(value, unit) if value else paper.word("texts.not_rounded")
 
 
 def _roof(paper, roof):
     if roof is None:
         return None
     text = paper.word(
-        "texts.roof", mass=paper.chosen(roof["mass_kg"], "kg"),
-        density=paper.chosen(roof["density_kg_m3"], "kg/m3"),
+        "texts.roof", mass=paper.declared_value(roof["mass_kg"], "kg"),
+        density=paper.declared_value(roof["density_kg_m3"], "kg/m3"),
         weighing=paper.word(f"parts.{roof['weighing']}"),
     )  # fmt: skip
     if roof["critical_m"] is None:
@@ -436,7 +436,7 @@ def _courses(paper):
 # ---- values estimated from the tables
 
 
-def _read_out(paper):
+def _estimated_values(paper):
     """Return the values estimated from a table because they are not declared."""
     entries = paper.found["read"]
     if not entries:
