@@ -61,23 +61,23 @@ class TableRead:
 def read_table(
     path, courses_path=None, former_toml=None, *, kind=None, e_pa=STEEL_PA, bottom_m=None
 ):
-    """Read the geometry of a tank out of a former table.
+    """Estimate the geometry of a tank from a former table.
 
     Parameters
     ----------
     path : path
-        The table; a record.json gives the radii that it has.
+        The table. The radii of a record.json are used as they are in the record.
     courses_path : path or None
-        courses.csv: course, height_m (blank: the seams are found), thickness_mm; None for a
+        courses.csv: course, height_m (blank: estimated from the table), thickness_mm. None for a
         record, a lying tank and a sphere.
     former_toml : path or None
-        What else is known of the table.
+        former.toml with other facts about the table.
     kind : {"vertical", "horizontal", "sphere"} or None
-        None: as former.toml or the record says, else upright.
+        None: the kind in former.toml or in the record, else upright.
     e_pa : float
         Young's modulus of the shell.
     bottom_m : float or None
-        Dip of the highest point of the bottom; None: found.
+        Dip of the highest point of the bottom; None: estimated.
 
     Returns
     -------
@@ -86,9 +86,9 @@ def read_table(
     Raises
     ------
     InputError
-        With every problem of table and courses.
+        With all problems of table and courses.
     SolutionError
-        When the table does not determine its tank.
+        If the table does not determine its tank.
 
     Examples
     --------

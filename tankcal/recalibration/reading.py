@@ -33,19 +33,18 @@ def read_former(path, former_toml=None) -> FormerTable:
         tankcal; heights in any unit that its headings name, feet and inches, or ullages. Or a
         former.toml that names such a file under `file`.
     former_toml : path, optional
-        The former.toml that says what else is known of it (docs/read-table.md).
+        former.toml with other facts about the table (docs/read-table.md).
 
     Returns
     -------
     FormerTable
-        In SI units, dips rising; the linter's warnings under `warnings`.
+        Table in SI units, with rising dips, and the warnings of the linter.
 
     Raises
     ------
     InputError
-        With every problem: of former.toml; of a file that cannot be read; the findings of the
-        linter, where it calls the table wrong; of units, columns or a reference height that are
-        not clear.
+        With all problems: of former.toml, of an unreadable file, errors found by the linter, and
+        undetermined units, columns or reference heights.
 
     Examples
     --------
@@ -71,7 +70,7 @@ def read_former(path, former_toml=None) -> FormerTable:
     rows, warnings = _read_rows(path, declared, log)
     if rows is None:
         log.stop_if_problems()
-        raise AssertionError("no rows, and nothing told")
+        raise AssertionError("no rows and no problem")
     record = _load_record(path)
     if record is None:
         former = _table_from_rows(path, rows, declared, log)

@@ -102,27 +102,30 @@ def find_seams_within(dips_m, volumes_m3, sd_m3, heights_m):
 
 def _chi2(dips, volumes, sds, seams):
     """Return chi2 of a parabola for each ring, and the jumps (seams,) of the slope."""
-    x = dips / dips[-1]
-    columns = [np.ones_like(x), x, x**2]
-    for seam in seams:
-        above = np.maximum(x - seam / dips[-1], 0.0)
-        columns += [above, above**2]
-    basis = np.column_stack(columns) / sds[:, None]
+    basis = _parabolas(dips, sds, seams)
     solution = np.linalg.lstsq(basis, volumes / sds, rcond=None)[0]
     left = volumes / sds - basis @ solution
     return float(left @ left), solution[3::2]
 
 
-def _gains(dips, volumes, sds, seams, places):
-    """Reduction (places,) of chi2 by another seam; 0 near an existing seam."""
+def _parabolas(dips, sds, seams):
+    """Weighted basis (rows, 3 + 2 seams) of a parabola for each ring, continuous at the seams."""
     x = dips / dips[-1]
     columns = [np.ones_like(x), x, x**2]
     for seam in seams:
         above = np.maximum(x - seam / dips[-1], 0.0)
         columns += [above, above**2]
-    q = np.linalg.qr(np.column_stack(columns) / sds[:, None])[0]
+    return np.column_stack(columns) / sds[:, None]
+
+
+def _gains(dips, volumes, sds, seams, places):
+    """Reduction (places,) of chi2 by another seam; 0 near an existing seam."""
+    x = dips / dips[-1]
+    q = np.linalg.qr(_parabolas(dips, sds, seams))[0]
     value = volumes / sds
     left = value - q @ (q.T @ value)
+    # A further seam adds a ramp and its square. Their part that the parabolas do not explain lowers
+    # chi2 by the square of its projection on the residuals.
     gains = np.zeros(len(places))
     for k, place in enumerate(places):
         if any(abs(place - seam) < LEAST_APART_M for seam in seams):

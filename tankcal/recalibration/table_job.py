@@ -228,10 +228,8 @@ def make_solid_job(former, fit, *, tank_id):
             lines.append(f"{key} = {_text(value) if isinstance(value, str) else value}")
         lines.append("")
     lines += ["[survey]", 'side = "inside"', f"date = {_day(former)}"]
-    lines += [
-        f"shell_temperature_c = {_temperature(former)}",
-        "",
-    ]  # reference temperature of the dimensions
+    # The dimensions are those at the reference temperature.
+    lines += [f"shell_temperature_c = {_temperature(former)}", ""]
     texts = {"job.toml": "\n".join(lines)}
     rows = [
         ",".join(str(row[key]) for key in ("input", "u", "unit"))
@@ -377,9 +375,8 @@ def _bottom(former, geometry):
     if is_near and np.all(np.abs(volumes - flat) < SURE * geometry.expected_m3):
         return level, None
     rows = _rising_rows([*zip(dips, volumes, strict=True), (lowest, max(base.value, 0.0))])
-    floor = (
-        np.floor(min(zero.value, 0.0) / LEVEL_M) * LEVEL_M
-    )  # rounded down, so that it does not lie above the shell
+    # rounded down, so that the lowest dip does not lie above the shell
+    floor = np.floor(min(zero.value, 0.0) / LEVEL_M) * LEVEL_M
     if (rows[0][0] > floor and rows[0][1] > 0) or len(rows) == 1:
         rows.insert(0, _extrapolate_row(rows, area, floor))
     return min(zero.value, lowest), np.array(rows)

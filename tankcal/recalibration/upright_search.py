@@ -121,25 +121,26 @@ def _search_bulged(rows, state, lowest_m, density, density_sd):
         usual_density_kg_m3=density,
         density_sd_kg_m3=density_sd,
     )
-    some = rows.select_above(lowest).thin(MOST_BULGED_ROWS)
+    chosen_rows = rows.select_above(lowest).thin(MOST_BULGED_ROWS)
     best = None
     for zero in USUAL_ZEROS_M:
         candidate = _fit_free_zero(
-            some.select_above(zero + NEAR_M), replace(start, zero_m=zero), zero
+            chosen_rows.select_above(zero + NEAR_M), replace(start, zero_m=zero), zero
         )
         if candidate and (best is None or _cost(candidate) < _cost(best) - LEAST_GAIN):
             best = candidate
     if best is None:
         return None
     about = best.state.zero_m
-    some = some.select_above(best.state.lowest_m)
+    chosen_rows = chosen_rows.select_above(best.state.lowest_m)
     while len(best.state.fittings) < MOST_FITTINGS:
-        again = _add_fitting(some, best, LONGEST_BULGED_M, about, rough=True)
+        again = _add_fitting(chosen_rows, best, LONGEST_BULGED_M, about, rough=True)
         if again is None:
             break
         best = again
     best = try_fit(
-        rows.select_above(max(lowest, best.state.lowest_m)), _drop_unsure_fittings(some, best).state
+        rows.select_above(max(lowest, best.state.lowest_m)),
+        _drop_unsure_fittings(chosen_rows, best).state,
     )
     return best and _add_lower_rows(rows.select_above(lowest), best)
 
@@ -162,24 +163,27 @@ def _drop_unsure_fittings(rows, solution):
     """Return the Fit without insignificant fittings, where courses bulge."""
     while solution.state.fittings:
         sds = solution.sd("fittings")[2::3] * roughness(solution, rows)
-        sizes = np.abs([fitting.volume_m3 for fitting in solution.state.fittings]) / np.maximum(
-            sds, 1e-12
-        )
+        volumes = np.abs([fitting.volume_m3 for fitting in solution.state.fittings])
+        sizes = volumes / np.maximum(sds, 1e-12)
         worst = int(np.argmin(sizes))
-        rest = solution.state.fittings[:worst] + solution.state.fittings[worst + 1 :]
-        again = try_fit(rows, replace(solution.state, fittings=rest))
+        again = try_fit(rows, _drop_fitting(solution.state, worst))
         if sizes[worst] >= SURE_OF_BULGED or again is None:
             break
         solution = again
     return solution
 
 
-def _resembles_joint(state, thing):
+def _drop_fitting(state, place):
+    """Return the State without one of its fittings."""
+    return replace(state, fittings=state.fittings[:place] + state.fittings[place + 1 :])
+
+
+def _resembles_joint(state, fitting):
     """Whether a fitting adds volume, or resembles plates drawn in at a joint."""
     joints = state.rings.edges_m
-    ends = np.array([[thing.bottom_m], [thing.top_m]])
+    ends = np.array([[fitting.bottom_m], [fitting.top_m]])
     girth = 2 * np.pi * float(state.radii_m[0])
-    thickness = -thing.volume_m3 / (girth * max(thing.top_m - thing.bottom_m, 1e-9))
+    thickness = -fitting.volume_m3 / (girth * max(fitting.top_m - fitting.bottom_m, 1e-9))
     is_near = bool(np.any(np.abs(ends - joints) < JOINT_M))
     return thickness <= 0 or (is_near and thickness < DRAWN_IN_M)
 
@@ -283,9 +287,8 @@ def _fit_fittings(rows, state, at_most=MOST_FITTINGS):
             message("former_undetermined", "the rows of the table do not determine the radii")
         )
     if len(best.state.fittings) > FEW_FITTINGS and not _is_within_rounding(best):
-        bare = replace(
-            best.state, fittings=()
-        )  # fittings of unlimited height also explain other effects
+        # Fittings of unlimited height also explain other effects, such as a wrong cross section.
+        bare = replace(best.state, fittings=())
         best = _fit_free_zero(rows.select_above(best.state.lowest_m), bare, bare.zero_m) or best
     return _add_lower_rows(rows, best)
 
@@ -346,9 +349,8 @@ def _add_fitting(rows, solution, longest, about, rough=False):
 
     rough: whether residuals exceed rounding; the required gain is then relative to the residuals.
     """
-    design, left, sds = (
-        solution.bulges
-    )  # prior observations do not depend on a fitting: place them at the lowest row
+    # Prior observations do not depend on a fitting, so they are placed at the lowest row.
+    design, left, sds = solution.bulges
     candidates = find_fittings(
         np.append(np.full(len(sds), rows.dip_m[0]), rows.dip_m),
         np.append(left, solution.left_m3),
@@ -356,10 +358,10 @@ def _add_fitting(rows, solution, longest, about, rough=False):
         np.append(sds, rows.sd_m3),
         longest,
     )
-    for thing, gain in candidates:
+    for fitting, gain in candidates:
         if gain < LEAST_GAIN:
             break
-        more = replace(solution.state, fittings=(*solution.state.fittings, thing))
+        more = replace(solution.state, fittings=(*solution.state.fittings, fitting))
         again = _fit_free_zero(rows, more, about)
         factor = roughness(again, rows) ** 2 if rough and again else 1.0
         if (
@@ -372,9 +374,9 @@ def _add_fitting(rows, solution, longest, about, rough=False):
     return None
 
 
-def _is_large(rows, thing):
+def _is_large(rows, fitting):
     """Whether a fitting is larger than the effect of two rounded digits."""
-    return abs(thing.volume_m3) > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
+    return abs(fitting.volume_m3) > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
 
 
 def _simplify_fittings(rows, solution, about):
@@ -394,11 +396,9 @@ def drop_insignificant_fittings(rows, solution, quantum_m3):
     """Return the Fit without fittings whose volume does not exceed its uncertainty."""
     solution = drop_phantom_fittings(rows, solution, quantum_m3)
     while solution.state.fittings:
-        things = solution.state.fittings
         sizes = _sizes(rows, solution, quantum_m3)
         worst = int(np.argmin(sizes))
-        rest = things[:worst] + things[worst + 1 :]
-        again = try_fit(rows, replace(solution.state, fittings=rest))
+        again = try_fit(rows, _drop_fitting(solution.state, worst))
         rise = np.inf if again is None else again.chi2 - solution.chi2
         limit = 2 * LEAST_GAIN if sizes[worst] < CRITICAL else LEAST_GAIN
         if limit < rise < DOUBTFUL_GAIN and quantum_m3 > 0:
@@ -420,8 +420,7 @@ def drop_phantom_fittings(rows, solution, quantum_m3):
         worst = int(np.argmin(sizes))
         if sizes[worst] >= 1:
             break
-        things = solution.state.fittings
-        bare = replace(solution.state, fittings=things[:worst] + things[worst + 1 :])
+        bare = _drop_fitting(solution.state, worst)
         held = replace(bare, free=bare.free - {"kinks", "zero"})
         again = try_fit(rows, bare) or try_fit(rows, held)
         if again is None:
@@ -440,6 +439,7 @@ def _sizes(rows, solution, quantum_m3):
 
 def _gain_by_chance(solution, rows, quantum):
     """Largest reduction of chi2 by a fitting in simulations of correlated rounding."""
+    # Residuals of simulated rounding: (1 - q q') e, as the adjustment absorbs the part in q.
     q = np.linalg.qr(solution.design / rows.sd_m3[:, None])[0]
     gains = []
     for error in simulate_rounding(solution, rows, quantum, CHANCES):
