@@ -77,10 +77,8 @@ class SolidFit:
     values, u : (unknowns,) ndarray
         Values in m (tilt: tangent) and standard uncertainties by rounding only. If the residuals
         exceed rounding, u is scaled by the residuals. inf: not determined.
-    covariance : (unknowns, unknowns) ndarray
-    residuals_m3 : (rows,) ndarray
-        Table minus solid.
     rms_m3 : float
+        Root mean square of the residuals, table minus solid.
     chi2 : float
         Sum of squares of the residuals over their standard deviations by rounding.
     dof : int
@@ -92,8 +90,6 @@ class SolidFit:
     names: tuple[str, ...]
     values: np.ndarray
     u: np.ndarray
-    covariance: np.ndarray
-    residuals_m3: np.ndarray
     rms_m3: float
     chi2: float
     dof: int
@@ -253,12 +249,9 @@ def fit_solid(rows, kind, ends, names, start, solid):
         raise SolutionError(no_solid_message())
     chi2, dof = float(solved.fun @ solved.fun), len(rows.height) - len(names)
     # Scaled unknowns of similar size make the rank decision independent of their units.
-    covariance, u = _covariance(solved.jac * scale, scale, _variance_factor(chi2, dof))
-    left = solved.fun * rows.sd
-    return SolidFit(
-        kind, ends, names, solved.x, u, covariance, left, float(np.sqrt(np.mean(left**2))), chi2,
-        dof, solid(solved.x),
-    )  # fmt: skip
+    u = _standard_uncertainties(solved.jac * scale, scale, _variance_factor(chi2, dof))
+    rms_m3 = float(np.sqrt(np.mean((solved.fun * rows.sd) ** 2)))
+    return SolidFit(kind, ends, names, solved.x, u, rms_m3, chi2, dof, solid(solved.x))
 
 
 def _variance_factor(chi2, dof):
@@ -279,15 +272,20 @@ def _limits(names, start):
     return np.array([limits[name] for name in names]).T
 
 
-def _covariance(jacobian, scale, factor):
-    """Return (covariance, u) of the unknowns; inf if the rows do not determine one of them."""
+def _standard_uncertainties(jacobian, scale, factor):
+    """Return u (unknowns,); inf for an unknown that the rows do not determine.
+
+    jacobian  of the scaled unknowns
+    factor    variance factor
+    """
+    # (J' J)^-1 by the singular values of J, without the undetermined directions
     _, values, rows = np.linalg.svd(jacobian, full_matrices=False)
     good = values > _STEEP * values[0]
     inverse = (rows[good].T / values[good] ** 2) @ rows[good]
     # unknowns with a share in the undetermined directions
     lost = (rows[~good] ** 2).sum(axis=0) > 1e-6
     covariance = factor * inverse * np.outer(scale, scale)
-    return covariance, np.where(lost, np.inf, np.sqrt(np.diag(covariance)))
+    return np.where(lost, np.inf, np.sqrt(np.diag(covariance)))
 
 
 def _volumes(tank, dips_m):

@@ -140,7 +140,6 @@ def read_upright(
     thickness_m,
     *,
     modulus_pa=STEEL_PA,
-    known=(),
     lowest_m=None,
     seams_known=True,
 ):
@@ -152,8 +151,6 @@ def read_upright(
     heights_m, thickness_m : array_like, shape (n,)
         Rings from the bottom up; the table must reach all of them.
     modulus_pa : float
-    known : sequence of Fitting
-        Known fittings, at dips of the table; they are removed first.
     lowest_m : float, optional
         Dip of the highest point of the bottom; None: estimated.
     seams_known : bool
@@ -169,12 +166,9 @@ def read_upright(
         If there are too few rows, or they do not determine the radii.
     """
     heights, plates = np.asarray(heights_m, float), np.asarray(thickness_m, float)
-    volume = former.volume_m3 - sum(
-        (fitting.volume_below_m3(former.height_m) for fitting in known), 0.0
-    )
-    rows = Rows(former.height_m, volume, row_sds(former))
+    rows = Rows(former.height_m, former.volume_m3, row_sds(former))
     zone = former.roof.critical_m if former.roof else None
-    used = np.ones(len(volume), dtype=bool)
+    used = np.ones(len(rows.dip_m), dtype=bool)
     if zone is not None:
         used = (rows.dip_m < zone[0]) | (rows.dip_m > zone[1])
     empty = rows.volume_m3 <= 0
