@@ -114,7 +114,7 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     deliveries = _deliveries(basis, agreement)
     from_m, worst = _find_worst_error(basis, agreement, deliveries)
     tank = tank_kind_of_rules(facts, former, new)
-    legal = judge_limits(chosen, tank, former, new, basis, agreement.former_U, agreement.new_U)
+    legal = judge_limits(chosen, tank, former, new, basis, agreement.new_U)
     ages = judge_ages(chosen, tank, former, new)
     verdict = decide(legal, ages, basis, worst, c, find_zero_limit(chosen, tank))
     return ComparisonFile(

@@ -72,7 +72,7 @@ def tank_kind_of_rules(facts, former, new):
 # ---- limits of a rule
 
 
-def judge_limits(rule, tank, former, new, basis, former_U, new_U):
+def judge_limits(rule, tank, former, new, basis, new_U):
     """Return the `LegalNumber` of each limit of a rule for a kind of tank.
 
     Parameters
@@ -82,10 +82,11 @@ def judge_limits(rule, tank, former, new, basis, former_U, new_U):
         Kind of tank in the terms of the rules.
     former, new : FormerTable
     basis : OneBasis
-    former_U, new_U : TableUncertainty
+    new_U : TableUncertainty
+        Uncertainty of the new table at the rows.
     """
     numbers = [
-        _deviation(limit, basis, former_U, new_U)
+        _deviation(limit, basis, new_U)
         for limit in rule.deviation
         if applies_to(limit, tank) and basis.usable.any()
     ]
@@ -98,7 +99,11 @@ def applies_to(limit, tank):
     return not limit.tanks or tank in limit.tanks
 
 
-def _deviation(limit, basis, former_U, new_U):
+def _deviation(limit, basis, new_U):
+    """Judge the deviation of the new volume from the former one on the basis of the new table.
+
+    The deviation from the former volume as printed is stated, but not judged.
+    """
     use = np.flatnonzero(basis.usable)
     low, high, code = _find_judged_rows(limit, basis, use)
     stated = _volume(basis.on_basis_m3, low, high)
@@ -108,6 +113,7 @@ def _deviation(limit, basis, former_U, new_U):
         if low is None
         else new_U.deliveries(np.array([low]), np.array([high]))[0]
     )
+    # Without a known U, a rule without guard band is still judged; see `unknown` below.
     known = 0.0 if np.isnan(U) else float(U)
     dips = [float(basis.height_m[dip]) for dip in (low, high) if dip is not None]
     judged = judge_volume(
