@@ -90,7 +90,7 @@ class Journal:
         finally:
             os.close(file)
 
-    def deaths(self, job):
+    def count_deaths(self, job):
         """Return how many times this batch started a job without ending it."""
         begun = ended = 0
         for line in self._lines():

@@ -256,7 +256,7 @@ class _ByWorkers:
         """Return whether a job may have been on a dead worker without causing its death."""
         self._deaths[task.job.name] += 1
         return (
-            self._journal.deaths(task.job.name) < TRIES
+            self._journal.count_deaths(task.job.name) < TRIES
             and self._deaths[task.job.name] < MOST_DEATHS
         )
 

@@ -141,7 +141,7 @@ def _run_step(step, task, clock):
         with clock.step(step):
             written = _STEP_FUNCTIONS[step](task, clock)
         with clock.step("row"):
-            values, warnings = read_values(step, job_folder(task.out, name) / FOLDERS[step])
+            values, warnings = read_values(job_folder(task.out, name) / FOLDERS[step])
         if compute_keys(task.job, find_former_or_none(task.job))[step] != key:
             text = message(
                 "batch_changed",
@@ -327,7 +327,7 @@ def _processor_s():
 # ---- results of the steps
 
 
-def read_values(step, folder):
+def read_values(folder):
     """Return ({name: value} for the summary, warnings as plain data) from the folder of a step."""
     saved = next((folder / name for name in SAVED if (folder / name).is_file()), None)
     if saved is None:

@@ -98,7 +98,7 @@ def sort_readings(readings, choices, known, log, leave_out):
         else:
             others.append(reading)
     if not hits and not choices.no_hits:
-        _refuse_without_hits(readings, choices, log)
+        _refuse_without_hits(readings, log)
     whole = [reading for reading in hits if None not in _values(reading.shot)]
     for reading in hits:
         if None in _values(reading.shot):
@@ -147,7 +147,7 @@ def _targets(control, others, of_hits, choices, known, leave_out):
     return tuple(again), tuple(ties)
 
 
-def _refuse_without_hits(readings, choices, log):
+def _refuse_without_hits(readings, log):
     """Report that no reading is a hit."""
     names = _join_ranges([reading.shot.point for reading in readings])
     shown = [*names[:MOST_NAMES], *(["..."] if len(names) > MOST_NAMES else [])]

@@ -267,13 +267,14 @@ def _steps(former, new, facts, densities, zero, rows, until="rounding"):
     before = interpolate_volume(former, dips)
     basis = interpolate_volume(former, dips + zero)
     steps = {"zero": Step(basis - before, "done")}
-    for name, make in (
-        ("temperature", _temperature_step),
-        ("head", _head_step),
-        ("roof", _roof_step),
-        ("rounding", _rounding_step),
-    ):
-        steps[name] = make(former, new, facts, densities, zero, dips, basis)
+    makers = {
+        "temperature": lambda basis: _temperature_step(former, new, facts, dips, basis),
+        "head": lambda basis: _head_step(former, facts, densities, zero, dips, basis),
+        "roof": lambda _: _roof_step(former, new, zero, dips),
+        "rounding": lambda basis: _rounding_step(former, new, dips, basis),
+    }
+    for name, make in makers.items():
+        steps[name] = make(basis)
         basis = basis + steps[name].added_m3
         if name == until:
             break
@@ -290,7 +291,7 @@ def _missing_keys(*pairs):
     return tuple(name for name, value in pairs if value is None)
 
 
-def _temperature_step(former, new, facts, densities, zero, dips, basis):
+def _temperature_step(former, new, facts, dips, basis):
     former_c, new_c = former.reference_temperature_c, new.reference_temperature_c
     values = {"former": former_c, "new": new_c}
     lacking = _missing_keys(
@@ -312,7 +313,7 @@ def _temperature_step(former, new, facts, densities, zero, dips, basis):
     return Step(added, "done", "declared", **values)
 
 
-def _head_step(former, new, facts, densities, zero, dips, basis):
+def _head_step(former, facts, densities, zero, dips, basis):
     former_head, new_head = densities
     values = {"former": former_head.kg_m3, "new": new_head.kg_m3}
     lacking = _missing_keys(
@@ -336,7 +337,7 @@ def _head_step(former, new, facts, densities, zero, dips, basis):
     return Step(after - before, "done", source, **values)
 
 
-def _roof_step(former, new, facts, densities, zero, dips, basis):
+def _roof_step(former, new, zero, dips):
     former_roof, new_roof = former.roof, new.roof
     if former_roof is None and new_roof is None:
         return _no_change(dips, "same")
@@ -363,7 +364,7 @@ def _displacement_m3(roof):
     return float(part.displacement_m3())
 
 
-def _rounding_step(former, new, facts, densities, zero, dips, basis):
+def _rounding_step(former, new, dips, basis):
     digit = new.volume_quantum_m3
     values = {"former": former.volume_quantum_m3, "new": digit}
     if digit == 0:

@@ -73,7 +73,7 @@ def read_former(path, former_toml=None) -> FormerTable:
         raise AssertionError("no rows and no problem")
     record = _load_record(path)
     if record is None:
-        former = _table_from_rows(path, rows, declared, log)
+        former = _table_from_rows(rows, declared, log)
     else:
         former = _table_from_record(path, record, declared, log)
     log.stop_if_problems()
@@ -140,7 +140,7 @@ def _load_record(path):
     return load(path) if path.suffix.lower() == ".json" or start[:1] == b"{" else None
 
 
-def _table_from_rows(path, rows, declared, log):
+def _table_from_rows(rows, declared, log):
     """Return the FormerTable of rows and of declared facts."""
     height = rows.height_m
     if rows.is_ullage:

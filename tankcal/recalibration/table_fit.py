@@ -157,11 +157,13 @@ class State:
         return replace(self, **changes)
 
     def design(self, dips_m):
-        """Derivatives (rows, u) of `volume_m3` by the unknowns."""
+        """Derivatives (rows, u) of `volume_m3` by the unknowns, in the order of `layout`."""
+        # The last row is h_0: the model contains W(h) - W(h_0), and so do its derivatives.
         dips = np.append(dips_m, self.lowest_m)
         by_radius, by_density, by_edge = self.rings.derivatives(
             dips, self.radii_m, self.density_kg_m3
         )
+        # A higher zero shifts all edges together.
         by_bulge, by_zero = np.zeros((len(dips), 0)), by_edge.sum(axis=1, keepdims=True)
         if self.bulges_m is not None:
             by_bulge, *more = bulge_derivatives(self.rings, dips, self.radii_m, self.bulges_m)
@@ -178,8 +180,8 @@ class State:
             columns.append(by_edge[:, 1:])
         columns += [by_bulge]
         columns += [fitting.derivatives(dips) for fitting in self.fittings]
-        relative = np.hstack(columns)
-        parts = [relative[:-1] - relative[-1]]
+        columns_of_rows = np.hstack(columns)
+        parts = [columns_of_rows[:-1] - columns_of_rows[-1]]
         if "base" in self.free:
             parts.insert(0, np.ones((len(dips_m), 1)))
         if self.roof_zone_m is not None:
@@ -249,6 +251,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     SolutionError
         If the rows do not determine the unknowns.
     """
+    # Unknowns that the rows cannot determine are fixed; all others move.
     held, known, about, sds = _priors(state)
     moving = np.setdiff1d(np.arange(len(state.unknowns)), held)
     observed = np.concatenate([volumes_m3, about])
@@ -257,6 +260,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     rows = np.eye(len(state.unknowns))[known][:, moving]
 
     def misclosure(now):
+        """Model minus observations, of the rows and of the priors."""
         return np.concatenate([now.volume_m3(dips_m), now.unknowns[known]]) - observed
 
     now, w = state, misclosure(state)
@@ -301,7 +305,7 @@ def _linear_model(w, design):
 def _priors(state):
     """Return fixed unknowns, and unknowns with weak priors, their values and sds."""
     layout = state.layout
-    sds, held = {}, []
+    sds, held = {}, []  # sds: {place of the unknown: sd of its prior}
     density_sd = state.density_sd_kg_m3
     zero_sd = ZERO_SD_M if state.bulges_m is None else BULGED_ZERO_SD_M
     for name, sd in (("zero", zero_sd), ("seams", SEAM_SD_M), ("density", density_sd)):
@@ -317,6 +321,7 @@ def _priors(state):
             else:
                 sds[place + edge] = KINK_SD_M
     known = np.array(list(sds), dtype=int)
+    # Priors are centred on the start values, those of zero and bulges on 0.
     about = state.unknowns[known]
     for name in ("zero", "bulges"):
         about[np.isin(known, np.arange(len(state.unknowns))[layout[name]])] = 0.0

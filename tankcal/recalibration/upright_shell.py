@@ -64,6 +64,7 @@ class Rings:
     def volume_m3(self, dips_m, radii_m, density_kg_m3):
         """Volume W(h), shape (rows,), m3; 0 below the first ring."""
         first, second, third = self._powers(dips_m)
+        # widening of a ring per metre of liquid above, K rho
         soft = self.compliance_m(radii_m) * density_kg_m3
         linear = first @ radii_m**2 + second @ (radii_m * soft)
         return np.pi * (linear + third @ (soft**2 / 3))
@@ -76,6 +77,7 @@ class Rings:
         first, second, third = self._powers(dips_m)
         compliance = self.compliance_m(radii_m)
         soft = compliance * density_kg_m3
+        # K is proportional to r^2, so d(r K)/dr = 3 K and d(K^2)/dr = 4 K^2 / r.
         by_radius = np.pi * (
             2 * first * radii_m + 3 * second * soft + 4 / 3 * third * soft**2 / radii_m
         )
@@ -94,6 +96,7 @@ class Rings:
 
         The free surface plus the widening of the wall below.
         """
+        # Heads at the bottom and at the top of the wet part of each ring.
         high = np.maximum(np.asarray(dips_m)[:, None] - self.edges_m[:-1], 0.0)
         low = self._low(dips_m)
         soft = self.compliance_m(radii_m) * density_kg_m3
@@ -109,6 +112,7 @@ class Rings:
         return np.pi * (radii_m**2 + 2 * radii_m * soft * head + square)
 
     def _low(self, dips_m):
+        """Head (rows, n) at the top of the wet part of each ring; the last ring has no top."""
         low = np.maximum(np.asarray(dips_m)[:, None] - self.edges_m[1:], 0.0)
         low[:, -1] = 0.0
         return low
@@ -216,10 +220,12 @@ def bulge_derivatives(rings: Rings, dips_m, radii_m, bulges_m):
     unit, zeta, p, is_inside = _unit_volumes(rings, dips_m, radii_m)
     by_radius = np.einsum("rcj,cj->rc", unit, bulges_m) / radii_m
     profile = np.einsum("rcj,cj->rc", p, bulges_m) * is_inside
+    # Both edges of a course scale its height, and they shift zeta of the dips within it.
     half = by_radius * radii_m / np.diff(rings.edges_m)
     lower = -half - np.pi * radii_m * (1 - zeta) * profile
     upper = half - np.pi * radii_m * (1 + zeta) * profile
     by_zero = (lower + upper).sum(axis=1, keepdims=True)
+    # The upper edge of a course is the lower edge of the next one.
     lower[:, 1:] += upper[:, :-1]
     return unit.reshape(len(unit), -1), by_radius, lower, by_zero
 
@@ -267,6 +273,7 @@ def show_bulges(dips_m, volumes_m3, sd_m3, edges_m):
 
 
 def _least_chi2(basis, value):
+    """Return the smallest sum of squares of value - basis b for any b."""
     q = np.linalg.qr(basis)[0]
     left = value - q @ (q.T @ value)
     return float(left @ left)
