@@ -183,10 +183,10 @@ def _run_tasks(waiting, journal, batch, callbacks, workers, worker_bytes):
         return
     settings = {ALLOWED_FAILURES: 0}  # TRIES limits the attempts instead
     with open_client(workers, worker_bytes=worker_bytes, settings=settings) as client:
-        _ByWorkers(client, journal, ended).do(waiting)
+        _WorkerRuns(client, journal, ended).do(waiting)
 
 
-class _ByWorkers:
+class _WorkerRuns:
     """Execution of tasks by workers: a few are submitted at a time."""
 
     def __init__(self, client, journal, ended):
@@ -241,7 +241,7 @@ class _ByWorkers:
             future.release()
         if result is not None:
             self._report_ended(task, *result)
-        elif self._is_tried_again(task):
+        elif self._may_try_again(task):
             self._submit(task)
         else:
             text = message(
@@ -252,7 +252,7 @@ class _ByWorkers:
             )
             self._report_ended(task, *fail_job(task, Problem(task.job.name, text)))
 
-    def _is_tried_again(self, task):
+    def _may_try_again(self, task):
         """Return whether a job may have been on a dead worker without causing its death."""
         self._deaths[task.job.name] += 1
         return (
