@@ -26,7 +26,7 @@ from tankcal.camera.model import (
     AFFINITIES,
     CONVENTIONS,
     Form,
-    balanced_about,
+    balance_about,
     correct_image_points,
     distort_image_points,
 )
@@ -240,7 +240,7 @@ def test_a_calibration_against_itself(seven, method, as_published):
 def test_the_same_bundle_in_another_dress():
     """Property: balanced about another radius (another c and K) it is the same camera in space."""
     form = Form("correction_added", "both_y")
-    q, other = balanced_about(Q, form, 2.5)
+    q, other = balance_about(Q, form, 2.5)
     assert abs(q[0] - Q[0]) > 0.01
     base = setup("a")
     first = replace(base, camera=replace(base.camera, values=Q, form=form))

@@ -10,7 +10,7 @@ from tankcal.camera.model import (
     AFFINITIES,
     CONVENTIONS,
     Form,
-    balanced_about,
+    balance_about,
     correct_image_points,
     distort_image_points,
 )
@@ -160,7 +160,7 @@ def test_balanced_form_both_ways(convention, affinity):
     q, form = Q, Form(convention, affinity, 0.0)
     expected = distort_image_points(q[0] * points[:, :2], q, form)
     for radius in (40.0, 25.0, 0.0):
-        q, form = balanced_about(q, form, radius)
+        q, form = balance_about(q, form, radius)
         assert form.radial_balance_mm == radius
         assert distort_image_points(q[0] * points[:, :2], q, form) == pytest.approx(
             expected, abs=1e-11

@@ -24,7 +24,7 @@ from tankcal.camera.formats.frame import (
     pixels_to_mm,
     rays_of,
 )
-from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balanced_about
+from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balance_about
 
 RADIAL = ("K1", "K2", "K3", "K4")
 DECENTRING = ("P1", "P2", "P3", "P4")
@@ -166,7 +166,7 @@ def _convert_exactly(camera: FramedCamera, has):
     """Brown by formula, or None if a required term is not available."""
     if CONVENTIONS[camera.form.convention]:
         return None
-    q = balanced_about(camera.interior, camera.form, 0.0)[0]
+    q = balance_about(camera.interior, camera.form, 0.0)[0]
     # Parameters without a counterpart must be zero.
     missing = [*q[3 + has.radial : 7], *q[7 + has.decentring : 11], *q[11:]]
     width, height = camera.pixel_mm
@@ -178,7 +178,7 @@ def _convert_exactly(camera: FramedCamera, has):
 def _fit_brown(camera, has, rays, points):
     """Brown by a fit with square pixels of the height of the camera's pixels."""
     side = camera.pixel_mm[1]
-    start = balanced_about(camera.interior, camera.form, 0.0)[0]
+    start = balance_about(camera.interior, camera.form, 0.0)[0]
     if CONVENTIONS[camera.form.convention] > 0:
         # A correction added to the measured point has the opposite sign of a distortion.
         start[3:9] *= -1

@@ -27,7 +27,7 @@ from tankcal.camera.formats.frame import (
     pixels_to_mm,
     rays_of,
 )
-from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balanced_about, rescale_interior
+from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balance_about, rescale_interior
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
@@ -280,7 +280,7 @@ def _convert_values(values, camera, to_form, used, may_turn):
     extras = ("turn",) if may_turn else ()
     result = fit(rays_of(source, points), image_mm, camera.pixel_mm, plain, start, names, extras)
     return (
-        balanced_about(result.interior, plain, to_form.radial_balance_mm)[0],
+        balance_about(result.interior, plain, to_form.radial_balance_mm)[0],
         result.turn_rad,
         False,
     )
@@ -293,7 +293,7 @@ def _usual_names(values):
 
 def _first_values(values, form, to_form):
     """Start values (13,) of the form without a balance: first-order, without A and B."""
-    plain = balanced_about(values, form, 0.0)[0]
+    plain = balance_about(values, form, 0.0)[0]
     if (CONVENTIONS[form.convention] > 0) != (CONVENTIONS[to_form.convention] > 0):
         plain[list(TURNS_ROUND)] *= -1
     plain[[11, 12]] = 0.0
@@ -306,7 +306,7 @@ def _convert_exactly(values, form, to_form):
     # A distortion of the ideal point has no closed inverse.
     if abs(sign) != abs(to_sign):
         return None
-    plain = balanced_about(values, form, 0.0)[0]
+    plain = balance_about(values, form, 0.0)[0]
     if sign != to_sign:
         plain[list(TURNS_ROUND)] *= -1
         if form.affinity != "before_distortion":
@@ -315,7 +315,7 @@ def _convert_exactly(values, form, to_form):
     if plain is None:
         return None
     unbalanced_form = Form(to_form.convention, to_form.affinity)
-    return balanced_about(plain, unbalanced_form, to_form.radial_balance_mm)[0]
+    return balance_about(plain, unbalanced_form, to_form.radial_balance_mm)[0]
 
 
 def _replace_affinity(plain, affinity, to_form):
