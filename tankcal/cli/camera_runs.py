@@ -164,10 +164,10 @@ def convert(options):
 
 def _convert_to_form(form, cameras, covariances):
     """Return [(name, FramedCamera)] in the form of a publication, and covariances or None."""
-    from tankcal.camera.formats.published import camera_in_form
+    from tankcal.camera.formats.published import convert_to_publication
 
     converted = [
-        (name, *camera_in_form(camera, form, covariance))
+        (name, *convert_to_publication(camera, form, covariance))
         for (name, camera), covariance in zip(cameras, covariances, strict=True)
     ]
     return [(name, camera) for name, camera, _ in converted], [after for *_, after in converted]

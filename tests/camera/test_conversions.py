@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tankcal.camera.formats import balanced, colmap, metashape, pix4d
-from tankcal.camera.formats.frame import frame_points, image_of, make_framed_camera, rays_of
+from tankcal.camera.formats.frame import frame_points, make_framed_camera, project_rays, trace_rays
 from tankcal.camera.formats.opencv import OpenCV, distort_rays, from_opencv, to_opencv
 from tankcal.camera.model import Form
 from tankcal.errors import SolutionError
@@ -57,11 +57,11 @@ def test_opencv_as_documented(camera, ratio):
     size, f, cx, cy, k, p = camera
     matrix = np.array([[f * ratio, 0, cx], [0, f, cy], [0, 0, 1]])
     own = from_opencv(OpenCV(matrix, np.array([k[0], k[1], *p, k[2]])), 0.004, size)
-    rays = rays_of(own, frame_points(size))
+    rays = trace_rays(own, frame_points(size))
     along, down = brown(rays, k[:3], *p)
     assert off_px(f * ratio * along + cx, f * down + cy, size) < SAME_PX
     again = from_opencv(to_opencv(own), 0.004, size)
-    assert np.abs(image_of(again, rays) - frame_points(size)).max() < SAME_PX
+    assert np.abs(project_rays(again, rays) - frame_points(size)).max() < SAME_PX
     assert own.error_px < SAME_PX
     assert to_opencv(own).error_px < SAME_PX
 
@@ -88,7 +88,7 @@ def test_opencv_projects_the_same(count, figure):
     full[:count] = k
     plane = np.column_stack(distort_rays(x, y, full)) * [3300, 3320] + [2290, 1750]
     assert np.abs(plane - seen).max() < SAME_PX
-    off = np.hypot(*(image_of(own, np.column_stack([x, -y])) - seen).T)
+    off = np.hypot(*(project_rays(own, np.column_stack([x, -y])) - seen).T)
     inside = np.all((seen >= 0) & (seen <= np.array(SIZE) - 1), axis=1)
     figure(f"OpenCV's {count} coefficients as tankcal's, over the frame", f"{own.error_px:.1e} px")
     assert off[inside].max() <= max(1.02 * own.error_px, SAME_PX)
@@ -106,7 +106,7 @@ def test_colmap_as_documented(camera, model):
     names = colmap.MODELS[model]
     given_ = colmap.Colmap(model, size, tuple(float(values[name]) for name in names))
     own = colmap.from_colmap(given_, 0.005)
-    rays = rays_of(own, frame_points(size))
+    rays = trace_rays(own, frame_points(size))
     has = {name: values[name] if name in names else 0.0 for name in values}
     along, down = brown(rays, (has["k1"], has["k2"], has["k3"]), has["p1"], has["p2"])
     u, v = (has["fx"] or f) * along + cx, f * down + cy
@@ -114,7 +114,7 @@ def test_colmap_as_documented(camera, model):
     back = colmap.to_colmap(own, model)
     assert back.error_px < SAME_PX
     again = colmap.from_colmap(back, 0.005)
-    assert np.abs(image_of(again, rays) - frame_points(size)).max() < SAME_PX
+    assert np.abs(project_rays(again, rays) - frame_points(size)).max() < SAME_PX
     simplest = colmap.to_colmap(own)
     assert simplest.error_px < SAME_PX
     assert len(simplest.params) <= len(names)
@@ -156,7 +156,7 @@ def test_metashape_as_documented(camera, affinity, more):
     offset = (cx - size[0] / 2, cy - size[1] / 2)
     given_ = metashape.Metashape(size, f, *offset, affinity * f, 0.0, tuple(k), (*p, *p34))
     own = metashape.from_metashape(given_, 0.003)
-    rays = rays_of(own, frame_points(size))
+    rays = trace_rays(own, frame_points(size))
     u, v = metashape_image(rays, given_)
     assert off_px(u - 0.5, v - 0.5, size) < SAME_PX
     back = metashape.to_metashape(own)
@@ -173,7 +173,7 @@ def test_metashape_skew_states_its_error(figure):
     )
     own = metashape.from_metashape(given_, PIXEL)
     finer = frame_points(SIZE, (93, 71))
-    u, v = metashape_image(rays_of(own, finer), given_)
+    u, v = metashape_image(trace_rays(own, finer), given_)
     off = np.hypot(u - 0.5 - finer[:, 0], v - 0.5 - finer[:, 1]).max()
     figure("Metashape's B2 of 4 px as A and B, over the frame", f"{own.error_px:.1e} px")
     assert 1e-3 < own.error_px < 0.2
@@ -194,7 +194,7 @@ def test_pix4d_as_documented(camera):
     sensor = (size[0] * pixel, size[1] * pixel)
     given_ = pix4d.Pix4D(sensor, f * pixel, cx * pixel, cy * pixel, tuple(k[:3]), tuple(p))
     own = pix4d.from_pix4d(given_, size)
-    rays = rays_of(own, frame_points(size))
+    rays = trace_rays(own, frame_points(size))
     along, down = brown(rays, k[:3], *p)
     u, v = cx + f * along, cy + f * down
     assert off_px(u - 0.5, v - 0.5, size) < SAME_PX
@@ -226,7 +226,7 @@ def test_published_pix4d_camera_agrees_with_pessoa(figure):
         for s2 in (1, -1):
             t1, t2 = FRAME_1.t
             other = pix4d.from_pix4d(replace(FRAME_1, t=(s1 * t1, s2 * t2)), SIZE)
-            apart = (rays_of(own, points) - rays_of(other, points)) * own.interior[0] / pixel
+            apart = (trace_rays(own, points) - trace_rays(other, points)) * own.interior[0] / pixel
             rms[s1, s2] = np.sqrt(np.mean(np.sum(apart**2, axis=1)))
     figure("P frame 1 against P table 6 set 2, rms", f"{rms[1, 1]:.1f} px")
     assert rms[1, 1] < 10
@@ -252,7 +252,7 @@ def test_balanced_form_of_aicon():
     plain = np.array([24.1, 0.1, -0.05, -1e-4, 1.2e-7, -3e-11, 0, 4e-6, -3e-6, 0, 0, 1e-4, -5e-5])
     own = make_framed_camera(plain, Form(), 0.006, (6000, 4000))
     points = frame_points(own.size_px)
-    rays = rays_of(own, points)
+    rays = trace_rays(own, points)
     for radius in (0.0, 12.0, 14.5):
         found = balanced.to_balanced(own, radius)
         assert found.values["Ck"] < 0
@@ -260,7 +260,7 @@ def test_balanced_form_of_aicon():
         x, y = aicon_image(rays, found.values)
         assert off_px(x / 0.006 + 2999.5, -y / 0.006 + 1999.5, own.size_px) < SAME_PX
         back = balanced.from_balanced(found, 0.006, own.size_px)
-        assert np.abs(image_of(back, rays) - points).max() < SAME_PX
+        assert np.abs(project_rays(back, rays) - points).max() < SAME_PX
         again = balanced.to_balanced(back, 0.0)
         assert [again.values[key] for key in balanced.KEYS] == pytest.approx(
             [balanced.to_balanced(own, 0.0).values[key] for key in balanced.KEYS], rel=1e-11

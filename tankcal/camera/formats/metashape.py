@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 from tankcal.camera.formats.brown import Brown, from_brown, to_brown
 from tankcal.camera.formats.texts import (
+    duplicate_message,
     exact_text,
-    given_twice,
+    report_wrong_root,
     short_text,
-    tell_outermost,
     xml_root,
 )
 from tankcal.messages import message
@@ -133,9 +133,9 @@ def parse(text, notes):
     found = {}
     for child in root:
         if child.tag in found:
-            notes.tell(given_twice(), key=short_text(child.tag))
+            notes.add(duplicate_message(), key=short_text(child.tag))
         elif child.tag not in (*TERMS, *OTHERS, *OLD):
-            notes.tell(
+            notes.add(
                 message(
                     "convert_metashape_unknown", "unknown; expected the keys of a frame camera"
                 ),
@@ -144,7 +144,7 @@ def parse(text, notes):
         found[child.tag] = (child.text or "").strip()
     kind = found.get("projection", "frame")
     if kind != "frame":
-        notes.tell(
+        notes.add(
             message(
                 "convert_metashape_kind",
                 "{kind}; only frame cameras are read",
@@ -159,7 +159,7 @@ def parse(text, notes):
             "convert_metashape_old",
             "a form of PhotoScan before 1.2; open it in Metashape and save it again",
         )
-        notes.tell(expected, key=next(key for key in OLD if key in found))
+        notes.add(expected, key=next(key for key in OLD if key in found))
         return None
     # Values that are missing or wrong are replaced, so that all problems are found in one run.
     size = tuple(_read_required(found, key, notes.count, notes) for key in ("width", "height"))
@@ -170,7 +170,7 @@ def parse(text, notes):
     camera = Metashape(size, f, *terms[:4], tuple(terms[4:8]), tuple(terms[8:]))
     # f + B1 is the focal length in x, which must be positive.
     if f + terms[2] <= 0:
-        notes.tell(
+        notes.add(
             message(
                 "convert_metashape_shear",
                 "{found:g} beside f = {f:g}; expected less in magnitude",
@@ -190,7 +190,7 @@ def _calibration_root(text, notes):
             "convert_metashape_root",
             "expected calibration: save it in Tools, Camera Calibration, as Agisoft XML",
         )
-        tell_outermost(root, expected, notes)
+        report_wrong_root(root, expected, notes)
         return None
     return root
 
@@ -198,12 +198,12 @@ def _calibration_root(text, notes):
 def _read_required(texts, key, read, notes):
     """Value of a required key, read by `read`; 2 for a missing value, with a problem."""
     if texts.get(key, "") == "":
-        notes.tell(message("convert_metashape_missing", "missing; expected a number"), key=key)
+        notes.add(message("convert_metashape_missing", "missing; expected a number"), key=key)
         return 2
     return read(texts[key], key=key)
 
 
-def text_of(camera):
+def format_text(camera):
     """XML of a Metashape camera; k4, p3 and p4 are omitted if zero."""
     values = dict(zip(TERMS, (camera.cx, camera.cy, camera.b1, camera.b2), strict=False))
     values |= dict(zip(TERMS[4:], (*camera.k, *camera.p), strict=True))

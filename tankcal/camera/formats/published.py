@@ -25,7 +25,7 @@ from tankcal.camera.formats.frame import (
     frame_points,
     make_framed_camera,
     pixels_to_mm,
-    rays_of,
+    trace_rays,
 )
 from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balance_about, rescale_interior
 from tankcal.errors import SolutionError
@@ -41,7 +41,7 @@ TURNS_ROUND = (3, 4, 5, 6, 7, 8)  # parameters K1..K4, P1, P2, which change thei
 
 
 @dataclass(frozen=True)
-class Converted:
+class Conversion:
     """Camera in another form.
 
     Attributes
@@ -95,7 +95,7 @@ def convert_camera(
 
     Returns
     -------
-    Converted
+    Conversion
 
     Raises
     ------
@@ -110,7 +110,7 @@ def convert_camera(
     converted, turn, is_exact = convert(camera.interior)
     points = frame_points(size_px)
     # Errors compare the images of equal rays.
-    rays = _rotate_rays(rays_of(camera, points), turn)
+    rays = _rotate_rays(trace_rays(camera, points), turn)
     distances = differences_px(
         make_framed_camera(converted, to_form, camera.pixel_mm, size_px), rays, points
     )
@@ -120,12 +120,12 @@ def convert_camera(
         new_covariance = propagate_by_differences(
             lambda values: convert(values)[0], camera.interior, covariance
         )
-    return Converted(
+    return Conversion(
         converted, to_form, float(distances.max()), rms, is_exact, new_covariance, turn
     )
 
 
-def camera_in_form(camera, name, covariance=None):
+def convert_to_publication(camera, name, covariance=None):
     """Convert a FramedCamera to the form of a publication.
 
     Parameters
@@ -191,7 +191,7 @@ def _restore_unknown(new_covariance, camera, values, covariance):
 def _effect_px(camera, changes):
     """Largest change (13,) of the image over the frame for each change (13,) of a parameter, px."""
     points = frame_points(camera.size_px)
-    rays = rays_of(camera, points)
+    rays = trace_rays(camera, points)
     changed = camera.interior + np.diag(changes)
     return np.array(
         [
@@ -264,7 +264,7 @@ def _standard_deviations(covariance, count):
 
 
 def _convert_values(values, camera, to_form, used, may_turn):
-    """Converted interior parameters, rotation (rad), and whether the conversion is exact."""
+    """Conversion interior parameters, rotation (rad), and whether the conversion is exact."""
     excluded = [i for i, name in enumerate(PARAMETERS) if used is not None and name not in used]
     exact = _convert_exactly(values, camera.form, to_form)
     if exact is not None and not np.any(exact[excluded]):
@@ -278,7 +278,7 @@ def _convert_values(values, camera, to_form, used, may_turn):
     # The fit uses the form without a balance; balancing afterwards is exact.
     plain = Form(to_form.convention, to_form.affinity)
     extras = ("turn",) if may_turn else ()
-    result = fit(rays_of(source, points), image_mm, camera.pixel_mm, plain, start, names, extras)
+    result = fit(trace_rays(source, points), image_mm, camera.pixel_mm, plain, start, names, extras)
     return (
         balance_about(result.interior, plain, to_form.radial_balance_mm)[0],
         result.turn_rad,
@@ -301,7 +301,7 @@ def _first_values(values, form, to_form):
 
 
 def _convert_exactly(values, form, to_form):
-    """Converted interior parameters (13,) by formula, or None without a formula."""
+    """Conversion interior parameters (13,) by formula, or None without a formula."""
     sign, to_sign = CONVENTIONS[form.convention], CONVENTIONS[to_form.convention]
     # A distortion of the ideal point has no closed inverse.
     if abs(sign) != abs(to_sign):
