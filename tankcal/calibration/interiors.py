@@ -61,7 +61,7 @@ class Interior:
     shared: bool = False
 
 
-def interiors_of(adjustment, measurements=None):
+def collect_interiors(adjustment, measurements=None):
     """Return the interior orientations of an adjustment, with covariances scaled as in it.
 
     Parameters
@@ -130,7 +130,7 @@ def _pair_of_setup(setup, name):
     return None if values is None else np.array(values, dtype=float)
 
 
-def sets_to_be(measurements, camera=None, photo=None):
+def count_sets(measurements, camera=None, photo=None):
     """Predict the number of sets of interior parameters of an adjustment.
 
     Parameters
@@ -158,7 +158,7 @@ def sets_to_be(measurements, camera=None, photo=None):
     return len(separate) + len({item.camera for item in photos} - with_photo_scope)
 
 
-def photos_in(record):
+def read_photos(record):
     """Return {photo: camera} of a record (dict); raise InputError if the list is missing."""
     try:
         return {photo["photo"]: photo["camera"] for photo in record["adjustment"]["photos"]}
@@ -228,7 +228,7 @@ def select_interiors(interiors, photos, camera=None, photo=None):
     )
 
 
-def framed_in(record, pixel_mm=None):
+def read_framed_cameras(record, pixel_mm=None):
     """Return the cameras of a record and their covariances.
 
     Parameters
@@ -252,7 +252,7 @@ def framed_in(record, pixel_mm=None):
         If the format of a camera is missing.
     """
     cameras, covariances, problems = [], [], []
-    for interior in interiors_in(record):
+    for interior in read_interiors(record):
         if interior.format_mm is None:
             problems.append(
                 _problem(
@@ -289,7 +289,7 @@ def _embed_covariance(names, covariance):
     return matrix
 
 
-def interiors_in(record):
+def read_interiors(record):
     """Return the Interior objects of a record (dict); raise InputError for an invalid record."""
     adjustment = record.get("adjustment") if isinstance(record, dict) else None
     if not isinstance(adjustment, dict):

@@ -23,9 +23,9 @@ FIRST_WORDS = 200  # bytes
 def parameters(options):
     """Test which additional parameters are significant."""
     prepare_for_small_work()
-    from tankcal.calibration.interiors import sets_to_be
+    from tankcal.calibration.interiors import count_sets
     from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
-    from tankcal.calibration.parameters.findings import Choices
+    from tankcal.calibration.parameters.judgement import Choices
     from tankcal.record.camera_parameters import as_json
 
     show = _start(options)
@@ -39,7 +39,7 @@ def parameters(options):
     else:
         job = _load(options.source, show, options.language)
         if job.measurements is not None:
-            _refuse_several(options, sets_to_be(job.measurements, **of))
+            _refuse_several(options, count_sets(job.measurements, **of))
         analyses = analyse_job(
             job, choices, **of, dropping=not options.no_trials, progress=show.part
         )
@@ -51,7 +51,7 @@ def compare(options):
     """Compare all pairs of calibrations."""
     prepare_for_small_work()
     from tankcal.calibration.stability.comparison import compare as compared
-    from tankcal.calibration.stability.grids import parse
+    from tankcal.calibration.stability.grids import parse_grid
     from tankcal.calibration.stability.terrains import parse_terrain
     from tankcal.job.calibrations import choose, read_cameras, with_pixels
     from tankcal.record.camera_stability import as_json, summary
@@ -64,7 +64,7 @@ def compare(options):
     comparison = compared(
         choose(with_pixels(cameras, pixel_um), options.names, name),
         options.method,
-        grid=None if options.grid is None else parse(options.grid),
+        grid=None if options.grid is None else parse_grid(options.grid),
         terrain=None if options.terrain is None else parse_terrain(options.terrain),
         threshold_px=options.threshold,
         as_published=options.as_published,
@@ -103,7 +103,7 @@ def check(options):
     prepare_for_small_work()
     from tankcal.calibration.product import limits
     from tankcal.calibration.product.check import check_product
-    from tankcal.calibration.product.differences import differences_of, read_differences
+    from tankcal.calibration.product.differences import collect_differences, read_differences
     from tankcal.record.camera_product import as_json
 
     show = _start(options)
@@ -112,13 +112,13 @@ def check(options):
         table = limits.limits_of_scale(table, options.scale)
     job, record = None, _record_of(options.source)
     if record is not None:
-        differences = differences_of(record)
+        differences = collect_differences(record)
     elif Path(options.source).suffix.lower() == ".csv":
         differences = read_differences(options.source, options.separator, options.decimal)
     else:
         job = _load(options.source, show, options.language)
-        differences = differences_of(tankcal.adjust_job(job, show.step))
-    axes, values = differences.of_known_axes()
+        differences = collect_differences(tankcal.adjust_job(job, show.step))
+    axes, values = differences.select_known_axes()
     checked = check_product(
         values, axes, names=differences.names, limits=table, alpha=options.alpha
     )
@@ -175,12 +175,12 @@ def _convert_to_form(form, cameras, covariances):
 
 def _cameras_of(options):
     """Return [(name, FramedCamera)] of a file, and the covariance (13, 13) of each, or None."""
-    from tankcal.calibration.interiors import framed_in
+    from tankcal.calibration.interiors import read_framed_cameras
     from tankcal.camera.formats.reading import read_camera
 
     if options.kind is None and _is_record(options.file):
         pixel_mm = options.pixel_um and options.pixel_um / 1000
-        return framed_in(_record_of(options.file), pixel_mm)
+        return read_framed_cameras(_record_of(options.file), pixel_mm)
     is_register = options.kind is None and Path(options.file).suffix.lower() == ".toml"
     if is_register or options.kind == "cameras.toml":
         return _read_cameras_toml(options.file, options.pixel_um)

@@ -15,17 +15,23 @@ from itertools import combinations
 import numpy as np
 
 from tankcal.calibration.capacity_at_top import TopOfTank, TopVolume
-from tankcal.calibration.influence.blocks import Block, Moved, PhotosMoved, block_of, differences
+from tankcal.calibration.influence.blocks import (
+    Block,
+    PhotoChanges,
+    PositionChanges,
+    compare_blocks,
+    make_block,
+)
 from tankcal.calibration.influence.exchange import (
     FILE,
     STATES,
+    add_pixel_size,
     can_be_weighted,
-    counted_in,
     exchange_calibration,
-    free_parameters,
     leave_out_readings,
-    refuse_others,
+    refuse_unsuitable,
     select_camera,
+    select_free_parameters,
 )
 from tankcal.calibration.product.check import ALPHA
 from tankcal.errors import TankcalError
@@ -83,7 +89,7 @@ class Pair:
     ----------
     one, other : int
         Indices of the runs.
-    points, photos : Moved, PhotosMoved
+    points, photos : PositionChanges, PhotoChanges
         Differences of points and photos.
     aligned : int
         Number of motions that the observations do not determine, removed from the differences.
@@ -93,8 +99,8 @@ class Pair:
 
     one: int
     other: int
-    points: Moved
-    photos: PhotosMoved
+    points: PositionChanges
+    photos: PhotoChanges
     aligned: int
     volume_m3: float | None
     volume_percent: float | None
@@ -184,14 +190,14 @@ def influence(
         raise ValueError(f"found states {states!r}; expected some of {', '.join(STATES)}")
     calibrations = tuple(calibrations)
     setup = select_camera(job, camera)
-    refuse_others(setup, calibrations, file)
-    calibrations = tuple(counted_in(item, calibrations) for item in calibrations)
-    free = free_parameters(setup, calibrations)
+    refuse_unsuitable(setup, calibrations, file)
+    calibrations = tuple(add_pixel_size(item, calibrations) for item in calibrations)
+    free = select_free_parameters(setup, calibrations)
     progress = progress or (lambda text, done, total: None)
     total = 1 + len(calibrations) * len(states)
     progress(message("camera_reference_run", "reference"), 0, total)
     top = TopOfTank(job) if volume and _is_whole(job) else None
-    reference, removed = _run_reference(job, counted_in(setup, calibrations), alpha, top)
+    reference, removed = _run_reference(job, add_pixel_size(setup, calibrations), alpha, top)
     common = leave_out_readings(job.measurements, removed)
     runs = [reference]
     for item in calibrations:
@@ -258,7 +264,7 @@ def _adjust_and_record(job, setup, alpha, initial, top):
     result = replace(
         initial,
         outcome="adjusted",
-        block=block_of(adjustment, setup, alpha),
+        block=make_block(adjustment, setup, alpha),
         volume=volume,
         volume_failed=failed,
     )
@@ -279,7 +285,7 @@ def _make_pairs(runs):
 
 
 def _make_pair(i, j, first, second):
-    points, photos, aligned = differences(first.block, second.block)
+    points, photos, aligned = compare_blocks(first.block, second.block)
     volume = percent = None
     if first.volume is not None and second.volume is not None:
         volume = second.volume.value_m3 - first.volume.value_m3

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from tankcal.calibration.parameters.significance import cholesky_of
+from tankcal.calibration.parameters.significance import factor_correlations
 from tankcal.survey.network import correlations
 
 MATRICES = ("correlation", "covariance")
@@ -95,7 +95,7 @@ def components(names, covariance, values=None, *, of="correlation", unscaled=Fal
         raise ValueError(f"of {of!r}: expected one of {', '.join(MATRICES)}")
     matrix = _check_matrix(names, covariance)
     sd = np.sqrt(np.diag(matrix))
-    lower = cholesky_of(matrix)
+    lower = factor_correlations(matrix)
     weight = np.ones_like(sd) if of == "correlation" else sd
     eigenvalues, vectors = _decompose(correlations(matrix), lower, weight)
     # Loadings c_ij sqrt(lambda_j) / sd(x_i)
@@ -124,7 +124,7 @@ def _decompose(correlation, lower, weight):
     """Eigenvalues (k,), descending, and eigenvectors of W R W, R = L L', W = diag(weight).
 
     They follow from the singular values of W L. The eigenvalues of a covariance of K1 to K3 in mm
-    span thirty powers of ten, and a decomposition of W R W would resolve only sixteen. Without L
+    span thirty powers of ten, and a decomposition of W R W would resolve only sixteen. Prediction L
     (matrix not positive definite), W R W is decomposed, and negative eigenvalues are returned.
     """
     if lower is None:

@@ -25,7 +25,7 @@ from tankcal.survey.network_of_survey import gather
 
 
 @dataclass(frozen=True)
-class Moved:
+class PointChanges:
     """Change of adjusted points between two adjustments; fixed coordinates have zero change.
 
     Attributes
@@ -69,7 +69,7 @@ class Outcome:
         Reason of a failure, or None.
     adjustment : survey.Adjustment or None
         Points, covariances and statistics, without readings; None if the adjustment failed.
-    moved : Moved or None
+    moved : PointChanges or None
         Change of the points by dropping the parameters; None if the adjustment failed.
     volume : TopVolume or None
         Volume, or None if there is no tank or the capacity cannot be computed.
@@ -79,7 +79,7 @@ class Outcome:
     names: tuple
     failed: str | None = None
     adjustment: Adjustment | None = None
-    moved: Moved | None = None
+    moved: PointChanges | None = None
     volume: TopVolume | None = None
 
 
@@ -122,7 +122,7 @@ class Dropping:
         """
         try:
             adjusted = self.adjusted(_drop_from_cameras(self._survey.cameras, camera, names))
-            moved = movement(self.adjustment, adjusted)
+            moved = compare_points(self.adjustment, adjusted)
         except SolutionError as error:
             return Outcome(camera, tuple(names), str(error))
         if self.volume is None:
@@ -159,7 +159,7 @@ class Dropping:
         )
 
 
-def movement(before, after):
+def compare_points(before, after):
     """Compare the common points of two Adjustments, in standard deviations of the first."""
     places = {name: i for i, name in enumerate(after.names)}
     pairs = [(i, places[name]) for i, name in enumerate(before.names) if name in places]
@@ -173,7 +173,7 @@ def movement(before, after):
     relative = np.abs(np.divide(change, sd, out=np.zeros_like(change), where=has_sd))
     size = np.linalg.norm(change, axis=1)
     far, worst = int(np.argmax(size)), int(np.argmax(relative.max(axis=1)))
-    return Moved(
+    return PointChanges(
         count=len(pairs),
         rms_m=float(np.sqrt(np.mean(size**2))),
         largest_m=float(size[far]),
@@ -186,7 +186,7 @@ def movement(before, after):
     )
 
 
-def interior_after(outcome, interior):
+def read_interior_after(outcome, interior):
     """Parameters of a set after an Outcome.
 
     Parameters
