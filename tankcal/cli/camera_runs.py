@@ -258,11 +258,11 @@ def _write_new(target, text):
 def read(options):
     """Measure targets in photographs and write image_points.csv."""
     prepare_for_small_work()
-    from tankcal.calibration.targets import Wanted, read_photographs
+    from tankcal.calibration.targets import TargetSettings, read_photographs
 
     speak(options.language)
     show = Progress(options.quiet)
-    wanted = Wanted(
+    wanted = TargetSettings(
         what=options.what,
         dictionary=options.dictionary,
         names=options.names,
