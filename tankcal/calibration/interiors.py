@@ -42,7 +42,7 @@ class Interior:
         Whether the format was declared.
     format_mm : ndarray, shape (2,), or None
         Width and height of the image, mm.
-    shared : bool
+    is_shared : bool
         Whether other sets share some of the parameters. Dropping a parameter then changes more
         than this set.
     """
@@ -58,7 +58,7 @@ class Interior:
     frame: Frame
     frame_known: bool
     format_mm: np.ndarray | None = None
-    shared: bool = False
+    is_shared: bool = False
 
 
 def collect_interiors(adjustment, measurements=None):
@@ -83,32 +83,51 @@ def collect_interiors(adjustment, measurements=None):
     for photo, places in enumerate(adjusted.problem.interior_of.tolist()):
         sets.setdefault((int(survey.photos.camera[photo]), tuple(places)), []).append(photo)
     setups = {setup.camera.name: setup for setup in getattr(measurements, "cameras", ())}
+    cameras_of_sets = [camera for camera, _ in sets]
     return tuple(
         _make_interior(
-            adjustment, setups, camera, photos, _has_several_sets(sets, camera), len(sets) > 1
+            adjustment, setups, camera, photos, cameras_of_sets.count(camera) > 1, len(sets) > 1
         )
         for (camera, _), photos in sets.items()
     )
 
 
-def _has_several_sets(sets, camera):
-    return sum(camera_of_set == camera for camera_of_set, _ in sets) > 1
+def _make_interior(adjustment, setups, number, photos, is_part, has_others):
+    """Create an Interior.
 
+    Parameters
+    ----------
+    adjustment : survey.Adjustment
+        The adjusted survey.
+    setups : dict
+        {name: job.CameraSetup}.
+    number : int
+        Number of the camera in the survey.
+    photos : list of int
+        Numbers of the photos of the set.
+    is_part : bool
+        Whether the camera has other sets.
+    has_others : bool
+        Whether the adjustment has other sets.
 
-def _make_interior(adjustment, setups, number, photos, part, others):
+    Returns
+    -------
+    Interior
+    """
     adjusted = adjustment.adjusted
     camera = adjusted.survey.cameras[number]
     values, free, cofactors = adjusted.camera(photos[0])
     setup = setups.get(camera.name)
     size = _pair_of_setup(setup, "format_mm")
-    common = others and any(scope == "block" for scope in camera.scope)
+    is_common = has_others and any(scope == "block" for scope in camera.scope)
+    # Without a declared format, the frame extends to the farthest image points.
     images = adjusted.survey.image_points
     is_used = np.isin(images.photo, photos) & images.in_use
     measured = images.value[is_used]
     half = np.abs(measured).max(axis=0, initial=0.0) if size is None else np.asarray(size) / 2
     return Interior(
         camera=camera.name,
-        photos=tuple(adjusted.survey.photos.names[i] for i in photos) if part else None,
+        photos=tuple(adjusted.survey.photos.names[i] for i in photos) if is_part else None,
         form=camera.form,
         values=np.array([values[name] for name in PARAMETERS]),
         scope=tuple(camera.scope),
@@ -120,7 +139,7 @@ def _make_interior(adjustment, setups, number, photos, part, others):
         ),
         frame_known=size is not None,
         format_mm=size,
-        shared=part or common,
+        is_shared=is_part or is_common,
     )
 
 
@@ -384,7 +403,7 @@ def _read_interior(entry, cameras):
     values = np.array([value_of.get(name, 0.0) for name in PARAMETERS], dtype=float)
     half = np.array(entry["edge_mm"], dtype=float).reshape(2)
     _refuse_impossible(values, covariance, half)
-    common = len(cameras) > 1 and "block" in scope.values()
+    is_common = len(cameras) > 1 and "block" in scope.values()
     return Interior(
         camera=str(entry["camera"]),
         photos=None if entry["photos"] is None else tuple(entry["photos"]),
@@ -399,7 +418,7 @@ def _read_interior(entry, cameras):
         ),
         frame_known=bool(entry["edge_known"]),
         format_mm=_positive_pair(entry.get("format_mm")),
-        shared=entry["photos"] is not None or common,
+        is_shared=entry["photos"] is not None or is_common,
     )
 
 

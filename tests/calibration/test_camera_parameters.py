@@ -394,7 +394,7 @@ def test_volume_and_points_of_a_job(silva_parameters, silva_result):
     assert volume.U_m3 == pytest.approx(top.U_m3, rel=1e-6)
     for trial in silva_parameters.trials:
         assert trial.outcome.failed is None
-        assert trial.outcome.moved.count == 137
+        assert trial.outcome.changes.count == 137
         assert trial.outcome.volume.points == 120
         assert trial.outcome.adjustment.redundancy == 496 + len(trial.names)
 
@@ -418,7 +418,7 @@ def test_dropping_equals_adjustment_with_parameter_off(a_tank, figure):
     assert outcome.adjustment.sigma0 == pytest.approx(again.sigma0, rel=1e-6)
     assert outcome.adjustment.redundancy == again.redundancy == base.redundancy + 2
     moved = compare_points(base, again)
-    assert moved.rms_m == pytest.approx(outcome.moved.rms_m, rel=1e-3)
+    assert moved.rms_m == pytest.approx(outcome.changes.rms_m, rel=1e-3)
     changes = np.linalg.norm(again.xyz_m - base.xyz_m, axis=1)
     assert moved.largest_point == base.names[int(np.argmax(changes))]
     volume = tankcal.run(replace(job, measurements=with_cameras(
@@ -459,7 +459,7 @@ def test_any_datum_can_be_kept(a_tank, datum):
     base = adjust_survey(measured)
     outcome = Dropping(job_of(a_tank, measured), base).without("camera", ("P2",))
     assert outcome.failed is None
-    assert outcome.moved.rms_sds < 1
+    assert outcome.changes.rms_sds < 1
     assert outcome.adjustment.redundancy == base.redundancy + 1
 
 
@@ -558,7 +558,7 @@ def test_droppable_parameters_are_dropped_together(silva_parameters):
     goes = tuple(one.name for one in silva_parameters.recommendation if not one.keep)
     trial = next(t for t in silva_parameters.trials if "advised" in t.because)
     assert trial.names == goes
-    assert trial.outcome.moved is not None
+    assert trial.outcome.changes is not None
     for one in silva_parameters.recommendation:
         codes = [reason["code"] for reason in one.reasons]
         assert (codes[-1] in ("together_stay", "together_move")) == (not one.keep)

@@ -40,7 +40,7 @@ from tankcal.pipeline.chain import adjust_job
 
 REFERENCE = "reference"
 REASON_LINES = 3  # number of lines kept of the reason why there is no volume
-BAD_END = (TankcalError, np.linalg.LinAlgError)
+EXPECTED_ERRORS = (TankcalError, np.linalg.LinAlgError)
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ def influence(
     progress = progress or (lambda text, done, total: None)
     total = 1 + len(calibrations) * len(states)
     progress(message("camera_reference_run", "reference"), 0, total)
-    top = TopOfTank(job) if volume and _is_whole(job) else None
+    top = TopOfTank(job) if volume and _has_tank(job) else None
     reference, removed = _run_reference(job, add_pixel_size(setup, calibrations), alpha, top)
     common = leave_out_readings(job.measurements, removed)
     runs = [reference]
@@ -209,6 +209,7 @@ def influence(
             )
             runs.append(_run_calibration(job, common, setup, item, state, free, alpha, top))
     progress(message("camera_runs_done", "done"), total, total)
+    adjusted = [number for number, run in enumerate(runs) if run.block is not None]
     return Influence(
         camera=setup.camera.name,
         states=states,
@@ -217,7 +218,7 @@ def influence(
         removed=removed,
         free=free,
         runs=tuple(runs),
-        pairs=_make_pairs(runs),
+        pairs=tuple(_make_pair(i, j, runs[i], runs[j]) for i, j in combinations(adjusted, 2)),
     )
 
 
@@ -253,13 +254,13 @@ def _adjust_and_record(job, setup, alpha, initial, top):
     """
     try:
         adjustment = adjust_job(job)
-    except BAD_END as error:
+    except EXPECTED_ERRORS as error:
         return replace(initial, message=str(error)), None
     volume = failed = None
     if top is not None:
         try:
-            volume = top.of(adjustment)
-        except BAD_END as error:
+            volume = top.compute_volume(adjustment)
+        except EXPECTED_ERRORS as error:
             failed = "; ".join(str(error).splitlines()[:REASON_LINES])
     result = replace(
         initial,
@@ -271,20 +272,15 @@ def _adjust_and_record(job, setup, alpha, initial, top):
     return result, adjustment
 
 
-def _is_whole(job):
+def _has_tank(job):
     """Whether a job contains a complete tank, not only its survey."""
     parts = (job.tank, job.survey, job.datum, job.table)
     shell = job.courses or job.horizontal or job.sphere or job.mesh
     return None not in parts and bool(shell)
 
 
-def _make_pairs(runs):
-    """Create a Pair for any two adjusted runs."""
-    numbers = [i for i, run in enumerate(runs) if run.block is not None]
-    return tuple(_make_pair(i, j, runs[i], runs[j]) for i, j in combinations(numbers, 2))
-
-
 def _make_pair(i, j, first, second):
+    """Create the Pair of two adjusted runs with the numbers i and j."""
     points, photos, aligned = compare_blocks(first.block, second.block)
     volume = percent = None
     if first.volume is not None and second.volume is not None:

@@ -163,7 +163,8 @@ def _run_trials(analyses, job, adjustment, progress):
     progress(message("camera_volume_all", "computing the volume with all parameters"), 0, total)
     dropping = Dropping(job, adjustment)
 
-    def with_outcomes_of(stage):
+    def run_stage(stage):
+        """Change the trials by `stage`, run the new trials, and update the recommendations."""
         staged = tuple(stage(analysis) for analysis in analyses)
         for analysis in staged:
             for trial in analysis.trials:
@@ -184,14 +185,14 @@ def _run_trials(analyses, job, adjustment, progress):
 
     # First drop parameters singly or in groups, then all that are recommended together. While
     # these change the product, hold back one more parameter.
-    analyses = with_outcomes_of(remove_joint_trial)
-    analyses = with_outcomes_of(add_joint_trial)
+    analyses = run_stage(remove_joint_trial)
+    analyses = run_stage(add_joint_trial)
     while any(
         fewer is not analysis
         for fewer, analysis in zip(map(hold_back_worst, analyses), analyses, strict=True)
     ):
         analyses = tuple(advise(hold_back_worst(analysis)) for analysis in analyses)
-        analyses = with_outcomes_of(add_joint_trial)
+        analyses = run_stage(add_joint_trial)
     progress("done", total, total)
     return tuple(advise_together(analysis) for analysis in analyses)
 

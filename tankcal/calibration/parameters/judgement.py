@@ -295,7 +295,9 @@ def _make_trials(interior, names, values, covariance, groups, silva, pessoa):
         if key and "c" not in key and len(key) < len(names):
             because.setdefault(key, []).append(why)
     return tuple(
-        Trial(key, tuple(why), drop_parameters(names, covariance, key, values), not interior.shared)
+        Trial(
+            key, tuple(why), drop_parameters(names, covariance, key, values), not interior.is_shared
+        )
         for key, why in because.items()
     )
 
@@ -315,7 +317,7 @@ def add_joint_trial(analysis):
     trials = list(remove_joint_trial(analysis).trials)
     if dropped and dropped not in [item.names for item in trials]:
         predicted = drop_parameters(analysis.names, analysis.covariance, dropped, analysis.values)
-        trials.append(Trial(dropped, (), predicted, not analysis.interior.shared))
+        trials.append(Trial(dropped, (), predicted, not analysis.interior.is_shared))
     return replace(
         analysis,
         trials=tuple(
@@ -402,21 +404,21 @@ def _correlated_with(analysis, name):
 
 def _failure(trial):
     """Reason why the survey cannot be adjusted without the parameters of a trial, or None."""
-    if trial is None or trial.outcome is None or trial.outcome.moved is not None:
+    if trial is None or trial.outcome is None or trial.outcome.changes is not None:
         return None
     return trial.outcome.failed
 
 
 def _product_change(analysis, trial):
     """Effect of a trial on points and volume as a dict, or None if it is not known."""
-    if trial is None or trial.outcome is None or trial.outcome.moved is None:
+    if trial is None or trial.outcome is None or trial.outcome.changes is None:
         return None
-    moved, after = trial.outcome.moved, trial.outcome.volume
+    points, after = trial.outcome.changes, trial.outcome.volume
     before = None if analysis.base is None else analysis.base[0]
     both = before is not None and after is not None
     return {
-        "largest_sds": moved.largest_sds,
-        "largest_mm": 1e3 * moved.largest_m,
+        "largest_sds": points.largest_sds,
+        "largest_mm": 1e3 * points.largest_m,
         "volume_change_m3": after.value_m3 - before.value_m3 if both else None,
         "volume_u_m3": before.u_m3 if both else None,
     }

@@ -207,7 +207,9 @@ def compare(
     return Stability(
         method=method,
         as_published=as_published,
-        conventions=_conventions(method, as_published, sets, grid, terrain, seed, pairs, known),
+        conventions=_list_conventions(
+            method, as_published, sets, grid, terrain, seed, pairs, known
+        ),
         grid=grid,
         format_px=format_px,
         threshold_px=float(threshold_px),
@@ -477,18 +479,15 @@ def _compare_resection(first, second, terrain, depth_m):
     )
 
 
-def _depends_on_focal_lengths(method, as_published):
-    return method in ("zrot", "spr") or (method == "rot" and not as_published)
-
-
 def _expected_figure(pair, method, as_published, result, known):
     """Expected figure of a pair, px, or None if a calibration has no standard deviations."""
-    needs_c = _depends_on_focal_lengths(method, as_published)
+    # Figures of these methods depend on the focal lengths of both bundles.
+    needs_c = method in ("zrot", "spr") or (method == "rot" and not as_published)
     covariances = [
         camera_covariance(calibration.setup.camera, known.get(calibration.name), needs_c)
         for calibration in pair
     ]
-    if any(calibration is None for calibration in covariances):
+    if any(covariance is None for covariance in covariances):
         return None
     first, second = pair
     parts = [
@@ -497,7 +496,7 @@ def _expected_figure(pair, method, as_published, result, known):
         )
         for calibration in pair
     ]
-    # The figures of these methods depend on both focal lengths, at the scale of the first.
+    # Derivatives by both focal lengths, at the scale of the first.
     if needs_c:
         parts[0][:, :, 0] = -first.ideal_mm / first.c_mm
         parts[1][:, :, 0] = -second.ideal_mm / second.c_mm
@@ -513,7 +512,8 @@ def _expected_figure(pair, method, as_published, result, known):
     return float(np.sqrt(np.mean(np.square(figures))))
 
 
-def _conventions(method, as_published, sets, grid, terrain, seed, pairs, known):
+def _list_conventions(method, as_published, sets, grid, terrain, seed, pairs, known):
+    """Conventions that the figures of all pairs depend on, in the order of reading."""
     unknowns = UNKNOWNS[method]
     if unknowns:
         figure = Convention("figure_sigma0", {"points": grid.size, "unknowns": unknowns})
