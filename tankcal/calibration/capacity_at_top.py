@@ -65,7 +65,7 @@ class TopOfTank:
         job = self.job
         points = wall_points(adjustment, job.measurements, job.survey.side)
         points, snooping = s_transform(points), job.snooping
-        # The selected points are not tested again, so that all runs use the same points.
+        # The selected points are not tested again: they are common to all runs.
         if self._wall is not None:
             points, snooping = _select_points(points, self._wall), False
         table = replace(

@@ -365,8 +365,8 @@ def _show_results(results, options, show, paths, job=None, record=None, printed=
     language = options.language or _find_language(job, record) or language_of_run()
     speak(language)
     _refuse_several(options, len(results))
-    made_from = camera_papers.made_from(paths, job)
-    results = [result | {"made_from": made_from} for result in results]
+    origin = camera_papers.describe_origin(paths, job)
+    results = [result | {"made_from": origin} for result in results]
     written = []
     if options.out is not None:
         written = camera_papers.write(results[0], options.out, show.part, language)

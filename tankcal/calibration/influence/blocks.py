@@ -104,7 +104,7 @@ def make_block(adjustment, setup, alpha=ALPHA):
     place, _, _ = adjusted.photos
     check_points = adjustment.check_points
     differences = None if check_points is None else collect_differences(adjustment)
-    free_motions, centre = _undetermined_motions(adjustment)
+    free_motions, centre = _find_free_motions(adjustment)
     return Block(
         points=adjustment.names,
         xyz_m=np.where(adjustment.fixed & (not free_motions.size), np.nan, adjustment.xyz_m),
@@ -124,7 +124,7 @@ def make_block(adjustment, setup, alpha=ALPHA):
     )
 
 
-def _undetermined_motions(adjustment):
+def _find_free_motions(adjustment):
     """Motions (7, d) that the block can make without its datum, and their centre (3,), m.
 
     There is no such motion (d = 0) if control points define the frame, fixed or not.
@@ -234,15 +234,15 @@ class PhotoChanges(PositionChanges):
     largest_turn_name: str | None
 
 
-def compare_blocks(one, other):
-    """Differences between two blocks, other minus one.
+def compare_blocks(first, second):
+    """Differences between two blocks, second minus first.
 
-    Motions that the observations do not determine (`one.free_motions`) are first removed by a
+    Motions that the observations do not determine (`first.free_motions`) are first removed by a
     least-squares fit to the common points.
 
     Parameters
     ----------
-    one, other : Block
+    first, second : Block
         Blocks to compare.
 
     Returns
@@ -254,13 +254,13 @@ def compare_blocks(one, other):
     aligned : int
         Number of motions removed.
     """
-    points = [name for name in one.points if name in set(other.points)]
-    photos = [name for name in one.photos if name in set(other.photos)]
-    a, b = (_select_rows(block.points, points, block.xyz_m) for block in (one, other))
-    p, q = (_select_rows(block.photos, photos, block.place_m) for block in (one, other))
-    r, s = (_select_rows(block.photos, photos, block.rotation) for block in (one, other))
-    if one.free_motions.shape[1]:
-        b, q, s = _align(one, a, b, q, s)
+    points = [name for name in first.points if name in set(second.points)]
+    photos = [name for name in first.photos if name in set(second.photos)]
+    a, b = (_select_rows(block.points, points, block.xyz_m) for block in (first, second))
+    p, q = (_select_rows(block.photos, photos, block.place_m) for block in (first, second))
+    r, s = (_select_rows(block.photos, photos, block.rotation) for block in (first, second))
+    if first.free_motions.shape[1]:
+        b, q, s = _align(first, a, b, q, s)
     turn = rotation_vector(s @ r.transpose(0, 2, 1)) if photos else np.zeros((0, 3))
     angle = np.linalg.norm(turn, axis=1)
     of_photos = _summarise(q - p, photos)
@@ -273,7 +273,7 @@ def compare_blocks(one, other):
             largest_turn_rad=float(angle.max()) if photos else np.nan,
             largest_turn_name=photos[int(angle.argmax())] if photos else None,
         ),
-        one.free_motions.shape[1],
+        first.free_motions.shape[1],
     )
 
 

@@ -103,9 +103,9 @@ def components(names, covariance, values=None, *, of="correlation", unscaled=Fal
     loadings = vectors * root / weight[:, None]
     vectors, loadings = _orient(vectors, loadings, weight)
     share = 100 * eigenvalues / eigenvalues.sum()
-    given = np.full(len(sd), np.nan) if values is None else np.asarray(values, dtype=float)
+    x = np.full(len(sd), np.nan) if values is None else np.asarray(values, dtype=float)
     if of == "correlation" and not unscaled:
-        given = given / sd
+        x = x / sd
     return Components(
         names=tuple(names),
         of=of,
@@ -115,7 +115,7 @@ def components(names, covariance, values=None, *, of="correlation", unscaled=Fal
         cumulative_percent=np.cumsum(share),
         vectors=vectors,
         loadings=loadings,
-        values=vectors.T @ given,
+        values=vectors.T @ x,
         unscaled=unscaled,
     )
 

@@ -1,8 +1,8 @@
 """New adjustments of a survey without some parameters of a camera, and their effect on the volume.
 
-The dropped parameters are held at zero. The readings are the same: outliers remain rejected, and no
-other reading is rejected. The results therefore differ only by the parameters, and an inadequate
-model appears in sigma0 rather than in rejected readings. The points of the wall are also the same.
+The dropped parameters are held at zero. The readings do not change: outliers remain rejected, and
+no other reading is rejected. The results therefore differ only by the parameters, and an inadequate
+model appears in sigma0 rather than in rejected readings. The points of the wall do not change.
 
 `survey.adjust_survey` is not used, because it searches for outliers: a camera that lacks a
 parameter would produce apparent outliers.

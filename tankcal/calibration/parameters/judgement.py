@@ -380,7 +380,7 @@ def advise(analysis):
             left=(analysis.left.get(name) or (None,))[0],
             state=analysis.interior.state[PARAMETERS.index(name)],
             groups=tuple(group for group in analysis.groups if name in group.names),
-            correlated=_correlated_with(analysis, name),
+            correlated=_find_correlated(analysis, name),
             product=_product_change(analysis, singles.get(name)),
             failed=_failure(singles.get(name)),
         )
@@ -392,7 +392,7 @@ def advise(analysis):
     return replace(analysis, recommendation=recommendation)
 
 
-def _correlated_with(analysis, name):
+def _find_correlated(analysis, name):
     """Other parameters with a high correlation: ((name, correlation), ...)."""
     row = analysis.correlation[analysis.names.index(name)].tolist()
     return tuple(

@@ -1,4 +1,4 @@
-"""Four tests whether two calibrations of a camera give the same bundle of rays.
+"""Four tests whether two calibrations of a camera give equal bundles of rays.
 
 A grid of image points is corrected with both calibrations. With the ideal points (x1, y1), (x2, y2)
 and the focal lengths c1, c2, the figure of a pair, in pixels, is
@@ -407,7 +407,7 @@ def _make_pair(pair, method, as_published, threshold_px, ground, known):
         figure_px=result.figure_px,
         similar=result.figure_px < threshold_px,
         difference_px=result.difference_px,
-        expected_px=_expected_figure(pair, method, as_published, result, known),
+        expected_px=_compute_expected_figure(pair, method, as_published, result, known),
         scale=result.scale,
         rotation_rad=result.rotation_rad,
         shift_m=result.shift_m,
@@ -479,7 +479,7 @@ def _compare_resection(first, second, terrain, depth_m):
     )
 
 
-def _expected_figure(pair, method, as_published, result, known):
+def _compute_expected_figure(pair, method, as_published, result, known):
     """Expected figure of a pair, px, or None if a calibration has no standard deviations."""
     # Figures of these methods depend on the focal lengths of both bundles.
     needs_c = method in ("zrot", "spr") or (method == "rot" and not as_published)

@@ -196,13 +196,13 @@ def _decode(data):
     cv2 = opencv()
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     image = None
-    with _captured_error_stream() as printed, suppress(cv2.error):
+    with _capture_error_stream() as printed, suppress(cv2.error):
         image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
     return image, printed.text
 
 
 @contextmanager
-def _captured_error_stream():
+def _capture_error_stream():
     """Collect in `text` what C libraries print to the standard error stream of the process."""
     printed = SimpleNamespace(text="")
     with TemporaryFile() as file:

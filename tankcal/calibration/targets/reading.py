@@ -432,7 +432,7 @@ def _warn_of_names(photos, settings, names, log):
         )
 
 
-def refused_path(path):
+def make_refused_path(path):
     """Path of the list of refused candidates: image_points_refused.csv for image_points.csv."""
     path = Path(path)
     return path.with_name(f"{path.stem}_refused.csv")
@@ -447,7 +447,7 @@ def _message_exists():
 
 def check_free(path, replace, log):
     """Log a problem if the folder is missing, or if a file exists and `replace` is false."""
-    for file in (Path(path), refused_path(path)):
+    for file in (Path(path), make_refused_path(path)):
         if not file.parent.is_dir():
             log.problem(file.name, message("targets_no_folder", "its folder does not exist"))
             return
@@ -477,7 +477,7 @@ def write_image_points(photos, path, replace=False):
     InputError
         If a file exists or cannot be written. No file is then written.
     """
-    existing = [item.name for item in (Path(path), refused_path(path)) if item.exists()]
+    existing = [item.name for item in (Path(path), make_refused_path(path)) if item.exists()]
     if existing and not replace:
         expected = _message_exists()
         raise InputError([Problem(name, expected) for name in existing])
@@ -486,9 +486,9 @@ def write_image_points(photos, path, replace=False):
         for photo in photos
         for item in photo.points
     ]
-    refused = [_refused_row(photo.photo, item) for photo in photos for item in photo.refused]
+    refused = [_format_refused(photo.photo, item) for photo in photos for item in photo.refused]
     texts = {
-        refused_path(path): _format_csv(REFUSED_HEADINGS, refused),
+        make_refused_path(path): _format_csv(REFUSED_HEADINGS, refused),
         Path(path): _format_csv(HEADINGS, rows),
     }
     drafts = {target: target.with_name(f".{target.name}.part") for target in texts}
@@ -508,10 +508,10 @@ def write_image_points(photos, path, replace=False):
                 ),
             )
         ) from None
-    return Path(path), refused_path(path)
+    return Path(path), make_refused_path(path)
 
 
-def _refused_row(photo, refused):
+def _format_refused(photo, refused):
     column, line = refused.place_px
     detail = "; ".join(f"{key} {value:.3g}" for key, value in refused.detail.items())
     number = "" if refused.id is None else refused.id

@@ -56,7 +56,7 @@ class Balanced:
     covariance: np.ndarray | None = None
 
 
-def from_balanced(camera, pixel_mm, size_px):
+def convert_from_balanced(camera, pixel_mm, size_px):
     """Convert to a FramedCamera with equal numbers, except for the sign of Ck.
 
     Parameters
@@ -76,7 +76,7 @@ def from_balanced(camera, pixel_mm, size_px):
     return make_framed_camera(*_interior_of(camera), pixel_mm, size_px)
 
 
-def film_from_balanced(camera, format_mm):
+def convert_film_from_balanced(camera, format_mm):
     """Convert to a FramedCamera on film of a given width and height (2,), mm."""
     return make_film_camera(*_interior_of(camera), format_mm)
 
@@ -91,7 +91,7 @@ def _interior_of(camera):
     return interior, Form(camera.convention, "b1_b2", float(camera.values["R0"]))
 
 
-def to_balanced(camera, radius_mm, convention="distortion_of_ideal", covariance=None):
+def convert_to_balanced(camera, radius_mm, convention="distortion_of_ideal", covariance=None):
     """Convert a FramedCamera, exactly for K4 = P3 = P4 = 0 and a suitable convention.
 
     Parameters

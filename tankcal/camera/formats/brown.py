@@ -85,7 +85,7 @@ def project_brown(brown, rays):
     )
 
 
-def from_brown(brown, pixel_mm, size_px):
+def convert_from_brown(brown, pixel_mm, size_px):
     """Convert to a FramedCamera in the plain Form().
 
     Parameters
@@ -134,7 +134,7 @@ def _interior(brown, pixel_mm, size_px):
     return np.array([c, x0, y0, *radial, p2 / c, -p1 / c, p3 / c**2, p4 / c**4, 0, 0])
 
 
-def to_brown(camera, terms=None):
+def convert_to_brown(camera, terms=None):
     """Convert a FramedCamera, exactly if the terms allow it, else by a fit over the frame.
 
     Parameters

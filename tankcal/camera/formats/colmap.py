@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.formats.brown import Terms, to_brown
-from tankcal.camera.formats.opencv import OpenCV, from_opencv
+from tankcal.camera.formats.brown import Terms, convert_to_brown
+from tankcal.camera.formats.opencv import OpenCV, convert_from_opencv
 from tankcal.camera.formats.texts import exact_text, short_text
 from tankcal.messages import message
 
@@ -52,7 +52,7 @@ class Colmap:
     error_px: float = 0.0
 
 
-def from_colmap(camera, pixel_mm):
+def convert_from_colmap(camera, pixel_mm):
     """Convert to a FramedCamera in the plain Form().
 
     Parameters
@@ -76,10 +76,10 @@ def from_colmap(camera, pixel_mm):
     # COLMAP counts from the corner of the first pixel, OpenCV from its centre.
     matrix = [[fx, 0, values["cx"] - HALF], [0, fy, values["cy"] - HALF], [0, 0, 1]]
     coefficients = np.array([values.get(name, 0.0) for name in ORDER])
-    return from_opencv(OpenCV(np.array(matrix), coefficients), pixel_mm, camera.size_px)
+    return convert_from_opencv(OpenCV(np.array(matrix), coefficients), pixel_mm, camera.size_px)
 
 
-def to_colmap(camera, model=None):
+def convert_to_colmap(camera, model=None):
     """Convert a FramedCamera, exactly if the model has all terms, else by a fit.
 
     Parameters
@@ -112,7 +112,7 @@ def _convert_to_model(camera, model):
         two_focals="fx" in names,
         skew=False,
     )
-    brown, error = to_brown(camera, terms)
+    brown, error = convert_to_brown(camera, terms)
     values = {
         "f": brown.fy,
         "fx": brown.fx,

@@ -16,7 +16,7 @@ of PhotoScan 1.2 to 1.4.
 
 from dataclasses import dataclass
 
-from tankcal.camera.formats.brown import Brown, from_brown, to_brown
+from tankcal.camera.formats.brown import Brown, convert_from_brown, convert_to_brown
 from tankcal.camera.formats.texts import (
     duplicate_message,
     exact_text,
@@ -58,7 +58,7 @@ class Metashape:
     error_px: float = 0.0
 
 
-def from_metashape(camera, pixel_mm):
+def convert_from_metashape(camera, pixel_mm):
     """Convert to a FramedCamera in the plain Form(), exactly except for B2.
 
     Parameters
@@ -93,10 +93,10 @@ def from_metashape(camera, pixel_mm):
         tuple(camera.k),
         (p2, p1, p3, p4),
     )
-    return from_brown(brown, pixel_mm, camera.size_px)
+    return convert_from_brown(brown, pixel_mm, camera.size_px)
 
 
-def to_metashape(camera):
+def convert_to_metashape(camera):
     """Convert a FramedCamera, exactly in its plain form without affinity, else by a fit.
 
     Parameters
@@ -108,7 +108,7 @@ def to_metashape(camera):
     -------
     Metashape
     """
-    brown, error = to_brown(camera)
+    brown, error = convert_to_brown(camera)
     columns, lines = camera.size_px
     p1, p2, p3, p4 = brown.p
     # cx and cy count from the middle of the image.
@@ -130,9 +130,9 @@ def parse(text, notes):
     root = _calibration_root(text, notes)
     if root is None:
         return None
-    found = {}
+    texts = {}
     for child in root:
-        if child.tag in found:
+        if child.tag in texts:
             notes.add(duplicate_message(), key=short_text(child.tag))
         elif child.tag not in (*TERMS, *OTHERS, *OLD):
             notes.add(
@@ -141,8 +141,8 @@ def parse(text, notes):
                 ),
                 key=short_text(child.tag),
             )
-        found[child.tag] = (child.text or "").strip()
-    kind = found.get("projection", "frame")
+        texts[child.tag] = (child.text or "").strip()
+    kind = texts.get("projection", "frame")
     if kind != "frame":
         notes.add(
             message(
@@ -154,19 +154,19 @@ def parse(text, notes):
         )
         return None
     # PhotoScan before 1.2 wrote fx, fy and skew.
-    if any(key in found for key in OLD):
+    if any(key in texts for key in OLD):
         expected = message(
             "convert_metashape_old",
             "a form of PhotoScan before 1.2; open it in Metashape and save it again",
         )
-        notes.add(expected, key=next(key for key in OLD if key in found))
+        notes.add(expected, key=next(key for key in OLD if key in texts))
         return None
-    # Values that are missing or wrong are replaced, so that all problems are found in one run.
-    size = tuple(_read_required(found, key, notes.count, notes) for key in ("width", "height"))
+    # Values that are missing or wrong are replaced, so that one run reports all problems.
+    size = tuple(_read_required(texts, key, notes.count, notes) for key in ("width", "height"))
     f = _read_required(
-        found, "f", lambda text_of_f, key: notes.number(text_of_f, key=key, above=0), notes
+        texts, "f", lambda text_of_f, key: notes.number(text_of_f, key=key, above=0), notes
     )
-    terms = [notes.number(found[key], key=key) if key in found else 0.0 for key in TERMS]
+    terms = [notes.number(texts[key], key=key) if key in texts else 0.0 for key in TERMS]
     camera = Metashape(size, f, *terms[:4], tuple(terms[4:8]), tuple(terms[8:]))
     # f + B1 is the focal length in x, which must be positive.
     if f + terms[2] <= 0:

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.formats.brown import Brown, Terms, from_brown, to_brown
+from tankcal.camera.formats.brown import Brown, Terms, convert_from_brown, convert_to_brown
 from tankcal.camera.formats.fitting import fit
 from tankcal.camera.formats.frame import (
     differences_px,
@@ -77,7 +77,7 @@ class OpenCV:
     error_px: float = 0.0
 
 
-def from_opencv(camera, pixel_mm, size_px):
+def convert_from_opencv(camera, pixel_mm, size_px):
     """Convert to a FramedCamera in the plain Form().
 
     Parameters
@@ -105,7 +105,7 @@ def from_opencv(camera, pixel_mm, size_px):
     # Up to five coefficients: the plain form is exact.
     if not np.any(k[5:]):
         brown = Brown(fx, fy, cx, cy, 0.0, (k[0], k[1], k[4], 0.0), (k[2], k[3], 0.0, 0.0))
-        return from_brown(brown, pixel_mm, size_px)
+        return convert_from_brown(brown, pixel_mm, size_px)
     points = frame_points(size_px)
     rays = _invert_distortion(k, (points - [cx, cy]) / [fx, fy], points, [fx, fy]) * [1, -1]
     pixel = np.array([pixel_mm * (fy / fx), pixel_mm])
@@ -122,7 +122,7 @@ def from_opencv(camera, pixel_mm, size_px):
     return make_framed_camera(interior, Form(), pixel, size_px, error)
 
 
-def to_opencv(camera):
+def convert_to_opencv(camera):
     """Convert a FramedCamera, exactly in its plain form, else by a fit over the frame.
 
     Parameters
@@ -134,7 +134,7 @@ def to_opencv(camera):
     -------
     OpenCV
     """
-    brown, error = to_brown(camera, Terms(radial=3, decentring=2, skew=False))
+    brown, error = convert_to_brown(camera, Terms(radial=3, decentring=2, skew=False))
     matrix = np.array([[brown.fx, 0, brown.cx], [0, brown.fy, brown.cy], [0, 0, 1]])
     k1, k2, k3, _ = brown.k
     return OpenCV(matrix, np.array([k1, k2, *brown.p[:2], k3]), error)

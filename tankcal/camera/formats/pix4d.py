@@ -20,7 +20,7 @@ and T2 agree.
 import re
 from dataclasses import dataclass
 
-from tankcal.camera.formats.brown import Brown, Terms, from_brown, to_brown
+from tankcal.camera.formats.brown import Brown, Terms, convert_from_brown, convert_to_brown
 from tankcal.camera.formats.texts import exact_text, short_text
 from tankcal.messages import message
 
@@ -58,7 +58,7 @@ class Pix4D:
     error_px: float = 0.0
 
 
-def from_pix4d(camera, size_px):
+def convert_from_pix4d(camera, size_px):
     """Convert to a FramedCamera in the plain Form(), exactly.
 
     Parameters
@@ -86,10 +86,10 @@ def from_pix4d(camera, size_px):
     # The printed width may differ slightly from the width of the pixels; the middle is kept.
     shift = (size_px[0] - camera.sensor_mm[0] / pixel) / 2
     brown = Brown(f, f, middle[0] + shift, middle[1], 0.0, (k1, k2, k3, 0.0), (*camera.t, 0.0, 0.0))
-    return from_brown(brown, pixel, size_px)
+    return convert_from_brown(brown, pixel, size_px)
 
 
-def to_pix4d(camera):
+def convert_to_pix4d(camera):
     """Convert a FramedCamera, exactly in its plain form with square pixels, else by a fit.
 
     Parameters
@@ -101,7 +101,9 @@ def to_pix4d(camera):
     -------
     Pix4D
     """
-    brown, error = to_brown(camera, Terms(radial=3, decentring=2, two_focals=False, skew=False))
+    brown, error = convert_to_brown(
+        camera, Terms(radial=3, decentring=2, two_focals=False, skew=False)
+    )
     pixel = float(camera.pixel_mm[1])
     # Square pixels with the height of the camera's pixels.
     sensor = (camera.size_px[0] * pixel, camera.size_px[1] * pixel)

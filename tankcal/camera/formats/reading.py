@@ -213,14 +213,14 @@ def _read_opencv(text, notes, file, size_px):
         return []
     camera, size = parsed
     size = _resolve_size(size, size_px, notes)
-    return [(_name_from_file(file), lambda pixel: opencv.from_opencv(camera, pixel, size))]
+    return [(_name_from_file(file), lambda pixel: opencv.convert_from_opencv(camera, pixel, size))]
 
 
 def _read_colmap(text, notes, _file, _size):
     """Names and converters of the cameras of a cameras.txt."""
 
     def converter(camera):
-        return lambda pixel: colmap.from_colmap(camera, pixel)
+        return lambda pixel: colmap.convert_from_colmap(camera, pixel)
 
     # A function for each camera binds the camera of its own iteration.
     return [(name, converter(camera)) for name, camera in colmap.parse(text, notes)]
@@ -231,7 +231,7 @@ def _read_metashape(text, notes, file, _size):
     camera = metashape.parse(text, notes)
     if camera is None:
         return []
-    return [(_name_from_file(file), lambda pixel: metashape.from_metashape(camera, pixel))]
+    return [(_name_from_file(file), lambda pixel: metashape.convert_from_metashape(camera, pixel))]
 
 
 def _read_pix4d(text, notes, _file, size_px):
@@ -240,7 +240,7 @@ def _read_pix4d(text, notes, _file, size_px):
     def converter(camera):
         def convert(pixel_mm):
             _refuse_other_pixel(camera.sensor_mm[1] / size_px[1], pixel_mm)
-            return pix4d.from_pix4d(camera, size_px)
+            return pix4d.convert_from_pix4d(camera, size_px)
 
         return convert
 
@@ -316,7 +316,7 @@ def _read_balanced(text, notes, file, size_px):
             )
         if sides:
             _refuse_other_pixel(sides[-1], pixel_mm)
-        return balanced.from_balanced(camera, sides or pixel_mm, size)
+        return balanced.convert_from_balanced(camera, sides or pixel_mm, size)
 
     return [(_name_from_file(file), convert)]
 
@@ -329,10 +329,10 @@ def _film_converter(camera, film_mm):
 
     def convert(pixel_mm):
         if pixel_mm is None:
-            return balanced.film_from_balanced(camera, film_mm)
+            return balanced.convert_film_from_balanced(camera, film_mm)
         # Scanned film: the number of pixels follows from the format.
         size_px = [max(2, round(side / pixel_mm)) for side in film_mm]
-        return balanced.from_balanced(camera, pixel_mm, size_px)
+        return balanced.convert_from_balanced(camera, pixel_mm, size_px)
 
     return convert
 

@@ -16,7 +16,7 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.text.naming import is_name
 
-# Every number in cameras.toml reads back as the same number. Only the size of a pixel, which is
+# Every number in cameras.toml reads back without a change. Only the size of a pixel, which is
 # converted to micrometres, may differ by its last bit.
 NEIGHBOURS = 4  # neighbouring numbers tried for an exact text in micrometres
 
@@ -241,7 +241,7 @@ def _write_register(cameras, sds):
 def _write_balanced(cameras, radius_mm):
     """Text of a camera in the balanced form."""
     camera = cameras[0][1]
-    converted = balanced.to_balanced(camera, radius_mm)
+    converted = balanced.convert_to_balanced(camera, radius_mm)
     return CameraText(balanced.format_text(converted, camera), (converted.error_px,))
 
 
@@ -263,11 +263,11 @@ def _write_in_pixels(kind, cameras):
 
 
 _CONVERTERS = {
-    "opencv": opencv.to_opencv,
-    "opencv-json": opencv.to_opencv,
-    "colmap": colmap.to_colmap,
-    "metashape": metashape.to_metashape,
-    "pix4d": pix4d.to_pix4d,
+    "opencv": opencv.convert_to_opencv,
+    "opencv-json": opencv.convert_to_opencv,
+    "colmap": colmap.convert_to_colmap,
+    "metashape": metashape.convert_to_metashape,
+    "pix4d": pix4d.convert_to_pix4d,
 }
 SINGLE = ("opencv", "opencv-json", "metashape", "aicon")  # kinds with one camera in a file
 IN_MM = ("cameras.toml", "aicon")  # kinds that do not require pixels

@@ -13,11 +13,11 @@ from tankcal.messages import message
 from tankcal.record import manifest
 from tankcal.record.camera_versions import KINDS
 from tankcal.report import folders
-from tankcal.report.camera.paper import CameraPaper, made_from
+from tankcal.report.camera.paper import CameraPaper, describe_origin
 from tankcal.report.outputs.csv_files import write_rows
 from tankcal.report.terminal import lines_of
 
-__all__ = ["CameraPaper", "lines", "made_from", "refuse_foreign", "write"]
+__all__ = ["CameraPaper", "describe_origin", "lines", "refuse_foreign", "write"]
 
 RECORD = "camera.json"
 TEMPLATE = "camera.ipynb"

@@ -21,7 +21,7 @@ from tankcal.report.camera.drawings import (
     typeset_indices,
     widen_to_decades,
 )
-from tankcal.report.camera.influence import adjusted_runs, label
+from tankcal.report.camera.influence import label, list_adjusted_runs
 from tankcal.report.camera.paper import number_names
 from tankcal.report.camera.parameters import is_in_pixels
 from tankcal.report.camera.product import unit_of
@@ -130,7 +130,7 @@ def _image_edges(column_px, line_px):
 
 
 @styled
-def coloured_matrix(paper):
+def figure_matrix(paper):
     """Matrix of the figures of all pairs as colours, with frames around similar pairs."""
     names = [camera["name"] for camera in paper.result["cameras"]]
     labels, heads = number_names(names)
@@ -343,7 +343,7 @@ def _draw_log_bars(ax, places, sizes, colour, name, height):
 
 def bars_name(paper):
     """Name of the figure of bars, from the results to be drawn; None without results."""
-    parts = _parts_of_bars(adjusted_runs(paper))
+    parts = _parts_of_bars(list_adjusted_runs(paper))
     if len(parts) == 2:
         return "bars"
     return f"bars_{parts[0]}" if parts else None
@@ -356,7 +356,7 @@ def _parts_of_bars(runs):
 @styled
 def bars(paper):
     """RMSE at check points by axis, and change of the volume, for each run."""
-    runs = adjusted_runs(paper)
+    runs = list_adjusted_runs(paper)
     parts = _parts_of_bars(runs)
     figure = Figure(figsize=(WIDTH, min(0.3 * len(runs), TALLEST_BARS) + 0.75))
     axes = figure.subplots(1, len(parts), sharey=True, squeeze=False)[0]

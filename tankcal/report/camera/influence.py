@@ -54,7 +54,7 @@ def label(paper, run):
     return paper.text("run", name=shorten(run["calibration"]), state=state)
 
 
-def adjusted_runs(paper):
+def list_adjusted_runs(paper):
     """Runs with an adjustment."""
     return [run for run in paper.result["runs"] if run["outcome"] == "adjusted"]
 
@@ -120,13 +120,13 @@ def shifts(paper):
     """Table of the changes of points and photos against the reference."""
     rows = [
         _shift_cells(run["shifts"]) | {"run": label(paper, run)}
-        for run in adjusted_runs(paper)
+        for run in list_adjusted_runs(paper)
         if run["shifts"]
     ]
     if not rows:
         return [paper.paragraph("no_shifts")]
     content = [paper.show(SHIFTS, rows)]
-    if any(run["shifts"] and run["shifts"]["aligned"] for run in adjusted_runs(paper)):
+    if any(run["shifts"] and run["shifts"]["aligned"] for run in list_adjusted_runs(paper)):
         content.append(paper.paragraph("aligned"))
     return content
 
@@ -161,7 +161,7 @@ def _shift_cells(shift):
 
 def checks(paper):
     """Table of the check points of each run: bias of each axis, RMSE with and without it."""
-    runs = [run for run in adjusted_runs(paper) if run["product"]]
+    runs = [run for run in list_adjusted_runs(paper) if run["product"]]
     if not runs:
         return [paper.paragraph("no_check_points")]
     unit = "m" if "m" in {unit_of(run["product"]) for run in runs} else "mm"
@@ -177,7 +177,7 @@ def checks(paper):
 
 def volumes(paper):
     """Table of the volume of each run, and its difference from the reference."""
-    runs = [run for run in adjusted_runs(paper) if run["volume"]]
+    runs = [run for run in list_adjusted_runs(paper) if run["volume"]]
     if not runs:
         return []
     rows = []
@@ -228,7 +228,7 @@ def pairs(paper, most=MOST_PAIRS):
 
 
 def _are_free(first, second):
-    """Whether both runs use calibrations as initial values only, in the same adjustment."""
+    """Whether calibrations are only initial values in both runs, so that the results agree."""
     return first["state"] == second["state"] == "free"
 
 
@@ -261,7 +261,7 @@ def rejections(paper):
 
 def interiors(paper):
     """Tables of the interior parameters after each adjustment, and of different forms."""
-    runs = [run for run in adjusted_runs(paper) if run["interior"]]
+    runs = [run for run in list_adjusted_runs(paper) if run["interior"]]
     units = {item["parameter"]: item["unit"] for run in runs for item in run["interior"]}
     parts = [[name for name in part if name in units] for part in (INTERIOR, *DISTORTION)]
     tables = [_interior_table(paper, runs, part, units) for part in parts if part]

@@ -81,7 +81,7 @@ class CameraPaper(PlainPaper):
             blocks.masthead(self.title(), self.word(f"subtitles.{self.result['kind']}")),
         ]
 
-    def made_from(self):
+    def origin(self):
         """Table of the input files, and the version of tankcal; empty if they are not known."""
         origin = self.result.get("made_from")
         if not origin:
@@ -146,7 +146,7 @@ def _variant(reason):
     return "_together" if reason["code"] == "not_determined_without" and "names" in reason else ""
 
 
-def made_from(paths=(), job=None):
+def describe_origin(paths=(), job=None):
     """Origin of a result: {"version", "notice", "files": [{file, sha256}]} of files and a job."""
     files = [] if job is None else [{"file": f.file, "sha256": f.sha256} for f in job.files]
     for path in map(Path, paths):

@@ -374,7 +374,7 @@ def tables(result):
         "correlations.csv": correlations,
         "groups.csv": result["groups"],
         **_component_tables(result["components"]),
-        "dropped.csv": [row for trial in result["without"] for row in _dropped_rows(trial)],
+        "dropped.csv": [row for trial in result["without"] for row in _trial_rows(trial)],
         "advice.csv": [
             {
                 "parameter": item["name"],
@@ -410,7 +410,7 @@ def _component_tables(components):
     return {"components.csv": shares, "loadings.csv": loadings}
 
 
-def _dropped_rows(trial):
+def _trial_rows(trial):
     """Yield a row for each parameter that a trial keeps."""
     points = trial["points"] or {}
     common = {

@@ -123,7 +123,7 @@ def classes(paper):
 
 
 def _decimals_of_limits(limits_m):
-    """Number of decimals, two to six, that shows every limit as it is in its file."""
+    """Number of decimals, two to six, that shows every limit exactly."""
     needed = (next((d for d in range(2, 6) if round(x, d) == x), 6) for x in limits_m)
     return max(needed, default=2)
 
