@@ -195,21 +195,19 @@ def _read_cameras_toml(path, pixel_um):
     """Return [(name, FramedCamera)] of a cameras.toml, and covariances from standard deviations."""
     import numpy as np
 
+    from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
     from tankcal.job.calibrations import read_cameras, with_pixels
 
     setups = with_pixels(read_cameras(path, in_pixels=False), pixel_um)
-    cameras = [(setup.camera.name, _make_framed_camera(setup)) for setup in setups]
+    cameras = []
+    for setup in setups:
+        values, form = setup.camera.values, setup.camera.form
+        if setup.pixel_mm is None:
+            camera = make_film_camera(values, form, setup.format_mm)
+        else:
+            camera = make_framed_camera(values, form, setup.pixel_mm, setup.format_px)
+        cameras.append((setup.camera.name, camera))
     return cameras, [np.diag(setup.camera.sd**2) for setup in setups]
-
-
-def _make_framed_camera(setup):
-    """Return the FramedCamera of a CameraSetup."""
-    from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
-
-    values, form = setup.camera.values, setup.camera.form
-    if setup.pixel_mm is None:
-        return make_film_camera(values, form, setup.format_mm)
-    return make_framed_camera(values, form, setup.pixel_mm, setup.format_px)
 
 
 def _select_camera(options, cameras, covariances):

@@ -346,9 +346,8 @@ def test_rotation_against_scipy_and_singular_values():
     sigma0, angles = by_least_squares(rays(second, c2), first, c1, np.zeros(3), False)
     assert fit.sigma0_px == pytest.approx(sigma0, rel=1e-9)
     assert angles_of(fit.rotation) == pytest.approx(angles, abs=1e-9)
-    wahba = find_nearest_rotation(
-        rays(first, c1), rays(second, c2)
-    )  # other weights, so only nearly
+    # Wahba's problem has other weights, so the rotations agree only nearly.
+    wahba = find_nearest_rotation(rays(first, c1), rays(second, c2))
     assert angles_of(wahba) == pytest.approx(angles, abs=2e-3)
 
 

@@ -124,7 +124,7 @@ def _decompose(correlation, lower, weight):
     """Eigenvalues (k,), descending, and eigenvectors of W R W, R = L L', W = diag(weight).
 
     They follow from the singular values of W L. The eigenvalues of a covariance of K1 to K3 in mm
-    span thirty powers of ten, and a decomposition of W R W would resolve only sixteen. Prediction L
+    span thirty powers of ten, and a decomposition of W R W would resolve only sixteen. Without L
     (matrix not positive definite), W R W is decomposed, and negative eigenvalues are returned.
     """
     if lower is None:

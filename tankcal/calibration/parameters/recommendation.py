@@ -263,7 +263,10 @@ def recommend(evidence, limit, frame, held_back=()):
     """
     advices = [_advise_on(item, limit, frame) for item in evidence]
     advices = [
-        _hold_back(item) if item.name in held_back and not item.keep else item for item in advices
+        Advice(item.name, True, (*item.reasons, {"code": "not_with_the_others"}))
+        if item.name in held_back and not item.keep
+        else item
+        for item in advices
     ]
     kept = {item.name for item in advices if item.keep}
     return tuple(_keep_lower_orders(item, kept) for item in advices)
@@ -302,10 +305,6 @@ def _advise_on(evidence, limit, frame):
         reasons.append({"code": "known_beforehand"})
     keep, last = _decide_by_product(evidence, significant or large is not False, significant)
     return Advice(name, keep, (*reasons, *last))
-
-
-def _hold_back(item):
-    return Advice(item.name, True, (*item.reasons, {"code": "not_with_the_others"}))
 
 
 def _is_large(shift, limit):

@@ -58,7 +58,8 @@ class ZeroTest:
 
 def critical_f(parameters, dof, alpha=ALPHA):
     """Quantile F(1 - alpha; parameters, dof); dof may be infinite."""
-    _refuse_level(alpha)
+    if not 0 < alpha < 1:
+        raise ValueError(f"alpha {alpha}: expected a probability between 0 and 1")
     if np.isinf(dof):
         return float(chdtri(parameters, alpha) / parameters)
     return float(fdtri(parameters, dof, 1 - alpha))
@@ -145,8 +146,3 @@ def select_groups(names):
     """Return the groups of GROUPS with two or more of these names."""
     present = (tuple(name for name in group if name in names) for group in GROUPS)
     return tuple(group for group in present if len(group) > 1)
-
-
-def _refuse_level(alpha):
-    if not 0 < alpha < 1:
-        raise ValueError(f"alpha {alpha}: expected a probability between 0 and 1")

@@ -220,11 +220,6 @@ def _check_values(values, notes):
         notes.add(message("convert_balanced_radius", "below 0; expected a radius in mm"), key="R0")
 
 
-def _format_value(value):
-    """Text of an integer or of a float with all digits."""
-    return str(value) if isinstance(value, int) else exact_text(value)
-
-
 def format_text(camera, framed_camera):
     """Text of a Balanced camera and of its frame."""
     lines = ["# camera in the balanced form: mm, x to the right, y up"]
@@ -235,5 +230,6 @@ def format_text(camera, framed_camera):
     if frame is None:
         keys = [key for key in FRAME_KEYS if key not in FILM_KEYS]
         frame = (*framed_camera.size_px, *framed_camera.pixel_mm)
-    lines += [f"{key} {_format_value(value)}" for key, value in zip(keys, frame, strict=True)]
+    for key, value in zip(keys, frame, strict=True):
+        lines.append(f"{key} {value if isinstance(value, int) else exact_text(value)}")
     return "\n".join(lines) + "\n"

@@ -264,7 +264,7 @@ def _standard_deviations(covariance, count):
 
 
 def _convert_values(values, camera, to_form, used, may_turn):
-    """Conversion interior parameters, rotation (rad), and whether the conversion is exact."""
+    """Converted interior parameters, rotation (rad), and whether the conversion is exact."""
     excluded = [i for i, name in enumerate(PARAMETERS) if used is not None and name not in used]
     exact = _convert_exactly(values, camera.form, to_form)
     if exact is not None and not np.any(exact[excluded]):
@@ -272,23 +272,19 @@ def _convert_values(values, camera, to_form, used, may_turn):
     source = make_framed_camera(values, camera.form, camera.pixel_mm, camera.size_px)
     points = frame_points(camera.size_px)
     image_mm = pixels_to_mm(points, camera.pixel_mm, camera.size_px)
-    names = tuple(used) if used is not None else _usual_names(values)
+    if used is None:
+        used = (*USUAL, *(name for name, value in zip(PARAMETERS, values, strict=True) if value))
     start = _first_values(values, camera.form, to_form)
     start[excluded] = 0.0
     # The fit uses the form without a balance; balancing afterwards is exact.
     plain = Form(to_form.convention, to_form.affinity)
     extras = ("turn",) if may_turn else ()
-    result = fit(trace_rays(source, points), image_mm, camera.pixel_mm, plain, start, names, extras)
+    result = fit(trace_rays(source, points), image_mm, camera.pixel_mm, plain, start, used, extras)
     return (
         balance_about(result.interior, plain, to_form.radial_balance_mm)[0],
         result.turn_rad,
         False,
     )
-
-
-def _usual_names(values):
-    """Parameters of a fit: the usual parameters and all non-zero parameters."""
-    return USUAL + tuple(name for name, value in zip(PARAMETERS, values, strict=True) if value)
 
 
 def _first_values(values, form, to_form):
@@ -301,7 +297,7 @@ def _first_values(values, form, to_form):
 
 
 def _convert_exactly(values, form, to_form):
-    """Conversion interior parameters (13,) by formula, or None without a formula."""
+    """Converted interior parameters (13,) by formula, or None without a formula."""
     sign, to_sign = CONVENTIONS[form.convention], CONVENTIONS[to_form.convention]
     # A distortion of the ideal point has no closed inverse.
     if abs(sign) != abs(to_sign):

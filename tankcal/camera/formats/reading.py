@@ -10,6 +10,7 @@ aicon      lines of the balanced form, such as Ck -24.1
 The files of OpenCV, COLMAP and Metashape do not contain the size of a pixel.
 """
 
+from functools import partial
 from pathlib import Path
 
 from tankcal.camera.formats import balanced, colmap, metashape, opencv, pix4d
@@ -213,17 +214,15 @@ def _read_opencv(text, notes, file, size_px):
         return []
     camera, size = parsed
     size = _resolve_size(size, size_px, notes)
-    return [(_name_from_file(file), lambda pixel: opencv.convert_from_opencv(camera, pixel, size))]
+    return [(_name_from_file(file), partial(opencv.convert_from_opencv, camera, size_px=size))]
 
 
 def _read_colmap(text, notes, _file, _size):
     """Names and converters of the cameras of a cameras.txt."""
-
-    def converter(camera):
-        return lambda pixel: colmap.convert_from_colmap(camera, pixel)
-
-    # A function for each camera binds the camera of its own iteration.
-    return [(name, converter(camera)) for name, camera in colmap.parse(text, notes)]
+    return [
+        (name, partial(colmap.convert_from_colmap, camera))
+        for name, camera in colmap.parse(text, notes)
+    ]
 
 
 def _read_metashape(text, notes, file, _size):
@@ -231,18 +230,11 @@ def _read_metashape(text, notes, file, _size):
     camera = metashape.parse(text, notes)
     if camera is None:
         return []
-    return [(_name_from_file(file), lambda pixel: metashape.convert_from_metashape(camera, pixel))]
+    return [(_name_from_file(file), partial(metashape.convert_from_metashape, camera))]
 
 
 def _read_pix4d(text, notes, _file, size_px):
     """Names and converters of the cameras of a .cam file."""
-
-    def converter(camera):
-        def convert(pixel_mm):
-            _refuse_other_pixel(camera.sensor_mm[1] / size_px[1], pixel_mm)
-            return pix4d.convert_from_pix4d(camera, size_px)
-
-        return convert
 
     cameras = pix4d.parse(text, notes)
     # The file contains the sensor in mm, but no columns and lines.
@@ -266,7 +258,13 @@ def _read_pix4d(text, notes, _file, size_px):
                 camera=name,
             )
             notes.add(expected, key="columns")
-    return [(name, converter(camera)) for name, camera in cameras]
+    return [(name, partial(_convert_pix4d, camera, size_px)) for name, camera in cameras]
+
+
+def _convert_pix4d(camera, size_px, pixel_mm):
+    """FramedCamera of a Pix4D camera; a given size of a pixel is compared with the file."""
+    _refuse_other_pixel(camera.sensor_mm[1] / size_px[1], pixel_mm)
+    return pix4d.convert_from_pix4d(camera, size_px)
 
 
 def _read_balanced(text, notes, file, size_px):
@@ -291,7 +289,7 @@ def _read_balanced(text, notes, file, size_px):
             key="format_width",
         )
     if film_mm:
-        return [(_name_from_file(file), _film_converter(camera, film_mm))]
+        return [(_name_from_file(file), partial(_convert_film, camera, film_mm))]
     size_in_file = (
         (frame["columns"], frame["lines"]) if {"columns", "lines"} <= set(frame) else None
     )
@@ -306,35 +304,27 @@ def _read_balanced(text, notes, file, size_px):
             ),
             key="pixel_width",
         )
-
-    def convert(pixel_mm):
-        if pixel_mm is None and not sides:
-            raise SolutionError(
-                message(
-                    "convert_no_pixel", "the size of a pixel is missing; give it in micrometres"
-                )
-            )
-        if sides:
-            _refuse_other_pixel(sides[-1], pixel_mm)
-        return balanced.convert_from_balanced(camera, sides or pixel_mm, size)
-
-    return [(_name_from_file(file), convert)]
+    return [(_name_from_file(file), partial(_convert_balanced, camera, sides, size))]
 
 
-def _film_converter(camera, film_mm):
-    """Converter of a Balanced camera on film.
+def _convert_balanced(camera, sides, size_px, pixel_mm):
+    """FramedCamera of a Balanced camera with the sides of a pixel in the file, or given."""
+    if sides:
+        _refuse_other_pixel(sides[-1], pixel_mm)
+    elif pixel_mm is None:
+        raise SolutionError(
+            message("convert_no_pixel", "the size of a pixel is missing; give it in micrometres")
+        )
+    return balanced.convert_from_balanced(camera, sides or pixel_mm, size_px)
 
-    The converter accepts the size of a pixel in mm, or None, and returns a FramedCamera.
-    """
 
-    def convert(pixel_mm):
-        if pixel_mm is None:
-            return balanced.convert_film_from_balanced(camera, film_mm)
-        # Scanned film: the number of pixels follows from the format.
-        size_px = [max(2, round(side / pixel_mm)) for side in film_mm]
-        return balanced.convert_from_balanced(camera, pixel_mm, size_px)
-
-    return convert
+def _convert_film(camera, film_mm, pixel_mm):
+    """FramedCamera of a Balanced camera on film; without a size of a pixel, it has no pixels."""
+    if pixel_mm is None:
+        return balanced.convert_film_from_balanced(camera, film_mm)
+    # Scanned film: the number of pixels follows from the format.
+    size_px = [max(2, round(side / pixel_mm)) for side in film_mm]
+    return balanced.convert_from_balanced(camera, pixel_mm, size_px)
 
 
 def _resolve_size(size_in_file, given_size, notes):

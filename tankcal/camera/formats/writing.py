@@ -54,12 +54,11 @@ def cameras_toml_entry(name, interior, form, size_px, pixel_mm, sds=None, film_m
     -----
     Parameters with the value 0 and without a standard deviation are omitted, except c, x0 and y0.
     """
-    frame = (
-        _frame_lines(size_px, pixel_mm)
-        if film_mm is None
-        else [f"format_mm = {_format_pair(film_mm)}"]
-    )
-    lines = [f"[cameras.{_quote_name(name)}]", *frame]
+    lines = [f"[cameras.{_quote_name(name)}]"]
+    if film_mm is None:
+        lines += _frame_lines(size_px, pixel_mm)
+    else:
+        lines.append(f"format_mm = [{', '.join(map(exact_text, film_mm))}]")
     for place, parameter in enumerate(PARAMETERS):
         sd = np.nan if sds is None else float(sds[place])
         # c, x0 and y0 are always written.
@@ -76,19 +75,10 @@ def cameras_toml_entry(name, interior, form, size_px, pixel_mm, sds=None, film_m
 def _frame_lines(size_px, pixel_mm):
     """Lines that describe the frame of a camera with pixels."""
     width, height = np.broadcast_to(pixel_mm, 2)
-    # A single number for square pixels, else width and height.
-    sizes = (
-        [_format_micrometres(width)]
-        if width == height
-        else list(map(_format_micrometres, (width, height)))
-    )
-    pixel = sizes[0] if len(sizes) == 1 else f"[{', '.join(sizes)}]"
+    pixel = _format_micrometres(width)
+    if width != height:
+        pixel = f"[{pixel}, {_format_micrometres(height)}]"
     return [f"format_px = [{int(size_px[0])}, {int(size_px[1])}]", f"pixel_um = {pixel}"]
-
-
-def _format_pair(values):
-    """Text of an array of two numbers."""
-    return f"[{', '.join(map(exact_text, values))}]"
 
 
 def value_key(parameter):
