@@ -191,9 +191,14 @@ def read_photos(record):
 
 
 def refuse_unknown(photos, camera=None, photo=None):
-    """Raise InputError for the name of a camera or photo that is not in `photos`.
+    """Raise InputError for an unknown name of a camera or photo.
 
-    `photos` is {photo: camera}.
+    Parameters
+    ----------
+    photos : dict
+        {photo: camera}.
+    camera, photo : str, optional
+        Names to check.
     """
     cameras = list(dict.fromkeys(photos.values()))
     if camera is not None and camera not in cameras:

@@ -41,6 +41,8 @@ NEWTON_ROUNDS = 50
 PARAMETERS = ("c", "x0", "y0", "K1", "K2", "K3", "K4", "P1", "P2", "P3", "P4", "A", "B")
 _UNITS = ("mm", "mm", "mm", "mm-2", "mm-4", "mm-6", "mm-8", "mm-1", "mm-1", "mm-2", "mm-4", "", "")
 UNITS = dict(zip(PARAMETERS, _UNITS, strict=True))
+# Keys of the parameters in files: name and unit
+KEYS = {name: f"{name}_{unit}" if unit else name for name, unit in UNITS.items()}
 CONVENTIONS = {"distortion_of_ideal": 0.0, "correction_added": 1.0, "correction_subtracted": -1.0}
 WEIGHTS = ("measured", "ideal")
 # Switches: A x in dx, A y in dx, B y in dx, B x in dy, B y in dy, and A x + B y before the

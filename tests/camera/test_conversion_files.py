@@ -11,8 +11,8 @@ from tankcal.camera.formats import reading, writing
 from tankcal.camera.formats.frame import frame_points, make_framed_camera, project_rays, trace_rays
 from tankcal.camera.formats.reading import parse_cameras, read_camera
 from tankcal.camera.formats.texts import LONGEST
-from tankcal.camera.formats.writing import cameras_toml_entry, sd_key_of, value_key, write_camera
-from tankcal.camera.model import PARAMETERS, Form
+from tankcal.camera.formats.writing import cameras_toml_entry, make_sd_key, write_camera
+from tankcal.camera.model import KEYS, PARAMETERS, Form
 from tankcal.errors import InputError
 from tankcal.job.calibrations import read_cameras
 from tankcal.job.contract.registers import PARAMETER_KEYS, sd_key
@@ -284,10 +284,8 @@ def test_cameras_toml_reads_back_the_same(
 
 
 def test_keys_are_those_of_the_job():
-    assert {name: value_key(name) for name in PARAMETERS} == {
-        name: key for name, (key, _) in PARAMETER_KEYS.items()
-    }
-    assert [sd_key_of(name) for name in PARAMETERS] == [sd_key(name) for name in PARAMETERS]
+    assert {name: key for name, (key, _) in PARAMETER_KEYS.items()} == KEYS
+    assert [make_sd_key(name) for name in PARAMETERS] == [sd_key(name) for name in PARAMETERS]
 
 
 def test_a_name_that_no_camera_can_have():

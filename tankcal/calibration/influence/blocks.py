@@ -98,7 +98,21 @@ class Block:
 
 
 def make_block(adjustment, setup, alpha=ALPHA):
-    """Create the Block of a survey.Adjustment, for the job.CameraSetup of its camera."""
+    """Create the Block of an adjustment.
+
+    Parameters
+    ----------
+    adjustment : survey.Adjustment
+        The adjusted survey.
+    setup : job.CameraSetup
+        Camera whose calibration is compared.
+    alpha : float, optional
+        Significance level of the tests at check points.
+
+    Returns
+    -------
+    Block
+    """
     adjusted = adjustment.adjusted
     photos = adjusted.survey.photos
     place, _, _ = adjusted.photos
@@ -162,6 +176,7 @@ def _interior_values(adjustment, setup):
 
 
 def _image_residuals(adjustment, setup):
+    """ImageResiduals of the photos of a camera, or None without image points in use."""
     names = adjustment.adjusted.survey.photos.names
     own_photos = {names[i] for i in _photos_of_camera(adjustment, setup)}
     readings = adjustment.readings

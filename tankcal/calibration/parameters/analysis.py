@@ -144,6 +144,7 @@ def analyse_job(
 
 
 def _judge_all(interiors, statistics, choices, file, source="record"):
+    """Analyse all sets with adjusted parameters; raise InputError if there are none."""
     judged = [interior for interior in interiors if len(find_adjusted_rows(interior))]
     if not judged:
         text = message(

@@ -273,6 +273,7 @@ def recommend(evidence, limit, frame, held_back=()):
 
 
 def _advise_on(evidence, limit, frame):
+    """Create the Advice about a parameter from its own evidence, without the other parameters."""
     (name,) = evidence.test.names
     if not evidence.test.decides:
         return Advice(name, True, ({"code": "principal"},))
@@ -315,6 +316,7 @@ def _is_large(shift, limit):
 
 
 def _reasons_of_effect(evidence, limit, significant, large):
+    """Reasons from the effect of a parameter at the corner, compared with its test."""
     if large is None:
         return [{"code": "effect_not_known"}]
     sizes = {
@@ -344,7 +346,22 @@ def _decide_by_product(evidence, keep, significant):
 
 
 def make_joint_reasons(names, product, failed):
-    """Return at most one reason about the effect of dropping several parameters together."""
+    """Create the reason about the effect of dropping several parameters together.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the parameters.
+    product : dict or None
+        Change of the product as in Evidence, or None if it is not known.
+    failed : str or None
+        Reason why the survey cannot be adjusted without the parameters.
+
+    Returns
+    -------
+    tuple of dict
+        At most one reason.
+    """
     if failed is not None:
         return ({"code": "not_determined_without", "text": failed, "names": list(names)},)
     if product is None:

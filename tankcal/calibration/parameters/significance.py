@@ -57,7 +57,21 @@ class ZeroTest:
 
 
 def critical_f(parameters, dof, alpha=ALPHA):
-    """Quantile F(1 - alpha; parameters, dof); dof may be infinite."""
+    """Critical value F(1 - alpha; parameters, dof).
+
+    Parameters
+    ----------
+    parameters : int
+        Number of parameters p.
+    dof : float
+        Degrees of freedom of sigma0; infinite if it is not estimated.
+    alpha : float, optional
+        Significance level.
+
+    Returns
+    -------
+    float
+    """
     if not 0 < alpha < 1:
         raise ValueError(f"alpha {alpha}: expected a probability between 0 and 1")
     if np.isinf(dof):

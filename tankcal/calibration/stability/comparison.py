@@ -379,6 +379,7 @@ class _MethodResult:
 
 
 def _correct_grid(setup, grid, format_px):
+    """Correct the grid with a calibration; raise SolutionError if it folds the frame."""
     camera = setup.camera
     points_mm = grid.image_points_mm(format_px, setup.pixel_mm)
     with np.errstate(all="ignore"):
@@ -400,6 +401,7 @@ def _correct_grid(setup, grid, format_px):
 
 
 def _make_pair(pair, method, as_published, threshold_px, ground, known):
+    """Compare two corrected sets; `ground` is the terrain and its depths, or None and None."""
     result = _compare_pair(pair, method, as_published, *ground)
     return Pair(
         a=pair[0].name,
@@ -416,6 +418,7 @@ def _make_pair(pair, method, as_published, threshold_px, ground, known):
 
 
 def _compare_pair(pair, method, as_published, terrain, depths_m):
+    """_MethodResult of a pair; an error names both calibrations."""
     try:
         if method == "rot":
             return _compare_rotation(*pair, as_published)

@@ -177,6 +177,7 @@ def make_orientation_model(place, c_mm, start, pixel_mm):
 
 
 def _fit_orientation(place, image_mm, c_mm, pixel_mm, start, position):
+    """Fit the rotation, and the projection centre unless `position` is None; return a Fit."""
     model = make_orientation_model(place, c_mm, start, pixel_mm)
     unknowns = np.zeros(3) if position is None else np.append(np.zeros(3), position)
     image = (image_mm / pixel_mm).ravel()

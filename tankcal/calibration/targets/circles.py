@@ -225,6 +225,7 @@ def _fit_ellipse(image, centre, axes, turn, blur):
 
 
 def _evaluate_fit(fit, centre, elements, count):
+    """Results of a fit as in `_fit_ellipse`, or None for an implausible or undetermined ellipse."""
     e, dof = fit.x, count - len(fit.x)
     blur = float(np.exp(np.clip(e[5], -3, 3)))
     p, q, r = elements * (1 + e[2:5])

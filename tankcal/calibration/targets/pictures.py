@@ -57,6 +57,7 @@ def read_header(data):
 
 
 def _read_jpeg_header(data):
+    """Header of a JPEG file from its segments, or None without a start of frame."""
     place, turn = 2, 1
     while data[place] == 0xFF:
         kind = data[place + 1]

@@ -234,6 +234,7 @@ def _read_settings(settings, log):
 
 
 def _read_circle_places(settings, log):
+    """Return None and {photo: [Place]}; problems of the settings are logged."""
     if settings.names is not None:
         log.problem(
             "names",
@@ -252,6 +253,7 @@ def _read_circle_places(settings, log):
 
 
 def _read_code_names(settings, log):
+    """Return {id: name} or None, and no positions; problems of the settings are logged."""
     if settings.places is not None:
         log.problem(
             "places",
@@ -339,6 +341,7 @@ def _measure_photo(title, picture, settings, names, places, log):
 
 
 def _measure_circles(title, picture, settings, places, log):
+    """Measure circles in one picture and name them by positions; return a PhotoReading."""
     measured = read_circles(picture.image, settings.smallest_px or 6.0, settings.largest_px)
     named, refused, missing = match_circles_to_places(measured.targets, places, settings.reach_px)
     if missing:
@@ -512,6 +515,7 @@ def write_image_points(photos, path, replace=False):
 
 
 def _format_refused(photo, refused):
+    """Cells of a refused candidate in the order of REFUSED_HEADINGS."""
     column, line = refused.place_px
     detail = "; ".join(f"{key} {value:.3g}" for key, value in refused.detail.items())
     number = "" if refused.id is None else refused.id

@@ -113,15 +113,29 @@ def frame_points(size_px, counts=GRID):
 
 
 def pixels_to_mm(points_px, pixel_mm, size_px):
-    """Coordinates (n, 2) from the middle of the frame, y up, mm, for columns and lines (n, 2)."""
+    """Convert columns and lines to coordinates from the middle of the frame.
+
+    Parameters
+    ----------
+    points_px : array_like, shape (n, 2)
+        Columns and lines.
+    pixel_mm : array_like, shape (2,)
+        Width and height of a pixel, mm.
+    size_px : sequence of two int
+        Columns and lines of the frame.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Coordinates, y up, mm.
+    """
     # Lines count downwards, y upwards, hence the sign.
     middle = (np.array(size_px, dtype=float) - 1) / 2
     return (np.asarray(points_px, dtype=float) - middle) * pixel_mm * [1, -1]
 
 
 def mm_to_pixels(points_mm, pixel_mm, size_px):
-    """Columns and lines (n, 2) for coordinates (n, 2) from the middle of the frame, y up, mm."""
-    # Inverse of pixels_to_mm.
+    """Convert coordinates (n, 2), mm, to columns and lines (n, 2): inverse of `pixels_to_mm`."""
     middle = (np.array(size_px, dtype=float) - 1) / 2
     return np.asarray(points_mm, dtype=float) / pixel_mm * [1, -1] + middle
 

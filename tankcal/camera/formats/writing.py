@@ -11,7 +11,7 @@ import numpy as np
 
 from tankcal.camera.formats import balanced, colmap, metashape, opencv, pix4d
 from tankcal.camera.formats.texts import NAME_IS, exact_text, short_text
-from tankcal.camera.model import PARAMETERS, UNITS
+from tankcal.camera.model import KEYS, PARAMETERS, UNITS
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.text.naming import is_name
@@ -63,9 +63,9 @@ def cameras_toml_entry(name, interior, form, size_px, pixel_mm, sds=None, film_m
         sd = np.nan if sds is None else float(sds[place])
         # c, x0 and y0 are always written.
         if place < 3 or interior[place] or np.isfinite(sd):
-            lines.append(f"{value_key(parameter)} = {exact_text(interior[place])}")
+            lines.append(f"{KEYS[parameter]} = {exact_text(interior[place])}")
         if np.isfinite(sd):
-            lines.append(f"{sd_key_of(parameter)} = {exact_text(sd)}")
+            lines.append(f"{make_sd_key(parameter)} = {exact_text(sd)}")
     lines.append(f'affinity = "{form.affinity}"')
     lines.append(f"radial_balance_mm = {exact_text(form.radial_balance_mm)}")
     lines.append(f'convention = "{form.convention}"')
@@ -81,13 +81,7 @@ def _frame_lines(size_px, pixel_mm):
     return [f"format_px = [{int(size_px[0])}, {int(size_px[1])}]", f"pixel_um = {pixel}"]
 
 
-def value_key(parameter):
-    """Key of a parameter in cameras.toml: name and unit."""
-    unit = UNITS[parameter]
-    return f"{parameter}_{unit}" if unit else parameter
-
-
-def sd_key_of(parameter):
+def make_sd_key(parameter):
     """Key of the standard deviation of a parameter in cameras.toml."""
     return f"s_{parameter}_mm" if UNITS[parameter] == "mm" else f"s_{parameter}"
 

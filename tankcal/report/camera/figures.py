@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from tankcal.calibration.curves import decentring_profile, radial_curve
-from tankcal.camera.model import PARAMETERS, Form
+from tankcal.camera.model import KEYS, PARAMETERS, Form
 from tankcal.pipeline.plot_style import FAINT, GREY, INK, RED, WIDTH, even_groups, set_margins
 from tankcal.report import numbers
 from tankcal.report.camera.drawings import (
@@ -25,7 +25,7 @@ from tankcal.report.camera.influence import label, list_adjusted_runs
 from tankcal.report.camera.paper import number_names
 from tankcal.report.camera.parameters import is_in_pixels
 from tankcal.report.camera.product import unit_of
-from tankcal.report.camera.stability import KEYS, number_calibrations
+from tankcal.report.camera.stability import number_calibrations
 from tankcal.text.digits import fixed
 
 MAPS_IN_ROW, MOST_MAPS = 6, 36  # of a figure
@@ -67,6 +67,7 @@ def _scale_of_differences(paper, largest):
 
 @styled
 def _draw_maps(paper, pairs, norm):
+    """Figure with a map of each pair; contours show the threshold."""
     width, height = paper.result["cameras"][0]["format_px"]
     names = [camera["name"] for camera in paper.result["cameras"]]
     heads = number_names(names)[1]
@@ -97,6 +98,7 @@ def _draw_maps(paper, pairs, norm):
 
 
 def _draw_colour_bar(paper, figure, image):
+    """Draw a colour bar at the right edge of a figure."""
     width, height = figure.get_size_inches()
     tall = min(height - 0.3, 2.4)
     place = [1 - 0.68 / width, (height - 0.2 - tall) / height, 0.11 / width, tall / height]
@@ -379,6 +381,7 @@ def bars(paper):
 
 
 def _draw_rmse(paper, ax, runs, places):
+    """Draw the RMSE of each axis and run."""
     units = {unit_of(run["product"]) for run in runs if run["product"]}
     unit = numbers.unit("m" if "m" in units else "mm")
     for k, axis in enumerate("xyz"):
@@ -404,6 +407,7 @@ def _draw_rmse(paper, ax, runs, places):
 
 
 def _draw_volume_changes(paper, ax, runs, places):
+    """Draw the change of the volume in each run, and the band of U of the reference."""
     changes = [
         ((run["shifts"] or {}).get("volume") or {}).get("difference_m3", np.nan) for run in runs
     ]
@@ -446,6 +450,7 @@ def differences(paper):
 
 
 def _draw_plan(paper, ax, values, unit):
+    """Draw differences in plan, with a cross at their mean."""
     x, y = values["x"], values["y"]
     limit = 1.15 * np.nanmax(np.abs([x, y]), initial=0.0) or 1.0
     ax.axhline(0, color=FAINT, linewidth=0.6)
@@ -461,6 +466,7 @@ def _draw_plan(paper, ax, values, unit):
 
 
 def _draw_by_number(paper, ax, values, unit):
+    """Draw differences against the number of the point, with lines at their means."""
     for number, column in enumerate(values.values()):
         style = {"color": line_style(number)["color"], "markersize": 2.6}
         ax.plot(np.arange(1, len(column) + 1), column, "o", **style)

@@ -79,6 +79,7 @@ def runs(paper):
 
 
 def _run_cells(paper, run):
+    """Cells of a run for its global test and the residuals of its images."""
     quality, images = run["quality"] or {}, run["images"] or {}
     row = {
         "run": label(paper, run),
@@ -336,6 +337,7 @@ def _run_row(run):
 
 
 def _shift_row(shift):
+    """CSV cells of the changes between two runs; None without changes."""
     shift = shift or {}
     points, photos = shift.get("points", {}), shift.get("photos", {})
     volume = shift.get("volume") or {}

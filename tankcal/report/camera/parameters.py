@@ -115,6 +115,7 @@ def tests(paper):
 
 
 def _parameter_cells(paper, row):
+    """Cells of a parameter for its test and effects."""
     left, own = row["edge"]["left"] or {}, row["edge"]["own"] or {}
     # The test of c against zero has no meaning, and is not shown.
     tested = row if row["decides"] else row | dict.fromkeys(("F", "critical", "significant"))
@@ -243,6 +244,7 @@ def dropping(paper):
 
 
 def _dropping_table(paper, trials):
+    """Table of trials that were adjusted again."""
     rows = [
         {
             "without": paper.parameters(trial["names"]) + ("" if trial["comparable"] else " *"),
@@ -396,6 +398,7 @@ def _parameter_row(row):
 
 
 def _component_tables(components):
+    """CSV rows of shares and loadings of the components."""
     if not components:
         return {}
     keys = ("eigenvalues", "share_percent", "cumulative_percent", "values")

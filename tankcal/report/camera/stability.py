@@ -1,12 +1,11 @@
 """Comparison of calibrations: sentences, tables and rows for CSV files."""
 
-from tankcal.camera.model import PARAMETERS, UNITS
+from tankcal.camera.model import KEYS, UNITS
 from tankcal.report import blocks, numbers
 from tankcal.report.camera.paper import number_names, shorten
 from tankcal.report.plain import Column
 from tankcal.text.digits import NOTHING, decimals_of, fixed
 
-KEYS = {name: f"{name}_{UNITS[name]}" if UNITS[name] else name for name in PARAMETERS}
 MOST_LISTED = 12  # pairs in a sentence
 INTERIOR = ("c", "x0", "y0")
 DISTORTION = (("K1", "K2", "K3", "K4"), ("P1", "P2", "P3", "P4", "A", "B"))
