@@ -113,7 +113,7 @@ class Circle:
 
 
 @dataclass(frozen=True)
-class Refused:
+class RefusedTarget:
     """Candidate for a target that was refused.
 
     Attributes
@@ -135,15 +135,15 @@ class Refused:
 
 
 @dataclass(frozen=True)
-class Found:
+class PhotoTargets:
     """Targets of one photograph.
 
     Attributes
     ----------
     targets : tuple of Marker or of Circle
         Markers in the order of their ids, or circles from top to bottom.
-    refused : tuple of Refused
-        Refused candidates.
+    refused : tuple of RefusedTarget
+        RefusedTarget candidates.
     size_px : tuple of int
         Columns and lines of the photo.
     doubtful : tuple of int
