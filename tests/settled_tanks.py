@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from levelled_tanks import LIMITS, epoch_of, even_azimuths
 
-from tankcal.inspection.out_of_plane import explained_share, find_neighbours, fit_plane
+from tankcal.inspection.out_of_plane import find_neighbours, fit_plane, r_squared
 from tankcal.inspection.rules import SettlementLimits, Strength
 from tankcal.inspection.settlement import assess, settlement_figures
 from tankcal.inspection.verdict import make_check
@@ -69,7 +69,7 @@ def _tank(rng, family, count, noise):
     true = FAMILIES[family](rng, t) + rng.uniform(5, 40) * np.cos(t - rng.uniform(0, 7))
     plane = fit_plane(t, true)
     S = np.abs(find_neighbours(t, RADIUS_M).operator @ plane.residual_m).max()
-    r2 = explained_share(true, plane.residual_m)[0]
+    r2 = r_squared(true, plane.residual_m)[0]
     s = S * np.exp(rng.uniform(*np.log(noise)))
     arc, limit = 2 * np.pi * RADIUS_M / count, S * rng.uniform(0.6, 1.6)
     yield_pa = 2e-3 * limit * E_PA * HEIGHT_M / (FACTOR * arc**2)

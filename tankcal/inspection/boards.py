@@ -321,14 +321,14 @@ def lay_boards(wall, weld, across_m, grid, distance, sd):
     Boards
     """
     profiles = _profiles(wall, weld, across_m, grid, distance, sd)
-    boards = _averaged_boards(weld, *profiles)
+    boards = _average_boards(weld, *profiles)
     if weld.loose_m and (offset := _peak_offset(boards)):
         azimuth = (weld.azimuth_rad + offset / wall.surface.radius_m) % FULL_TURN
         weld = replace(weld, azimuth_rad=azimuth)
         profiles = _profiles(wall, weld, across_m, grid, distance, sd)
-        boards = _averaged_boards(weld, *profiles)
+        boards = _average_boards(weld, *profiles)
     if _has_bead(boards):
-        boards = _averaged_boards(weld, *profiles, has_bead=True)
+        boards = _average_boards(weld, *profiles, has_bead=True)
     return boards
 
 
@@ -352,7 +352,7 @@ def _profiles(wall, weld, across_m, grid, distance, sd):
     return s, along, distance[:, slot], sd[:, slot]
 
 
-def _averaged_boards(weld, s, along, e, sd, has_bead=False):
+def _average_boards(weld, s, along, e, sd, has_bead=False):
     """`Boards` of two bands each, as means over the scans with weights 1 / noise variance."""
     gap, noise, missed = np.full((3, *e.shape), np.nan)
     for scan, band in np.ndindex(e.shape[:2]):

@@ -290,7 +290,10 @@ def _edge_figure(lines, profiles, breaks, edge):
     if not with_break:
         return Figure(value=None, U=None, k=None, dof=0.0, limit=None, remark="no_break", **place)
     limited = [i for i in with_break if profiles[i].limit_mm is not None]
-    worst = max(limited or with_break, key=lambda i: _profile_severity(profiles[i]))
+    worst = max(
+        limited or with_break,
+        key=lambda i: severity(profiles[i].drop_mm, profiles[i].U_mm, profiles[i].limit_mm),
+    )
     profile, bend = profiles[worst], breaks[worst]
     limit = None
     if profile.limit_mm is not None:
@@ -310,11 +313,6 @@ def _edge_figure(lines, profiles, breaks, edge):
         },
         **place,
     )
-
-
-def _profile_severity(profile):
-    """Sort key of a profile with a break-over point, see `verdict.severity`."""
-    return severity(profile.drop_mm, profile.U_mm, profile.limit_mm)
 
 
 def _bulge_figure(lines, breaks, bulge):

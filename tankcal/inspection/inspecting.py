@@ -18,9 +18,9 @@ from tankcal.inspection.rules import (
     settlement_limits,
 )
 from tankcal.inspection.settlement import assess_settlement
-from tankcal.inspection.shape import LEAST_READ, inspect_shape, unsurveyed_figures
+from tankcal.inspection.shape import LEAST_READ, empty_wall_figures, inspect_shape
 from tankcal.inspection.verdict import Figure, make_check
-from tankcal.inspection.weld_gaps import find_gaps, undetermined_gaps
+from tankcal.inspection.weld_gaps import empty_gaps, find_gaps
 from tankcal.inspection.welds import list_welds
 from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import Log
@@ -147,7 +147,7 @@ def _welds(basis, rule, part_progress, progress):
         limits = {code: entry.value for code, entry in gap_limits.items() if entry is not None}
         return find_gaps(basis.survey, limits, Reading(None, part_progress), progress)
     given_rad = [entry.get("welds_rad") or () for entry in basis.job["courses"]]
-    return undetermined_gaps(list_welds(basis.courses_m, given_rad), "gap_no_cloud")
+    return empty_gaps(list_welds(basis.courses_m, given_rad), "gap_no_cloud")
 
 
 def assemble_inspection(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
@@ -175,13 +175,13 @@ def assemble_inspection(basis, rule, bottom=None, welds=None, *, nominal="drawin
         sizes = replace(sizes, nominal_radius_m=None)
     if basis.shape is None:
         figures, generatrices, levels = (
-            unsurveyed_figures(rule, sizes, "wall_not_surveyed"),
+            empty_wall_figures(rule, sizes, "wall_not_surveyed"),
             None,
             [],
         )
     else:
         figures, generatrices, levels = inspect_shape(basis.shape, sizes, rule)
-        problems += _shape_warnings(basis, sizes, levels)
+        problems += _warn_about_shape(basis, sizes, levels)
     if welds is not None:
         figures += [_gap_figure(item, limit_of(rule, item.code)) for item in welds.figures]
     checks = [make_check(item) for item in (*figures, *bottom.figures)]  # in the order of CHECKS
@@ -247,11 +247,11 @@ def _rule_record(rule):
     return InspectionRule(rule.name, rule.file, rule.source, rule.verified, rule.remark)
 
 
-def _shape_warnings(basis, sizes, levels):
+def _warn_about_shape(basis, sizes, levels):
     """Warnings about the shape of a wall."""
     if sizes.nominal_radius_m is not None:
-        yield from _nominal_warnings(basis, sizes, levels)
-    yield from _rejected_warnings(basis)
+        yield from _warn_about_nominal(basis, sizes, levels)
+    yield from _warn_about_rejected(basis)
     plumb_lines = [*basis.shape["plumbs"][-1:], *basis.shape["courses"]]
     if any(sum(plumb["is_read"]) < LEAST_READ for plumb in plumb_lines):
         text = message(
@@ -264,7 +264,7 @@ def _shape_warnings(basis, sizes, levels):
         yield Problem(basis.file, text)
 
 
-def _nominal_warnings(basis, sizes, levels):
+def _warn_about_nominal(basis, sizes, levels):
     """Warning if the mean radii of all levels deviate alike from the nominal radius."""
     means = [1000 * (level.mean_radius_m - sizes.nominal_radius_m) for level in levels]
     spread = max(means) - min(means)
@@ -280,7 +280,7 @@ def _nominal_warnings(basis, sizes, levels):
         yield Problem(basis.file, text, column="tank.nominal_diameter_m")
 
 
-def _rejected_warnings(basis):
+def _warn_about_rejected(basis):
     """Warning about rejected points near the wall, which enter no check."""
     rejected = basis.shape["set_aside"]
     if not rejected:

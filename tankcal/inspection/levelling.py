@@ -100,7 +100,7 @@ def read_settlement(path, log):
     places = _places(values, azimuth, log)
     groups = _repeats(values, epochs)
     given = values.of("s_mm")[0] is not None
-    pooled, dof = _pooled_sd(values, groups)
+    pooled, dof = _pool_sd(values, groups)
     if given:
         _warn_about_repeats(values, groups, log)
     sd_m = values.numbers("s_mm") / 1000 if given else np.full(len(epochs), pooled)
@@ -228,11 +228,11 @@ def _azimuths(values, log):
     elif has_azimuth:
         return azimuth, None
     else:
-        return _on_circle(values, x, y, log)
+        return _azimuths_about_circle(values, x, y, log)
     return None
 
 
-def _on_circle(values, x, y, log):
+def _azimuths_about_circle(values, x, y, log):
     """Azimuths about the centre of the circle through all points, and its radius, m."""
     known = np.isfinite(x) & np.isfinite(y)
     for row, one_x, one_y in zip(values.rows, x, y, strict=True):
@@ -296,7 +296,7 @@ def _repeats(values, epochs):
     return groups
 
 
-def _pooled_sd(values, groups):
+def _pool_sd(values, groups):
     """Pooled standard deviation of a reading from repeats, m, and its degrees of freedom.
 
     Identical repeats suggest copied rows; the result is then nan and 0.

@@ -109,7 +109,7 @@ def _least_squares(columns):
     return np.linalg.solve(root, basis.T)
 
 
-def explained_share(z_m, residual_m):
+def r_squared(z_m, residual_m):
     """Share of the variance that the plane explains, R2 = 1 - sum U^2 / sum (z - mean z)^2.
 
     Parameters
@@ -127,7 +127,7 @@ def explained_share(z_m, residual_m):
     Examples
     --------
     >>> z = np.array([0.0, 1.0, 2.0])
-    >>> explained_share(z, np.array([0.0, 0.5, -0.5]))[0]
+    >>> r_squared(z, np.array([0.0, 0.5, -0.5]))[0]
     0.75
     """
     about_mean = z_m - np.mean(z_m)
@@ -212,7 +212,7 @@ def arcs_to_next(azimuth_rad):
     return np.diff(azimuth_rad, append=azimuth_rad[0] + 2 * np.pi)
 
 
-def spaced_subset(azimuth_rad, residual_m, radius_m, *, arc_m, least):
+def select_subset(azimuth_rad, residual_m, radius_m, *, arc_m, least):
     """Select points about `arc_m` apart that include the largest residuals of both signs.
 
     The selection starts at the point farthest from the plane and takes the nearest point to each
@@ -237,7 +237,7 @@ def spaced_subset(azimuth_rad, residual_m, radius_m, *, arc_m, least):
     Examples
     --------
     >>> t = np.radians(np.arange(0.0, 360.0, 22.5))
-    >>> spaced_subset(t, np.cos(2 * t - 0.1), 10.0, arc_m=9.0, least=8).tolist()
+    >>> select_subset(t, np.cos(2 * t - 0.1), 10.0, arc_m=9.0, least=8).tolist()
     [0, 2, 4, 6, 8, 10, 12, 14]
     """
     count, size = len(azimuth_rad), np.abs(residual_m)

@@ -107,22 +107,22 @@ def settlement_limits(section):
     >>> limits.curvature_factor, limits.de_beer
     (11, None)
     """
-    given = _given_values(section)
+    given = _values_of_section(section)
     counts = {key: int(given[key]) for key in ("least_points", "highest_harmonic") if key in given}
     return SettlementLimits(**(given | counts))
 
 
 def edge_limits(section):
     """`EdgeLimits` of the section `[edge]`, {key: value}, or of no rule for None."""
-    return EdgeLimits(**_given_values(section))
+    return EdgeLimits(**_values_of_section(section))
 
 
 def bulge_limits(section):
     """`BulgeLimits` of the section `[bulge]`, {key: value}, or of no rule for None."""
-    return BulgeLimits(**_given_values(section))
+    return BulgeLimits(**_values_of_section(section))
 
 
-def _given_values(section):
+def _values_of_section(section):
     """Keys of a section that have a value."""
     return {key: value for key, value in (section or {}).items() if value is not None}
 

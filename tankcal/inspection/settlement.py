@@ -24,11 +24,11 @@ from tankcal.inspection.out_of_plane import (
     Neighbours,
     Plane,
     curvature_rows,
-    explained_share,
     find_largest_curvature,
     find_neighbours,
     fit_plane,
-    spaced_subset,
+    r_squared,
+    select_subset,
 )
 from tankcal.inspection.rules import compute_curvature_limit
 from tankcal.inspection.verdict import PROBABILITY, Figure
@@ -184,8 +184,8 @@ def assess(epoch, dof, strength, limits):
     azimuth, z, radius_m = epoch.azimuth_rad, epoch.z_m, strength.diameter_m / 2
     variance = np.full(len(z), np.nan) if not dof else epoch.u_m**2
     plane = fit_plane(azimuth, z)
-    r2, gradient = explained_share(z, plane.residual_m)
-    chosen = spaced_subset(
+    r2, gradient = r_squared(z, plane.residual_m)
+    chosen = select_subset(
         azimuth,
         plane.residual_m,
         radius_m,
@@ -194,7 +194,7 @@ def assess(epoch, dof, strength, limits):
     )
     every, subset = (find_neighbours(azimuth, radius_m, points) for points in (None, chosen))
     curvature_limit = compute_curvature_limit(limits, strength)
-    S, u_S = _out_of_plane(every, plane, variance)
+    S, u_S = _compute_S(every, plane, variance)
     every_limit, subset_limit = (
         None if curvature_limit is None else points.limits_m(curvature_limit)
         for points in (every, subset)
@@ -239,7 +239,7 @@ def assess(epoch, dof, strength, limits):
     )
 
 
-def _out_of_plane(neighbours, plane, variance):
+def _compute_S(neighbours, plane, variance):
     """S of the points of `neighbours` and its standard uncertainty, m."""
     rows = neighbours.operator @ plane.residual_operator
     return neighbours.operator @ plane.residual_m, np.sqrt(rows**2 @ variance)
@@ -274,7 +274,7 @@ def _share_statistic(plane):
 
 def _largest(neighbours, plane, variance, limits_m, true_value):
     """`Largest` of the points of `neighbours`."""
-    S, u = _out_of_plane(neighbours, plane, variance)
+    S, u = _compute_S(neighbours, plane, variance)
     limits = np.ones(len(S)) if limits_m is None else limits_m
     at = int(np.argmax(np.abs(S) / limits))
     # Compare the points by their shares of the limits, and return to m at the limit of this place.
@@ -401,19 +401,19 @@ def make_settlement(assessed, strength, sd_known):
         p_mm=1000 * plane.p_m,
         q_mm=1000 * plane.q_m,
         b_mm=1000 * plane.b_m,
-        U_b_mm=_known(1000 * k * _u(plane.b_gradient(), variance)),
+        U_b_mm=_finite_or_none(1000 * k * _u(plane.b_gradient(), variance)),
         highest_azimuth_deg=float(np.degrees(plane.highest_rad)),
         tilt_mm_per_m=1000 * plane.b_m / (strength.diameter_m / 2),
         R2=assessed.r2,
         sd_known=sd_known,
         arc_m=circumference_m / len(epoch.points),
-        limit_mm=_in_mm(assessed.largest.limit_m),
-        limit_half_mm=_in_mm(limit_of_every_second(assessed)),
+        limit_mm=_mm_or_none(assessed.largest.limit_m),
+        limit_half_mm=_mm_or_none(limit_of_every_second(assessed)),
         subset_arc_m=circumference_m / len(assessed.subset.places),
-        subset_limit_mm=_in_mm(assessed.largest_of_subset.limit_m),
+        subset_limit_mm=_mm_or_none(assessed.largest_of_subset.limit_m),
         harmonics=curvature.highest,
         curvature_per_m=curvature.per_m,
-        U_curvature_per_m=_known(k * assessed.u_curvature_per_m),
+        U_curvature_per_m=_finite_or_none(k * assessed.u_curvature_per_m),
         curvature_limit_per_m=assessed.curvature_limit_per_m,
         points=[_point(assessed, i) for i in range(len(epoch.points))],
     )
@@ -441,21 +441,21 @@ def _point(assessed, i):
         point=epoch.points[i],
         azimuth_deg=float(np.degrees(epoch.azimuth_rad[i])),
         z_mm=1000 * float(epoch.z_m[i]),
-        s_mm=_known(1000 * epoch.u_m[i]),
+        s_mm=_finite_or_none(1000 * epoch.u_m[i]),
         fitted_mm=1000 * float(plane.fitted_m[i]),
         U_i_mm=1000 * float(plane.residual_m[i]),
         S_i_mm=1000 * float(assessed.S_m[i]),
-        U_S_mm=_known(1000 * k * assessed.u_S_m[i]),
+        U_S_mm=_finite_or_none(1000 * k * assessed.u_S_m[i]),
         in_subset=i in assessed.subset.places,
         limit_mm=None if limits is None else 1000 * float(limits[i]),
     )
 
 
-def _known(value):
+def _finite_or_none(value):
     """Value as float, or None if it is not finite."""
     return float(value) if np.isfinite(value) else None
 
 
-def _in_mm(value_m):
+def _mm_or_none(value_m):
     """Value in mm, or None for None."""
     return None if value_m is None else float(1000 * value_m)

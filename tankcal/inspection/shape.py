@@ -142,9 +142,9 @@ def inspect_shape(shape, sizes, rule):
     return figures, _generatrices(shape), levels
 
 
-def unsurveyed_figures(rule, sizes, remark):
+def empty_wall_figures(rule, sizes, remark):
     """Figures of the checks of a wall that was not surveyed, without values."""
-    return [_undetermined(code, _limit(rule, code, sizes), remark) for code in WALL_CHECKS]
+    return [_empty_figure(code, _limit(rule, code, sizes), remark) for code in WALL_CHECKS]
 
 
 def _limit(rule, code, sizes, course=None):
@@ -155,7 +155,7 @@ def _limit(rule, code, sizes, course=None):
     return limit_of(rule, code, diameter_m=sizes.diameter_m, height_m=height)
 
 
-def _undetermined(code, limit, remark):
+def _empty_figure(code, limit, remark):
     """Figure without a value."""
     return Figure(
         code=code, unit="mm", value=None, U=None, k=None, dof=np.inf, limit=limit, remark=remark
@@ -170,7 +170,7 @@ def _axis(axis, sizes, rule):
     # The offset between two levels is extrapolated to the height of the shell.
     limit = _limit(rule, "plumbness_axis", sizes)
     if axis is None:
-        return _undetermined("plumbness_axis", limit, "one_level")
+        return _empty_figure("plumbness_axis", limit, "one_level")
     distance_m = axis["high_m"] - axis["low_m"]
     offset = spread_of([hypot(axis["x_mm"], axis["y_mm"])], [axis["u_mm"]], [axis["dof"]])
     offset = offset.times(sizes.height_m / distance_m)
@@ -190,7 +190,7 @@ def _generatrix(shape, sizes, rule):
     """Figure of the generatrices: offset of the top from the bottom, over the shell."""
     limit = _limit(rule, "plumbness_generatrix", sizes)
     if not shape["plumbs"]:
-        return _undetermined("plumbness_generatrix", limit, "one_level")
+        return _empty_figure("plumbness_generatrix", limit, "one_level")
     top = shape["plumbs"][-1]
     return _plumb_figure("plumbness_generatrix", top, sizes.height_m, limit)
 
@@ -203,7 +203,7 @@ def _courses(shape, sizes, rule):
         height = sizes.courses_m[item["course"] - 1]
         figures.append(_plumb_figure("plumbness_course", item, height, limit, item["course"]))
     if not figures:
-        return _undetermined("plumbness_course", None, "one_level_a_course")
+        return _empty_figure("plumbness_course", None, "one_level_a_course")
     used = sum(item.used for item in figures)
     worst = max(
         figures, key=lambda item: severity(item.value, item.U, item.limit and item.limit.value)
@@ -293,7 +293,7 @@ def _roundness(code, shape, sizes, rule):
     limit = _limit(rule, code, sizes)
     levels = [item for item in shape["levels"] if item["is_low"] == is_low]
     if not levels:
-        return _undetermined(code, limit, "no_level_there")
+        return _empty_figure(code, limit, "no_level_there")
     spreads = [_departures(item, sizes.nominal_radius_m) for item in levels]
     whole = Spread(*(np.concatenate([getattr(item, name) for item in spreads])
                      for name in ("value", "U", "k", "dof")))  # fmt: skip

@@ -67,7 +67,7 @@ def find_gaps(result, limits_mm, reading=None, progress=None):
     heights = [course.height_m for course in job.courses]
     given = [course.welds_rad for course in job.courses]
     if clouded is None:
-        return undetermined_gaps(list_welds(heights, given), "gap_no_cloud")
+        return empty_gaps(list_welds(heights, given), "gap_no_cloud")
     wall, reading = clouded.cells, reading or Reading()
     welds = list_welds(heights, given, wall.welds, wall.surface.radius_m)
     telling = Telling(progress, reading.part_progress)
@@ -270,7 +270,7 @@ def _figure(kind, gap, worst, known, welds, noise_scale):
     )
 
 
-def undetermined_gaps(welds, remark):
+def empty_gaps(welds, remark):
     """`WeldGaps` without any determined gap, as for a survey by points or strapping."""
     figures = []
     for kind in (PEAKING, BANDING):

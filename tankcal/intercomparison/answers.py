@@ -108,7 +108,7 @@ def make_forms(manifest, translate=str):
     lines = [*(f"# {translate(item)}" for item in ABOUT), "", "[participant]"]
     for item in KEYS:
         value = manifest["truth_sha256"] if item.name == "package" else ""
-        value = "2026-01-31" if item.kind == "date" else _quoted(value)
+        value = "2026-01-31" if item.kind == "date" else _quote(value)
         lines.append(
             f"{'' if item.required else '# '}{item.name} = {value}  # {translate(item.note)}"
         )
@@ -129,7 +129,7 @@ def answer_files(saved):
         value = getattr(participant, item.name)
         if value is not None:
             lines.append(f"{item.name} = {value}" if item.kind == "date" else
-                         f"{item.name} = {_quoted(value)}")  # fmt: skip
+                         f"{item.name} = {_quote(value)}")  # fmt: skip
     files = {PARTICIPANT: ("\n".join(lines) + "\n").encode()}
     for item in saved.answers:
         columns = zip(item.height_m, item.volume_m3, item.U_m3, item.k, strict=True)
@@ -152,7 +152,7 @@ def _cell(value):
     return "" if value is None or not np.isfinite(value) else f"{value:.9g}"
 
 
-def _quoted(text):
+def _quote(text):
     """Text as a TOML string, whose escapes are those of JSON."""
     return json.dumps(text, ensure_ascii=False)
 
@@ -366,7 +366,7 @@ def _read_json(path, requested, log, warnings):
             log.problem(name, message("ic_uneven", "lists of different lengths; expected a value "
                         "(or null) for each height"))  # fmt: skip
         elif not _has_too_many(name, len(entry["height_m"]), requested[entry["tank"]][0], log):
-            U, k = (_checked_positive(name, key, entry[key], log) for key in ("U_m3", "k"))
+            U, k = (_check_positive(name, key, entry[key], log) for key in ("U_m3", "k"))
             height = np.array(entry["height_m"], float)
             _check_heights(
                 name, range(1, len(height) + 1), height, requested[entry["tank"]][0], log
@@ -380,7 +380,7 @@ def _read_json(path, requested, log, warnings):
     return AnswersFile(Participant(**data["participant"]), answers)
 
 
-def _checked_positive(name, key, values, log):
+def _check_positive(name, key, values, log):
     """List of values, nan for None; report values that are not positive."""
     numbers = np.array([np.nan if value is None else value for value in values], float)
     if np.any(numbers <= 0):
@@ -426,7 +426,9 @@ def answer_package(folder, manifest, progress=None, run=None):
             table = run(Path(folder) / job["folder"])
             volumes = [table.at(height) for height in requested]
         except InputError as error:
-            problems += [_problem_of_job(job, item) for item in error.problems]
+            problems += [
+                replace(item, file=f"{job['folder']}/{item.file}") for item in error.problems
+            ]
             continue
         except TankcalError as error:
             problems += [Problem(job["folder"], text) for text in error.texts]
@@ -453,8 +455,3 @@ def _run(folder):
     import tankcal
 
     return tankcal.run(tankcal.load(folder))
-
-
-def _problem_of_job(job, problem):
-    """Problem with the folder of its job before the file name."""
-    return replace(problem, file=f"{job['folder']}/{problem.file}")

@@ -85,9 +85,9 @@ def score_folders(folders, truth, package=None):
                 _identifying_file(folder),
                 _other_package(answers.saved.participant.package, truth_sha256),
             )
-        problems += [_with_folder(folder, item, folders) for item in folder_log.problems]
+        problems += [_add_folder(folder, item, folders) for item in folder_log.problems]
         if answers is not None:
-            warnings = [_with_folder(folder, item, folders) for item in answers.warnings]
+            warnings = [_add_folder(folder, item, folders) for item in answers.warnings]
             participants.append(replace(answers, warnings=tuple(warnings)))
     if problems:
         raise InputError(problems)
@@ -110,7 +110,7 @@ def _identifying_file(folder):
     return ANSWERS.file if (Path(folder) / ANSWERS.file).is_file() else PARTICIPANT
 
 
-def _with_folder(folder, problem, folders):
+def _add_folder(folder, problem, folders):
     """Problem with the folder before its file name if several folders are scored."""
     if len(folders) < 2:
         return problem
@@ -295,19 +295,19 @@ def score_method(participant, method, tables, asked):
         bias_ppm=_or_none(_mean(tops)),
         u_bias_ppm=float(np.std(tops, ddof=1) / np.sqrt(len(tops))) if len(tops) > 1 else None,
         rms_top_ppm=_or_none(_rms(tops)),
-        rms_ppm=_pooled([table.rms_ppm for table in tables]),
-        mean_U_ppm=_or_none(_mean(_known(table.mean_U_ppm for table in tables))),
+        rms_ppm=_pool_rms([table.rms_ppm for table in tables]),
+        mean_U_ppm=_or_none(_mean(_drop_none(table.mean_U_ppm for table in tables))),
         share_within=share,
         u_share=u_share,
         tops_within=good,
         tops_judged=len(E_n),
         tops_low=low,
         tops_high=high,
-        rms_zeta=_pooled([table.rms_zeta for table in tables]),
-        form_ppm=_pooled([table.form.form_ppm for table in tables]),
-        delivery_1cm_percent=_pooled([table.form.delivery_1cm_percent for table in tables]),
-        delivery_10cm_percent=_pooled([table.form.delivery_10cm_percent for table in tables]),
-        delivery_2m_ppm=_pooled([table.form.delivery_2m_ppm for table in tables]),
+        rms_zeta=_pool_rms([table.rms_zeta for table in tables]),
+        form_ppm=_pool_rms([table.form.form_ppm for table in tables]),
+        delivery_1cm_percent=_pool_rms([table.form.delivery_1cm_percent for table in tables]),
+        delivery_10cm_percent=_pool_rms([table.form.delivery_10cm_percent for table in tables]),
+        delivery_2m_ppm=_pool_rms([table.form.delivery_2m_ppm for table in tables]),
         falling_rows=sum(table.form.falling_rows for table in tables),
     )
 
@@ -358,14 +358,14 @@ def exact_bounds(good, count, probability=BOUNDS):
     return float(low), float(high)
 
 
-def _known(values):
+def _drop_none(values):
     """Array of the values that are not None."""
     return np.array([value for value in values if value is not None], float)
 
 
-def _pooled(values):
+def _pool_rms(values):
     """Root mean square of the values that are not None, or None."""
-    return _or_none(_rms(_known(values)))
+    return _or_none(_rms(_drop_none(values)))
 
 
 def _mean(values):

@@ -280,11 +280,6 @@ def trim_cells(cells):
     return cells
 
 
-def _column(number):
-    """Heading of a column without heading."""
-    return message("lint_column", "column {number}", number=str(number))
-
-
 def _block_without_heading(name, rows):
     """Block of columns 1 and 2 of a text without headings, or () if it has no numbers."""
     body = [row for row in rows if all(has_digit(cell) for cell in row[1][:2]) and row[1][1:]]
@@ -301,7 +296,8 @@ def _block_without_heading(name, rows):
         )
         raise InputError(Problem(name, text, body[0][0]))
     nothing = heading_of(None)
-    pair = Pair(0, 1, *(replace(nothing, text=_column(k)) for k in (1, 2)))
+    names = (message("lint_column", "column {number}", number=number) for number in "12")
+    pair = Pair(0, 1, *(replace(nothing, text=name) for name in names))
     width = max(len(trim_cells(cells)) for _, cells in body)
     return (Block((pair,), width, tuple(body)),)
 

@@ -119,7 +119,7 @@ def most_suspicious(rows):
 
 MOST_ROUNDS = 150
 _SECOND_LOOK = 10  # rows examined again about a rejected joint
-_SAME_SIZE = 0.02
+_SAME_SIZE = 0.02  # largest relative difference of sizes treated as equal, beside 3 quanta
 _FEWEST_FOR_SLOPES = 4  # rows
 # Area of the cross section in the last interval over that of the intervals before it. If the last
 # step is shorter, curves through the rows predict it poorly, but no tank doubles its area.
@@ -245,7 +245,7 @@ def _slopes_around(slope):
 
 def _reopen(rows, joint):
     """Examine rows again without a joint that leaves more than rounding."""
-    rows.joints = [kept_joint for kept_joint in rows.joints if kept_joint != joint]
+    rows.joints = [other for other in rows.joints if other != joint]
     rows.is_settled[max(joint - _SECOND_LOOK, 0) : joint + _SECOND_LOOK] = False
 
 
@@ -259,7 +259,7 @@ def _test_other_joint(rows, best, moved):
         return best
     joint = beside[0]
     moved.add(joint)
-    rows.joints = [near_joint for near_joint in rows.joints if near_joint != joint]
+    rows.joints = [other for other in rows.joints if other != joint]
     alternative = explain(rows, best.rows[0])
     if alternative.kind == "joint" and alternative.rows[0] != joint:
         return alternative
@@ -301,7 +301,9 @@ def _merge_shifts(faults, count):
     others = [f for f in faults if f.kind != "shift"]
     left = []
     for shift in shifts:
-        start = next((s for s in left if abs(s.size + shift.size) <= _tolerance(s.size)), None)
+        start = next(
+            (s for s in left if abs(s.size + shift.size) <= _SAME_SIZE * abs(s.size) + 3), None
+        )
         if start is None:
             left.append(shift)
         else:
@@ -311,8 +313,3 @@ def _merge_shifts(faults, count):
         Fault("row", f.first, f.first, f.size) if f.kind == "block" and f.first == f.last else f
         for f in others + left
     ]
-
-
-def _tolerance(size):
-    """Largest difference of two sizes that are treated as equal."""
-    return _SAME_SIZE * abs(size) + 3

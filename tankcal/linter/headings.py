@@ -12,12 +12,12 @@ from tankcal.linter.units import (
     NO_UNIT,
     VOLUME,
     Unit,
+    drop_prepositions,
     names_only_units,
     plain_text,
     size_of,
     tokens_of,
     unit_of,
-    without_prepositions,
 )
 from tankcal.messages import Message
 
@@ -188,7 +188,7 @@ def is_heading_of_parts(cell):
 
 def _words(text):
     """Words of a heading."""
-    return [token for token in without_prepositions(tokens_of(text)) if token[0].isalpha()]
+    return [token for token in drop_prepositions(tokens_of(text)) if token[0].isalpha()]
 
 
 def _any(pattern, words):

@@ -164,7 +164,7 @@ def _correct_order(reporter, step, tolerance):
         )
         reporter.problem(misplaced[0], expected)
         return height, keep
-    expected = {k: _expected_height(k, chain, height, step, tolerance) for k in misplaced}
+    expected = {k: _interpolate_height(k, chain, height, step, tolerance) for k in misplaced}
     done = set()
     for k in misplaced:
         if k in done:
@@ -213,7 +213,7 @@ def _longest_rise(height):
     return chain[::-1]
 
 
-def _expected_height(k, chain, height, step, tolerance):
+def _interpolate_height(k, chain, height, step, tolerance):
     """Height that a misplaced row should have at its position; None if no row is missing there."""
     place = bisect_left(chain, k)
     left = chain[place - 1] if place else None

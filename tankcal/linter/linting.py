@@ -186,7 +186,7 @@ def check_file(
     grids = read_grids(path, log)
     log.stop_if_problems()
     tables = _select_tables(path.name, grids, sheet, log, choose)
-    tables = [_with_declared_units(table, declared) for table in tables]
+    tables = [_apply_declared_units(table, declared) for table in tables]
     longest = max(len(table.entries) for table in tables)
     complaints = [
         problem
@@ -212,7 +212,7 @@ def check_file(
     return CheckedFile(report, tuple(checked_tables))
 
 
-def _with_declared_units(table, declared):
+def _apply_declared_units(table, declared):
     """Return the table with declared units where its headings state none."""
     choices = table.volume_choices
     is_choice = not choices or declared.volume_m3 in choices

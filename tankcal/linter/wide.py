@@ -18,11 +18,11 @@ from tankcal.linter.units import (
     LENGTH,
     VOLUME,
     Unit,
+    drop_prepositions,
     number_of,
     size_of,
     tokens_of,
     unit_of,
-    without_prepositions,
 )
 from tankcal.messages import message
 
@@ -171,7 +171,7 @@ def _units(cells, above, label_unit):
     row_units = []
     for line in (cells, *above[::-1]):
         text = line[0] if line and _is_short(line[0]) else ""
-        tokens = without_prepositions(tokens_of(text))
+        tokens = drop_prepositions(tokens_of(text))
         row_units += [
             size for size in (size_of(token, LENGTH) for token in tokens) if size is not None
         ]
@@ -180,7 +180,7 @@ def _units(cells, above, label_unit):
     label_units = [label_unit] if label_unit is not None else row_units[1:]
     if not label_units:
         texts = [cell for line in above for cell in line[1:] if isinstance(cell, str)]
-        tokens = [token for text in texts for token in without_prepositions(tokens_of(text))]
+        tokens = [token for text in texts for token in drop_prepositions(tokens_of(text))]
         label_units = [
             size for size in (size_of(token, LENGTH) for token in tokens) if size is not None
         ]

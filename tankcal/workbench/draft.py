@@ -316,16 +316,11 @@ class Draft:
             file = self.source.name
             tables = [self.tables[name] for name in changed if name in self.tables]
             keys = [self.keys[name] for name in changed if name in self.keys]
-            return {file: write_book(self._original, tables, keys)}, numbers
+            return {file: write_book(self._saved_bytes[file], tables, keys)}, numbers
         files = {now[name].file: now[name].render()[0] for name in changed}
         return {
             name: data for name, data in files.items() if data != self._saved_bytes[name]
         }, numbers
-
-    @property
-    def _original(self):
-        """Bytes of the workbook on the disk."""
-        return self._saved_bytes[self.source.name]
 
     def check(self):
         """Check the job in its edited state, and return a `Check` with all problems by cell."""
@@ -345,7 +340,7 @@ class Draft:
             if (problem.file, problem.row, problem.column) not in places
             and (problem.file, None, problem.column) not in places
         ]
-        off = self._commented_rows(numbers)
+        off = self._warn_about_comments(numbers)
         return mark_cells(self, numbers, Check((*ambiguous, *problems), (*warnings, *off), job))
 
     def _ambiguous_values(self):
@@ -358,7 +353,7 @@ class Draft:
             for owner, key in keys.ambiguous:
                 yield Problem(keys.file, AMBIGUOUS, None, f"{owner}.{key}")
 
-    def _commented_rows(self, numbers):
+    def _warn_about_comments(self, numbers):
         """Warnings of rows that an edit made a comment."""
         return [
             Problem(table.file, READ_AS_COMMENT, numbers[name][place], table.headings[0])

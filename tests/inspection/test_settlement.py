@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose
 
 from tankcal.inspection.epochs import Levelling, is_within_noise
 from tankcal.inspection.out_of_plane import (
-    explained_share,
     find_largest_curvature,
     find_neighbours,
     fit_plane,
-    spaced_subset,
+    r_squared,
+    select_subset,
 )
 from tankcal.inspection.rules import SettlementLimits, Strength, compute_curvature_limit
 from tankcal.inspection.settlement import (
@@ -232,7 +232,7 @@ def test_subset_keeps_the_farthest_on_both_sides():
     rng = np.random.default_rng(11)
     for count in (19, 28, 40, 64):
         azimuth, left = uneven(count, count), rng.normal(0, 1, count)
-        chosen = spaced_subset(azimuth, left, 20.0, arc_m=9.144, least=8)
+        chosen = select_subset(azimuth, left, 20.0, arc_m=9.144, least=8)
         assert len(set(chosen)) == len(chosen) == 14  # of 125.7 m
         assert {int(np.argmax(left)), int(np.argmin(left))} <= set(chosen.tolist())
         assert np.all(np.diff(chosen) > 0)
@@ -240,9 +240,9 @@ def test_subset_keeps_the_farthest_on_both_sides():
 
 
 def test_few_points_are_their_own_subset():
-    chosen = spaced_subset(even_azimuths(8), np.arange(8.0), 30.0, arc_m=9.144, least=8)
+    chosen = select_subset(even_azimuths(8), np.arange(8.0), 30.0, arc_m=9.144, least=8)
     assert chosen.tolist() == [*range(8)]
-    nearly = spaced_subset(even_azimuths(17), np.arange(17.0), 20.0, arc_m=9.144, least=8)
+    nearly = select_subset(even_azimuths(17), np.arange(17.0), 20.0, arc_m=9.144, least=8)
     assert len(nearly) == 17  # 24 ft apart
 
 
@@ -281,7 +281,7 @@ def test_uncertainty_of_curvature_tilt_and_r2_by_simulation():
     for _ in range(1500):
         z = (true + rng.normal(0, 1, 16)) / 1000
         plane = fit_plane(azimuth, z)
-        r2 = explained_share(z, plane.residual_m)[0]
+        r2 = r_squared(z, plane.residual_m)[0]
         found.append((find_largest_curvature(azimuth, z, 30.0, 4).per_m, plane.b_m, r2))
     of_b = np.sqrt(assessed.plane.b_gradient() ** 2 @ np.full(16, 1e-6))
     expected = [assessed.u_curvature_per_m, of_b, assessed.u_r2]
@@ -293,9 +293,9 @@ def test_gradients():
     z = np.random.default_rng(0).normal(0, 1, 12)
 
     def r2(z):
-        return np.array([explained_share(z, fit_plane(azimuth, z).residual_m)[0]])
+        return np.array([r_squared(z, fit_plane(azimuth, z).residual_m)[0]])
 
-    assert_derivative(r2, z, explained_share(z, fit_plane(azimuth, z).residual_m)[1][None])
+    assert_derivative(r2, z, r_squared(z, fit_plane(azimuth, z).residual_m)[1][None])
     assert_derivative(
         lambda z: np.array([fit_plane(azimuth, z).b_m]), z, fit_plane(azimuth, z).b_gradient()[None]
     )

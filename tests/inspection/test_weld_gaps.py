@@ -24,7 +24,7 @@ from scanned_tanks import scanned_parts
 
 import tankcal
 from tankcal.clouds.wall import Passes, find_cloud_wall
-from tankcal.inspection.weld_gaps import find_gaps, find_gaps_in_cloud, undetermined_gaps
+from tankcal.inspection.weld_gaps import empty_gaps, find_gaps, find_gaps_in_cloud
 from tankcal.inspection.welds import (
     build_round_grid,
     build_upright_grid,
@@ -365,7 +365,7 @@ def test_survey_without_a_cloud_determines_nothing(tmp_path):  # property
 
 
 def test_welds_of_which_nothing_is_told():  # property
-    found = undetermined_gaps(list_welds([2.0, 2.0], [[0.5], [1.5]]), "gap_no_cloud")
+    found = empty_gaps(list_welds([2.0, 2.0], [[0.5], [1.5]]), "gap_no_cloud")
     assert [(one.kind, one.course, one.gap_mm) for one in found.gaps] == [
         ("peaking", 1, None),
         ("peaking", 2, None),

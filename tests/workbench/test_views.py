@@ -252,7 +252,7 @@ def test_one_point_after_another(points):
     points.step(-1)
     assert points.chosen == "dent"
     assert points.list.value == "dent"
-    assert "mm" in points.told.value
+    assert "mm" in points.details.value
 
 
 def test_a_decision_needs_a_reason(points, heard):

@@ -30,18 +30,15 @@ def settlements(paper):
     if not items:
         return []
     has_several = len(items) > 1
+    # A figure with a reading beside it estimates a true value.
+    has_estimates = any(check["reading"] is not None for check in paper.found["checks"])
     return [
         paper.heading("settlement"),
         *([paper.figure(draw_epochs(paper), "epochs")] if has_several else []),
         paper.paragraph("settlement"),
-        *([paper.paragraph("estimates")] if _has_estimates(paper) else []),
+        *([paper.paragraph("estimates")] if has_estimates else []),
         *(block for item in items for block in settlement_blocks(paper, item)),
     ]
-
-
-def _has_estimates(paper):
-    """Whether a figure estimates a true value, with the reading beside it."""
-    return any(check["reading"] is not None for check in paper.found["checks"])
 
 
 def settlement_blocks(paper, item):
@@ -118,14 +115,14 @@ def points(paper):
     if not items:
         return []
     tables = [
-        paper.show(POINTS, item["points"], across=_across(item["points"]),
+        paper.show(POINTS, item["points"], across=_column_count(item["points"]),
                    epoch=bearable(epoch_name(item)))
         for item in items
     ]  # fmt: skip
     return [paper.heading("points"), *tables]
 
 
-def _across(points):
+def _column_count(points):
     """Number of columns of the page for a short table of points; None for a long table."""
     short = all(len(point["point"]) <= SHORT_NAME for point in points)
     return 2 if short and len(points) <= FEW_POINTS else None
@@ -164,12 +161,12 @@ def draw_settlement(paper, item):
     above.plot(turn, plane, color=FAINT, label=paper.word("legend.plane"))
     above.plot(azimuth, values["z_mm"], "o", color=INK, markersize=3, label=paper.word("legend.z"))
     below.plot(azimuth, values["U_i_mm"], "-", color=FAINT, marker=".", markersize=3,
-               label=_indexed(paper.word("legend.U_i")))  # fmt: skip
+               label=_set_indices(paper.word("legend.U_i")))  # fmt: skip
     _draw_curvatures(paper, below, azimuth, values, points)
     _draw_limits(paper, below, azimuth, item)
     below.axhline(0, color=GREY, linewidth=0.6)
     above.set_ylabel(paper.word("axes.change" if item["since"] else "axes.elevation"))
-    below.set_ylabel(_indexed(paper.word("axes.out_of_plane")))
+    below.set_ylabel(_set_indices(paper.word("axes.out_of_plane")))
     below.set_xlabel(paper.word("axes.azimuth"))
     for ax in (above, below):
         ax.set(xlim=_TURN, xticks=range(0, 361, 45))
@@ -204,7 +201,7 @@ def _draw_curvatures(paper, ax, azimuth, values, points):
         if (chosen & known).any():
             ax.plot(azimuth[chosen & known], values["S_i_mm"][chosen & known], "o", color=INK,
                     markerfacecolor=face, markersize=4,
-                    label=_indexed(paper.word(f"legend.{name}")))  # fmt: skip
+                    label=_set_indices(paper.word(f"legend.{name}")))  # fmt: skip
 
 
 @styled
@@ -220,7 +217,7 @@ def draw_epochs(paper):
         ax.plot(azimuth, out, **line_style(number), marker=".", markersize=4, label=name)
     ax.axhline(0, color=GREY, linewidth=0.6)
     ax.set(xlim=_TURN, xticks=range(0, 361, 45), xlabel=paper.word("axes.azimuth"))
-    ax.set_ylabel(_indexed(paper.word("axes.out")))
+    ax.set_ylabel(_set_indices(paper.word("axes.out")))
     ax.grid(True)
     top = _draw_legend(figure, ax, has_user_names=True)
     figure.set_figheight(HIGH + top)
@@ -296,6 +293,6 @@ def _draw_legend(figure, *axes, has_user_names=False):
     return 0.14 * ceil(len(labels) / columns) + 0.14
 
 
-def _indexed(text):
+def _set_indices(text):
     """Text for a figure in which U_i and S_i are set as mathematics."""
     return text.replace("U_i", "$U_i$").replace("S_i", "$S_i$")

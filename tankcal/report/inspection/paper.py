@@ -100,7 +100,7 @@ class InspectionPaper(SavedPaper):
         """Azimuth to a tenth of a degree."""
         return self.number(degrees, "deg", decimals=1)
 
-    def in_unit(self, check, value):
+    def format_figure(self, check, value):
         """Figure of a check in its unit, with the decimals of the check; None for None."""
         if value is None:
             return None
@@ -112,7 +112,7 @@ class InspectionPaper(SavedPaper):
         """Figure of a check, with a sign unless the limit is a lower limit."""
         if check["value"] is None:
             return None
-        text = self.in_unit(check, check["value"])
+        text = self.format_figure(check, check["value"])
         return text if check["code"] in AT_LEAST else signed_text(check["value"], text)
 
     def reading(self, check):
@@ -150,19 +150,21 @@ class InspectionPaper(SavedPaper):
         code = check["remark"]
         if code is None:
             return None
-        values = {key: self._shown(key, value) for key, value in check["remark_values"].items()}
+        values = {
+            key: self._format_value(key, value) for key, value in check["remark_values"].items()
+        }
         template = self.words["remarks"].get(code)
         if template is None:
             listed = ", ".join(f"{key} {value}" for key, value in values.items())
             return f"{code}: {listed}" if listed else code
         return template.format_map(defaultdict(lambda: NOTHING, values))
 
-    def _shown(self, key, value):
+    def _format_value(self, key, value):
         """Value of a remark: a text, or a number in the unit at the end of its key."""
         if value is None:
             return NOTHING
         if isinstance(value, list):
-            return ", ".join(self._shown(key, item) for item in value)
+            return ", ".join(self._format_value(key, item) for item in value)
         if isinstance(value, bool):
             return self.words["yes_no"]["yes" if value else "no"]
         if not isinstance(value, int | float):

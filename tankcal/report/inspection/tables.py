@@ -36,7 +36,7 @@ CHECKS = Table(
         _text_column("check", lambda paper, row: paper.check_name(row["code"])),
         _text_column("place", lambda paper, row: paper.place(row)),
         _text_column("value", lambda paper, row: paper.value(row), align="right"),
-        _text_column("U", lambda paper, row: paper.in_unit(row, row["U"]), align="right"),
+        _text_column("U", lambda paper, row: paper.format_figure(row, row["U"]), align="right"),
         _text_column("limit", lambda paper, row: paper.limit(row), align="right"),
         _text_column("verdict", lambda paper, row: paper.verdict(row)),
         _text_column("probability", lambda paper, row: paper.probability(row), align="right"),

@@ -195,11 +195,11 @@ def _draw_level(paper, ax, level, factor):
         enlarged * np.array(level[key])[[*order, order[0]]] for key in ("departure_mm", "U_mm")
     )
     circle = np.linspace(0, 2 * np.pi, 361)
-    inner, outer = _around(turn, departure - U), _around(turn, departure + U)
+    inner, outer = _polar_curve(turn, departure - U), _polar_curve(turn, departure + U)
     ax.fill(*np.concatenate([inner, outer[:, ::-1]], axis=1), color=PALE, alpha=0.5, linewidth=0)
-    ax.plot(*_around(circle, 0 * circle), color=FAINT, linewidth=0.6)
-    ax.plot(*_around(turn, departure), color=INK, linewidth=0.9)
-    ax.plot(*_around(turn, departure)[:, :-1], ".", color=INK, markersize=2.4)
+    ax.plot(*_polar_curve(circle, 0 * circle), color=FAINT, linewidth=0.6)
+    ax.plot(*_polar_curve(turn, departure), color=INK, linewidth=0.9)
+    ax.plot(*_polar_curve(turn, departure)[:, :-1], ".", color=INK, markersize=2.4)
     limit = limit_of_level(paper.found, level)
     lines = [
         paper.word("texts.course", course=level["course"]),
@@ -209,12 +209,12 @@ def _draw_level(paper, ax, level, factor):
         lines.append(f"≤ {paper.plain(limit, 'mm')}")
         if enlarged * limit < FARTHEST - 1.02:
             for side in (-1, 1):
-                line = _around(circle, side * enlarged * limit + 0 * circle)
+                line = _polar_curve(circle, side * enlarged * limit + 0 * circle)
                 ax.plot(*line, color=RED, linewidth=0.8, linestyle="--")
     worst = worst_place(level["departure_mm"])
     at = np.radians(level["azimuth_deg"][worst])
     ax.plot(
-        *_around(at, enlarged * level["departure_mm"][worst]), "o", color=RED, markersize=4,
+        *_polar_curve(at, enlarged * level["departure_mm"][worst]), "o", color=RED, markersize=4,
         markerfacecolor="none",
     )  # fmt: skip
     ax.text(0, 0, "\n".join(lines), ha="center", va="center", fontsize=8, parse_math=False)
@@ -222,7 +222,7 @@ def _draw_level(paper, ax, level, factor):
     ax.set(aspect="equal", xlim=(-FARTHEST, FARTHEST), ylim=(-FARTHEST, FARTHEST))
 
 
-def _around(azimuth, departure):
+def _polar_curve(azimuth, departure):
     """Coordinates (2, n) of a curve about the unit circle, with azimuths clockwise from the top."""
     return np.array([(1 + departure) * np.sin(azimuth), (1 + departure) * np.cos(azimuth)])
 

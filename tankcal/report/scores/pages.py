@@ -33,7 +33,7 @@ def _subject(paper):
     """Blocks on the tanks, methods and participants."""
     scores = paper.found
     tanks = {table["tank"] for table in scores["tables"]}
-    methods = answered_methods(scores)
+    methods = list_methods(scores)
     return [
         paper.heading("subject"),
         paper.paragraph(
@@ -65,7 +65,7 @@ def _figures(paper):
     """Blocks with a figure of errors for each method, and Youden's plot."""
     scores = paper.found
     page_blocks = [paper.heading("figures")]
-    for method in answered_methods(scores):
+    for method in list_methods(scores):
         name = paper.method(method)
         page_blocks.append(paper.figure(draw_errors(paper, method), "scored_lines", method=name))
     pair = select_two_tanks(scores)
@@ -92,7 +92,7 @@ def _warnings(paper):
 # ---- figures
 
 
-def answered_methods(scores):
+def list_methods(scores):
     """Methods with answers, in the order of the scores."""
     return list(dict.fromkeys(row["method"] for row in scores["methods"] if row["method"] != EVERY))
 
@@ -146,7 +146,7 @@ def draw_youden(paper, first, second):
     }
     figure = Figure(figsize=(4.6, 3.6))
     ax = figure.subplots()
-    methods, sizes = answered_methods(scores), [1.0]
+    methods, sizes = list_methods(scores), [1.0]
     for who in range(len(scores["participants"])):
         for number, method in enumerate(methods):
             pair = [tops.get((who, method, tank)) for tank in (first, second)]
