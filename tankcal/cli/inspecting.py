@@ -127,7 +127,7 @@ def _line(paper, check):
     values = {
         "check": name,
         "value": paper.value(check),
-        "U": paper.in_unit(check, check["U"]) or "?",
+        "U": paper.format_figure(check, check["U"]) or "?",
         "limit": paper.limit(check) or "-",
         "verdict": verdict,
         "place": paper.place(check),

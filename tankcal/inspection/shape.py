@@ -1,6 +1,7 @@
 """Plumbness and roundness of a wall, from its shape in a record.
 
-The place with the largest `verdict.gravity` decides a check: a tank passes only if all places pass.
+The place with the largest `verdict.severity` decides a check: a tank passes only if all its places
+pass.
 """
 
 from dataclasses import dataclass
@@ -8,9 +9,8 @@ from math import atan2, degrees, hypot
 
 import numpy as np
 
-from tankcal.inspection.figures import PROBABILITY, Figure
 from tankcal.inspection.rules import limit_of
-from tankcal.inspection.verdict import gravity
+from tankcal.inspection.verdict import PROBABILITY, Figure, severity
 from tankcal.record.inspection import Generatrices, InspectedLevel
 from tankcal.uncertainty import coverage_factor
 
@@ -58,6 +58,15 @@ class Spread:
         """Values and expanded uncertainties times a factor."""
         return Spread(factor * self.value, factor * self.U, self.k, self.dof)
 
+    def at(self, place):
+        """Value, U, k and degrees of freedom at a place, as arguments of a `Figure`."""
+        return {
+            "value": float(self.value[place]),
+            "U": float(self.U[place]),
+            "k": float(self.k[place]),
+            "dof": float(self.dof[place]),
+        }
+
 
 def spread_of(value, u, dof):
     """Build a `Spread`.
@@ -98,7 +107,7 @@ def deciding_place(value, U, limit):
     >>> [deciding_place(values, U, limit) for limit in (6.0, 9.0, None)]
     [1, 2, 1]
     """
-    return max(range(len(value)), key=lambda i: gravity(value[i], U[i], limit))
+    return max(range(len(value)), key=lambda i: severity(value[i], U[i], limit))
 
 
 def inspect_shape(shape, sizes, rule):
@@ -133,9 +142,9 @@ def inspect_shape(shape, sizes, rule):
     return figures, _generatrices(shape), levels
 
 
-def not_surveyed(rule, sizes, remark):
+def empty_wall_figures(rule, sizes, remark):
     """Figures of the checks of a wall that was not surveyed, without values."""
-    return [_undetermined(code, _limit(rule, code, sizes), remark) for code in WALL_CHECKS]
+    return [_empty_figure(code, _limit(rule, code, sizes), remark) for code in WALL_CHECKS]
 
 
 def _limit(rule, code, sizes, course=None):
@@ -146,7 +155,7 @@ def _limit(rule, code, sizes, course=None):
     return limit_of(rule, code, diameter_m=sizes.diameter_m, height_m=height)
 
 
-def _undetermined(code, limit, remark):
+def _empty_figure(code, limit, remark):
     """Figure without a value."""
     return Figure(
         code=code, unit="mm", value=None, U=None, k=None, dof=np.inf, limit=limit, remark=remark
@@ -161,7 +170,7 @@ def _axis(axis, sizes, rule):
     # The offset between two levels is extrapolated to the height of the shell.
     limit = _limit(rule, "plumbness_axis", sizes)
     if axis is None:
-        return _undetermined("plumbness_axis", limit, "one_level")
+        return _empty_figure("plumbness_axis", limit, "one_level")
     distance_m = axis["high_m"] - axis["low_m"]
     offset = spread_of([hypot(axis["x_mm"], axis["y_mm"])], [axis["u_mm"]], [axis["dof"]])
     offset = offset.times(sizes.height_m / distance_m)
@@ -169,7 +178,7 @@ def _axis(axis, sizes, rule):
     return Figure(
         code="plumbness_axis",
         unit="mm",
-        **_values_at(offset, 0),
+        **offset.at(0),
         limit=limit,
         azimuth_deg=azimuth_deg,
         used=2,
@@ -181,7 +190,7 @@ def _generatrix(shape, sizes, rule):
     """Figure of the generatrices: offset of the top from the bottom, over the shell."""
     limit = _limit(rule, "plumbness_generatrix", sizes)
     if not shape["plumbs"]:
-        return _undetermined("plumbness_generatrix", limit, "one_level")
+        return _empty_figure("plumbness_generatrix", limit, "one_level")
     top = shape["plumbs"][-1]
     return _plumb_figure("plumbness_generatrix", top, sizes.height_m, limit)
 
@@ -194,10 +203,10 @@ def _courses(shape, sizes, rule):
         height = sizes.courses_m[item["course"] - 1]
         figures.append(_plumb_figure("plumbness_course", item, height, limit, item["course"]))
     if not figures:
-        return _undetermined("plumbness_course", None, "one_level_a_course")
+        return _empty_figure("plumbness_course", None, "one_level_a_course")
     used = sum(item.used for item in figures)
     worst = max(
-        figures, key=lambda item: gravity(item.value, item.U, item.limit and item.limit.value)
+        figures, key=lambda item: severity(item.value, item.U, item.limit and item.limit.value)
     )
     return Figure(**(vars(worst) | {"used": used}))
 
@@ -216,7 +225,7 @@ def _plumb_figure(code, plumb, height_m, limit, course=None):
     return Figure(
         code=code,
         unit="mm",
-        **_values_at(departures, place),
+        **departures.at(place),
         limit=limit,
         course=course,
         azimuth_deg=azimuth_deg[place] % 360,
@@ -232,16 +241,6 @@ def _lean_remark(value_mm, height_m, levels):
     values = {"low_m": levels["low_m"], "high_m": levels["high_m"], "mm_per_m": per_m,
               "one_in": one_in, "over_m": height_m}  # fmt: skip
     return {"remark": "plumb_between", "remark_values": values}
-
-
-def _values_at(spread, place):
-    """Value, U, k and degrees of freedom at a place."""
-    return {
-        "value": float(spread.value[place]),
-        "U": float(spread.U[place]),
-        "k": float(spread.k[place]),
-        "dof": float(spread.dof[place]),
-    }
 
 
 def _generatrices(shape):
@@ -294,7 +293,7 @@ def _roundness(code, shape, sizes, rule):
     limit = _limit(rule, code, sizes)
     levels = [item for item in shape["levels"] if item["is_low"] == is_low]
     if not levels:
-        return _undetermined(code, limit, "no_level_there")
+        return _empty_figure(code, limit, "no_level_there")
     spreads = [_departures(item, sizes.nominal_radius_m) for item in levels]
     whole = Spread(*(np.concatenate([getattr(item, name) for item in spreads])
                      for name in ("value", "U", "k", "dof")))  # fmt: skip
@@ -314,7 +313,7 @@ def _roundness(code, shape, sizes, rule):
     return Figure(
         code=code,
         unit="mm",
-        **_values_at(whole, place),
+        **whole.at(place),
         limit=limit,
         course=level["course"],
         height_m=level["height_m"],

@@ -231,7 +231,7 @@ _PATTERNS = {
 
 def unit_of(text, dimension):
     """Return the `Unit` in a heading of heights (LENGTH) or volumes (VOLUME)."""
-    tokens = without_prepositions(tokens_of(text))
+    tokens = drop_prepositions(tokens_of(text))
     large = _LARGE_PREFIX.search(text) if dimension == VOLUME else None
     if large is not None:
         return Unit(complaint=_unusable(large[0], _UNCLEAR, dimension))
@@ -281,7 +281,7 @@ def countries_in(text):
     return _countries(tokens, gallons)[0] if gallons else ()
 
 
-def without_prepositions(tokens):
+def drop_prepositions(tokens):
     """Tokens without an "in" that is no inch: before a word, a unit or a number."""
     kept = []
     for k, token in enumerate(tokens):
@@ -329,7 +329,7 @@ def _unit_without_size(tokens, dimension, text):
             return unusable(token, _UNKNOWN)
     for k, token in enumerate(tokens):
         value = number_of(token)
-        before, after = _around(tokens, k)
+        before, after = _neighbours(tokens, k)
         is_bare = before in _OPENS and after in _CLOSES and value and value >= _LEAST_BARE_FACTOR
         is_power = is_bare and float(log10(value)).is_integer()
         if value and (before in _TIMES or is_power):
@@ -337,14 +337,14 @@ def _unit_without_size(tokens, dimension, text):
     return NO_UNIT
 
 
-def _around(tokens, k):
+def _neighbours(tokens, k):
     """The tokens before and after a token; "(" and ")" at the ends."""
     return tokens[k - 1] if k else "(", tokens[k + 1] if k + 1 < len(tokens) else ")"
 
 
 def _is_placed(tokens, k):
     """Whether a token is at the position of a unit: in brackets, last, or after a comma or "in"."""
-    before, after = _around(tokens, k)
+    before, after = _neighbours(tokens, k)
     is_last = k + 1 == len(tokens) and (k > 0 or len(tokens) == 1)
     is_symbol = tokens[k] == "v" and before not in _BREAKS | _INTRODUCES  # volume V
     return not is_symbol and (
@@ -354,7 +354,7 @@ def _is_placed(tokens, k):
 
 def _is_alone(tokens, k):
     """Whether a word is the only one in brackets, or after a comma, a slash or "in"."""
-    before, after = _around(tokens, k)
+    before, after = _neighbours(tokens, k)
     is_end = k + 1 == len(tokens) or after in _CLOSES or after in (",", ";")
     return k > 0 and is_end and (before in _BREAKS - {"-"} or before in _INTRODUCES)
 
@@ -392,7 +392,7 @@ def _factor(tokens, places):
         value = number_of(token)
         if value is None:
             continue
-        before, after = _around(tokens, k)
+        before, after = _neighbours(tokens, k)
         ahead = k + 1
         while ahead < len(tokens) and (
             tokens[ahead] in _TIMES | _BETWEEN
@@ -432,6 +432,7 @@ _ROLE_WORD = re.compile(
 
 
 def _is_usual_factor(value):
+    """Whether a number is a usual factor of a unit."""
     return value > 0 and (value in _PLAIN_FACTORS or abs(log10(value) - round(log10(value))) < 1e-9)
 
 
@@ -452,6 +453,7 @@ def _countries(tokens, names):
 
 
 def _unusable(unit, kind, dimension):
+    """Message about a unit that cannot be used."""
     expected = "m, dm, cm, mm, in, ft"
     if dimension == VOLUME:
         expected = "m3, L, hL, bbl, US gal, imp gal, ft3"
@@ -466,6 +468,7 @@ def _unusable(unit, kind, dimension):
 
 
 def _unclear_factor(number):
+    """Message about a number that may be a factor."""
     return message(
         "lint_unclear_factor",
         "found the number {number} in the heading, perhaps a factor; expected a factor with its "

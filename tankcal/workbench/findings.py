@@ -37,12 +37,12 @@ class Check:
     marks: dict = field(default_factory=dict)
 
     @property
-    def is_sound(self):
+    def is_valid(self):
         """Whether the job has no problem and can be computed."""
         return not self.problems
 
 
-def found_in(draft, numbers, check):
+def mark_cells(draft, numbers, check):
     """Assign the problems and warnings of a check to cells.
 
     Parameters
@@ -69,7 +69,7 @@ def found_in(draft, numbers, check):
             name = _table_of(draft, problem)
             if name is None:
                 continue
-            place = _place(problem, rows.get(name))
+            place = rows.get(name, {}).get(problem.row), problem.column
             if name in draft.keys:
                 place = _place_in_keys(problem, {entry.owner for entry in draft.keys[name].entries})
             known = marks.setdefault(name, {})
@@ -85,11 +85,6 @@ def _table_of(draft, problem):
         if ending not in ("csv", "toml") or (ending == "toml") != (name in draft.keys):
             return None
     return name if name in draft.keys or name in draft.tables else None
-
-
-def _place(problem, rows):
-    """Row from 0 and heading of a problem of a table."""
-    return (rows or {}).get(problem.row), problem.column
 
 
 def _place_in_keys(problem, owners):

@@ -28,7 +28,7 @@ class PointsPanel(traitlets.HasTraits):
         super().__init__()
         self.paper, self.on_overrule = paper, on_overrule
         self.points = {item.name: item for item in looked_at(paper.record)}
-        self.used = _used(paper.record)
+        self.used = _read_deviations(paper.record)
         word = paper.word
         self.list = widgets.Select(
             options=[(self._line(item), item.name) for item in self.points.values()],
@@ -36,7 +36,7 @@ class PointsPanel(traitlets.HasTraits):
             rows=min(max(len(self.points), 3), 10),
             layout={"width": "60rem", "max_width": "100%"},
         )
-        self.told, self.state = widgets.HTML(), widgets.HTML()
+        self.details, self.state = widgets.HTML(), widgets.HTML()
         self.reason = widgets.Text(
             placeholder=word("views.reason"),
             layout={"width": "60rem", "max_width": "100%"},
@@ -60,7 +60,7 @@ class PointsPanel(traitlets.HasTraits):
         rows = [widgets.HTML(f"<b>{escape(heading)}</b>")]
         if count:
             rows += [self.list, widgets.HBox([self.previous, self.next])]
-        rows.append(self.told)
+        rows.append(self.details)
         if self.on_overrule is None:
             return rows
         return [*rows, self.reason, widgets.HBox(list(self.decide.values())), self.state]
@@ -91,12 +91,14 @@ class PointsPanel(traitlets.HasTraits):
             button.disabled = not is_known
         self.state.value = ""
         if point is not None:
-            self.told.value = f"<div>{escape(self._sentence(point))}</div>"
+            self.details.value = f"<div>{escape(self._sentence(point))}</div>"
         elif name in self.used:
             off = self.paper.number(self.used[name], "mm", decimals=1)
-            self.told.value = f"<div>{escape(word('views.point_used', point=name, off=off))}</div>"
+            self.details.value = (
+                f"<div>{escape(word('views.point_used', point=name, off=off))}</div>"
+            )
         else:
-            self.told.value = f"<div>{escape(word('views.choose_point'))}</div>"
+            self.details.value = f"<div>{escape(word('views.choose_point'))}</div>"
 
     def _line(self, point):
         """Text of a point in the list: name, deviation and reason."""
@@ -145,7 +147,7 @@ class PointsPanel(traitlets.HasTraits):
         self.state.value = f'<div role="status" style="color:{colour}">{lines}</div>'
 
 
-def _used(record):
+def _read_deviations(record):
     """Deviations of the used points from the circles of their sections, {name: m}."""
     return {
         point["point"]: point["residual_m"]

@@ -38,7 +38,7 @@ class Answer:
     is_refused: bool = False
 
 
-def typed_number(text):
+def parse_number(text):
     """Number in an entered text, with decimal point or comma, or None."""
     plain = text.strip().replace(",", ".")
     return float(plain) if len(plain) < MOST_LETTERS and _NUMBER.fullmatch(plain) else None
@@ -68,13 +68,13 @@ class Calculator:
         stated = self.result.intervals
         U, k = stated.U_m3[row], self.result.table.k[row] if stated.by_gum[row] else None
         facts = [self._standard(self.result.table.u_m3[row])]
-        return self._stated(volume.value_m3, float(U), k, [*facts, *self._ullage(dip)])
+        return self._state_volume(volume.value_m3, float(U), k, [*facts, *self._ullage(dip)])
 
     def dip_of(self, text):
         """Answer with the dip of a volume, entered in the unit of the table."""
-        volume = typed_number(text)
+        volume = parse_number(text)
         if volume is None:
-            return self._refused(
+            return self._refuse(
                 "views.no_volume" if text.strip() else "views.type_volume",
                 text=text.strip()[:MOST_LETTERS],
                 unit=self._unit.symbol,
@@ -82,7 +82,7 @@ class Calculator:
         try:
             result = self.result.dip_of(volume / self._unit.factor)
         except HeightError as error:
-            return self._refused("views.refused", reason=say(self.paper.words, error.args[0]))
+            return self._refuse("views.refused", reason=say(self.paper.words, error.args[0]))
         dip, u = float(result.height_m[0]), float(result.u_m[0])
         k = float(self.result.table.at(dip).k)
         paper = self.paper
@@ -103,27 +103,27 @@ class Calculator:
                 return dip
         low, high = sorted(dips)
         if high - low < SAME_M:
-            return self._refused("web.same_dip")
+            return self._refuse("web.same_dip")
         delivery = self.result.delivery(low, high)
         facts = [] if delivery.k is None else [self._standard(delivery.u_m3)]
-        return self._stated(delivery.value_m3, delivery.U_m3, delivery.k, facts)
+        return self._state_volume(delivery.value_m3, delivery.U_m3, delivery.k, facts)
 
     # ---- parts of an answer
 
     def _dip(self, text):
         """Dip in the range of the table, or an `Answer` that refuses the entered text."""
-        heights, dip = self.result.table.height_m, typed_number(text)
+        heights, dip = self.result.table.height_m, parse_number(text)
         if not text.strip():
-            return self._refused("web.type_dip")
+            return self._refuse("web.type_dip")
         if dip is None:
-            return self._refused("web.no_number", text=text.strip()[:MOST_LETTERS])
+            return self._refuse("web.no_number", text=text.strip()[:MOST_LETTERS])
         if dip < heights[0] - SAME_M:
-            return self._refused("web.below", **{"from": self._metres(heights[0])})
+            return self._refuse("web.below", **{"from": self._metres(heights[0])})
         if dip > max(heights[-1], round(heights[-1], 3)) + SAME_M:
-            return self._refused("web.above", to=self._metres(heights[-1]))
+            return self._refuse("web.above", to=self._metres(heights[-1]))
         low, high = self._critical or (np.inf, -np.inf)
         if low + SAME_M < dip < high - SAME_M:
-            return self._refused("web.critical")
+            return self._refuse("web.critical")
         return float(np.clip(dip, heights[0], heights[-1]))
 
     def _worse_row(self, dip):
@@ -132,7 +132,7 @@ class Calculator:
         U = self.result.intervals.U_m3[rows]
         return int(rows[-1] if U[-1] >= U[0] else rows[0])
 
-    def _stated(self, volume_m3, U_m3, k, facts):
+    def _state_volume(self, volume_m3, U_m3, k, facts):
         """Answer with a volume, its U and k, and the relative U; k is None if simulated."""
         volume, U = volume_m3 * self._unit.factor, U_m3 * self._unit.factor
         least = self._unit.least
@@ -174,6 +174,6 @@ class Calculator:
         places = decimals_of_height(height) if places is None else places
         return f"{fixed(height, places, self.paper.marks)}\N{NO-BREAK SPACE}m"
 
-    def _refused(self, name, **values):
+    def _refuse(self, name, **values):
         """Answer that refuses a question."""
         return Answer(self.paper.word(name, **values), is_refused=True)
