@@ -21,7 +21,7 @@ from itertools import combinations
 
 import numpy as np
 
-from tankcal.adjust import SD_OVER_MEDIAN
+from tankcal.adjust import SD_OVER_MEDIAN, gauss_newton
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.field.components import SETTLEMENT_MODES
@@ -182,21 +182,25 @@ def _centre(sights, nominal_m, is_inside):
     nearest = np.hypot(*places.T).min()
     # From outside, the nearest hit lies at the distance of the axis minus the radius.
     start = ray / size * (nearest + nominal_m)
-    centre = start.copy()
-    for _ in range(CENTRE_ROUNDS):
+    # A weak prior fixes the direction that a narrow arc leaves undetermined.
+    weight = np.diag([1e-4 * len(places)] * 2)
+
+    def step_at(centre, _):
         away = places - centre
         distance = np.hypot(*away.T)
         jacobian = -away / distance[:, None]
-        # A weak prior fixes the direction that a narrow arc leaves undetermined.
-        weight = np.diag([1e-4 * len(places)] * 2)
-        change = np.linalg.solve(
+        return np.linalg.solve(
             jacobian.T @ jacobian + weight,
             jacobian.T @ (nominal_m - distance) + weight @ (start - centre),
         )
-        centre = centre + change
-        if np.hypot(*change) < 1e-9:
-            break
-    return centre
+
+    return gauss_newton(
+        step_at,
+        start,
+        move=np.add,
+        is_small=lambda step: np.hypot(*step) < 1e-9,
+        most_steps=CENTRE_ROUNDS,
+    )
 
 
 def _fitted(poses, sights, pose, untied, axis, *, is_even):
@@ -221,66 +225,78 @@ def _fitted(poses, sights, pose, untied, axis, *, is_even):
         Root mean square of the hits about the surface, each limited to FAR_SDS of a wall, m.
     """
     z = poses.xyz_m[pose, 2] + sights[:, 2]
-    middle = z.mean()
     order = np.argsort(z, kind="stable")
     level = np.empty(len(z), dtype=int)
     # A gap larger than LEVEL_GAP_M starts a new level.
     level[order] = np.cumsum(np.diff(z[order], prepend=z[order[0]]) > LEVEL_GAP_M)
-    place = {number: i for i, number in enumerate(untied)}
-    free, levels = 3 * len(untied), level.max() + 1
-    settled = np.full(2 * len(SETTLEMENT_MODES), SETTLEMENT_SD_M)
+    levels, free, waves = level.max() + 1, 3 * len(untied), 2 * len(SETTLEMENT_MODES)
+    # Unknowns: changes of x, y and rotation of each pose, shift and lean of the axis, waves of
+    # settlement. The radii of the levels follow from them.
+    lean_from, waves_from, unknowns = free + 2, free + 4, free + 4 + waves
+    above, share_of_height = z - z.mean(), (z - z.min()) / max(np.ptp(z), LEVEL_GAP_M)
     # Priors keep undetermined parameters at their start values without constraining the others.
-    prior = np.diag(np.concatenate([np.ones(free), AXIS_SDS, settled]) ** -2.0)
-    for number, i in place.items():
+    sds = np.concatenate([np.ones(free), AXIS_SDS, np.full(waves, SETTLEMENT_SD_M)])
+    prior = np.diag(sds**-2.0)
+    for i, number in enumerate(untied):
         prior[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = _prior_weight(
             poses.xyz_m[number, :2] - axis, sights[pose == number], is_even=is_even[i]
         )
-    shift, lean, waves = np.zeros(2), np.zeros(2), np.zeros(2 * len(SETTLEMENT_MODES))
-    xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
-    up = (z - z.min()) / max(np.ptp(z), LEVEL_GAP_M)
-    first, constrained = free + 4, free + 4 + len(waves)
-    moved = np.zeros(constrained)
-    for _ in range(ROUNDS):
+
+    def poses_at(x):
+        changes = x[:free].reshape(-1, 3)
+        xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
+        xyz[untied, :2] += changes[:, :2]
+        zero[untied] += changes[:, 2]
+        return xyz, zero
+
+    def linearise(x):
+        """Return the distances (n,) of the hits from the surface, and their derivatives."""
+        xyz, zero = poses_at(x)
         turned = _turned(sights, zero[pose])
-        away = xyz[pose, :2] + turned - axis - shift - np.outer(z - middle, lean)
+        away = xyz[pose, :2] + turned - axis - x[free:lean_from]
+        away -= np.outer(above, x[lean_from:waves_from])
         distance = np.hypot(*away.T)
         normal = away / distance[:, None]
-        jacobian = np.zeros((len(z), constrained + levels))
-        for number, i in place.items():
+        jacobian = np.zeros((len(z), unknowns + levels))
+        for i, number in enumerate(untied):
             is_of_pose = pose == number
             jacobian[is_of_pose, 3 * i : 3 * i + 2] = normal[is_of_pose]
             # A rotation of the circle moves a hit perpendicular to its sight.
             across = np.column_stack([turned[is_of_pose, 1], -turned[is_of_pose, 0]])
             jacobian[is_of_pose, 3 * i + 2] = np.sum(normal[is_of_pose] * across, axis=1)
-        jacobian[:, free : free + 2] = -normal
-        jacobian[:, free + 2 : first] = -normal * (z - middle)[:, None]
+        jacobian[:, free:lean_from] = -normal
+        jacobian[:, lean_from:waves_from] = -normal * above[:, None]
         f = np.multiply.outer(np.arctan2(*away.T), SETTLEMENT_MODES)
-        jacobian[:, first:constrained] = -up[:, None] * np.hstack([np.cos(f), np.sin(f)])
-        jacobian[np.arange(len(z)), constrained + level] = -1.0
+        by_waves = -share_of_height[:, None] * np.hstack([np.cos(f), np.sin(f)])
+        jacobian[:, waves_from:unknowns] = by_waves
+        jacobian[np.arange(len(z)), unknowns + level] = -1.0
         # Settlement moves the shell horizontally in proportion to the height, so it is removed
-        # first.
-        round_m = distance + jacobian[:, first:constrained] @ waves
+        # before the radii of the levels are taken.
+        round_m = distance + by_waves @ x[waves_from:]
         radii = np.array([np.median(round_m[level == number]) for number in range(levels)])
-        off = round_m - radii[level]
+        return round_m - radii[level], jacobian
+
+    def step_at(x, _):
+        off, jacobian = linearise(x)
         # Scale from the median absolute deviation, at least that of a wall.
         spread = max(WALL_SD_M, SD_OVER_MEDIAN * float(np.median(np.abs(off))))
         weight = np.minimum(1.0, FAR_SDS * spread / np.maximum(np.abs(off), 1e-12)) / spread**2
         normals = jacobian.T @ (weight[:, None] * jacobian)
-        normals[:constrained, :constrained] += prior
-        rhs = -jacobian.T @ (weight * off)
-        # The prior refers to the start values, so the accumulated change enters the right-hand
-        # side.
-        rhs[:constrained] -= prior @ moved
-        change = np.linalg.solve(normals, rhs)
-        for number, i in place.items():
-            xyz[number, :2] += change[3 * i : 3 * i + 2]
-            zero[number] += change[3 * i + 2]
-        shift += change[free : free + 2]
-        lean += change[free + 2 : first]
-        waves += change[first:constrained]
-        moved += change[:constrained]
-        if np.abs(change[:constrained]).max() < 1e-7:
-            break
+        normals[:unknowns, :unknowns] += prior
+        right = -jacobian.T @ (weight * off)
+        # The prior refers to the start values, hence to x = 0.
+        right[:unknowns] -= prior @ x
+        return np.linalg.solve(normals, right)[:unknowns]
+
+    x = gauss_newton(
+        step_at,
+        np.zeros(unknowns),
+        move=np.add,
+        is_small=lambda step: np.abs(step).max() < 1e-7,
+        most_steps=ROUNDS,
+    )
+    xyz, zero = poses_at(x)
+    off = linearise(x)[0]
     misfit = np.sqrt(np.mean(np.minimum(np.abs(off), FAR_SDS * WALL_SD_M) ** 2))
     return replace(poses, xyz_m=xyz, orientation_rad=zero), float(misfit)
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tankcal.adjust import gauss_newton
 from tankcal.calibration.product.check import ALPHA, ProductCheck, check_product
 from tankcal.calibration.product.differences import differences_of
 from tankcal.camera.model import PARAMETERS, UNITS, Form
@@ -319,15 +320,25 @@ def _align(reference, target, xyz, place, rotation):
     size = max(float(np.nanmax(np.abs(target - centre))), 1e-9)
     scale = np.array([1, 1, 1, *(1 / size,) * 4])
     ways = reference.ways / np.linalg.norm(reference.ways / scale[:, None], axis=0)
-    for _ in range(ROUNDS):
-        design = _motion_derivatives(xyz) @ ways
-        misclosure = (target - centre - xyz)[is_known]
-        step = ways @ np.linalg.lstsq(design[is_known], misclosure, rcond=None)[0]
+
+    def step_at(block, _):
+        design = _motion_derivatives(block[0]) @ ways
+        misclosure = (target - centre - block[0])[is_known]
+        return ways @ np.linalg.lstsq(design[is_known], misclosure, rcond=None)[0]
+
+    def move(block, step):
+        xyz, place, rotation = block
         turn = apply_small_rotation(np.eye(3)[None], step[None, 3:6])[0]
         xyz, place = (step[:3] + (1 + step[6]) * a @ turn.T for a in (xyz, place))
-        rotation = rotation @ turn.T
-        if np.abs(step / scale).max() < SETTLED * size:
-            break
+        return xyz, place, rotation @ turn.T
+
+    xyz, place, rotation = gauss_newton(
+        step_at,
+        (xyz, place, rotation),
+        move=move,
+        is_small=lambda step: np.abs(step / scale).max() < SETTLED * size,
+        most_steps=ROUNDS,
+    )
     return xyz + centre, place + centre, rotation
 
 

@@ -6,10 +6,12 @@ least squares estimates the seven parameters from 24 starts, the rotations of a 
 parameters keep their start values.
 """
 
+from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
 
+from tankcal.adjust import Damping, gauss_newton
 from tankcal.geometry.rotations import apply_small_rotation
 from tankcal.survey.observations import HeightDifferences
 from tankcal.survey.start.pieces import Motion
@@ -38,12 +40,12 @@ def align_piece(survey, piece, known, place_m):
     count = np.isfinite(places).sum(axis=0)
     middle = np.nansum(places, axis=0) / np.maximum(count, 1)
     clues = _Clues(survey, piece, known, place_m)
-    if not len(clues.misfits(np.eye(3), np.zeros(3), 1.0)):
-        return Motion(np.eye(3), np.zeros(3), 1.0, 0.0)
+    at_rest = Motion(np.eye(3), np.zeros(3), 1.0, 0.0)
+    if not len(clues.misfits(at_rest)):
+        return at_rest
     best = None
     for rotation in _cube():
-        shift = clues.middle - rotation @ middle
-        motion = _settled(clues, rotation, shift)
+        motion = _fit_from(clues, rotation, clues.middle - rotation @ middle)
         # The margin keeps the first of equal solutions, whatever the rounding.
         if best is None or motion.misfit_m < best.misfit_m * (1 - 1e-6):
             best = motion
@@ -66,21 +68,21 @@ class _Clues:
         points = piece.known[:, None] & np.isfinite(known_m)
         photos = piece.oriented[:, None] & np.isfinite(place_m)
         self.places = np.vstack([piece.xyz_m, piece.place_m])
-        self.told = np.vstack([known_m, place_m])
+        self.known_m = np.vstack([known_m, place_m])
         self.size = max(piece.extent, 1e-9)
         self.which = np.nonzero(np.vstack([points, photos]))
         self.others = [_between(item, piece.known) for item in survey.observations
                        if item.knows_frame]  # fmt: skip
-        target = np.where(np.vstack([points, photos]), self.told, np.nan)
+        target = np.where(np.vstack([points, photos]), self.known_m, np.nan)
         counts = np.isfinite(target).sum(axis=0)
         levelled = any(isinstance(item, HeightDifferences) and len(item) for item in self.others)
         self.metres = levelled or np.isfinite(target).any(axis=1).sum() > 1
         self.middle = np.where(counts, np.nansum(target, axis=0) / np.maximum(counts, 1), 0.0)
 
-    def misfits(self, rotation, shift, scale):
+    def misfits(self, motion):
         """Misfits (n,) in metres of the transformed piece."""
-        xyz = scale * self.places @ rotation.T + shift
-        parts = [(xyz - self.told)[self.which]]
+        xyz = motion.of(self.places)
+        parts = [(xyz - self.known_m)[self.which]]
         for item in self.others:
             parts += item.off_frame(xyz[item.end] - xyz[item.start])
         return np.concatenate(parts)
@@ -93,38 +95,45 @@ def _between(observations, known):
     )
 
 
-def _settled(clues, rotation, shift):
+def _fit_from(clues, rotation, shift_m):
     """Fit a Motion by damped least squares from one start."""
-    scale, damping = 1.0, 1e-3
-    misfits = clues.misfits(rotation, shift, scale)
-    size = clues.size
-    tiny = 1e-6
-    for _ in range(STEPS):
+    tiny, size = 1e-6, clues.size
+
+    def step_at(motion, damping):
+        misfits = clues.misfits(motion)
         # Seven parameters: numerical derivatives are accurate enough for a start value.
         jac = np.empty((len(misfits), 7))
         for k in range(7):
-            moved = _stepped(rotation, shift, scale, tiny * np.eye(7)[k], size)
-            jac[:, k] = (clues.misfits(*moved) - misfits) / tiny
+            moved = _move(motion, tiny * np.eye(7)[k], size)
+            jac[:, k] = (clues.misfits(moved) - misfits) / tiny
         # Without a length, plumb lines would fit best at scale zero, so the scale is held.
-        if not clues.metres:  # else plumb lines would be best in a piece of no size
+        if not clues.metres:
             jac[:, 6] = 0.0
         normal = jac.T @ jac
         ridge = damping * np.eye(7) * max(float(normal.diagonal().max()), 1e-30)
-        step = -np.linalg.solve(normal + ridge, jac.T @ misfits)
-        moved = _stepped(rotation, shift, scale, step, size)
-        new_misfits = clues.misfits(*moved)
-        if new_misfits @ new_misfits < misfits @ misfits:
-            (rotation, shift, scale), misfits = moved, new_misfits
-            # Levenberg-Marquardt: less damping after a success, more after a failure.
-            damping = max(damping / 10, 1e-9)
-            if np.abs(step).max() < 1e-10:
-                break
-        else:
-            damping *= 10
-    return Motion(rotation, shift, scale, float(np.sqrt(misfits @ misfits)))
+        return -np.linalg.solve(normal + ridge, jac.T @ misfits)
+
+    def square(motion):
+        misfits = clues.misfits(motion)
+        return misfits @ misfits
+
+    motion = gauss_newton(
+        step_at,
+        Motion(rotation, shift_m, 1.0, 0.0),
+        move=lambda motion, step: _move(motion, step, size),
+        is_better=lambda candidate, motion: square(candidate) < square(motion),
+        is_small=lambda step: np.abs(step).max() < 1e-10,
+        most_steps=STEPS,
+        damping=Damping(relax=10.0),
+    )
+    return replace(motion, misfit_m=float(np.sqrt(square(motion))))
 
 
-def _stepped(rotation, shift, scale, step, size):
-    """Rotation, shift and scale after a step of the seven parameters."""
-    turn = apply_small_rotation(rotation[None], step[None, :3])[0]
-    return turn, shift + size * step[3:6], scale * np.exp(np.clip(step[6], -FAR, FAR))
+def _move(motion, step, size):
+    """Motion after a step (7,): rotation, shift over `size`, logarithm of the scale."""
+    return Motion(
+        apply_small_rotation(motion.rotation[None], step[None, :3])[0],
+        motion.shift_m + size * step[3:6],
+        motion.scale * np.exp(np.clip(step[6], -FAR, FAR)),
+        motion.misfit_m,
+    )

@@ -13,6 +13,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from tankcal.adjust import gauss_newton
 from tankcal.geometry.rotations import apply_small_rotation
 from tankcal.survey.start.resection import bearings
 
@@ -193,7 +194,7 @@ def _decomposed(matrix, f1, f2):
 
 def _pair(pose, f1, f2):
     """The refined Pair of a rotation and a base."""
-    rotation, base, error = _refined(*pose, f1, f2)
+    rotation, base, error = _refine(*pose, f1, f2)
     cosine = np.sum(f1 * (f2 @ rotation), axis=1)
     return Pair(rotation, base, error, float(np.median(np.arccos(np.clip(cosine, -1, 1)))))
 
@@ -206,41 +207,49 @@ def _in_front(rotation, base, f1, f2):
     return (a - cosine * b > 0) & (cosine * a - b > 0)
 
 
-def _refined(rotation, base, f1, f2):
-    """Refine rotation and base by Gauss-Newton with decreasing weights; return them and the
-    error."""
-    error = np.inf
-    for _ in range(REFINING_STEPS):
-        off, a = _linearised(rotation, base, f1, f2)
+def _refine(rotation, base, f1, f2):
+    """Refine rotation and base by Gauss-Newton with Cauchy weights; return them and the error."""
+
+    def step_at(pose, _):
+        off, a = _linearise(*pose[:2], f1, f2)
         scale = max(float(np.median(np.abs(off))), 1e-9)
         root = 1 / np.sqrt(1 + (off / (3 * scale)) ** 2)
-        step = np.linalg.lstsq(a * root[:, None], -off * root, rcond=None)[0]
-        # The base has length 1, so it moves in two directions only.
-        across = np.linalg.svd(base[None])[2][1:]
-        turn = apply_small_rotation(rotation[None], step[None, :3])[0]
-        moved = base + step[3:] @ across
-        moved = moved / np.linalg.norm(moved)
-        cross = np.cross(np.eye(3), moved)
-        matrix = turn @ -cross
-        new_error = float(_misfit(epipolar_errors(matrix[None], f1, f2))[0])
-        if not new_error < error:
-            break
-        rotation, base, error = turn, moved, new_error
-        if np.abs(step).max() < 1e-9:
-            break
-    return rotation, base, error
+        return np.linalg.lstsq(a * root[:, None], -off * root, rcond=None)[0]
+
+    def move(pose, step):
+        rotation, base, _ = pose
+        rotation = apply_small_rotation(rotation[None], step[None, :3])[0]
+        base = base + step[3:] @ _across(base)
+        base = base / np.linalg.norm(base)
+        # E = R [b]x, with [b]x from the products of the axes and the base.
+        essential = rotation @ -np.cross(np.eye(3), base)
+        return rotation, base, float(_misfit(epipolar_errors(essential[None], f1, f2))[0])
+
+    return gauss_newton(
+        step_at,
+        (rotation, base, np.inf),
+        move=move,
+        is_better=lambda candidate, pose: candidate[2] < pose[2],
+        is_small=lambda step: np.abs(step).max() < 1e-9,
+        most_steps=REFINING_STEPS,
+    )
 
 
-def _linearised(rotation, base, f1, f2):
+def _across(base):
+    """Two unit vectors (2, 3) across a base of length 1, in which a step moves the base."""
+    return np.linalg.svd(base[None])[2][1:]
+
+
+def _linearise(rotation, base, f1, f2):
     """Sines (n,) between rays and epipolar planes, and derivatives (n, 5) by rotation and base."""
     second_rays = f2 @ rotation
     plane = np.cross(base, f1)
     length = np.maximum(np.linalg.norm(plane, axis=1), 1e-9)
-    across = np.linalg.svd(base[None])[2][1:]
     a = np.empty((len(f1), 5))
     a[:, :3] = -np.cross(f2, plane @ rotation.T)  # d (R'f2).p for R <- exp([d]x) R
     a[:, 3:] = np.stack(
-        [np.sum(np.cross(direction, f1) * second_rays, axis=1) for direction in across], axis=1
+        [np.sum(np.cross(direction, f1) * second_rays, axis=1) for direction in _across(base)],
+        axis=1,
     )
     return np.sum(plane * second_rays, axis=1) / length, a / length[:, None]
 
