@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.adjust import SD_OVER_MEDIAN
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.inspection.boards import BOARD_M, END_M, REACH_M, bead_height, gaps_of_profile
 from tankcal.inspection.known_welds import BANDING, PEAKING
+from tankcal.units import FULL_TURN
 
 TOGETHER = 2  # number of boards averaged along the weld, 0.3 m
 LAGS = 2, 4, 6  # distances of compared boards, in boards; at these distances no point is shared

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 # Size of a cell: least and largest width across the weld, and length along the weld.
 ACROSS_M, WIDEST_M, ALONG_M = 0.0125, 0.05, 0.15

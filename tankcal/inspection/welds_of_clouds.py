@@ -1,6 +1,5 @@
 """Peaking and banding at the welds of a shell, from the points of its scans."""
 
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.inspection.known_welds import BANDING, PEAKING, known_welds
 from tankcal.inspection.largest_gaps import GapsFound, largest_gaps, undetermined
 from tankcal.inspection.weld_boards import boards_of, reach_of
@@ -17,6 +16,7 @@ from tankcal.inspection.weld_cells import (
 from tankcal.messages import message
 from tankcal.pipeline.cloud_cluster import open_passes
 from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
+from tankcal.units import FULL_TURN
 
 MEMORY_BYTES = 512 << 20  # memory of the histograms; more welds require several passes
 

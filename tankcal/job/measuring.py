@@ -22,9 +22,9 @@ from tankcal.survey.measurements import (
     Targets,
 )
 from tankcal.survey.stadia import distance_of_angle_m, distance_sd_m
+from tankcal.units import ARCSEC, GON
 
-ARCSEC = np.pi / 180 / 3600
-RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "dms": np.pi / 180}
+RADIANS = {"deg": np.pi / 180, "gon": GON, "dms": np.pi / 180}
 PRINTED = ("certificate", "tension_n")  # keys of instruments that the report shows
 
 

@@ -18,9 +18,9 @@ from tankcal.errors import HeightError, InputError, Problem
 from tankcal.job.tables import shown
 from tankcal.linter.headings import parts_of_inch
 from tankcal.linter.numbers import MOST_DECIMALS, Reading, has_digit, read_number
-from tankcal.linter.units import FOOT_M
 from tankcal.messages import message
 from tankcal.tank.dips import INCHES_PER_FOOT, METRES_PER_INCH, parse_dip
+from tankcal.units import FOOT_M
 
 _SAME = 1e-9
 _FEET_DECIMALS = 4  # decimals of a metre in a label with decimals of an inch

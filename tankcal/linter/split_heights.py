@@ -16,8 +16,9 @@ from tankcal.job.tables import BadCell, shown
 from tankcal.linter.feet import number_with_fraction
 from tankcal.linter.headings import Heading
 from tankcal.linter.numbers import has_digit, is_blank, read_number, style_of
-from tankcal.linter.units import INCH_M, Unit, plain_text
+from tankcal.linter.units import Unit, plain_text
 from tankcal.messages import message
+from tankcal.units import INCH_M
 
 _MOSTLY = 0.9  # share of the rows
 _ROUNDED = 1.001  # largest difference of heights in two units, last digits

@@ -18,7 +18,6 @@ from tankcal.geometry.great_ellipses import (
     fit_ellipsoid,
     great_circle_lengths,
 )
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 from tankcal.pipeline.wall_readings import (
     WallReading,
@@ -34,6 +33,7 @@ from tankcal.tank.ellipsoids import Ellipsoid
 from tankcal.tank.factors import Factor
 from tankcal.tank.surveyed_form import SurveyedForm, node_levels
 from tankcal.uncertainty import factor_of
+from tankcal.units import FULL_TURN
 
 OVALITY_SHARE = 1e-3  # prior degree-2 form over the radius, if neither measured nor declared
 NO_AREA_TERM = AreaTerm(0.0, 0.0)  # included in the field: a reading is a mean of radii

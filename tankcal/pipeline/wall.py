@@ -12,7 +12,7 @@ from tankcal.geometry.field.cells import MOST_SITES, cells_of, sites_of_cells
 from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES, ROUND_SHAPES
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import Sites, spans_of
-from tankcal.geometry.outlines import FULL_TURN, polar
+from tankcal.geometry.outlines import polar
 from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
 from tankcal.messages import Message, message
 from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
@@ -48,6 +48,7 @@ from tankcal.sections import (
     sample_of,
 )
 from tankcal.solver.threads import threads_for
+from tankcal.units import FULL_TURN
 
 
 def find_wall(job, progress, dof=np.inf, amplitudes=None, *, sizes=None):

@@ -17,7 +17,6 @@ from tankcal.geometry.field.components import COMPONENTS, ROUND_SHAPES
 from tankcal.geometry.field.estimate import LEVELS, WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.girth import Ring, perimeter_excess, seen_excess
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.tanks import insets_of
 from tankcal.pipeline.untied_setups import Unbound
@@ -36,6 +35,7 @@ from tankcal.pipeline.wall_readings import (
 from tankcal.quadrature import panels
 from tankcal.survey.reference_line import courses_told
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
+from tankcal.units import FULL_TURN
 
 # Least number of circumferences to reject one if they alone determine an offset of the points: of
 # two contradictory circumferences either may be wrong.

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.tank.hydrostatics import STANDARD_GRAVITY
+from tankcal.units import STANDARD_GRAVITY
 
 
 @dataclass(frozen=True)

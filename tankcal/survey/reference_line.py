@@ -20,9 +20,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tankcal.geometry.form import harmonics
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import ARCSEC as ARCSEC  # for callers, who state angles in arc seconds
 
-ARCSEC = FULL_TURN / 1_296_000
 SAME_LEVEL_M = 0.02  # largest difference of heights regarded as one level
 FEWEST_LINES = 4  # lines per level: three for radius and centre, and one redundant
 

@@ -25,9 +25,9 @@ from tankcal.adjust import SD_OVER_MEDIAN, gauss_newton
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.field.components import SETTLEMENT_MODES
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 from tankcal.survey.sighting import certified_m, rays
+from tankcal.units import FULL_TURN
 
 LEVEL_GAP_M = 0.15  # gap of heights that separates levels with radii of their own
 NARROW_RAD = 0.1  # range of directions of a set-up that sees a line of the wall, along its normal

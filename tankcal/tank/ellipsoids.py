@@ -10,9 +10,9 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 from tankcal.tank.lying import levels_inside, require_length
 from tankcal.tank.parts import Solid
+from tankcal.units import STANDARD_GRAVITY
 
 ROUNDS = 60  # iterations of the highest dip; each reduces the error by the strain, about 1e-4
 

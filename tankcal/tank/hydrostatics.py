@@ -31,8 +31,8 @@ from tankcal.quadrature import height_polynomials
 from tankcal.tank.courses import CourseShape, gauss_levels
 from tankcal.tank.parts import Part, as_levels
 from tankcal.tank.volumes import ShellVolume
+from tankcal.units import STANDARD_GRAVITY
 
-STANDARD_GRAVITY = 9.80665  # m/s2
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact to degree seven
 INPUTS = (
     "datum",

@@ -31,7 +31,7 @@ import tankcal
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.pipeline.line_checks import check_leans, compare_leans, levels_and_lean
-from tankcal.survey.reference_line import ARCSEC
+from tankcal.units import ARCSEC
 
 KAPPA, COUNT = 15 * ARCSEC, 12
 

@@ -28,7 +28,7 @@ from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, invert
 from tankcal.geometry.field.precision import Precision
 from tankcal.geometry.field.sites import free_design
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 MOST_ROUNDS = 4  # rounds: amplitudes from the accepted readings, then tests of all readings
 FEW = 0.005  # share of readings that change between accepted and rejected, at convergence

@@ -32,8 +32,8 @@ from tankcal.geometry.field.covariances import Covariances, without_rounding
 from tankcal.geometry.field.hidden_seams import hidden_covariance_m2
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.geometry.field.sites import Sites, free_design
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import panels
+from tankcal.units import FULL_TURN
 
 LEVELS = 7  # number of Gauss levels of a course, at which its outlines are estimated
 SHAPES = ("mean", *ROUND_SHAPES, "weld")

@@ -22,7 +22,7 @@ from tankcal.geometry.field.components import (
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, prior_of
 from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.form import multiples
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 SMALLEST = 1e-8  # keeps the remainder of a covariance without its modelled part positive
 NEAR_M = 0.02  # azimuths within this distance along the arc count as equal for the common form

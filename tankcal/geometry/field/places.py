@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.geometry.field.components import wave_columns
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 WRAPS = np.arange(-2, 3)  # turns over which a short covariance is summed to make it periodic
 CELL_M, LARGEST_CELL_M = 0.15, 120  # length of a cell along the axis; largest number of cells

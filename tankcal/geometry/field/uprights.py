@@ -23,7 +23,7 @@ from tankcal.geometry.field.amplitudes import likely_variances
 from tankcal.geometry.field.blunders import NOTHING_LEFT, Piece, carried_over
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 LINK_M, WIDEST_M = 0.2, 0.4  # along the arc: largest gap in a column, and its largest width
 LEAST_RINGS, LEAST_SHARE = 3, 0.5  # rings with a point of the column: least number, least share

@@ -6,7 +6,6 @@ import numpy as np
 
 from tankcal.geometry.field.components import COMPONENTS, KINDS
 from tankcal.geometry.field.estimate import gauss_heights
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.job.plausibility import INSIDE, PLATES_TO_INSIDE
 from tankcal.pipeline.tanks.common import (
@@ -29,6 +28,7 @@ from tankcal.tank.tips import FORMS as TIPS
 from tankcal.tank.tips import tip_of
 from tankcal.tank.tops import HeadedShell
 from tankcal.tank.volumes import ShellVolume
+from tankcal.units import FULL_TURN
 
 # The plan of a bottom is that of the shell, so it widens with the shell.
 

@@ -15,12 +15,13 @@ from tankcal.messages import message
 from tankcal.survey.diagnosis.diagnoses import GON, MIRROR, mirrored_fits, mirrored_photo
 from tankcal.survey.diagnosis.fixed_datum_check import ALIKE
 from tankcal.survey.observations import KINDS
+from tankcal.units import FOOT_M
 
 BETTER = 0.2  # largest remaining share of sigma0 under a valid explanation
 SOUND = 5.0  # sigma0 of a survey that fits moderately; a single blunder causes more
 CERTAIN = 2.0  # sigma0 below which no other mistake is tried
 OTHER_UNITS = (
-    (0.3048, message("feet", "feet")),
+    (FOOT_M, message("feet", "feet")),
     (0.001, message("millimetres", "millimetres")),
 )
 HORIZONTAL = ("directions", "horizontal_angles", "azimuths")
