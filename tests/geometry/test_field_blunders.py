@@ -10,17 +10,20 @@ from generated_walls import make_wall, survey
 from test_field import RADIUS_M, sites_of
 
 from tankcal.geometry.clutter import find_rings
-from tankcal.geometry.field.amplitudes import assumed_amplitudes
-from tankcal.geometry.field.blunders import against_others, find_blunders, restricted_precision
+from tankcal.geometry.field.amplitudes import assumed_amplitudes, likelihood_of
+from tankcal.geometry.field.blunders import (
+    Precision,
+    against_others,
+    find_blunders,
+    restricted_precision,
+)
 from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
     seam_correlation,
 )
 from tankcal.geometry.field.covariances import Covariances
-from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, MIRRORED, invert
-from tankcal.geometry.field.precision import Precision
 from tankcal.geometry.field.sites import Sites, free_design
 
 STEP = 1e-4  # of a logarithm, in differences
