@@ -8,7 +8,6 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
-from tankcal.survey.causes import causes_of
 from tankcal.survey.datum import make_frame
 from tankcal.survey.depth import adjust_in_depth
 from tankcal.survey.diagnosis.blunders import gross_readings, search_blunders, swapped_at_start
@@ -24,11 +23,11 @@ from tankcal.survey.diagnosis.outlier_attribution import (
     find_undecided_outliers,
 )
 from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
+from tankcal.survey.network.adjustment import find_hardly_determined
 from tankcal.survey.network.reactions import reactions
-from tankcal.survey.network.soundness import find_hardly_determined
 from tankcal.survey.network.survey import IMAGES
 from tankcal.survey.network_of_survey import gather, held_trace, named_in
-from tankcal.survey.results import Adjustment, Readings
+from tankcal.survey.results import Adjustment, Readings, causes_of
 from tankcal.survey.rows import gone_with_their_points, readings_of
 from tankcal.survey.start.unstarted import SeveralPlacesError
 from tankcal.survey.start_values import add_start_values, mirrored_targets, started_like

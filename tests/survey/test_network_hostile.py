@@ -11,7 +11,7 @@ from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import rotation_of_view
 from tankcal.survey.network import Camera, Photos, Survey, adjust
-from tankcal.survey.network.soundness import find_hardly_determined
+from tankcal.survey.network.adjustment import find_hardly_determined
 from tankcal.survey.network.unknowns import in_words
 from tankcal.survey.observations import ControlCoordinates, Distances, ImageCoordinates
 

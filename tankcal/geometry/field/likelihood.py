@@ -197,7 +197,8 @@ class Likelihood:
             if length > NEAR_TOP and candidate.value > current.value:
                 reach = length / 4
                 continue
-            inverse = update_inverse(inverse, candidate_logs - best, candidate.slope - current.slope)
+            slope_change = candidate.slope - current.slope
+            inverse = update_inverse(inverse, candidate_logs - best, slope_change)
             best, current, reach = candidate_logs, candidate, min(2 * reach, LOG_STEP)
             # At convergence or slow progress, replace the updated curvature by the exact one.
             refresh = length < AT_TOP or length > previous_length / 2

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.messages import join_with_and, message
-from tankcal.survey.observations.nuisance import NUISANCES
+from tankcal.survey.observations.base import NUISANCES
 
 SHIFTS, TURNS = ("x", "y", "z"), ("X", "Y", "Z")
 THREE_TURNS = message("rotations", "three rotations")

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, stdtr
 
-from tankcal.tank.rules.model import DeviationLimit
-from tankcal.tank.rules.printed import printed_of_table
+from tankcal.tank.rules.model import DeviationLimit, printed_of_table
 
 AT_TOP_M = 1e-3  # a dip within a millimetre of the last row counts as the top
 

@@ -21,8 +21,7 @@ from tankcal.tank.deliveries import (
     ratio_of,
     worst_deliveries,
 )
-from tankcal.tank.rules.model import UncertaintyLimit
-from tankcal.tank.rules.printed import printed_of_table
+from tankcal.tank.rules.model import UncertaintyLimit, printed_of_table
 
 _ROUNDING = 1e-12  # relative tolerance: U equal to the limit meets it
 _SAME_M = 1e-6  # heights of deliveries with a smaller difference are equal
