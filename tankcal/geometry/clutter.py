@@ -88,18 +88,18 @@ def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m
     thin = _sample_points(xyz, courses, axis)
     part = xyz[thin], courses[thin], Uneven(uneven.columns[thin], uneven.sd_m)
 
-    def fitted(accepted, previous_fit):
+    def fit_accepted(accepted, previous_fit):
         return _fit_form(*part, axis, relative[thin], slope_sd, accepted, previous_fit)
 
     def refit(previous_fit, goes, comes):
-        return fitted(previous_fit.accepted & ~goes | comes, previous_fit)
+        return fit_accepted(previous_fit.accepted & ~goes | comes, previous_fit)
 
     def tests(fit, stays=stays[thin]):
         is_far = (np.abs(fit.residual) > least_m) & ~stays
         return fit.accepted, np.where(is_far, np.abs(fit.w), 0.0), CRITICAL
 
     # The first fit accepts all points; `snoop` then alternates rejections and fits.
-    fit = fitted(np.ones(len(thin), dtype=bool), None)
+    fit = fit_accepted(np.ones(len(thin), dtype=bool), None)
     if least_m is not None:
         fit = snoop(fit, tests, refit, at_once=0.9, returns=1).adjustment
     # The sample determined the form; now predict and test the remaining points once.

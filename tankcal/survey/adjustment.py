@@ -66,7 +66,7 @@ def adjust_survey(measurements, progress=None):
     progress = progress or (lambda text: None)
 
     def adjusted(measured, like):
-        return _adjusted(measured, progress, like=like)
+        return _adjust(measured, progress, like=like)
 
     try:
         result, measurements, depth = adjust_in_depth(measurements, adjusted, progress)
@@ -84,7 +84,7 @@ def adjust_survey(measurements, progress=None):
     return replace(_complete(*result, measurements), depth=depth)
 
 
-def _adjusted(measurements, progress, snooping=None, most=100, like=None):
+def _adjust(measurements, progress, snooping=None, most=100, like=None):
     """Adjust measurements with a search for blunders.
 
     Parameters
@@ -128,9 +128,9 @@ def _adjusted(measurements, progress, snooping=None, most=100, like=None):
     return search_blunders(frame.survey, options, gross), gathered, frame
 
 
-def _tried(measurements, snooping=False, like=None):
+def _adjust_trial(measurements, snooping=False, like=None):
     """Adjust trial measurements; return network.Adjusted and Gathered."""
-    search, gathered, _ = _adjusted(measurements, lambda text: None, snooping, TRIED, like)
+    search, gathered, _ = _adjust(measurements, lambda text: None, snooping, TRIED, like)
     return search.adjusted, gathered
 
 
@@ -139,11 +139,11 @@ def _why_not(measurements, message):
     # These messages already name their cause.
     if "datum defect" in message or MIRROR in message:
         return []
-    photo_problems = photos_that_do_not_fit(measurements, message, _tried)
+    photo_problems = photos_that_do_not_fit(measurements, message, _adjust_trial)
     return (
         photo_problems
-        or likely_mistake(measurements, np.inf, _tried, message)
-        or wrong_control(measurements, np.inf, _tried)[0]
+        or likely_mistake(measurements, np.inf, _adjust_trial, message)
+        or wrong_control(measurements, np.inf, _adjust_trial)[0]
     )
 
 
@@ -166,11 +166,16 @@ def _complete(search, gathered, frame, measurements):
     gone = gone_with_their_points(adjusted, search.removed)
     removed = sorted([*readings.where(readings.removed), *gone], key=lambda one: -abs(one.w))
     checks = check_readings(adjusted, gathered.checks, scale)
-    readings = _in_order(Readings.joined([readings, Readings.of([*gone, *checks])]))
+    readings = _sort_readings(Readings.joined([readings, Readings.of([*gone, *checks])]))
     there = np.flatnonzero(np.isfinite(adjusted.xyz_m).all(axis=1))
     late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
-    warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
-    warnings += [_kept(one, adjusted.survey) for one in search.needed if one.w > CRITICAL]
+    survey = adjusted.survey
+    warnings += [
+        _lost_point_problem(measurements, survey.points[i], why) for i, why in late.items()
+    ]
+    warnings += [
+        _kept_reading_problem(needed, survey) for needed in search.needed if needed.w > CRITICAL
+    ]
     diagnoses = _diagnoses(adjusted, readings, groups, gathered, measurements)
     doubts = _causes(adjusted, readings, gathered, measurements, diagnoses)
     # If the whole survey is in doubt, outliers in readings say little; only control is examined
@@ -213,7 +218,7 @@ def _complete(search, gathered, frame, measurements):
     )
 
 
-def _kept(one, survey):
+def _kept_reading_problem(one, survey):
     """Problem of a reading that disagrees but cannot be removed."""
     trace = survey.table(one.source).trace
     text = message(
@@ -226,7 +231,7 @@ def _kept(one, survey):
     return Problem(trace.file, text, trace.rows[one.row])
 
 
-def _lost(measurements, name, why):
+def _lost_point_problem(measurements, name, why):
     """Problem of a point that the search for blunders left with too few readings."""
     file, row = named_in(measurements, name)
     text = message("left_after_search", "{why} left after the search for blunders", why=why)
@@ -253,7 +258,7 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
     if not (one_sided or adjusted.sigma0 > SUSPICIOUS or gone > SOME * len(readings)):
         return strained(readings, gathered.known)
     # Trials start from this solution, which is close to theirs.
-    close, sigma0 = partial(_tried, like=adjusted), adjusted.sigma0
+    close, sigma0 = partial(_adjust_trial, like=adjusted), adjusted.sigma0
     # The search for blunders lowers sigma0. The test needs sigma0 of all readings, so it adjusts
     # again without snooping.
     if gone:
@@ -266,7 +271,7 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
         bad and sigma0 > SUSPICIOUS and not any(MIRROR in problem.expected for problem in diagnoses)
     )
     # A mirror image has its own diagnosis; trials of other mistakes cannot remove it.
-    misread = likely_mistake(measurements, sigma0, _tried) if bad else []
+    misread = likely_mistake(measurements, sigma0, _adjust_trial) if bad else []
     if misread:
         raise SolutionError("\n".join(["the readings do not fit together", *map(str, misread)]))
     control, left = wrong_control(measurements, gone, close)
@@ -286,7 +291,7 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
     return problems + (strained(readings, gathered.known) if not control else [])
 
 
-def _in_order(readings):
+def _sort_readings(readings):
     """Sort readings by file, then by row."""
     places = readings.columns["file"].tolist()
     # Images and control come first, as in the report; the other files follow in alphabetical order.

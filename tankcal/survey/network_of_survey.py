@@ -100,12 +100,12 @@ def gather(measurements):
     # Omitting a point removes observations of its neighbours, so repeat until every point has
     # enough.
     while True:
-        gathered = _gathered(measurements, excluded)
+        gathered = _gather(measurements, excluded)
         poor = find_left_out(gathered.survey)
         if not poor:
             break
         excluded |= poor
-    excluded = _unmeasured(measurements, gathered.survey.points, excluded)
+    excluded = _omitted_points(measurements, gathered.survey.points, excluded)
     where = {name: named_in(measurements, name) for name in excluded}
     idle, warnings = find_untouched_coordinates(gathered.survey)
     warnings += _omission_warnings(excluded, where)
@@ -136,7 +136,7 @@ def _omission_warnings(excluded, where):
     return [*problems[: TOLD - 1], Problem("job.toml", text, None, "adjustment")]
 
 
-def _unmeasured(measurements, points, excluded):
+def _omitted_points(measurements, points, excluded):
     """{name: reason} of omitted points, including unmeasured points of control.csv and
     check.csv."""
     reasons = dict(excluded)
@@ -162,11 +162,11 @@ def named_in(measurements, name):
     return "setups.csv", None
 
 
-def _gathered(measurements, excluded):
+def _gather(measurements, excluded):
     """The Gathered of measurements without the excluded points."""
     warnings = []
     numbers = _numbers(measurements, excluded)
-    known = _known(measurements.control, numbers.points)
+    known = _known_control(measurements.control, numbers.points)
     observations, checks = [], []
     fixed = None
     if measurements.settings.datum == "control":
@@ -254,7 +254,7 @@ def _rows_in_survey_frame(control):
     ]
 
 
-def _known(control, points):
+def _known_control(control, points):
     """The Known control of the points of the survey."""
     xyz, sd = np.full((2, len(points), 3), np.nan)
     row = {}

@@ -150,7 +150,7 @@ class PoseNetwork:
         prior_rows, prior, covariance = self._priors()
         used = np.flatnonzero(chosen)
         # Held unknowns are removed from the vector rather than given a large weight.
-        held = self._held(used)
+        held = self._held_mask(used)
         free = np.flatnonzero(~held)
         at_start = state.copy()
 
@@ -175,7 +175,7 @@ class PoseNetwork:
         self.last = used, whole, cofactor
         return adjustment
 
-    def _held(self, used):
+    def _held_mask(self, used):
         """Mask (u,) of constant unknowns: exact poses, scales and offsets, unobserved targets."""
         s, k, t = len(self.scans), len(self.scanners), len(self.names)
         held = np.zeros(6 * s + 2 * k + 3 * t, dtype=bool)

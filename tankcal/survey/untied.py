@@ -80,26 +80,26 @@ def place_untied(hits, poses, untied, *, nominal_m, is_inside):
     ]
     known_azimuths = _azimuths(hits, poses, untied, axis)
 
-    def placed(azimuth):
+    def place_at(azimuth):
         xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
         for number, at, centre in zip(untied, azimuth, centres, strict=True):
             # The set-up looks at the axis: the azimuth back to the axis fixes its circle zero.
             xyz[number, :2] = axis + np.hypot(*centre) * np.array([np.sin(at), np.cos(at)])
             zero[number] = at + np.pi - np.arctan2(*centre)
         start = replace(poses, xyz_m=xyz, orientation_rad=zero)
-        return _fitted(start, sights, pose, untied, axis, is_even=np.isnan(known_azimuths))
+        return _fit_surface(start, sights, pose, untied, axis, is_even=np.isnan(known_azimuths))
 
     even = FULL_TURN * np.arange(len(untied)) / len(untied)
-    result, misfit = placed(np.where(np.isnan(known_azimuths), even, known_azimuths))
+    result, misfit = place_at(np.where(np.isnan(known_azimuths), even, known_azimuths))
     # Tied poses, or fewer than three set-ups, leave no order to be tested.
     if tied.any() or len(untied) < 3:
         return result
     if np.isnan(known_azimuths).all():
-        reversed_poses, more = placed(-even)
+        reversed_poses, more = place_at(-even)
         return reversed_poses if more < misfit else result
     if not np.isnan(known_azimuths).any():
         _refuse_order(
-            hits, [poses.keys[number][0] for number in untied], known_azimuths, placed, misfit
+            hits, [poses.keys[number][0] for number in untied], known_azimuths, place_at, misfit
         )
     return result
 
@@ -115,9 +115,9 @@ def _azimuths(hits, poses, untied, axis):
     return azimuths
 
 
-def _refuse_order(hits, names, azimuth, placed, misfit_m):
+def _refuse_order(hits, names, azimuth, place_at, misfit_m):
     """Raise InputError if stations fit much better mirrored, or with two of them exchanged."""
-    mirrored = placed(-azimuth)[1]
+    mirrored = place_at(-azimuth)[1]
     if misfit_m > MIRRORED * mirrored:
         text = message(
             "stations_mirrored",
@@ -132,7 +132,7 @@ def _refuse_order(hits, names, azimuth, placed, misfit_m):
     for one, other in combinations(range(len(names)), 2):
         exchanged = azimuth.copy()
         exchanged[[one, other]] = azimuth[[other, one]]
-        rms = placed(exchanged)[1]
+        rms = place_at(exchanged)[1]
         if misfit_m > EXCHANGED * rms:
             text = message(
                 "stations_exchanged",
@@ -153,7 +153,7 @@ def sees_all_around(sights):
     return np.max(np.diff(turn, append=turn[0] + FULL_TURN)) < np.pi
 
 
-def _turned(sights, zero):
+def _rotate_sights(sights, zero):
     """Horizontal components (n, 2) of sights after rotation by the circle zeros."""
     sin, cos = np.sin(zero), np.cos(zero)
     x, y = sights[:, 0], sights[:, 1]
@@ -163,7 +163,7 @@ def _turned(sights, zero):
 def _axis(hits, poses, sights, pose, tied, untied):
     """Position (2,) of the axis: from tied hits, else the mean of the stations, else the origin."""
     if tied.any():
-        places = _turned(sights[tied], poses.orientation_rad[pose[tied]])
+        places = _rotate_sights(sights[tied], poses.orientation_rad[pose[tied]])
         places += poses.xyz_m[pose[tied], :2]
         middle = places.mean(axis=0)
         return middle + taubin_circle(places - middle)[:2]
@@ -203,7 +203,7 @@ def _centre(sights, nominal_m, is_inside):
     )
 
 
-def _fitted(poses, sights, pose, untied, axis, *, is_even):
+def _fit_surface(poses, sights, pose, untied, axis, *, is_even):
     """Adjust the untied poses to the leaning surface of the module docstring.
 
     Parameters
@@ -252,7 +252,7 @@ def _fitted(poses, sights, pose, untied, axis, *, is_even):
     def linearise(x):
         """Return the distances (n,) of the hits from the surface, and their derivatives."""
         xyz, zero = poses_at(x)
-        turned = _turned(sights, zero[pose])
+        turned = _rotate_sights(sights, zero[pose])
         away = xyz[pose, :2] + turned - axis - x[free:lean_from]
         away -= np.outer(above, x[lean_from:waves_from])
         distance = np.hypot(*away.T)

@@ -108,7 +108,7 @@ class ShellVolume:
         result = np.empty((columns.shape[1], len(heights)))
         below = np.zeros(columns.shape[1])
         divisors = np.arange(1.0, LEVELS + 1)[:, None]
-        for course, rows, polynomial in self._by_course(heights, columns):
+        for course, rows, polynomial in self._rows_by_course(heights, columns):
             # Primitive of sum a_k t^k: height times a_k / (k + 1), above the sum of the courses
             # below.
             primitive = np.concatenate([below[None], course.height_m * polynomial / divisors])
@@ -132,7 +132,7 @@ class ShellVolume:
         """Return the inside area (rows,) at each height; at a joint, of the upper course."""
         heights = self._inside(heights_m)
         area = np.empty(len(heights))
-        for course, rows, polynomial in self._by_course(heights, self.features):
+        for course, rows, polynomial in self._rows_by_course(heights, self.features):
             t = (heights[rows] - course.bottom_m) / course.height_m
             area[rows] = np.polynomial.polynomial.polyval(t, polynomial)
         return area
@@ -194,7 +194,7 @@ class ShellVolume:
             for start in range(0, len(features), LEVELS)
         ]
 
-    def _by_course(self, heights, features):
+    def _rows_by_course(self, heights, features):
         """Return (course, its rows, polynomial) for each course.
 
         The rows are those whose height is in the course, at a joint in the upper course; a slice if

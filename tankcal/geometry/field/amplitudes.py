@@ -368,22 +368,22 @@ def _build_part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_
     azimuth, heights = sites.azimuth_rad[members], sites.heights[members]
     basis = _complement_basis(sites.free_columns(members))
 
-    def seen(covariance):
+    def project(covariance):
         return basis.T @ covariance @ basis
 
     if np.ndim(noise_m2) == 2:
-        noise = seen(noise_m2[np.ix_(members, members)])
+        noise = project(noise_m2[np.ix_(members, members)])
     else:
         noise = (basis.T * noise_m2[members]) @ basis
     waves, seams = wave_columns(azimuth), seam_correlations(azimuth, azimuth, nominal_m)
     welds = weld_columns(azimuth, sites.welds_of(sites.course[members[0]]), nominal_m)
-    own_covariances, level = [], seen(seams)
+    own_covariances, level = [], project(seams)
     for component in (COMPONENTS[i] for i in own_indices):
         if component.shape == "seam":
             over_height = (
                 1.0 if component.is_level else component.height_covariance(heights, heights)
             )
-            own_covariances.append(level if component.is_level else seen(seams * over_height))
+            own_covariances.append(level if component.is_level else project(seams * over_height))
         else:
             projected = basis.T @ (
                 welds if component.shape == "weld" else component.columns(waves, heights)

@@ -307,21 +307,21 @@ class Misfit:
     @cached_property
     def slope(self):
         """Derivative (variances,) by the logarithms."""
-        return self._variances * self._by_variances + 2 * self._by_prior
+        return self._variances * self._variance_slopes + 2 * self._by_prior
 
     @property
     def curvature(self):
         """Second derivative (variances, variances) by the logarithms."""
-        return self._of_logs(2 * self._squares() - self._traces())
+        return self._convert_to_logs(2 * self._squares() - self._traces())
 
     @property
     def average_curvature(self):
         """Mean of observed and expected second derivative, without traces: a tenth of the work."""
-        return self._of_logs(self._squares())
+        return self._convert_to_logs(self._squares())
 
-    def _of_logs(self, by_variances):
+    def _convert_to_logs(self, by_variances):
         """Convert a second derivative by variances to the logarithms, and add the prior."""
-        diagonal = np.diag(self._variances * self._by_variances) + 2 * self._likelihood.precision
+        diagonal = np.diag(self._variances * self._variance_slopes) + 2 * self._likelihood.precision
         return self._variances[:, None] * by_variances * self._variances + diagonal
 
     @cached_property
@@ -335,7 +335,7 @@ class Misfit:
         return parts
 
     @cached_property
-    def _by_variances(self):
+    def _variance_slopes(self):
         """Derivative (variances,) by the variances, without the prior."""
         likelihood = self._likelihood
         slopes, by_root = np.zeros(len(self._variances)), self._normal @ self._root
@@ -357,7 +357,7 @@ class Misfit:
             inner_terms += changes.T @ _times(precision, changes) + np.outer(by_pull, by_pull)
             inner_terms += shared.T @ shared
             cross_terms += shared
-        return self._scattered(inner_terms - cross_terms.T @ cross_terms)
+        return self._scatter(inner_terms - cross_terms.T @ cross_terms)
 
     def _traces(self):
         """Return tr(P K_i P K_j), shape (variances, variances)."""
@@ -377,9 +377,9 @@ class Misfit:
             projector.T @ by_common @ projector, likelihood.spread, ((1, 2), (1, 2))
         )
         common = _products(likelihood.spread, self._normal @ projector)
-        return self._scattered(np.block([[own, mixed], [mixed.T, common]]))
+        return self._scatter(np.block([[own, mixed], [mixed.T, common]]))
 
-    def _scattered(self, elements):
+    def _scatter(self, elements):
         """Sum the elements of covariances of parts and of `spread` that belong to each variance."""
         index = np.concatenate([self._likelihood.own, self._likelihood.common])
         total = np.zeros((len(self._variances),) * 2)

@@ -83,7 +83,7 @@ class SolidField:
     amplitudes: Amplitudes
 
     @cached_property
-    def _solved(self):
+    def _solution(self):
         """Cholesky factors of V and X' V^-1 X with V^-1 X between, beta, and V^-1 (y - X beta)."""
         factor = scipy.linalg.cho_factor(self._covariance, lower=True)
         by_columns = scipy.linalg.cho_solve(factor, self.design)
@@ -144,7 +144,7 @@ class SolidField:
         by_shape : ndarray, shape (f, p)
             Derivatives by the parameters of the shape, in the order of the design.
         """
-        factor, by_columns, normal, beta, pull = self._solved
+        factor, by_columns, normal, beta, pull = self._solution
         sized_departures = list(
             zip(self.amplitudes.variances_m2, self.places.departures, strict=True)
         )

@@ -67,7 +67,7 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
     def without(sizes):
         noise = sizes[-1] * variance_m2 + LEAST_NOISE_M**2
         precision = piece.precision(sizes[:-1], noise)[0][:, :]  # most of its columns are required
-        return _eliminated(precision, precision @ centred, np.flatnonzero(~tested.accepted))
+        return _eliminate(precision, precision @ centred, np.flatnonzero(~tested.accepted))
 
     sizes, least_jump = tested.sizes_m2, max(LEAST_M, LEAST_W * scatter_m)
     reduced = without(sizes)
@@ -102,7 +102,7 @@ def _select_unlikely(precision, pull, columns, least_m):
         members = np.arange(start, stop)
         # Eliminate the other columns of the selection: each is tested against regular wall only.
         jump = _jump(
-            *_eliminated(block, block_pull, np.delete(np.arange(len(block_pull)), members)), members
+            *_eliminate(block, block_pull, np.delete(np.arange(len(block_pull)), members)), members
         )
         if abs(jump.size_m) > least_m and abs(jump.w) > LEAST_W:
             selected.append(column)
@@ -118,7 +118,7 @@ class _Jump:
     members: np.ndarray
 
 
-def _eliminated(precision, pull, eliminated):
+def _eliminate(precision, pull, eliminated):
     """Return P and P y after elimination of readings, whose rows are then meaningless."""
     if not len(eliminated):
         return precision, pull

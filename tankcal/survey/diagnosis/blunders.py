@@ -65,7 +65,7 @@ def search_blunders(survey, options, gross=None):
     if gross is None:
         return Searched(adjust(survey, **options), (), 1)
     try:
-        cleaned = _without(survey, options, gross) if gross else snoop(survey, **options)
+        cleaned = _search_without(survey, options, gross) if gross else snoop(survey, **options)
     except SolutionError as error:
         adjusted = adjust(survey, **options)
         text = message(
@@ -77,7 +77,7 @@ def search_blunders(survey, options, gross=None):
         return Searched(
             adjusted, (), 1, (), (Problem("job.toml", text, None, "adjustment.snooping"),)
         )
-    again = _readmitted(cleaned, gross)
+    again = _readmit(cleaned, gross)
     if again is not None:
         try:
             # The start values are good now, so a robust start is not needed.
@@ -91,7 +91,7 @@ def search_blunders(survey, options, gross=None):
     return Searched(cleaned.adjusted, cleaned.removed, cleaned.rounds, cleaned.needed)
 
 
-def _counted_anew(block, gross):
+def _renumber(block, gross):
     """Renumber the rows of a Block after readings outside the block left the tables."""
     row = block.row.copy()
     for source, removed in gross.items():
@@ -101,7 +101,7 @@ def _counted_anew(block, gross):
     return replace(block, row=row)
 
 
-def _without(survey, options, gross):
+def _search_without(survey, options, gross):
     """Search a survey twice: first without some readings, then with these readings rejected.
 
     Parameters
@@ -123,7 +123,7 @@ def _without(survey, options, gross):
             replace(one.taken(~gross[number]) if number in gross else one, trace=None)
             for number, one in enumerate(survey.observations)
         ),
-        correlated=tuple(_counted_anew(one, gross) for one in survey.correlated),
+        correlated=tuple(_renumber(one, gross) for one in survey.correlated),
     )
     first = snoop(thin, **options)
     uses = {}
@@ -141,7 +141,7 @@ def _without(survey, options, gross):
     return replace(cleaned, rounds=first.rounds + cleaned.rounds)
 
 
-def _readmitted(cleaned, gross):
+def _readmit(cleaned, gross):
     """Restore all readings of points that lost too many to the search; None: no such point."""
     lost_points = cleaned.adjusted.problem.aside
     if not lost_points.any():
@@ -197,7 +197,7 @@ def gross_readings(survey):
         if source == "image points":
             _refuse_mirrored(survey, np.linalg.norm(off, axis=1), rows)
             continue
-        off = _about_their_sets(group, off) if isinstance(group, Directions) else np.abs(off)
+        off = _centre_on_sets(group, off) if isinstance(group, Directions) else np.abs(off)
         # All readings of a kind may be off because the start values are poor.
         limit = np.maximum(_limit(group, problem.state), AS_OTHERS * np.median(off[:, 0]))
         gross = off[:, 0] > limit
@@ -238,7 +238,7 @@ def _limit(observations, state):
     return ASKEW_RAD if observations.unit == "rad" else np.inf
 
 
-def _about_their_sets(directions, misclosure):
+def _centre_on_sets(directions, misclosure):
     """Misclosures (n, 1) of directions relative to the median of their set."""
     off = np.zeros_like(misclosure)
     for number in np.unique(directions.set):

@@ -51,7 +51,8 @@ def likely_mistake(measurements, sigma0, run, failure=None):
     """
     limit = min(BETTER * sigma0, SOUND)
     explained, alike = [], 0
-    for suppositions in (_mirrored, _files_in_other_unit, _exchanged, _setup_in_other_unit):
+    mistakes = (_mirror_mistakes, _files_in_other_unit, _name_exchanges, _setup_in_other_unit)
+    for suppositions in mistakes:
         for problem, changed in suppositions(measurements):
             try:
                 trial_sigma0 = run(changed)[0].sigma0
@@ -73,7 +74,7 @@ def likely_mistake(measurements, sigma0, run, failure=None):
     return sorted(likely, key=lambda problem: problem.file == CONTROL)
 
 
-def _mirrored(measurements):
+def _mirror_mistakes(measurements):
     """Yield (Problem, corrected measurements) for mistakes that mirror the survey.
 
     The mistakes are not always distinguishable.
@@ -92,7 +93,7 @@ def _mirrored(measurements):
             )
 
 
-def _exchanged(measurements):
+def _name_exchanges(measurements):
     """Yield (Problem, corrected measurements) for two control points with exchanged names."""
     control = measurements.control
     names = [] if control is None else list(control.point)

@@ -47,8 +47,8 @@ def adjust(survey, *, datum="control", over=None, photo=None, tolerance=1e-4, ma
         If unknowns or the datum are undetermined (the message names them), or if the iteration does
         not converge.
     """
-    problem = _in_datum(survey, datum, over, photo)
-    return _adjusted(
+    problem = _assemble_in_datum(survey, datum, over, photo)
+    return _adjust_problem(
         survey,
         problem,
         datum,
@@ -75,11 +75,11 @@ def predict(survey, *, datum="control", over=None, photo=None):
     -------
     Adjusted
     """
-    problem = _in_datum(survey, datum, over, photo)
-    return _adjusted(survey, problem, datum, lambda: linearise(problem.model, problem.state))
+    problem = _assemble_in_datum(survey, datum, over, photo)
+    return _adjust_problem(survey, problem, datum, lambda: linearise(problem.model, problem.state))
 
 
-def _in_datum(survey, datum, over, photo):
+def _assemble_in_datum(survey, datum, over, photo):
     """The Problem of a survey, with inner constraints where requested and needed."""
     problem = assemble(survey)
     if datum == "inner":
@@ -94,7 +94,7 @@ def _in_datum(survey, datum, over, photo):
     return problem
 
 
-def _adjusted(survey, problem, datum, solved):
+def _adjust_problem(survey, problem, datum, solved):
     """The Adjusted of a Problem solved by `solved`; failures are explained in words."""
     try:
         solution = solved()

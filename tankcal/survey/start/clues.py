@@ -72,7 +72,7 @@ def grow_piece(clues, piece, least, free=False):
     while True:
         before = np.isfinite(piece.xyz_m).sum() + piece.oriented.sum()
         piece = _add_by_vectors(clues, piece, free)
-        piece = _add_by_tapes(clues, _surveyed(clues, piece, free), free)
+        piece = _add_by_tapes(clues, _add_by_survey(clues, piece, free), free)
         wall = clues.wall or wall_of(piece.xyz_m)
         piece = grow_by_photos(clues.sights, piece, clues.rng, wall, least)
         if np.isfinite(piece.xyz_m).sum() + piece.oriented.sum() == before:
@@ -115,7 +115,7 @@ def _add_by_mixtures(clues, piece):
     return replace(piece, xyz_m=xyz, by_photos=piece.by_photos & ~new)
 
 
-def _surveyed(clues, piece, free):
+def _add_by_survey(clues, piece, free):
     """Add points from angles, distances and levels."""
     if clues.silent:
         return piece
@@ -167,13 +167,13 @@ def _add_by_tapes(clues, piece, free):
         either = [_piece_of(clues, points, places * mirror) for mirror in ([1, 1, 1], [1, 1, -1])]
         if free and not known.any():
             return piece.filled_from(either[0])
-        joined = _joined(clues, piece, either)
+        joined = _join_mirror_image(clues, piece, either)
         if joined is not None:
             return joined
     return piece
 
 
-def _joined(clues, piece, either):
+def _join_mirror_image(clues, piece, either):
     """Join the mirror image that agrees with the readings; None if neither or both do.
 
     Known points in one plane leave the side of the other points undetermined.

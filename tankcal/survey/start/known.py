@@ -44,7 +44,7 @@ def certain_places(survey):
     """Known positions that are fixed or observed, of points with measurements."""
     xyz = np.full((len(survey.points), 3), np.nan)
     if survey.fixed is not None:
-        xyz = np.where(survey.fixed & _measured(survey)[:, None], survey.xyz_m, xyz)
+        xyz = np.where(survey.fixed & _measured_points(survey)[:, None], survey.xyz_m, xyz)
     for item in survey.observations:
         if isinstance(item, ControlCoordinates):
             accepted = item.in_use
@@ -76,13 +76,13 @@ def _photos_observed(survey):
 
 def hinted_places(survey):
     """All given start values, whatever their quality, of points with measurements."""
-    photos, xyz = survey.photos, np.where(_measured(survey)[:, None], survey.xyz_m, np.nan)
+    photos, xyz = survey.photos, np.where(_measured_points(survey)[:, None], survey.xyz_m, np.nan)
     if photos is None:
         return Known(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
     return Known(_piece(xyz, photos.xyz_m, photos.rotation))
 
 
-def _measured(survey):
+def _measured_points(survey):
     """Mask (points,) of points in an image or an observation."""
     mask = np.zeros(len(survey.points), dtype=bool)
     if survey.image_points is not None:

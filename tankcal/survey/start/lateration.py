@@ -49,7 +49,7 @@ def lay_out_networks(low, high, length, dims, rng):
             continue
         place = np.full(len(points), -1)
         place[nodes] = np.arange(len(nodes))
-        places = _solved(place[a[rows]], place[b[rows]], length[rows], len(nodes), dims, rng)
+        places = _place_network(place[a[rows]], place[b[rows]], length[rows], len(nodes), dims, rng)
         if places is not None:
             firm = _firm(places, place[a[rows]], place[b[rows]], dims)
             yield points[nodes[firm]], places[firm]
@@ -67,7 +67,7 @@ def _well_tied(nodes, a, b, dims):
         nodes = remaining
 
 
-def _solved(a, b, length, n, dims, rng):
+def _place_network(a, b, length, n, dims, rng):
     """Places (n, dims) that fit the distances, or None."""
     graph = coo_array((length, (a, b)), shape=(n, n)).tocsr()
     ways = shortest_path(graph, directed=False)
@@ -81,7 +81,7 @@ def _solved(a, b, length, n, dims, rng):
     for trial in range(TRIES):
         shake = 0.0 if not trial else 0.3 * np.median(length)
         xyz = _fit_places(start + shake * rng.normal(size=start.shape), a, b, length)
-        xyz = _unfolded(xyz, a, b, length)
+        xyz = _unfold(xyz, a, b, length)
         off = np.abs(np.linalg.norm(xyz[a] - xyz[b], axis=1) - length)
         # 80 % of the distances must fit: blunders may remain.
         keep = np.sort(off / length)[min(len(off) - 1, int(0.8 * len(off)))]
@@ -90,7 +90,7 @@ def _solved(a, b, length, n, dims, rng):
     return None
 
 
-def _unfolded(xyz, a, b, length):
+def _unfold(xyz, a, b, length):
     """Move points on the wrong side to the position that fits their neighbours."""
     for _ in range(UNFOLDING):
         off = np.abs(np.linalg.norm(xyz[a] - xyz[b], axis=1) - length) / length

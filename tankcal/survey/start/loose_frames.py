@@ -53,43 +53,43 @@ def join_local_frames(clues, piece, places, least):
         if local is None:
             reasons.append(why)
             break
-        piece, loose = _attached(clues, piece, [*loose, local], least)
+        piece, loose = _attach_frames(clues, piece, [*loose, local], least)
         tried |= local.oriented | piece.oriented
-    if loose and not (piece.oriented.any() or (piece.known & ~_held(clues.survey)).any()):
+    if loose and not (piece.oriented.any() or (piece.known & ~_held_points(clues.survey)).any()):
         local = max(loose, key=lambda frame: frame.oriented.sum())
         # Without a place in common, align the largest frame to single known coordinates.
         motion = align_piece(clues.survey, local, piece.xyz_m, places)
         piece = grow_piece(clues, piece.filled_from(local.moved(motion)), least)
-        piece, loose = _attached(
+        piece, loose = _attach_frames(
             clues, piece, [frame for frame in loose if frame is not local], least
         )
-    reasons += [_apart(clues.survey, local, piece) for local in loose]
-    piece = _scaled_about_photo(clues, piece, original, places)
+    reasons += [_unjoined_sentence(clues.survey, local, piece) for local in loose]
+    piece = _scale_about_photo(clues, piece, original, places)
     return grow_piece(clues, piece, least, free=not np.isfinite(piece.xyz_m[:, 0]).any()), reasons
 
 
-def _attached(clues, piece, loose, least):
+def _attach_frames(clues, piece, loose, least):
     """Join all frames that share enough with the Piece or with each other; return it and the
     others."""
-    loose = [_stretched(clues, frame) for frame in loose]
+    loose = [_scale_by_distances(clues, frame) for frame in loose]
     while True:
         for local in loose:
-            joined = _joined(clues, local, piece)
+            joined = _join(clues, local, piece)
             if joined is not None:
                 piece = grow_piece(clues, joined, least)
                 loose = [frame for frame in loose if frame is not local]
                 break
         else:
-            pairs = ((a, b, _joined(clues, a, b)) for a, b in combinations(loose, 2))
+            pairs = ((a, b, _join(clues, a, b)) for a, b in combinations(loose, 2))
             first, second, joined = next((frame for frame in pairs if frame[2]), (None,) * 3)
             if joined is None:
                 return piece, loose
             joined = grow_by_photos(clues.sights, joined, clues.rng, least=least)
             rest = [frame for frame in loose if frame is not first and frame is not second]
-            loose = [*rest, _stretched(clues, joined)]
+            loose = [*rest, _scale_by_distances(clues, joined)]
 
 
-def _joined(clues, local, onto):
+def _join(clues, local, onto):
     """The Piece `onto` extended by another one, or None if too little is common."""
     motion = joint(local, onto, clues.rng)
     if motion is None or motion.misfit_m > BAD_JOINT * max(local.extent * motion.scale, 1e-9):
@@ -97,7 +97,7 @@ def _joined(clues, local, onto):
     return onto.filled_from(local.moved(motion))
 
 
-def _scaled_about_photo(clues, piece, original, places):
+def _scale_about_photo(clues, piece, original, places):
     """Scale a Piece about its only completely given photo.
 
     Relative orientation alone sets the base to 1. Single coordinates of other photos and of points
@@ -135,12 +135,12 @@ def _scaled_about_photo(clues, piece, original, places):
     return original.filled_from(bare.moved(Motion(np.eye(3), hinge * (1 - scale), scale, 0.0)))
 
 
-def _held(survey):
+def _held_points(survey):
     """Mask (points,) of points with certain coordinates."""
     return np.isfinite(certain_places(survey).piece.xyz_m).any(axis=1)
 
 
-def _stretched(clues, piece):
+def _scale_by_distances(clues, piece):
     """The Piece scaled by measured distances."""
     plan, known = clues.plan, piece.known
     use = known[plan.start] & known[plan.end] & ~plan.flat
@@ -153,7 +153,7 @@ def _stretched(clues, piece):
     return replace(piece, xyz_m=scale * piece.xyz_m, place_m=scale * piece.place_m)
 
 
-def _apart(survey, local, piece):
+def _unjoined_sentence(survey, local, piece):
     """Sentence about photos of a frame that does not join."""
     names = [survey.photos.names[i] for i in np.flatnonzero(local.oriented & ~piece.oriented)]
     common, some = int((local.known & piece.known).sum()), ", ".join(names[:10])
@@ -227,7 +227,7 @@ class _FrameClues:
         self.known_m = np.vstack([known_m, place_m])
         self.size = max(piece.extent, 1e-9)
         self.which = np.nonzero(np.vstack([points, photos]))
-        self.others = [_between(item, piece.known) for item in survey.observations
+        self.others = [_rows_between(item, piece.known) for item in survey.observations
                        if item.knows_frame]  # fmt: skip
         target = np.where(np.vstack([points, photos]), self.known_m, np.nan)
         counts = np.isfinite(target).sum(axis=0)
@@ -244,7 +244,7 @@ class _FrameClues:
         return np.concatenate(parts)
 
 
-def _between(observations, known):
+def _rows_between(observations, known):
     """Rows of an observation between known points."""
     return observations.taken(
         observations.in_use & known[observations.start] & known[observations.end]

@@ -77,7 +77,9 @@ def blind_piece(sights, waiting, points, rng, seed=0):
     hypotheses = _hypotheses(sights, waiting, points, seed)
     if not hypotheses:
         return None, f"no two of these photos share {COMMON} points seen from different places"
-    judged = [(*_judged(sights, piece, rng), pair, piece) for pair, piece in hypotheses]
+    judged = [
+        (*_judge_by_third_photo(sights, piece, rng), pair, piece) for pair, piece in hypotheses
+    ]
     judged.sort(key=lambda candidate: (-candidate[0], candidate[1]))
     third, misfit, pair, piece = judged[0]
     if not third:
@@ -138,7 +140,7 @@ def _piece_of_pair(sights, pair, pose, points):
     return add_points(sights, replace(piece, place_m=place, rotation=rotation))
 
 
-def _judged(sights, piece, rng):
+def _judge_by_third_photo(sights, piece, rng):
     """Whether a third photo shows enough points of a Piece, and its misfit (smaller is better)."""
     known, best = piece.known, (False, np.inf)
     counts = [0 if is_oriented else known[sight.point].sum()
@@ -195,11 +197,11 @@ def relative_poses(first, second, seed):
     first, second = (
         np.ascontiguousarray(ideal, dtype=float).tobytes() for ideal in (first, second)
     )
-    return list(_remembered(first, second, seed))
+    return list(_cached_poses(first, second, seed))
 
 
 @lru_cache(maxsize=256)
-def _remembered(first, second, seed):
+def _cached_poses(first, second, seed):
     """`relative_poses` of arrays as bytes, which a cache can use as a key."""
     first, second = (np.frombuffer(item).reshape(-1, 2) for item in (first, second))
     n, rng = len(first), np.random.default_rng(seed)
@@ -214,12 +216,12 @@ def _remembered(first, second, seed):
     for best in np.argsort(errors)[:TRIED]:
         if pairs and errors[best] > WORSE * max(pairs[0].error, FLOOR):
             break
-        pose = _decomposed(matrices[best], f1, f2)
-        if pose is None or any(_alike(pose, pose_before) for pose_before in rough):
+        pose = _decompose(matrices[best], f1, f2)
+        if pose is None or any(_are_alike(pose, pose_before) for pose_before in rough):
             continue
         rough.append(pose)
         pair = _pair(pose, f1, f2)
-        if not any(_alike((pair.rotation, pair.base), (o.rotation, o.base)) for o in pairs):
+        if not any(_are_alike((pair.rotation, pair.base), (o.rotation, o.base)) for o in pairs):
             pairs.append(pair)
     pairs.sort(key=lambda pair: pair.error)
     return [item for item in pairs if item.error <= RIVAL * max(pairs[0].error, FLOOR)]
@@ -291,7 +293,7 @@ def _misfit(errors):
     return np.exp(np.mean(np.log(others**2 + FLOOR**2), axis=1) / 2)
 
 
-def _decomposed(matrix, f1, f2):
+def _decompose(matrix, f1, f2):
     """Rotation and base of a matrix, or None if most points lie behind the cameras."""
     u, _, v = np.linalg.svd(matrix.T)
     w = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
@@ -301,7 +303,7 @@ def _decomposed(matrix, f1, f2):
         rotation = (u @ middle @ v).T
         rotation = rotation * np.sign(np.linalg.det(rotation))
         for base in (u[:, 2], -u[:, 2]):
-            share = float(np.mean(_in_front(rotation, base, f1, f2)))
+            share = float(np.mean(_is_in_front(rotation, base, f1, f2)))
             if share > most:
                 best, most = (rotation, base), share
     return best
@@ -314,7 +316,7 @@ def _pair(pose, f1, f2):
     return Pair(rotation, base, error, float(np.median(np.arccos(np.clip(cosine, -1, 1)))))
 
 
-def _in_front(rotation, base, f1, f2):
+def _is_in_front(rotation, base, f1, f2):
     """Mask (n,) of points where both rays intersect in front of the cameras."""
     second_rays = f2 @ rotation
     cosine = np.sum(f1 * second_rays, axis=1)
@@ -369,7 +371,7 @@ def _linearise(rotation, base, f1, f2):
     return np.sum(plane * second_rays, axis=1) / length, a / length[:, None]
 
 
-def _alike(first, second):
+def _are_alike(first, second):
     """Whether two poses (rotation, base) are equal within SAME_RAD."""
     cosine = (np.trace(first[0] @ second[0].T) - 1) / 2
     return np.arccos(np.clip(cosine, -1, 1)) < SAME_RAD and first[1] @ second[1] > np.cos(

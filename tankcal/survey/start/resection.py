@@ -91,13 +91,13 @@ def find_poses(xyz_m, ideal, rng, count=TRIPLES):
     poses = []
     for best in order[np.isfinite(errors[order])]:
         pose = refine_pose(xyz_m, ideal, Pose(centres[best], rotations[best], float(errors[best])))
-        if not any(_alike(pose, pose_before, xyz_m) for pose_before in poses):
+        if not any(_are_alike(pose, pose_before, xyz_m) for pose_before in poses):
             poses.append(pose)
     poses.sort(key=lambda pose: pose.error)
     return [item for item in poses if item.error <= RIVAL * poses[0].error + NOISE]
 
 
-def _alike(first, second, xyz_m):
+def _are_alike(first, second, xyz_m):
     """Whether two poses have the same position, relative to the distance of the points."""
     away = np.median(np.linalg.norm(xyz_m - second.xyz_m, axis=1))
     return np.linalg.norm(first.xyz_m - second.xyz_m) < SAME * away

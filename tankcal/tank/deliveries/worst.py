@@ -173,7 +173,7 @@ def _size_of(delivery, is_relative):
 
 
 @dataclass(frozen=True)
-class _Prepared:
+class _SearchRows:
     """Rows for use, the first row of each piece between critical zones, and their blocks."""
 
     rows: Rows
@@ -187,10 +187,10 @@ class _Prepared:
 
 
 def _prepare(table):
-    """Return the `_Prepared` of a table, which does not depend on the minimum height."""
+    """Return the `_SearchRows` of a table, which does not depend on the minimum height."""
     rows, pieces = _rows_for_use(table)
     levels = levels_of(rows, pieces) if len(rows.height_m) else []
-    return _Prepared(rows, pieces, levels, table.probability)
+    return _SearchRows(rows, pieces, levels, table.probability)
 
 
 def _find_worst(prepared, minimum_m, is_relative):
