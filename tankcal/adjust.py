@@ -317,7 +317,7 @@ def gauss_newton(step_at, state, *, move, is_small, most_steps, is_better=None, 
 
 
 @dataclass(frozen=True)
-class Snooped:
+class SnoopingResult:
     """Result of data snooping among k candidates.
 
     Attributes
@@ -370,7 +370,7 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
 
     Returns
     -------
-    Snooped
+    SnoopingResult
 
     Raises
     ------
@@ -432,7 +432,7 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
             )
             return_counts[readmitted] += 1
         if not (rejected.any() or readmitted.any()):
-            return Snooped(adjustment, statistic, needed, round_number)
+            return SnoopingResult(adjustment, statistic, needed, round_number)
         try:
             adjustment, only_worst = readjust(adjustment, rejected, readmitted), False
         except SolutionError:

@@ -267,7 +267,7 @@ def _test_by_field(
 
     Returns
     -------
-    tested : Tested
+    tested : ReadingTests
         Results for the points of the band.
     stands : ndarray of bool
         Points of the band in columns that are unlikely for a wall.

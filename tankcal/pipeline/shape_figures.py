@@ -187,7 +187,7 @@ class ShapeBase:
         rows = scipy.sparse.csr_array(rows)
         value = rows @ self._value_m
         value += rows[:, self._count :] @ self._origins()
-        unseen = self._found.unseen_of(rows)
+        unseen = self._found.undetermined_variances(rows)
         kinds = np.array([component.kind for component in COMPONENTS])
         variances = [unseen[kinds == kind].sum(axis=0) for kind in KINDS]
         parts = [Source("", np.sqrt(np.maximum(variance, 0.0))[:, None]) for variance in variances]

@@ -28,7 +28,7 @@ from tankcal.pipeline.wall_readings import (
 )
 from tankcal.pipeline.wall_straps import AreaTerm
 from tankcal.survey.great_circles import KINDS
-from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
+from tankcal.survey.strapping import ReducedStrap, reduce_straps, tapes_used
 from tankcal.tank.ellipsoids import Ellipsoid
 from tankcal.tank.factors import Factor
 from tankcal.tank.surveyed_form import SurveyedForm, node_levels
@@ -46,7 +46,7 @@ class StrappedSphere:
 
     Attributes
     ----------
-    reduced : tuple of Reduced
+    reduced : tuple of ReducedStrap
         All readings, in the order of the file.
     adjusted : ndarray of int, shape (k,)
         Indices of the adjusted readings; the other readings are checks.
@@ -64,7 +64,7 @@ class StrappedSphere:
         Tapes used, and the standard uncertainties of their scale from a master.
     """
 
-    reduced: tuple[Reduced, ...]
+    reduced: tuple[ReducedStrap, ...]
     adjusted: np.ndarray
     azimuth_rad: np.ndarray
     readings: tuple[WallReading, ...]

@@ -155,7 +155,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     if has_loose_poses(job) and not is_known:
         # Free set-ups absorb waves as numerous as themselves, so that the readings show too little
         # of the common form: its prior median is the lower bound.
-        amplitudes = amplitudes.with_least("common ovality")
+        amplitudes = amplitudes.raise_to_median("common ovality")
     if amplitudes.noise != 1.0:  # avoid a copy of up to half a gigabyte
         covariance = covariance * amplitudes.noise
         noise *= amplitudes.noise

@@ -10,11 +10,15 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.survey.datum import make_frame
 from tankcal.survey.depth import adjust_in_depth
-from tankcal.survey.diagnosis.blunders import gross_readings, search_blunders, swapped_at_start
+from tankcal.survey.diagnosis.blunders import find_swapped_control, gross_readings, search_blunders
 from tankcal.survey.diagnosis.checks import check_points, check_readings, find_disagreeing_checks
 from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnose
 from tankcal.survey.diagnosis.double_names import names_alike, same_place
-from tankcal.survey.diagnosis.fixed_datum_check import strained, wrong_control, wrongly_held
+from tankcal.survey.diagnosis.fixed_datum_check import (
+    find_strained_control,
+    wrong_control,
+    wrongly_held,
+)
 from tankcal.survey.diagnosis.misread_files import likely_mistake, photos_that_do_not_fit
 from tankcal.survey.diagnosis.outlier_attribution import (
     SOME,
@@ -26,11 +30,11 @@ from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
 from tankcal.survey.network.adjustment import find_hardly_determined
 from tankcal.survey.network.reactions import reactions
 from tankcal.survey.network.survey import IMAGES
-from tankcal.survey.network_of_survey import gather, held_trace, named_in
+from tankcal.survey.network_of_survey import find_point_row, gather, held_trace
 from tankcal.survey.results import Adjustment, Readings, causes_of
 from tankcal.survey.rows import gone_with_their_points, readings_of
 from tankcal.survey.start.unstarted import SeveralPlacesError
-from tankcal.survey.start_values import add_start_values, mirrored_targets, started_like
+from tankcal.survey.start_values import add_start_values, mirrored_targets, start_like
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are suspected
 SEVERAL = 0.05  # share of rejected values above which whole files are suspected
@@ -100,7 +104,7 @@ def _adjust(measurements, progress, snooping=None, most=100, like=None):
 
     Returns
     -------
-    tuple of (Searched, Gathered, Frame)
+    tuple of (SearchResult, GatheredSurvey, Frame)
     """
     gathered = gather(measurements)
     if not gathered.survey.points:
@@ -113,11 +117,11 @@ def _adjust(measurements, progress, snooping=None, most=100, like=None):
             count=len(gathered.survey.points),
         )
     )
-    survey = None if like is None else started_like(like, gathered, measurements)
+    survey = None if like is None else start_like(like, gathered, measurements)
     survey = survey or add_start_values(gathered, measurements)
     # Exchanged names show at the start values, where the residuals are still large; the adjustment
     # would spread them over all points.
-    swapped = swapped_at_start(survey, gathered.known)
+    swapped = find_swapped_control(survey, gathered.known)
     if swapped:
         raise SolutionError("\n".join(map(str, swapped)))
     frame = make_frame(survey, gathered, measurements.settings)
@@ -129,7 +133,7 @@ def _adjust(measurements, progress, snooping=None, most=100, like=None):
 
 
 def _adjust_trial(measurements, snooping=False, like=None):
-    """Adjust trial measurements; return network.Adjusted and Gathered."""
+    """Adjust trial measurements; return network.Adjusted and GatheredSurvey."""
     search, gathered, _ = _adjust(measurements, lambda text: None, snooping, TRIED, like)
     return search.adjusted, gathered
 
@@ -233,7 +237,7 @@ def _kept_reading_problem(one, survey):
 
 def _lost_point_problem(measurements, name, why):
     """Problem of a point that the search for blunders left with too few readings."""
-    file, row = named_in(measurements, name)
+    file, row = find_point_row(measurements, name)
     text = message("left_after_search", "{why} left after the search for blunders", why=why)
     return Problem(file, text, row)
 
@@ -256,7 +260,7 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
     gone = count_set_aside(adjusted.survey)
     one_sided = find_one_sided_losses(readings, gathered.known)
     if not (one_sided or adjusted.sigma0 > SUSPICIOUS or gone > SOME * len(readings)):
-        return strained(readings, gathered.known)
+        return find_strained_control(readings, gathered.known)
     # Trials start from this solution, which is close to theirs.
     close, sigma0 = partial(_adjust_trial, like=adjusted), adjusted.sigma0
     # The search for blunders lowers sigma0. The test needs sigma0 of all readings, so it adjusts
@@ -288,7 +292,7 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
             left=left,
         )
         raise SolutionError("\n".join(map(str, [text, *problems])))
-    return problems + (strained(readings, gathered.known) if not control else [])
+    return problems + (find_strained_control(readings, gathered.known) if not control else [])
 
 
 def _sort_readings(readings):

@@ -57,7 +57,7 @@ def make_frame(survey, gathered, settings):
     Parameters
     ----------
     survey : network.Survey
-    gathered : Gathered
+    gathered : GatheredSurvey
     settings : AdjustmentSettings
 
     Returns

@@ -28,8 +28,8 @@ def adjust_in_depth(measurements, adjust, progress):
     ----------
     measurements : Measurements
     adjust : callable
-        adjust(measurements, like) returns (Searched, ...); like is a similar network.Adjusted or
-        None.
+        adjust(measurements, like) returns (SearchResult, ...); like is a similar network.Adjusted
+        or None.
     progress : callable
         progress(text) is called before each round.
 

@@ -130,7 +130,7 @@ def _take_network_poses(hits, poses, adjustment):
     return Poses(poses.keys, xyz, zero, poses.instruments, scale, offset, covariance, tuple(ties))
 
 
-def settled(poses, change):
+def settle_poses(poses, change):
     """Return the poses with the positions that the wall determined.
 
     Parameters

@@ -177,7 +177,7 @@ class Lean:
     sd: float
 
 
-def courses_told(seen, strapped, read):
+def courses_with_radius(seen, strapped, read):
     """Set of the courses with a known radius: from points, a tape, or by transfer along lines.
 
     A line transfers the radius of one of its courses to all its other courses.
@@ -193,9 +193,9 @@ def courses_told(seen, strapped, read):
 
     Examples
     --------
-    >>> sorted(courses_told({1}, {4}, {1, 2, 3}))
+    >>> sorted(courses_with_radius({1}, {4}, {1, 2, 3}))
     [1, 2, 3, 4]
-    >>> sorted(courses_told({1}, set(), {2, 3}))
+    >>> sorted(courses_with_radius({1}, set(), {2, 3}))
     [1]
     """
     with_radius = set(seen) | set(strapped)

@@ -33,10 +33,10 @@ def plan_fit(points, source, target):
     misfit : float
         Largest distance between corresponding places.
     """
-    return _plan_fit(points, source, target, -1.0 if turned_over(source, target) else 1.0)
+    return _plan_fit(points, source, target, -1.0 if is_turned_over(source, target) else 1.0)
 
 
-def turned_over(source, target):
+def is_turned_over(source, target):
     """Whether a reflection in plan maps points (k, 3) onto others far better than a rotation."""
     if len(source) < 3:
         return False
@@ -74,7 +74,7 @@ def add_start_values(gathered, measurements):
 
     Parameters
     ----------
-    gathered : Gathered
+    gathered : GatheredSurvey
     measurements : Measurements
 
     Returns
@@ -103,13 +103,13 @@ def add_start_values(gathered, measurements):
     raise failure
 
 
-def started_like(adjusted, gathered, measurements):
+def start_like(adjusted, gathered, measurements):
     """Start a survey from an adjusted survey of the same points and photos.
 
     Parameters
     ----------
     adjusted : network.Adjusted
-    gathered : Gathered
+    gathered : GatheredSurvey
     measurements : Measurements
 
     Returns
@@ -202,7 +202,7 @@ def mirrored_targets(xyz_m, points, measurements):
     if nominal is None:
         return []
     common = np.isfinite(nominal).all(axis=1) & np.isfinite(xyz_m).all(axis=1)
-    if not turned_over(nominal[common], xyz_m[common]):
+    if not is_turned_over(nominal[common], xyz_m[common]):
         return []
     text = message(
         "mirrored_generatrices",
@@ -237,7 +237,7 @@ def finish_start_values(survey, gathered, measurements):
     Parameters
     ----------
     survey : network.Survey
-    gathered : Gathered
+    gathered : GatheredSurvey
     measurements : Measurements
 
     Returns

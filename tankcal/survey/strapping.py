@@ -217,7 +217,7 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class Reduced:
+class ReducedStrap:
     """A reading reduced to the circumference of the shell.
 
     Attributes
@@ -260,7 +260,7 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
 
     Returns
     -------
-    Reduced
+    ReducedStrap
     """
     observed_m = strap.reading_m
     # The corrections act on the length in turn, in the order of the heading.
@@ -307,7 +307,7 @@ def reduce_strap(strap, tape, obstructions, shell_temperature_c, strapping, diam
     # Each pull is laid anew, so the variances of laying add.
     variance = strap.sd_m**2 + strap.pulls * tape.laying_m**2
     variance += sum((item.count * item.sd_m) ** 2 for item in obstructions)
-    return Reduced(
+    return ReducedStrap(
         strap,
         observed_m + sum(steps.values()),
         steps,

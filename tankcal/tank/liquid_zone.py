@@ -15,7 +15,7 @@ from tankcal.uncertainty import Source
 class MeasuredBottom(Part):
     """Lowest zone of a tank, measured with liquid; it replaces all parts in that zone.
 
-    All other parts count only above `highest_m` (`Above`). The measured volumes already contain
+    All other parts count only above `highest_m` (`PartAbove`). The measured volumes already contain
     shell, deadwood and head of that zone, and their uncertainty replaces that of these parts.
 
     levels_m    (n,) ascending
@@ -171,7 +171,7 @@ def measured_bottom(levels_m, volumes_m3, u_m3=None):
 
 
 @dataclass(frozen=True)
-class Above(Part):
+class PartAbove(Part):
     """Another part of the tank above a level: P(L) - P(level) for L above the level, else 0.
 
     Its derivatives and sources are reduced likewise, so that errors of the replaced zone cancel.

@@ -67,7 +67,7 @@ class Amplitudes:
         """Degrees of freedom of the noise factor; inf if the covariance is known."""
         return 2 / self.noise_log_sd**2 if self.noise_log_sd else np.inf
 
-    def with_bulges(self, scale):
+    def scale_bulges(self, scale):
         """Return amplitudes with those of bulges and tapers multiplied by a scale."""
         return replace(self, likely_m2=np.where(BULGES, scale**2, 1.0) * self.likely_m2)
 
@@ -90,7 +90,7 @@ class Amplitudes:
         """
         return self.likely_m2 * np.exp(np.diag(self.log_covariance) / 2)
 
-    def with_least(self, name):
+    def raise_to_median(self, name):
         """Return amplitudes with a named component at least as large as its prior median."""
         index = [component.name for component in COMPONENTS].index(name)
         likely_m2 = self.likely_m2.copy()

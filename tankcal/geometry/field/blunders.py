@@ -45,7 +45,7 @@ NOTHING_LEFT = 1e-9  # relative to the largest eigenvalue of P_SS: smaller ones 
 
 
 @dataclass(frozen=True)
-class Tested:
+class ReadingTests:
     """Accepted and rejected readings, and their departures from the prediction.
 
     Attributes
@@ -68,10 +68,10 @@ class Tested:
     sizes_m2: np.ndarray | None = None
 
 
-def nothing_tested(accepted):
-    """Return a `Tested` with zeros, to be filled."""
+def empty_tests(accepted):
+    """Return a `ReadingTests` with zeros, to be filled."""
     zero_rows = np.zeros((3, len(accepted)))
-    return Tested(accepted.copy(), *zero_rows)
+    return ReadingTests(accepted.copy(), *zero_rows)
 
 
 def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None, may_go=True):
@@ -97,13 +97,13 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None
 
     Returns
     -------
-    Tested
+    ReadingTests
     """
     barred = np.zeros(len(sites), dtype=bool) if barred is None else barred
     may_go = np.broadcast_to(may_go, len(sites))
     accepted = (accepted | ~may_go) & ~barred
     pieces = [Piece(sites, members, nominal_m) for members in _split_readings(sites)]
-    centred, results, sizes = radius_m - radius_m.mean(), nothing_tested(accepted), None
+    centred, results, sizes = radius_m - radius_m.mean(), empty_tests(accepted), None
     for _ in range(MOST_ROUNDS):
         accepted_sites = sites.take(accepted)
         accepted_readings = radius_m[accepted], variance_m2[accepted]
@@ -261,7 +261,7 @@ def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf, barred=
 
     Returns
     -------
-    Tested
+    ReadingTests
     """
 
     def tests(result):
@@ -269,20 +269,20 @@ def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf, barred=
         return result.accepted, np.where(barred, np.nan, statistic), CRITICAL
 
     def again(previous, goes, comes):
-        return against_others(precision, pull, previous.accepted & ~goes | comes)
+        return judge_by_others(precision, pull, previous.accepted & ~goes | comes)
 
-    start = against_others(precision, pull, accepted)
+    start = judge_by_others(precision, pull, accepted)
     return snoop(start, tests, again, at_once=AT_ONCE, returns=1).adjustment
 
 
-def carried_over(precision, aside):
+def eliminators(precision, aside):
     """Return P_SS^-1 and P_.S P_SS^-1 of rejected readings S, the terms that eliminate S from P."""
     inverse_block = scipy.linalg.pinvh(precision[np.ix_(aside, aside)], rtol=NOTHING_LEFT)
     return inverse_block, precision[:, aside] @ inverse_block
 
 
-def against_others(precision, pull, accepted):
-    """Return `Tested` from P and P y of the module docstring.
+def judge_by_others(precision, pull, accepted):
+    """Return `ReadingTests` from P and P y of the module docstring.
 
     Parameters
     ----------
@@ -294,12 +294,12 @@ def against_others(precision, pull, accepted):
 
     Returns
     -------
-    Tested
+    ReadingTests
     """
     rejected = np.flatnonzero(~accepted)
     departure, weight = pull.copy(), precision.diagonal().copy()
     if len(rejected):
-        inverse_block, eliminator = carried_over(precision, rejected)
+        inverse_block, eliminator = eliminators(precision, rejected)
         # Eliminate S: the accepted rows of P and P y refer to the accepted readings alone.
         departure -= eliminator @ pull[rejected]
         weight -= np.sum(eliminator * precision[:, rejected], axis=1)
@@ -309,4 +309,4 @@ def against_others(precision, pull, accepted):
         departure[rejected] *= weight[rejected]
     # departure holds e_i and weight P_ii: their quotient is the difference in metres.
     weight = np.maximum(weight, 1e-300)
-    return Tested(accepted, departure / weight, departure / np.sqrt(weight), weight**-0.5)
+    return ReadingTests(accepted, departure / weight, departure / np.sqrt(weight), weight**-0.5)

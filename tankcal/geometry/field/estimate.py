@@ -28,7 +28,7 @@ from tankcal.geometry.field.components import (
     azimuth_correlations,
     weld_columns,
 )
-from tankcal.geometry.field.covariances import Covariances, without_rounding
+from tankcal.geometry.field.covariances import Covariances, clip_to_semidefinite
 from tankcal.geometry.field.hidden_seams import hidden_covariance_m2
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.geometry.field.sites import Sites, free_design
@@ -126,7 +126,7 @@ class WallField:
         pull = sum(parts) * self._weighted_residuals[members]
         if shape == "mean":
             return pull.sum(axis=1, keepdims=True)
-        return pull @ self._covariances.at_sites(self._grid_covariances[shape], members).T
+        return pull @ self._covariances.columns_at_sites(self._grid_covariances[shape], members).T
 
     def functionals(self, gradients_m):
         """Return `Functionals` of the wall: integrals of gradients times the radius.
@@ -319,7 +319,7 @@ class Functionals:
     def _along_sites(self, to_grid):
         """Return integrals (courses, LEVELS, n) of gradients times a covariance (g, azimuths)."""
         flat = self._gradients.reshape(-1, len(to_grid)) @ to_grid  # a single matrix product
-        flat = self._field._covariances.at_sites(flat)
+        flat = self._field._covariances.columns_at_sites(flat)
         return flat.reshape(*self._totals.shape, -1)
 
     def unseen(self, index):
@@ -330,7 +330,8 @@ class Functionals:
         cross_term = self.weights @ self._across[index].T
         size = self._field.amplitudes.variances_m2[index]
         spread = size * self._field._covariances.spread(self.weights, index)
-        return without_rounding(self._prior_covariance(index) - cross_term - cross_term.T + spread)
+        prior = self._prior_covariance(index)
+        return clip_to_semidefinite(prior - cross_term - cross_term.T + spread)
 
     def hidden_seams(self):
         """Return the covariance (f, f) due to seams between the columns of points."""

@@ -67,7 +67,7 @@ class Part:
     fixed: np.ndarray
     values: np.ndarray
 
-    def inverted(self, variances):
+    def invert_covariance(self, variances):
         """Return the log determinant of the covariance B, and the upper half of its inverse."""
         if not len(self.fixed):  # radius and centres of the course use up all its readings
             return 0.0, self.fixed
@@ -288,7 +288,7 @@ class Misfit:
         half = np.linalg.cholesky(regularise(common_covariance))
         products, value, self._solved = np.zeros((len(half) + 1,) * 2), 0.0, []
         for part in likelihood.parts:
-            logarithm, inverse = part.inverted(self._variances[likelihood.own])
+            logarithm, inverse = part.invert_covariance(self._variances[likelihood.own])
             solved = _times(inverse, part.both)
             products += part.both.T @ solved
             value += logarithm

@@ -20,8 +20,8 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.amplitudes import Amplitudes, most_likely
-from tankcal.geometry.field.blunders import against_others, restricted_precision
-from tankcal.geometry.field.covariances import without_rounding
+from tankcal.geometry.field.blunders import judge_by_others, restricted_precision
+from tankcal.geometry.field.covariances import clip_to_semidefinite
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, prior_of
 
 
@@ -124,7 +124,7 @@ class SolidField:
         pull = precision @ self.distance_m
         accepted, rejected = np.ones(len(pull), dtype=bool), []
         while np.count_nonzero(accepted) > self.design.shape[1] + 1:
-            tested = against_others(precision, pull, accepted)
+            tested = judge_by_others(precision, pull, accepted)
             deep = accepted & (np.abs(tested.departure_m) > least_m)
             statistics = np.where(deep, np.abs(tested.w), 0.0)
             worst = int(np.argmax(statistics))
@@ -135,7 +135,7 @@ class SolidField:
         return np.array(rejected, dtype=int)
 
     def estimated(self, functionals, by_shape):
-        """Return `Estimated` of functionals of the wall.
+        """Return `FieldEstimate` of functionals of the wall.
 
         Parameters
         ----------
@@ -166,12 +166,12 @@ class SolidField:
             difference = (
                 size * self.places.within(departure, functionals) - cross_term - cross_term.T
             )
-            unseen.append(without_rounding(difference + weights @ part @ weights.T))
-        return Estimated(beta, total @ pull, weights, unseen)
+            unseen.append(clip_to_semidefinite(difference + weights @ part @ weights.T))
+        return FieldEstimate(beta, total @ pull, weights, unseen)
 
 
 @dataclass(frozen=True)
-class Estimated:
+class FieldEstimate:
     """Estimated functionals of a wall.
 
     Attributes

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.amplitudes import likely_variances
-from tankcal.geometry.field.blunders import NOTHING_LEFT, Piece, carried_over
+from tankcal.geometry.field.blunders import NOTHING_LEFT, Piece, eliminators
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.units import FULL_TURN
@@ -43,7 +43,7 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
         n readings.
     radius_m, variance_m2, nominal_m
         As in `blunders.find_blunders`.
-    tested : Tested
+    tested : ReadingTests
         Result of `blunders.find_blunders`.
     sure : ndarray of bool, shape (n,)
         Readings that certainly belong to the wall.
@@ -122,7 +122,7 @@ def _eliminate(precision, pull, eliminated):
     """Return P and P y after elimination of readings, whose rows are then meaningless."""
     if not len(eliminated):
         return precision, pull
-    eliminator = carried_over(precision, eliminated)[1]
+    eliminator = eliminators(precision, eliminated)[1]
     return precision - eliminator @ precision[eliminated], pull - eliminator @ pull[eliminated]
 
 

@@ -102,7 +102,7 @@ class FieldValues:
         self.weights[rows] = -scipy.linalg.cho_solve(factor, by_parameters.T, check_finite=False).T
         self.weights[rows, sites] += 1.0
 
-    def unseen_of(self, rows):
+    def undetermined_variances(self, rows):
         """Return variances of sums of the values due to the undetermined part of each component.
 
         Parameters
@@ -202,9 +202,8 @@ class FieldValues:
         correlations = azimuth_correlations(
             self._spots.azimuth_rad, self._covariances.azimuths_rad, self._field.nominal_m
         )
-        return {
-            shape: self._covariances.at_sites(columns) for shape, columns in correlations.items()
-        }
+        expand = self._covariances.columns_at_sites
+        return {shape: expand(columns) for shape, columns in correlations.items()}
 
     @cached_property
     def _peaks(self):

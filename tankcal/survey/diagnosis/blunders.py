@@ -16,14 +16,14 @@ from tankcal.survey.diagnosis.diagnoses import find_swapped_points, mirrored_fit
 from tankcal.survey.network import adjust, snoop
 from tankcal.survey.network.assembly import assemble
 from tankcal.survey.network.blocks import CORRELATED
-from tankcal.survey.network.snooping import kept_of, set_use, start_from_adjusted
+from tankcal.survey.network.snooping import kept_rows, set_use, start_from_adjusted
 from tankcal.survey.observations import Directions, Distances
 from tankcal.survey.start.photographs import sights_of
 from tankcal.survey.start.resection import bearings, intersect_rays
 
 
 @dataclass(frozen=True)
-class Searched:
+class SearchResult:
     """An adjusted survey after the search for blunders.
 
     Attributes
@@ -60,10 +60,10 @@ def search_blunders(survey, options, gross=None):
 
     Returns
     -------
-    Searched
+    SearchResult
     """
     if gross is None:
-        return Searched(adjust(survey, **options), (), 1)
+        return SearchResult(adjust(survey, **options), (), 1)
     try:
         cleaned = _search_without(survey, options, gross) if gross else snoop(survey, **options)
     except SolutionError as error:
@@ -74,7 +74,7 @@ def search_blunders(survey, options, gross=None):
             " the result",
             error=error.args[0],
         )
-        return Searched(
+        return SearchResult(
             adjusted, (), 1, (), (Problem("job.toml", text, None, "adjustment.snooping"),)
         )
     again = _readmit(cleaned, gross)
@@ -87,8 +87,8 @@ def search_blunders(survey, options, gross=None):
         # Accept the second search only if it recovers points.
         if second.adjusted.problem.aside.sum() < cleaned.adjusted.problem.aside.sum():
             rounds = cleaned.rounds + second.rounds
-            return Searched(second.adjusted, second.removed, rounds, second.needed)
-    return Searched(cleaned.adjusted, cleaned.removed, cleaned.rounds, cleaned.needed)
+            return SearchResult(second.adjusted, second.removed, rounds, second.needed)
+    return SearchResult(cleaned.adjusted, cleaned.removed, cleaned.rounds, cleaned.needed)
 
 
 def _renumber(block, gross):
@@ -113,7 +113,7 @@ def _search_without(survey, options, gross):
 
     Returns
     -------
-    network.Cleaned
+    network.CleanedSurvey
     """
     images = survey.image_points
     thin = replace(  # without traces: the scatter of repeated readings does not count here
@@ -204,11 +204,11 @@ def gross_readings(survey):
         if gross.any() and gross.mean() < MOST:
             gross_rows[source] = np.zeros(len(survey.observations[source]), dtype=bool)
             gross_rows[source][rows[gross]] = True
-            gross_rows[source] &= ~kept_of(survey.observations[source], survey.kept)
+            gross_rows[source] &= ~kept_rows(survey.observations[source], survey.kept)
     return gross_rows
 
 
-def swapped_at_start(survey, known):
+def find_swapped_control(survey, known):
     """Problem rows for fixed control points whose rays meet where x and y are exchanged.
 
     Weighted points are left to the adjustment, which can reject them.

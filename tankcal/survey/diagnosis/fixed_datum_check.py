@@ -40,7 +40,7 @@ def wrongly_held(measurements, sigma0, rejected, run):
     gone : int
         Number of values rejected by data snooping; inf likewise.
     run : callable
-        run(measurements, snooping=False) returns (network.Adjusted, Gathered).
+        run(measurements, snooping=False) returns (network.Adjusted, GatheredSurvey).
 
     Returns
     -------
@@ -223,7 +223,7 @@ def _wrong(adjusted, known, point, axis, here_m, value_m):
     return Problem("control.csv", text, known.row.get(name), f"{'xyz'[axis]}_m")
 
 
-def strained(readings, known):
+def find_strained_control(readings, known):
     """Problem rows on held coordinates that the readings contradict, all equivalent ones.
 
     A held coordinate is not suspected where a reading explains the contradiction better.

@@ -41,7 +41,7 @@ def likely_mistake(measurements, sigma0, run, failure=None):
     sigma0 : float
         Without data snooping; inf if the survey could not be adjusted.
     run : callable
-        run(measurements) returns (network.Adjusted, Gathered), without data snooping.
+        run(measurements) returns (network.Adjusted, GatheredSurvey), without data snooping.
     failure : str, optional
         Error message of the failed adjustment.
 

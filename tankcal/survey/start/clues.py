@@ -12,7 +12,7 @@ from tankcal.survey.start.photographs import Wall, grow_by_photos, wall_of
 from tankcal.survey.start.pieces import empty, joint
 from tankcal.survey.start.plan import Plan
 from tankcal.survey.start.plan_frames import find_plan_positions
-from tankcal.survey.start.polar import improved_in_plan
+from tankcal.survey.start.polar import improve_plan_positions
 from tankcal.survey.start.single_points import misfit_of_places, position_single_points
 
 AS_WELL = 1e-6  # share of the extent: misfits closer than this are equal
@@ -125,7 +125,7 @@ def _add_by_survey(clues, piece, free):
         return piece
     # Compute the new positions again from all their sights, so that blunders are outvoted.
     if np.isfinite(xyz[:, 2]).any():
-        xy = improved_in_plan(clues.plan, xyz[:, :2], xyz[:, 2], ~new[:, 0])
+        xy = improve_plan_positions(clues.plan, xyz[:, :2], xyz[:, 2], ~new[:, 0])
         first = np.where(new[:, 2], np.nan, xyz[:, 2])
         if not np.isfinite(first).any():
             # Heights without a known value start from one of the computed heights.

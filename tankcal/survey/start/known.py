@@ -10,7 +10,7 @@ from tankcal.survey.start.pieces import Piece
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownPositions:
     """Known positions as a Piece; each coordinate of a point may be known separately."""
 
     piece: Piece
@@ -24,7 +24,7 @@ class Known:
         """Omit points and photos known in another Known."""
         piece, is_known = self.piece, np.isfinite(reference.piece.xyz_m).any(axis=1)
         photos = reference.piece.oriented
-        return Known(
+        return KnownPositions(
             replace(
                 piece,
                 xyz_m=np.where(is_known[:, None], np.nan, piece.xyz_m),
@@ -37,7 +37,8 @@ class Known:
     def shifted(self, shift_m):
         """Shift the frame."""
         piece = self.piece
-        return Known(replace(piece, xyz_m=piece.xyz_m + shift_m, place_m=piece.place_m + shift_m))
+        xyz_m, place_m = piece.xyz_m + shift_m, piece.place_m + shift_m
+        return KnownPositions(replace(piece, xyz_m=xyz_m, place_m=place_m))
 
 
 def certain_places(survey):
@@ -51,7 +52,7 @@ def certain_places(survey):
             xyz[item.point[accepted], item.axis[accepted]] = item.value[accepted]
     photos = survey.photos
     if photos is None:
-        return Known(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
+        return KnownPositions(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
     place, angles, rotation = _photos_observed(survey)
     if photos.fixed is not None:
         place = np.where(photos.fixed[:, :3], photos.xyz_m, place)
@@ -59,7 +60,7 @@ def certain_places(survey):
     has_angles = np.isfinite(angles).all(axis=1) & np.isnan(rotation).any(axis=(1, 2))
     if has_angles.any():
         rotation[has_angles] = rotation_of_angles(*angles[has_angles].T)
-    return Known(_piece(xyz, place, rotation))
+    return KnownPositions(_piece(xyz, place, rotation))
 
 
 def _photos_observed(survey):
@@ -78,8 +79,8 @@ def hinted_places(survey):
     """All given start values, whatever their quality, of points with measurements."""
     photos, xyz = survey.photos, np.where(_measured_points(survey)[:, None], survey.xyz_m, np.nan)
     if photos is None:
-        return Known(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
-    return Known(_piece(xyz, photos.xyz_m, photos.rotation))
+        return KnownPositions(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
+    return KnownPositions(_piece(xyz, photos.xyz_m, photos.rotation))
 
 
 def _measured_points(survey):

@@ -84,7 +84,7 @@ def _wrap_angles(angle):
     return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
-def improved_in_plan(plan, xy_m, z_m, held, north=True):
+def improve_plan_positions(plan, xy_m, z_m, held, north=True):
     """Recompute each position in plan from the others, so that blunders are outvoted.
 
     Parameters

@@ -128,7 +128,7 @@ def judge_deviation(limit, table, stated, printed=None):
     limit : DeviationLimit
     table : Capacity
     stated : StatedVolume
-    printed : Printed, optional
+    printed : PrintedU, optional
         Printed uncertainties; None: those of the table.
 
     Returns

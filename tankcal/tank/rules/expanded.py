@@ -77,7 +77,7 @@ def judge_uncertainty(limit, table, lowest_m=None, printed=None):
     lowest_m : float, optional
         Dip at the start of the calibrated zone; only rows from there on, and deliveries between
         them, are judged. None: all.
-    printed : Printed, optional
+    printed : PrintedU, optional
         Printed uncertainties; None: those of the table. The search for deliveries uses the U of the
         table; the worst delivery and all simulated deliveries have their printed U.
 

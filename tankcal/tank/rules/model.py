@@ -1,6 +1,6 @@
 """Data model of a decision rule: limits of the expanded uncertainty, limits of a deviation.
 
-`Printed` holds printed expanded uncertainties, where they differ from those of the table.
+`PrintedU` holds printed expanded uncertainties, where they differ from those of the table.
 """
 
 from dataclasses import dataclass, field
@@ -166,7 +166,7 @@ class Rule:
 
 
 @dataclass(frozen=True)
-class Printed:
+class PrintedU:
     """U of rows and deliveries as printed in reports: Monte Carlo where the GUM does not apply.
 
     Attributes
@@ -217,5 +217,5 @@ class Printed:
 
 
 def printed_of_table(table):
-    """Return the `Printed` with the uncertainties of the table."""
-    return Printed(table.U_m3)
+    """Return the `PrintedU` with the uncertainties of the table."""
+    return PrintedU(table.U_m3)

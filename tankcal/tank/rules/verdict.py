@@ -57,7 +57,7 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
         Dip at the start of the calibrated zone, see `judge_uncertainty`.
     stated : sequence of StatedVolume, optional
         Stated volumes for the deviations.
-    printed : Printed, optional
+    printed : PrintedU, optional
         Printed uncertainties, such as Monte Carlo's; None: those of the table.
 
     Returns
