@@ -48,7 +48,7 @@ class ShellVolume:
     @property
     def joint_steps_m2(self):
         """Area just below each joint less the area just above it, shape (courses - 1,)."""
-        polynomials = self._by_height(self.features)
+        polynomials = self._course_polynomials(self.features)
         return np.array([below.sum() - above[0] for below, above in pairwise(polynomials)])
 
     @property
@@ -187,7 +187,7 @@ class ShellVolume:
         radii = [np.sqrt(course.areas_m2 / np.pi) for course in self.courses]
         return np.array([-1.5 * 2.5 * np.sum(weights * parabola * radius) for radius in radii])
 
-    def _by_height(self, features):
+    def _course_polynomials(self, features):
         """Return, for each course, coefficients of sum l_i(t) features_i by powers of t."""
         return [
             _height_polynomials() @ features[start : start + LEVELS]
@@ -206,7 +206,7 @@ class ShellVolume:
         else:
             place = np.searchsorted(self.joints_m, heights, side="right")
             rows = [place == index for index in range(len(self.courses))]
-        return zip(self.courses, rows, self._by_height(features), strict=True)
+        return zip(self.courses, rows, self._course_polynomials(features), strict=True)
 
     def _inside(self, heights_m):
         """Return heights (rows,) as an array; raise HeightError outside the shell."""

@@ -38,7 +38,6 @@ WIDE_RAD = 0.7  # parallax beyond which a pair gains nothing
 NARROW_RAD = 0.02  # parallax below which a pair determines no depth
 HYPOTHESES = 6  # hypotheses decided by a third photo
 BAD_PAIR = 0.01  # error, rad, above which two photos do not show the same points
-RIVAL_PIECE = 2.0  # misfit ratio of the third photo below which another pose is equivalent
 
 _CUBES = list(combinations_with_replacement(range(3), 3))
 _SQUARES = list(combinations_with_replacement(range(3), 2))
