@@ -25,7 +25,7 @@ FILES = (LOCK, JOURNAL, JOBS, *SUMMARY)
 
 
 @contextmanager
-def opened_folder(out):
+def open_folder(out):
     """Lock the folder of a batch for this process, create it if missing, and yield its `Journal`.
 
     Raises
@@ -90,7 +90,7 @@ class Journal:
         finally:
             os.close(file)
 
-    def deaths(self, job):
+    def count_deaths(self, job):
         """Return how many times this batch started a job without ending it."""
         begun = ended = 0
         for line in self._lines():

@@ -46,8 +46,8 @@ class TopOfTank:
     def __init__(self, job):
         self.job, self._wall = job, None
 
-    def of(self, adjustment):
-        """Return the TopVolume from a survey.Adjustment.
+    def compute_volume(self, adjustment):
+        """Compute the TopVolume from a survey.Adjustment.
 
         The first call selects the points of the wall for all calls. Raises SolutionError or
         InputError if the capacity cannot be computed.
@@ -58,12 +58,14 @@ class TopOfTank:
             points = accepted.job.points.names
             if accepted.accepted is not None:
                 self._wall = frozenset(points[i] for i in accepted.accepted)
-        return _top_volume(self._run(adjustment))
+        return _read_top_volume(self._run(adjustment))
 
     def _run(self, adjustment):
+        """Compute the table of the job, which needs only its top row, from an adjustment."""
         job = self.job
         points = wall_points(adjustment, job.measurements, job.survey.side)
         points, snooping = s_transform(points), job.snooping
+        # The selected points are not tested again: they are common to all runs.
         if self._wall is not None:
             points, snooping = _select_points(points, self._wall), False
         table = replace(
@@ -74,7 +76,8 @@ class TopOfTank:
         return run(job, simulated=False)
 
 
-def _top_volume(result):
+def _read_top_volume(result):
+    """TopVolume of the result of a run."""
     height_m = float(result.table.height_m[-1])
     top, accepted = result.at(height_m), result.accepted
     points = None if accepted is None else len(accepted)

@@ -1,7 +1,7 @@
 """Distortion curves of a camera as functions of the radius in the image, with standard deviations.
 
 The radial curve is the measured radius less the radius corrected by the radial terms alone. This
-definition is the same in every convention. The decentring profile is
+definition holds in every convention. The decentring profile is
 sqrt(P1^2 + P2^2) r^2 (1 + P3 r^2 + P4 r^4). On the circle of radius r the largest shift is three
 times the profile in the radial direction, and once the profile in the tangential direction.
 

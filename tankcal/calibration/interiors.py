@@ -42,7 +42,7 @@ class Interior:
         Whether the format was declared.
     format_mm : ndarray, shape (2,), or None
         Width and height of the image, mm.
-    shared : bool
+    is_shared : bool
         Whether other sets share some of the parameters. Dropping a parameter then changes more
         than this set.
     """
@@ -58,10 +58,10 @@ class Interior:
     frame: Frame
     frame_known: bool
     format_mm: np.ndarray | None = None
-    shared: bool = False
+    is_shared: bool = False
 
 
-def interiors_of(adjustment, measurements=None):
+def collect_interiors(adjustment, measurements=None):
     """Return the interior orientations of an adjustment, with covariances scaled as in it.
 
     Parameters
@@ -83,32 +83,51 @@ def interiors_of(adjustment, measurements=None):
     for photo, places in enumerate(adjusted.problem.interior_of.tolist()):
         sets.setdefault((int(survey.photos.camera[photo]), tuple(places)), []).append(photo)
     setups = {setup.camera.name: setup for setup in getattr(measurements, "cameras", ())}
+    cameras_of_sets = [camera for camera, _ in sets]
     return tuple(
         _make_interior(
-            adjustment, setups, camera, photos, _has_several_sets(sets, camera), len(sets) > 1
+            adjustment, setups, camera, photos, cameras_of_sets.count(camera) > 1, len(sets) > 1
         )
         for (camera, _), photos in sets.items()
     )
 
 
-def _has_several_sets(sets, camera):
-    return sum(camera_of_set == camera for camera_of_set, _ in sets) > 1
+def _make_interior(adjustment, setups, number, photos, is_part, has_others):
+    """Create an Interior.
 
+    Parameters
+    ----------
+    adjustment : survey.Adjustment
+        The adjusted survey.
+    setups : dict
+        {name: job.CameraSetup}.
+    number : int
+        Number of the camera in the survey.
+    photos : list of int
+        Numbers of the photos of the set.
+    is_part : bool
+        Whether the camera has other sets.
+    has_others : bool
+        Whether the adjustment has other sets.
 
-def _make_interior(adjustment, setups, number, photos, part, others):
+    Returns
+    -------
+    Interior
+    """
     adjusted = adjustment.adjusted
     camera = adjusted.survey.cameras[number]
     values, free, cofactors = adjusted.camera(photos[0])
     setup = setups.get(camera.name)
     size = _pair_of_setup(setup, "format_mm")
-    common = others and any(scope == "block" for scope in camera.scope)
+    is_common = has_others and any(scope == "block" for scope in camera.scope)
+    # Without a declared format, the frame extends to the farthest image points.
     images = adjusted.survey.image_points
     is_used = np.isin(images.photo, photos) & images.in_use
     measured = images.value[is_used]
     half = np.abs(measured).max(axis=0, initial=0.0) if size is None else np.asarray(size) / 2
     return Interior(
         camera=camera.name,
-        photos=tuple(adjusted.survey.photos.names[i] for i in photos) if part else None,
+        photos=tuple(adjusted.survey.photos.names[i] for i in photos) if is_part else None,
         form=camera.form,
         values=np.array([values[name] for name in PARAMETERS]),
         scope=tuple(camera.scope),
@@ -120,7 +139,7 @@ def _make_interior(adjustment, setups, number, photos, part, others):
         ),
         frame_known=size is not None,
         format_mm=size,
-        shared=part or common,
+        is_shared=is_part or is_common,
     )
 
 
@@ -130,7 +149,7 @@ def _pair_of_setup(setup, name):
     return None if values is None else np.array(values, dtype=float)
 
 
-def sets_to_be(measurements, camera=None, photo=None):
+def count_sets(measurements, camera=None, photo=None):
     """Predict the number of sets of interior parameters of an adjustment.
 
     Parameters
@@ -158,7 +177,7 @@ def sets_to_be(measurements, camera=None, photo=None):
     return len(separate) + len({item.camera for item in photos} - with_photo_scope)
 
 
-def photos_in(record):
+def read_photos(record):
     """Return {photo: camera} of a record (dict); raise InputError if the list is missing."""
     try:
         return {photo["photo"]: photo["camera"] for photo in record["adjustment"]["photos"]}
@@ -172,9 +191,14 @@ def photos_in(record):
 
 
 def refuse_unknown(photos, camera=None, photo=None):
-    """Raise InputError for the name of a camera or photo that is not in `photos`.
+    """Raise InputError for an unknown name of a camera or photo.
 
-    `photos` is {photo: camera}.
+    Parameters
+    ----------
+    photos : dict
+        {photo: camera}.
+    camera, photo : str, optional
+        Names to check.
     """
     cameras = list(dict.fromkeys(photos.values()))
     if camera is not None and camera not in cameras:
@@ -228,7 +252,7 @@ def select_interiors(interiors, photos, camera=None, photo=None):
     )
 
 
-def framed_in(record, pixel_mm=None):
+def read_framed_cameras(record, pixel_mm=None):
     """Return the cameras of a record and their covariances.
 
     Parameters
@@ -252,7 +276,7 @@ def framed_in(record, pixel_mm=None):
         If the format of a camera is missing.
     """
     cameras, covariances, problems = [], [], []
-    for interior in interiors_in(record):
+    for interior in read_interiors(record):
         if interior.format_mm is None:
             problems.append(
                 _problem(
@@ -289,7 +313,7 @@ def _embed_covariance(names, covariance):
     return matrix
 
 
-def interiors_in(record):
+def read_interiors(record):
     """Return the Interior objects of a record (dict); raise InputError for an invalid record."""
     adjustment = record.get("adjustment") if isinstance(record, dict) else None
     if not isinstance(adjustment, dict):
@@ -384,7 +408,7 @@ def _read_interior(entry, cameras):
     values = np.array([value_of.get(name, 0.0) for name in PARAMETERS], dtype=float)
     half = np.array(entry["edge_mm"], dtype=float).reshape(2)
     _refuse_impossible(values, covariance, half)
-    common = len(cameras) > 1 and "block" in scope.values()
+    is_common = len(cameras) > 1 and "block" in scope.values()
     return Interior(
         camera=str(entry["camera"]),
         photos=None if entry["photos"] is None else tuple(entry["photos"]),
@@ -399,7 +423,7 @@ def _read_interior(entry, cameras):
         ),
         frame_known=bool(entry["edge_known"]),
         format_mm=_positive_pair(entry.get("format_mm")),
-        shared=entry["photos"] is not None or common,
+        is_shared=entry["photos"] is not None or is_common,
     )
 
 

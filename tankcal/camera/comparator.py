@@ -27,7 +27,7 @@ from tankcal.messages import message
 KINDS = {"affine": 3, "similarity": 2}  # least number of marks
 GROSS = 0.002  # residual of a mark, relative to the extent; larger than any film shrinkage
 SHEAR = 0.01  # largest ratio of the scales of an affine transformation, minus 1
-ONE_LINE = 0.01  # ratio of width to length below which the marks lie on a line
+LINE_RATIO = 0.01  # ratio of width to length below which the marks lie on a line
 SCALES = (0.8, 1.25)  # limits of the scale: a comparator measures the photo itself, in mm
 
 
@@ -53,13 +53,13 @@ class Repeats:
     mean: np.ndarray
     sd: np.ndarray
 
-    def beyond(self, limit):
+    def exceeds(self, limit):
         """True (n,) where the standard deviation of x or y exceeds a limit; None: no limit."""
         with np.errstate(invalid="ignore"):
             return (self.sd > (np.inf if limit is None else limit)).any(axis=1)
 
 
-def repeats(names, values):
+def group_readings(names, values):
     """Group repeated readings by name.
 
     Parameters
@@ -76,7 +76,7 @@ def repeats(names, values):
 
     Examples
     --------
-    >>> readings = repeats(["A", "B", "A"], [[0, 0], [5, 5], [0.002, 0]])
+    >>> readings = group_readings(["A", "B", "A"], [[0, 0], [5, 5], [0.002, 0]])
     >>> readings.count, readings.mean[:, 0].tolist()
     (array([2, 1]), [0.001, 5.0])
     """
@@ -156,17 +156,17 @@ class Transformation:
         """Largest and smallest scale (2,) over all directions."""
         return np.linalg.svd(self.matrix, compute_uv=False)
 
-    def of(self, xy_mm):
+    def transform(self, xy_mm):
         """Photo coordinates (n, 2) of readings (n, 2)."""
         return (np.asarray(xy_mm) - self.centre_mm) @ self.matrix.T + (
             self.matrix @ self.centre_mm + self.shift_mm
         )
 
-    def turned(self, sd_mm):
+    def propagate_sds(self, sd_mm):
         """Standard deviations (n, 2) in the photo system, from those along the comparator axes."""
         return np.sqrt(np.asarray(sd_mm) ** 2 @ (self.matrix**2).T)
 
-    def added_covariance(self, xy_mm):
+    def parameter_covariance(self, xy_mm):
         """Covariance (n, 2, 2), mm2, of points read at (n, 2) caused by the parameters."""
         # J C J', the part that is common to all points of the photo.
         rows = _design_rows(np.asarray(xy_mm, dtype=float) - self.centre_mm).reshape(-1, 2, 6)
@@ -174,7 +174,7 @@ class Transformation:
 
 
 _NAMES = ("a1", "a2", "a3", "a4", "a5", "a6")
-_SIX = {  # derivatives of a1, a2, x', a4, a5, y' by the parameters of each kind
+_TO_AFFINE = {  # derivatives of a1, a2, x', a4, a5, y' by the parameters of each kind
     "affine": np.eye(6),
     "similarity": np.array(
         [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]],
@@ -183,7 +183,7 @@ _SIX = {  # derivatives of a1, a2, x', a4, a5, y' by the parameters of each kind
 }
 
 
-def transformation(readings_mm, marks_mm, sd_mm, kind="affine"):
+def fit_transformation(readings_mm, marks_mm, sd_mm, kind="affine"):
     """Determine the transformation from readings of marks to their calibrated coordinates.
 
     Parameters
@@ -209,34 +209,34 @@ def transformation(readings_mm, marks_mm, sd_mm, kind="affine"):
     Examples
     --------
     >>> readings = [[1, 1], [11, 1], [1, 11], [11, 11]]
-    >>> result = transformation(readings, [[0, 0], [10, 0], [0, 10], [10, 10]], 0.005)
-    >>> result.of([[6.0, 6.0]]).round(9), result.dof
+    >>> result = fit_transformation(readings, [[0, 0], [10, 0], [0, 10], [10, 10]], 0.005)
+    >>> result.transform([[6.0, 6.0]]).round(9), result.dof
     (array([[5., 5.]]), 2)
     """
     readings = np.asarray(readings_mm, dtype=float)
     marks = np.asarray(marks_mm, dtype=float)
     start = _fit_linear(readings, marks, kind)
     # Readings relative to their centre reduce the correlation of shift and matrix.
-    centre, to_six = readings.mean(axis=0), _SIX[kind]
+    centre, to_affine = readings.mean(axis=0), _TO_AFFINE[kind]
     variance = np.broadcast_to(np.asarray(sd_mm, dtype=float) ** 2, readings.shape).ravel()
 
     def model(p, observed):
-        six = to_six @ p
+        affine = to_affine @ p
         # Conditions f = J p - mark = 0, with B the matrix M for each reading.
         a = _design_rows(observed.reshape(-1, 2) - centre)
-        b = np.kron(np.eye(len(readings)), six[[0, 1, 3, 4]].reshape(2, 2))
-        return a @ six - marks.ravel(), a @ to_six, b
+        b = np.kron(np.eye(len(readings)), affine[[0, 1, 3, 4]].reshape(2, 2))
+        return a @ affine - marks.ravel(), a @ to_affine, b
 
     result = adjust(model, start, readings.ravel(), variance)
-    six = to_six @ result.unknowns
-    matrix = six[[0, 1, 3, 4]].reshape(2, 2)
+    affine = to_affine @ result.unknowns
+    matrix = affine[[0, 1, 3, 4]].reshape(2, 2)
     return Transformation(
         kind=kind,
         matrix=matrix,
-        shift_mm=six[[2, 5]] - matrix @ centre,
+        shift_mm=affine[[2, 5]] - matrix @ centre,
         centre_mm=centre,
-        covariance=to_six @ result.cofactor @ to_six.T,
-        residuals_mm=(readings - centre) @ matrix.T + six[[2, 5]] - marks,
+        covariance=to_affine @ result.cofactor @ to_affine.T,
+        residuals_mm=(readings - centre) @ matrix.T + affine[[2, 5]] - marks,
         chi2=result.chi2,
         dof=result.dof,
     )
@@ -262,10 +262,10 @@ def _fit_linear(readings, marks, kind):
                 needed=KINDS[kind],
             )
         )
-    rows = _design_rows(centred) @ _SIX[kind]
+    rows = _design_rows(centred) @ _TO_AFFINE[kind]
     # Singular values of the centred readings: length and width of the marks.
     sizes = np.linalg.svd(centred, compute_uv=False)
-    if sizes[0] == 0 or (kind == "affine" and sizes[1] < ONE_LINE * sizes[0]):
+    if sizes[0] == 0 or (kind == "affine" and sizes[1] < LINE_RATIO * sizes[0]):
         raise SolutionError(
             message(
                 "marks_on_a_line",
@@ -276,7 +276,7 @@ def _fit_linear(readings, marks, kind):
 
 
 @dataclass(frozen=True)
-class Suspicion:
+class MarkError:
     """Suspected error in the marks of a photo.
 
     Attributes
@@ -296,7 +296,7 @@ class Suspicion:
     size: float
 
 
-def suspicion(readings_mm, marks_mm, kind="affine"):
+def find_mark_error(readings_mm, marks_mm, kind="affine"):
     """Search for an error in the marks of a photo, each with a single reading.
 
     An error is suspected if the fit is worse than the distortion of film, or if no comparator can
@@ -312,42 +312,42 @@ def suspicion(readings_mm, marks_mm, kind="affine"):
 
     Returns
     -------
-    Suspicion or None
+    MarkError or None
 
     Examples
     --------
     >>> readings = [[0, 0], [10, 0], [0, 10], [10, 10], [5, 0]]
-    >>> error = suspicion(readings, [[10, 0], [0, 0], [0, 10], [10, 10], [5, 0]])
+    >>> error = find_mark_error(readings, [[10, 0], [0, 0], [0, 10], [10, 10], [5, 0]])
     >>> error.what, error.marks
     ('exchanged', ((0, 1),))
     """
     readings, marks = np.asarray(readings_mm, dtype=float), np.asarray(marks_mm, dtype=float)
-    fit = _Fit.of(readings, marks, kind)
+    fit = _fit_marks(readings, marks, kind)
     if fit is None:
         return None
-    if fit.is_good and fit.impossible is None:
+    if fit.is_good and fit.scale_error is None:
         return None
     n = len(marks)
-    mirrored = _Fit.of(readings * [-1, 1], marks, kind)
+    mirrored = _fit_marks(readings * [-1, 1], marks, kind)
     # A similarity cannot mirror, so that a mirrored plate gives a bad fit.
     if kind == "similarity" and mirrored is not None and mirrored.is_good:
-        return Suspicion("mirrored", (), fit.misfit)
+        return MarkError("mirrored", (), fit.misfit)
     pairs = tuple(
         p for p in combinations(range(n), 2) if _fits_after_exchange(readings, marks, kind, p)
     )
     # More than two possible exchanges do not locate the error.
     if 0 < len(pairs) < 3:
-        return Suspicion("exchanged", pairs, fit.misfit)
+        return MarkError("exchanged", pairs, fit.misfit)
     if fit.is_good:
-        return fit.impossible
+        return fit.scale_error
     # Without a mark, at least one redundant mark must remain to confirm the fit.
     is_ambiguous = n < KINDS[kind] + 2 or pairs
     wrong_marks = (
         [] if is_ambiguous else [k for k in range(n) if _fits_without(readings, marks, kind, k)]
     )
     if len(wrong_marks) == 1:
-        return Suspicion("wrong", ((wrong_marks[0],),), fit.misfit)
-    return Suspicion("misfit", ((fit.worst,),), fit.misfit)
+        return MarkError("wrong", ((wrong_marks[0],),), fit.misfit)
+    return MarkError("misfit", ((fit.worst,),), fit.misfit)
 
 
 @dataclass(frozen=True)
@@ -358,36 +358,25 @@ class _Fit:
     ----------
     matrix : ndarray, shape (2, 2)
         M.
-    away_mm : ndarray, shape (n,)
+    distance_mm : ndarray, shape (n,)
         Distances from the calibrated marks, mm.
     extent_mm : float
         Diagonal of the marks, mm.
     """
 
     matrix: np.ndarray
-    away_mm: np.ndarray
+    distance_mm: np.ndarray
     extent_mm: float
-
-    @classmethod
-    def of(cls, readings, marks, kind):
-        """Fit of readings to marks, each with one reading; None if the marks are insufficient."""
-        try:
-            six = _SIX[kind] @ _fit_linear(readings, marks, kind)
-        except SolutionError:
-            return None
-        deviations = (_design_rows(readings - readings.mean(axis=0)) @ six).reshape(-1, 2) - marks
-        extent = float(np.linalg.norm(np.ptp(marks, axis=0)))
-        return cls(six[[0, 1, 3, 4]].reshape(2, 2), np.linalg.norm(deviations, axis=1), extent)
 
     @property
     def worst(self):
         """Index of the mark with the largest residual."""
-        return int(np.argmax(self.away_mm))
+        return int(np.argmax(self.distance_mm))
 
     @property
     def misfit(self):
         """Largest residual relative to the extent of the marks."""
-        return float(self.away_mm.max() / self.extent_mm)
+        return float(self.distance_mm.max() / self.extent_mm)
 
     @property
     def is_good(self):
@@ -395,32 +384,44 @@ class _Fit:
         return self.misfit < GROSS
 
     @property
-    def impossible(self):
-        """Suspicion about the scales, or None."""
+    def scale_error(self):
+        """MarkError of impossible scales, or None."""
         # Singular values are the extreme scales.
         large, small = np.linalg.svd(self.matrix, compute_uv=False)
         if large > (1 + SHEAR) * small:
-            return Suspicion("sheared", (), float(large / small))
+            return MarkError("sheared", (), float(large / small))
         if not SCALES[0] <= small <= large <= SCALES[1]:
-            return Suspicion("unit", (), float(np.sqrt(large * small)))
+            return MarkError("unit", (), float(np.sqrt(large * small)))
         return None
 
     @property
-    def is_sound(self):
+    def is_valid(self):
         """Whether the fit is good, possible and not mirrored."""
-        return self.is_good and self.impossible is None and np.linalg.det(self.matrix) > 0
+        return self.is_good and self.scale_error is None and np.linalg.det(self.matrix) > 0
+
+
+def _fit_marks(readings, marks, kind):
+    """_Fit of readings to marks, each with one reading; None if the marks are insufficient."""
+    try:
+        affine = _TO_AFFINE[kind] @ _fit_linear(readings, marks, kind)
+    except SolutionError:
+        return None
+    centred = readings - readings.mean(axis=0)
+    distances = np.linalg.norm((_design_rows(centred) @ affine).reshape(-1, 2) - marks, axis=1)
+    extent = float(np.linalg.norm(np.ptp(marks, axis=0)))
+    return _Fit(affine[[0, 1, 3, 4]].reshape(2, 2), distances, extent)
 
 
 def _fits_after_exchange(readings, marks, kind, pair):
     """Whether the fit is valid after an exchange of two marks."""
     order = np.arange(len(marks))
     order[list(pair)] = pair[::-1]
-    fit = _Fit.of(readings[order], marks, kind)
-    return fit is not None and fit.is_sound
+    fit = _fit_marks(readings[order], marks, kind)
+    return fit is not None and fit.is_valid
 
 
 def _fits_without(readings, marks, kind, number):
     """Whether the fit is valid without one mark."""
     is_kept = np.arange(len(marks)) != number
-    fit = _Fit.of(readings[is_kept], marks[is_kept], kind)
-    return fit is not None and fit.is_sound
+    fit = _fit_marks(readings[is_kept], marks[is_kept], kind)
+    return fit is not None and fit.is_valid

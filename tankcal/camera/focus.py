@@ -49,62 +49,54 @@ class Lens:
     radial: np.ndarray
 
     @property
-    def focused(self):
+    def radial_in_focus(self):
         """K1, K2, K3 (3,) for an object in focus."""
         return self.radial_at(self.focus_mm)
 
     def radial_at(self, distance_mm):
-        """K1, K2, K3 (..., 3) of the lens focused at distances (...)."""
-        return radial_at(distance_mm, self.distances_mm, self.radial, self.focal_length_mm)
+        """Radial coefficients of the lens focused at any distance, from the two calibrations.
 
-    def in_depth(self, depth_mm):
+        Parameters
+        ----------
+        distance_mm : array_like, shape (...)
+            Focus distances, mm; may be infinite.
+
+        Returns
+        -------
+        ndarray, shape (..., 3)
+            K1 (mm^-2), K2 (mm^-4), K3 (mm^-6).
+
+        Raises
+        ------
+        ValueError
+            If the two calibrated distances are equal.
+
+        Examples
+        --------
+        >>> radial = np.array([[-1e-4, 0, 0], [-2e-4, 0, 0]])
+        >>> lens = Lens(50.0, 2000.0, np.array([1000.0, np.inf]), radial)
+        >>> lens.radial_at(2000.0)[0].round(8)
+        np.float64(-0.00014773)
+        """
+        f, s = self.focal_length_mm, np.asarray(distance_mm, dtype=float)
+        near, far = np.sort(self.distances_mm)
+        if near == far:
+            raise ValueError("two calibrations at the same distance say nothing of another one")
+        first, second = self.radial[np.argsort(self.distances_mm)]
+        at_infinity = [
+            coefficients / (1 - f / distance) ** _ODD
+            for coefficients, distance in ((first, near), (second, far))
+        ]
+        # alpha in terms of reciprocal distances, so that each distance may be infinite.
+        alpha = ((1 / s - 1 / far) / (1 / near - 1 / far) * (1 - f / near) / (1 - f / s))[..., None]
+        combined = alpha * at_infinity[0] + (1 - alpha) * at_infinity[1]
+        return (1 - f / s)[..., None] ** _ODD * combined
+
+    def radial_in_depth(self, depth_mm):
         """K1, K2, K3 (..., 3) for objects in depths (...), with the lens focused at focus_mm."""
         # Ki(s, s') = gamma^(2i) Ki(s').
         gamma = depth_factor(depth_mm, self.focus_mm, self.focal_length_mm)
         return gamma[..., None] ** _EVEN * self.radial_at(depth_mm)
-
-
-def radial_at(distance_mm, distances_mm, radial, focal_length_mm):
-    """Radial coefficients at any focus distance, from the coefficients at two distances.
-
-    Parameters
-    ----------
-    distance_mm : array_like, shape (...)
-        Focus distances, mm; may be infinite.
-    distances_mm : array_like, shape (2,)
-        S1, S2, mm; may be infinite.
-    radial : array_like, shape (2, 3)
-        K1 (mm^-2), K2 (mm^-4), K3 (mm^-6) at S1 and S2.
-    focal_length_mm : float
-        f, mm.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        K1, K2, K3.
-
-    Raises
-    ------
-    ValueError
-        If the two distances are equal.
-
-    Examples
-    --------
-    >>> radial_at(2000.0, [1000.0, np.inf], [[-1e-4, 0, 0], [-2e-4, 0, 0]], 50.0)[0].round(8)
-    np.float64(-0.00014773)
-    """
-    f, s = focal_length_mm, np.asarray(distance_mm, dtype=float)
-    near, far = np.sort(np.asarray(distances_mm, dtype=float))
-    if near == far:
-        raise ValueError("two calibrations at the same distance say nothing of another one")
-    first, second = np.asarray(radial, dtype=float)[np.argsort(distances_mm)]
-    at_infinity = [
-        coefficients / (1 - f / distance) ** _ODD
-        for coefficients, distance in ((first, near), (second, far))
-    ]
-    # alpha in terms of reciprocal distances, so that each distance may be infinite.
-    alpha = ((1 / s - 1 / far) / (1 / near - 1 / far) * (1 - f / near) / (1 - f / s))[..., None]
-    return (1 - f / s)[..., None] ** _ODD * (alpha * at_infinity[0] + (1 - alpha) * at_infinity[1])
 
 
 def depth_factor(depth_mm, focus_mm, focal_length_mm):
@@ -168,7 +160,7 @@ def refer_to_focus(xy_mm, depth_mm, interior, form, lens):
     depth_interior = at_focus[is_finite].copy()
     # Only the difference of both calibrations counts; `interior` may come from another adjustment.
     depth_interior[:, _FIRST : _FIRST + 3] += (
-        lens.in_depth(np.asarray(depth_mm)[is_finite]) - lens.focused
+        lens.radial_in_depth(np.asarray(depth_mm)[is_finite]) - lens.radial_in_focus
     )
     image = np.array(xy_mm, dtype=float)
     # Correct with the distortion in depth, then distort with the distortion in focus.

@@ -101,7 +101,7 @@ def distortion_derivatives(x, y, q, form):
     )
 
 
-def undistorted_by(x, y, q, form):
+def invert_correction(x, y, q, form):
     """Point whose correction gives an ideal point, by Newton's method.
 
     Parameters
@@ -163,7 +163,7 @@ def image_point(x, y, q, form, of_ideal):
         e, f, g, h = 1.0, 0.0, 0.0, 1.0
     else:
         side = form[0]
-        px, py = undistorted_by(x, y, q, form)
+        px, py = invert_correction(x, y, q, form)
         _, _, dxx, dxy, dyx, dyy = distort(px, py, q, form)
         a, b, c, d = 1.0 + side * dxx, side * dxy, side * dyx, 1.0 + side * dyy
         # Implicit differentiation of p + side d(p) = ideal: dp = J^-1 (d ideal - side d_K).
@@ -253,7 +253,7 @@ def image_point_derivatives(p, r, q, form, of_ideal):
     x, y, px, py, a, b, c, d, e, f, g, h = image_point(xi, eta, q, form, of_ideal)
     kx, ky = distortion_derivatives(px, py, q, form)
     # Chain rule: coordinate by distortion, distortion by its parameters.
-    by_kx = ten(e, f, kx, ky)
+    by_kx = combine_ten(e, f, kx, ky)
     # The affinity before the distortion: derivatives of x = s (x' - B y) by A and B.
     affinity_factor = form[6] / (1.0 + form[6] * q[11])
     by_a, by_b = by_kx[8] - affinity_factor * (x - q[1]), by_kx[9] - affinity_factor * (y - q[2])
@@ -261,8 +261,8 @@ def image_point_derivatives(p, r, q, form, of_ideal):
     return (
         x,
         y,
-        seven(a, b, dxi, deta) + (unit, zero) + by_kx[:8] + (by_a, by_b),
-        seven(c, d, dxi, deta) + (zero, unit) + ten(g, h, kx, ky),
+        combine_seven(a, b, dxi, deta) + (unit, zero) + by_kx[:8] + (by_a, by_b),
+        combine_seven(c, d, dxi, deta) + (zero, unit) + combine_ten(g, h, kx, ky),
     )
 
 
@@ -301,7 +301,7 @@ def ideal_point_derivatives(p, r, q, measured, form, of_ideal):
     x, y = apply_first_affinity(from_x, from_y, q, form)
     zero = 0.0 * x
     if of_ideal:
-        x, y = undistorted_by(
+        x, y = invert_correction(
             x, y, q, (1.0, form[1], form[2], form[3], form[4], form[5], form[6], form[7])
         )
         _, _, dxx, dxy, dyx, dyy = distort(x, y, q, form)
@@ -317,7 +317,7 @@ def ideal_point_derivatives(p, r, q, measured, form, of_ideal):
         corrected_x, corrected_y = x + side * dx, y + side * dy
         e, f, g, h = zero - side, zero, zero, zero - side
     kx, ky = distortion_derivatives(x, y, q, form)
-    by_kx, by_ky = ten(e, f, kx, ky), ten(g, h, kx, ky)
+    by_kx, by_ky = combine_ten(e, f, kx, ky), combine_ten(g, h, kx, ky)
     # Derivatives of the affinity before the distortion; x0 and y0 act through it.
     scale, skew = 1.0 + form[6] * q[11], form[6] * q[12]
     by_a, by_b = form[6] * from_x, form[6] * from_y
@@ -329,7 +329,7 @@ def ideal_point_derivatives(p, r, q, measured, form, of_ideal):
     )
 
 
-def seven(a, b, p, q):
+def combine_seven(a, b, p, q):
     """Linear combination a p + b q of seven elements, numbers or arrays."""
     return (
         a * p[0] + b * q[0],
@@ -342,16 +342,16 @@ def seven(a, b, p, q):
     )
 
 
-def ten(a, b, p, q):
+def combine_ten(a, b, p, q):
     """Linear combination a p + b q of ten elements, numbers or arrays."""
-    return seven(a, b, p[:7], q[:7]) + (
+    return combine_seven(a, b, p[:7], q[:7]) + (
         a * p[7] + b * q[7],
         a * p[8] + b * q[8],
         a * p[9] + b * q[9],
     )
 
 
-def _keep(lane, l, x, y, dx, dy):
+def _store_results(lane, l, x, y, dx, dy):
     """Store the results for image point l.
 
     The elements are stored one by one, because the compiler can vectorise assignments to constant
@@ -379,7 +379,7 @@ def _keep(lane, l, x, y, dx, dy):
     lane[23, l], lane[42, l] = dx[18], dy[18]
 
 
-def _loop(
+def _compute_rows_in_loops(
     xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac,
     in_ideal,
 ):  # fmt: skip
@@ -411,7 +411,7 @@ def _loop(
             lane[1, l] = xyz[j, 1] - photo_xyz[f, 1]
             lane[2, l] = xyz[j, 2] - photo_xyz[f, 2]
             lane[3, l], lane[4, l] = xy[begin + l, 0], xy[begin + l, 1]
-        _side_by_side(lane, end - begin, turn, parameters, form, of_ideal, in_ideal)
+        _compute_lane(lane, end - begin, turn, parameters, form, of_ideal, in_ideal)
         for l in range(end - begin):
             i = begin + l
             wx, wy = weight[i, 0], weight[i, 1]
@@ -430,7 +430,7 @@ def _loop(
                 jac[i, 1, 9 + k] = lane[30 + active[k], l] * wy
 
 
-def _side_by_side(lane, n, turn, parameters, form, of_ideal, in_ideal):
+def _compute_lane(lane, n, turn, parameters, form, of_ideal, in_ideal):
     """Misclosures and derivatives of n image points of a photo, in the rows of lane."""
     # The case is chosen outside the loops.
     if in_ideal:
@@ -439,19 +439,19 @@ def _side_by_side(lane, n, turn, parameters, form, of_ideal, in_ideal):
                 (lane[0, l], lane[1, l], lane[2, l]), turn, parameters, (lane[3, l], lane[4, l]),
                 form, of_ideal,
             )  # fmt: skip
-            _keep(lane, l, x, y, dx, dy)
+            _store_results(lane, l, x, y, dx, dy)
     elif of_ideal:
         for l in range(n):
             x, y, dx, dy = image_point_derivatives(
                 (lane[0, l], lane[1, l], lane[2, l]), turn, parameters, form, True
             )
-            _keep(lane, l, x - lane[3, l], y - lane[4, l], dx, dy)
+            _store_results(lane, l, x - lane[3, l], y - lane[4, l], dx, dy)
     else:
         for l in range(n):
             x, y, dx, dy = image_point_derivatives(
                 (lane[0, l], lane[1, l], lane[2, l]), turn, parameters, form, False
             )
-            _keep(lane, l, x - lane[3, l], y - lane[4, l], dx, dy)
+            _store_results(lane, l, x - lane[3, l], y - lane[4, l], dx, dy)
 
 
 _COMPILED = (
@@ -459,20 +459,20 @@ _COMPILED = (
     "distort",
     "distortion_derivatives",
     "_newton_step",
-    "undistorted_by",
+    "invert_correction",
     "image_point",
     "ideal_point",
-    "seven",
-    "ten",
+    "combine_seven",
+    "combine_ten",
     "image_point_derivatives",
     "ideal_point_derivatives",
-    "_keep",
-    "_side_by_side",
-    "_loop",
+    "_store_results",
+    "_compute_lane",
+    "_compute_rows_in_loops",
 )
 
 
-def _arrays(
+def _compute_rows_in_arrays(
     xyz, photo_xyz, rotation, interior, form, of_ideal, point, photo, xy, weight, active, w, jac,
     in_ideal,
 ):  # fmt: skip
@@ -532,6 +532,6 @@ def image_rows(*arguments, in_ideal=False):
     if is_worth_compiling(len(arguments[6])):
         loops = compile_functions(sys.modules[__name__], _COMPILED)
         state = (np.ascontiguousarray(array) for array in arguments[:4])  # compiled for these alone
-        loops._loop(*state, *arguments[4:], in_ideal)
+        loops._compute_rows_in_loops(*state, *arguments[4:], in_ideal)
     else:
-        _arrays(*arguments, in_ideal)
+        _compute_rows_in_arrays(*arguments, in_ideal)

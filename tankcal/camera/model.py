@@ -35,12 +35,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.camera.imaging import apply_first_affinity, distort, image_point, undistorted_by
+from tankcal.camera.imaging import apply_first_affinity, distort, image_point, invert_correction
 
 NEWTON_ROUNDS = 50
 PARAMETERS = ("c", "x0", "y0", "K1", "K2", "K3", "K4", "P1", "P2", "P3", "P4", "A", "B")
 _UNITS = ("mm", "mm", "mm", "mm-2", "mm-4", "mm-6", "mm-8", "mm-1", "mm-1", "mm-2", "mm-4", "", "")
 UNITS = dict(zip(PARAMETERS, _UNITS, strict=True))
+# Keys of the parameters in files: name and unit
+KEYS = {name: f"{name}_{unit}" if unit else name for name, unit in UNITS.items()}
 CONVENTIONS = {"distortion_of_ideal": 0.0, "correction_added": 1.0, "correction_subtracted": -1.0}
 WEIGHTS = ("measured", "ideal")
 # Switches: A x in dx, A y in dx, B y in dx, B x in dy, B y in dy, and A x + B y before the
@@ -113,7 +115,7 @@ def correct_image_points(xy_mm, interior, form):
         dx, dy = distort(x, y, q, numbers)[:2]
         return np.column_stack([x + numbers[0] * dx, y + numbers[0] * dy])
     # A distortion of the ideal point is inverted: p + d(p) = measured, hence the sign +1.
-    return np.column_stack(undistorted_by(x, y, q, (1.0, *numbers[1:])))
+    return np.column_stack(invert_correction(x, y, q, (1.0, *numbers[1:])))
 
 
 def distort_image_points(ideal_mm, interior, form):
@@ -145,7 +147,7 @@ def distort_image_points(ideal_mm, interior, form):
     return np.column_stack(image_point(*ideal_mm.T, q, form.numbers, of_ideal)[:2])
 
 
-def balanced_about(interior, form, radius_mm):
+def balance_about(interior, form, radius_mm):
     """Balance the radial distortion of a camera about another radius R0.
 
     Parameters
@@ -173,7 +175,7 @@ def balanced_about(interior, form, radius_mm):
     --------
     >>> interior = np.zeros(13)
     >>> interior[[0, 3]] = 50.0, -1e-4
-    >>> balanced, form = balanced_about(interior, Form("correction_added"), 10.0)
+    >>> balanced, form = balance_about(interior, Form("correction_added"), 10.0)
     >>> round(float(balanced[0]), 6), form.radial_balance_mm
     (50.505051, 10.0)
     """

@@ -22,6 +22,7 @@ from tankcal.cli import (
     running,
     starting,
     table_reading,
+    ticketing,
     verifying,
     workbench,
 )
@@ -188,7 +189,8 @@ def _parser_in_english():
 
     main_job = (running, batching, reporting, starting, workbench, importing, planning)
     tables = (linting, table_reading, comparing, history, exporting, inspecting, verifying)
-    for room in (*main_job, *tables, camera, intercomparison):
+    quantity = (ticketing,)
+    for room in (*main_job, *tables, *quantity, camera, intercomparison):
         room.add(commands)
     pages.add(commands)
     completing.add(commands, _parser_in_english)

@@ -17,41 +17,41 @@ from tankcal.cli.showing import (
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
 
-FIRST_WORDS = 200  # bytes
+HEAD_BYTES = 200  # start of a file that identifies a record
 
 
 def parameters(options):
     """Test which additional parameters are significant."""
     prepare_for_small_work()
-    from tankcal.calibration.interiors import sets_to_be
+    from tankcal.calibration.interiors import count_sets
     from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
-    from tankcal.calibration.parameters.findings import Choices
+    from tankcal.calibration.parameters.judgement import Choices
     from tankcal.record.camera_parameters import as_json
 
     show = _start(options)
     choices = Choices(
         alpha=options.alpha, of=options.matrix, limit_px=options.limit_px, limit_um=options.limit_um
     )
-    of = {"camera": options.camera, "photo": options.photo}
-    job, record = None, _record_of(options.source)
+    selection = {"camera": options.camera, "photo": options.photo}
+    job, record = None, _load_record(options.source)
     if record is not None:
-        analyses = analyse_record(record, choices, **of)
+        analyses = analyse_record(record, choices, **selection)
     else:
-        job = _load(options.source, show, options.language)
+        job = _load_job(options.source, show, options.language)
         if job.measurements is not None:
-            _refuse_several(options, sets_to_be(job.measurements, **of))
+            _refuse_several(options, count_sets(job.measurements, **selection))
         analyses = analyse_job(
-            job, choices, **of, dropping=not options.no_trials, progress=show.part
+            job, choices, **selection, dropping=not options.no_trials, progress=show.part
         )
     paths = [] if job is not None else [options.source]
-    _finish([as_json(analysis) for analysis in analyses], options, show, paths, job, record)
+    _show_results([as_json(analysis) for analysis in analyses], options, show, paths, job, record)
 
 
 def compare(options):
     """Compare all pairs of calibrations."""
     prepare_for_small_work()
-    from tankcal.calibration.stability.comparison import compare as compared
-    from tankcal.calibration.stability.grids import parse
+    from tankcal.calibration.stability.comparison import compare as compare_calibrations
+    from tankcal.calibration.stability.grids import parse_grid
     from tankcal.calibration.stability.terrains import parse_terrain
     from tankcal.job.calibrations import choose, read_cameras, with_pixels
     from tankcal.record.camera_stability import as_json, summary
@@ -61,10 +61,10 @@ def compare(options):
     pixel_um = options.pixel_um
     cameras = read_cameras(options.cameras, warnings.append, in_pixels=pixel_um is None)
     name = Path(options.cameras).name
-    comparison = compared(
+    comparison = compare_calibrations(
         choose(with_pixels(cameras, pixel_um), options.names, name),
         options.method,
-        grid=None if options.grid is None else parse(options.grid),
+        grid=None if options.grid is None else parse_grid(options.grid),
         terrain=None if options.terrain is None else parse_terrain(options.terrain),
         threshold_px=options.threshold,
         as_published=options.as_published,
@@ -72,21 +72,23 @@ def compare(options):
         file=name,
     )
     warn(warnings)
-    _finish([as_json(comparison)], options, show, [options.cameras], printed=summary(comparison))
+    _show_results(
+        [as_json(comparison)], options, show, [options.cameras], printed=summary(comparison)
+    )
 
 
 def influence(options):
     """Compare the adjustments of one survey with several calibrations."""
     prepare_for_small_work()
-    from tankcal.calibration.influence.runs import influence as influence_of
+    from tankcal.calibration.influence.runs import influence as compute_influence
     from tankcal.job.calibrations import read_cameras
     from tankcal.record.camera_influence import as_json
 
     show = _start(options)
     warnings = []
     calibrations = read_cameras(options.cameras, warnings.append, in_pixels=False)
-    job = _load(options.job, show, options.language)
-    effects = influence_of(
+    job = _load_job(options.job, show, options.language)
+    effects = compute_influence(
         job,
         calibrations,
         states=options.states,
@@ -95,7 +97,7 @@ def influence(options):
         file=Path(options.cameras).name,
     )
     warn(warnings)
-    _finish([as_json(effects)], options, show, [options.cameras], job)
+    _show_results([as_json(effects)], options, show, [options.cameras], job)
 
 
 def check(options):
@@ -103,28 +105,28 @@ def check(options):
     prepare_for_small_work()
     from tankcal.calibration.product import limits
     from tankcal.calibration.product.check import check_product
-    from tankcal.calibration.product.differences import differences_of, read_differences
+    from tankcal.calibration.product.differences import collect_differences, read_differences
     from tankcal.record.camera_product import as_json
 
     show = _start(options)
     table = limits.read_limits(options.limits) if options.limits else limits.shipped_limits()
     if options.scale is not None:
         table = limits.limits_of_scale(table, options.scale)
-    job, record = None, _record_of(options.source)
+    job, record = None, _load_record(options.source)
     if record is not None:
-        differences = differences_of(record)
+        differences = collect_differences(record)
     elif Path(options.source).suffix.lower() == ".csv":
         differences = read_differences(options.source, options.separator, options.decimal)
     else:
-        job = _load(options.source, show, options.language)
-        differences = differences_of(tankcal.adjust_job(job, show.step))
-    axes, values = differences.of_known_axes()
+        job = _load_job(options.source, show, options.language)
+        differences = collect_differences(tankcal.adjust_job(job, show.step))
+    axes, values = differences.select_known_axes()
     checked = check_product(
         values, axes, names=differences.names, limits=table, alpha=options.alpha
     )
     paths = [] if job is not None else [options.source]
     paths += [options.limits] if options.limits else []
-    _finish([as_json(checked)], options, show, paths, job, record)
+    _show_results([as_json(checked)], options, show, paths, job, record)
 
 
 def convert(options):
@@ -134,18 +136,18 @@ def convert(options):
     from tankcal.camera.formats.writing import write_camera
 
     speak(options.language)
-    cameras, covariances = _cameras_of(options)
+    cameras, covariances = _read_cameras(options)
     if options.name is not None:
         cameras, covariances = _select_camera(options, cameras, covariances)
     for name, camera in cameras:
-        _tell_error(message("convert_as_read", "{name}, as read", name=name), camera)
+        _warn_of_error(message("convert_as_read", "{name}, as read", name=name), camera)
     if options.form is not None:
         cameras, covariances = _convert_to_form(options.form, cameras, covariances)
         for name, camera in cameras:
             what = message(
                 "convert_in_form", "{name}, in the form of {form}", name=name, form=options.form
             )
-            _tell_error(what, camera)
+            _warn_of_error(what, camera)
     sds = [
         None if covariance is None else np.sqrt(np.maximum(np.diag(covariance), 0.0))
         for covariance in covariances
@@ -155,7 +157,7 @@ def convert(options):
     if options.to != "cameras.toml":
         for (name, camera), error_px in zip(cameras, written.error_px, strict=True):
             what = message("convert_as", "{name}, as {form}", name=name, form=options.to)
-            _tell_error(what, replace(camera, error_px=error_px))
+            _warn_of_error(what, replace(camera, error_px=error_px))
     if options.out is None:
         print(written.text, end="")
         return
@@ -164,23 +166,23 @@ def convert(options):
 
 def _convert_to_form(form, cameras, covariances):
     """Return [(name, FramedCamera)] in the form of a publication, and covariances or None."""
-    from tankcal.camera.formats.published import camera_in_form
+    from tankcal.camera.formats.published import convert_to_publication
 
     converted = [
-        (name, *camera_in_form(camera, form, covariance))
+        (name, *convert_to_publication(camera, form, covariance))
         for (name, camera), covariance in zip(cameras, covariances, strict=True)
     ]
     return [(name, camera) for name, camera, _ in converted], [after for *_, after in converted]
 
 
-def _cameras_of(options):
+def _read_cameras(options):
     """Return [(name, FramedCamera)] of a file, and the covariance (13, 13) of each, or None."""
-    from tankcal.calibration.interiors import framed_in
+    from tankcal.calibration.interiors import read_framed_cameras
     from tankcal.camera.formats.reading import read_camera
 
     if options.kind is None and _is_record(options.file):
         pixel_mm = options.pixel_um and options.pixel_um / 1000
-        return framed_in(_record_of(options.file), pixel_mm)
+        return read_framed_cameras(_load_record(options.file), pixel_mm)
     is_register = options.kind is None and Path(options.file).suffix.lower() == ".toml"
     if is_register or options.kind == "cameras.toml":
         return _read_cameras_toml(options.file, options.pixel_um)
@@ -193,21 +195,19 @@ def _read_cameras_toml(path, pixel_um):
     """Return [(name, FramedCamera)] of a cameras.toml, and covariances from standard deviations."""
     import numpy as np
 
+    from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
     from tankcal.job.calibrations import read_cameras, with_pixels
 
     setups = with_pixels(read_cameras(path, in_pixels=False), pixel_um)
-    cameras = [(setup.camera.name, _make_framed_camera(setup)) for setup in setups]
+    cameras = []
+    for setup in setups:
+        values, form = setup.camera.values, setup.camera.form
+        if setup.pixel_mm is None:
+            camera = make_film_camera(values, form, setup.format_mm)
+        else:
+            camera = make_framed_camera(values, form, setup.pixel_mm, setup.format_px)
+        cameras.append((setup.camera.name, camera))
     return cameras, [np.diag(setup.camera.sd**2) for setup in setups]
-
-
-def _make_framed_camera(setup):
-    """Return the FramedCamera of a CameraSetup."""
-    from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
-
-    values, form = setup.camera.values, setup.camera.form
-    if setup.pixel_mm is None:
-        return make_film_camera(values, form, setup.format_mm)
-    return make_framed_camera(values, form, setup.pixel_mm, setup.format_px)
 
 
 def _select_camera(options, cameras, covariances):
@@ -225,7 +225,7 @@ def _select_camera(options, cameras, covariances):
     return [cameras[place]], [covariances[place]]
 
 
-def _tell_error(what, camera):
+def _warn_of_error(what, camera):
     """Warn of the largest difference of a fitted camera within the frame."""
     if camera.error_px > 1e-9:
         away = message("convert_px", "{error:.2g} px", error=camera.error_px)
@@ -258,11 +258,11 @@ def _write_new(target, text):
 def read(options):
     """Measure targets in photographs and write image_points.csv."""
     prepare_for_small_work()
-    from tankcal.calibration.targets import Wanted, read_photographs
+    from tankcal.calibration.targets import TargetSettings, read_photographs
 
     speak(options.language)
     show = Progress(options.quiet)
-    wanted = Wanted(
+    wanted = TargetSettings(
         what=options.what,
         dictionary=options.dictionary,
         names=options.names,
@@ -282,9 +282,9 @@ def read(options):
         message(
             "targets_read",
             "{targets}, {points} in {photos}; refused: {refused}{reasons}",
-            targets=_targets(result.targets),
-            points=_image_points(result.points),
-            photos=_photos(len(result.photos)),
+            targets=_count_targets(result.targets),
+            points=_count_image_points(result.points),
+            photos=_count_photos(len(result.photos)),
             refused=refused,
             reasons=f" ({reasons})" if refused else "",
         )
@@ -292,7 +292,8 @@ def read(options):
     print(f"  {printable(result.path)}\n  {printable(result.refused_path)}")
 
 
-def _targets(count):
+def _count_targets(count):
+    """Message of a number of targets."""
     if count == 1:
         return message("one_target", "1 target")
     if count == 0:
@@ -300,7 +301,8 @@ def _targets(count):
     return message("some_targets", "{count} targets", count=count)
 
 
-def _image_points(count):
+def _count_image_points(count):
+    """Message of a number of image points."""
     if count == 1:
         return message("one_image_point", "1 image point")
     if count == 0:
@@ -308,7 +310,8 @@ def _image_points(count):
     return message("some_image_points", "{count} image points", count=count)
 
 
-def _photos(count):
+def _count_photos(count):
+    """Message of a number of photos."""
     if count == 1:
         return message("one_photo_read", "1 photo")
     return message("some_photos_read", "{count} photos", count=count)
@@ -324,7 +327,7 @@ def _start(options):
     return Progress(options.quiet)
 
 
-def _load(source, show, language):
+def _load_job(source, show, language):
     """Return the job, with its tank if it has one."""
     from tankcal.cli.asked_language import asked_language
 
@@ -336,7 +339,7 @@ def _load(source, show, language):
     return job if job.tank is None else tankcal.load(source)
 
 
-def _record_of(source):
+def _load_record(source):
     """Return the record if `source` is a record, else None."""
     if Path(source).suffix.lower() != ".json":
         return None
@@ -350,18 +353,18 @@ def _is_record(source):
     if Path(source).suffix.lower() != ".json" or not Path(source).is_file():
         return False
     with Path(source).open("rb") as file:
-        return b'"tankcal-record/' in file.read(FIRST_WORDS)
+        return b'"tankcal-record/' in file.read(HEAD_BYTES)
 
 
-def _finish(results, options, show, paths, job=None, record=None, printed=None):
+def _show_results(results, options, show, paths, job=None, record=None, printed=None):
     """Print tables or JSON, and write reports on request."""
     from tankcal.report import camera as camera_papers
 
-    language = options.language or _language_of(job, record) or language_of_run()
+    language = options.language or _find_language(job, record) or language_of_run()
     speak(language)
     _refuse_several(options, len(results))
-    made_from = camera_papers.made_from(paths, job)
-    results = [result | {"made_from": made_from} for result in results]
+    origin = camera_papers.describe_origin(paths, job)
+    results = [result | {"made_from": origin} for result in results]
     written = []
     if options.out is not None:
         written = camera_papers.write(results[0], options.out, show.part, language)
@@ -377,7 +380,7 @@ def _finish(results, options, show, paths, job=None, record=None, printed=None):
         print_paths(options.out, written)
 
 
-def _language_of(job, record):
+def _find_language(job, record):
     """Return the language of a job or a record, or None."""
     from tankcal.text.words import language_of
 

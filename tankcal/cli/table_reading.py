@@ -134,11 +134,11 @@ def _describe_solid(geometry):
 
 
 def _ends(geometry, fit):
-    from tankcal.recalibration.solid_geometry import TOLD_APART
+    from tankcal.recalibration.solid_geometry import EXCLUDING_CHI2
 
     ends = fit.ends.replace("_", " ")
     others = [
-        form for form in geometry.worse_by if form not in (fit.ends, *geometry.not_told_apart)
+        form for form in geometry.chi2_excess if form not in (fit.ends, *geometry.equally_good_ends)
     ]
     if not others:
         return message("read_ends", "ends: {ends}", ends=ends)
@@ -147,8 +147,8 @@ def _ends(geometry, fit):
         "ends: {ends}; the next best form, {other}, raises chi2 by {by} (significant from {limit})",
         ends=ends,
         other=others[0].replace("_", " "),
-        by=fixed(geometry.worse_by[others[0]], 0, marks()),
-        limit=fixed(TOLD_APART, 0, marks()),
+        by=fixed(geometry.chi2_excess[others[0]], 0, marks()),
+        limit=fixed(EXCLUDING_CHI2, 0, marks()),
     )
 
 
@@ -175,7 +175,7 @@ def _tilt(geometry):
             largest=fixed(largest, 1, marks()),
         )
         return
-    other, zero = geometry.tilted.mirrored
+    other, zero = geometry.tilted.mirror_image
     yield message(
         "read_leaning",
         "tilt: {tilt} mm/m, u {u} mm/m: no level tank explains the rows; {other} mm/m with "

@@ -1,13 +1,12 @@
 """Exports of a table to gauging and inventory systems.
 
-profiles      description of a file for a system (TOML), and the shipped profiles
+profiles      description of a file for a system (TOML), and the shipped profiles with their texts
 marks         rows as whole numbers of last digits, each rounded once
 chords, breakpoints, splines   rows selected for a polyline or a spline of few points
 choosing      rows of a record for a profile, or the reasons why the profile does not fit
 writing       the text, and the text read back by the linter
-facts         provenance, and content of the report
 shell_movement   HyTD of a gauge supported by the shell
-exporting     from a record to the file
+exporting     from a record to the file, with provenance and report
 """
 
 from tankcal.exports.exporting import Export, export_record, write_export

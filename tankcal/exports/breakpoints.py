@@ -48,7 +48,7 @@ class Breakpoints:
 
 
 @dataclass(frozen=True)
-class Written:
+class RoundedTable:
     """A table, and its rows as written.
 
     Attributes
@@ -76,7 +76,7 @@ class Written:
         return self.height, self.volume, self.at, self.written
 
     @property
-    def own_error(self):
+    def rounding_error(self):
         """Distance of each written row from the table, shape (rows,)."""
         return np.abs(self.written - np.interp(self.at, self.height, self.volume))
 
@@ -86,33 +86,33 @@ class Written:
         fewest, before = np.full(count, chords.NEVER), np.full(count, -1)
         if self.loops is chords:
             fewest, before = fewest.tolist(), before.tolist()
-        arrays = self._for_loops(*self.lines, self.last, is_open)
+        arrays = self._loop_arguments(*self.lines, self.last, is_open)
         self.loops.fewest_chords(*arrays, eps, most, fewest, before)
         return np.asarray(fewest), np.asarray(before)
 
     def longest_chords(self, is_open, eps):
         """Rows of the path of longest chords within eps; empty if there is none."""
         rows = np.zeros(len(self.height), dtype=int)
-        arrays = self._for_loops(*self.lines, self.last, is_open)
+        arrays = self._loop_arguments(*self.lines, self.last, is_open)
         return rows[: self.loops.longest_chords(*arrays, eps, rows)]
 
-    def error_of(self, rows):
+    def largest_error(self, rows):
         """Largest error of chords at rows between, and of the rows themselves."""
-        between = self.loops.largest_error(*self._for_loops(*self.lines, rows))
-        return max(float(between), float(self.own_error[rows].max()))
+        between = self.loops.largest_error(*self._loop_arguments(*self.lines, rows))
+        return max(float(between), float(self.rounding_error[rows].max()))
 
-    def _for_loops(self, *arrays):
+    def _loop_arguments(self, *arrays):
         """Arrays for compiled loops, lists for plain loops, which access lists faster."""
         return [array.tolist() for array in arrays] if self.loops is chords else arrays
 
     def reversed(self):
         """Return the table from its top down."""
         count = len(self.height)
-        must = np.zeros(count, dtype=bool)
-        must[self.last] = must[0] = True
-        return Written(
+        required = np.zeros(count, dtype=bool)
+        required[self.last] = required[0] = True
+        return RoundedTable(
             *(np.ascontiguousarray(-line[::-1]) for line in self.lines),
-            _next_fixed(must[::-1]),
+            _next_fixed(required[::-1]),
             np.ascontiguousarray(self.is_open[::-1]),
             self.loops,
         )
@@ -151,7 +151,7 @@ def best_breakpoints(height, volume, points, *, fixed=(), at=None, written=None,
     ([0, 2, 4], 1.0)
     """
     table = _table(height, volume, fixed, at, written, candidates)
-    least = int(np.count_nonzero(_is_fixed(table)))
+    least = int(np.count_nonzero(_required_rows(table)))
     if points < least:
         raise ValueError(f"{points} points, expected {least} or more: so many rows have to stand")
     rows, greedy = _greedy(table, points)
@@ -179,7 +179,7 @@ def fewest_breakpoints(height, volume, error, *, fixed=(), at=None, written=None
     for _ in range(_MOST_TURNS):  # repeated only if heights are rounded
         if eps <= 0 and error > 0:
             return None
-        rows = _way(table, eps, chords.NEVER)
+        rows = _fewest_chords_path(table, eps, chords.NEVER)
         if rows is None:
             return None
         best = best_breakpoints(
@@ -217,23 +217,25 @@ def _table(height, volume, fixed, at, written, candidates):
     height, volume = (np.ascontiguousarray(values, dtype=float) for values in (height, volume))
     at = height if at is None else np.ascontiguousarray(at, dtype=float)
     written = volume if written is None else np.ascontiguousarray(written, dtype=float)
-    must = np.zeros(len(height), dtype=bool)
-    must[list(fixed)] = must[0] = must[-1] = True
-    is_open = must | (True if candidates is None else np.asarray(candidates, dtype=bool))
-    return Written(height, volume, at, written, _next_fixed(must), is_open, _loops(len(height)))
+    required = np.zeros(len(height), dtype=bool)
+    required[list(fixed)] = required[0] = required[-1] = True
+    is_open = required | (True if candidates is None else np.asarray(candidates, dtype=bool))
+    return RoundedTable(
+        height, volume, at, written, _next_fixed(required), is_open, _loops(len(height))
+    )
 
 
-def _next_fixed(must):
+def _next_fixed(required):
     """Next required row after each row, shape (rows,); the last row for itself."""
-    fixed = np.flatnonzero(must)
-    place = np.searchsorted(fixed, np.arange(len(must)), side="right")
+    fixed = np.flatnonzero(required)
+    place = np.searchsorted(fixed, np.arange(len(required)), side="right")
     return fixed[np.minimum(place, len(fixed) - 1)]
 
 
-def _is_fixed(table):
-    must = np.zeros(len(table.height), dtype=bool)
-    must[table.last] = must[0] = True
-    return must
+def _required_rows(table):
+    required = np.zeros(len(table.height), dtype=bool)
+    required[table.last] = required[0] = True
+    return required
 
 
 def _loops(rows):
@@ -243,24 +245,24 @@ def _loops(rows):
     return compile_functions(sys.modules[chords.__name__], chords.COMPILED)
 
 
-def _within(table, eps):
+def _open_rows(table, eps):
     """Mask (rows,): permitted rows with an own error of at most eps."""
-    return table.is_open & (table.own_error <= eps * (1 + _CLOSE))
+    return table.is_open & (table.rounding_error <= eps * (1 + _CLOSE))
 
 
-def _way(table, eps, most):
+def _fewest_chords_path(table, eps, most):
     """Rows of a path of the fewest chords within eps, at most `most` chords.
 
     None if there is none.
     """
-    is_open = _within(table, eps)
-    if not np.all(is_open[_is_fixed(table)]):
+    is_open = _open_rows(table, eps)
+    if not np.all(is_open[_required_rows(table)]):
         return None
     fewest, before = table.fewest_chords(is_open, eps, most)
-    return _traced(before) if fewest[-1] <= most else None
+    return _trace_path(before) if fewest[-1] <= most else None
 
 
-def _traced(before):
+def _trace_path(before):
     rows = [len(before) - 1]
     while rows[-1] > 0:
         rows.append(int(before[rows[-1]]))
@@ -269,22 +271,22 @@ def _traced(before):
 
 def _greedy(table, points):
     """(rows, error) of the better of the two greedy solutions, from the bottom and from the top."""
-    up = _greedy_way(table, points)
-    down = len(table.height) - 1 - _greedy_way(table.reversed(), points)[::-1]
+    up = _greedy_path(table, points)
+    down = len(table.height) - 1 - _greedy_path(table.reversed(), points)[::-1]
     error, rows = min(
-        ((table.error_of(rows), rows) for rows in (up, down)), key=lambda solution: solution[0]
+        ((table.largest_error(rows), rows) for rows in (up, down)), key=lambda solution: solution[0]
     )
     return rows, error
 
 
-def _greedy_way(table, points):
+def _greedy_path(table, points):
     """Rows of the longest chords, at most `points` points, with the smallest error."""
-    low, high, best = 0.0, 2 * float(np.ptp(table.volume)) + float(table.own_error.max()), None
+    low, high, best = 0.0, 2 * float(np.ptp(table.volume)) + float(table.rounding_error.max()), None
     for _ in range(_MOST_TURNS):
         eps = high if best is None else 0.5 * (low + high)
-        rows = _longest(table, eps)
+        rows = _longest_chords_path(table, eps)
         if best is None or 0 < len(rows) <= points:
-            best, high = rows, min(eps, max(table.error_of(rows), low))
+            best, high = rows, min(eps, max(table.largest_error(rows), low))
         else:
             low = eps
         if high - low <= _CLOSE * high:
@@ -292,38 +294,38 @@ def _greedy_way(table, points):
     return best
 
 
-def _longest(table, eps):
+def _longest_chords_path(table, eps):
     """Rows of the longest chords within eps; empty if a required row has a larger error."""
-    is_open = _within(table, eps)
-    return table.longest_chords(is_open, eps) if np.all(is_open[_is_fixed(table)]) else ()
+    is_open = _open_rows(table, eps)
+    return table.longest_chords(is_open, eps) if np.all(is_open[_required_rows(table)]) else ()
 
 
 def _optimum(table, points, rows):
     """Rows with the smallest error; `rows` are those of the greedy solution."""
-    high, low, step = table.error_of(rows), 0.0, _FIRST_STEP
-    table = _kept(table, high, points)
+    high, low, step = table.largest_error(rows), 0.0, _FIRST_STEP
+    table = _restrict(table, high, points)
     for _ in range(_MOST_TURNS):
         if high - low <= _CLOSE * high:
             break
         eps = 0.5 * (low + high) if low > 0 else high * (1 - min(step, 0.5))
-        better = _way(table, eps, points - 1)
+        better = _fewest_chords_path(table, eps, points - 1)
         if better is None:
             low = eps
             continue
         step *= 2
-        rows, best = better, table.error_of(better)
+        rows, best = better, table.largest_error(better)
         high = max(min(best, eps), low)
-        table = _kept(table, high, points)
+        table = _restrict(table, high, points)
     return rows
 
 
-def _kept(table, eps, points):
+def _restrict(table, eps, points):
     """Return the table restricted to rows on a path of at most `points` points within eps."""
     if np.count_nonzero(table.is_open) <= points:
         return table
-    is_open = _within(table, eps)
+    is_open = _open_rows(table, eps)
     back = table.reversed()
     up, _ = table.fewest_chords(is_open, eps, points - 1)
     down, _ = back.fewest_chords(np.ascontiguousarray(is_open[::-1]), eps, points - 1)
     is_open = is_open & (up + down[::-1] <= points - 1)
-    return Written(*table.lines, table.last, is_open, table.loops)
+    return RoundedTable(*table.lines, table.last, is_open, table.loops)

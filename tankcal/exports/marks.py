@@ -22,7 +22,7 @@ class Marks:
         Quanta of the leading column of levels, and of volumes, offsets subtracted.
     at_m, written_m3 : (rows,) ndarray
         Dip and volume as a system interprets them.
-    stands : (rows,) ndarray of bool
+    permitted : (rows,) ndarray of bool
         Permitted rows: on a mark if most rows are, and only one row per level.
     """
 
@@ -30,7 +30,7 @@ class Marks:
     volume: list
     at_m: np.ndarray
     written_m3: np.ndarray
-    stands: np.ndarray
+    permitted: np.ndarray
 
 
 def to_quanta(value, quantum):
@@ -46,21 +46,21 @@ def to_quanta(value, quantum):
     return (2 * over + under) // (2 * under)
 
 
-def increments_of(height_m, increment):
+def count_increments(height_m, increment):
     """Height as a whole number of increments, such as "1/16 in".
 
     Examples
     --------
     >>> from tankcal.tank.dips import parse_dip
-    >>> increments_of(parse_dip("5 ft 3 3/16 in", "ft-in-16"), "1/16 in")
+    >>> count_increments(parse_dip("5 ft 3 3/16 in", "ft-in-16"), "1/16 in")
     1011
-    >>> increments_of(5.5, "1/100 m")
+    >>> count_increments(5.5, "1/100 m")
     550
     """
     return to_quanta(height_m, INCREMENTS_M[increment])
 
 
-def marks_of(height_m, volume_m3, profile, reference_m=None, must=()):
+def make_marks(height_m, volume_m3, profile, reference_m=None, required=()):
     """Return the `Marks` of a table in a profile.
 
     Parameters
@@ -69,7 +69,7 @@ def marks_of(height_m, volume_m3, profile, reference_m=None, must=()):
     profile : Profile
     reference_m : float, optional
         Reference height of ullages.
-    must : sequence of int, optional
+    required : sequence of int, optional
         Rows that take precedence over other rows of equal level.
     """
     quantum, volume_quantum = profile.level_quantum_m, profile.volume_quantum_m3
@@ -82,7 +82,7 @@ def marks_of(height_m, volume_m3, profile, reference_m=None, must=()):
     at = np.array([float(n * quantum + level_offset) for n in level])
     at = reference_m - at if is_ullage else at
     written = np.array([float(n * volume_quantum + volume_offset) for n in volume])
-    return Marks(level, volume, at, written, _standing(height_m, at, level, must))
+    return Marks(level, volume, at, written, _find_permitted(height_m, at, level, required))
 
 
 def _quanta(values, quantum, offset):
@@ -92,15 +92,15 @@ def _quanta(values, quantum, offset):
     return [floor((Fraction(value) - offset) / quantum + half) for value in values.tolist()]
 
 
-def _standing(height_m, at_m, level, must):
+def _find_permitted(height_m, at_m, level, required):
     """Mask (rows,) of the permitted rows."""
     off = np.abs(at_m - height_m)
     on_mark = off <= ON_THE_MARK_M
-    stands = on_mark.copy() if on_mark.mean() >= _MOSTLY else np.ones(len(off), dtype=bool)
-    stands[list(must)] = True
-    off[list(must)] = -1.0  # takes precedence over other rows of its level
+    permitted = on_mark.copy() if on_mark.mean() >= _MOSTLY else np.ones(len(off), dtype=bool)
+    permitted[list(required)] = True
+    off[list(required)] = -1.0  # takes precedence over other rows of its level
     best = {}
-    for row in np.flatnonzero(stands):
+    for row in np.flatnonzero(permitted):
         n = level[row]
         if n not in best or off[row] < off[best[n]]:
             best[n] = row

@@ -10,7 +10,6 @@ from fractions import Fraction
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
-from tankcal.exports.profile_texts import as_message
 from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.entries import read_section
 from tankcal.job.fields import Field
@@ -41,7 +40,7 @@ LEVEL_COLUMNS = ("dip", "ullage", "increments")
 VOLUME_COLUMNS = ("volume", "increment_volume")
 LINE_ENDS = {"lf": "\n", "crlf": "\r\n"}
 PLACEHOLDERS = ("tank", "number", "level_unit", "volume_unit", "date", "points")
-MOST_POINTS, MOST_LINES = 100_000, 40
+MOST_POINTS, MOST_LINES, MOST_LETTERS = 100_000, 40, 300  # letters of a line
 
 FIELDS = {
     "profile": (
@@ -209,7 +208,7 @@ def parse_profile(file, data, log):
             values[section, key] = _texts(*place, stated.pop(key, None), row, needed, log)
         read = read_section(file, section, fields, stated, row, log)
         values |= {(section, key): value for key, value in read.items()}
-    tell = _Teller(file, settings, sections, log)
+    tell = _Reporter(file, settings, sections, log)
     _check_columns(values, tell)
     _check_table(values, tell)
     _check_marks(values, tell)
@@ -224,9 +223,8 @@ def _texts(file, name, value, row, needed, log):
             log.problem(file, message("export_no_list", "missing; expected a list of texts"),
                         row, name)  # fmt: skip
         return ()
-    sound = isinstance(raw, list) and len(raw) <= MOST_LINES
-    if not sound or not all(isinstance(text, str) and text.isprintable() and len(text) <= 300
-                            for text in raw):  # fmt: skip
+    is_short_list = isinstance(raw, list) and len(raw) <= MOST_LINES
+    if not is_short_list or not all(map(_is_line, raw)):
         text = message(
             "export_texts", "found {found}; expected a list of at most {most} texts, each of one "
             "line", found=shown(raw), most=MOST_LINES,
@@ -236,7 +234,12 @@ def _texts(file, name, value, row, needed, log):
     return tuple(raw)
 
 
-class _Teller:
+def _is_line(text):
+    """Whether a value is a text of one line."""
+    return isinstance(text, str) and text.isprintable() and len(text) <= MOST_LETTERS
+
+
+class _Reporter:
     """Reports problems of a key of the profile, with its row."""
 
     def __init__(self, file, settings, sections, log):
@@ -358,5 +361,73 @@ def _profile(file, values):
         if value is not None:
             settings[name] = int(value) if name in whole else value
     for name in settings.keys() & {"name", "source", "remark"}:
-        settings[name] = as_message(settings[name])
+        settings[name] = _MESSAGES.get(settings[name], settings[name])
     return Profile(code=file.removesuffix(_ENDING), **settings)
+
+
+# ---- texts of the shipped profiles, for translation
+
+
+_TEXTS = (
+    message(
+        "profile_typed",
+        "Values are typed in, so that unit, decimals and marks are free: set those of the gauge's "
+        "display",
+    ),
+    message(
+        "profile_typed_claim",
+        "Values are typed in, so that unit, decimals and marks are free: set those of the gauge's "
+        "display; its claim of 0.1 % does not hold for a lying tank",
+    ),
+    message(
+        "profile_typed_linear",
+        "Values are typed in, so that unit, decimals and marks are free: set those of the gauge's "
+        "display; for Universal Linear, what Universal Curved does was not found",
+    ),
+    message(
+        "profile_typed_offsets",
+        "Values are typed in, so that unit, decimals and marks are free: set those of the gauge's "
+        "display; copy the profile to set the offsets, and give --points",
+    ),
+    message(
+        "profile_typed_limit",
+        "Values are typed in, so that unit, decimals and marks are free: set those of the gauge's "
+        "display; give --points, the limit was not found",
+    ),
+    message(
+        "profile_typed_spline",
+        "Values are typed in, so that unit, decimals and marks are free: set those of the gauge's "
+        "display; give --points, the limit was not found. Taken as a natural cubic spline: the end "
+        "condition was not found",
+    ),
+    message("profile_litres", "Unit of volumes is assumed to be the litre"),
+    message("profile_layout", "Layout of the file is assumed"),
+    message(
+        "profile_layout_initial",
+        "Layout of the file is assumed; the first row is the initial volume",
+    ),
+    message(
+        "profile_units_assumed",
+        "Units and marks are assumed; dV is the volume since the row before",
+    ),
+    message(
+        "profile_columns_assumed",
+        "The order of the columns and the headings are assumed: compare with an export of your "
+        "system",
+    ),
+    message("profile_every_row", "Every row, decimal point, comma"),
+    message("profile_unchecked", "Not checked with its manual"),
+    message("profile_any", "any program that reads CSV"),
+    message("profile_russian", "a Russian level meter"),
+    message("profile_aveva_centimetres", "AVEVA (increments of 1/100 m)"),
+    message("profile_aveva_sixteenths", "AVEVA (increments of 1/16 in)"),
+    message("profile_jde_increments", "Oracle JD Edwards (volume for each increment)"),
+    message("profile_jde", "Oracle JD Edwards (height and volume)"),
+    message("profile_siemens_spline", "Siemens LUT400, HydroRanger (cubic spline)"),
+    message("profile_siemens_linear", "Siemens LUT400, HydroRanger (linear)"),
+    message("profile_tls", "Veeder-Root TLS (20 points)"),
+    message("profile_arts", "ARTS retail data model"),
+    message("profile_own_choice", "own choice of tankcal"),
+    message("profile_from_memory", "from memory: 1, 4 or 20 points"),
+)
+_MESSAGES = {str(text): text for text in _TEXTS}

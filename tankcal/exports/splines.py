@@ -2,7 +2,7 @@
 
 The pieces of a spline cannot be judged separately, so the result is a good solution, not a proven
 optimum. Starting from a few rows, the row with the largest error is added each time. Then single
-rows are moved while the error decreases.
+rows are move_rows while the error decreases.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from tankcal.exports.breakpoints import Breakpoints
 
 _PART_AT_ONCE = 4  # one in four of the remaining rows is added at once
-_MOST_MOVED = 64  # largest number of points that are moved
+_MOST_MOVED = 64  # largest number of points that are move_rows
 _MOST_TRIED = 1200  # largest number of splines tried
 _FALL = 1e-9  # tolerance of a falling slope, relative to the mean slope
 
@@ -29,24 +29,24 @@ def spline_breakpoints(height, volume, points, *, fixed=(), at=None, written=Non
         The error bounds the distance of the spline from the table at any height. None if no
         spline found is monotone.
     """
-    seeker = _Seeker(height, volume, at, written)
-    count = len(seeker.height)
+    search = _SplineSearch(height, volume, at, written)
+    count = len(search.height)
     is_open = np.ones(count, dtype=bool) if candidates is None else np.array(candidates, dtype=bool)
-    must = sorted({0, count - 1, *fixed})
-    is_open[must] = True
-    rows = seeker.filled(must, np.flatnonzero(is_open), points)
+    required = sorted({0, count - 1, *fixed})
+    is_open[required] = True
+    rows = search.add_rows(required, np.flatnonzero(is_open), points)
     if len(rows) <= _MOST_MOVED:
-        rows = seeker.moved(rows, set(must), is_open)
-    error, where, is_rising = seeker.judge(rows)
+        rows = search.move_rows(rows, set(required), is_open)
+    error, where, is_rising = search.judge(rows)
     return Breakpoints(np.array(rows), error, where) if is_rising else None
 
 
-def fewest_spline_breakpoints(height, volume, error, *, most, **given):
+def fewest_spline_breakpoints(height, volume, error, *, most, **options):
     """Return `Breakpoints` of a spline with few points within an error, at most `most`, or None."""
     low, high, best = 2, most, None
     while low <= high:
         points = (low + high) // 2
-        solution = spline_breakpoints(height, volume, points, **given)
+        solution = spline_breakpoints(height, volume, points, **options)
         if solution is not None and solution.error <= error:
             best, high = solution, min(points, len(solution.rows)) - 1
         else:
@@ -56,11 +56,11 @@ def fewest_spline_breakpoints(height, volume, error, *, most, **given):
 
 def spline_error(height, volume, at, written, rows):
     """(bound of the error of the spline through the written rows at any height, its height)."""
-    error, where, _ = _Seeker(height, volume, at, written).judge(rows)
+    error, where, _ = _SplineSearch(height, volume, at, written).judge(rows)
     return error, where
 
 
-class _Seeker:
+class _SplineSearch:
     """A table, its rows as written, and splines through some of them."""
 
     def __init__(self, height, volume, at, written):
@@ -75,7 +75,7 @@ class _Seeker:
         return CubicSpline(self.at[rows], self.written[rows], bc_type=kind)
 
     def judge(self, rows):
-        """(bound of the error at any height, height of the worst row, whether the spline rises).
+        """Return (bound of the error at any height, height of the worst row, whether it rises).
 
         Between two heights the spline differs from its own chord by at most max |s''| d^2/8, and
         s'' is linear there.
@@ -89,9 +89,13 @@ class _Seeker:
             np.diff(inside) ** 2 / 8
         )
         worst = int(np.argmax(off))
-        return max(float(beside.max()), float(off[worst])), float(heights[worst]), rises(spline)
+        return (
+            max(float(beside.max()), float(off[worst])),
+            float(heights[worst]),
+            is_rising_spline(spline),
+        )
 
-    def filled(self, rows, free, points):
+    def add_rows(self, rows, free, points):
         """Return the rows with the worst rows added, up to `points` rows."""
         rows = list(rows)
         while len(rows) < points:
@@ -107,15 +111,15 @@ class _Seeker:
             rows = sorted({*rows, *new})
         return rows
 
-    def moved(self, rows, must, is_open):
-        """Return the rows moved singly, by decreasing steps, while the error decreases."""
+    def move_rows(self, rows, required, is_open):
+        """Return the rows move_rows singly, by decreasing steps, while the error decreases."""
         rows, best, left = list(rows), self._rank(rows), _MOST_TRIED
         step = max(len(self.height) // (2 * len(rows)), 1)
         while step and left > 0:
             before = best
             for n in range(1, len(rows) - 1):
                 for row in (rows[n] + step, rows[n] - step):
-                    is_free = rows[n] not in must and rows[n - 1] < row < rows[n + 1]
+                    is_free = rows[n] not in required and rows[n - 1] < row < rows[n + 1]
                     if not is_free or not is_open[row]:
                         continue
                     tried, left = [*rows[:n], row, *rows[n + 1 :]], left - 1
@@ -132,7 +136,7 @@ class _Seeker:
         return (not is_rising, error)
 
 
-def rises(spline):
+def is_rising_spline(spline):
     """Whether a cubic spline falls nowhere, judged at its knots and at the minima of its slope."""
     slope = spline.derivative()
     knots = spline.x

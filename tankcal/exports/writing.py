@@ -5,7 +5,7 @@ import unicodedata
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
-from tankcal.exports.marks import increments_of, to_quanta
+from tankcal.exports.marks import count_increments, to_quanta
 from tankcal.exports.profiles import LEVEL_UNITS_M, LINE_ENDS, MARKED
 from tankcal.job.tables import Log
 from tankcal.linter import lint
@@ -24,7 +24,7 @@ _OF_UNITS = ("lint_no_units",)  # finding about a heading without a unit
 _MOST_TOLD = 5  # largest number of findings listed
 
 
-def body_of(rows, height_m, marks, profile, reference_m):
+def make_body(rows, height_m, marks, profile, reference_m):
     """Return the rows of the file as lists of cells, in its order."""
     lines, before = [], 0
     for row in rows:
@@ -46,7 +46,7 @@ def _level(column, row, height_m, marks, profile, reference_m):
     number = marks.level[row]
     if column == "increments":
         if column != profile.leading:
-            number = increments_of(height_m[row] - profile.level_offset_m, profile.increment)
+            number = count_increments(height_m[row] - profile.level_offset_m, profile.increment)
         return str(number)
     if profile.level_unit in MARKED:
         if column != profile.leading:
@@ -56,19 +56,19 @@ def _level(column, row, height_m, marks, profile, reference_m):
         level = reference_m - height_m[row] if column == "ullage" else height_m[row]
         quantum = LEVEL_UNITS_M[profile.level_unit] / 10**profile.level_decimals
         number = to_quanta(level - profile.level_offset_m, quantum)
-    return written(number, profile.level_decimals, profile.decimal)
+    return format_quanta(number, profile.level_decimals, profile.decimal)
 
 
 def _volume(number, profile):
-    return written(number, profile.volume_decimals, profile.decimal, profile.thousands)
+    return format_quanta(number, profile.volume_decimals, profile.decimal, profile.thousands)
 
 
-def written(number, decimals, mark=".", thousands=""):
+def format_quanta(number, decimals, mark=".", thousands=""):
     """Text of a whole number of last digits.
 
     Examples
     --------
-    >>> written(-1234567, 3, ",", "."), written(5, 2), written(12, 0)
+    >>> format_quanta(-1234567, 3, ",", "."), format_quanta(5, 2), format_quanta(12, 0)
     ('-1.234,567', '0.05', '12')
     """
     whole, part = divmod(abs(number), 10**decimals)
@@ -96,12 +96,12 @@ def file_text(body, profile, facts, values):
     if profile.headings:
         head.append(profile.separator.join(profile.headings))
     end = LINE_ENDS[profile.line_end]
-    lines = [plain(line, profile.encoding) for line in head]
+    lines = [to_encodable(line, profile.encoding) for line in head]
     lines += [profile.separator.join(cells) for cells in body]
     return "".join(f"{line}{end}" for line in lines)
 
 
-def plain(text, encoding):
+def to_encodable(text, encoding):
     """Return a text without characters missing in an encoding: accents removed, others left out."""
     kept = []
     for char in text:
@@ -138,7 +138,9 @@ def read_back(data, body, profile, is_even=False, rounded=0):
     log = Log()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "export.csv")
-        path.write_text("\n".join([_headings(profile), *_as_read(rows, profile)]) + "\n", "utf-8")
+        path.write_text(
+            "\n".join([_headings(profile), *_sum_increments(rows, profile)]) + "\n", "utf-8"
+        )
         grids = read_grids(path, log)
         log.stop_if_problems()
         tables = [table for grid in grids for table in tables_of(grid, log)]
@@ -148,14 +150,15 @@ def read_back(data, body, profile, is_even=False, rounded=0):
     findings = [
         finding
         for finding in report.findings
-        if not _is_of_profile(finding, len(body), profile) and not _is_of_tank(finding, is_even)
+        if not _is_caused_by_profile(finding, len(body), profile)
+        and not _concerns_tank(finding, is_even)
     ]
     if findings:
-        shown = [_finding(finding, profile) for finding in findings[:_MOST_TOLD]]
-        raise InputError([*_rounded(rounded, profile), *shown])
+        shown = [_make_problem(finding, profile) for finding in findings[:_MOST_TOLD]]
+        raise InputError([*_rounding_hint(rounded, profile), *shown])
 
 
-def _rounded(count, profile):
+def _rounding_hint(count, profile):
     """Likely reason for rows that do not fit: rounded levels."""
     if not count:
         return []
@@ -184,7 +187,7 @@ def _headings(profile):
     return profile.separator.join(known)
 
 
-def _as_read(rows, profile):
+def _sum_increments(rows, profile):
     """Rows as the linter reads them, with increments of volume summed."""
     if "volume" in profile.columns:
         return rows
@@ -193,7 +196,7 @@ def _as_read(rows, profile):
     total, order = 0, table[::-1] if profile.order == "descending" else table
     for cells in order:
         total += _number(cells[place], profile)
-        cells[place] = written(total, profile.volume_decimals, profile.decimal)
+        cells[place] = format_quanta(total, profile.volume_decimals, profile.decimal)
     return [profile.separator.join(cells) for cells in table]
 
 
@@ -227,17 +230,17 @@ def _refuse_other_rows(entries, body, profile):
         raise InputError(Problem(f"{profile.code}.toml", text))
 
 
-def _is_of_profile(finding, rows, profile):
+def _is_caused_by_profile(finding, rows, profile):
     """Whether a finding is a consequence of the profile: thousands separators, two rows, a unit."""
     code = getattr(finding.problem.expected, "code", None)
     return (
         (code == "lint_written_in_all" and bool(profile.thousands))
         or (code == "lint_few_rows" and rows < _FEW)
-        or (code in _OF_UNITS and not _has_units_read(profile))
+        or (code in _OF_UNITS and not _are_units_known(profile))
     )
 
 
-def _is_of_tank(finding, is_even):
+def _concerns_tank(finding, is_even):
     """Whether a finding concerns the tank, not the file: proportions, edges of fittings, kinks.
 
     Breakpoints are not a smooth table, so neighbours do not predict their volumes. The number read
@@ -248,7 +251,7 @@ def _is_of_tank(finding, is_even):
     return code == "lint_proportions" or (code in _BY_NEIGHBOURS and (is_warning or not is_even))
 
 
-def _has_units_read(profile):
+def _are_units_known(profile):
     """Whether the linter knows the units of both columns.
 
     It knows neither cubic feet nor 1/16 in.
@@ -257,7 +260,7 @@ def _has_units_read(profile):
     return profile.volume_unit in _UNITS_READ and (level in _UNITS_READ or level in MARKED)
 
 
-def _finding(finding, profile):
+def _make_problem(finding, profile):
     problem = finding.problem
     text = message("export_finding", "the linter finds in the export: {finding}",
                    finding=problem.expected)  # fmt: skip

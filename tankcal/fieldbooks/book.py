@@ -33,7 +33,7 @@ class SetUp:
     xyz_m : tuple or None
         East, north and height of the point; None if unknown.
     row : int
-    is_told : bool
+    is_recorded : bool
         Whether a record of the file begins the set-up; otherwise it is inferred from readings.
     """
 
@@ -41,7 +41,7 @@ class SetUp:
     height_m: float | None
     xyz_m: tuple | None
     row: int
-    is_told: bool = True
+    is_recorded: bool = True
 
 
 @dataclass(frozen=True)
@@ -139,12 +139,12 @@ class FieldBook:
         if text not in self.units:
             self.units.append(text)
 
-    def keep_text(self, name, text, row):
+    def add_text(self, name, text, row):
         """Add the text of a number of a field; a blank text is ignored."""
         if text.strip():
             self.texts.setdefault(name, []).append((text.strip(), row))
 
-    def say_units(self, *, length=None, angle=None, last=None):
+    def add_units(self, *, length=None, angle=None, last=None):
         """Add the units of a file: names in METRES and DEGREES, or dms and packed_dms.
 
         last  unit of the last digit of a length, such as "1 mm"
@@ -157,9 +157,9 @@ class FieldBook:
         elif length is not None:
             self.unit(message("lengths_in", "lengths in {unit}", unit=length))
 
-    def stand(self, station, height_m, xyz_m, row, *, is_told=True):
+    def begin_setup(self, station, height_m, xyz_m, row, *, is_recorded=True):
         """Begin a set-up."""
-        self.setups.append(SetUp(station, height_m, xyz_m, row, is_told))
+        self.setups.append(SetUp(station, height_m, xyz_m, row, is_recorded))
 
     def add_shot(self, log, row, *, point, direction, zenith, distance, face=None, height=None,
                  code="", time=None, prism=None, setup=None):  # fmt: skip
@@ -184,7 +184,7 @@ class FieldBook:
             Index of the set-up; None: the last.
         """
         if not self.setups:
-            self.stand("", None, None, row, is_told=False)
+            self.begin_setup("", None, None, row, is_recorded=False)
         if not all(
             (
                 _is_within(log, self.file, row, direction, 2 * FULL_TURN, "deg"),
@@ -243,7 +243,7 @@ def _is_within(log, file, row, value, most, unit):
     return False
 
 
-def number_of(text):
+def parse_number(text):
     """Return a plain number, or None if the text is not a number."""
     text = text.strip()
     if len(text) > MAX_NUMBER or not NUMBER.fullmatch(text):
@@ -252,7 +252,7 @@ def number_of(text):
     return value if math.isfinite(value) else None
 
 
-def unpacked(value):
+def unpack_dms(value):
     """Convert ddd.mmssss to degrees; None if minutes or seconds are impossible."""
     text = f"{abs(value):.10f}"
     whole, _, behind = text.partition(".")
@@ -279,7 +279,7 @@ def refuse_minutes(log, file, row, text):
     log.problem(file, expected, row)
 
 
-def plain_name(text):
+def strip_name(text):
     """Return the name of a point without the zeros or blanks that fill its field."""
     text = text.strip()
     return text.lstrip("0") or text[-1:]

@@ -1,9 +1,10 @@
-"""Detection of the format of a file from its content, and decoding of its text."""
+"""Format of a file from its content, decoding of its text, and detection of truncated numbers."""
 
 import re
+from collections import Counter
+from statistics import median
 
 from tankcal.fieldbooks import gsi, jobxml, profile, rw5, sdr
-from tankcal.fieldbooks.cutting import tell_cut_numbers
 from tankcal.job.folder import has_too_many_lines
 from tankcal.job.tables import Log
 from tankcal.messages import message
@@ -17,13 +18,18 @@ NAMES = {
     "sdr": "Sokkia SDR",
     "csv": "CSV",
 }
-MAX_BYTES, MAX_LINES, MAX_LINE, LOOKED_AT = 50_000_000, 100_000, 4000, 60  # of a file, characters
+MAX_BYTES, MAX_LINES, MAX_LINE, MOST_LINES_OF_TEST = (
+    50_000_000,
+    100_000,
+    4000,
+    60,
+)  # of a file, characters
 _JOBXML = re.compile(r"<(\w+:)?JOBFile[\s>]")
 # Serial transfers add control characters (STX, ETX, Ctrl-Z, zero bytes) around lines and flow
 # control characters (XON, XOFF) anywhere.
-_AROUND_BYTES = bytes((*range(0x09), *range(0x0B, 0x20), 0x7F))
-_AROUND = _AROUND_BYTES.decode("ascii") + "\ufeff"
-_FLOW = str.maketrans(dict.fromkeys("\x11\x13"))
+_CONTROL_BYTES = bytes((*range(0x09), *range(0x0B, 0x20), 0x7F))
+_CONTROL_CHARACTERS = _CONTROL_BYTES.decode("ascii") + "\ufeff"
+_WITHOUT_FLOW_CONTROL = str.maketrans(dict.fromkeys("\x11\x13"))
 _FOREIGN = {  # unsupported formats: regular expressions of their lines
     "Nikon RAW": r"CO,\s*Nikon RAW|(MP|CC|ST|CP|SS|F[12]|UP)(,[^,]*){4,}$",
     "Trimble DC": r"00NMSC|10NM.*SCV",
@@ -31,9 +37,11 @@ _FOREIGN = {  # unsupported formats: regular expressions of their lines
     "Topcon GTS": r"GTS-\d+ v|(STN|BKB|XYZ|HV|SD)\t",
     "LandXML": r"<LandXML\b|<\?xml.*<LandXML\b",
 }
+FEWER = 3  # missing decimals of a truncated number; fields with a smaller median are not tested
+OFTEN, SHARE = 3, 0.1  # count and share of a field that make a number of decimals regular
 
 
-def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
+def read_book(file, data, log, wanted=None, described=None, custom=gsi.NO_CODES):
     """Return the FieldBook of a file, or None after adding a problem to the log.
 
     Parameters
@@ -52,7 +60,7 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
     text = _text(file, data, log)
     if text is None:
         return None
-    format_name = wanted or _format_of(text, described)
+    format_name = wanted or _detect_format(text, described)
     if format_name is None:
         log.problem(file, _refusal(text))
         return None
@@ -67,7 +75,7 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
             find_encoding(data) == "utf-8"
         )  # bytes of UTF-16 letters may be control characters
         if is_plain:
-            return jobxml.read(data.strip(_AROUND_BYTES + b"\r\n\t "), file, log)
+            return jobxml.read(data.strip(_CONTROL_BYTES + b"\r\n\t "), file, log)
         # An editor that writes UTF-16 leaves encoding="UTF-8" in the declaration.
         return jobxml.read(text.strip().encode(errors="replace"), file, log, "utf-8")
     if has_too_many_lines(
@@ -95,14 +103,14 @@ def read_book(file, data, log, wanted=None, described=None, custom=gsi.UNSAID):
                 count=count,
             )
         )
-    tell_cut_numbers(book, log)
+    report_truncated_numbers(book, log)
     return book
 
 
 def is_field_book(data):
     """Return whether the content of a file is a field book in a known format."""
     text = _text("", data, Log())
-    return text is not None and _format_of(text, None) is not None
+    return text is not None and _detect_format(text, None) is not None
 
 
 def _text(file, data, log):
@@ -116,8 +124,13 @@ def _text(file, data, log):
             text = decode_text(data, name)
         except UnicodeDecodeError:
             continue
-        lines = text.replace("\r\n", "\n").replace("\r", "\n").translate(_FLOW).split("\n")
-        lines = [line.strip(_AROUND) for line in lines]
+        lines = (
+            text.replace("\r\n", "\n")
+            .replace("\r", "\n")
+            .translate(_WITHOUT_FLOW_CONTROL)
+            .split("\n")
+        )
+        lines = [line.strip(_CONTROL_CHARACTERS) for line in lines]
         row = next((row for row, line in enumerate(lines, 1) if "\0" in line), None)
         if row is None and (any(lines) or "\0" not in text):
             return "\n".join(lines)
@@ -152,7 +165,7 @@ def _refusal(text):
     )
 
 
-def _format_of(text, described):
+def _detect_format(text, described):
     """Return the format of a text, or None."""
     lines = _first_lines(text)
     if lines and lines[0].lstrip().startswith("<"):
@@ -168,5 +181,65 @@ def _format_of(text, described):
 
 def _first_lines(text):
     """Return the first non-blank lines."""
-    lines = [line for line in text[: LOOKED_AT * MAX_LINE].split("\n") if line.strip()]
-    return lines[:LOOKED_AT]
+    lines = [line for line in text[: MOST_LINES_OF_TEST * MAX_LINE].split("\n") if line.strip()]
+    return lines[:MOST_LINES_OF_TEST]
+
+
+# ---- truncated numbers
+#
+# An instrument writes each kind of number with a constant number of decimals, including zeros. A
+# number with at least FEWER decimals less than the median of its kind is therefore truncated. Only
+# the text counts: 290.0000 is complete, 290. is not. Files of two programs, or with records in two
+# forms, have two frequent numbers of decimals. Such numbers are read as written.
+
+
+def report_truncated_numbers(book, log):
+    """Report each truncated number among the texts of `FieldBook.add_text`."""
+    reported_rows = {problem.row for problem in log.problems if problem.file == book.file}
+    for column, texts in book.texts.items():
+        decimals = [_decimals(text) for text, _ in texts]
+        usual = median(decimals)
+        if usual < FEWER or _omits_final_zeros(texts, decimals, usual):
+            continue
+        counts = Counter(decimals)
+        regular = {
+            count for count, times in counts.items() if times >= max(OFTEN, SHARE * len(texts))
+        }
+        short = [count for count in sorted(regular) if count <= usual - FEWER]
+        if short:
+            text = message(
+                "ways_of_writing",
+                "numbers of {column} with {short} and with {usual:.0f} decimals, each frequent: "
+                "read as written",
+                column=column,
+                short=", ".join(map(str, short)),
+                usual=usual,
+            )
+            book.note(text)
+        for (text, row), count in zip(texts, decimals, strict=True):
+            if count <= usual - FEWER and count not in regular and row not in reported_rows:
+                expected = message(
+                    "cut_short",
+                    "found {text!r} with {count} decimals; expected {usual:.0f}: {many} of the "
+                    "{all} numbers of this field have at least that many (truncated? If the "
+                    "number is correct, add its zeros)",
+                    text=text[:40],
+                    count=count,
+                    usual=usual,
+                    many=sum(number >= usual for number in decimals),
+                    all=len(texts),
+                )
+                log.problem(book.file, expected, row, column)
+
+
+def _decimals(text):
+    """Return the number of digits after the last decimal mark."""
+    _, mark, behind = text.replace(",", ".").rpartition(".")
+    return sum(character.isdigit() for character in behind) if mark else 0
+
+
+def _omits_final_zeros(texts, decimals, usual):
+    """Return whether the file omits final zeros: some numbers are short, none ends with 0."""
+    whole = [text for (text, _), count in zip(texts, decimals, strict=True) if count >= usual]
+    are_uneven = any(usual - FEWER < count < usual for count in decimals)
+    return are_uneven and not any(re.search(r"0\D*$", text) for text in whole)

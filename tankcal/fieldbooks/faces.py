@@ -22,7 +22,7 @@ DEGREE = math.pi / HALF_TURN
 
 
 @dataclass(frozen=True)
-class Reading:
+class Pointing:
     """Result of pointings to one point on face 1: one face, or the mean of both.
 
     Attributes
@@ -62,7 +62,7 @@ class FaceReport:
 
 
 def reduce_faces(shots, log):
-    """Return the Readings in the order of the shots, and a FaceReport for each set-up.
+    """Return the pointings in the order of the shots, and a FaceReport for each set-up.
 
     The second face of a point is the next shot with its name on the other face of the same set-up.
     """
@@ -82,10 +82,10 @@ def reduce_faces(shots, log):
             pair = sorted((shot, shots[mates[place]]), key=lambda member: member.face)
             mean = _mean(*pair, tally, log)
             if mean is not None:
-                readings.append(Reading(replace(mean, row=shot.row, time=shot.time), "both"))
+                readings.append(Pointing(replace(mean, row=shot.row, time=shot.time), "both"))
         else:
             tally[str(shot.face)] += 1
-            readings.append(Reading(_convert_to_face_1(shot), str(shot.face)))
+            readings.append(Pointing(_convert_to_face_1(shot), str(shot.face)))
     reports = {setup: _report(setup, tally) for setup, tally in errors.items()}
     return [_correct_single(reading, reports[reading.shot.setup]) for reading in readings], [
         *reports.values()
@@ -96,9 +96,8 @@ def _correct_single(reading, report):
     """Return a single reading corrected by the mean c and i of its set-up."""
     if reading.faces == "both":
         return reading
-    sign = (
-        1.0 if reading.faces == "1" else -1.0
-    )  # readings of face 2 are already converted to face 1, which reverses the sign
+    # Readings of face 2 are already converted to face 1, which reverses the sign.
+    sign = 1.0 if reading.faces == "1" else -1.0
     shot, sine = reading.shot, 1.0
     if shot.zenith_deg is not None and report.index is not None:
         shot = replace(shot, zenith_deg=shot.zenith_deg - sign * report.index[0])
@@ -119,16 +118,13 @@ def _convert_to_face_1(shot):
     """Return a shot converted to face 1."""
     if shot.face == 1:
         return shot
+    direction, zenith = shot.direction_deg, shot.zenith_deg
+    # The telescope is transited: half a turn of the circle, and the zenith angle counted back.
     return replace(
         shot,
-        direction_deg=None if shot.direction_deg is None else _turn_half(shot.direction_deg),
-        zenith_deg=None if shot.zenith_deg is None else FULL_TURN - shot.zenith_deg,
+        direction_deg=None if direction is None else (direction + HALF_TURN) % FULL_TURN,
+        zenith_deg=None if zenith is None else FULL_TURN - zenith,
     )
-
-
-def _turn_half(direction):
-    """Return a direction plus half a turn, degrees."""
-    return (direction + HALF_TURN) % FULL_TURN
 
 
 def _mean(first, second, tally, log):
@@ -136,6 +132,7 @@ def _mean(first, second, tally, log):
     turned, means = _convert_to_face_1(second), {}
     sine = 1.0
     collimation = index = None
+    # Half the difference of the faces is i, and half their difference across is c / sin z.
     if None not in (first.zenith_deg, turned.zenith_deg):
         index = (first.zenith_deg - turned.zenith_deg) / 2
         means["zenith_deg"] = first.zenith_deg - index
@@ -163,12 +160,10 @@ def _mean(first, second, tally, log):
     if None not in (first.distance_m, turned.distance_m):
         means["distance_m"] = (first.distance_m + turned.distance_m) / 2
         tally["apart"] = max(tally["apart"], abs(first.distance_m - turned.distance_m))
-    first_values = {
-        key: getattr(first, key) for key in ("direction_deg", "zenith_deg", "distance_m")
-    }
-    second_values = {key: getattr(turned, key) for key in first_values}
+    # A value read on one face only is that of this face.
     merged = {
-        key: second_values[key] if value is None else value for key, value in first_values.items()
+        key: getattr(turned, key) if getattr(first, key) is None else getattr(first, key)
+        for key in ("direction_deg", "zenith_deg", "distance_m")
     }
     return replace(first, **(merged | means))
 

@@ -18,9 +18,9 @@ from tankcal.fieldbooks.book import (
     NO_YEAR,
     FieldBook,
     KnownPoint,
-    plain_name,
     refuse_minutes,
     refuse_number,
+    strip_name,
 )
 from tankcal.messages import message
 
@@ -66,10 +66,10 @@ class Custom:
     station: str | None = None
 
 
-UNSAID = Custom()
+NO_CODES = Custom()
 
 
-def read(text, file, log, custom=UNSAID):
+def read(text, file, log, custom=NO_CODES):
     """Return the FieldBook of the text of a GSI file."""
     book, state = FieldBook(file, "gsi"), _State()
     for row, line in enumerate(text.split("\n"), 1):
@@ -90,7 +90,7 @@ def read(text, file, log, custom=UNSAID):
             else:
                 _take(book, log, row, block, state)
     if state.blocks:
-        _say_codes(book, state.blocks)
+        _note_codes(book, state.blocks)
     return book
 
 
@@ -143,7 +143,7 @@ def _take_code(book, log, row, words, state, custom):
         return
     texts = [_text(values[index]) if index in values else "" for index in CODES]
     code = " ".join(text for text in texts if text.strip("0"))
-    if custom.station is not None and texts[0].upper() == plain_name(custom.station).upper():
+    if custom.station is not None and texts[0].upper() == strip_name(custom.station).upper():
         _begin_station(book, log, row, texts[1], values.get("43"), state)
     elif custom.codes == "before":
         state.code = code
@@ -173,11 +173,11 @@ def _begin_station(book, log, row, name, word, state):
         )
         log.problem(book.file, text, row)
         return
-    book.stand(name, height, None, row)
+    book.begin_setup(name, height, None, row)
     state.height, state.code = None, ""
 
 
-def _say_codes(book, blocks):
+def _note_codes(book, blocks):
     """Add a note about code blocks that are not used."""
     shown = [code for code, _ in blocks if code][:SHOWN]
     text = message(
@@ -253,7 +253,7 @@ def _select_words(book, log, row, words):
 
 def _text(word):
     """Return the text of a word without filling characters."""
-    return plain_name(word[1][1:])
+    return strip_name(word[1][1:])
 
 
 def _has_value(word):
@@ -279,9 +279,10 @@ def _value(book, log, row, index, unit, text):
     name, parts = known
     sign, number = (-1.0 if text[0] == "-" else 1.0), int(digits)
     if not is_angle:
-        _say_length(book, name, parts)
+        last = f"{1000 / parts:g} mm" if name == "m" else f"1/{parts:.0f} ft"
+        book.add_units(length=name, last=last)
         return sign * number / parts * METRES[name]
-    book.say_units(angle=name)
+    book.add_units(angle=name)
     if name != "dms":
         return sign * number / parts * DEGREES[name]
     degrees, rest = divmod(number, 100000)  # dddmmsss: the last digit is a tenth of a second
@@ -290,12 +291,6 @@ def _value(book, log, row, index, unit, text):
         refuse_minutes(log, book.file, row, text)
         return None
     return sign * (degrees + minutes / 60 + tenths / 36000)
-
-
-def _say_length(book, name, parts):
-    """Add the unit of a length."""
-    last = f"{1000 / parts:g} mm" if name == "m" else f"1/{parts:.0f} ft"
-    book.say_units(length=name, last=last)
 
 
 def _take_times(words_by_index, state):
@@ -339,9 +334,8 @@ def _take_station(book, row, name, values, is_reading, state):
         return
     if book.setups:
         now = book.setups[-1]
-        same_name = (
-            is_reading or name == now.station
-        )  # in a block with a reading, the name is the target
+        # In a block with a reading, the name is that of the target.
+        same_name = is_reading or name == now.station
         same_place = None in (xyz, now.xyz_m) or all(map(_are_same, xyz, now.xyz_m))
         same_height = _are_same(height, now.height_m)
         if same_name and same_place and (same_height or not book.has_shots):
@@ -357,7 +351,7 @@ def _take_station(book, row, name, values, is_reading, state):
             name = ""
     elif is_reading:
         name = ""
-    book.stand(name, height, xyz, row)
+    book.begin_setup(name, height, xyz, row)
     state.height = state.height if is_reading else None
 
 

@@ -11,9 +11,8 @@ from tankcal.fieldbooks.detection import MAX_BYTES, read_book
 from tankcal.fieldbooks.faces import reduce_faces
 from tankcal.fieldbooks.gsi import Custom
 from tankcal.fieldbooks.profile import read_profile
-from tankcal.fieldbooks.rows import check_rows, make_rows
-from tankcal.fieldbooks.sorting import sort_readings
-from tankcal.fieldbooks.summary import summarise, warn_of
+from tankcal.fieldbooks.rows import check_rows, make_rows, sort_readings
+from tankcal.fieldbooks.summary import collect_warnings, summarise
 from tankcal.fieldbooks.writing import write_tables
 from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import list_some, message
@@ -94,12 +93,12 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     Parameters
     ----------
     files : sequence of str or Path
-        In the order in which they were measured.
+        Field books in the order of measurement.
     folder : str or Path
-        Of the job; made when missing.
+        Folder of the job; created if missing.
     choices : Choices
     replace_tables : bool
-        Tables that have rows already are replaced.
+        Whether tables that already contain rows are replaced.
 
     Returns
     -------
@@ -108,57 +107,62 @@ def import_fieldbooks(files, folder, choices=Choices(), *, replace_tables=False)
     Raises
     ------
     InputError
-        With every problem of every file; nothing is written then.
+        With all problems of all files; no file is written then.
 
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     found = import_fieldbooks(["examples/wall-hits/field-book.gsi"], folder)
-    >>> [path.name for path in found.paths]
+    ...     result = import_fieldbooks(["examples/wall-hits/field-book.gsi"], folder)
+    >>> [path.name for path in result.paths]
     ['setups.csv', 'wall_hits.csv', 'control_readings.csv', 'control.csv']
-    >>> print(found.summary[4])
+    >>> print(result.summary[4])
     hits of the wall: 200
     """
     log, result = Log(), Imported()
     _check_times(choices, log)
     books = _read_all(files, choices, log)
     log.stop_if_problems()
-    stands, shots = _join_books(books)
+    all_setups, shots = _join_books(books)
     shots = _complete_times(shots, choices)
     readings, reports = reduce_faces(shots, log)
     log.stop_if_problems()
-    places = sorted({shot.setup for shot in shots})
-    names = _names_of_setups(stands, places)
-    known = _collect_coordinates(books, stands, places, names, log)
-    stands = {place: (replace(stand, station=_station(stand, names[place])), file)
-              for place, (stand, file) in enumerate(stands) if place in names}  # fmt: skip
+    names = _name_setups(all_setups, sorted({shot.setup for shot in shots}))
+    # Set-ups with readings; a set-up without a station stands for its own station.
+    setups = {}
+    for place, name in names.items():
+        setup, file = all_setups[place]
+        setups[place] = replace(setup, station=setup.station or name), file
+    known = _collect_coordinates(books, setups, log)
     unused = {}
     chosen = sort_readings(
-        readings, choices, {*known, *(stand.station for stand, _ in stands.values())}, log,
+        readings, choices, {*known, *(setup.station for setup, _ in setups.values())}, log,
         lambda what, reading: unused.setdefault(what, []).append(reading.shot),
     )  # fmt: skip
-    _tell_empty_setups(books)
+    _leave_out_empty_setups(books)
     chosen = _keep_timed_control(chosen, choices, unused, log)
     _check_ties(chosen, choices, log)
     log.stop_if_problems()
-    stations = {} if choices.no_control else _stations(known, stands, chosen, log)
+    stations = {} if choices.no_control else _stations(known, setups, chosen, log)
     used = {reading.shot.setup for reading in (*chosen.hits, *chosen.control, *chosen.ties)}
     names = {place: name for place, name in names.items() if place in used}
-    tables = make_rows(stands, names, stations, chosen, choices)
+    tables = make_rows(setups, names, stations, chosen, choices)
     check_rows(tables, log)
     if not tables.keys() - {"setups", "control"} and not log.problems:
         text = message("nothing_read", "no usable reading; expected readings of hits or targets")
         log.problem(Path(files[0]).name, text)
     log.stop_if_problems()
-    result.paths, standing = write_tables(folder, tables, replace=replace_tables)
-    result.summary = summarise(books, chosen, unused, names, stands, reports, (known, stations),
-                              standing)  # fmt: skip
-    result.warnings = [*_warn_of_customs(choices, books), *warn_of(chosen, names, stands, reports)]
+    result.paths, filled_tables = write_tables(folder, tables, replace=replace_tables)
+    result.summary = summarise(books, chosen, unused, names, setups, reports, (known, stations),
+                              filled_tables)  # fmt: skip
+    result.warnings = [
+        *_code_option_warnings(choices, books),
+        *collect_warnings(chosen, names, setups, reports),
+    ]
     return result
 
 
-def _warn_of_customs(choices, books):
+def _code_option_warnings(choices, books):
     """Yield warnings about options for code blocks if no file is GSI."""
     if any(book.format == "gsi" for book in books):
         return
@@ -206,31 +210,31 @@ def _read_all(files, choices, log):
 
 def _join_books(books):
     """Return ([(SetUp, file)], shots) of all books, with consecutive indices of set-ups."""
-    stands, shots = [], []
+    setups, shots = [], []
     for book in books:
-        shots += [replace(shot, setup=shot.setup + len(stands)) for shot in book.shots]
-        stands += [(setup, book.file) for setup in book.setups]
-    return stands, shots
+        shots += [replace(shot, setup=shot.setup + len(setups)) for shot in book.shots]
+        setups += [(setup, book.file) for setup in book.setups]
+    return setups, shots
 
 
-def _tell_empty_setups(books):
+def _leave_out_empty_setups(books):
     """Count set-ups without readings as left out."""
     for book in books:
         used = {shot.setup for shot in book.shots}
-        for place, stand in enumerate(book.setups):
+        for place, setup in enumerate(book.setups):
             if place not in used:
                 what = message("setups_without_readings", "set-ups without readings")
-                book.leave_out(what, stand.row)
+                book.leave_out(what, setup.row)
 
 
-def _names_of_setups(stands, places):
+def _name_setups(setups, places):
     """Return {index: name}: the station, or S1, S2, ...; a repeated station gets -2."""
-    named = {stands[place][0].station for place in places} - {""}
+    named = {setups[place][0].station for place in places} - {""}
     free = (f"S{number}" for number in range(1, len(places) + len(named) + 2))
     free = (candidate for candidate in free if candidate not in named)
     setup_names, counts = {}, Counter()
     for place in places:
-        name = stands[place][0].station or next(free)
+        name = setups[place][0].station or next(free)
         counts[name] += 1
         while counts[name] > 1 and f"{name}-{counts[name]}" in (*named, *setup_names.values()):
             counts[name] += 1
@@ -238,18 +242,12 @@ def _names_of_setups(stands, places):
     return setup_names
 
 
-def _station(stand, name):
-    """Return the station of a set-up, or the name of the set-up."""
-    return stand.station or name
-
-
-def _collect_coordinates(books, stands, places, names, log):
+def _collect_coordinates(books, setups, log):
     """Return {name: list of (xyz, file, row)} of all coordinates in the files."""
-    occupied = [(names[place], *stands[place]) for place in places]
     items = [
-        (stand.station or name, stand.xyz_m, file, stand.row)
-        for name, stand, file in occupied
-        if stand.xyz_m is not None
+        (setup.station, setup.xyz_m, file, setup.row)
+        for setup, file in setups.values()
+        if setup.xyz_m is not None
     ]
     items += [
         (point.point, point.xyz_m, book.file, point.row) for book in books for point in book.known
@@ -336,9 +334,9 @@ def _check_ties(chosen, choices, log):
             log.problem(key, text)
 
 
-def _stations(known, stands, chosen, log):
+def _stations(known, setups, chosen, log):
     """Return {point: (xyz, file, row)} of the stations and of the targets that tie set-ups."""
-    used = [stand.station for stand, _ in stands.values()] + [
+    used = [setup.station for setup, _ in setups.values()] + [
         reading.shot.point for reading in chosen.ties
     ]
     stations, reported = {}, set()

@@ -8,7 +8,7 @@ import datetime
 import re
 from xml.parsers import expat
 
-from tankcal.fieldbooks.book import FieldBook, KnownPoint, number_of, refuse_number
+from tankcal.fieldbooks.book import FieldBook, KnownPoint, parse_number, refuse_number
 from tankcal.messages import message
 
 DEEPEST, LONGEST = 30, 20_000  # nested elements; characters of one value
@@ -20,7 +20,7 @@ MOST_PPM, MOST_PRISM_M = 1e3, 0.5
 _TIME = re.compile(r"(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d)(\.\d+)?(Z|[+-]\d\d:?\d\d)?")
 
 
-class _Refused(Exception):
+class _UnreadableFile(Exception):
     """The file cannot be read further; the problem is in the log."""
 
 
@@ -30,35 +30,35 @@ def read(data, file, log, encoding=None):
     encoding  encoding of the bytes; None: as declared in the file
     """
     book = FieldBook(file, "jxl")
-    taker = _Taker(book, log)
+    reader = _RecordReader(book, log)
     parser = expat.ParserCreate(encoding)
     parser.buffer_text = True
-    parser.StartElementHandler = taker.start
-    parser.EndElementHandler = taker.end
-    parser.CharacterDataHandler = taker.text
-    parser.StartDoctypeDeclHandler = taker.refuse_doctype
-    taker.parser = parser
+    parser.StartElementHandler = reader.start
+    parser.EndElementHandler = reader.end
+    parser.CharacterDataHandler = reader.text
+    parser.StartDoctypeDeclHandler = reader.refuse_doctype
+    reader.parser = parser
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
         text = message("no_xml", "not valid XML ({reason}); is the file complete?", reason=reason)
         log.problem(file, text, error.lineno)
-    except _Refused:
+    except _UnreadableFile:
         return book
     except (ValueError, LookupError):  # an unknown declared encoding
         text = message("xml_encoding", "unknown XML encoding; expected UTF-8")
         log.problem(file, text, 1)
-    taker.tell_strays()
-    if not taker.has_field_book and not log.problems:
+    reader.report_strays()
+    if not reader.has_field_book and not log.problems:
         text = message("no_field_book", "no FieldBook element; expected a JobXML file")
         log.problem(file, text)
     if book.shots:
-        book.say_units(length="m", angle="deg")
+        book.add_units(length="m", angle="deg")
     return book
 
 
-class _Taker:
+class _RecordReader:
     """Handler of XML events that reads each record below FieldBook as {path: text}."""
 
     def __init__(self, book, log):
@@ -75,7 +75,7 @@ class _Taker:
             "a document type (DOCTYPE); expected XML without one, as instruments write it",
         )
         self.log.problem(self.book.file, text, self.parser.CurrentLineNumber)
-        raise _Refused
+        raise _UnreadableFile
 
     def start(self, name, attributes):
         name = name.rpartition(":")[2]
@@ -88,7 +88,7 @@ class _Taker:
                 most=DEEPEST,
             )
             self.log.problem(self.book.file, text, self.parser.CurrentLineNumber)
-            raise _Refused
+            raise _UnreadableFile
         self.has_field_book |= name == "FieldBook"
         if len(self.path) == 3 and self.path[1] == "FieldBook":
             self.record, self.attributes = {}, attributes
@@ -124,7 +124,7 @@ class _Taker:
     def number(self, key):
         """Return a number of the record; None if it is blank or invalid (reported)."""
         text = self.record.get(key, "")
-        value = number_of(text) if text else None
+        value = parse_number(text) if text else None
         if text and value is None:
             refuse_number(self.log, self.book.file, self.row, text)
         return value
@@ -176,7 +176,7 @@ class _Taker:
             return
         book, identity = self.book, self.attributes.get("ID")
         ppm = self.ppm.get(self.record.get("AtmosphereID"), self.last_ppm)
-        book.stand(self.record.get("StationName", ""), self.number("TheodoliteHeight"), None,
+        book.begin_setup(self.record.get("StationName", ""), self.number("TheodoliteHeight"), None,
                    self.row)  # fmt: skip
         self.stations[identity] = len(book.setups) - 1, ppm
         scale = self.number("ScaleFactor")
@@ -231,10 +231,10 @@ class _Taker:
             zenith=self.number("Circle/VerticalCircle"),
             face={"Face1": 1, "Face2": 2}.get(self.record.get("Circle/Face")),
             code=self.record.get("Code", ""), prism=1000 * prism, setup=place,
-            time=time_of(self.attributes.get("TimeStamp", "")),
+            time=parse_time(self.attributes.get("TimeStamp", "")),
         )  # fmt: skip
 
-    def tell_strays(self):
+    def report_strays(self):
         """Report each missing station once."""
         for station, (count, row) in self.strays.items():
             text = message(
@@ -247,7 +247,7 @@ class _Taker:
             self.log.problem(self.book.file, text, row)
 
 
-def time_of(text):
+def parse_time(text):
     """Return date and time without zone, or None."""
     match = _TIME.fullmatch(text.strip()[:40])
     if match is None:

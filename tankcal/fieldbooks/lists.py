@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from tankcal.fieldbooks.writing import refuse_standing, tables_with_rows, write_grids
+from tankcal.fieldbooks.writing import find_filled_tables, refuse_filled, write_grids
 from tankcal.job.contract import COLUMNS
 from tankcal.job.decimals import has_two_meanings, settle_decimal
 from tankcal.job.entries import read_columns
@@ -87,38 +87,26 @@ def read_list(path, folder, name="points", given=None):
     stated = _read_memory(folder, name, log) | (given or {})
     stated = {head: column for head, column in stated.items() if head in table.headings}
     for heading, column in (given or {}).items():
-        _check_given(heading, column, table, fields, log)
+        _check_stated(heading, column, table, fields, log)
     log.stop_if_problems()
-    taken = set(stated.values())
-    free = [field for field in fields if field.name not in taken]
-    headings = [head for head in table.headings if head not in stated]
-    identical = {head: Meaning(head, Fraction(1)) for head in headings if head in _names(free)}
-    rest = [head for head in headings if head not in identical]
+    # Stated meanings take precedence, then headings equal to a column, then recognised headings.
+    by_name = {field.name: field for field in fields}
+    meanings = {head: stated_meaning(head, by_name[column]) for head, column in stated.items()}
+    free = [field for field in fields if field.name not in stated.values()]
+    identical = {field.name for field in free} & set(table.headings) - stated.keys()
+    meanings |= {head: Meaning(head, Fraction(1)) for head in identical}
+    rest = [head for head in table.headings if head not in meanings]
     free = [field for field in free if field.name not in identical]
-    recognised = {
+    meanings |= {
         head: meaning
         for head, meaning in meanings_of(rest, free).items()
         if meaning.factor is not None
     }
-    recognised |= identical | {
-        head: _make_meaning(head, column, fields) for head, column in stated.items()
-    }
-    meanings = {head: recognised[head] for head in table.headings if head in recognised}
-    return ForeignList(name, table, meanings, tuple(log.warnings))
+    in_order = {head: meanings[head] for head in table.headings if head in meanings}
+    return ForeignList(name, table, in_order, tuple(log.warnings))
 
 
-def _names(fields):
-    """Return the names of fields."""
-    return {field.name for field in fields}
-
-
-def _make_meaning(heading, column, fields):
-    """Return the Meaning stated by the user, with the factor of the unit in the heading."""
-    [field] = [field_ for field_ in fields if field_.name == column]
-    return stated_meaning(heading, field)
-
-
-def _check_given(heading, column, table, fields, log):
+def _check_stated(heading, column, table, fields, log):
     """Report a stated heading or column that does not exist."""
     names = [field.name for field in fields]
     if heading not in table.headings:
@@ -183,8 +171,8 @@ def write_list(foreign_list, folder, *, replace=False):
     """
     folder, log = Path(folder), Log()
     refuse_missing(foreign_list)
-    standing = [] if replace else tables_with_rows(folder, [foreign_list.name])
-    refuse_standing(folder, standing)
+    filled_tables = [] if replace else find_filled_tables(folder, [foreign_list.name])
+    refuse_filled(folder, filled_tables)
     table = _convert_table(foreign_list, log)
     log.stop_if_problems()
     read_columns(foreign_list.name, table, log)

@@ -10,10 +10,10 @@ from tankcal.fieldbooks.book import (
     FULL_TURN,
     METRES,
     FieldBook,
-    number_of,
+    parse_number,
     refuse_minutes,
     refuse_number,
-    unpacked,
+    unpack_dms,
 )
 from tankcal.job.folder import parsed_toml
 from tankcal.job.tables import read_bytes
@@ -139,7 +139,7 @@ def read(text, file, log, profile):
             key: cells[place] if place < len(cells) else "" for key, place in places.items()
         }
         key_of_setup = _take(book, log, row, row_cells, values, key_of_setup)
-    book.say_units(length=values["length"], angle=values["angle"])
+    book.add_units(length=values["length"], angle=values["angle"])
     return book
 
 
@@ -179,7 +179,7 @@ def _take(book, log, row, row_cells, values, before):
     if False in angles.values():
         return before
     for key in ("direction", "zenith", "distance"):
-        book.keep_text(key, row_cells[key], row)
+        book.add_text(key, row_cells[key], row)
     face = {"": None, "1": 1, "2": 2, "I": 1, "II": 2}.get(row_cells.get("face", "").upper(), 0)
     time = _time(row_cells.get("time", ""), values)
     if face == 0 or time is False:
@@ -197,7 +197,7 @@ def _take(book, log, row, row_cells, values, before):
     height = values.get("instrument_height_m") if height is None else height * scale
     here = row_cells.get("setup") or values.get("station", ""), height
     if here != before:
-        book.stand(*here, None, row)
+        book.begin_setup(*here, None, row)
     zenith = angles["zenith"]
     if zenith is not None and values["vertical"] == "horizon":
         zenith = (FULL_TURN / 4 - zenith) % FULL_TURN
@@ -216,7 +216,7 @@ def _number(book, log, row, text, values):
         return None
     mark = values["decimal"]
     is_other = mark == "," and "." in text  # 1.234 may mean one thousand
-    value = None if is_other else number_of(text.replace(mark, "."))
+    value = None if is_other else parse_number(text.replace(mark, "."))
     if value is None:
         refuse_number(log, book.file, row, text)
         return False
@@ -233,7 +233,7 @@ def _angle(book, log, row, text, values):
             return False
         if values["angle"] != "packed_dms":
             return value * DEGREES[values["angle"]]
-        value = unpacked(value)
+        value = unpack_dms(value)
     else:
         value = _join_parts(text.replace(",", "."))
     if value is None:
@@ -245,7 +245,7 @@ def _angle(book, log, row, text, values):
 def _join_parts(text):
     """Convert a text with degrees, minutes and seconds to degrees, or return None."""
     sign = -1.0 if text.startswith("-") else 1.0
-    parts = [number_of(part) for part in text.translate(_MARKS).split()]
+    parts = [parse_number(part) for part in text.translate(_MARKS).split()]
     if not 1 <= len(parts) <= 3 or None in parts or any(part >= 60 for part in parts[1:]):
         return None
     return sign * sum(part / 60**power for power, part in enumerate(parts))

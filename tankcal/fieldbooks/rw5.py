@@ -15,10 +15,10 @@ from tankcal.fieldbooks.book import (
     METRES,
     FieldBook,
     KnownPoint,
-    number_of,
+    parse_number,
     refuse_minutes,
     refuse_number,
-    unpacked,
+    unpack_dms,
 )
 from tankcal.messages import message
 
@@ -43,11 +43,11 @@ class _State:
     """Values that apply from one line to the next."""
 
     length = angle = None  # of MO
-    units_told = False  # whether unknown units were reported
+    units_reported = False  # whether unknown units were reported
     station = back = height = rod = None
     azimuth = circle = None  # of the backsight
     key = None  # of the set-up
-    is_told = False  # whether there was a record OC
+    is_recorded = False  # whether there was a record OC
     date = None  # date of the last note with a date
     follows_shot = False  # whether a time in this line belongs to the last reading
     kind = None  # kind of horizontal angle in this set-up: "turned" or "azimuth"
@@ -74,7 +74,7 @@ def _take(book, log, row, line, state):
     elif kind == "MO":
         _take_mode(book, log, row, fields, state)
     elif kind == "OC":
-        state.is_told = True
+        state.is_recorded = True
         state.station = fields.get("OP", fields.get("PN", ""))
         state.back = state.azimuth = state.circle = None
         _take_point(book, log, row, state.station, fields, state)
@@ -126,7 +126,7 @@ def _take_note(book, row, line, state):
 
 def _take_mode(book, log, row, fields, state):
     """Read the units of a record MO."""
-    length, angle = (number_of(fields.get(key_, "")) for key_ in ("UN", "AU"))
+    length, angle = (parse_number(fields.get(key_, "")) for key_ in ("UN", "AU"))
     angle = 0 if "AU" not in fields else angle
     if length not in UNITS or angle not in (0, 1):
         text = message(
@@ -137,12 +137,12 @@ def _take_mode(book, log, row, fields, state):
             au=fields.get("AU", ""),
         )
         log.problem(book.file, text, row)
-        state.units_told = True
+        state.units_reported = True
         return
     state.length, state.angle = UNITS[length], "gon" if angle else "packed_dms"
-    book.say_units(length=state.length, angle=state.angle)
+    book.add_units(length=state.length, angle=state.angle)
     for key, usual in (("SF", 1.0), ("EO", 0.0)):
-        value = number_of(fields.get(key, ""))
+        value = parse_number(fields.get(key, ""))
         if value is not None and value != usual:
             text = message(
                 "rw5_correction",
@@ -155,7 +155,7 @@ def _take_mode(book, log, row, fields, state):
 
 def _length(book, log, row, text, state):
     """Return a length in metres, or None."""
-    value = number_of(text)
+    value = parse_number(text)
     if value is None:
         refuse_number(log, book.file, row, text)
         return None
@@ -164,17 +164,17 @@ def _length(book, log, row, text, state):
 
 def _angle(text, state):
     """Return degrees, or None."""
-    value = None if text is None else number_of(text)
+    value = None if text is None else parse_number(text)
     if value is None or state.angle is None:
         return None
-    return 0.9 * value if state.angle == "gon" else unpacked(value)
+    return 0.9 * value if state.angle == "gon" else unpack_dms(value)
 
 
 def _take_point(book, log, row, name, fields, state):
     """Read the coordinates of a point."""
     if state.length is None:
         return
-    coordinates = [number_of(fields.get(axis, "")) for axis in ("E", "N", "EL")]
+    coordinates = [parse_number(fields.get(axis, "")) for axis in ("E", "N", "EL")]
     for value, code in zip(coordinates, ("E", "N", "EL"), strict=True):
         if value is None and fields.get(code):
             refuse_number(log, book.file, row, fields[code])
@@ -187,8 +187,8 @@ def _take_point(book, log, row, name, fields, state):
 def _take_shot(book, log, row, kind, fields, code, state):
     """Read a reading; begin a set-up if station, backsight or instrument height change."""
     if state.length is None:
-        if not state.units_told:
-            state.units_told = True
+        if not state.units_reported:
+            state.units_reported = True
             text = message(
                 "units_unknown", "no units before this record; expected a record MO with UN and AU"
             )
@@ -208,7 +208,9 @@ def _take_shot(book, log, row, kind, fields, code, state):
     here = (state.station, state.back, state.azimuth, state.circle, state.height)
     if here != state.key:
         state.key, state.kind = here, None
-        book.stand(state.station or "", state.height, None, row, is_told=state.is_told)
+        book.begin_setup(
+            state.station or "", state.height, None, row, is_recorded=state.is_recorded
+        )
     codes = [
         field_code for field_code in (*_HORIZONTAL, "ZE", "VA", "SD", "HD") if field_code in fields
     ]
@@ -216,7 +218,7 @@ def _take_shot(book, log, row, kind, fields, code, state):
     bad = [
         field_code
         for field_code in codes
-        if field_code != "BR" and number_of(texts[field_code]) is None
+        if field_code != "BR" and parse_number(texts[field_code]) is None
     ]
     if bad or "CE" in fields:
         text = message(
@@ -228,7 +230,7 @@ def _take_shot(book, log, row, kind, fields, code, state):
         log.problem(book.file, text, row)
         return
     for field_code in codes:
-        book.keep_text(field_code, texts[field_code], row)
+        book.add_text(field_code, texts[field_code], row)
     _add(book, log, row, kind, {field_code: texts[field_code] for field_code in codes}, code, state,
          fields.get("FP", ""))  # fmt: skip
 
@@ -263,9 +265,9 @@ def _add(book, log, row, kind, texts, code, state, name):
     zenith = angles.get("ZE")
     if zenith is None and "VA" in angles:
         zenith = FULL_TURN / 4 - angles["VA"]
-    distance = number_of(texts["SD"]) if "SD" in texts else None
+    distance = parse_number(texts["SD"]) if "SD" in texts else None
     if distance is None and "HD" in texts and zenith:
-        distance = number_of(texts["HD"]) / max(abs(math.sin(math.radians(zenith))), 1e-6)
+        distance = parse_number(texts["HD"]) / max(abs(math.sin(math.radians(zenith))), 1e-6)
     distance = None if distance is None else distance * METRES[state.length]
     book.add_shot(log, row, point=name, direction=direction, zenith=zenith, distance=distance,
                   face=FACES.get(kind), height=state.rod, code=code)  # fmt: skip

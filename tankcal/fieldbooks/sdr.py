@@ -14,8 +14,8 @@ from tankcal.fieldbooks.book import (
     METRES,
     FieldBook,
     KnownPoint,
-    number_of,
-    plain_name,
+    parse_number,
+    strip_name,
 )
 from tankcal.messages import message
 
@@ -82,13 +82,13 @@ def _take_header(book, log, row, line, state):
     state.wide = HEADER.match(line)[1] == "33"
     state.angle, state.length = ANGLES[units[0]], LENGTHS[units[1]]
     state.east_first = units[4] == "2"
-    book.say_units(length=state.length, angle=state.angle)
+    book.add_units(length=state.length, angle=state.angle)
 
 
 def _take(book, log, row, line, state):
     """Read a record."""
     kind, way = line[:2], line[2:4]
-    takers = {
+    readers = {
         "01": _take_instrument,
         "02": _take_station,
         "03": _take_rod,
@@ -98,8 +98,8 @@ def _take(book, log, row, line, state):
         "09": _take_shot,
         "13": _take_note,
     }
-    if kind in takers:
-        takers[kind](book, log, row, line, state)
+    if kind in readers:
+        readers[kind](book, log, row, line, state)
     elif kind == "11":
         what = message("reduced", "reduced readings (azimuth, horizontal distance)")
         book.leave_out(what, row)
@@ -120,8 +120,8 @@ def _take_station(book, log, row, line, state):
     values = _numbers(book, log, row, parts[1:], METRES[state.length])
     if values is None:
         return
-    xyz, name = _coordinates(values, state), plain_name(parts[0])
-    book.stand(name, values[3], xyz if None not in xyz[:2] else None, row)
+    xyz, name = _coordinates(values, state), strip_name(parts[0])
+    book.begin_setup(name, values[3], xyz if None not in xyz[:2] else None, row)
 
 
 def _take_rod(book, log, row, line, state):
@@ -132,7 +132,7 @@ def _take_rod(book, log, row, line, state):
 
 def _take_scale(book, _log, _row, line, _state):
     """Add a note about a scale factor, which is not applied."""
-    scale = number_of(line[4:20])
+    scale = parse_number(line[4:20])
     if scale not in (None, 1.0):
         text = message(
             "sdr_scale", "scale {scale:g} of record 06: not applied to distances", scale=scale
@@ -144,7 +144,7 @@ def _take_backsight(book, _log, row, _line, _state):
     """Begin a set-up after readings, because a new backsight changes the zero of the circle."""
     if book.has_shots:
         now = book.setups[-1]
-        book.stand(now.station, now.height_m, now.xyz_m, row, is_told=now.is_told)
+        book.begin_setup(now.station, now.height_m, now.xyz_m, row, is_recorded=now.is_recorded)
 
 
 def _fields(line, state, names, numbers):
@@ -159,7 +159,7 @@ def _fields(line, state, names, numbers):
 
 def _numbers(book, log, row, texts, scale):
     """Return numbers (None if blank), or None after adding a problem to the log."""
-    numbers = [number_of(text) if text.strip() else None for text in texts[:4]]
+    numbers = [parse_number(text) if text.strip() else None for text in texts[:4]]
     bad = [
         text
         for text, number in zip(texts[:4], numbers, strict=True)
@@ -191,7 +191,7 @@ def _take_point(book, log, row, line, state):
     parts = _fields(line, state, 1, 3)
     values = _numbers(book, log, row, parts[1:4], METRES[state.length])
     if values and None not in values[:2]:
-        book.known.append(KnownPoint(plain_name(parts[0]), _coordinates(values, state), row))
+        book.known.append(KnownPoint(strip_name(parts[0]), _coordinates(values, state), row))
 
 
 def _take_shot(book, log, row, line, state):
@@ -203,8 +203,8 @@ def _take_shot(book, log, row, line, state):
         return
     station, point, distance, vertical, direction, code = _fields(line, state, 2, 3)
     if not book.setups:  # without record 02 the reading names its station
-        book.stand(plain_name(station), None, None, row, is_told=False)
-    if plain_name(station) != book.setups[-1].station:
+        book.begin_setup(strip_name(station), None, None, row, is_recorded=False)
+    if strip_name(station) != book.setups[-1].station:
         text = message(
             "sdr_station",
             "read from {found!r}, but the last record 02 is of {station!r}; expected the same "
@@ -218,14 +218,14 @@ def _take_shot(book, log, row, line, state):
     if values is None:
         return
     for name, text in (("distance", distance), ("zenith", vertical), ("direction", direction)):
-        book.keep_text(name, text, row)
+        book.add_text(name, text, row)
     distance, vertical, direction = values
     scale = DEGREES[state.angle]
     zenith = None if vertical is None else vertical * scale
     if zenith is not None and not state.from_zenith:
         zenith = (FULL_TURN / 4 - zenith) % FULL_TURN
     book.add_shot(
-        log, row, point=plain_name(point), zenith=zenith, face=face, height=state.rod, code=code,
+        log, row, point=strip_name(point), zenith=zenith, face=face, height=state.rod, code=code,
         direction=None if direction is None else direction * scale,
         distance=None if distance is None else distance * METRES[state.length],
         time=state.time, prism=state.prism,
@@ -242,7 +242,7 @@ def _take_note(book, _log, row, line, state):
             book.shots[-1] = replace(book.shots[-1], time=when)
         return
     if constant:
-        state.prism = number_of(constant[1])
+        state.prism = parse_number(constant[1])
         return
     book.leave_out(message("sdr_notes", "notes (records 13)"), row)
 

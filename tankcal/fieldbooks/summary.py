@@ -11,29 +11,32 @@ SHOWN = 8
 APPLIED_BY_INSTRUMENT = ("gsi", "sdr")  # formats with distances that include the prism constant
 
 
-def summarise(books, chosen, unused, names, stands, reports, coordinates, standing):
+def summarise(books, chosen, unused, names, setups, reports, coordinates, filled_tables):
     """Return the lines of the summary.
 
     Parameters
     ----------
     books : list of FieldBook
-    chosen : Sorted
+    chosen : SortedReadings
     unused : dict
         {reason: shots}
     names : dict
         {index: name of the set-up}
-    stands : dict
+    setups : dict
         {index: (SetUp, file)}
     reports : list of FaceReport
     coordinates : tuple of dict
         Known points, and the points written to control.csv.
-    standing : list of str
+    filled_tables : list of str
         Other tables of the folder that contain rows.
     """
     lines = []
     for book in books:
         lines += _describe_book(book)
-    shown = [_describe_setup(name, stands[place][0].station) for place, name in names.items()]
+    shown = []
+    for place, name in names.items():
+        station = setups[place][0].station
+        shown.append(name if name == station else f"{name} ({station})")
     lines.append(message("import_setups", "set-ups: {names}", names=list_some(shown, SHOWN)))
     reports = [report for report in reports if report.setup in names]
     for report in reports:
@@ -61,8 +64,8 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
                 names=list_some(list(dict.fromkeys(shot.point or "?" for shot in shots)), SHOWN),
             )
         )
-    if standing:
-        tables = [f"{table}.csv" for table in standing]
+    if filled_tables:
+        tables = [f"{table}.csv" for table in filled_tables]
         lines.append(
             message(
                 "import_standing",
@@ -71,11 +74,6 @@ def summarise(books, chosen, unused, names, stands, reports, coordinates, standi
             )
         )
     return lines
-
-
-def _describe_setup(name, station):
-    """Return the name of a set-up, with its station if different."""
-    return name if name == station else f"{name} ({station})"
 
 
 def _describe_book(book):
@@ -154,12 +152,12 @@ def _describe_targets(chosen):
                           count=len(readings), names=list_some(points, SHOWN))  # fmt: skip
 
 
-def warn_of(chosen, names, stands, reports):
+def collect_warnings(chosen, names, setups, reports):
     """Return warnings about readings that may need correction."""
     problems = []
     for place, name in names.items():
-        stand, file = stands[place]
-        if not stand.is_told and stand.height_m is not None:
+        setup, file = setups[place]
+        if not setup.is_recorded and setup.height_m is not None:
             text = message(
                 "station_of_readings",
                 "set-up {setup}: the file has no station record, only an instrument height; the "
@@ -167,24 +165,24 @@ def warn_of(chosen, names, stands, reports):
                 "record is not detected; check setups.csv",
                 setup=name,
             )
-            problems.append(Problem(file, text, stand.row))
-        elif not stand.is_told:
+            problems.append(Problem(file, text, setup.row))
+        elif not setup.is_recorded:
             text = message(
                 "no_station",
                 "set-up {setup}: the file has no station, so the station name and the instrument "
                 "height are unknown; enter them in setups.csv before you run the job",
                 setup=name,
             )
-            problems.append(Problem(file, text, stand.row))
-        elif stand.height_m is None:
+            problems.append(Problem(file, text, setup.row))
+        elif setup.height_m is None:
             text = message(
                 "no_instrument_height",
                 "set-up {setup}: the file has no instrument height; it is left blank (0)",
                 setup=name,
             )
-            problems.append(Problem(file, text, stand.row))
+            problems.append(Problem(file, text, setup.row))
     for report in (report for report in reports if report.setup in names):
-        name, file = names[report.setup], stands[report.setup][1]
+        name, file = names[report.setup], setups[report.setup][1]
         for what in (report.collimation, report.index):
             if what is not None and max(abs(what[0]), what[1]) > LARGE_DEG:
                 text = message(

@@ -10,7 +10,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from tankcal.fieldbooks.rows import CONTRACT, columns_of
+from tankcal.fieldbooks.rows import CONTRACT, needed_columns
 from tankcal.job.contract import COLUMNS
 from tankcal.job.folder import csv_marks, read_toml
 from tankcal.job.tables import SETTINGS_FILE, Log, read_bytes
@@ -24,19 +24,19 @@ def write_tables(folder, tables, *, replace):
     Raises InputError if the folder is a file, or if a table already contains rows.
     """
     folder = Path(folder)
-    standing = tables_with_rows(folder, CONTRACT)
-    refuse_standing(folder, [] if replace else [name for name in standing if name in tables])
+    filled_tables = find_filled_tables(folder, CONTRACT)
+    refuse_filled(folder, [] if replace else [name for name in filled_tables if name in tables])
     grids = {name: _make_grid(name, rows) for name, rows in tables.items()}
     paths = write_grids(folder, grids)
-    return paths, [table for table in standing if table not in tables]
+    return paths, [table for table in filled_tables if table not in tables]
 
 
-def tables_with_rows(folder, names):
+def find_filled_tables(folder, names):
     """Return the tables of a job folder that contain rows."""
     return [name for name in names if _has_rows(folder / f"{name}.csv")]
 
 
-def refuse_standing(folder, names):
+def refuse_filled(folder, names):
     """Raise InputError if the folder is a file, or for tables that are not to be replaced."""
     log = Log()
     if folder.exists() and not folder.is_dir():
@@ -60,7 +60,7 @@ def write_grids(folder, grids, others=None):
         f"{name}.csv": _comments(folder / f"{name}.csv") + _text(name, grid, separator, decimal)
         for name, grid in grids.items()
     }
-    _put(folder, texts | (others or {}))
+    _write_files(folder, texts | (others or {}))
     return [folder / name for name in texts]
 
 
@@ -93,7 +93,7 @@ def _comments(path):
 
 
 def _make_grid(name, rows):
-    columns = columns_of(name, rows)
+    columns = needed_columns(name, rows)
     return [columns, *([row.cells.get(column, "") for column in columns] for row in rows)]
 
 
@@ -112,7 +112,7 @@ def _text(name, grid, separator, decimal):
     return stream.getvalue()
 
 
-def _put(folder, texts):
+def _write_files(folder, texts):
     """Write the files to a temporary folder, then move all of them into the folder."""
     target = folder.resolve()
     target.parent.mkdir(parents=True, exist_ok=True)

@@ -38,6 +38,7 @@ from tankcal.job.model import (
     Top,
 )
 from tankcal.job.strapping import gauged
+from tankcal.job.structure import structure, to_si
 from tankcal.job.tables import fingerprint, read_beside
 from tankcal.messages import message
 from tankcal.tank.rules.model import Rule
@@ -135,10 +136,9 @@ def stated_of(table):
     """`StatedVolume` of each row of stated.csv."""
     if table is None:
         return ()
-    columns = map(table.of, ("high_m", "low_m", "volume_m3", "note"))
     return tuple(
-        StatedVolume(high, low, volume, note or "", row, table.file)
-        for high, low, volume, note, row in zip(*columns, table.rows, strict=True)
+        structure(StatedVolume, cells, row=row, file=table.file)
+        for row, cells in zip(table.rows, table.records(), strict=True)
     )
 
 
@@ -215,11 +215,11 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         files=(*frame.files, *(InputFile(*file) for file in attached.files)),
         bottom=_bottom(values, tables["bottom"]),
         deadwood=_deadwood(tables["deadwood"]),
-        roof=_roof(values["roof"]),
-        top=_top(values["top"]),
+        roof=_part(Roof, values["roof"], "mass_kg"),
+        top=_part(Top, values["top"], "form"),
         horizontal=_horizontal(values["horizontal"], has_points) if kind == "horizontal" else None,
         rings=_rings(tables) if kind == "horizontal" else (),
-        sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
+        sphere=structure(Sphere, values["sphere"]) if kind == "sphere" else None,
         circumference_m=values["checks"]["circumference_m"],
         diameter_is=values["checks"]["diameter_is"],
         diameter_within_m=None if within_mm is None else within_mm / 1000,
@@ -231,10 +231,7 @@ def make_job(raw, values, tables, attached, measurements, warnings):
 
 def _inspection(given):
     """`Inspection` of the section [inspection]; None if rule and yield stress are blank."""
-    rule, strength = given["rule"], given["yield_mpa"]
-    if rule is None and strength is None:
-        return None
-    return Inspection(rule, None if strength is None else 1e6 * strength)
+    return structure(Inspection, given) if _given(given) else None
 
 
 def make_frame(raw, values, tables, measurements, warnings, has_points=True):
@@ -257,7 +254,11 @@ def make_frame(raw, values, tables, measurements, warnings, has_points=True):
         survey=_survey(values["survey"]),
         datum=_datum(values["datum"], kind, has_points),
         table=_table(values["table"]),
-        material=_material(values["material"]),
+        material=structure(
+            Material,
+            values["material"],
+            expansion_given=values["material"]["expansion_per_k"] is not None,
+        ),
         courses=_courses(tables) if kind == "vertical" else (),
         points=None,
         certificate=_given(values["certificate"]),
@@ -280,17 +281,16 @@ def _tank(values):
     """`Tank`; None if its name or kind is not given."""
     if values["id"] is None or values["kind"] is None:
         return None
-    sizes = {name: value for name, value in values.items() if name.startswith("nominal_")}
+    sizes = [name for name in values if name.startswith("nominal_")]
     texts = {name: value for name, value in values.items() if name not in (*sizes, "id", "kind")}
-    return Tank(values["id"], values["kind"], details=_given(texts), **sizes)
+    return structure(Tank, values, details=_given(texts))
 
 
 def _survey(values):
     if values["date"] is None:
         return None
-    given = {name: value for name, value in values.items() if name != "pressure_bar"}
     pressure = _pascals(values["pressure_bar"])
-    return Survey(**{**given, "side": values["side"] or "inside"}, pressure_pa=pressure)
+    return structure(Survey, values, side=values["side"] or "inside", pressure_pa=pressure)
 
 
 def _pascals(pressure_bar):
@@ -309,26 +309,12 @@ def _datum(values, kind, has_points):
 def _table(values):
     if values["reference_temperature_c"] is None:
         return None
-    given = _given(values)
-    litres = given.pop("max_interpolation_error_l", None)
-    pressure = _pascals(given.pop("pressure_bar", None))
-    return TableSpec(
-        step_m=given.pop("step_m", None),
-        fine_zones=tuple(sorted(given.pop("fine_zones", ()))),
-        max_interpolation_error_m3=None if litres is None else litres / 1000,
-        pressure_pa=pressure,
-        **given,
+    return structure(
+        TableSpec,
+        values,
+        fine_zones=tuple(sorted(values["fine_zones"] or ())),
+        pressure_pa=_pascals(values["pressure_bar"]),
     )
-
-
-def _material(values):
-    given = _given(values)
-    si = {"e_pa": 1e9 * given["e_gpa"]} if "e_gpa" in given else {}
-    if "expansion_per_k" in given:
-        si["expansion_per_k"] = given["expansion_per_k"]
-    if "poisson" in given:
-        si["poisson"] = given["poisson"]
-    return Material(**si, expansion_given="expansion_per_k" in given)
 
 
 def _courses(tables):
@@ -340,15 +326,14 @@ def _courses(tables):
     if welds is not None:
         for course, azimuth in zip(welds.of("course"), welds.of("azimuth_deg"), strict=True):
             azimuths.setdefault(course, []).append(float(np.radians(azimuth)))
-    columns = (table.of(name) for name in ("course", "height_m", "thickness_mm", "paint_mm"))
     return tuple(
-        Course(
-            name,
-            height_m,
-            *_plate(thickness_mm / 1000, (paint_mm or 0.0) / 1000, gauge_means.get(name)),
-            tuple(sorted(azimuths[name])) if name in azimuths else None,
+        structure(
+            Course,
+            cells | _gauged_plate(gauge_means.get(cells["course"])),
+            name=cells["course"],
+            welds_rad=tuple(sorted(azimuths.get(cells["course"], ()))) or None,
         )
-        for name, height_m, thickness_mm, paint_mm in zip(*columns, strict=True)
+        for cells in table.records()
     )
 
 
@@ -357,23 +342,22 @@ def _rings(tables):
     if table is None:
         return ()
     gauge_means = gauged(tables["thickness"])
-    columns = map(table.of, ("ring", "length_m", "thickness_mm", "paint_mm", "lap"))
     return tuple(
-        Ring(
-            name,
-            length_m,
-            *_plate((thickness_mm or 0.0) / 1000, (paint_mm or 0.0) / 1000, gauge_means.get(name)),
-            lap,
+        structure(
+            Ring,
+            cells | _gauged_plate(gauge_means.get(cells["ring"])),
+            name=cells["ring"],
         )
-        for name, length_m, thickness_mm, paint_mm, lap in zip(*columns, strict=True)
+        for cells in table.records()
     )
 
 
-def _plate(thickness_m, paint_m, gauge_mean):
-    """Thickness of plate and paint, m; gauge readings, averaged by `gauged`, take precedence."""
+def _gauged_plate(gauge_mean):
+    """Thickness of plate and paint by the gauge, m, which replaces the declared thickness."""
     if gauge_mean is None:
-        return thickness_m, paint_m
-    return gauge_mean[0], paint_m if gauge_mean[2] is None else gauge_mean[2]
+        return {}
+    plate, _, paint = gauge_mean
+    return {"thickness_m": plate} | ({} if paint is None else {"paint_m": paint})
 
 
 def _points(table, covariance):
@@ -408,10 +392,6 @@ def _bottom(values, table):
     return Bottom(form, **{key: value for key, value in values["bottom"].items() if key != "form"})
 
 
-def _top(values):
-    return None if values["form"] is None else Top(**values)
-
-
 def _column(table, name, per_si=1):
     """Column as an array (n,) in SI; None if the table has no such column."""
     return None if table.columns[name] is None else np.array(table.of(name)) / per_si
@@ -420,32 +400,27 @@ def _column(table, name, per_si=1):
 def _deadwood(table):
     if table is None:
         return ()
-    columns = (table.of(name) for name in ("name", "bottom_m", "top_m", "volume_m3", "u_m3"))
-    return tuple(Deadwood(*row) for row in zip(*columns, table.rows, strict=True))
+    rows = zip(table.rows, table.records(), strict=True)
+    return tuple(structure(Deadwood, cells, row=row) for row, cells in rows)
 
 
-def _roof(values):
-    return None if values["mass_kg"] is None else Roof(**values)
+def _part(cls, values, main_key):
+    """Part of the tank described by one section; None if its main key is blank."""
+    return None if values[main_key] is None else structure(cls, values)
 
 
 def _horizontal(values, has_points):
-    width, height = (values[name] or values["diameter_m"] for name in ("width_m", "height_m"))
-    length, dip, tilt = (values[name] for name in ("length_m", "dip_from_a_m", "tilt_mm_per_m"))
-    azimuth, angle = values["azimuth_deg"], values["tube_angle_deg"]
-    return Horizontal(
-        length,
-        _end(values, "end_a"),
-        _end(values, "end_b"),
-        width,
-        height,
-        tilt=None if has_points else (tilt or 0.0) / 1000,
-        roll_rad=float(np.radians(values["roll_deg"] or 0.0)),
+    size = values["diameter_m"]  # of a round tank
+    length, dip = values["length_m"], values["dip_from_a_m"]
+    return structure(
+        Horizontal,
+        values,
+        end_a=_end(values, "end_a"),
+        end_b=_end(values, "end_b"),
+        width_m=values["width_m"] or size,
+        height_m=values["height_m"] or size,
         dip_from_a_m=length / 2 if dip is None else dip,
-        dip_direction=values["dip_direction"] or "plumb",
-        thickness_m=(values["thickness_mm"] or 0.0) / 1000,
-        azimuth_rad=None if azimuth is None else float(np.radians(azimuth)),
-        tube_angle_rad=angle and float(np.radians(angle)),
-        tube_offset_m=values["tube_offset_m"],
+        **({"tilt": None} if has_points else {}),  # the points determine the tilt
     )
 
 
@@ -457,26 +432,16 @@ def _end(values, end):
     return End(form, depth or 0.0, *radii, values[f"{end}_standard"])
 
 
-def _sphere(values):
-    lengths = (values[name] for name in ("ovality_mm", "form_mm"))
-    return Sphere(
-        values["diameter_m"],
-        (values["thickness_mm"] or 0.0) / 1000,
-        *(None if length is None else length / 1000 for length in lengths),
-    )
-
-
 def _ship(values):
-    bow, contraction = values["bow_azimuth_deg"], values["contraction_percent"]
-    return Ship(
-        tuple(sorted(values["trim_m"])),
-        values["length_between_marks_m"],
-        tuple(sorted(float(np.radians(angle)) for angle in values["list_deg"])),
-        float(np.radians(BOW_DEG if bow is None else bow)),
-        values["pipe_bottom_m"],
-        values["pipe_top_m"],
-        values["correction_step_m"],
-        None if contraction is None else contraction / 100,
+    given = to_si(values)
+    return structure(
+        Ship,
+        values,
+        trim_m=tuple(sorted(given["trim_m"])),
+        list_rad=tuple(sorted(given["list_rad"])),
+        bow_azimuth_rad=float(np.radians(BOW_DEG))
+        if given["bow_azimuth_rad"] is None
+        else given["bow_azimuth_rad"],
     )
 
 

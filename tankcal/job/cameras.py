@@ -117,7 +117,7 @@ def at_focus(given):
     lens = lens_of(given)
     if lens is None:
         return given
-    values = zip(RADIAL, lens.focused.tolist(), strict=True)
+    values = zip(RADIAL, lens.radial_in_focus.tolist(), strict=True)
     return given | {PARAMETER_KEYS[name][0]: value for name, value in values}
 
 

@@ -48,6 +48,12 @@ class ColumnValues:
         """Values of a numeric column, shape (n,); nan for blank and invalid values."""
         return np.array(self.of(name), dtype=float)
 
+    def records(self):
+        """Yield {column: value} of each row."""
+        columns = [self.of(name) for name in self.columns]
+        for values in zip(*columns, strict=True):
+            yield dict(zip(self.columns, values, strict=True))
+
     @property
     def is_empty(self):
         """Return True if the table has no row, readable or not."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tankcal.camera.comparator import repeats, transformation
+from tankcal.camera.comparator import fit_transformation, group_readings
 from tankcal.camera.film import Surface, flatten_film, heights_at
 from tankcal.errors import SolutionError
 from tankcal.job.cameras import image_coordinates, image_frames
@@ -100,15 +100,15 @@ def _transformed(imagery, tables, cameras, adjustment):
         points = [points_of[i] for i in rows_of_photo.tolist()]
         readings, reading_sd = (
             xy[rows_of_photo],
-            fit.turned(np.where(np.isnan(sd[rows_of_photo]), default, sd[rows_of_photo])),
+            fit.propagate_sds(np.where(np.isnan(sd[rows_of_photo]), default, sd[rows_of_photo])),
         )
-        added = np.einsum("nii->ni", fit.added_covariance(readings))
+        added = np.einsum("nii->ni", fit.parameter_covariance(readings))
         # The mean of repeated readings has a smaller variance; the transformation adds to it.
-        repeated = repeats(points, readings)
+        repeated = group_readings(points, readings)
         variance = reading_sd**2 / repeated.count[repeated.group][:, None]
         growth = np.sqrt(1 + added / variance)
         xy[rows_of_photo], sd[rows_of_photo], shared[rows_of_photo] = (
-            fit.of(readings),
+            fit.transform(readings),
             reading_sd,
             np.sqrt(added),
         )
@@ -225,7 +225,7 @@ class MarkReadings:
             The remaining readings, with the others in `rejected`.
         """
         repeated = self.repeats
-        is_rejected = repeated.beyond(limit_mm)
+        is_rejected = repeated.exceeds(limit_mm)
         rejected = tuple(
             RejectedReadings(
                 photo,
@@ -250,14 +250,14 @@ class MarkReadings:
     @property
     def repeats(self):
         """Repeated readings of the marks (comparator.Repeats)."""
-        return repeats(self.names, self.xy_mm)
+        return group_readings(self.names, self.xy_mm)
 
     def fit(self, photo, camera):
         """Fit the transformation; raises SolutionError if the marks do not determine it."""
         repeated = self.repeats
         if not len(self.rows):
             raise SolutionError(message("no_marks", "no marks"))
-        fitted = transformation(self.xy_mm, self.marks_mm, self.sd_mm[:, None], self.kind)
+        fitted = fit_transformation(self.xy_mm, self.marks_mm, self.sd_mm[:, None], self.kind)
         calibrated = self.marks_mm[repeated.first]
         return FiducialFit(
             photo=photo,
@@ -267,7 +267,7 @@ class MarkReadings:
             count=repeated.count,
             mean_mm=repeated.mean,
             sd_mm=repeated.sd,
-            residual_mm=fitted.of(repeated.mean) - calibrated,
+            residual_mm=fitted.transform(repeated.mean) - calibrated,
             transformation=fitted,
             rejected=self.rejected,
         )

@@ -8,6 +8,7 @@ from tankcal.job.checks.liquid import meters_read
 from tankcal.job.checks.runs import CHECK
 from tankcal.job.contract.liquid import EXPANSION_SHARE, JOINT, RADIUS_SHARE, TEMPERATURE_SD_K
 from tankcal.job.model.liquid import Meter, Metering
+from tankcal.job.structure import structure
 
 _EPOCH = datetime.datetime(2000, 1, 1)
 
@@ -71,19 +72,8 @@ def _or_default(value, default):
 
 
 def _meter(name, given, row):
-    return Meter(
-        name,
-        factor=given["factor"],
-        u_factor=given["u_factor_ppm"] / (given["k"] or 1.0) / 1e6,
-        repeatability=given["repeatability_ppm"] / 1e6,
-        fixed_m3=(given["fixed_l"] or 0.0) / 1000,
-        certificate=given["certificate"] or "",
-        prover=given["prover"] or "",
-        flow_min_m3_h=given["flow_min_m3_h"],
-        flow_max_m3_h=given["flow_max_m3_h"],
-        factor_after=given["factor_after"],
-        row=row,
-    )
+    u_factor = given["u_factor_ppm"] / (given["k"] or 1.0) / 1e6
+    return structure(Meter, given, name=name, u_factor=u_factor, row=row)
 
 
 def _moment(seconds):

@@ -8,6 +8,7 @@ from tankcal.job.checks.survey.stadia import bars_of, bars_used, is_bar
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.contract.registers import FREE, INSTRUMENT_KINDS
 from tankcal.job.imagery import imagery_of
+from tankcal.job.structure import structure
 from tankcal.survey.measurements import (
     AdjustmentSettings,
     CorrelatedReadings,
@@ -77,19 +78,8 @@ def _has_rows(table):
 
 
 def _settings(given):
-    sd, limit = given["image_sd_um"], given["reading_limit_um"]
-    return AdjustmentSettings(
-        datum=given["datum"] or "control",
-        datum_points=tuple(datum_point(text) for text in given["datum_points"] or ()),
-        fixed_photo=given["fixed_photo"],
-        image_sd_mm=None if sd is None else sd / 1000,
-        snooping=given["snooping"] is not False,
-        scale=given["scale"] or "a_priori",
-        refraction=given["refraction"],
-        image_weights=given["image_weights"] or "measured",
-        reading_limit_mm=None if limit is None else limit / 1000,
-        depth_of_field=bool(given["depth_of_field"]),
-    )
+    points = tuple(datum_point(text) for text in given["datum_points"] or ())
+    return structure(AdjustmentSettings, given, datum_points=points)
 
 
 def _nominal(values):
@@ -187,16 +177,15 @@ def _instrument(name, given):
     if is_bar(kind) and given["length_m"] and given["u_mm"] is not None:
         scale = 1e3 * given["u_mm"] / given["length_m"]  # ppm
     details = {key: given[key] for key in PRINTED if given[key] is not None}
-    return Instrument(
+    is_known = kind in INSTRUMENT_KINDS
+    return structure(
+        Instrument,
+        given,
         name=name,
-        kind=kind if kind in INSTRUMENT_KINDS else "other",
-        correction=given["correction"] or 0.0,
-        correction_m=(given["correction_mm"] or 0.0) / 1000,
-        certified_temperature_c=given["certified_temperature_c"],
-        expansion_per_k=given["expansion_per_k"] or 0.0,
+        kind=kind if is_known else "other",
         u_scale=np.nan if scale == FREE else (scale or 0.0) / 1e6,
         u_offset_m=np.nan if offset == FREE else (offset or 0.0) / 1000,
-        details=details if kind in INSTRUMENT_KINDS else {"kind": given["kind"]} | details,
+        details=details if is_known else {"kind": given["kind"]} | details,
     )
 
 
@@ -204,12 +193,12 @@ def setups_of(table):
     """`Setup`s of setups.csv, in the order of the file."""
     if not _has_rows(table):
         return ()
-    names = ("setup", "station", "instrument", "instrument_height_m")
+    rows = zip(table.rows, table.records(), strict=True)
     return tuple(
-        Setup(name, station, instrument, height or 0.0, row)
-        for name, station, instrument, height, row in zip(
-            *(table.of(column) for column in names), table.rows, strict=True
+        structure(
+            Setup, cells, name=cells["setup"], height_m=cells["instrument_height_m"] or 0.0, row=row
         )
+        for row, cells in rows
     )
 
 

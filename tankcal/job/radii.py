@@ -4,6 +4,7 @@ import numpy as np
 
 from tankcal.job.checks.extent import is_surveyed
 from tankcal.job.model.radii import Change, Radii
+from tankcal.job.structure import structure
 
 
 def make_radii(values, tables, covariance_m2):
@@ -40,18 +41,13 @@ def make_radii(values, tables, covariance_m2):
     temperature = given["reference_temperature_c"]
     if temperature is None:
         temperature = values["table"]["reference_temperature_c"]
-    radii = Radii(
-        radius,
-        covariance,
-        given["u_common_mm"] / 1000,
-        temperature,
-        given["source"],
-        given["note"] or "",
-        table.file,
-        tuple(None if i is None else table.rows[i] for i in order),
+    radii = structure(
+        Radii,
+        given,
+        radius_m=radius,
+        covariance_m2=covariance,
+        temperature_c=temperature,
+        file=table.file,
+        row=tuple(None if i is None else table.rows[i] for i in order),
     )
-    return radii, _change(values["change"]) if is_surveyed(tables) else None
-
-
-def _change(given):
-    return Change(*((given[f"{name}_mm"] or 0.0) / 1000 for name in ("common", "own", "shared")))
+    return radii, structure(Change, values["change"]) if is_surveyed(tables) else None

@@ -113,7 +113,7 @@ class TableUncertainty:
         return np.hypot(U, np.sqrt(2) * self.rounding_m3)
 
 
-def coverage_factor_of(table):
+def coverage_factor(table):
     """Coverage factor of a normal distribution for the coverage of a table's U."""
     if table.record is None:
         return table.k
@@ -121,7 +121,7 @@ def coverage_factor_of(table):
     return float(ndtri(0.5 + probability / 2))
 
 
-def uncertainty_at(table, dips_m, volume_m3, k, error_m3=0.0):
+def interpolate_uncertainty(table, dips_m, volume_m3, k, error_m3=0.0):
     """Return the TableUncertainty of a FormerTable at dips.
 
     Parameters
@@ -141,17 +141,17 @@ def uncertainty_at(table, dips_m, volume_m3, k, error_m3=0.0):
     rounding = float(k * spread)
     if table.U_m3 is None:
         return TableUncertainty(k, volume_m3, None, rounding, None, None)
-    scale = k / coverage_factor_of(table)
+    scale = k / coverage_factor(table)
     stated = scale * np.interp(dips_m, table.height_m, table.U_m3)
     factor, by = None, "independent_rows"
     if table.factor_m3 is not None:
-        factor, by = _factor_at(table, dips_m, stated), "record"
+        factor, by = _interpolate_factor(table, dips_m, stated), "record"
     elif _is_in_percent(table):
         by = "proportional"
     return TableUncertainty(k, volume_m3, np.hypot(stated, rounding), rounding, factor, by)
 
 
-def _factor_at(table, dips, stated):
+def _interpolate_factor(table, dips, stated):
     """Covariance factor (rows, inputs) at dips; each row has the norm of the stated U."""
     upper = np.clip(np.searchsorted(table.height_m, dips), 1, len(table.height_m) - 1)
     below = table.height_m[upper - 1]
@@ -183,7 +183,7 @@ class Deliveries:
     c_limit: np.ndarray
 
 
-def deliveries_between(basis, former_U, new_U, c, low, high):
+def compare_deliveries(basis, former_U, new_U, c, low, high):
     """Return the `Deliveries` between rows of a OneBasis.
 
     Parameters
@@ -206,14 +206,14 @@ def deliveries_between(basis, former_U, new_U, c, low, high):
     )  # fmt: skip
 
 
-def worst_by_share(basis, minimum_m):
+def find_worst_by_share(basis, minimum_m):
     """Rows (low, high) of the delivery of at least `minimum_m` with the largest |d| / V, or None.
 
     A delivery of at least twice the minimum consists of two shorter ones, one of which has at least
     the same |d| / V. So only shorter deliveries are examined. No delivery begins or ends in a zone
     that is not for use.
     """
-    dips, use = basis.height_m, np.flatnonzero(basis.for_use)
+    dips, use = basis.height_m, np.flatnonzero(basis.usable)
     dips, d = dips[use], (basis.new_m3 - basis.on_basis_m3)[use]
     volume = basis.on_basis_m3[use]
     if len(use) < 2:
@@ -232,13 +232,13 @@ def worst_by_share(basis, minimum_m):
     return pair
 
 
-def worst_by_error(basis, former_U, new_U, c, minimum_m, also=()):
+def find_worst_by_error(basis, former_U, new_U, c, minimum_m, also=()):
     """Return the one-row Deliveries of minimum height with the largest |E_n|, or None.
 
     `also` lists further pairs of rows. The result is None if a U is unknown, or no delivery is high
     enough.
     """
-    use = np.flatnonzero(basis.for_use)
+    use = np.flatnonzero(basis.usable)
     dips = basis.height_m[use]
     first = np.searchsorted(dips, dips + minimum_m - SAME_M)
     starts = np.flatnonzero(first < len(dips))
@@ -247,8 +247,8 @@ def worst_by_error(basis, former_U, new_U, c, minimum_m, also=()):
         low, high = np.append(low, pair[0]), np.append(high, pair[1])
     if not len(low) or former_U.deliveries_by is None or new_U.deliveries_by is None:
         return None
-    deliveries = deliveries_between(basis, former_U, new_U, c, low.astype(int), high.astype(int))
+    deliveries = compare_deliveries(basis, former_U, new_U, c, low.astype(int), high.astype(int))
     place = int(np.argmax(np.abs(deliveries.E_n)))
-    return deliveries_between(
+    return compare_deliveries(
         basis, former_U, new_U, c, deliveries.low[place], deliveries.high[place]
     )

@@ -19,9 +19,9 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.recalibration.densities import Density, densities_of
 from tankcal.recalibration.difference import adjust_difference, slopes_m2
-from tankcal.recalibration.upright_shell import Rings
+from tankcal.recalibration.tank_facts import Density, find_densities
+from tankcal.recalibration.upright_shell import Rings, estimate_radii
 from tankcal.record.comparison import BasisStep, ZeroShift
 from tankcal.tank.fittings import floating_roof
 
@@ -69,7 +69,7 @@ class OneBasis:
     steps : dict
         {name: Step}, in order.
     zero : ZeroShift
-    for_use : (rows,) ndarray of bool
+    usable : (rows,) ndarray of bool
         False where a roof is partly afloat.
     interpolation_m3 : float
         Largest interpolation error in the former table.
@@ -84,14 +84,14 @@ class OneBasis:
     new_m3: np.ndarray
     steps: dict
     zero: ZeroShift
-    for_use: np.ndarray
+    usable: np.ndarray
     interpolation_m3: float
     densities: tuple[Density, Density]
 
     @property
-    def saved_steps(self):
+    def basis_steps(self):
         """Return the `BasisStep` of each step."""
-        return [_saved(name, step, self.height_m) for name, step in self.steps.items()]
+        return [_basis_step(name, step, self.height_m) for name, step in self.steps.items()]
 
 
 def bring_to_one_basis(former, new, facts):
@@ -112,7 +112,7 @@ def bring_to_one_basis(former, new, facts):
         If the tables have fewer than two rows in common.
     """
     zero = _declared_zero(former, new)
-    densities = densities_of(former, new, facts)
+    densities = find_densities(former, new, facts)
     fitted = _fitted_zero(former, new, facts, densities)
     if zero is None and fitted is not None:
         least = max(NOTICED * fitted[1], LEAST_ZERO_M)
@@ -129,7 +129,7 @@ def bring_to_one_basis(former, new, facts):
         new_m3=new.volume_m3[rows],
         steps=steps,
         zero=shift,
-        for_use=_for_use(former, new, zero or 0.0, new.height_m[rows]),
+        usable=_usable_rows(former, new, zero or 0.0, new.height_m[rows]),
         interpolation_m3=interpolation_error_m3(former, new.height_m[rows] + (zero or 0.0)),
         densities=densities,
     )
@@ -159,13 +159,13 @@ def rows_in_both(former, new, zero_m):
     return rows
 
 
-def volume_at(table, dips_m):
+def interpolate_volume(table, dips_m):
     """Volumes (n,) of a table at dips, by linear interpolation as in a gauge, m3."""
     return np.interp(dips_m, table.height_m, table.volume_m3)
 
 
 def interpolation_error_m3(table, dips_m):
-    """Bound of the error of `volume_at`, from distances of rows to chords of their neighbours.
+    """Bound of the error of `interpolate_volume`, from distances of rows to chords beside them.
 
     The error is 0 at rows of the table; distances within one digit are ignored. On a smooth curve,
     a row is V'' s^2 / 2 off the chord, and the middle between rows a fourth of it. A kink between
@@ -189,6 +189,11 @@ def interpolation_error_m3(table, dips_m):
     return float(bound[upper - 1][nearest > 1e-7].max(initial=0.0))
 
 
+def rounding_sd_m3(former, new):
+    """Standard deviation of a difference of rows by the last digits of both tables, m3."""
+    return np.hypot(former.volume_quantum_m3, new.volume_quantum_m3) / np.sqrt(12)
+
+
 # ---- the zero
 
 
@@ -200,8 +205,7 @@ def _declared_zero(former, new):
 
 def _fitted_zero(former, new, facts, densities):
     """Fit the height of the new zero above the former one to the volumes: (height, u), or None."""
-    zero, difference = 0.0, None
-    quanta = np.hypot(former.volume_quantum_m3, new.volume_quantum_m3) / np.sqrt(12)
+    zero, sd_m3 = 0.0, rounding_sd_m3(former, new)
     # The area depends on the zero, so the linear adjustment is repeated.
     for _ in range(ROUNDS):
         try:
@@ -210,8 +214,8 @@ def _fitted_zero(former, new, facts, densities):
             return None
         _, _, basis = _steps(former, new, facts, densities, zero, rows, until="roof")
         dips, volumes = new.height_m[rows], new.volume_m3[rows]
-        usable = _for_use(former, new, zero, dips)
-        difference = adjust_difference(facts, dips, volumes - basis, volumes, quanta, usable)
+        usable = _usable_rows(former, new, zero, dips)
+        difference = adjust_difference(facts, dips, volumes - basis, volumes, sd_m3, usable)
         if difference is None:
             return None
         zero += difference.zero_m
@@ -244,7 +248,7 @@ def _zero_step(step, shift, former, new):
         return replace(step, state="done", source="fitted")
     if shift.fitted_m is not None:
         return replace(step, state="same")
-    return replace(step, state="not_declared", lacking=_lacking(
+    return replace(step, state="not_declared", lacking=_missing_keys(
         ("former.reference_height_m", former.reference_height_m),
         ("new.reference_height_m", new.reference_height_m),
     ))  # fmt: skip
@@ -254,48 +258,52 @@ def _zero_step(step, shift, former, new):
 
 
 def _steps(former, new, facts, densities, zero, rows, until="rounding"):
-    """Return the steps, and the former volumes as printed and on the new basis, at new dips.
+    """Return the steps {name: Step}, and the former volumes as printed and on the new basis.
 
-    The steps are {name: Step}. `until` is the name of the last step.
+    Each step function takes the volumes on the basis of the steps before it. `until` is the name of
+    the last step.
     """
     dips = new.height_m[rows]
-    before = volume_at(former, dips)
-    basis = volume_at(former, dips + zero)
+    before = interpolate_volume(former, dips)
+    basis = interpolate_volume(former, dips + zero)
     steps = {"zero": Step(basis - before, "done")}
-    for name, make in (
-        ("temperature", _temperature),
-        ("head", _head),
-        ("roof", _roof),
-        ("rounding", _rounding),
-    ):
-        steps[name] = make(former, new, facts, densities, zero, dips, basis)
+    makers = {
+        "temperature": lambda basis: _temperature_step(former, new, facts, dips, basis),
+        "head": lambda basis: _head_step(former, facts, densities, zero, dips, basis),
+        "roof": lambda _: _roof_step(former, new, zero, dips),
+        "rounding": lambda basis: _rounding_step(former, new, dips, basis),
+    }
+    for name, make in makers.items():
+        steps[name] = make(basis)
         basis = basis + steps[name].added_m3
         if name == until:
             break
     return steps, before, basis
 
 
-def _none(dips, state, **more):
+def _no_change(dips, state, **more):
+    """Return a Step that changes no volume."""
     return Step(np.zeros(len(dips)), state, **more)
 
 
-def _lacking(*pairs):
+def _missing_keys(*pairs):
+    """Return the keys of (key, value) pairs without a value."""
     return tuple(name for name, value in pairs if value is None)
 
 
-def _temperature(former, new, facts, densities, zero, dips, basis):
-    was, is_now = former.reference_temperature_c, new.reference_temperature_c
-    values = {"former": was, "new": is_now}
-    lacking = _lacking(
-        ("former.reference_temperature_c", was), ("new.reference_temperature_c", is_now)
+def _temperature_step(former, new, facts, dips, basis):
+    former_c, new_c = former.reference_temperature_c, new.reference_temperature_c
+    values = {"former": former_c, "new": new_c}
+    lacking = _missing_keys(
+        ("former.reference_temperature_c", former_c), ("new.reference_temperature_c", new_c)
     )
     if lacking:
-        return _none(dips, "not_declared", lacking=lacking, **values)
-    if was == is_now:
-        return _none(dips, "same", **values)
+        return _no_change(dips, "not_declared", lacking=lacking, **values)
+    if former_c == new_c:
+        return _no_change(dips, "same", **values)
     if facts.kind is None:
-        return _none(dips, "not_declared", lacking=("kind",), **values)
-    scale = 1 + facts.expansion_per_k * (is_now - was)
+        return _no_change(dips, "not_declared", lacking=("kind",), **values)
+    scale = 1 + facts.expansion_per_k * (new_c - former_c)
     if facts.kind == "vertical" and not facts.dips_expand:
         added = basis * (scale**2 - 1)  # only areas expand
     else:
@@ -305,117 +313,79 @@ def _temperature(former, new, facts, densities, zero, dips, basis):
     return Step(added, "done", "declared", **values)
 
 
-def _head(former, new, facts, densities, zero, dips, basis):
-    was, is_now = densities
-    values = {"former": was.kg_m3, "new": is_now.kg_m3}
-    lacking = _lacking(
-        ("former.liquid_density_kg_m3", was.kg_m3), ("new.liquid_density_kg_m3", is_now.kg_m3)
+def _head_step(former, facts, densities, zero, dips, basis):
+    former_head, new_head = densities
+    values = {"former": former_head.kg_m3, "new": new_head.kg_m3}
+    lacking = _missing_keys(
+        ("former.liquid_density_kg_m3", former_head.kg_m3),
+        ("new.liquid_density_kg_m3", new_head.kg_m3),
     )
     if lacking:
-        return _none(dips, "not_declared", lacking=lacking, **values)
-    if was.kg_m3 == is_now.kg_m3:
-        return _none(dips, "same", **values)
+        return _no_change(dips, "not_declared", lacking=lacking, **values)
+    if former_head.kg_m3 == new_head.kg_m3:
+        return _no_change(dips, "same", **values)
     if not facts.has_plates:
         lacking = ("courses.thickness_mm",) if facts.is_shell else ("courses",)
-        return _none(dips, "not_possible", lacking=lacking, **values)
+        return _no_change(dips, "not_possible", lacking=lacking, **values)
     rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
     zone = former.roof and former.roof.critical_m
     zone = zone and tuple(edge - zero for edge in zone)
-    radii = radii_of_rows(rings, dips, basis, was.kg_m3, zone)
-    added = rings.volume_m3(dips, radii, is_now.kg_m3) - rings.volume_m3(dips, radii, was.kg_m3)
-    source = "read" if "read" in (was.source, is_now.source) else "declared"
-    return Step(added, "done", source, **values)
+    radii = estimate_radii(rings, dips, basis, former_head.kg_m3, zone)
+    # The same unloaded rings, once under each head.
+    before, after = (rings.volume_m3(dips, radii, head.kg_m3) for head in (former_head, new_head))
+    source = "read" if "read" in (former_head.source, new_head.source) else "declared"
+    return Step(after - before, "done", source, **values)
 
 
-def radii_of_rows(rings, dips, volumes, density, zone=None):
-    """Unloaded radii (courses,) of the rings, from the rise of the volumes within them, m.
-
-    A ring between two rows takes the radius of the next ring below. Over the critical zone of a
-    roof, the rows rise by less than the ring holds. The ring is then evaluated on one side of the
-    zone.
-
-    Parameters
-    ----------
-    rings : Rings
-    dips, volumes : (rows,) ndarray
-        Dips, m, and volumes, m3.
-    density : float
-        Density of the head in the volumes, kg/m3.
-    zone : (float, float), optional
-        Lower and upper dip of the critical zone.
-    """
-    radii, edges = np.empty(len(rings.thickness_m)), rings.edges_m.copy()
-    edges[-1] = max(edges[-1], dips[-1])
-    head = np.zeros(len(dips))
-    for _ in range(2):  # first without, then with the head in rings of these radii
-        for k in range(len(radii)):
-            inside = np.flatnonzero((dips >= edges[k] - 1e-9) & (dips <= edges[k + 1] + 1e-9))
-            # The lower half of the first ring may contain the bottom.
-            inside = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
-            inside = _beside(zone, inside, dips)
-            radii[k] = radii[k - 1] if k else np.sqrt(volumes[-1] / np.pi / dips[-1])
-            if len(inside) > 1:
-                first, last = inside[0], inside[-1]
-                # pi r^2 times the height equals the rise without the effect of the head
-                rise = volumes[last] - head[last] - volumes[first] + head[first]
-                radii[k] = np.sqrt(max(rise, 1e-9) / np.pi / (dips[last] - dips[first]))
-        head = rings.volume_m3(dips, radii, density) - rings.volume_m3(dips, radii, 0.0)
-    return radii
-
-
-def _beside(zone, inside, dips):
-    """Indices of the rows on one side of a critical zone, the side with more rows."""
-    if zone is None:
-        return inside
-    above = inside[dips[inside] >= zone[1] - 1e-9]
-    below = inside[dips[inside] <= zone[0] + 1e-9]
-    return above if len(above) >= len(below) else below
-
-
-def _roof(former, new, facts, densities, zero, dips, basis):
-    was, is_now = former.roof, new.roof
-    if was is None and is_now is None:
-        return _none(dips, "same")
-    lacking = _lacking(("former.roof", was), ("new.roof", is_now))
+def _roof_step(former, new, zero, dips):
+    former_roof, new_roof = former.roof, new.roof
+    if former_roof is None and new_roof is None:
+        return _no_change(dips, "same")
+    lacking = _missing_keys(("former.roof", former_roof), ("new.roof", new_roof))
     if lacking:
-        return _none(dips, "not_declared", lacking=lacking)
-    displaced = [_displaced_m3(roof) for roof in (was, is_now)]
-    values = {"former": displaced[0], "new": displaced[1]}
-    zone = is_now.critical_m or (was.critical_m and tuple(x - zero for x in was.critical_m))
-    if displaced[0] == displaced[1]:
-        return _none(dips, "same", **values)
+        return _no_change(dips, "not_declared", lacking=lacking)
+    former_m3, new_m3 = _displacement_m3(former_roof), _displacement_m3(new_roof)
+    values = {"former": former_m3, "new": new_m3}
+    zone = new_roof.critical_m or (
+        former_roof.critical_m and tuple(x - zero for x in former_roof.critical_m)
+    )
+    if former_m3 == new_m3:
+        return _no_change(dips, "same", **values)
     if zone is None:
-        return _none(dips, "not_declared", lacking=("new.roof.critical_m",), **values)
+        return _no_change(dips, "not_declared", lacking=("new.roof.critical_m",), **values)
+    # The displaced volume counts fully above the critical zone, and in part within it.
     afloat = np.clip((dips - zone[0]) / max(zone[1] - zone[0], 1e-9), 0.0, 1.0)
-    return Step((displaced[0] - displaced[1]) * afloat, "done", "declared", **values)
+    return Step((former_m3 - new_m3) * afloat, "done", "declared", **values)
 
 
-def _displaced_m3(roof):
+def _displacement_m3(roof):
+    """Volume displaced by a floating roof in the liquid for which it was computed, m3."""
     part = floating_roof(roof.mass_kg, 0.0, 1.0, roof.density_kg_m3, roof.weighing)
     return float(part.displacement_m3())
 
 
-def _rounding(former, new, facts, densities, zero, dips, basis):
+def _rounding_step(former, new, dips, basis):
     digit = new.volume_quantum_m3
     values = {"former": former.volume_quantum_m3, "new": digit}
     if digit == 0:
-        return _none(dips, "same", **values)
+        return _no_change(dips, "same", **values)
     added = np.round(basis / digit) * digit - basis
     added[np.abs(added) < 1e-9 * digit] = 0.0
     state = "done" if added.any() else "same"
     return Step(added, state, "declared" if state == "done" else None, **values)
 
 
-def _for_use(former, new, zero, dips):
-    for_use = np.full(len(dips), True)
+def _usable_rows(former, new, zero, dips):
+    """Whether the roofs of both tables are aground or afloat at each dip, shape (rows,)."""
+    usable = np.full(len(dips), True)
     for table, shift in ((former, zero), (new, 0.0)):
         if table.roof is not None and table.roof.critical_m is not None:
             low, high = table.roof.critical_m
-            for_use &= (dips + shift <= low + 1e-9) | (dips + shift >= high - 1e-9)
-    return for_use
+            usable &= (dips + shift <= low + 1e-9) | (dips + shift >= high - 1e-9)
+    return usable
 
 
-def _saved(name, step, dips):
+def _basis_step(name, step, dips):
     most = int(np.argmax(np.abs(step.added_m3)))
     return BasisStep(
         code=name,

@@ -9,24 +9,24 @@ from tankcal.job.rule_files import named_rule
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.recalibration.agreement import (
-    coverage_factor_of,
+    compare_deliveries,
+    coverage_factor,
     critical_correlation,
-    deliveries_between,
+    find_worst_by_error,
+    find_worst_by_share,
+    interpolate_uncertainty,
     normalized_error,
-    uncertainty_at,
-    worst_by_error,
-    worst_by_share,
 )
-from tankcal.recalibration.basis import bring_to_one_basis
-from tankcal.recalibration.courses_of_tables import compared_courses
-from tankcal.recalibration.tank_facts import facts_of
+from tankcal.recalibration.basis import bring_to_one_basis, rounding_sd_m3
+from tankcal.recalibration.difference import compare_courses
+from tankcal.recalibration.tank_facts import collect_facts
 from tankcal.recalibration.verdict import (
     WorstError,
-    ages_of,
     decide,
-    legal_numbers,
-    tank_of_rules,
-    zero_limit_of,
+    find_zero_limit,
+    judge_ages,
+    judge_limits,
+    tank_kind_of_rules,
 )
 from tankcal.record.comparison import (
     ComparedDelivery,
@@ -104,47 +104,50 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
     >>> result.verdict, round(float(result.rows.d_m3[-1]), 3), round(float(result.rows.E_n[-1]), 2)
     ('keep', 0.4, 0.2)
     """
-    c = _common(former, new)
+    c = _declared_correlation(former, new)
     _refuse_other_kinds(former, new)
-    facts = facts_of(former, new, courses)
+    facts = collect_facts(former, new, courses)
     chosen, file = rule or named_rule(DEFAULT_RULE, Log())
     basis = bring_to_one_basis(former, new, facts)
     _refuse_other_tanks(former, new, basis)
     agreement = _agreement(former, new, basis, c)
     deliveries = _deliveries(basis, agreement)
-    from_m, worst = _worst(basis, agreement, deliveries)
-    tank = tank_of_rules(facts, former, new)
-    of_rule = (chosen, tank, former, new)
-    legal = legal_numbers(*of_rule, basis, agreement.former_U, agreement.new_U)
-    ages = ages_of(*of_rule)
-    verdict = decide(legal, ages, basis, worst, c, zero_limit_of(chosen, tank))
-    is_default = rule is None
+    from_m, worst = _find_worst_error(basis, agreement, deliveries)
+    tank = tank_kind_of_rules(facts, former, new)
+    legal = judge_limits(chosen, tank, former, new, basis, agreement.new_U)
+    ages = judge_ages(chosen, tank, former, new)
+    verdict = decide(legal, ages, basis, worst, c, find_zero_limit(chosen, tank))
     return ComparisonFile(
         tank=_tank_id(former, new),
         notice=_notice(former, new),
         former=_table(former, fingerprints[0], agreement.former_U),
         new=_table(new, fingerprints[1], agreement.new_U),
-        material=Material(facts.expansion_per_k, facts.modulus_pa, facts.material_is),
+        material=Material(facts.expansion_per_k, facts.modulus_pa, facts.material_source),
         low_m=float(basis.height_m[0]),
         high_m=float(basis.height_m[-1]),
         interpolation_m3=basis.interpolation_m3,
-        steps=basis.saved_steps,
+        steps=basis.basis_steps,
         zero=basis.zero,
         rows=_rows(basis, agreement),
         waterfall=_waterfall(basis),
         deliveries=deliveries,
-        courses=compared_courses(
-            facts, basis, agreement.former_U, agreement.new_U, agreement.used_c, _sd(former, new)
+        courses=compare_courses(
+            facts,
+            basis,
+            agreement.former_U,
+            agreement.new_U,
+            agreement.used_c,
+            float(rounding_sd_m3(former, new)),
         ),
         correlation=_correlation(agreement, worst),
         judged_from_m=from_m,
         legal=legal,
         ages=ages,
-        rule=filled_from(ComparisonRule, chosen, file=file, is_default=is_default),
+        rule=filled_from(ComparisonRule, chosen, file=file, is_default=rule is None),
         verdict=verdict.code,
         verified=verdict.verified,
         reasons=list(verdict.reasons),
-        read=_read(former, new, basis),
+        read=_estimated_values(former, new, basis),
         warnings=warnings_of(_warnings(former, new, basis)),
     )
 
@@ -152,19 +155,19 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
 # ---- tables that cannot be compared
 
 
-def _common(former, new):
-    """Declared correlation of the tables, or None."""
-    of_former, of_new = former.common, new.common
-    if of_former is not None and of_new is not None and of_former != of_new:
+def _declared_correlation(former, new):
+    """FormerFacts correlation of the tables, or None."""
+    former_c, new_c = former.common, new.common
+    if former_c is not None and new_c is not None and former_c != new_c:
         expected = message(
             "compare_two_correlations",
             "common is {one:g} there and {two:g} for {other}; expected one correlation of both",
-            one=of_new,
-            two=of_former,
+            one=new_c,
+            two=former_c,
             other=former.name,
         )
         raise InputError(Problem(new.name, expected))
-    return of_former if of_former is not None else of_new
+    return former_c if former_c is not None else new_c
 
 
 def _refuse_other_kinds(former, new):
@@ -181,16 +184,16 @@ def _refuse_other_kinds(former, new):
 
 
 def _refuse_other_tanks(former, new, basis):
-    was, is_now, dip = basis.former_m3[-1], basis.new_m3[-1], basis.height_m[-1]
-    if abs(is_now - was) <= MOST_APART * max(abs(was), abs(is_now)):
+    former_m3, new_m3, dip = basis.former_m3[-1], basis.new_m3[-1], basis.height_m[-1]
+    if abs(new_m3 - former_m3) <= MOST_APART * max(abs(former_m3), abs(new_m3)):
         return
     expected = message(
         "compare_other_tank",
         "{new:.6g} m3 at {dip:g} m, but {former:.6g} m3 in {other}; expected two tables of one "
         "tank, in the units that their headings name",
-        new=float(is_now),
+        new=float(new_m3),
         dip=float(dip),
-        former=float(was),
+        former=float(former_m3),
         other=former.name,
     )
     raise InputError(Problem(new.name, expected))
@@ -199,36 +202,31 @@ def _refuse_other_tanks(former, new, basis):
 # ---- the agreement
 
 
-def _sd(former, new):
-    return float(np.hypot(former.volume_quantum_m3, new.volume_quantum_m3) / np.sqrt(12))
-
-
 def _agreement(former, new, basis, c):
-    k = coverage_factor_of(new if new.U_m3 is not None else former)
+    """Return U of both tables at the rows, of one coverage, and E_n of the rows."""
+    k = coverage_factor(new if new.U_m3 is not None else former)
     dips = basis.height_m
-    former_U = uncertainty_at(
+    former_U = interpolate_uncertainty(
         former, dips + basis.zero.height_m, basis.on_basis_m3, k, basis.interpolation_m3
     )
-    new_U = uncertainty_at(new, dips, basis.new_m3, k)
-    d = basis.new_m3 - basis.on_basis_m3
-    of_rows = d, new_U.rows(), former_U.rows()
-    return _Agreement(
-        c, former_U, new_U,
-        normalized_error(*of_rows, 0.0 if c is None else c), critical_correlation(*of_rows),
-    )  # fmt: skip
+    new_U = interpolate_uncertainty(new, dips, basis.new_m3, k)
+    d, U = basis.new_m3 - basis.on_basis_m3, (new_U.rows(), former_U.rows())
+    E_n = normalized_error(d, *U, 0.0 if c is None else c)
+    return _Agreement(c, former_U, new_U, E_n, critical_correlation(d, *U))
 
 
 def _deliveries(basis, agreement):
+    """Return the worst deliveries of each minimum height, by |d| / V and by |E_n|."""
     deliveries = []
     U = agreement.former_U, agreement.new_U, agreement.used_c
-    use = np.flatnonzero(basis.for_use)
+    use = np.flatnonzero(basis.usable)
     for minimum in MINIMUM_M:
-        pair = worst_by_share(basis, minimum)
+        pair = find_worst_by_share(basis, minimum)
         if pair is None:
             continue
-        one = deliveries_between(basis, *U, *pair)
-        deliveries.append(_delivery(basis, minimum, "relative", one))
-        worst = worst_by_error(basis, *U, minimum, also=(pair, (use[0], use[-1])))
+        by_share = compare_deliveries(basis, *U, *pair)
+        deliveries.append(_delivery(basis, minimum, "relative", by_share))
+        worst = find_worst_by_error(basis, *U, minimum, also=(pair, (use[0], use[-1])))
         if worst is not None:
             deliveries.append(_delivery(basis, minimum, "E_n", worst))
     return deliveries
@@ -253,12 +251,12 @@ def _delivery(basis, minimum, by, worst):
     )
 
 
-def _worst(basis, agreement, deliveries):
+def _find_worst_error(basis, agreement, deliveries):
     """Return the lowest judged dip, and the WorstError or None of rows and deliveries."""
     dips = basis.height_m
     reach = dips[-1] - dips[0]
     from_m = float(dips[0] + (MINIMUM_M[0] if reach > 2 * MINIMUM_M[0] else JUDGED_PART * reach))
-    judged = np.flatnonzero(basis.for_use & (dips >= from_m - 1e-9))
+    judged = np.flatnonzero(basis.usable & (dips >= from_m - 1e-9))
     candidates = []
     if len(judged) and not np.isnan(agreement.E_n[judged]).all():
         row = int(judged[np.nanargmax(np.abs(agreement.E_n[judged]))])
@@ -314,13 +312,13 @@ def _rows(basis, agreement):
         U_new_m3=agreement.new_U.rows(),
         E_n=agreement.E_n,
         c_limit=agreement.c_limit,
-        for_use=basis.for_use,
+        for_use=basis.usable,
     )
 
 
 def _waterfall(basis):
     """Return rows at given parts of the range, each the nearest row for use."""
-    use = np.flatnonzero(basis.for_use)
+    use = np.flatnonzero(basis.usable)
     dips = basis.height_m[use]
     at = [dips[0] + part * (dips[-1] - dips[0]) for part in PARTS_OF_HEIGHT]
     chosen = dict.fromkeys(int(use[np.argmin(np.abs(dips - index))]) for index in at)
@@ -367,18 +365,18 @@ def _notice(former, new):
     return next(filter(None, notices), "")
 
 
-def _read(former, new, basis):
+def _estimated_values(former, new, basis):
     """Return the values that were estimated from the tables because they are not declared."""
     estimates = []
-    for name, one in zip(("former", "new"), basis.densities, strict=True):
-        if one.head is not None:
-            sure = "sure" if one.head != "undecided" else "doubtful"
-            used, value, u = one.source == "read", one.read_kg_m3, one.u_kg_m3
-            estimates.append(ReadOut(name, f"head_{one.head}", value, u, "kg/m3", sure, used))
+    for name, density in zip(("former", "new"), basis.densities, strict=True):
+        if density.head is not None:
+            sure = "sure" if density.head != "undecided" else "doubtful"
+            used, value, u = density.source == "read", density.read_kg_m3, density.u_kg_m3
+            estimates.append(ReadOut(name, f"head_{density.head}", value, u, "kg/m3", sure, used))
     zero = basis.zero
     if zero.fitted_m is not None:
         is_seen = abs(zero.fitted_m) > ZERO_APART * (zero.fitted_u_m or 0.0)
-        is_seen &= all(basis.steps[density].state in ("done", "same") for density in BEFORE_ZERO)
+        is_seen &= all(basis.steps[step].state in ("done", "same") for step in BEFORE_ZERO)
         estimates.append(
             ReadOut(
                 "former", "zero", zero.fitted_m, zero.fitted_u_m, "m",

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.recalibration.table_fit import Rows, tried
+from tankcal.recalibration.table_fit import Rows, try_fit
 
 USUAL_STEPS_M = (  # steps of computed rows; longer ones give too few rows per course
     0.2, 0.1524, 0.1, 0.0762, 0.0508, 0.05, 0.0254, 0.02, 0.0127, 0.01, 0.005
@@ -77,7 +77,7 @@ class ComputedRows:
         linear = np.interp(dips, dips[self.rows], state.volume_m3(dips)[self.rows])
         by_parts = float(np.sum(((former.volume_m3 - linear) / sd_m3)[between] ** 2))
         # Computed rows may locate seams and zero poorly, so all rows estimate them again.
-        exact = tried(Rows(dips, former.volume_m3, sd_m3).of(between), state)
+        exact = try_fit(Rows(dips, former.volume_m3, sd_m3).select(between), state)
         return exact is not None and exact.chi2 - by_parts > LEAST_GAIN
 
 

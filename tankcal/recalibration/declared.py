@@ -1,16 +1,19 @@
-"""former.toml: declared facts about a former table, and their checks."""
+"""Declared facts about a former table: former.toml and courses.csv, with their checks."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tankcal.job.checking import RELATIVE_DENSITY, missing_beside
+import numpy as np
+
+from tankcal.job.checking import RELATIVE_DENSITY, missing_beside, refuse_repeated
+from tankcal.job.contract.courses import COLUMNS, SMALLEST_THICKNESS_MM, no_courses
 from tankcal.job.contract.kinds import KINDS
 from tankcal.job.contract.roof import KEYS as ROOF
 from tankcal.job.contract.roof import upside_down
 from tankcal.job.contract.shorthand import choice, number, positive
-from tankcal.job.entries import read_section, unknown_section
+from tankcal.job.entries import read_columns, read_section, unknown_section
 from tankcal.job.fields import Field, is_blank
-from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
+from tankcal.job.folder import MAX_SETTINGS_BYTES, read_csv, read_toml
 from tankcal.job.tables import read_bytes
 from tankcal.linter.totals import NO_UNITS, Units
 from tankcal.linter.units import FOOT3_M3, IMPERIAL_GALLON_M3, US_GALLON_M3
@@ -55,10 +58,13 @@ FORMER = (
 )
 SECTIONS = {"former": FORMER, "roof": ROOF}
 UNCERTAINTIES = ("U_m3", "U_percent", "u_m3", "u_percent")
+FIELDS = tuple(
+    replace(field, required=False) if field.name == "height_m" else field for field in COLUMNS
+)
 
 
 @dataclass(frozen=True)
-class Declared:
+class FormerFacts:
     """Content of a former.toml.
 
     Attributes
@@ -99,8 +105,8 @@ class Declared:
         log.problem(self.name, expected, self.rows.get(key), f"former.{key}")
 
 
-def read_declared(path, log):
-    """Return the `Declared` of a former.toml (a Path); report its problems to `log`.
+def read_former_facts(path, log):
+    """Return the `FormerFacts` of a former.toml (a Path); report its problems to `log`.
 
     Invalid keys count as not stated, so that the table is examined in the same run.
     """
@@ -108,7 +114,7 @@ def read_declared(path, log):
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     settings, sections = (None, {}) if data is None else read_toml(path.name, data, log)
     if settings is None:
-        return Declared(path.name)
+        return FormerFacts(path.name)
     for section in settings:
         if section not in SECTIONS:
             expected = unknown_section(section, SECTIONS)
@@ -120,7 +126,7 @@ def read_declared(path, log):
     values = read_section(path.name, "former", FORMER, entries, sections.get("former"), log)
     rows = {key: value.row for key, value in entries.items()}
     roof = _roof(path.name, settings.get("roof"), sections.get("roof"), log)
-    declared = Declared(path.name, values, rows, roof)
+    declared = FormerFacts(path.name, values, rows, roof)
     _check(declared, log)
     return declared
 
@@ -184,4 +190,73 @@ def _roof(file, entries, row, log):
         values["reference_density_kg_m3"],
         values["weighing"],
         None if low is None or high is None else (low, high),
+    )
+
+
+# ---- courses.csv
+
+
+@dataclass(frozen=True)
+class Courses:
+    """The rings of a tank, from the bottom up.
+
+    Attributes
+    ----------
+    file : str
+    names : tuple of str
+    heights_m : ndarray, shape (n,)
+        nan if unknown.
+    thickness_m : ndarray, shape (n,)
+    """
+
+    file: str
+    names: tuple[str, ...]
+    heights_m: np.ndarray
+    thickness_m: np.ndarray
+
+    def first(self, count):
+        """Return the lowest `count` courses."""
+        return replace(
+            self,
+            names=self.names[:count],
+            heights_m=self.heights_m[:count],
+            thickness_m=self.thickness_m[:count],
+        )
+
+
+def read_courses(path, log):
+    """Return the `Courses` of a CSV file; None after reporting its problems to `log`."""
+    path = Path(path)
+    if not path.exists():
+        log.problem(path.name, message("read_no_file", "not found; expected a file of courses"))
+        return None
+    data = read_bytes(path, log)
+    if data is None:
+        return None
+    separator, decimal = (";", ",") if b";" in data[:2000] else (",", ".")
+    table = read_csv(path.name, data, separator, decimal, log)
+    if table is None:
+        return None
+    before = len(log.problems)
+    values = read_columns("courses", table, log, FIELDS)
+    if len(log.problems) > before or values.skipped:
+        return None
+    if values.is_empty:
+        log.problem(path.name, no_courses())
+        return None
+    refuse_repeated(values, "course", log)
+    plates = values.of("thickness_mm")
+    for row, plate in zip(values.rows, plates, strict=True):
+        if plate < SMALLEST_THICKNESS_MM:
+            expected = message(
+                "thin_course",
+                "found {thickness:g}; expected millimetres, at least 1: is it in metres?",
+                thickness=plate,
+            )
+            log.problem(path.name, expected, row, "thickness_mm")
+    if len(log.problems) > before:
+        return None
+    heights = [np.nan if height is None else height for height in values.of("height_m")]
+    return Courses(
+        path.name, tuple(values.of("course")), np.array(heights), np.array(plates) / 1000
     )

@@ -1,4 +1,4 @@
-"""Components of the difference of two tables: zero of the dips, and areas of the courses.
+"""Components of the difference of two tables: zero of the dips, areas and radii of the courses.
 
 On one basis the difference of an upright tank is, above the highest point of the bottom,
 
@@ -12,6 +12,9 @@ dV/dL = V / L and dV/dD = (2 V - h A) / D, a sphere V = D^3 f(h / D) has dV/dD =
 from dataclasses import dataclass
 
 import numpy as np
+
+from tankcal.recalibration.upright_shell import Rings, estimate_radii
+from tankcal.record.comparison import ComparedCourse
 
 LEAST_WINDOW_M = 0.05  # shortest window of a slope
 LEVEL_PARTS = 200  # smallest rise of the volume within a window, in last digits
@@ -31,18 +34,12 @@ class Difference:
     areas_m2, u_areas_m2 : (courses,) ndarray
         New minus former areas of an upright tank with known courses; nan if no row reaches the
         course.
-    lowest_m : float
-        Dip of the lowest row used.
-    left_m3 : float
-        Root mean square of the residuals.
     """
 
     zero_m: float
     u_zero_m: float
     areas_m2: np.ndarray
     u_areas_m2: np.ndarray
-    lowest_m: float
-    left_m3: float
 
 
 def adjust_difference(facts, dips_m, difference_m3, volume_m3, sd_m3, usable):
@@ -86,8 +83,6 @@ def adjust_difference(facts, dips_m, difference_m3, volume_m3, sd_m3, usable):
         u_zero_m=float(u[0]),
         areas_m2=areas[0],
         u_areas_m2=areas[1],
-        lowest_m=float(dips_m[rows][0]),
-        left_m3=float(np.sqrt(np.mean(left**2))),
     )
 
 
@@ -137,3 +132,89 @@ def _above_bottom(facts, dips, area):
     bottom = np.flatnonzero(is_lower & (area < ONE_CUT * np.median(area)))
     first = bottom[-1] + 1 if len(bottom) else 0
     return np.arange(len(dips)) >= first
+
+
+# ---- radii of the courses
+
+
+def compare_courses(facts, basis, former_U, new_U, c, sd_m3):
+    """Return the `ComparedCourse` of each course within the rows; none if the courses are unknown.
+
+    Parameters
+    ----------
+    facts : TankFacts
+    basis : OneBasis
+    former_U, new_U : TableUncertainty
+    c : float
+        Correlation of the errors of both tables.
+    sd_m3 : float
+        Standard deviation of a difference of rows, by rounding.
+    """
+    if not facts.is_shell:
+        return []
+    difference = basis.new_m3 - basis.on_basis_m3
+    adjusted = adjust_difference(
+        facts, basis.height_m, difference, basis.new_m3, sd_m3, basis.usable
+    )
+    if adjusted is None:
+        return []
+    new, edges = _radii(facts, basis), facts.edges_m()
+    changes = adjusted.areas_m2 / (2 * np.pi * new)
+    rounding = adjusted.u_areas_m2 / (2 * np.pi * new)
+    courses = []
+    for k in np.flatnonzero(np.isfinite(changes)):
+        parts = _u_of_tables(basis, (former_U, new_U), edges[k : k + 2], new[k])
+        u = None if None in parts else float(np.hypot(_u_of_change(*parts, c), rounding[k]))
+        courses.append(
+            ComparedCourse(
+                course=int(k) + 1,
+                bottom_m=float(edges[k]),
+                top_m=float(edges[k + 1]),
+                former_m=float(new[k] - changes[k]),
+                new_m=float(new[k]),
+                d_m=float(changes[k]),
+                u_m=u,
+                u_rounding_m=float(rounding[k]),
+                w=float(changes[k] / u) if u else None,
+                u_former_m=parts[0],
+                u_new_m=parts[1],
+            )
+        )
+    return courses
+
+
+def _radii(facts, basis):
+    """Radii (courses,) in the new table: from its record, else from the rise of its rows."""
+    if facts.inside_m is not None:
+        return facts.inside_m
+    rings = Rings(facts.edges_m(), facts.thickness_m, facts.modulus_pa, is_first_order=False)
+    density = basis.densities[1].kg_m3 or 0.0
+    zone, afloat = None, np.flatnonzero(~basis.usable)
+    if len(afloat):
+        first, last = max(afloat[0] - 1, 0), min(afloat[-1] + 1, len(basis.height_m) - 1)
+        zone = basis.height_m[first], basis.height_m[last]
+    return estimate_radii(rings, basis.height_m, basis.new_m3, density, zone)
+
+
+def _u_of_tables(basis, tables, ends, radius):
+    """Standard uncertainty of a radius from the volume of its course in each table.
+
+    None if unknown.
+
+    u(r) = r u(V) / (2 V), V between the lowest and the highest row within the course.
+    """
+    dips = basis.height_m
+    inside = np.flatnonzero((dips >= ends[0] - 1e-9) & (dips <= ends[1] + 1e-9) & basis.usable)
+    if len(inside) < 2:
+        return [None for _ in tables]
+    low, high = inside[:1], inside[-1:]
+    volume = basis.new_m3[high[0]] - basis.new_m3[low[0]]
+    uncertainties = [
+        radius / 2 * float(table.deliveries(low, high)[0]) / table.k / volume for table in tables
+    ]
+    return [None if np.isnan(u) else u for u in uncertainties]
+
+
+def _u_of_change(former, new, c):
+    """Standard uncertainty of the difference of two radii with correlation c."""
+    return float(np.sqrt(max(former**2 + new**2 - 2 * c * former * new, 0.0)))

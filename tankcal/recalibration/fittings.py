@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 ROUNDING = 1e-11  # relative remainder of a ramp that the adjustment absorbs
-GIVING = 0.5  # weight of fittings that add volume: rarer, and similar to a gap between two others
+ADDING_WEIGHT = (
+    0.5  # weight of fittings that add volume: rarer, and similar to a gap between two others
+)
 APART = 3  # smallest distance of candidates, in candidate places
 MOST_PLACES = 300  # largest number of places tested for kinks; finer tables are thinned
 
@@ -91,7 +93,7 @@ def find_fittings(dips_m, left_m3, design, sd_m3, longest_m=np.inf, most=4):
     along = of_left[:, None] - of_left
     gain = np.where(is_told, along**2 / np.where(is_told, apart, 1.0), 0.0)
     slopes = along / np.where(is_told, apart, 1.0)
-    likely = np.where(slopes > 0, GIVING * gain, gain)
+    likely = np.where(slopes > 0, ADDING_WEIGHT * gain, gain)
     fittings = []
     for _ in range(most):
         low, high = (int(k) for k in np.unravel_index(np.argmax(likely), gain.shape))
@@ -120,7 +122,7 @@ def _reducing_alternative(gain, low, high, slope):
     return low, high
 
 
-def in_other_pairs(fittings, near_m, least_share):
+def pair_kinks_again(fittings, near_m, least_share):
     """Pair the kinks differently: fittings one above the other instead of overlapping ones.
 
     Parameters

@@ -13,10 +13,9 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.recalibration.agreement import coverage_factor_of, normalized_error
+from tankcal.recalibration.agreement import coverage_factor, normalized_error
 from tankcal.recalibration.comparison import PARTS_OF_HEIGHT, compare
 from tankcal.recalibration.former import FormerTable
-from tankcal.recalibration.history_checks import warnings_of_tables
 from tankcal.record.history import (
     CertificateInHistory,
     HistoryFile,
@@ -29,6 +28,7 @@ from tankcal.record.texts import warnings_of
 
 DAYS_OF_YEAR = 365.25
 MOST_WARNINGS = 100
+SAME_M = 1e-3  # largest difference of equal dimensions and reference heights
 
 
 @dataclass(frozen=True)
@@ -94,13 +94,13 @@ def history_of(
     >>> [entry.date for entry in history.certificates], round(history.changes[0].top_d_m3, 3)
     (['2010-05-01', '2020-05-01'], 0.4)
     """
-    ordered = sorted(tables, key=_order)
+    ordered = sorted(tables, key=_sort_key)
     progress = progress or (lambda text, done, total: None)
     on_newest, successive = _comparisons(ordered, courses, progress)
-    k = coverage_factor_of(_with_u(ordered))
-    rows = _shown_rows(on_newest, dips_m)
+    k = coverage_factor(_newest_with_U(ordered))
+    rows = _select_dips(on_newest, dips_m)
     newest = ordered[-1].table
-    problems = [*warnings, *warnings_of_tables(ordered)]
+    problems = [*warnings, *_table_warnings(ordered)]
     return HistoryFile(
         notice=_notice(newest),
         tank=next((table.tank for table in reversed(ordered) if table.tank), None),
@@ -131,13 +131,13 @@ def history_of(
     )
 
 
-def _order(table):
+def _sort_key(table):
     """Sort key: date, then number, program and file, so that the order is reproducible."""
     record = table.table.record or {}
     return table.day, str(table.table.number or ""), record.get("tankcal") or "", table.table.name
 
 
-def _with_u(ordered):
+def _newest_with_U(ordered):
     """Newest table with U, else the newest table."""
     known = [table.table for table in ordered if table.table.U_m3 is not None]
     return known[-1] if known else ordered[-1].table
@@ -145,19 +145,19 @@ def _with_u(ordered):
 
 def _comparisons(ordered, courses, progress):
     """Compare each table with the newest, and with the one before: two lists of ComparisonFile."""
-    newest, problems, found = ordered[-1].table, {}, ([], [])
+    newest, problems, comparisons = ordered[-1].table, {}, ([], [])
     pairs = [(0, table.table, newest) for table in ordered]
     pairs += [(1, a.table, b.table) for a, b in pairwise(ordered)]
     for done, (role, former, new) in enumerate(pairs):
         text = message("history_comparing", "comparing {count} tables", count=len(ordered))
         progress(text, done, len(pairs))
         try:
-            found[role].append(compare(former, new, courses=courses))
+            comparisons[role].append(compare(former, new, courses=courses))
         except InputError as error:
             problems |= dict.fromkeys(error.problems)
     if problems:
         raise InputError(list(problems))
-    return found
+    return comparisons
 
 
 def _warnings(problems, comparisons):
@@ -218,7 +218,7 @@ def _certificates(ordered):
     return certificates
 
 
-def _shown_rows(on_newest, dips_m):
+def _select_dips(on_newest, dips_m):
     """Dips of the newest table, for use in all comparisons, at which volumes are shown."""
     common = None
     for comparison in on_newest:
@@ -231,10 +231,10 @@ def _shown_rows(on_newest, dips_m):
         expected = message("history_no_range", "no dip that every table has; expected one")
         raise InputError(Problem(on_newest[-1].new.name, expected))
     if dips_m is None:
-        asked = [dips[0] + part * (dips[-1] - dips[0]) for part in PARTS_OF_HEIGHT]
+        wanted = [dips[0] + part * (dips[-1] - dips[0]) for part in PARTS_OF_HEIGHT]
     else:
-        asked = list(dips_m)
-        outside = [dip for dip in asked if not dips[0] - 1e-9 <= dip <= dips[-1] + 1e-9]
+        wanted = list(dips_m)
+        outside = [dip for dip in wanted if not dips[0] - 1e-9 <= dip <= dips[-1] + 1e-9]
         if outside:
             raise InputError([
                 Problem(
@@ -247,7 +247,7 @@ def _shown_rows(on_newest, dips_m):
                 )
                 for dip in outside
             ])  # fmt: skip
-    nearest = dict.fromkeys(float(dips[np.argmin(np.abs(dips - dip))]) for dip in asked)
+    nearest = dict.fromkeys(float(dips[np.argmin(np.abs(dips - dip))]) for dip in wanted)
     return sorted(nearest)
 
 
@@ -258,12 +258,12 @@ def _volumes(number, comparison, rows_m):
     for dip in rows_m:
         at = places[dip]
         d = 0.0 - float(rows.d_m3[at])
-        U, of_newest = _known(rows.U_former_m3[at]), _known(rows.U_new_m3[at])
+        U, of_newest = _none_if_nan(rows.U_former_m3[at]), _none_if_nan(rows.U_new_m3[at])
         E_n = None if None in (U, of_newest) else float(normalized_error(d, U, of_newest, c))
         yield VolumeInHistory(number, dip, float(rows.former_on_basis_m3[at]), U, d, E_n)
 
 
-def _known(value):
+def _none_if_nan(value):
     return None if np.isnan(value) else float(value)
 
 
@@ -278,7 +278,7 @@ def _radii(number, comparison, k):
 def _change(number, comparison, pair, k):
     rows, worst = comparison.rows, comparison.correlation
     c = worst.c or 0.0
-    U = [_known(of[-1]) for of in (rows.U_former_m3, rows.U_new_m3)]
+    U = [_none_if_nan(of[-1]) for of in (rows.U_former_m3, rows.U_new_m3)]
     U_top = None if None in U else float(np.sqrt(U[0] ** 2 + U[1] ** 2 - 2 * c * U[0] * U[1]))
     if U_top is not None and worst.coverage_k is not None:
         U_top *= k / worst.coverage_k
@@ -310,3 +310,106 @@ def _change(number, comparison, pair, k):
             for course in comparison.courses
         ],
     )
+
+
+# ---- warnings about the tables
+
+
+def _table_warnings(ordered):
+    """Compare each table (DatedTable, oldest first) with the one before it; return Problems.
+
+    Examples
+    --------
+    >>> from datetime import date
+    >>> from tankcal.recalibration.former import FormerTable
+    >>> from tankcal.recalibration.history import DatedTable
+    >>> tables = [
+    ...     DatedTable(FormerTable("a.csv", [0, 1], [0, 1], reference_height_m=x), "", date.min)
+    ...     for x in (9.1, 9.2)
+    ... ]
+    >>> [problem.expected.code for problem in _table_warnings(tables)]
+    ['history_same_day', 'history_reference_height']
+    """
+    problems = []
+    for before, after in pairwise(ordered):
+        problems += _pair_warnings(before, after)
+    return problems
+
+
+def _pair_warnings(before, after):
+    name, other = after.table.name, before.table.name
+    if before.day == after.day:
+        text = message(
+            "history_same_day",
+            "of {date}, as {other}: which of them came first is not known; is one of them to be "
+            "left out?",
+            date=after.day.isoformat(),
+            other=other,
+        )
+        yield Problem(name, text)
+    if None not in (before.tank, after.tank) and before.tank != after.tank:
+        text = message(
+            "history_other_id",
+            "of tank {tank}, {other} of tank {other_tank}: taken as one tank, as wanted",
+            tank=after.tank,
+            other=other,
+            other_tank=before.tank,
+        )
+        yield Problem(name, text)
+    yield from _size_warnings(name, other, _tank(before), _tank(after))
+    heights = before.table.reference_height_m, after.table.reference_height_m
+    if None not in heights and abs(heights[1] - heights[0]) > SAME_M:
+        text = message(
+            "history_reference_height",
+            "reference height {new:.4f} m, {old:.4f} m in {other}: the volumes are brought to one "
+            "zero by these; has the dip plate or the reference point been moved?",
+            new=heights[1],
+            old=heights[0],
+            other=other,
+        )
+        yield Problem(name, text)
+    zeros = _zero(before), _zero(after)
+    if None not in zeros and zeros[0] != zeros[1]:
+        text = message(
+            "history_other_zero",
+            "dips count from {new}, from {old} in {other}",
+            new=zeros[1],
+            old=zeros[0],
+            other=other,
+        )
+        yield Problem(name, text)
+
+
+def _tank(table):
+    return {} if table.table.record is None else table.table.record["job"]
+
+
+def _zero(table):
+    return None if table.table.record is None else table.table.record["capacity"].get("zero")
+
+
+def _size_warnings(name, former_name, was, now):
+    """Report changed nominal dimensions or courses."""
+    for key in ("nominal_diameter_m", "nominal_height_m"):
+        sizes = [(job.get("tank") or {}).get(key) for job in (was, now)]
+        if None not in sizes and abs(sizes[1] - sizes[0]) > SAME_M:
+            text = message(
+                "history_other_size",
+                "{key} {new:g}, {old:g} in {other}; expected the sizes of one tank",
+                key=key,
+                new=sizes[1],
+                old=sizes[0],
+                other=former_name,
+            )
+            yield Problem(name, text)
+    heights = [[course["height_m"] for course in job.get("courses") or ()] for job in (was, now)]
+    if not all(heights):
+        return
+    same = len(heights[0]) == len(heights[1])
+    if not same or np.abs(np.subtract(*heights)).max() > SAME_M:
+        text = message(
+            "history_other_courses",
+            "courses of other heights than {other}: radii are compared by those of the newer one",
+            other=former_name,
+        )
+        yield Problem(name, text)

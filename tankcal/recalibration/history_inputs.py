@@ -13,7 +13,7 @@ from tankcal.errors import InputError, Problem, reason_of
 from tankcal.job.tables import Log
 from tankcal.messages import list_some, message
 from tankcal.recalibration.history import DatedTable, history_of
-from tankcal.recalibration.inputs import read_shell, rows_file
+from tankcal.recalibration.inputs import read_course_sizes, rows_file
 from tankcal.recalibration.reading import read_former
 from tankcal.record.history import CheckInHistory, InspectionInHistory
 from tankcal.record.inspection import INSPECTION, VERDICTS
@@ -25,7 +25,7 @@ TABLES = (".csv", ".xlsx", ".pdf", ".toml")
 
 
 @dataclass
-class Found:
+class HistoryArchive:
     """Content of an archive.
 
     Attributes
@@ -39,6 +39,10 @@ class Found:
         Unreadable files.
     ids : dict
         {id of a tank: number of its files}.
+    tanks : tuple of str
+        Ids of the tank; files of other tanks are skipped. Empty: all files are read.
+    seen : dict
+        {SHA-256: name} of the files read.
     """
 
     tables: list = field(default_factory=list)
@@ -47,6 +51,28 @@ class Found:
     warnings: list = field(default_factory=list)
     problems: list = field(default_factory=list)
     ids: dict = field(default_factory=dict)
+    tanks: tuple = ()
+    seen: dict = field(default_factory=dict)
+
+    def is_of_other_tank(self, tank):
+        """Return whether the id of a tank is none of the ids asked for."""
+        return bool(self.tanks) and tank not in self.tanks
+
+    def is_repeated(self, name, digest):
+        """Return whether a file was read before under another name; it is then left out."""
+        if digest not in self.seen:
+            self.seen[digest] = name
+            return False
+        text = message(
+            "history_same_file", "is the same file as {other}: it counts once",
+            other=self.seen[digest],
+        )  # fmt: skip
+        self.left_out.append(Problem(name, text))
+        return True
+
+    def count(self, tank):
+        """Count a file of a tank."""
+        self.ids[tank] = self.ids.get(tank, 0) + 1
 
 
 def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=None):
@@ -76,27 +102,26 @@ def history_of_files(paths, *, tanks=(), dips_m=None, courses=None, progress=Non
         With every unreadable file; for several tanks without `tanks`; and for tables that cannot be
         of one tank.
     """
-    archive = Found()
+    archive = HistoryArchive(tanks=tuple(tanks))
     files = find_files(paths, progress)
-    seen = {}
-    for done, (path, name, is_sought) in enumerate(files):
+    for done, (path, name, is_searched) in enumerate(files):
         if progress is not None:
             progress(message("history_reading", "reading the files"), done, len(files))
         try:
-            _read(archive, path, name, tanks, seen, is_sought)
+            _read(archive, path, name, is_searched)
         except InputError as error:
             archive.problems += [
                 replace(problem, file=name) if problem.file in (path.name, RECORD) else problem
                 for problem in error.problems
             ]
     log = Log()
-    shell = None if courses is None else read_shell(Path(courses), log)
+    shell = None if courses is None else read_course_sizes(Path(courses), log)
     archive.problems += log.problems
     if archive.problems:
         raise InputError(archive.problems)
-    _refuse_several(archive, tanks, paths)
+    _refuse_several(archive, paths)
     if not archive.tables:
-        raise InputError(_nothing(archive, tanks, paths))
+        raise InputError(_no_table_problems(archive, paths))
     return history_of(
         archive.tables,
         archive.inspections,
@@ -139,7 +164,7 @@ def find_files(paths, progress=None):
 def _name_files(files):
     """Return (path, name, whether found in a folder), named with enough folders to be unique.
 
-    found: (path, fewest parts of the name, or 0 if not found in a folder) of each file.
+    files: (path, fewest parts of the name, or 0 if not found in a folder) of each file.
     """
     places = {Path(os.path.abspath(path)).parts: least for path, least in reversed(files)}
     tails, named = {}, []
@@ -161,7 +186,7 @@ def _count_tails(places, count, known):
 def _files_below(folder, problems):
     """Paths of candidate files below a folder; unreadable folders are reported."""
 
-    def tell(error):
+    def report(error):
         text = message(
             "history_folder_unreadable",
             "a folder that cannot be read ({why}); expected one that can, or it left out",
@@ -169,36 +194,43 @@ def _files_below(folder, problems):
         )
         problems.append(Problem(str(error.filename), text))
 
-    for place, folders, files in os.walk(folder, onerror=tell):
+    for place, folders, files in os.walk(folder, onerror=report):
         folders[:] = sorted(folder for folder in folders if not folder.startswith("."))
         for name in (RECORD, INSPECTION.file):
             if name in files and Path(place, name).is_file():  # excludes pipes and broken links
                 yield Path(place, name)
 
 
-def _read(archive, path, name, tanks, seen, is_sought):
-    """Read one file and add it to the archive."""
+def _read(archive, path, name, is_searched):
+    """Read one file and add it to the archive.
+
+    is_searched  whether the file was found in a folder, and may be of another tank or program
+    """
     if path.suffix.lower() in TABLES:
-        _take_former(archive, path, name, seen)
+        _add_former(archive, path, name)
         return
     data = path.read_bytes()
-    content = data if find_encoding(data) == "utf-8" else _in_utf8(data, path)
-    if is_sought and tanks and not any(_may_name(content, tank) for tank in tanks):
+    content = data if find_encoding(data) == "utf-8" else _to_utf8(data, path)
+    if (
+        is_searched
+        and archive.tanks
+        and not any(_may_name(content, tank) for tank in archive.tanks)
+    ):
         if content.rstrip()[-1:] != b"}":
             text = message("history_cut_off", "is cut off: of which tank it was is not known")
             archive.left_out.append(Problem(name, text))
         return
-    saved = _parsed(content, path)
+    saved = _parse_json(content, path)
     kind = str(saved.get("format") or "") if isinstance(saved, dict) else ""
-    if is_sought and not kind.startswith("tankcal-"):
+    if is_searched and not kind.startswith("tankcal-"):
         text = message("history_not_ours", "no file of tankcal: passed over")
         archive.left_out.append(Problem(name, text))
         return
     digest = hashlib.sha256(data).hexdigest()
     if kind.startswith(f"{INSPECTION.name}/"):
-        _take_inspection(archive, INSPECTION.migrated(saved, path.name), name, digest, tanks, seen)
+        _add_inspection(archive, INSPECTION.migrated(saved, path.name), name, digest)
     else:
-        _take_record(archive, records.migrated(saved, path.name), path, name, digest, tanks, seen)
+        _add_record(archive, records.migrated(saved, path.name), path, name, digest)
 
 
 def _may_name(content, tank):
@@ -209,14 +241,14 @@ def _may_name(content, tank):
     )
 
 
-def _in_utf8(data, path):
+def _to_utf8(data, path):
     try:
         return decode_text(data).encode("utf-8")
     except ValueError as error:
         raise _unreadable(error, path) from None
 
 
-def _parsed(content, path):
+def _parse_json(content, path):
     try:
         return json.loads(content)
     except (ValueError, RecursionError) as error:
@@ -228,26 +260,12 @@ def _unreadable(error, path):
     return InputError(Problem(path.name, text))
 
 
-def _is_again(archive, name, digest, seen):
-    """Whether the file was read before; then a warning is added."""
-    if digest not in seen:
-        seen[digest] = name
-        return False
-    text = message(
-        "history_same_file", "is the same file as {other}: it counts once", other=seen[digest]
-    )
-    archive.left_out.append(Problem(name, text))
-    return True
-
-
-def _take_record(archive, record, path, name, digest, tanks, seen):
+def _add_record(archive, record, path, name, digest):
     tank = ((record["job"] or {}).get("tank") or {}).get("id")
-    if tanks and tank not in tanks:
-        return
-    if _is_again(archive, name, digest, seen):
+    if archive.is_of_other_tank(tank) or archive.is_repeated(name, digest):
         return
     if tank is not None:
-        archive.ids[tank] = archive.ids.get(tank, 0) + 1
+        archive.count(tank)
     if record["capacity"] is None:
         text = message("history_only_survey", "a survey that was only adjusted: it has no table")
         archive.left_out.append(Problem(name, text))
@@ -255,10 +273,10 @@ def _take_record(archive, record, path, name, digest, tanks, seen):
     _add_table(archive, replace(read_former(path), name=name), digest)
 
 
-def _take_former(archive, path, name, seen):
+def _add_former(archive, path, name):
     table = replace(read_former(path), name=name)
     digest = hashlib.sha256(rows_file(path).read_bytes()).hexdigest()
-    if not _is_again(archive, name, digest, seen):
+    if not archive.is_repeated(name, digest):
         _add_table(archive, table, digest)
 
 
@@ -282,13 +300,11 @@ def _day(text):
         return None
 
 
-def _take_inspection(archive, saved, name, digest, tanks, seen):
+def _add_inspection(archive, saved, name, digest):
     tank = saved["tank"]
-    if tanks and tank["id"] not in tanks:
+    if archive.is_of_other_tank(tank["id"]) or archive.is_repeated(name, digest):
         return
-    if _is_again(archive, name, digest, seen):
-        return
-    archive.ids[tank["id"]] = archive.ids.get(tank["id"], 0) + 1
+    archive.count(tank["id"])
     day = _day(tank["survey_date"])
     archive.inspections.append(
         InspectionInHistory(
@@ -329,8 +345,9 @@ def _gravity(check):
     return -VERDICTS.index(check["verdict"]), value / limit if limit else value
 
 
-def _refuse_several(archive, tanks, paths):
-    if tanks or len(archive.ids) < 2:
+def _refuse_several(archive, paths):
+    """Raise InputError for files of several tanks if no tank was asked for."""
+    if archive.tanks or len(archive.ids) < 2:
         return
     ids = sorted(archive.ids)
     text = message(
@@ -343,18 +360,18 @@ def _refuse_several(archive, tanks, paths):
     raise InputError(Problem(Path(paths[0]).name or str(paths[0]), text))
 
 
-def _nothing(archive, tanks, paths):
+def _no_table_problems(archive, paths):
     """Message that no table was found, with the files found instead."""
     name = Path(paths[0]).name or str(paths[0])
     text = message(
         "history_no_table",
         "no capacity table with a date; expected record.json of tankcal in or below it",
     )
-    if tanks:
+    if archive.tanks:
         text = message(
             "history_no_table_of_tank",
             "no capacity table with a date of tank {tank}; expected record.json of tankcal with "
             "that id in or below it",
-            tank=", ".join(tanks),
+            tank=", ".join(archive.tanks),
         )
     return [Problem(name, text), *archive.left_out]

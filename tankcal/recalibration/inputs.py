@@ -12,7 +12,7 @@ from tankcal.job.rule_files import named_rule
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.recalibration.comparison import compare
-from tankcal.recalibration.read_courses import read_courses
+from tankcal.recalibration.declared import read_courses
 from tankcal.recalibration.reading import read_former
 from tankcal.record.comparison import ComparisonFile
 
@@ -63,11 +63,11 @@ def compare_files(asked) -> ComparisonFile:
     log = Log()
     old, former = _table(asked.old, asked.former, log)
     recent, new = _table(asked.new, asked.new_former, log)
-    courses = None if asked.courses is None else read_shell(asked.courses, log)
+    courses = None if asked.courses is None else read_course_sizes(asked.courses, log)
     rule = None if asked.rule is None else named_rule(asked.rule, log)
     log.stop_if_problems()
     if former.name == new.name:
-        former, new = _with_folders((old, former), (recent, new))
+        former, new = _name_with_folders((old, former), (recent, new))
     fingerprints = tuple(
         sha256(rows_file(source).read_bytes()).hexdigest() for source in (old, recent)
     )
@@ -93,7 +93,7 @@ def _table(source, declared, log):
         return path, None
 
 
-def _with_folders(*tables):
+def _name_with_folders(*tables):
     """Return both FormerTables, with enough folders in their names to make the names differ."""
     folders = [path.resolve().parent.parts for path, _ in tables]
     for count in range(1, max(map(len, folders))):
@@ -114,7 +114,7 @@ def rows_file(path):
     return path.parent / content["former"]["file"]
 
 
-def read_shell(path, log):
+def read_course_sizes(path, log):
     """Return (heights, thicknesses) of a courses.csv, m, from the bottom up.
 
     None after problems.

@@ -7,21 +7,25 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 from tankcal.job.tables import Log
 from tankcal.messages import message
-from tankcal.recalibration.bulges import largest_bulge_m
 from tankcal.recalibration.computed_rows import find_computed_rows
-from tankcal.recalibration.read_courses import read_courses
+from tankcal.recalibration.declared import read_courses
 from tankcal.recalibration.reading import read_former
-from tankcal.recalibration.recorded_radii import read_recorded
-from tankcal.recalibration.rounding import sd_of_rows
+from tankcal.recalibration.rounding import row_sds
 from tankcal.recalibration.seams import find_seams, find_seams_within
 from tankcal.recalibration.solid_geometry import fit_lying, fit_sphere
-from tankcal.recalibration.table_job import job_of_geometry, job_of_record, job_of_solid
+from tankcal.recalibration.table_job import (
+    make_record_job,
+    make_solid_job,
+    make_upright_job,
+    read_recorded,
+)
 from tankcal.recalibration.upright_geometry import (
     DECLARED_SD_KG_M3,
     STEEL_PA,
     is_possible,
     read_upright,
 )
+from tankcal.recalibration.upright_shell import largest_bulge_m
 
 FEWEST_ROWS = 8
 SOLIDS = "horizontal", "sphere"
@@ -43,7 +47,7 @@ class TableRead:
     geometry : UprightGeometry, RecordedRadii, LyingGeometry or SolidFit
     names : tuple of str
         Names of the courses.
-    job : JobOfTable
+    job : JobFiles
     warnings : tuple of Message
     """
 
@@ -57,23 +61,23 @@ class TableRead:
 def read_table(
     path, courses_path=None, former_toml=None, *, kind=None, e_pa=STEEL_PA, bottom_m=None
 ):
-    """Read the geometry of a tank out of a former table.
+    """Estimate the geometry of a tank from a former table.
 
     Parameters
     ----------
     path : path
-        The table; a record.json gives the radii that it has.
+        The table. The radii of a record.json are used as they are in the record.
     courses_path : path or None
-        courses.csv: course, height_m (blank: the seams are found), thickness_mm; None for a
+        courses.csv: course, height_m (blank: estimated from the table), thickness_mm. None for a
         record, a lying tank and a sphere.
     former_toml : path or None
-        What else is known of the table.
+        former.toml with other facts about the table.
     kind : {"vertical", "horizontal", "sphere"} or None
-        None: as former.toml or the record says, else upright.
+        None: the kind in former.toml or in the record, else upright.
     e_pa : float
         Young's modulus of the shell.
     bottom_m : float or None
-        Dip of the highest point of the bottom; None: found.
+        Dip of the highest point of the bottom; None: estimated.
 
     Returns
     -------
@@ -82,9 +86,9 @@ def read_table(
     Raises
     ------
     InputError
-        With every problem of table and courses.
+        With all problems of table and courses.
     SolutionError
-        When the table does not determine its tank.
+        If the table does not determine its tank.
 
     Examples
     --------
@@ -102,7 +106,7 @@ def read_table(
     ([6.0, 6.0], 'without')
     """
     log = Log()
-    former = _former(path, former_toml, log)
+    former = _read_former(path, former_toml, log)
     kind = kind or (former.kind if former else None) or "vertical"
     if former is not None and kind in SOLIDS:
         log.stop_if_problems()
@@ -110,8 +114,10 @@ def read_table(
     if former is not None and former.record is not None:
         log.stop_if_problems()
         radii = read_recorded(former)
-        job = job_of_record(former, radii, tank_id=_tank_of(former))
-        return TableRead(former, radii, radii.names, job, tuple(_of_job(former, 0.0)))
+        job = make_record_job(former, radii, tank_id=_tank_id(former))
+        return TableRead(
+            former, radii, radii.names, job, tuple(_missing_value_warnings(former, 0.0))
+        )
     courses = None
     if courses_path is None:
         expected = message("read_no_courses_file", "missing; expected --courses courses.csv")
@@ -125,10 +131,10 @@ def read_table(
     _check_heights(former, courses)
     computed = find_computed_rows(former)
     if computed is not None:
-        read = _read_computed(former, computed, courses, e_pa, bottom_m)
+        read = _read_computed_rows(former, computed, courses, e_pa, bottom_m)
         if read is not None:
             return read
-    return _read(former, former, courses, e_pa, bottom_m)
+    return _read_rows(former, former, courses, e_pa, bottom_m)
 
 
 def _check_heights(former, courses):
@@ -136,7 +142,7 @@ def _check_heights(former, courses):
     heights = courses.heights_m
     if np.isnan(heights).any():
         return
-    within = find_seams_within(former.height_m, former.volume_m3, sd_of_rows(former), heights)
+    within = find_seams_within(former.height_m, former.volume_m3, row_sds(former), heights)
     problems = []
     for number, seams in within.items():
         expected = message(
@@ -152,15 +158,15 @@ def _check_heights(former, courses):
         raise InputError(problems)
 
 
-def _read_computed(former, computed, courses, e_pa, bottom_m):
+def _read_computed_rows(former, computed, courses, e_pa, bottom_m):
     """Return the TableRead of computed rows; None if each row may have been computed."""
     try:
-        read = _read(former, computed.table(former), courses, e_pa, bottom_m)
+        read = _read_rows(former, computed.table(former), courses, e_pa, bottom_m)
     except TankcalError:
         if computed.is_certain:
             raise
         return None
-    if not computed.is_confirmed(former, read.geometry.state, sd_of_rows(former)):
+    if not computed.is_confirmed(former, read.geometry.state, row_sds(former)):
         return None
     text = message(
         "read_proportional_parts",
@@ -173,7 +179,7 @@ def _read_computed(former, computed, courses, e_pa, bottom_m):
     return replace(read, warnings=(text, *read.warnings))
 
 
-def _former(path, former_toml, log):
+def _read_former(path, former_toml, log):
     try:
         return read_former(path, former_toml)
     except InputError as error:
@@ -196,11 +202,17 @@ def _read_solid(former, kind):
                 kind=kind,
             )
         )
-    job = job_of_solid(former, fit, tank_id=_tank_of(former))
-    return TableRead(former, geometry, (), job, (*_of_solid(geometry), *_of_job(former, 0.0)))
+    job = make_solid_job(former, fit, tank_id=_tank_id(former))
+    return TableRead(
+        former,
+        geometry,
+        (),
+        job,
+        (*_solid_warnings(geometry), *_missing_value_warnings(former, 0.0)),
+    )
 
 
-def _of_solid(geometry):
+def _solid_warnings(geometry):
     fit = getattr(geometry, "best", geometry)
     if fit.variance_factor > 1:
         yield message(
@@ -209,14 +221,14 @@ def _of_solid(geometry):
             "is by what they leave",
             rms=1000 * fit.rms_m3,
         )
-    if fit.below_bottom_m:
+    if fit.zero_depth_m:
         yield message(
             "read_below_bottom",
             "dips of the table count from {below:.3g} mm below the inside bottom; those of the job "
             "count from the bottom: they are less by that",
-            below=1000 * fit.below_bottom_m,
+            below=1000 * fit.zero_depth_m,
         )
-    others = getattr(geometry, "not_told_apart", ())
+    others = getattr(geometry, "equally_good_ends", ())
     if others:
         yield message(
             "read_other_ends",
@@ -256,7 +268,7 @@ def _check_bottom(former, bottom_m, log):
         log.problem("--bottom", expected)
 
 
-def _fitting(former, courses):
+def _select_courses(former, courses):
     """Return the courses within the table, warnings, and whether the seams are known."""
     heights = courses.heights_m
     unknown = np.isnan(heights)
@@ -268,7 +280,7 @@ def _fitting(former, courses):
         )
         raise InputError(Problem(courses.file, expected, None, "height_m"))
     if unknown.all():
-        return _with_seams(former, courses), (), False
+        return _find_course_heights(former, courses), (), False
     total = float(np.sum(heights))
     if total < last - _slack(former):
         expected = message(
@@ -299,10 +311,10 @@ def _slack(former):
     return 0.35 + ABOVE_M if former.height_m[0] == 0 else ABOVE_M
 
 
-def _with_seams(former, courses):
+def _find_course_heights(former, courses):
     """Return the courses with heights from the seams that the table shows."""
     count = len(courses.names)
-    seams = find_seams(former.height_m, former.volume_m3, sd_of_rows(former), count - 1)
+    seams = find_seams(former.height_m, former.volume_m3, row_sds(former), count - 1)
     if len(seams) < count - 1:
         expected = message(
             "read_seams_missing",
@@ -315,9 +327,9 @@ def _with_seams(former, courses):
     return replace(courses, heights_m=np.diff(edges))
 
 
-def _read(former, chosen, courses, e_pa, bottom_m):
+def _read_rows(former, chosen, courses, e_pa, bottom_m):
     """Return the TableRead of a FormerTable from selected rows, given as a FormerTable."""
-    courses, warnings, seams_known = _fitting(chosen, courses)
+    courses, warnings, seams_known = _select_courses(chosen, courses)
     geometry = read_upright(
         chosen,
         courses.heights_m,
@@ -327,16 +339,20 @@ def _read(former, chosen, courses, e_pa, bottom_m):
         seams_known=seams_known,
     )
     u_common = _u_common_m(former, geometry)
-    job = job_of_geometry(
-        former, geometry, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_of(former)
+    job = make_upright_job(
+        former, geometry, courses.names, u_common_m=u_common, e_pa=e_pa, tank_id=_tank_id(former)
     )
     if seams_known:
-        warnings = (*warnings, *_other_seams(chosen, courses, geometry, e_pa, bottom_m))
-    messages = (*warnings, *_of_geometry(former, geometry, seams_known), *_of_job(former, u_common))
+        warnings = (*warnings, *_seam_warnings(chosen, courses, geometry, e_pa, bottom_m))
+    messages = (
+        *warnings,
+        *_geometry_warnings(former, geometry, seams_known),
+        *_missing_value_warnings(former, u_common),
+    )
     return TableRead(former, geometry, courses.names, job, messages)
 
 
-def _other_seams(former, courses, geometry, e_pa, bottom_m):
+def _seam_warnings(former, courses, geometry, e_pa, bottom_m):
     """Warn if other seams explain the residuals with fewer fittings than the declared seams."""
     declared = np.cumsum(geometry.heights_m)[:-1]
     doubtful = [
@@ -346,12 +362,12 @@ def _other_seams(former, courses, geometry, e_pa, bottom_m):
     ]
     is_bulged = geometry.state.bulges_m is not None  # profiles absorb the effect of displaced seams
     is_doubtful = is_bulged or doubtful or geometry.roughness > 1
-    if geometry.seams_are == "found" or not is_doubtful:
+    if geometry.seams_source == "found" or not is_doubtful:
         return
     try:
         alternative = read_upright(
             former,
-            _with_seams(former, courses).heights_m,
+            _find_course_heights(former, courses).heights_m,
             courses.thickness_m,
             modulus_pa=e_pa,
             lowest_m=bottom_m,
@@ -393,13 +409,13 @@ def _u_common_m(former, geometry):
     return float(relative * np.mean(geometry.radii_m) / 2)
 
 
-def _tank_of(former):
+def _tank_id(former):
     if former.record is not None:
         return former.record["job"]["tank"]["id"]
     return str(former.name).partition(",")[0].rpartition(".")[0] or "tank"
 
 
-def _of_geometry(former, geometry, seams_known):
+def _geometry_warnings(former, geometry, seams_known):
     """Messages about the geometry that the user must consider before using the radii."""
     if geometry.roughness > 1:
         yield message(
@@ -411,7 +427,7 @@ def _of_geometry(former, geometry, seams_known):
             expected=1000 * geometry.expected_m3,
             factor=geometry.roughness,
         )
-    yield from _of_density(former.liquid_density_kg_m3, geometry)
+    yield from _density_warnings(former.liquid_density_kg_m3, geometry)
     if geometry.state.bulges_m is not None:
         yield message(
             "read_bulges",
@@ -419,7 +435,7 @@ def _of_geometry(former, geometry, seams_known):
             "courses are estimated, too, and less is known of head, zero and things in the tank",
             largest=1000 * largest_bulge_m(geometry.state.bulges_m),
         )
-    if geometry.seams_are == "found" and seams_known:
+    if geometry.seams_source == "found" and seams_known:
         yield message(
             "read_other_seams",
             "the seams are not where courses.csv has them; the radii are for the seams that were "
@@ -438,7 +454,7 @@ def _of_geometry(former, geometry, seams_known):
             )
 
 
-def _of_density(declared, geometry):
+def _density_warnings(declared, geometry):
     """Compare the estimated density of the head with liquids and with the declared density."""
     density = geometry.density_kg_m3
     held = geometry.state.density_kg_m3
@@ -475,7 +491,7 @@ def _of_density(declared, geometry):
     )
 
 
-def _of_job(former, u_common):
+def _missing_value_warnings(former, u_common):
     """Messages about values that the job lacks because they are not declared."""
     if former.record is None and u_common == 0:
         yield message(

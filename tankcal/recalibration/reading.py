@@ -9,7 +9,7 @@ from tankcal.errors import InputError
 from tankcal.job.tables import Log
 from tankcal.linter.rows import read_rows
 from tankcal.messages import message
-from tankcal.recalibration.declared import Declared, read_declared
+from tankcal.recalibration.declared import FormerFacts, read_former_facts
 from tankcal.recalibration.former import FormerRoof, FormerTable
 from tankcal.record import load
 from tankcal.record.covariance_factor import factor_of
@@ -33,19 +33,18 @@ def read_former(path, former_toml=None) -> FormerTable:
         tankcal; heights in any unit that its headings name, feet and inches, or ullages. Or a
         former.toml that names such a file under `file`.
     former_toml : path, optional
-        The former.toml that says what else is known of it (docs/read-table.md).
+        former.toml with other facts about the table (docs/read-table.md).
 
     Returns
     -------
     FormerTable
-        In SI units, dips rising; the linter's warnings under `warnings`.
+        Table in SI units, with rising dips, and the warnings of the linter.
 
     Raises
     ------
     InputError
-        With every problem: of former.toml; of a file that cannot be read; the findings of the
-        linter, where it calls the table wrong; of units, columns or a reference height that are
-        not clear.
+        With all problems: of former.toml, of an unreadable file, errors found by the linter, and
+        undetermined units, columns or reference heights.
 
     Examples
     --------
@@ -60,23 +59,23 @@ def read_former(path, former_toml=None) -> FormerTable:
     ([0.0, 0.1, 0.2, 0.3], [0.0, 1.629, 3.259, 4.889], 0.001)
     """
     path, log = Path(path), Log()
-    declared = Declared()
+    declared = FormerFacts()
     if former_toml is None and path.suffix.lower() == ".toml":
         former_toml = path
-        declared = read_declared(path, log)
+        declared = read_former_facts(path, log)
         path = _named_file(declared, path, log)
     elif former_toml is not None:
-        declared = read_declared(former_toml, log)
+        declared = read_former_facts(former_toml, log)
         _check_name(declared, path, log)
-    rows, warnings = _rows(path, declared, log)
+    rows, warnings = _read_rows(path, declared, log)
     if rows is None:
         log.stop_if_problems()
-        raise AssertionError("no rows, and nothing told")
-    record = _record(path)
+        raise AssertionError("no rows and no problem")
+    record = _load_record(path)
     if record is None:
-        former = _of_rows(path, rows, declared, log)
+        former = _table_from_rows(rows, declared, log)
     else:
-        former = _of_record(path, record, declared, log)
+        former = _table_from_record(path, record, declared, log)
     log.stop_if_problems()
     return replace(former, warnings=warnings + tuple(log.warnings))
 
@@ -111,7 +110,7 @@ def _check_name(declared, path, log):
         declared.tell(log, "file", expected)
 
 
-def _rows(path, declared, log):
+def _read_rows(path, declared, log):
     """Return (TableRows or None, warnings); errors of the linter are reported to `log`."""
     try:
         rows, report = read_rows(
@@ -134,14 +133,14 @@ def _rows(path, declared, log):
     return rows, tuple(finding.problem for finding in report.findings)
 
 
-def _record(path):
+def _load_record(path):
     """Return the record in a file, migrated to the latest version; None for any other file."""
     with path.open("rb") as file:
         start = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")
     return load(path) if path.suffix.lower() == ".json" or start[:1] == b"{" else None
 
 
-def _of_rows(path, rows, declared, log):
+def _table_from_rows(rows, declared, log):
     """Return the FormerTable of rows and of declared facts."""
     height = rows.height_m
     if rows.is_ullage:
@@ -220,9 +219,9 @@ def _uncertainty(rows, declared, log):
     return (value if key.startswith("U") else k * value) * scale, k
 
 
-def _of_record(path, record, declared, log):
+def _table_from_record(path, record, declared, log):
     """Return the FormerTable of a record; declared facts must not contradict it."""
-    factor_m3 = _factor_of(record["capacity"], path, log)
+    factor_m3 = _covariance_factor(record["capacity"], path, log)
     table, job = record["capacity"], record["job"]
     certificate, choices = job.get("certificate") or {}, _choices(record)
     density = choices.get("head", job["table"].get("liquid_density_kg_m3"))
@@ -242,7 +241,7 @@ def _of_record(path, record, declared, log):
         stated = declared[key]
         if values[key] is None:
             values[key] = stated
-        elif stated is not None and not _same(stated, values[key]):
+        elif stated is not None and not _are_equal(stated, values[key]):
             expected = message(
                 "former_against_record",
                 "found {found}, but the record has {has}; expected no such key: it is taken from "
@@ -265,14 +264,14 @@ def _of_record(path, record, declared, log):
         U_m3=np.array(table["stated_U_m3"], dtype=float),
         k=float(np.median(table["k"])),
         common=declared["common"],
-        roof=_roof_of(record) or declared.roof,
+        roof=_roof_of_record(record) or declared.roof,
         factor_m3=factor_m3,
         record=record,
         **values,
     )
 
 
-def _factor_of(table, path, log):
+def _covariance_factor(table, path, log):
     """Return the covariance factor of a record's table.
 
     Raise InputError for inconsistent lengths.
@@ -306,13 +305,13 @@ def _choices(record):
     return {choice["code"]: choice["value"] for choice in record["choices"]}
 
 
-def _same(stated, has):
+def _are_equal(stated, has):
     if isinstance(stated, int | float) and isinstance(has, int | float):
         return abs(stated - has) <= 1e-9 * max(abs(stated), abs(has))
     return stated == has
 
 
-def _roof_of(record):
+def _roof_of_record(record):
     """Return the FormerRoof deducted in the record's table, or None."""
     details = {roof["code"]: roof["value"] for roof in record.get("roof") or ()}
     if not details or _choices(record).get("roof") == "off":

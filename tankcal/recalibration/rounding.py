@@ -13,7 +13,7 @@ ROUGH = 1.15  # largest rms residual over rms rounding error of rows without oth
 DRAWS, SEED = 150, 21  # number of simulated roundings, and seed
 
 
-def sd_of_rows(former):
+def row_sds(former):
     """Standard deviations (rows,) of a table's volumes by its last digits, m3.
 
     Dips with even steps are exact; other dips contribute their own rounding.
@@ -26,7 +26,7 @@ def sd_of_rows(former):
     return np.hypot(sd, np.gradient(volumes, dips) * former.height_rounding_m / np.sqrt(3))
 
 
-def rounded_again(solution, rows, quantum_m3, draws=DRAWS):
+def simulate_rounding(solution, rows, quantum_m3, draws=DRAWS):
     """Rounding errors of tanks compatible with a Fit, m3.
 
     Parameters
@@ -54,7 +54,7 @@ def rounded_again(solution, rows, quantum_m3, draws=DRAWS):
     return (np.round(places) - places) * quantum_m3
 
 
-def scale_of_u(solution, rows, quantum_m3):
+def u_factors(solution, rows, quantum_m3):
     """Factors (u,) of the standard deviations of the unknowns of a Fit, 1 or more.
 
     Parameters
@@ -64,16 +64,16 @@ def scale_of_u(solution, rows, quantum_m3):
     quantum_m3 : float
         Value of the last printed digit; 0: not rounded.
     """
-    return np.maximum(_by_steps(solution, rows, quantum_m3), roughness(solution, rows))
+    return np.maximum(_simulated_factors(solution, rows, quantum_m3), roughness(solution, rows))
 
 
-def _by_steps(solution, rows, quantum):
+def _simulated_factors(solution, rows, quantum):
     sds = np.sqrt(np.diag(solution.cofactor))
     if quantum <= 0 or solution.dof <= 0:
         return np.ones(len(sds))
     # Errors of the unknowns by errors of the rows: Q A' P.
     gain = solution.cofactor @ (solution.design / rows.sd_m3[:, None] ** 2).T
-    errors = rounded_again(solution, rows, quantum) @ gain.T
+    errors = simulate_rounding(solution, rows, quantum) @ gain.T
     moved = np.sqrt(np.mean(errors**2, axis=0))
     return np.maximum(moved / np.where(sds > 0, sds, np.inf), 1.0)
 

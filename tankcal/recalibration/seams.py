@@ -1,17 +1,30 @@
-"""Undeclared seams: dips where the second difference of a table jumps."""
+"""Seams in a table, where its second difference jumps, and the zero that all seams share.
+
+Seams of unknown position are sought one after the other (`find_seams`). For seams of known heights,
+two parabolas that meet at a dip s are adjusted to the rows about each seam, for each s. This gives
+chi2 of each seam as a function of the zero, s minus the height of the seam above the bottom. The
+contribution of each seam is capped, so that a fitting near one seam does not decide (`find_zeros`).
+"""
 
 import numpy as np
 
 LEAST_APART_M = 0.8  # smallest distance of two seams, and of a seam from the ends of the table
-PLACES_APART_M = 0.01
+PLACES_APART_M = 0.01  # distance of the places tried for a seam
 LEAST_GAIN = 30.0  # smallest reduction of chi2 by a seam
-MOST_ROWS = 300  # largest number of rows for checking heights of courses
+MOST_ROWS_OF_CHECK = 300  # largest number of rows for checking heights of courses
 ABOVE_BOTTOM_M = 0.4  # lowest row for checking heights of courses
 FROM_ENDS_M = 0.3  # smallest distance of a seam within a course from its ends
 # Height of a course, and height over the median; only taller courses are checked.
 WIDEST_PLATE_M, TALL = 3.1, 1.4
 CLEAR_RATIO = 30.0  # ratio of chi2 with declared seams to chi2 with seams from the table
 OPPOSITE = 0.25  # relative sum of two opposite jumps of area that are the ends of a fitting
+FARTHEST_M, STEP_M = 0.35, 0.01  # largest distance of a zero from dip 0, and step of the search
+MOVED_M = 0.15  # largest distance of a seam from its declared position
+WINDOW_M = 0.5  # half width of the window about a seam, beyond the farthest zero
+LARGEST_VOTE = 25.0  # cap on the chi2 of a seam
+FEWEST_ROWS_OF_WINDOW = 7  # fewest rows of a window
+MOST_ROWS_OF_WINDOW = 200  # largest number of rows used in a window
+APART_M = 0.03  # smallest distance of candidates
 
 
 def find_seams(dips_m, volumes_m3, sd_m3, count):
@@ -52,7 +65,7 @@ def find_seams_within(dips_m, volumes_m3, sd_m3, heights_m):
     ----------
     dips_m, volumes_m3, sd_m3 : (rows,) ndarray
     heights_m : (n,) ndarray
-        Declared heights of all courses, from the bottom up.
+        FormerFacts heights of all courses, from the bottom up.
 
     Returns
     -------
@@ -61,9 +74,9 @@ def find_seams_within(dips_m, volumes_m3, sd_m3, heights_m):
     """
     tall = np.flatnonzero((heights_m > WIDEST_PLATE_M) | (heights_m > TALL * np.median(heights_m)))
     some = np.flatnonzero((volumes_m3 > 0) & (dips_m > dips_m[0] + ABOVE_BOTTOM_M))
-    if not len(tall) or len(some) < MOST_ROWS // 10:
+    if not len(tall) or len(some) < MOST_ROWS_OF_CHECK // 10:
         return {}
-    some = some[np.unique(np.linspace(0, len(some) - 1, MOST_ROWS).round().astype(int))]
+    some = some[np.unique(np.linspace(0, len(some) - 1, MOST_ROWS_OF_CHECK).round().astype(int))]
     rows = dips_m[some], volumes_m3[some], sd_m3[some]
     edges = np.append(0.0, np.cumsum(heights_m))
     declared = _chi2(*rows, edges[1:-1][edges[1:-1] < dips_m[-1]])[0]
@@ -89,27 +102,30 @@ def find_seams_within(dips_m, volumes_m3, sd_m3, heights_m):
 
 def _chi2(dips, volumes, sds, seams):
     """Return chi2 of a parabola for each ring, and the jumps (seams,) of the slope."""
-    x = dips / dips[-1]
-    columns = [np.ones_like(x), x, x**2]
-    for seam in seams:
-        above = np.maximum(x - seam / dips[-1], 0.0)
-        columns += [above, above**2]
-    basis = np.column_stack(columns) / sds[:, None]
+    basis = _parabolas(dips, sds, seams)
     solution = np.linalg.lstsq(basis, volumes / sds, rcond=None)[0]
     left = volumes / sds - basis @ solution
     return float(left @ left), solution[3::2]
 
 
-def _gains(dips, volumes, sds, seams, places):
-    """Reduction (places,) of chi2 by another seam; 0 near an existing seam."""
+def _parabolas(dips, sds, seams):
+    """Weighted basis (rows, 3 + 2 seams) of a parabola for each ring, continuous at the seams."""
     x = dips / dips[-1]
     columns = [np.ones_like(x), x, x**2]
     for seam in seams:
         above = np.maximum(x - seam / dips[-1], 0.0)
         columns += [above, above**2]
-    q = np.linalg.qr(np.column_stack(columns) / sds[:, None])[0]
+    return np.column_stack(columns) / sds[:, None]
+
+
+def _gains(dips, volumes, sds, seams, places):
+    """Reduction (places,) of chi2 by another seam; 0 near an existing seam."""
+    x = dips / dips[-1]
+    q = np.linalg.qr(_parabolas(dips, sds, seams))[0]
     value = volumes / sds
     left = value - q @ (q.T @ value)
+    # A further seam adds a ramp and its square. Their part that the parabolas do not explain lowers
+    # chi2 by the square of its projection on the residuals.
     gains = np.zeros(len(places))
     for k, place in enumerate(places):
         if any(abs(place - seam) < LEAST_APART_M for seam in seams):
@@ -119,3 +135,77 @@ def _gains(dips, volumes, sds, seams, places):
         kinks = np.linalg.qr(kinks - q @ (q.T @ kinks))[0]
         gains[k] = float(np.sum((kinks.T @ left) ** 2))
     return gains
+
+
+# ---- zero of the table
+
+
+def find_zeros(dips_m, volumes_m3, sd_m3, seams_m, most=3):
+    """Dips of possible bottoms of the first ring, most likely first; (0.0,) if undetermined.
+
+    Parameters
+    ----------
+    dips_m, volumes_m3, sd_m3 : (rows,) ndarray
+    seams_m : (n,) ndarray
+        Heights above the bottom of the first ring.
+    most : int
+        Largest number of candidates.
+
+    Returns
+    -------
+    tuple of float
+    """
+    zeros = np.arange(-round(FARTHEST_M / STEP_M), round(FARTHEST_M / STEP_M) + 1) * STEP_M
+    votes = np.zeros(len(zeros))
+    for seam in seams_m:
+        votes += _seam_chi2(dips_m, volumes_m3, sd_m3, seam + zeros)
+    if np.ptp(votes) < 1.0:
+        return (0.0,)
+    votes = votes + 0.5 * (zeros / FARTHEST_M) ** 2  # of equal candidates, prefer the one near 0
+    candidates = []
+    for place in np.argsort(votes):
+        if all(abs(zeros[place] - zero) >= APART_M for zero in candidates):
+            candidates.append(float(zeros[place]))
+        if len(candidates) == most:
+            break
+    return tuple(candidates)
+
+
+def move_seams(dips_m, volumes_m3, sd_m3, seams_m):
+    """Dips (n,) of seams, each estimated separately from the rows about it.
+
+    Parameters
+    ----------
+    dips_m, volumes_m3, sd_m3 : (rows,) ndarray
+    seams_m : (n,) ndarray
+        FormerFacts dips.
+    """
+    shifts = np.arange(-round(MOVED_M / STEP_M), round(MOVED_M / STEP_M) + 1) * STEP_M
+    shifts = shifts[np.argsort(np.abs(shifts), kind="stable")]
+    votes = [_seam_chi2(dips_m, volumes_m3, sd_m3, seam + shifts) for seam in seams_m]
+    return np.array([s + shifts[np.argmin(v)] for s, v in zip(seams_m, votes, strict=True)])
+
+
+def _seam_chi2(dips, volumes, sds, seams):
+    """chi2 (zeros,) of the rows about one seam, capped, and scaled by its minimum."""
+    reach = FARTHEST_M + WINDOW_M
+    near = np.flatnonzero(np.abs(dips - seams.mean()) <= reach)
+    if len(near) < FEWEST_ROWS_OF_WINDOW:
+        return np.zeros(len(seams))
+    near = near[np.unique(np.linspace(0, len(near) - 1, MOST_ROWS_OF_WINDOW).astype(int))]
+    middle = float(seams.mean())
+    x = (dips[near] - middle) / reach
+    weight = 1 / sds[near]
+    value = (volumes[near] - volumes[near].mean()) * weight
+    q = np.linalg.qr(np.vander(x, 3) * weight[:, None])[0]
+    value = value - q @ (q.T @ value)
+    chi2 = np.empty(len(seams))
+    for k, seam in enumerate((seams - middle) / reach):
+        above = np.maximum(x - seam, 0.0)
+        kinks = np.column_stack([above, above**2]) * weight[:, None]
+        kinks = kinks - q @ (q.T @ kinks)
+        left = value - kinks @ np.linalg.lstsq(kinks, value, rcond=None)[0]
+        chi2[k] = left @ left
+    least = chi2.min()
+    scale = max(least / max(len(near) - 5, 1), 1.0)
+    return np.minimum((chi2 - least) / scale, LARGEST_VOTE)

@@ -11,9 +11,8 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
-from tankcal.recalibration.bulges import bulge_derivatives, bulge_volume_m3, prior_sds
 from tankcal.recalibration.fittings import Fitting
-from tankcal.recalibration.upright_shell import Rings
+from tankcal.recalibration.upright_shell import Rings, bulge_derivatives, bulge_volume_m3, prior_sds
 
 ZERO_SD_M, SEAM_SD_M, KINK_SD_M = 0.1, 0.05, 1.0  # weak priors, which prevent singularity
 BULGED_ZERO_SD_M = 0.03  # prior of the zero with profiles, which hide the joints
@@ -141,7 +140,7 @@ class State:
             [values[name][: part.stop - part.start] for name, part in self.layout.items()]
         )
 
-    def with_unknowns(self, unknowns):
+    def replace_unknowns(self, unknowns):
         """Return the state with other values of the unknowns."""
         values = {name: unknowns[part] for name, part in self.layout.items()}
         changes = {"radii_m": values["radii"]}
@@ -158,11 +157,13 @@ class State:
         return replace(self, **changes)
 
     def design(self, dips_m):
-        """Derivatives (rows, u) of `volume_m3` by the unknowns."""
+        """Derivatives (rows, u) of `volume_m3` by the unknowns, in the order of `layout`."""
+        # The last row is h_0: the model contains W(h) - W(h_0), and so do its derivatives.
         dips = np.append(dips_m, self.lowest_m)
         by_radius, by_density, by_edge = self.rings.derivatives(
             dips, self.radii_m, self.density_kg_m3
         )
+        # A higher zero shifts all edges together.
         by_bulge, by_zero = np.zeros((len(dips), 0)), by_edge.sum(axis=1, keepdims=True)
         if self.bulges_m is not None:
             by_bulge, *more = bulge_derivatives(self.rings, dips, self.radii_m, self.bulges_m)
@@ -179,8 +180,8 @@ class State:
             columns.append(by_edge[:, 1:])
         columns += [by_bulge]
         columns += [fitting.derivatives(dips) for fitting in self.fittings]
-        relative = np.hstack(columns)
-        parts = [relative[:-1] - relative[-1]]
+        columns_of_rows = np.hstack(columns)
+        parts = [columns_of_rows[:-1] - columns_of_rows[-1]]
         if "base" in self.free:
             parts.insert(0, np.ones((len(dips_m), 1)))
         if self.roof_zone_m is not None:
@@ -250,6 +251,7 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     SolutionError
         If the rows do not determine the unknowns.
     """
+    # Unknowns that the rows cannot determine are fixed; all others move.
     held, known, about, sds = _priors(state)
     moving = np.setdiff1d(np.arange(len(state.unknowns)), held)
     observed = np.concatenate([volumes_m3, about])
@@ -258,18 +260,21 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     rows = np.eye(len(state.unknowns))[known][:, moving]
 
     def misclosure(now):
+        """Model minus observations, of the rows and of the priors."""
         return np.concatenate([now.volume_m3(dips_m), now.unknowns[known]]) - observed
 
     now, w = state, misclosure(state)
     for _ in range(MOST_ROUNDS):
         design = np.vstack([now.design(dips_m)[:, moving], rows])
-        adjusted = adjust(_tangent(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances)
+        adjusted = adjust(
+            _linear_model(w, design), np.zeros(len(moving)), np.zeros(len(w)), variances
+        )
         before, cost = now, w @ (w / variances)
         step = np.zeros(len(now.unknowns))
         step[moving] = adjusted.unknowns
         # Gauss-Newton step, halved until the cost does not rise.
         for _ in range(MOST_HALVINGS):
-            now = before.with_unknowns(before.unknowns + step)
+            now = before.replace_unknowns(before.unknowns + step)
             w = misclosure(now)
             if w @ (w / variances) <= cost + SETTLED:
                 break
@@ -280,11 +285,11 @@ def fit(state, dips_m, volumes_m3, sd_m3):
     cofactor[np.ix_(moving, moving)] = adjusted.cofactor
     left = volumes_m3 - now.volume_m3(dips_m)
     chi2 = float(np.sum((left / sd_m3) ** 2))
-    bulges = _expected_bulges(now)
+    bulges = _bulge_prior(now)
     return Fit(now, cofactor, left, sd_m3, now.design(dips_m), chi2, bulges)
 
 
-def _expected_bulges(state):
+def _bulge_prior(state):
     """Derivatives, discrepancies and sds of the bulges as prior observations."""
     part = np.eye(len(state.unknowns))[state.layout["bulges"]]
     if not len(part):
@@ -292,7 +297,7 @@ def _expected_bulges(state):
     return part, -state.bulges_m.ravel(), prior_sds(state.bulges_m).ravel()
 
 
-def _tangent(w, design):
+def _linear_model(w, design):
     """Linear model of a step, for `adjust`."""
     return lambda x, l: (w + design @ x - l, design, None)
 
@@ -300,7 +305,7 @@ def _tangent(w, design):
 def _priors(state):
     """Return fixed unknowns, and unknowns with weak priors, their values and sds."""
     layout = state.layout
-    sds, held = {}, []
+    sds, held = {}, []  # sds: {place of the unknown: sd of its prior}
     density_sd = state.density_sd_kg_m3
     zero_sd = ZERO_SD_M if state.bulges_m is None else BULGED_ZERO_SD_M
     for name, sd in (("zero", zero_sd), ("seams", SEAM_SD_M), ("density", density_sd)):
@@ -310,12 +315,13 @@ def _priors(state):
         sds |= dict(zip(places, prior_sds(state.bulges_m).ravel(), strict=True))
     for k, fitting in enumerate(state.fittings):
         place = layout["fittings"].start + 3 * k
-        for edge, is_held in enumerate(held_kinks(state, fitting)):
+        for edge, is_held in enumerate(are_kinks_fixed(state, fitting)):
             if is_held:
                 held.append(place + edge)
             else:
                 sds[place + edge] = KINK_SD_M
     known = np.array(list(sds), dtype=int)
+    # Priors are centred on the start values, those of zero and bulges on 0.
     about = state.unknowns[known]
     for name in ("zero", "bulges"):
         about[np.isin(known, np.arange(len(state.unknowns))[layout[name]])] = 0.0
@@ -325,7 +331,7 @@ def _priors(state):
     return np.array(held, dtype=int), known, about, np.array(list(sds.values()))
 
 
-def held_kinks(state, fitting):
+def are_kinks_fixed(state, fitting):
     """Whether (bottom, top) kinks of a fitting lie outside the rows and are therefore fixed."""
     if "kinks" not in state.free:
         return True, True
@@ -346,19 +352,19 @@ class Rows:
     volume_m3: np.ndarray
     sd_m3: np.ndarray
 
-    def above(self, dip_m):
+    def select_above(self, dip_m):
         """Return the rows from a dip upwards."""
-        return self.of(self.dip_m >= dip_m - 1e-9)
+        return self.select(self.dip_m >= dip_m - 1e-9)
 
-    def of(self, mask):
+    def select(self, mask):
         """Return the rows of a mask."""
         return Rows(self.dip_m[mask], self.volume_m3[mask], self.sd_m3[mask])
 
-    def thinned(self, most):
+    def thin(self, most):
         """Return at most `most` evenly chosen rows, including the first and the last."""
         chosen = np.zeros(len(self.dip_m), dtype=bool)
         chosen[np.unique(np.linspace(0, len(self.dip_m) - 1, most).round().astype(int))] = True
-        return self.of(chosen)
+        return self.select(chosen)
 
     def adjust(self, state):
         """Return the Fit of a State to the rows."""
@@ -367,7 +373,7 @@ class Rows:
         return fit(state, self.dip_m, self.volume_m3, self.sd_m3)
 
 
-def tried(rows, state):
+def try_fit(rows, state):
     """Return the Fit of a State to Rows, or None if the rows do not determine it."""
     try:
         return rows.adjust(state)

@@ -1,4 +1,4 @@
-"""Build a job from the tank geometry estimated from a former table."""
+"""Jobs from the geometry estimated from a former table, or from the radii in a record."""
 
 import datetime
 import json
@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.recalibration.solid_geometry import declared_sizes, declared_uncertainties
+from tankcal.recalibration.solid_geometry import size_sections, uncertainty_rows
 
 USUAL_TEMPERATURE_C = 20.0
 UNKNOWN_ZERO_M = 0.02
@@ -19,7 +20,100 @@ SURE = 3.0  # standard uncertainties within which a bottom is flat, or a zero is
 
 
 @dataclass(frozen=True)
-class JobOfTable:
+class RecordedRadii:
+    """Radii of the courses in a record.
+
+    Attributes
+    ----------
+    names : tuple of str
+    radii_m : ndarray, shape (n,)
+        Inside radii of the empty tank at the temperature of the record's table.
+    covariance_m2 : ndarray, shape (n, n)
+        From the covariance of the rows of its table.
+    heights_m, thickness_m : ndarray, shape (n,)
+    """
+
+    names: tuple[str, ...]
+    radii_m: np.ndarray
+    covariance_m2: np.ndarray
+    heights_m: np.ndarray
+    thickness_m: np.ndarray
+
+    @property
+    def u_m(self):
+        """Standard uncertainties (n,), m."""
+        return np.sqrt(np.diag(self.covariance_m2))
+
+
+def read_recorded(former):
+    """Return the radii in the record of a former table.
+
+    Parameters
+    ----------
+    former : FormerTable
+        Table with its record.
+
+    Returns
+    -------
+    RecordedRadii
+
+    Raises
+    ------
+    InputError
+        For a tank that is not upright, or that held liquid during the survey, or a course with
+        fewer than two rows of the table.
+    """
+    record = former.record
+    courses = record.get("courses") or []
+    if (record["job"]["tank"].get("kind") or "vertical") != "vertical" or not courses:
+        _refuse(
+            former, message("read_no_courses", "not a tank of courses; expected an upright one")
+        )
+    if (record["job"]["survey"] or {}).get("liquid_level_m"):
+        expected = message(
+            "read_filled_record",
+            "the tank held liquid when it was measured; expected the record of an empty one: run "
+            "its job again for another table",
+        )
+        _refuse(former, expected)
+    zero = record["capacity"].get("zero_m") or 0.0
+    radii = np.array([course["inside_radius_m"] for course in courses])
+    parts = [_area_factor(former, course, zero) for course in courses]
+    factor = np.array(parts) / (2 * np.pi * radii[:, None])
+    return RecordedRadii(
+        tuple(course["course"] for course in courses),
+        radii,
+        factor @ factor.T,
+        np.array([course["height_m"] for course in courses]),
+        np.array([course["thickness_m"] for course in courses]),
+    )
+
+
+def _area_factor(former, course, zero):
+    """Covariance factor (inputs,) of the mean area between the rows of a course."""
+    low, high = course["bottom_m"] - zero, course["top_m"] - zero
+    rows = np.flatnonzero((former.height_m >= low - 1e-6) & (former.height_m <= high + 1e-6))
+    if len(rows) < 2:
+        expected = message(
+            "read_rows_of_course",
+            "fewer than two rows within course {course}; expected rows in each",
+            course=course["course"],
+        )
+        _refuse(former, expected)
+    first, last = rows[0], rows[-1]
+    apart = former.height_m[last] - former.height_m[first]
+    return (former.factor_m3[last] - former.factor_m3[first]) / apart
+
+
+def _refuse(former, expected):
+    raise InputError(Problem(former.name, expected))
+
+
+# ---- files of the jobs
+
+
+@dataclass(frozen=True)
+class JobFiles:
     """The files of a job.
 
     Attributes
@@ -40,8 +134,8 @@ class JobOfTable:
     words: tuple = ()
 
 
-def job_of_geometry(former, geometry, names, *, u_common_m, e_pa, tank_id):
-    """Return the `JobOfTable` of an `UprightGeometry`.
+def make_upright_job(former, geometry, names, *, u_common_m, e_pa, tank_id):
+    """Return the `JobFiles` of an `UprightGeometry`.
 
     Parameters
     ----------
@@ -89,11 +183,11 @@ def job_of_geometry(former, geometry, names, *, u_common_m, e_pa, tank_id):
     if geometry.state.bulges_m is not None:
         texts["uncertainty.csv"] = _profiles(geometry.state.bulges_m)
     words = (note, *names_of_things)
-    return JobOfTable(texts, geometry.covariance_m2, tuple(names), words)
+    return JobFiles(texts, geometry.covariance_m2, tuple(names), words)
 
 
-def job_of_record(former, radii, *, tank_id):
-    """Return the `JobOfTable` of `RecordedRadii`."""
+def make_record_job(former, radii, *, tank_id):
+    """Return the `JobFiles` of `RecordedRadii`."""
     job = former.record["job"]
     note = message("job_radii_of", "radii of {name}", name=str(former.name))
     settings = _settings(
@@ -109,13 +203,13 @@ def job_of_record(former, radii, *, tank_id):
         note=note,
     )
     wall = _wall(radii.names, radii.heights_m, radii.thickness_m, radii.radii_m)
-    return JobOfTable(
+    return JobFiles(
         {"job.toml": settings + _roof(former), **wall}, radii.covariance_m2, radii.names, (note,)
     )
 
 
-def job_of_solid(former, fit, *, tank_id):
-    """Return the `JobOfTable` of a `SolidFit`: a job of declared dimensions."""
+def make_solid_job(former, fit, *, tank_id):
+    """Return the `JobFiles` of a `SolidFit`: a job of declared dimensions."""
     diameter = fit["diameter"][0]
     tank = {
         "id": tank_id,
@@ -128,24 +222,22 @@ def job_of_solid(former, fit, *, tank_id):
         "reference_temperature_c": _temperature(former),
     }
     lines = []
-    for name, keys in ({"tank": tank} | declared_sizes(fit) | {"table": table}).items():
+    for name, keys in ({"tank": tank} | size_sections(fit) | {"table": table}).items():
         lines.append(f"[{name}]")
         for key, value in keys.items():
             lines.append(f"{key} = {_text(value) if isinstance(value, str) else value}")
         lines.append("")
     lines += ["[survey]", 'side = "inside"', f"date = {_day(former)}"]
-    lines += [
-        f"shell_temperature_c = {_temperature(former)}",
-        "",
-    ]  # reference temperature of the dimensions
+    # The dimensions are those at the reference temperature.
+    lines += [f"shell_temperature_c = {_temperature(former)}", ""]
     texts = {"job.toml": "\n".join(lines)}
     rows = [
         ",".join(str(row[key]) for key in ("input", "u", "unit"))
-        for row in declared_uncertainties(fit, former)
+        for row in uncertainty_rows(fit, former)
     ]
     if rows:
         texts["uncertainty.csv"] = "\n".join(["input,u,unit", *rows]) + "\n"
-    return JobOfTable(texts, None, ())
+    return JobFiles(texts, None, ())
 
 
 def _temperature(former):
@@ -282,16 +374,15 @@ def _bottom(former, geometry):
     is_near = abs(level - zero.value) <= SURE * (u + geometry.expected_m3 / area)
     if is_near and np.all(np.abs(volumes - flat) < SURE * geometry.expected_m3):
         return level, None
-    rows = _rising([*zip(dips, volumes, strict=True), (lowest, max(base.value, 0.0))])
-    floor = (
-        np.floor(min(zero.value, 0.0) / LEVEL_M) * LEVEL_M
-    )  # rounded down, so that it does not lie above the shell
+    rows = _rising_rows([*zip(dips, volumes, strict=True), (lowest, max(base.value, 0.0))])
+    # rounded down, so that the lowest dip does not lie above the shell
+    floor = np.floor(min(zero.value, 0.0) / LEVEL_M) * LEVEL_M
     if (rows[0][0] > floor and rows[0][1] > 0) or len(rows) == 1:
-        rows.insert(0, _row_below(rows, area, floor))
+        rows.insert(0, _extrapolate_row(rows, area, floor))
     return min(zero.value, lowest), np.array(rows)
 
 
-def _rising(rows):
+def _rising_rows(rows):
     """Return rows of bottom.csv, from the last one down, whose volumes rise.
 
     Coarse rounding repeats volumes; a job refuses a bottom whose volumes do not rise.
@@ -303,7 +394,7 @@ def _rising(rows):
     return kept
 
 
-def _row_below(rows, area_m2, floor_m):
+def _extrapolate_row(rows, area_m2, floor_m):
     """Return (dip, volume) below the first row: at `floor_m`, or at the empty level above it.
 
     The two lowest rows are extrapolated; a single row is extrapolated with the area of the shell.

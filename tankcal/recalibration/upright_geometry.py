@@ -14,14 +14,14 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.recalibration.rounding import roughness, scale_of_u, sd_of_rows
-from tankcal.recalibration.table_fit import Rows, State, held_kinks, tried
+from tankcal.recalibration.rounding import roughness, row_sds, u_factors
+from tankcal.recalibration.table_fit import Rows, State, are_kinks_fixed, try_fit
 from tankcal.recalibration.upright_search import (
     LEAST_GAIN,
     SAME_ZERO,
+    drop_insignificant_fittings,
+    drop_phantom_fittings,
     search,
-    with_sure_fittings,
-    without_phantoms,
 )
 
 STEEL_PA = 206e9
@@ -38,7 +38,7 @@ ORDER_IS_CLEAR = 9.0
 
 
 @dataclass(frozen=True)
-class Reading:
+class TableEstimate:
     """A value estimated from a table, and its standard uncertainty by rounding."""
 
     value: float
@@ -46,18 +46,18 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class FoundFitting:
+class FittingEstimate:
     """A fitting deducted or added in a table.
 
     Attributes
     ----------
-    bottom_m, top_m, volume_m3 : Reading
+    bottom_m, top_m, volume_m3 : TableEstimate
         Dips and volume; u is nan for an end outside the rows used.
     """
 
-    bottom_m: Reading
-    top_m: Reading
-    volume_m3: Reading
+    bottom_m: TableEstimate
+    top_m: TableEstimate
+    volume_m3: TableEstimate
 
 
 @dataclass(frozen=True)
@@ -74,21 +74,21 @@ class UprightGeometry:
         Covariance of the radii.
     heights_m, thickness_m : ndarray, shape (n,)
         Rings within the table.
-    zero_m : Reading
+    zero_m : TableEstimate
         Dip of the bottom of the first ring. u is 0 if the table is empty at its zero and begins
         there; nan if unknown because the seams are estimated as well.
-    seams_m : tuple of Reading
+    seams_m : tuple of TableEstimate
         Dips of the seams, each estimated separately; u is large if the area does not jump there.
-    seams_are : {"declared", "found"}
+    seams_source : {"declared", "found"}
         Which seams the radii refer to.
-    density_kg_m3 : Reading
+    density_kg_m3 : TableEstimate
     head : {"with", "without", "undecided"}
     t : float
         Density over its u.
-    fittings : tuple of FoundFitting
-    roof_m3 : Reading or None
+    fittings : tuple of FittingEstimate
+    roof_m3 : TableEstimate or None
         Effect of a declared roof above its critical zone; negative.
-    base_m3 : Reading
+    base_m3 : TableEstimate
         Volume at `lowest_m`, the lowest row used.
     lowest_m : float
     used : ndarray of bool, shape (rows,)
@@ -113,15 +113,15 @@ class UprightGeometry:
     covariance_m2: np.ndarray
     heights_m: np.ndarray
     thickness_m: np.ndarray
-    zero_m: Reading
-    seams_m: tuple[Reading, ...]
-    seams_are: str
-    density_kg_m3: Reading
+    zero_m: TableEstimate
+    seams_m: tuple[TableEstimate, ...]
+    seams_source: str
+    density_kg_m3: TableEstimate
     head: str
     t: float
-    fittings: tuple[FoundFitting, ...]
-    roof_m3: Reading | None
-    base_m3: Reading
+    fittings: tuple[FittingEstimate, ...]
+    roof_m3: TableEstimate | None
+    base_m3: TableEstimate
     lowest_m: float
     used: np.ndarray
     left_m3: np.ndarray
@@ -140,7 +140,6 @@ def read_upright(
     thickness_m,
     *,
     modulus_pa=STEEL_PA,
-    known=(),
     lowest_m=None,
     seams_known=True,
 ):
@@ -152,8 +151,6 @@ def read_upright(
     heights_m, thickness_m : array_like, shape (n,)
         Rings from the bottom up; the table must reach all of them.
     modulus_pa : float
-    known : sequence of Fitting
-        Known fittings, at dips of the table; they are removed first.
     lowest_m : float, optional
         Dip of the highest point of the bottom; None: estimated.
     seams_known : bool
@@ -169,18 +166,15 @@ def read_upright(
         If there are too few rows, or they do not determine the radii.
     """
     heights, plates = np.asarray(heights_m, float), np.asarray(thickness_m, float)
-    volume = former.volume_m3 - sum(
-        (fitting.volume_below_m3(former.height_m) for fitting in known), 0.0
-    )
-    rows = Rows(former.height_m, volume, sd_of_rows(former))
+    rows = Rows(former.height_m, former.volume_m3, row_sds(former))
     zone = former.roof.critical_m if former.roof else None
-    used = np.ones(len(volume), dtype=bool)
+    used = np.ones(len(rows.dip_m), dtype=bool)
     if zone is not None:
         used = (rows.dip_m < zone[0]) | (rows.dip_m > zone[1])
     empty = rows.volume_m3 <= 0
     if np.count_nonzero(empty) > 1:  # dips below the bottom
         used &= ~empty
-    usable = rows.of(used)
+    usable = rows.select(used)
     state = _start(usable, heights, plates, modulus_pa, zone)
     solution = search(usable, state, lowest_m, _usual_density(former))
     used &= rows.dip_m >= solution.state.lowest_m - 1e-9
@@ -191,6 +185,7 @@ def _start(rows, heights, plates, modulus, zone):
     """Return the initial State, with radii from the mean area of each ring."""
     edges = np.concatenate([[0.0], np.cumsum(heights)])
     radii = np.zeros(len(heights))
+    # Mean area of each ring: the rise of the volume over the rise of the dip.
     for k in range(len(heights)):
         inside = np.flatnonzero((rows.dip_m >= edges[k]) & (rows.dip_m <= edges[k + 1]))
         if len(inside) < FEWEST_ROWS:
@@ -203,6 +198,7 @@ def _start(rows, heights, plates, modulus, zone):
                     fewest=FEWEST_ROWS,
                 )
             )
+        # The lower half of the first ring may contain the bottom.
         upper = inside[len(inside) // 2 :] if k == 0 and len(inside) > 5 else inside
         rise = rows.volume_m3[upper[-1]] - rows.volume_m3[upper[0]]
         area = rise / (rows.dip_m[upper[-1]] - rows.dip_m[upper[0]])
@@ -223,99 +219,99 @@ def _start(rows, heights, plates, modulus, zone):
 
 
 def _geometry(former, solution, rows, used, seams_known):
-    chosen = rows.of(used)
-    quantum = former.volume_quantum_m3
-    solution = _with_known_zero(chosen, former, solution)
+    """Decide on zero, head, seams and fittings of a Fit, and return the UprightGeometry."""
+    chosen, quantum = rows.select(used), former.volume_quantum_m3
+    solution = _fix_known_zero(chosen, former, solution)
     is_bulged = solution.state.bulges_m is not None
+    # Profiles absorb the order of the head and small shifts of the seams, so both are kept.
     other_order = seams = None
     if not is_bulged:
-        solution, other_order = _with_order(chosen, with_sure_fittings(chosen, solution, quantum))
-        seams = solution if "seams" in solution.state.free else _free_seams(chosen, solution)
-    if seams is not None and (not seams_known or _are_elsewhere(solution, seams)):
-        solution = seams = without_phantoms(chosen, seams, quantum)
-    seams_are = "found" if "seams" in solution.state.free else "declared"
-    scale = scale_of_u(solution, chosen, quantum)
-    layout, by_order = solution.state.layout, _by_order(solution, other_order)
-    u_density = float(np.hypot((solution.sd("density") * scale[layout["density"]])[0], by_order[0]))
-    t = solution.state.density_kg_m3 / u_density
-    density = Reading(solution.state.density_kg_m3, u_density)
+        solution = drop_insignificant_fittings(chosen, solution, quantum)
+        solution, other_order = _choose_order(chosen, solution)
+        seams = solution if "seams" in solution.state.free else _fit_free_seams(chosen, solution)
+    if seams is not None and (not seams_known or _do_seams_differ(solution, seams)):
+        solution = seams = drop_phantom_fittings(chosen, seams, quantum)
+    seams_source = "found" if "seams" in solution.state.free else "declared"
+    # The density decides on the head. Its u includes rounding and the unknown order of the head.
+    layout, factors = solution.state.layout, u_factors(solution, chosen, quantum)
+    u_density = np.hypot(
+        (solution.sd("density") * factors[layout["density"]])[0],
+        _order_effect(solution, other_order)[0],
+    )
+    density = TableEstimate(solution.state.density_kg_m3, float(u_density))
     is_rough = is_bulged or roughness(solution, chosen) > 1
-    head, without = _decide_head(density, former.liquid_density_kg_m3, is_rough), None
-    independent = _independent(solution)
-    dry = _without_head(chosen, solution)
+    head = _decide_head(density, former.liquid_density_kg_m3, is_rough)
+    # for independent rounding of each row, before the factors of u
+    independent_u = float(solution.sd("density")[0]), solution.sd("radii")
+    # Without a determined density, the radii are those of a usual density, or of no head.
+    dry, without_head = _fit_without_head(chosen, solution), None
     if head != "without":
-        without = (*_remainders(dry.left_m3), dry.state.radii_m)
+        without_head = (*_rms_and_largest(dry.left_m3), dry.state.radii_m)
     if head == "undecided":
-        solution, other_order = _with_usual_density(chosen, former, solution, dry), None
+        solution, other_order = _fit_usual_density(chosen, former, solution, dry), None
     if head == "without":
         solution, other_order = dry, None
-    solution = without_phantoms(chosen, solution, quantum)
-    scale = scale_of_u(solution, chosen, quantum)
-    u_seams = (
-        seams.sd("seams") * scale_of_u(seams, chosen, quantum)[seams.state.layout["seams"]]
-        if seams
-        else None
-    )
-    return _as_geometry(
+    solution = drop_phantom_fittings(chosen, solution, quantum)
+    u_seams = None
+    if seams is not None:
+        factors = u_factors(seams, chosen, quantum)
+        u_seams = seams.sd("seams") * factors[seams.state.layout["seams"]]
+    return _make_geometry(
         former, solution, rows, used,
-        scale=scale, density=density, head=head, t=t, without=without,
-        seams=_seam_readings(seams.state if seams else solution.state, u_seams),
-        seams_are=seams_are, by_order=_by_order(solution, other_order)[1], independent=independent,
+        factors=u_factors(solution, chosen, quantum), density=density, head=head,
+        without_head=without_head,
+        seams=_seam_estimates(seams.state if seams else solution.state, u_seams),
+        seams_source=seams_source, order_effect=_order_effect(solution, other_order)[1],
+        independent_u=independent_u,
     )  # fmt: skip
 
 
-def _independent(solution):
-    """Standard deviations of density and radii (n,) for independent rounding."""
-    return float(solution.sd("density")[0]), solution.sd("radii")
-
-
-def _with_order(rows, solution):
+def _choose_order(rows, solution):
     """Return the Fit with the order of the head that fits better, and the Fit with the other order.
 
     The first order is used if both fit equally. The second Fit is None if it is clearly worse.
     """
-    try:
-        second = rows.adjust(replace(solution.state, is_first_order=False))
-    except SolutionError:
+    second = try_fit(rows, replace(solution.state, is_first_order=False))
+    if second is None:
         return solution, None
-    better = solution.chi2 - second.chi2
-    first, last = (second, solution) if better > BY_ORDER else (solution, second)
-    return first, last if abs(better) < ORDER_IS_CLEAR else None
+    gain = solution.chi2 - second.chi2
+    best, other = (second, solution) if gain > BY_ORDER else (solution, second)
+    return best, other if abs(gain) < ORDER_IS_CLEAR else None
 
 
-def _by_order(solution, other_order):
-    """Contribution of the unknown order of the head to the sds of density and radii (n,)."""
+def _order_effect(solution, other_order):
+    """Contribution of the unknown order of the head to the sds of density and radii (n,).
+
+    The difference d of the two orders is the half width of a rectangular distribution: d / sqrt(3).
+    """
     if other_order is None:
         return 0.0, np.zeros(len(solution.state.radii_m))
     density = abs(solution.state.density_kg_m3 - other_order.state.density_kg_m3)
     return density / np.sqrt(3), (solution.state.radii_m - other_order.state.radii_m) / np.sqrt(3)
 
 
-def _with_known_zero(rows, former, solution):
+def _fix_known_zero(rows, former, solution):
     """Return the Fit of a tank empty at dip 0, the bottom of the first ring, if rows allow it."""
     if not (rows.dip_m[0] == 0 and rows.volume_m3[0] == 0) or former.volume_quantum_m3 == 0:
         return solution
     free = solution.state.free - {"zero", "base"}
-    try:
-        held = rows.adjust(replace(solution.state, zero_m=0.0, base_m3=0.0, free=free))
-    except SolutionError:
-        return solution
-    return held if held.chi2 - solution.chi2 < SAME_ZERO**2 + 2 else solution
+    fixed = try_fit(rows, replace(solution.state, zero_m=0.0, base_m3=0.0, free=free))
+    # two unknowns fewer raise chi2 by 2 on average
+    is_as_good = fixed is not None and fixed.chi2 - solution.chi2 < SAME_ZERO**2 + 2
+    return fixed if is_as_good else solution
 
 
-def _free_seams(rows, solution):
+def _fit_free_seams(rows, solution):
     """Return the Fit with separately estimated seams; None if it has no solution."""
     if not len(solution.state.seams_m):
         return None
     free = (solution.state.free | {"seams"}) - {"zero"}
-    try:
-        seams = rows.adjust(replace(solution.state, free=free))
-    except SolutionError:
-        return None
-    return seams if np.all(np.diff(seams.state.rings.edges_m) > 0) else None
+    seams = try_fit(rows, replace(solution.state, free=free))
+    is_rising = seams is not None and np.all(np.diff(seams.state.rings.edges_m) > 0)
+    return seams if is_rising else None
 
 
-def _are_elsewhere(solution, seams):
+def _do_seams_differ(solution, seams):
     """Whether seams differ from the declared ones: one of them clearly, or all together by chi2."""
     apart = np.abs(seams.state.seams_m - solution.state.seams_m)
     count = len(apart)
@@ -324,11 +320,11 @@ def _are_elsewhere(solution, seams):
     )
 
 
-def _without_head(rows, solution):
+def _fit_without_head(rows, solution):
     """Return the Fit without a head."""
     free = solution.state.free - {"density"}
     dry = replace(solution.state, density_kg_m3=0.0, free=free)
-    solution = tried(rows, dry) or tried(rows, replace(dry, free=free - {"kinks"}))
+    solution = try_fit(rows, dry) or try_fit(rows, replace(dry, free=free - {"kinks"}))
     return solution or rows.adjust(replace(dry, free=free - {"kinks", "zero"}))
 
 
@@ -338,19 +334,19 @@ def _usual_density(former):
     return USUAL_KG_M3 if declared is None else (declared, DECLARED_SD_KG_M3)
 
 
-def _with_usual_density(rows, former, solution, dry):
+def _fit_usual_density(rows, former, solution, dry):
     """Return the Fit with the prior density, as the table does not determine it."""
     usual, sd = _usual_density(former)
     state = replace(
         solution.state, density_kg_m3=usual, usual_density_kg_m3=usual, density_sd_kg_m3=sd
     )
-    again = tried(rows, state) or solution
+    again = try_fit(rows, state) or solution
     density = again.state.density_kg_m3
     if LIGHTEST_KG_M3 <= density <= DENSEST_KG_M3:
         return again
     # The density is impossible: use the shell at the nearest possible density, and keep u.
     if density > DENSEST_KG_M3:
-        nearest = tried(rows, replace(state, density_sd_kg_m3=HELD_SD_KG_M3)) or dry
+        nearest = try_fit(rows, replace(state, density_sd_kg_m3=HELD_SD_KG_M3)) or dry
     else:
         nearest = dry
     possible = replace(nearest.state, free=again.state.free)
@@ -373,77 +369,81 @@ def _decide_head(density, declared_kg_m3, is_rough):
 
 
 def is_possible(density):
-    """Whether the density of a Reading is possible for a liquid, within its u."""
+    """Whether the density of a TableEstimate is possible for a liquid, within its u."""
     reach = CRITICAL * density.u
     return -reach <= density.value <= DENSEST_KG_M3 + reach
 
 
-def _remainders(residuals):
+def _rms_and_largest(residuals):
     return float(np.sqrt(np.mean(residuals**2))), float(np.abs(residuals).max())
 
 
-def _as_geometry(former, solution, rows, used, *, scale, density, head, t, without, seams,
-                 seams_are, by_order, independent):  # fmt: skip
+def _make_geometry(former, solution, rows, used, *, factors, density, head, without_head, seams,
+                   seams_source, order_effect, independent_u):  # fmt: skip
+    """Return the UprightGeometry of a Fit, with standard deviations multiplied by `factors`."""
     state, layout = solution.state, solution.state.layout
     radii = layout["radii"]
-    covariance = solution.cofactor[radii, radii] * np.outer(scale[radii], scale[radii])
-    covariance = covariance + np.outer(by_order, by_order)
-    sd = {name: solution.sd(name) * scale[part] for name, part in layout.items()}
-    rms, largest = _remainders(solution.left_m3)
-    chosen = rows.of(used)
-    edges = state.rings.edges_m
+    covariance = solution.cofactor[radii, radii] * np.outer(factors[radii], factors[radii])
+    covariance = covariance + np.outer(order_effect, order_effect)
+    sd = {name: solution.sd(name) * factors[part] for name, part in layout.items()}
+    rms, largest = _rms_and_largest(solution.left_m3)
+    chosen = rows.select(used)
     return UprightGeometry(
         name=former.name,
         radii_m=state.radii_m,
         u_m=np.sqrt(np.diag(covariance)),
         covariance_m2=covariance,
-        heights_m=np.diff(edges),
+        heights_m=np.diff(state.rings.edges_m),
         thickness_m=state.thickness_m,
-        zero_m=_zero_reading(state, sd["zero"]),
+        zero_m=_zero_estimate(state, sd["zero"]),
         seams_m=seams,
-        seams_are=seams_are,
+        seams_source=seams_source,
         density_kg_m3=density,
         head=head,
-        t=float(t),
-        fittings=_found_fittings(state, sd["fittings"]),
-        roof_m3=Reading(state.roof_m3, *sd["roof"]) if state.roof_zone_m else None,
-        base_m3=Reading(state.base_m3, *sd["base"]) if len(sd["base"]) else Reading(0.0, 0.0),
+        t=float(density.value / density.u),
+        fittings=_fitting_estimates(state, sd["fittings"]),
+        roof_m3=TableEstimate(state.roof_m3, *sd["roof"]) if state.roof_zone_m else None,
+        base_m3=TableEstimate(state.base_m3, *sd["base"])
+        if len(sd["base"])
+        else TableEstimate(0.0, 0.0),
         lowest_m=state.lowest_m,
         used=used,
         left_m3=former.volume_m3 - state.volume_m3(former.height_m),
         rms_m3=rms,
         largest_m3=largest,
         expected_m3=float(np.sqrt(np.mean(chosen.sd_m3**2))),
-        without_head=without,
+        without_head=without_head,
         roughness=roughness(solution, chosen),
         state=state,
-        independent_u=independent,
+        independent_u=independent_u,
     )
 
 
-def _zero_reading(state, sds):
-    """Reading of the zero.
+def _zero_estimate(state, sds):
+    """TableEstimate of the zero.
 
     U is 0 if the table is empty at its zero, nan if the seams are unknown.
     """
     if len(sds):
-        return Reading(state.zero_m, float(sds[0]))
-    return Reading(state.zero_m, np.nan if "base" in state.free else 0.0)
+        return TableEstimate(state.zero_m, float(sds[0]))
+    return TableEstimate(state.zero_m, np.nan if "base" in state.free else 0.0)
 
 
-def _seam_readings(state, sds):
+def _seam_estimates(state, sds):
     dips = state.rings.edges_m[1:-1]
     sds = np.full(len(dips), np.nan) if sds is None else sds
-    return tuple(Reading(float(d), float(u)) for d, u in zip(dips, sds, strict=True))
+    return tuple(TableEstimate(float(d), float(u)) for d, u in zip(dips, sds, strict=True))
 
 
-def _found_fittings(state, sds):
+def _fitting_estimates(state, sds):
     fittings = []
     for k, fitting in enumerate(state.fittings):
-        held = held_kinks(state, fitting)
+        held = are_kinks_fixed(state, fitting)
         u = [np.nan if h else s for h, s in zip(held, sds[3 * k : 3 * k + 2], strict=True)]
-        volume = Reading(fitting.volume_m3, float(sds[3 * k + 2]))
+        volume = TableEstimate(fitting.volume_m3, float(sds[3 * k + 2]))
         fittings.append(
-            FoundFitting(Reading(fitting.bottom_m, u[0]), Reading(fitting.top_m, u[1]), volume)
+            FittingEstimate(
+                TableEstimate(fitting.bottom_m, u[0]), TableEstimate(fitting.top_m, u[1]), volume
+            )
         )
     return tuple(sorted(fittings, key=lambda fitting: fitting.bottom_m.value))

@@ -14,11 +14,11 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.recalibration.bulges import no_bulges, show_bulges
-from tankcal.recalibration.fittings import find_fittings, in_other_pairs
-from tankcal.recalibration.rounding import ROUGH, roughness, rounded_again, scale_of_u
-from tankcal.recalibration.table_fit import DENSITY_SD_KG_M3, tried
-from tankcal.recalibration.zero import FARTHEST_M, find_zeros, move_seams
+from tankcal.recalibration.fittings import find_fittings, pair_kinks_again
+from tankcal.recalibration.rounding import ROUGH, roughness, simulate_rounding, u_factors
+from tankcal.recalibration.seams import FARTHEST_M, find_zeros, move_seams
+from tankcal.recalibration.table_fit import DENSITY_SD_KG_M3, try_fit
+from tankcal.recalibration.upright_shell import no_bulges, show_bulges
 
 SEAMS_FREE = "base", "density", "seams"
 LEAST_GAIN = 25.0  # smallest reduction of chi2 by a fitting; the best pair gains less by chance
@@ -76,7 +76,7 @@ def search(rows, state, lowest_m, usual_density):
         if solution is not None and not _is_straight(rows, solution):
             return solution
     solution = _search_straight(rows, state, lowest_m)
-    if shows_bulges or _is_plain(solution) or _is_by_rounding(solution):
+    if shows_bulges or _is_plain(solution) or _is_within_rounding(solution):
         return solution
     # In a coarse table, bulges look like many fittings, or like fittings that end at joints.
     bulged = _search_bulged(rows, state, lowest_m, *usual_density)
@@ -90,17 +90,19 @@ def search(rows, state, lowest_m, usual_density):
 def _search_straight(rows, state, lowest_m):
     """Return the Fit of straight courses; the arguments are those of `search`."""
     if lowest_m is not None:
-        rows = rows.above(lowest_m)
-        return _with_moved_seams(rows, _with_fittings(rows, state))
+        rows = rows.select_above(lowest_m)
+        return _try_moved_seams(rows, _fit_fittings(rows, state))
     lowest = _lowest_row(rows, state)
-    solution = _with_moved_seams(rows.above(lowest), _with_fittings(rows.above(lowest), state))
+    solution = _try_moved_seams(
+        rows.select_above(lowest), _fit_fittings(rows.select_above(lowest), state)
+    )
     if lowest > rows.dip_m[0]:
         more = replace(solution.state, lowest_m=float(rows.dip_m[0]))
         try:
-            whole = _with_fittings(rows, more, at_most=len(solution.state.fittings) + 1)
+            whole = _fit_fittings(rows, more, at_most=len(solution.state.fittings) + 1)
         except SolutionError:
             return solution
-        if _is_by_rounding(whole) and _is_enough(rows, solution, whole):
+        if _is_within_rounding(whole) and _is_gain_large_enough(rows, solution, whole):
             return whole
     return solution
 
@@ -119,23 +121,28 @@ def _search_bulged(rows, state, lowest_m, density, density_sd):
         usual_density_kg_m3=density,
         density_sd_kg_m3=density_sd,
     )
-    some = rows.above(lowest).thinned(MOST_BULGED_ROWS)
+    chosen_rows = rows.select_above(lowest).thin(MOST_BULGED_ROWS)
     best = None
     for zero in USUAL_ZEROS_M:
-        candidate = _with_free_zero(some.above(zero + NEAR_M), replace(start, zero_m=zero), zero)
+        candidate = _fit_free_zero(
+            chosen_rows.select_above(zero + NEAR_M), replace(start, zero_m=zero), zero
+        )
         if candidate and (best is None or _cost(candidate) < _cost(best) - LEAST_GAIN):
             best = candidate
     if best is None:
         return None
     about = best.state.zero_m
-    some = some.above(best.state.lowest_m)
+    chosen_rows = chosen_rows.select_above(best.state.lowest_m)
     while len(best.state.fittings) < MOST_FITTINGS:
-        again = _with_one_more(some, best, LONGEST_BULGED_M, about, rough=True)
+        again = _add_fitting(chosen_rows, best, LONGEST_BULGED_M, about, rough=True)
         if again is None:
             break
         best = again
-    best = tried(rows.above(max(lowest, best.state.lowest_m)), _without_unsure(some, best).state)
-    return best and _with_lower_rows(rows.above(lowest), best)
+    best = try_fit(
+        rows.select_above(max(lowest, best.state.lowest_m)),
+        _drop_unsure_fittings(chosen_rows, best).state,
+    )
+    return best and _add_lower_rows(rows.select_above(lowest), best)
 
 
 def _is_straight(rows, solution):
@@ -146,39 +153,42 @@ def _is_straight(rows, solution):
         usual_density_kg_m3=None,
         density_sd_kg_m3=DENSITY_SD_KG_M3,
     )
-    rows = rows.above(solution.state.lowest_m)
+    rows = rows.select_above(solution.state.lowest_m)
     free_zero = replace(state, free=state.free | {"zero"})  # profiles absorb an error of the zero
-    tries = (tried(rows, start) for start in (state, free_zero))
+    tries = (try_fit(rows, start) for start in (state, free_zero))
     return any(trial is not None and trial.chi2 < solution.cost + PRICE for trial in tries)
 
 
-def _without_unsure(rows, solution):
+def _drop_unsure_fittings(rows, solution):
     """Return the Fit without insignificant fittings, where courses bulge."""
     while solution.state.fittings:
         sds = solution.sd("fittings")[2::3] * roughness(solution, rows)
-        sizes = np.abs([fitting.volume_m3 for fitting in solution.state.fittings]) / np.maximum(
-            sds, 1e-12
-        )
+        volumes = np.abs([fitting.volume_m3 for fitting in solution.state.fittings])
+        sizes = volumes / np.maximum(sds, 1e-12)
         worst = int(np.argmin(sizes))
-        rest = solution.state.fittings[:worst] + solution.state.fittings[worst + 1 :]
-        again = tried(rows, replace(solution.state, fittings=rest))
+        again = try_fit(rows, _drop_fitting(solution.state, worst))
         if sizes[worst] >= SURE_OF_BULGED or again is None:
             break
         solution = again
     return solution
 
 
-def _is_of_joint(state, thing):
+def _drop_fitting(state, place):
+    """Return the State without one of its fittings."""
+    return replace(state, fittings=state.fittings[:place] + state.fittings[place + 1 :])
+
+
+def _resembles_joint(state, fitting):
     """Whether a fitting adds volume, or resembles plates drawn in at a joint."""
     joints = state.rings.edges_m
-    ends = np.array([[thing.bottom_m], [thing.top_m]])
+    ends = np.array([[fitting.bottom_m], [fitting.top_m]])
     girth = 2 * np.pi * float(state.radii_m[0])
-    thickness = -thing.volume_m3 / (girth * max(thing.top_m - thing.bottom_m, 1e-9))
+    thickness = -fitting.volume_m3 / (girth * max(fitting.top_m - fitting.bottom_m, 1e-9))
     is_near = bool(np.any(np.abs(ends - joints) < JOINT_M))
     return thickness <= 0 or (is_near and thickness < DRAWN_IN_M)
 
 
-def _with_moved_seams(rows, solution):
+def _try_moved_seams(rows, solution):
     """Return the Fit with seams from the rows, if this removes fittings that resemble seams."""
     if _is_plain(solution) or not len(solution.state.seams_m):
         return solution
@@ -188,20 +198,20 @@ def _with_moved_seams(rows, solution):
     if np.any(np.diff(moved) <= 0):
         return solution
     state = replace(solution.state, seams_m=moved, fittings=(), free=frozenset(SEAMS_FREE))
-    candidate = _from_zero(rows.above(zero + NEAR_M), state, MOST_FITTINGS)
+    candidate = _fit_from_zero(rows.select_above(zero + NEAR_M), state, MOST_FITTINGS)
     price = LEAST_GAIN * len(moved) / 2
     is_better = candidate is not None and _cost(candidate) + price < _cost(solution)
-    return _with_lower_rows(rows, candidate) if is_better else solution
+    return _add_lower_rows(rows, candidate) if is_better else solution
 
 
-def _is_enough(rows, solution, larger):
+def _is_gain_large_enough(rows, solution, larger):
     """Whether the reduction of chi2 is large for the number of new unknowns."""
     return len(rows.dip_m) - len(solution.left_m3) > 10 * (
         len(larger.state.unknowns) - len(solution.state.unknowns)
     )
 
 
-def _is_by_rounding(solution):
+def _is_within_rounding(solution):
     """Whether all residuals are within rounding: as a whole, and at the worst row."""
     worst = np.abs(solution.left_m3 / solution.sd_m3).max()
     return solution.chi2 < ROUGH**2 * max(solution.dof, 1) and worst < np.sqrt(3) * 1.25
@@ -214,20 +224,20 @@ def _lowest_row(rows, state, degree=2):
     Its degree is 2, or higher for bulging courses.
     """
     first = rows.dip_m <= state.seams_m[0] - EDGE_M if len(state.seams_m) else rows.dip_m >= 0
-    ring = rows.of(first)
+    ring = rows.select(first)
     length = max(CUT_M, CUT_ROWS * float(np.median(np.diff(rows.dip_m))))
     tries = np.flatnonzero(ring.dip_m <= ring.dip_m[-1] - length) if len(ring.dip_m) else ()
     if len(tries) == 0:
         return float(rows.dip_m[0])
-    for place in [int(tries[0]), *_halving(tries)]:
+    for place in [int(tries[0]), *_select_tries(tries)]:
         dip = ring.dip_m[place]
-        window = ring.of((ring.dip_m >= dip) & (ring.dip_m <= dip + length + 1e-9))
+        window = ring.select((ring.dip_m >= dip) & (ring.dip_m <= dip + length + 1e-9))
         if _is_one_cut(window, degree):
             return float(dip)
     return float(rows.dip_m[0])
 
 
-def _halving(tries):
+def _select_tries(tries):
     """At most BOTTOM_TRIES of the rows, rising, closer together near the bottom."""
     last = len(tries) - 1
     places = np.round(last * np.linspace(0, 1, BOTTOM_TRIES) ** 1.5).astype(int)
@@ -252,7 +262,7 @@ def _is_one_cut(ring, degree):
     )
 
 
-def _with_fittings(rows, state, at_most=MOST_FITTINGS):
+def _fit_fittings(rows, state, at_most=MOST_FITTINGS):
     """Return the Fit with the fittings in the rows, for the zero that needs the fewest of them.
 
     With a wrong zero, seams resemble fittings. Other zeros are therefore tried if there are many
@@ -262,10 +272,12 @@ def _with_fittings(rows, state, at_most=MOST_FITTINGS):
     best, tried = None, 0
     for zero in (state.zero_m,) if state.fittings else (zeros[0], *USUAL_ZEROS_M, *zeros[1:]):
         most = at_most if best is None else min(at_most, _most_fittings(best))
-        candidate = _from_zero(rows.above(zero + NEAR_M), replace(state, zero_m=zero), most)
+        candidate = _fit_from_zero(
+            rows.select_above(zero + NEAR_M), replace(state, zero_m=zero), most
+        )
         if candidate and (best is None or _cost(candidate) < _cost(best) - SAME_COST):
             best = candidate
-        if best and _is_plain(best) and _is_by_rounding(best):
+        if best and _is_plain(best) and _is_within_rounding(best):
             break
         tried += candidate is None or len(candidate.state.fittings) >= at_most
         if tried > 1:
@@ -274,20 +286,19 @@ def _with_fittings(rows, state, at_most=MOST_FITTINGS):
         raise SolutionError(
             message("former_undetermined", "the rows of the table do not determine the radii")
         )
-    if len(best.state.fittings) > FEW_FITTINGS and not _is_by_rounding(best):
-        bare = replace(
-            best.state, fittings=()
-        )  # fittings of unlimited height also explain other effects
-        best = _with_free_zero(rows.above(best.state.lowest_m), bare, bare.zero_m) or best
-    return _with_lower_rows(rows, best)
+    if len(best.state.fittings) > FEW_FITTINGS and not _is_within_rounding(best):
+        # Fittings of unlimited height also explain other effects, such as a wrong cross section.
+        bare = replace(best.state, fittings=())
+        best = _fit_free_zero(rows.select_above(best.state.lowest_m), bare, bare.zero_m) or best
+    return _add_lower_rows(rows, best)
 
 
-def _with_lower_rows(rows, solution):
+def _add_lower_rows(rows, solution):
     """Return the Fit with rows that were excluded because the first ring might begin among them."""
     more = len(rows.dip_m) - len(solution.left_m3)
     for lowest in rows.dip_m[:more]:
-        chosen = rows.above(lowest)
-        again = tried(chosen, replace(solution.state, base_m3=float(chosen.volume_m3[0])))
+        chosen = rows.select_above(lowest)
+        again = try_fit(chosen, replace(solution.state, base_m3=float(chosen.volume_m3[0])))
         if again and _is_possible(again):
             gain = again.chi2 - solution.chi2
             if gain < len(chosen.dip_m) - len(solution.left_m3) + SAME_ZERO**2:
@@ -316,31 +327,30 @@ def _cost(solution):
     return solution.cost + PRICE * len(solution.state.fittings)
 
 
-def _from_zero(rows, start, at_most):
+def _fit_from_zero(rows, start, at_most):
     """Return the Fit with fittings and the zero free about its start value, or None.
 
     Low fittings are sought first: two kinks of two fittings, one above the other, resemble one
     fitting.
     """
     about = start.zero_m
-    solution = _with_free_zero(rows, start, about)
+    solution = _fit_free_zero(rows, start, about)
     for longest in LENGTHS_M if solution else ():
         while len(solution.state.fittings) < at_most and solution.dof > 6:
-            again = _with_one_more(rows, solution, longest, about)
+            again = _add_fitting(rows, solution, longest, about)
             if again is None:
                 break
             solution = again
-    return _tidied(rows, solution, about) if solution else None
+    return _simplify_fittings(rows, solution, about) if solution else None
 
 
-def _with_one_more(rows, solution, longest, about, rough=False):
+def _add_fitting(rows, solution, longest, about, rough=False):
     """Return the Fit with the fitting that explains most; None if no fitting explains enough.
 
     rough: whether residuals exceed rounding; the required gain is then relative to the residuals.
     """
-    design, left, sds = (
-        solution.bulges
-    )  # prior observations do not depend on a fitting: place them at the lowest row
+    # Prior observations do not depend on a fitting, so they are placed at the lowest row.
+    design, left, sds = solution.bulges
     candidates = find_fittings(
         np.append(np.full(len(sds), rows.dip_m[0]), rows.dip_m),
         np.append(left, solution.left_m3),
@@ -348,49 +358,47 @@ def _with_one_more(rows, solution, longest, about, rough=False):
         np.append(sds, rows.sd_m3),
         longest,
     )
-    for thing, gain in candidates:
+    for fitting, gain in candidates:
         if gain < LEAST_GAIN:
             break
-        more = replace(solution.state, fittings=(*solution.state.fittings, thing))
-        again = _with_free_zero(rows, more, about)
+        more = replace(solution.state, fittings=(*solution.state.fittings, fitting))
+        again = _fit_free_zero(rows, more, about)
         factor = roughness(again, rows) ** 2 if rough and again else 1.0
         if (
             again
             and solution.cost - again.cost > LEAST_GAIN * factor
             and _is_large(rows, again.state.fittings[-1])
-            and not (rough and _is_of_joint(again.state, again.state.fittings[-1]))
+            and not (rough and _resembles_joint(again.state, again.state.fittings[-1]))
         ):
             return again
     return None
 
 
-def _is_large(rows, thing):
+def _is_large(rows, fitting):
     """Whether a fitting is larger than the effect of two rounded digits."""
-    return abs(thing.volume_m3) > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
+    return abs(fitting.volume_m3) > LEAST_SIZE * np.sqrt(12) * float(np.median(rows.sd_m3))
 
 
-def _tidied(rows, solution, about):
+def _simplify_fittings(rows, solution, about):
     """Return the Fit with fewer fittings, if fewer fit equally well."""
     if len(solution.state.fittings) > 1:
         near = 1.6 * float(np.median(np.diff(rows.dip_m)))
         for share in SAME_SLOPES:
-            pairs = in_other_pairs(solution.state.fittings, near, share)
-            solution = _cheaper(rows, solution, pairs, about)
+            pairs = pair_kinks_again(solution.state.fittings, near, share)
+            solution = _choose_cheaper(rows, solution, pairs, about)
     for smallest in sorted(solution.state.fittings, key=lambda fitting: abs(fitting.volume_m3)):
         rest = tuple(f for f in solution.state.fittings if f.volume_m3 != smallest.volume_m3)
-        solution = _cheaper(rows, solution, rest, about)
+        solution = _choose_cheaper(rows, solution, rest, about)
     return solution
 
 
-def with_sure_fittings(rows, solution, quantum_m3):
+def drop_insignificant_fittings(rows, solution, quantum_m3):
     """Return the Fit without fittings whose volume does not exceed its uncertainty."""
-    solution = without_phantoms(rows, solution, quantum_m3)
+    solution = drop_phantom_fittings(rows, solution, quantum_m3)
     while solution.state.fittings:
-        things = solution.state.fittings
         sizes = _sizes(rows, solution, quantum_m3)
         worst = int(np.argmin(sizes))
-        rest = things[:worst] + things[worst + 1 :]
-        again = tried(rows, replace(solution.state, fittings=rest))
+        again = try_fit(rows, _drop_fitting(solution.state, worst))
         rise = np.inf if again is None else again.chi2 - solution.chi2
         limit = 2 * LEAST_GAIN if sizes[worst] < CRITICAL else LEAST_GAIN
         if limit < rise < DOUBTFUL_GAIN and quantum_m3 > 0:
@@ -401,7 +409,7 @@ def with_sure_fittings(rows, solution, quantum_m3):
     return solution
 
 
-def without_phantoms(rows, solution, quantum_m3):
+def drop_phantom_fittings(rows, solution, quantum_m3):
     """Return the Fit without fittings whose u exceeds their volume.
 
     They are removed even if they explain residuals, which are then reported as excess residuals.
@@ -412,10 +420,9 @@ def without_phantoms(rows, solution, quantum_m3):
         worst = int(np.argmin(sizes))
         if sizes[worst] >= 1:
             break
-        things = solution.state.fittings
-        bare = replace(solution.state, fittings=things[:worst] + things[worst + 1 :])
+        bare = _drop_fitting(solution.state, worst)
         held = replace(bare, free=bare.free - {"kinks", "zero"})
-        again = tried(rows, bare) or tried(rows, held)
+        again = try_fit(rows, bare) or try_fit(rows, held)
         if again is None:
             break
         solution = again
@@ -424,7 +431,7 @@ def without_phantoms(rows, solution, quantum_m3):
 
 def _sizes(rows, solution, quantum_m3):
     """Volumes of fittings over their u, shape (fittings,); 0 if u is unknown."""
-    scale = scale_of_u(solution, rows, quantum_m3)[solution.state.layout["fittings"]]
+    scale = u_factors(solution, rows, quantum_m3)[solution.state.layout["fittings"]]
     sds = (solution.sd("fittings") * scale)[2::3]
     sizes = np.abs([fitting.volume_m3 for fitting in solution.state.fittings]) / sds
     return np.nan_to_num(sizes, nan=0.0)
@@ -432,9 +439,10 @@ def _sizes(rows, solution, quantum_m3):
 
 def _gain_by_chance(solution, rows, quantum):
     """Largest reduction of chi2 by a fitting in simulations of correlated rounding."""
+    # Residuals of simulated rounding: (1 - q q') e, as the adjustment absorbs the part in q.
     q = np.linalg.qr(solution.design / rows.sd_m3[:, None])[0]
     gains = []
-    for error in rounded_again(solution, rows, quantum, CHANCES):
+    for error in simulate_rounding(solution, rows, quantum, CHANCES):
         left = error / rows.sd_m3
         left = (left - q @ (q.T @ left)) * rows.sd_m3
         best = find_fittings(rows.dip_m, left, solution.design, rows.sd_m3, most=1)
@@ -442,10 +450,10 @@ def _gain_by_chance(solution, rows, quantum):
     return max(gains)
 
 
-def _cheaper(rows, solution, fittings, about):
+def _choose_cheaper(rows, solution, fittings, about):
     if len(fittings) > len(solution.state.fittings):
         return solution
-    candidate = _with_free_zero(rows, replace(solution.state, fittings=fittings), about)
+    candidate = _fit_free_zero(rows, replace(solution.state, fittings=fittings), about)
     return candidate if candidate and _cost(candidate) < _cost(solution) else solution
 
 
@@ -466,7 +474,7 @@ def _is_possible(solution):
     )
 
 
-def _with_free_zero(rows, state, about):
+def _fit_free_zero(rows, state, about):
     """Return the Fit with a free zero if it stays near, and with fittings at estimated positions.
 
     If that fails, the zero is fixed, or the fittings keep their start positions; None if all fail.
@@ -478,7 +486,7 @@ def _with_free_zero(rows, state, about):
         map(frozenset, (held | things | zero, held | things, held | zero, held))
     ):
         start = state if "zero" in free else replace(state, zero_m=about)
-        again = tried(rows, replace(start, free=free))
+        again = try_fit(rows, replace(start, free=free))
         if again and _is_possible(again) and abs(again.state.zero_m - about) <= NEAR_M:
             return again
     return None

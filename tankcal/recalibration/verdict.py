@@ -61,7 +61,7 @@ class WorstError:
         return low | {"high_m": self.high_m, "d_m3": self.d_m3}
 
 
-def tank_of_rules(facts, former, new):
+def tank_kind_of_rules(facts, former, new):
     """Kind of tank in the terms of the rules."""
     if facts.kind == "vertical":
         has_roof = former.roof is not None or new.roof is not None
@@ -72,7 +72,7 @@ def tank_of_rules(facts, former, new):
 # ---- limits of a rule
 
 
-def legal_numbers(rule, tank, former, new, basis, former_U, new_U):
+def judge_limits(rule, tank, former, new, basis, new_U):
     """Return the `LegalNumber` of each limit of a rule for a kind of tank.
 
     Parameters
@@ -82,25 +82,30 @@ def legal_numbers(rule, tank, former, new, basis, former_U, new_U):
         Kind of tank in the terms of the rules.
     former, new : FormerTable
     basis : OneBasis
-    former_U, new_U : TableUncertainty
+    new_U : TableUncertainty
+        Uncertainty of the new table at the rows.
     """
     numbers = [
-        _deviation(limit, basis, former_U, new_U)
+        _deviation(limit, basis, new_U)
         for limit in rule.deviation
-        if is_for(limit, tank) and basis.for_use.any()
+        if applies_to(limit, tank) and basis.usable.any()
     ]
-    heights = [limit for limit in rule.reference_height if is_for(limit, tank)]
+    heights = [limit for limit in rule.reference_height if applies_to(limit, tank)]
     return [*numbers, *(_reference_height(height, former, new) for height in heights)]
 
 
-def is_for(limit, tank):
+def applies_to(limit, tank):
     """Whether a limit applies to a kind of tank."""
     return not limit.tanks or tank in limit.tanks
 
 
-def _deviation(limit, basis, former_U, new_U):
-    use = np.flatnonzero(basis.for_use)
-    low, high, code = _rows_of(limit, basis, use)
+def _deviation(limit, basis, new_U):
+    """Judge the deviation of the new volume from the former one on the basis of the new table.
+
+    The deviation from the former volume as printed is stated, but not judged.
+    """
+    use = np.flatnonzero(basis.usable)
+    low, high, code = _find_judged_rows(limit, basis, use)
     stated = _volume(basis.on_basis_m3, low, high)
     value = _volume(basis.new_m3, low, high)
     U = (
@@ -108,6 +113,7 @@ def _deviation(limit, basis, former_U, new_U):
         if low is None
         else new_U.deliveries(np.array([low]), np.array([high]))[0]
     )
+    # Without a known U, a rule without guard band is still judged; see `unknown` below.
     known = 0.0 if np.isnan(U) else float(U)
     dips = [float(basis.height_m[dip]) for dip in (low, high) if dip is not None]
     judged = judge_volume(
@@ -137,7 +143,7 @@ def _deviation(limit, basis, former_U, new_U):
     )
 
 
-def _rows_of(limit, basis, use):
+def _find_judged_rows(limit, basis, use):
     """Rows (low or None, high, code) at which a limit is judged."""
     if limit.of == "capacity":
         return None, use[-1], "top"
@@ -175,7 +181,7 @@ def _reference_height(limit, former, new):
     )
 
 
-def ages_of(rule, tank, former, new):
+def judge_ages(rule, tank, former, new):
     """Return the `TableAge` of each period of a rule for a kind of tank."""
     years = _years_between(former.date, new.date)
     return [
@@ -193,7 +199,7 @@ def ages_of(rule, tank, former, new):
             verified=period.verified,
         )
         for period in rule.periods
-        if is_for(period, tank)
+        if applies_to(period, tank)
     ]
 
 
@@ -210,9 +216,9 @@ def _years_between(before, after):
 # ---- the verdict
 
 
-def zero_limit_of(rule, tank):
+def find_zero_limit(rule, tank):
     """Largest undeclared zero, m, by the rule or by default."""
-    return min((limit.limit_m for limit in rule.reference_height if is_for(limit, tank)),
+    return min((limit.limit_m for limit in rule.reference_height if applies_to(limit, tank)),
                default=USUAL_LIMIT_M)  # fmt: skip
 
 
@@ -227,16 +233,16 @@ def decide(legal, ages, basis, worst, c, zero_limit_m):
     worst : WorstError or None
         None: a U is unknown.
     c : float or None
-        Declared correlation.
+        FormerFacts correlation.
     zero_limit_m : float
         Largest zero that may be fitted without declaration; a larger one may be a changed bottom.
     """
     steps, zero = basis.steps, basis.zero
-    grave = [*_broken(legal), *_differing(worst, c)]
+    grave = [*_limit_reasons(legal), *_difference_reasons(worst, c)]
     if zero.source == "fitted" and abs(zero.height_m) > zero_limit_m:
         volumes = {"d_m3": zero.volume_m3, "zero_mm": 1000 * zero.height_m}
         grave.append(Reason("zero_not_explained", volumes | {"most_mm": 1000 * zero_limit_m}))
-    grave += _too_old(ages)
+    grave += _age_reasons(ages)
     judged = [item for item in (*legal, *ages) if item.verdict != "not_judged"]
     differing = [name for name in ON_BASIS if steps[name].state == "done"]
     undone = {
@@ -248,7 +254,7 @@ def decide(legal, ages, basis, worst, c, zero_limit_m):
     if differing:
         mild.append(Reason("basis_differs", {"steps": differing}))
     mild += [Reason("step_not_done", {"step": n, "lacking": what}) for n, what in undone.items()]
-    mild += _agreeing(worst, c)
+    mild += _agreement_reasons(worst, c)
     kept = [number.code for number in legal if number.verdict == "conforms"]
     if kept:
         mild.append(Reason("limits_kept", {"limits": kept}))
@@ -268,7 +274,7 @@ def decide(legal, ages, basis, worst, c, zero_limit_m):
     return Verdict(code, all(item.verified for item in judged), (*grave, *mild))
 
 
-def _broken(legal):
+def _limit_reasons(legal):
     return [
         Reason(
             "limit_exceeded" if number.verdict == "fails" else "in_guard_band",
@@ -284,7 +290,7 @@ def _broken(legal):
     ]
 
 
-def _too_old(ages):
+def _age_reasons(ages):
     return [
         Reason(
             "age_of_bottom_course_exceeded" if age.of == "bottom_course" else "age_exceeded",
@@ -295,13 +301,13 @@ def _too_old(ages):
     ]
 
 
-def _differing(worst, c):
+def _difference_reasons(worst, c):
     if worst is None or not abs(worst.E_n) > 1:
         return []
     return [Reason("tank_differs", {"E_n": _finite(worst.E_n), "c": c or 0.0, **worst.place})]
 
 
-def _agreeing(worst, c):
+def _agreement_reasons(worst, c):
     reasons = []
     if worst is None:
         return [Reason("E_n_not_known", {})]

@@ -250,9 +250,9 @@ def _fit_of_photos(adjustment):
 
 def cameras_of(adjustment, measurements=None):
     """The `AdjustedCamera` of each set of interior parameters."""
-    from tankcal.calibration.interiors import interiors_of
+    from tankcal.calibration.interiors import collect_interiors
 
-    return [_camera(one) for one in interiors_of(adjustment, measurements)]
+    return [_camera(one) for one in collect_interiors(adjustment, measurements)]
 
 
 def _camera(interior):

@@ -305,7 +305,7 @@ def _without(result, trial):
         values,
         sds,
         correlation,
-        outcome and filled_from(PointsMoved, outcome.moved),
+        outcome and filled_from(PointsMoved, outcome.changes),
         volume.value_m3 - base.value_m3 if volume and base else None,
         *_volume(volume),
     )

@@ -20,18 +20,17 @@ from typing import Literal
 
 import numpy as np
 
-from tankcal.camera.model import PARAMETERS, UNITS
+from tankcal.camera.model import KEYS, PARAMETERS
 from tankcal.record.camera_versions import CameraFile
 from tankcal.record.plain_data import to_plain
 from tankcal.record.schema import Saved, filled_from, key
 
 DECIMALS = 4  # of a difference in pixels
-_KEYS = [f"{name}_{UNITS[name]}" if UNITS[name] else name for name in PARAMETERS]
 Interior = make_dataclass(
     "Interior",
     [
-        (name, float, key(f"value or sd of {name}", named=one))
-        for name, one in zip(PARAMETERS, _KEYS, strict=True)
+        (name, float, key(f"value or sd of {name}", named=key_in_file))
+        for name, key_in_file in KEYS.items()
     ],
     namespace={"__doc__": "Parameters of the camera, each with its unit; of sds null: not known."},
     frozen=True,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.camera.comparator import repeats
+from tankcal.camera.comparator import group_readings
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.survey.measurements import RejectedReadings
@@ -35,8 +35,8 @@ def reject_scattered(measurements):
     if images is None:
         return measurements, None, []
     names = list(zip(images.photo, images.point, images.check.tolist(), strict=True))
-    groups = repeats(names, images.xy_mm)
-    several, bad = np.flatnonzero(groups.count > 1), groups.beyond(limit)
+    groups = group_readings(names, images.xy_mm)
+    several, bad = np.flatnonzero(groups.count > 1), groups.exceeds(limit)
     if not len(several):
         return measurements, None, []
     # The first reading represents its group in messages.

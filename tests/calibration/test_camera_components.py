@@ -8,7 +8,7 @@ import pytest
 
 from tankcal.calibration.parameters.components import components
 from tankcal.calibration.parameters.conditioning import drop_parameters
-from tankcal.calibration.parameters.rules import silva_rule
+from tankcal.calibration.parameters.recommendation import silva_rule
 
 # the labels printed with the tables are one place off from the fourth on; this is the true order
 NAMES = ("c", "x0", "y0", "A", "K1", "K2", "K3", "P1", "P2", "B")

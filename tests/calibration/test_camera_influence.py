@@ -13,15 +13,15 @@ from networks import CONTROL_SD_M, INTERIOR, photographed, tank_points
 from photographed_jobs import by_tape, control_of, measurements, tank_job
 
 import tankcal
-from tankcal.calibration.influence.blocks import block_of, differences
+from tankcal.calibration.influence.blocks import compare_blocks, make_block
 from tankcal.calibration.influence.exchange import (
-    counted_in,
+    add_pixel_size,
     exchange_calibration,
-    free_parameters,
     leave_out_readings,
+    select_free_parameters,
 )
 from tankcal.calibration.influence.runs import influence
-from tankcal.calibration.product.differences import differences_of
+from tankcal.calibration.product.differences import collect_differences
 from tankcal.camera.model import PARAMETERS, Form, distort_image_points
 from tankcal.errors import InputError
 from tankcal.geometry.rotations import rotation_of_angles, rotation_vector
@@ -167,7 +167,7 @@ def test_the_check_points_are_those_of_the_record():
     found = influence(job, (setup_of(FLIGHT, "same"),), ("fixed",)).runs[0]
     names, d = differences_at(found)
     for source in (record, adjustment):
-        expected = differences_of(source)
+        expected = collect_differences(source)
         assert expected.names == names
         assert expected.difference_m == pytest.approx(d, abs=1e-9)
 
@@ -409,7 +409,7 @@ def test_pairs_add_up(of_tank):
     # property: a to b and b to c is a to c, point by point
     runs = of_tank[0].runs
     xyz = [run.block.xyz_m for run in runs]
-    moved = differences(runs[1].block, runs[3].block)[0]
+    moved = compare_blocks(runs[1].block, runs[3].block)[0]
     assert moved.rms_m == pytest.approx(np.sqrt(np.mean((xyz[3] - xyz[1]) ** 2, axis=0)))
     assert moved.largest_m == pytest.approx(np.abs(xyz[3] - xyz[1]).max(axis=0))
     size = np.linalg.norm(xyz[3] - xyz[1], axis=1)
@@ -462,15 +462,17 @@ def test_a_motion_that_nothing_observes_is_taken_out_exactly(of_tank):
         place_m=1.01 * one.place_m @ turn.T + shift,
         rotation=one.rotation @ turn.T,
     )
-    points, photos, ways = differences(replace(one, ways=np.eye(7)), other)
+    points, photos, ways = compare_blocks(replace(one, free_motions=np.eye(7)), other)
     assert ways == 7
     assert points.largest_xyz_m < 1e-11
     assert photos.largest_xyz_m < 1e-11
     assert photos.largest_turn_rad < 1e-11
     # only what is not observed goes: a shift stays when the turns alone are free
-    stays = differences(replace(one, ways=np.eye(7)[:, 3:6]), replace(one, xyz_m=one.xyz_m + shift))
+    stays = compare_blocks(
+        replace(one, free_motions=np.eye(7)[:, 3:6]), replace(one, xyz_m=one.xyz_m + shift)
+    )
     assert stays[0].rms_m == pytest.approx(np.abs(shift), rel=0.2)
-    still = differences(one, other)
+    still = compare_blocks(one, other)
     size = np.linalg.norm(other.xyz_m - one.xyz_m, axis=1)
     assert still[0].largest_xyz_m == pytest.approx(size.max())
     assert still[1].rms_turn_rad == pytest.approx(np.linalg.norm(rotation_vector(turn[None])))
@@ -575,9 +577,9 @@ def test_known_coordinates_become_approximations():
 
 def test_parameter_of_calibration_only_is_free_in_all_runs():
     setup = setup_of(FLIGHT, "job")
-    names = free_parameters(setup, (changed("a"), changed("b", K4=1e-9)))
+    names = select_free_parameters(setup, (changed("a"), changed("b", K4=1e-9)))
     assert "K4" in names
-    assert "K4" not in free_parameters(setup, (changed("a"),))
+    assert "K4" not in select_free_parameters(setup, (changed("a"),))
 
 
 def test_film_stays_in_millimetres_without_pixels():
@@ -601,10 +603,10 @@ def test_film_takes_the_pixel_of_the_calibrations():
         replace(changed(name), pixel_mm=np.full(2, size))
         for name, size in (("a", 0.002), ("b", 0.002), ("c", 0.003))
     )
-    assert counted_in(film, (film, fine, same)).pixel_mm is fine.pixel_mm
-    assert counted_in(film, (film,)) is film
-    assert counted_in(film, (fine, coarse)) is film
-    assert counted_in(coarse, (fine, same)) is coarse
+    assert add_pixel_size(film, (film, fine, same)).pixel_mm is fine.pixel_mm
+    assert add_pixel_size(film, (film,)) is film
+    assert add_pixel_size(film, (fine, coarse)) is film
+    assert add_pixel_size(coarse, (fine, same)) is coarse
 
 
 @pytest.mark.slow
@@ -612,7 +614,7 @@ def test_residuals_in_pixels_that_are_not_square(with_blunders):
     """Closed form: a residual of x counts in widths of a pixel, one of y in heights."""
     adjustment = tankcal.adjust_job(with_blunders)
     setup = replace(with_blunders.measurements.cameras[0], pixel_mm=np.array([0.001, 0.004]))
-    found = block_of(adjustment, setup).images
+    found = make_block(adjustment, setup).images
     kept = [
         one
         for one in adjustment.readings

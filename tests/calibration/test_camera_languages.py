@@ -18,8 +18,8 @@ from tankcal.record import camera_stability as stability_json
 from tankcal.record.camera_versions import KINDS
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera import paper as papers
-from tankcal.report.camera.drawings import over_whole_decades
-from tankcal.report.camera.naming import short
+from tankcal.report.camera.drawings import widen_to_decades
+from tankcal.report.camera.paper import shorten
 from tankcal.report.notebook import joined
 from tankcal.report.numbers import UNITS
 from tankcal.text.languages import DEFAULT, LANGUAGES
@@ -88,7 +88,7 @@ def result(request, results):
 def names_in(result):
     """Letters of data: they may stand in any paper."""
     data = data_in(result)
-    return letters_in([*data, *map(short, data)])
+    return letters_in([*data, *map(shorten, data)])
 
 
 @pytest.mark.slow
@@ -159,7 +159,7 @@ def test_an_axis_of_less_than_a_decade_has_no_decimals():
     ax = Figure().subplots()
     ax.barh([0, 1], [1.1, 2.4])
     ax.set_xscale("log")
-    over_whole_decades(ax)
+    widen_to_decades(ax)
     assert ax.get_xlim() == pytest.approx((1, 10))
     ax.figure.canvas.draw()
     shown = {tick.get_text() for tick in ax.get_xticklabels(which="both")}

@@ -18,8 +18,7 @@ from tankcal.errors import InputError
 from tankcal.record import camera_product as product_json
 from tankcal.record import camera_stability as stability_json
 from tankcal.report import camera as camera_papers
-from tankcal.report.camera.naming import numbered, short
-from tankcal.report.camera.paper import CameraPaper, load
+from tankcal.report.camera.paper import CameraPaper, load, number_names, shorten
 from tankcal.report.numbers import concise
 from tankcal.text.digits import decimals_of, fixed
 from tankcal.text.words import load_words
@@ -210,10 +209,10 @@ def test_product_of_one_point_is_reported():
 
 
 def test_names_keep_their_beginning_and_end():
-    assert short("n" * 24) == "n" * 24
-    assert short("abc" + "n" * 60 + "xyz") == "abcnnnnnnnn…nnnnnnnnxyz"
-    assert numbered(["1", "2"]) == (["1", "2"], ["1", "2"])
-    assert numbered(["a", "longer name"]) == (["1  a", "2  longer name"], ["1", "2"])
+    assert shorten("n" * 24) == "n" * 24
+    assert shorten("abc" + "n" * 60 + "xyz") == "abcnnnnnnnn…nnnnnnnnxyz"
+    assert number_names(["1", "2"]) == (["1", "2"], ["1", "2"])
+    assert number_names(["a", "longer name"]) == (["1  a", "2  longer name"], ["1", "2"])
 
 
 @pytest.mark.parametrize(

@@ -13,17 +13,16 @@ from surveyed import by_photographs
 
 import tankcal
 from tankcal.calibration.edges import Frame, left_shifts, own_shift
-from tankcal.calibration.interiors import interiors_of
+from tankcal.calibration.interiors import collect_interiors
 from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
 from tankcal.calibration.parameters.conditioning import drop_parameters
-from tankcal.calibration.parameters.dropping import Dropping, interior_after, movement
-from tankcal.calibration.parameters.findings import Choices
-from tankcal.calibration.parameters.recommendation import Evidence, Limit, advice
-from tankcal.calibration.parameters.rules import pessoa_rule
+from tankcal.calibration.parameters.dropping import Dropping, compare_points, read_interior_after
+from tankcal.calibration.parameters.judgement import Choices
+from tankcal.calibration.parameters.recommendation import Evidence, Limit, pessoa_rule, recommend
 from tankcal.calibration.parameters.significance import (
-    AgainstZero,
+    ZeroTest,
+    compute_f,
     critical_f,
-    f_of_group,
     group_tests,
     single_tests,
 )
@@ -141,9 +140,9 @@ def test_f_of_a_group_is_that_of_the_inverse_in_any_units():
     a = rng.normal(size=(3, 9))
     covariance, values = a @ a.T, rng.normal(size=3)
     expected = values @ np.linalg.inv(covariance) @ values / 3
-    assert f_of_group(values, covariance) == pytest.approx(expected, rel=1e-12)
+    assert compute_f(values, covariance) == pytest.approx(expected, rel=1e-12)
     unit = np.array([1e-4, 1e-9, 1e-14])
-    assert f_of_group(unit * values, np.outer(unit, unit) * covariance) == pytest.approx(expected)
+    assert compute_f(unit * values, np.outer(unit, unit) * covariance) == pytest.approx(expected)
 
 
 @pytest.mark.slow
@@ -153,7 +152,7 @@ def test_f_of_groups_rejects_as_often_as_alpha_says(figure):
     covariance = np.array([[2.0, 0.9, 0.1], [0.9, 1.0, 0.3], [0.1, 0.3, 0.5]])
     x = rng.normal(size=(4000, 3)) @ np.linalg.cholesky(covariance).T
     sigma0 = rng.chisquare(dof, 4000) / dof
-    f = [f_of_group(one, s * covariance) for one, s in zip(x, sigma0, strict=True)]
+    f = [compute_f(one, s * covariance) for one, s in zip(x, sigma0, strict=True)]
     share = np.mean(np.array(f) > critical_f(3, dof, alpha))
     figure("groups of zero called significant at 5 %", f"{100 * share:.2f} %")
     assert share == pytest.approx(alpha, abs=4 * np.sqrt(alpha * (1 - alpha) / 4000))
@@ -287,7 +286,7 @@ def test_pessoa_keeps_k3_although_f_rejects_it(calibrations, number, figure):
     assert kept["K1"] == "both"
     assert kept["c"] == "significant"
     assert rule.drop == ("B",)  # 0.04 px, F of 1.3 to 2.1
-    told = {one.name: one for one in advice(
+    told = {one.name: one for one in recommend(
         tuple(Evidence(t, shifts[t.names[0]], None) for t in tests),
         Limit(0.5 * 1e3 * PESSOA_PIXEL_MM, 0.5, "given"), Frame(np.array([3.0, 2.0])),
     )}  # fmt: skip
@@ -304,7 +303,7 @@ def test_pessoa_keeps_k3_although_f_rejects_it(calibrations, number, figure):
 
 def a_case(f=1.0, um=1.0, name="K3", **more):
     """Evidence of a parameter: F against 3.9, a shift of some um."""
-    test = AgainstZero((name,), f, 3.9, 0.5)
+    test = ZeroTest((name,), f, 3.9, 0.5)
     q = interior(c=100.0, x0=um / 1e3)
     shift = own_shift("x0", q, Form(), Frame(np.ones(2)))
     return Evidence(test, shift, shift, **more)
@@ -328,27 +327,27 @@ def product(sds=0.1, volume=0.0):
         (a_case(f=5.0, product=product()), True, "product_stays"),
         (a_case(failed="not determined"), True, "not_determined_without"),
         (a_case(state="weighted"), False, "known_beforehand"),
-        (a_case(alike=(("K2", -0.98),)), False, "correlated"),
-        (a_case(groups=(AgainstZero(("K2", "K3"), 9.0, 3.0, 0.0),)), False, "group_significant"),
+        (a_case(correlated=(("K2", -0.98),)), False, "correlated"),
+        (a_case(groups=(ZeroTest(("K2", "K3"), 9.0, 3.0, 0.0),)), False, "group_significant"),
         (a_case(name="c", f=1e7), True, "principal"),
     ],
 )
 def test_each_situation_has_its_advice_and_its_reason(case, keep, code):
     """Property: the table of `recommending`, one row each; image accuracy 5 um."""
-    (told,) = advice((case,), Limit(5.0, np.nan, "given"), Frame(np.ones(2)))
+    (told,) = recommend((case,), Limit(5.0, np.nan, "given"), Frame(np.ones(2)))
     assert told.keep == keep
     assert code in [reason["code"] for reason in told.reasons]
 
 
 def test_without_an_image_accuracy_nothing_is_called_small():
-    (told,) = advice((a_case(),), Limit(np.nan, np.nan, "residuals"), Frame(np.ones(2)))
+    (told,) = recommend((a_case(),), Limit(np.nan, np.nan, "residuals"), Frame(np.ones(2)))
     assert told.keep
     codes = [reason["code"] for reason in told.reasons]
     assert codes == ["not_significant", "effect_not_known", "product_not_tried"]
 
 
 def test_k1_stays_where_k3_does():
-    told = advice(
+    told = recommend(
         (a_case(name="K1"), a_case(name="K3", f=9.0)),
         Limit(5.0, np.nan, "given"),
         Frame(np.ones(2)),
@@ -395,7 +394,7 @@ def test_volume_and_points_of_a_job(silva_parameters, silva_result):
     assert volume.U_m3 == pytest.approx(top.U_m3, rel=1e-6)
     for trial in silva_parameters.trials:
         assert trial.outcome.failed is None
-        assert trial.outcome.moved.count == 137
+        assert trial.outcome.changes.count == 137
         assert trial.outcome.volume.points == 120
         assert trial.outcome.adjustment.redundancy == 496 + len(trial.names)
 
@@ -418,8 +417,8 @@ def test_dropping_equals_adjustment_with_parameter_off(a_tank, figure):
     assert away < 1e-7
     assert outcome.adjustment.sigma0 == pytest.approx(again.sigma0, rel=1e-6)
     assert outcome.adjustment.redundancy == again.redundancy == base.redundancy + 2
-    moved = movement(base, again)
-    assert moved.rms_m == pytest.approx(outcome.moved.rms_m, rel=1e-3)
+    moved = compare_points(base, again)
+    assert moved.rms_m == pytest.approx(outcome.changes.rms_m, rel=1e-3)
     changes = np.linalg.norm(again.xyz_m - base.xyz_m, axis=1)
     assert moved.largest_point == base.names[int(np.argmax(changes))]
     volume = tankcal.run(replace(job, measurements=with_cameras(
@@ -460,7 +459,7 @@ def test_any_datum_can_be_kept(a_tank, datum):
     base = adjust_survey(measured)
     outcome = Dropping(job_of(a_tank, measured), base).without("camera", ("P2",))
     assert outcome.failed is None
-    assert outcome.moved.rms_sds < 1
+    assert outcome.changes.rms_sds < 1
     assert outcome.adjustment.redundancy == base.redundancy + 1
 
 
@@ -509,7 +508,7 @@ def test_a_value_of_each_photo_makes_a_set_of_each_photo(a_tank):
     assert [len(one.interior.photos) for one in found] == [1] * 8
     assert not found[3].trials[-1].comparable
     outcome = Dropping(job, base).without(found[3].interior.camera, ("K1",))
-    _, names, _ = interior_after(outcome, found[3].interior)
+    _, names, _ = read_interior_after(outcome, found[3].interior)
     assert names == ("c", "x0", "y0")
 
 
@@ -529,7 +528,7 @@ def test_a_weighted_parameter_is_judged_and_dropped(a_tank):
     predicted = next(t.predicted for t in found.trials if t.names == ("P1",))
     outcome = Dropping(job, base).without("camera", ("P1",))
     assert outcome.adjustment.redundancy == base.redundancy  # an unknown and what it was
-    sds = base.sigma0 * np.sqrt(np.diag(interior_after(outcome, found.interior)[2]))
+    sds = base.sigma0 * np.sqrt(np.diag(read_interior_after(outcome, found.interior)[2]))
     np.testing.assert_allclose(sds, predicted.sds, rtol=0.01)
 
 
@@ -559,7 +558,7 @@ def test_droppable_parameters_are_dropped_together(silva_parameters):
     goes = tuple(one.name for one in silva_parameters.recommendation if not one.keep)
     trial = next(t for t in silva_parameters.trials if "advised" in t.because)
     assert trial.names == goes
-    assert trial.outcome.moved is not None
+    assert trial.outcome.changes is not None
     for one in silva_parameters.recommendation:
         codes = [reason["code"] for reason in one.reasons]
         assert (codes[-1] in ("together_stay", "together_move")) == (not one.keep)
@@ -657,14 +656,14 @@ def test_effects_in_pixels_follow_the_declared_pixel(a_tank):
     shift = found.own["K1"]
     assert shift.corner_px == pytest.approx(shift.corner_um / 10)
     assert (found.limit.um, found.limit.px) == (5.0, 0.5)
-    interiors = interiors_of(base, job.measurements)
+    interiors = collect_interiors(base, job.measurements)
     assert interiors[0].frame.pixel_mm.tolist() == [0.01, 0.01]
 
 
 @pytest.mark.slow
 def test_values_after_are_those_of_the_photos_of_the_set(silva_parameters):
     trial = next(t for t in silva_parameters.trials if t.names == ("K3",))
-    values, names, _ = interior_after(trial.outcome, silva_parameters.interior)
+    values, names, _ = read_interior_after(trial.outcome, silva_parameters.interior)
     assert names == tuple(name for name in NAMES if name != "K3")
     assert values[0] == pytest.approx(100.0, abs=0.1)
 

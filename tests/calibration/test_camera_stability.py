@@ -12,21 +12,21 @@ from scipy.optimize import least_squares
 from survey_builder import survey_parts
 
 from tankcal.calibration.stability.comparison import METHODS, compare
-from tankcal.calibration.stability.expected import ideal_derivatives
 from tankcal.calibration.stability.fits import (
-    nearest_rotation,
-    orientation_model,
+    find_nearest_rotation,
+    fit_resection,
+    fit_rotation,
+    ideal_derivatives,
+    make_orientation_model,
     rays,
-    resection,
-    rotation_between,
 )
-from tankcal.calibration.stability.grids import Grid, default_grid, parse
+from tankcal.calibration.stability.grids import Grid, default_grid, parse_grid
 from tankcal.calibration.stability.terrains import DRAWN, TERRAINS, Terrain, parse_terrain
 from tankcal.camera.model import (
     AFFINITIES,
     CONVENTIONS,
     Form,
-    balanced_about,
+    balance_about,
     correct_image_points,
     distort_image_points,
 )
@@ -137,7 +137,7 @@ def test_which_focal_length_both_bundles_get_hardly_matters(seven, figure):
         for one in (seven[0], seven[4])
     )
     figures = [
-        rotation_between(first[0], c, second[0], c, pixel).sigma0_px
+        fit_rotation(first[0], c, second[0], c, pixel).sigma0_px
         for c in (first[1], second[1], 0.5 * (first[1] + second[1]))
     ]
     figure("ROT, both with c of the first, second, their mean: range, px", f"{np.ptp(figures):.4f}")
@@ -240,7 +240,7 @@ def test_a_calibration_against_itself(seven, method, as_published):
 def test_the_same_bundle_in_another_dress():
     """Property: balanced about another radius (another c and K) it is the same camera in space."""
     form = Form("correction_added", "both_y")
-    q, other = balanced_about(Q, form, 2.5)
+    q, other = balance_about(Q, form, 2.5)
     assert abs(q[0] - Q[0]) > 0.01
     base = setup("a")
     first = replace(base, camera=replace(base.camera, values=Q, form=form))
@@ -266,7 +266,7 @@ def test_a_turned_bundle_is_the_same_to_a_rotation():
     for angles in [(0.01, -0.02, 0.03), (0.2, -0.1, 2.0), (0.0, 0.0, np.pi)]:
         rotation = rotation_of_angles(*angles)
         turned_mm = image_of(rays(points, 4.4), rotation, 4.5)
-        fit = rotation_between(turned_mm, 4.5, points, 4.4, PIXEL_MM)
+        fit = fit_rotation(turned_mm, 4.5, points, 4.4, PIXEL_MM)
         assert fit.sigma0_px < 1e-9
         assert fit.rotation == pytest.approx(rotation, abs=1e-12)
 
@@ -291,7 +291,7 @@ def test_a_displaced_camera_is_the_same_to_a_resection():
     object_m = terrain.object_points_m(points, 4.4, terrain.depths_m(len(points), 1))
     rotation, position = rotation_of_angles(0.05, -0.1, 0.4), np.array([310.0, 270.0, 480.0])
     image = image_of(object_m - position, rotation, 4.4)
-    fit = resection(object_m, image, 4.4, PIXEL_MM, terrain.position_m)
+    fit = fit_resection(object_m, image, 4.4, PIXEL_MM, terrain.position_m)
     assert fit.sigma0_px < 1e-8
     assert fit.position_m == pytest.approx(position, abs=1e-7)
     assert angles_of(fit.rotation) == pytest.approx([0.05, -0.1, 0.4], abs=1e-9)
@@ -342,11 +342,12 @@ def bundles():
 
 def test_rotation_against_scipy_and_singular_values():
     (first, c1), (second, c2) = bundles()
-    fit = rotation_between(first, c1, second, c2, PIXEL_MM)
+    fit = fit_rotation(first, c1, second, c2, PIXEL_MM)
     sigma0, angles = by_least_squares(rays(second, c2), first, c1, np.zeros(3), False)
     assert fit.sigma0_px == pytest.approx(sigma0, rel=1e-9)
     assert angles_of(fit.rotation) == pytest.approx(angles, abs=1e-9)
-    wahba = nearest_rotation(rays(first, c1), rays(second, c2))  # other weights, so only nearly
+    # Wahba's problem has other weights, so the rotations agree only nearly.
+    wahba = find_nearest_rotation(rays(first, c1), rays(second, c2))
     assert angles_of(wahba) == pytest.approx(angles, abs=2e-3)
 
 
@@ -354,7 +355,7 @@ def test_resection_against_scipy():
     (first, c1), (second, c2) = bundles()
     terrain = TERRAINS["I"]
     object_m = terrain.object_points_m(first, c1, terrain.depths_m(len(first), 1))
-    fit = resection(object_m, second, c2, PIXEL_MM, terrain.position_m)
+    fit = fit_resection(object_m, second, c2, PIXEL_MM, terrain.position_m)
     start = np.array([0, 0, 0, *terrain.position_m])
     sigma0, found = by_least_squares(object_m, second, c2, start, True)
     assert fit.sigma0_px == pytest.approx(sigma0, rel=1e-9)
@@ -366,7 +367,7 @@ def test_derivatives_of_the_orientation(unknowns):
     (_, _), (second, c) = bundles()
     place = rays(second, c) * np.linspace(50, 60, len(second))[:, None]
     start = rotation_of_angles(0.1, -0.2, 0.5)
-    model = orientation_model(place, c, start, PIXEL_MM)
+    model = make_orientation_model(place, c, start, PIXEL_MM)
     x = np.array([0.03, -0.2, 0.1, 2.0, -3.0, 1.0])[:unknowns]
     design = model(x, np.zeros(2 * len(place)))[1]
     assert_derivative(
@@ -455,7 +456,7 @@ def seven_like(name):
 def test_the_grid_of_a_frame(frame, grid):
     """Published: Pessoa's grid on his frame, and the same in proportion."""
     assert default_grid(frame) == grid
-    assert parse(str(grid)) == grid
+    assert parse_grid(str(grid)) == grid
 
 
 @pytest.mark.parametrize("frame", [(1, 1), (640, 480), (6000, 4000), (100_000, 7), (4607, 3457)])
@@ -486,11 +487,11 @@ def test_a_grid_that_is_none(text):
     if text.endswith("\n"):
         text += "!"
     with pytest.raises(InputError, match="--grid: "):
-        parse(text)
+        parse_grid(text)
 
 
 def test_a_grid_off_the_frame(seven):
-    for grid in (parse("46x35,50,50,101"), Grid(2, 2, (-1, 0), 10), Grid(2, 3, (0, 0), 1728)):
+    for grid in (parse_grid("46x35,50,50,101"), Grid(2, 2, (-1, 0), 10), Grid(2, 3, (0, 0), 1728)):
         with pytest.raises(
             InputError, match=r"expected the whole grid on the frame of 4608 x 3456 px"
         ):

@@ -10,7 +10,7 @@ from draws import draws
 from scipy import stats
 
 from tankcal.calibration.product.check import check_product, chi2_limit, t_limit
-from tankcal.calibration.product.differences import differences_of, read_differences
+from tankcal.calibration.product.differences import collect_differences, read_differences
 from tankcal.calibration.product.limits import Limit, LimitTable, read_limits, shipped_limits
 from tankcal.errors import InputError
 from tankcal.record.camera_product import as_json
@@ -343,7 +343,7 @@ def test_differences_are_read_both_ways(tmp_path):
     for found in (one, other):
         assert found.names == ("P1", "P2")
         assert found.difference_m == pytest.approx(np.array(expected), nan_ok=True)
-    axes, d = one.of_known_axes()
+    axes, d = one.select_known_axes()
     assert axes == ("x", "z")
     assert d.shape == (2, 2)
 
@@ -392,12 +392,12 @@ def test_differences_of_adjustment_and_record_agree():
     ]
     part = {"check_points": {"points": rows}}
     for source in (adjustment, part, {"adjustment": part, "tank": {}}):
-        found = differences_of(source)
+        found = collect_differences(source)
         assert found.names == ("A", "B")
         assert found.difference_m == pytest.approx(points.difference_m, nan_ok=True)
     for none in ({}, {"adjustment": None}, type("Stub", (), {"check_points": None})):
         with pytest.raises(InputError, match="no check points"):
-            differences_of(none)
+            collect_differences(none)
 
 
 def test_json_agrees_with_the_check():

@@ -19,10 +19,10 @@ from rendering import (
 
 from tankcal.calibration.targets import eccentricity_px, read_circles, read_coded
 from tankcal.calibration.targets.edges import _Model
-from tankcal.calibration.targets.found import Marker
+from tankcal.calibration.targets.results import Marker
 
 cv2 = pytest.importorskip("cv2", reason="no OpenCV here: pip install 'tankcal[images]'")
-from tankcal.calibration.targets.dictionaries import dictionary_of, target_image  # noqa: E402
+from tankcal.calibration.targets.opencv import load_dictionary, target_image  # noqa: E402
 
 ARUCO, APRILTAG = "DICT_4X4_50", "DICT_APRILTAG_36H11"
 DISC = ((-1, -1), (1, -1), (1, 1), (-1, 1))
@@ -39,13 +39,13 @@ def scene(name, side=60, incidence=30.0, blur=1.0, noise=2.0, seed=0, count=6, *
         middle = room * (np.array([place % across, place // across]) + 0.5) + rng.uniform(-1, 1, 2)
         corners = tilted_square(middle, side, incidence, *rng.uniform(0, 360, 2))
         truth[int(number)] = corners
-        patterns.append(flat(code_value(dictionary_of(name).cells[number], **more), corners))
+        patterns.append(flat(code_value(load_dictionary(name).cells[number], **more), corners))
     return eight_bit(rendered(size, patterns, blur, noise, seed, oversampling=4)), truth
 
 
 def one_scene(number=7, name=ARUCO, corners=None, cells=None, **more):
     """An image of 200 x 200 pixels with one target."""
-    cells = dictionary_of(name).cells[number] if cells is None else cells
+    cells = load_dictionary(name).cells[number] if cells is None else cells
     corners = tilted_square((99.3, 100.4), 80, 20, 10, 30) if corners is None else corners
     return eight_bit(
         rendered((200, 200), [flat(code_value(cells), corners)], oversampling=3, **more)
@@ -152,7 +152,7 @@ def test_derivatives_of_the_edge():
         t, d, 100 * rng.random(60), 5 + 0.1 * t, 3 + 2 * t, np.array([0, 0, 1, 0, 1, 0]), 0.2
     )
     for model.degree in (2, 3):
-        model.row_of_code = model._row_of_code(1.1)
+        model.row_of_code = model._blur_code(1.1)
         start = np.array([0.2, -0.1, 0.05, np.log(1.2), 190.0, 35.0, 0.02, 120.0])
         start = np.delete(start, 2) if model.degree == 2 else start
         assert_derivative(model.residuals, start, model.jacobian(start))
@@ -197,7 +197,7 @@ def test_a_mirrored_target_is_reported():
 @pytest.mark.slow
 def test_a_code_that_is_its_own_mirror_image_is_doubtful():
     """Some codes of the small dictionaries are symmetric: in a flipped photo they are refused."""
-    number = min(dictionary_of(ARUCO).mirrored)
+    number = min(load_dictionary(ARUCO).mirrored)
     alone = read_coded(one_scene(number))
     assert [one.id for one in alone.targets] == [number]
     assert alone.doubtful == (number,)
@@ -208,7 +208,7 @@ def test_a_code_that_is_its_own_mirror_image_is_doubtful():
 
 @pytest.mark.slow
 def test_codes_without_a_top_are_refused():
-    number = min(dictionary_of("ARUCO_ORIGINAL").turning)
+    number = min(load_dictionary("ARUCO_ORIGINAL").turning)
     found = read_coded(one_scene(number, "ARUCO_ORIGINAL"), "ARUCO_ORIGINAL")
     assert codes(found) == ["turn_doubt"]
 
@@ -217,7 +217,7 @@ def test_codes_without_a_top_are_refused():
 @pytest.mark.parametrize("name", [ARUCO, APRILTAG])
 def test_a_damaged_code_is_refused(name):
     """One cell of the other colour: never that id, unless bit errors were allowed."""
-    cells = dictionary_of(name).cells[7].copy()
+    cells = load_dictionary(name).cells[7].copy()
     cells[2, 3] ^= 1
     image = one_scene(cells=cells)
     found = read_coded(image, name)
@@ -277,7 +277,7 @@ def test_study_of_random_codes(figure):
     Of 500 some 30 are by chance (standard error 5), of 1500 some 92 (9).
     """
     rng = np.random.default_rng(0)
-    known, count, read = dictionary_of("DICT_4X4_1000"), draws(200, 1500), 0
+    known, count, read = load_dictionary("DICT_4X4_1000"), draws(200, 1500), 0
     for _ in range(count // 25):
         sheet = np.full((400, 400), 200.0)
         for place in range(25):

@@ -8,12 +8,12 @@ import pytest
 from rendering import Pattern, code_value, eight_bit, rendered
 
 import tankcal
-from tankcal.calibration.targets import Wanted, read_photographs
+from tankcal.calibration.targets import TargetSettings, read_photographs
 from tankcal.camera.model import Form, correct_image_points, distort_image_points
 from tankcal.geometry.rotations import rotation_of_view
 
 cv2 = pytest.importorskip("cv2", reason="no OpenCV here: pip install 'tankcal[images]'")
-from tankcal.calibration.targets.dictionaries import dictionary_of  # noqa: E402
+from tankcal.calibration.targets.opencv import load_dictionary  # noqa: E402
 
 SIZE, PIXEL_MM, SIDE_M = np.array([1000, 800]), 0.005, 0.3
 INTERIOR = np.array([5.02, 0.03, -0.02, -2.5e-3, 4e-5, 0, 0, 2e-4, -1e-4, 0, 0, 0, 0])
@@ -66,7 +66,7 @@ def seen(target, number, place, rotation):
         return np.column_stack([on_plane @ right, on_plane @ down]) / SIDE_M**2
 
     (c0, l0), (c1, l1) = corners.min(axis=0) - 18, corners.max(axis=0) + 18
-    cells = dictionary_of("DICT_5X5_50").cells[number]
+    cells = load_dictionary("DICT_5X5_50").cells[number]
     return Pattern(plane_of, code_value(cells), (c0, c1, l0, l1)), corners
 
 
@@ -109,7 +109,7 @@ def test_a_rendered_calibration(tmp_path, photos, oversampling, figure):
     listed = tmp_path / "names.csv"
     listed.write_text("id,point\n" + "".join(f"{k},T{k}\n" for k in range(9)))
     reading = read_photographs(
-        paths, folder / "image_points.csv", Wanted(dictionary="DICT_5X5_50", names=listed)
+        paths, folder / "image_points.csv", TargetSettings(dictionary="DICT_5X5_50", names=listed)
     )
     errors = np.array(
         [p.place_px - truth[photo.photo, p.point] for photo in reading.photos for p in photo.points]

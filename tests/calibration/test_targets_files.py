@@ -9,12 +9,12 @@ import pytest
 from rendering import disc_value, eight_bit, flat, rendered, tilted_square
 from test_targets import ARUCO, DISC, one_scene
 
-from tankcal.calibration.targets import Wanted, read_coded, read_photographs
+from tankcal.calibration.targets import TargetSettings, read_coded, read_photographs
 from tankcal.errors import InputError
 
 cv2 = pytest.importorskip("cv2", reason="no OpenCV here: pip install 'tankcal[images]'")
 
-WANTED = Wanted(dictionary=ARUCO)
+WANTED = TargetSettings(dictionary=ARUCO)
 
 
 def rows_of(path):
@@ -47,7 +47,7 @@ def test_corners_get_their_names(photos, tmp_path):
     reading = read_photographs(
         photos,
         out,
-        Wanted(names=names, dictionary=ARUCO),
+        TargetSettings(names=names, dictionary=ARUCO),
         progress=lambda *a: steps.append(a),
     )
     rows = rows_of(out)
@@ -67,7 +67,7 @@ def test_corners_get_their_names(photos, tmp_path):
 
 def test_centres_have_the_plain_name(photos, tmp_path):
     reading = read_photographs(
-        photos[:1], tmp_path / "o.csv", Wanted(what="centres", dictionary=ARUCO)
+        photos[:1], tmp_path / "o.csv", TargetSettings(what="centres", dictionary=ARUCO)
     )
     assert [row["point"] for row in rows_of(reading.path)] == ["7", "9"]
     assert any("give the list of the ids" in str(one) for one in reading.warnings)
@@ -77,7 +77,7 @@ def test_refused_targets_are_listed(photos, tmp_path):
     names = tmp_path / "names.csv"
     names.write_text("id,point\n9,T9\n")
     reading = read_photographs(
-        photos[:1], tmp_path / "o.csv", Wanted(names=names, dictionary=ARUCO)
+        photos[:1], tmp_path / "o.csv", TargetSettings(names=names, dictionary=ARUCO)
     )
     (row,) = rows_of(reading.refused_path)
     assert (row["photo"], row["code"], row["id"]) == ("left", "not_listed", "7")
@@ -116,16 +116,18 @@ def test_all_bad_files_are_reported_in_one_run(photos, tmp_path):
 def test_names_are_checked(photos, tmp_path):
     names = tmp_path / "names.csv"
     names.write_text("id,point\n7,=1+1\n9,T9\n9,T10\n3,T9\n99,T99\n1.5,T1\nx,T2\n")
-    lines = told(photos, tmp_path / "o.csv", Wanted(names=names, dictionary=ARUCO))
+    lines = told(photos, tmp_path / "o.csv", TargetSettings(names=names, dictionary=ARUCO))
     assert [line.partition(", ")[2].partition(":")[0] for line in lines] == [
         *("id", "row 2, point", "row 4, id", "row 5, point", "row 7, id", "row 8, id")
     ]
 
 
 def test_settings_are_checked(photos, tmp_path):
-    lines = told(photos, tmp_path / "o.csv", Wanted(what="squares", encoding="jpeg", reach_px=-1.0))
+    lines = told(
+        photos, tmp_path / "o.csv", TargetSettings(what="squares", encoding="jpeg", reach_px=-1.0)
+    )
     assert [line.partition(":")[0] for line in lines] == ["what", "encoding", "reach_px"]
-    (line,) = told(photos, tmp_path / "o.csv", Wanted(dictionary="4X4_51"))
+    (line,) = told(photos, tmp_path / "o.csv", TargetSettings(dictionary="4X4_51"))
     assert "expected one of DICT_4X4_100" in line
 
 
@@ -176,7 +178,7 @@ def test_circles_are_named_by_their_places(circles, tmp_path):
     places = tmp_path / "places.csv"
     places.write_text("photo,point,column_px,line_px\ndiscs,A,63,48\ndiscs,B,160,90\ndiscs,X,9,9\n")
     out = tmp_path / "o.csv"
-    reading = read_photographs([path], out, Wanted(what="circles", places=places))
+    reading = read_photographs([path], out, TargetSettings(what="circles", places=places))
     assert [row["point"] for row in rows_of(out)] == ["A", "B"]
     found = np.array([point.place_px for point in reading.photos[0].points])
     assert np.abs(found - middles[:2]).max() < 0.1
@@ -188,7 +190,7 @@ def test_places_in_photos_that_are_not_given_are_reported(circles, tmp_path):
     places = tmp_path / "places.csv"
     rows = ("disc,C,63,48", "discs,A,63,48", "disc,D,5,5", "other,A,63,48")
     places.write_text("\n".join(["photo,point,column_px,line_px", *rows]))
-    wanted = Wanted(what="circles", places=places)
+    wanted = TargetSettings(what="circles", places=places)
     reading = read_photographs([circles[0]], tmp_path / "o.csv", wanted)
     assert [str(one) for one in reading.warnings if one.file == "places.csv"] == [
         "places.csv, row 2, photo: found 'disc'; expected one of the photos given"
@@ -202,7 +204,7 @@ def test_ambiguous_places_are_refused(circles, tmp_path):
     places = tmp_path / "places.csv"
     places.write_text("photo,point,column_px,line_px\ndiscs,A,60,50\ndiscs,B,62,52\n")
     reading = read_photographs(
-        [circles[0]], tmp_path / "o.csv", Wanted(what="circles", places=places)
+        [circles[0]], tmp_path / "o.csv", TargetSettings(what="circles", places=places)
     )
     assert reading.points == 0
     assert reading.refused["ambiguous"] == 1
@@ -210,7 +212,7 @@ def test_ambiguous_places_are_refused(circles, tmp_path):
 
 
 def test_circles_without_places_are_no_job(circles, tmp_path):
-    (line,) = told([circles[0]], tmp_path / "o.csv", Wanted(what="circles"))
+    (line,) = told([circles[0]], tmp_path / "o.csv", TargetSettings(what="circles"))
     assert line.startswith("places: missing")
 
 

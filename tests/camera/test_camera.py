@@ -5,12 +5,12 @@ import pytest
 from jacobians import assert_derivative
 
 from tankcal.camera.formats.frame import make_framed_camera
-from tankcal.camera.formats.opencv import OpenCV, from_opencv, to_opencv
+from tankcal.camera.formats.opencv import OpenCV, convert_from_opencv, convert_to_opencv
 from tankcal.camera.model import (
     AFFINITIES,
     CONVENTIONS,
     Form,
-    balanced_about,
+    balance_about,
     correct_image_points,
     distort_image_points,
 )
@@ -104,13 +104,13 @@ def test_opencv_camera(ratio):
     v = fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy
     pixel, size = 0.005, (4000, 3000)
     matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
-    camera = from_opencv(OpenCV(matrix, np.array([k1, k2, p1, p2, k3])), pixel, size)
+    camera = convert_from_opencv(OpenCV(matrix, np.array([k1, k2, p1, p2, k3])), pixel, size)
     q, sides = camera.interior, camera.pixel_mm
     found = distort_image_points(q[0] * np.column_stack([x, -y]), q, Form())
     expected = np.column_stack([u - (size[0] - 1) / 2, -(v - (size[1] - 1) / 2)]) * sides
     assert found == pytest.approx(expected, abs=1e-11)
     assert sides == pytest.approx([pixel * fy / fx, pixel])
-    back = to_opencv(camera)
+    back = convert_to_opencv(camera)
     assert back.matrix == pytest.approx(matrix, rel=1e-10)
     assert back.coefficients == pytest.approx([k1, k2, p1, p2, k3], abs=1e-9)
     assert back.error_px < 1e-9
@@ -122,7 +122,7 @@ def test_conversion_to_opencv_states_its_error(figure):
     q = np.array([15.0, 0.02, -0.01, -5e-4, 1e-6, 0, 0, 1e-5, -2e-5, 0, 0, 2e-4, 1e-4])
     for convention in CONVENTIONS:
         form = Form(convention, "b1_b2", 6.0)
-        found = to_opencv(make_framed_camera(q, form, pixel, size))
+        found = convert_to_opencv(make_framed_camera(q, form, pixel, size))
         x, y = (correct_image_points(PLACES * pixel, q, form) / q[0] * [1, -1]).T
         k1, k2, p1, p2, k3 = found.coefficients
         r2 = x * x + y * y
@@ -160,7 +160,7 @@ def test_balanced_form_both_ways(convention, affinity):
     q, form = Q, Form(convention, affinity, 0.0)
     expected = distort_image_points(q[0] * points[:, :2], q, form)
     for radius in (40.0, 25.0, 0.0):
-        q, form = balanced_about(q, form, radius)
+        q, form = balance_about(q, form, radius)
         assert form.radial_balance_mm == radius
         assert distort_image_points(q[0] * points[:, :2], q, form) == pytest.approx(
             expected, abs=1e-11
@@ -171,10 +171,12 @@ def test_balanced_form_both_ways(convention, affinity):
 def test_pixels_that_are_not_square():
     """Closed form: no distortion: fx over fy is the ratio of the pixel's sides."""
     size, matrix = (4001, 3001), np.array([[3000, 0, 2000], [0, 3030, 1500], [0, 0, 1]])
-    camera = from_opencv(OpenCV(matrix, np.zeros(4)), 0.004, size)
+    camera = convert_from_opencv(OpenCV(matrix, np.zeros(4)), 0.004, size)
     assert camera.interior[:3] == pytest.approx([12.12, 0, 0])
     assert camera.pixel_mm == pytest.approx([12.12 / 3000, 0.004])
-    plain = to_opencv(make_framed_camera([12.12, 0, 0, *[0] * 8, 1e-3, 0], Form(), 0.004, size))
+    plain = convert_to_opencv(
+        make_framed_camera([12.12, 0, 0, *[0] * 8, 1e-3, 0], Form(), 0.004, size)
+    )
     assert plain.matrix[0, 0] == pytest.approx(3030 * 1.001)
     assert plain.error_px < 1e-9
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from draws import draws
 
-from tankcal.camera.comparator import KINDS, repeats, suspicion, transformation
+from tankcal.camera.comparator import KINDS, find_mark_error, fit_transformation, group_readings
 from tankcal.camera.film import Surface, flatten_film, heights_at
 from tankcal.errors import SolutionError
 
@@ -24,20 +24,22 @@ def readings_of(places, matrix=SHRUNK, angle=0.3, mirrored=False):
 
 def test_mean_and_sd_of_repeated_readings():
     """Closed form: 1, 2, 3 have mean 2 and sample sd 1; one reading has no sd."""
-    found = repeats(["b", "a", "b", "b"], np.array([[1, 10], [7, 7], [2, 10], [3, 10.0]]) + 1e6)
+    found = group_readings(
+        ["b", "a", "b", "b"], np.array([[1, 10], [7, 7], [2, 10], [3, 10.0]]) + 1e6
+    )
     assert found.group.tolist() == [0, 1, 0, 0]
     assert found.count.tolist() == [3, 1]
     np.testing.assert_allclose(found.mean - 1e6, [[2, 10], [7, 7]], atol=1e-9)
     np.testing.assert_allclose(found.sd[0], [1, 0], atol=1e-9)
     assert np.isnan(found.sd[1]).all()
-    assert found.beyond(0.999).tolist() == [True, False]
-    assert found.beyond(1.001).tolist() == [False, False]
-    assert found.beyond(None).tolist() == [False, False]
+    assert found.exceeds(0.999).tolist() == [True, False]
+    assert found.exceeds(1.001).tolist() == [False, False]
+    assert found.exceeds(None).tolist() == [False, False]
 
 
 def test_no_readings_at_all():
-    found = repeats([], np.zeros((0, 2)))
-    assert (len(found.count), len(found.beyond(1.0))) == (0, 0)
+    found = group_readings([], np.zeros((0, 2)))
+    assert (len(found.count), len(found.exceeds(1.0))) == (0, 0)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 2, -3.0])
@@ -45,10 +47,12 @@ def test_no_readings_at_all():
 def test_a_transformation_comes_back(kind, angle):
     """Closed form: the inverse of what made the readings, to rounding."""
     matrix = SHRUNK if kind == "affine" else 0.9995 * np.eye(2)
-    found = transformation(readings_of(CORNERS, matrix, angle), CORNERS, 0.003, kind)
+    found = fit_transformation(readings_of(CORNERS, matrix, angle), CORNERS, 0.003, kind)
     np.testing.assert_allclose(found.residuals_mm, 0, atol=1e-11)
     points = np.random.default_rng(1).uniform(-60, 60, (20, 2))
-    np.testing.assert_allclose(found.of(readings_of(points, matrix, angle)), points, atol=1e-11)
+    np.testing.assert_allclose(
+        found.transform(readings_of(points, matrix, angle)), points, atol=1e-11
+    )
     a = found.parameters
     x, y = readings_of(points, matrix, angle).T
     by_formula = np.column_stack([a["a1"] * x + a["a2"] * y + a["a3"],
@@ -60,13 +64,13 @@ def test_covariance_of_four_marks_at_the_corners_of_a_square():
     """Closed form: unit marks, four corners (+-d): the centre has sd s/2, a corner sqrt(3)/2 s."""
     d, s = 80.0, 0.004
     marks = d * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1.0]])
-    found = transformation(marks, marks, s)
+    found = fit_transformation(marks, marks, s)
     at = np.array([[0, 0], [d, d], [d, 0]])
-    added = found.added_covariance(at)
+    added = found.parameter_covariance(at)
     np.testing.assert_allclose(np.einsum("nii->ni", added)[:, 0] / s**2, [1 / 4, 3 / 4, 1 / 2])
     np.testing.assert_allclose(added[:, 0, 1], 0, atol=1e-20)
     assert found.dof == 2
-    of_similarity = transformation(marks, marks, s, "similarity").added_covariance(at)
+    of_similarity = fit_transformation(marks, marks, s, "similarity").parameter_covariance(at)
     expected = np.array([1 / 4, 1 / 4 + 2 / 8, 1 / 4 + 1 / 8])  # 1/n + r2 / sum of r2
     np.testing.assert_allclose(of_similarity[:, 0, 0] / s**2, expected)
 
@@ -78,38 +82,38 @@ def test_second_method_derivatives_by_moved_readings(kind):
     readings = readings_of(EIGHT, 0.9995 * np.eye(2)) + rng.normal(0, 0.003, EIGHT.shape)
     sd = rng.uniform(0.002, 0.005, EIGHT.shape)
     place = np.array([[200.0, 190.0]])
-    found = transformation(readings, EIGHT, sd, kind)
+    found = fit_transformation(readings, EIGHT, sd, kind)
     columns, step = [], 1e-4
     for i in range(readings.size):
         moved = [readings.copy(), readings.copy()]
         moved[0].flat[i] += step
         moved[1].flat[i] -= step
-        up, down = (transformation(one, EIGHT, sd, kind).of(place)[0] for one in moved)
+        up, down = (fit_transformation(one, EIGHT, sd, kind).transform(place)[0] for one in moved)
         columns.append((up - down) / (2 * step) * sd.flat[i])
     columns = np.array(columns)
-    np.testing.assert_allclose(found.added_covariance(place)[0], columns.T @ columns, rtol=2e-3)
+    np.testing.assert_allclose(found.parameter_covariance(place)[0], columns.T @ columns, rtol=2e-3)
 
 
 def test_shifts_have_the_sds_of_the_formula():
     """Second method: a3 and a6 are the image of the comparator's zero."""
-    found = transformation(readings_of(EIGHT), EIGHT, 0.003)
-    at_zero = np.einsum("nii->ni", found.added_covariance(np.zeros((1, 2))))[0]
+    found = fit_transformation(readings_of(EIGHT), EIGHT, 0.003)
+    at_zero = np.einsum("nii->ni", found.parameter_covariance(np.zeros((1, 2))))[0]
     sds = found.parameter_sds
     np.testing.assert_allclose([sds["a3"] ** 2, sds["a6"] ** 2], at_zero, rtol=1e-9)
 
 
 def test_sds_turn_with_the_comparator():
     """Closed form: a quarter turn exchanges the sds of x and y."""
-    found = transformation(readings_of(CORNERS, np.eye(2), np.pi / 2), CORNERS, 0.003)
-    np.testing.assert_allclose(found.turned([[0.002, 0.005]]), [[0.005, 0.002]], rtol=1e-9)
+    found = fit_transformation(readings_of(CORNERS, np.eye(2), np.pi / 2), CORNERS, 0.003)
+    np.testing.assert_allclose(found.propagate_sds([[0.002, 0.005]]), [[0.005, 0.002]], rtol=1e-9)
 
 
 def test_sds_through_a_sheared_comparator():
     """Closed form: x' = a1 x + a2 y has the variance a1^2 sx^2 + a2^2 sy^2, y' alike."""
     matrix = np.array([[1.0, 0.3], [-0.1, 0.9]])
-    found = transformation(CORNERS @ np.linalg.inv(matrix).T, CORNERS, 0.003)
+    found = fit_transformation(CORNERS @ np.linalg.inv(matrix).T, CORNERS, 0.003)
     expected = np.sqrt([0.002**2 + 0.09 * 0.005**2, 0.01 * 0.002**2 + 0.81 * 0.005**2])
-    np.testing.assert_allclose(found.turned([[0.002, 0.005]]), [expected], rtol=1e-9)
+    np.testing.assert_allclose(found.propagate_sds([[0.002, 0.005]]), [expected], rtol=1e-9)
 
 
 def covered(trials, kind, seed):
@@ -120,11 +124,11 @@ def covered(trials, kind, seed):
     marks, places = readings_of(CORNERS, matrix), readings_of(points, matrix)
     found, factors = [], []
     for _ in range(trials):
-        fit = transformation(marks + rng.normal(0, 0.004, marks.shape), CORNERS, 0.004, kind)
+        fit = fit_transformation(marks + rng.normal(0, 0.004, marks.shape), CORNERS, 0.004, kind)
         read = places + rng.normal(0, 0.003, places.shape)
-        variance = fit.turned(np.full(read.shape, 0.003)) ** 2
-        variance += np.einsum("nii->ni", fit.added_covariance(read))
-        found.append((fit.of(read) - points) / np.sqrt(variance))
+        variance = fit.propagate_sds(np.full(read.shape, 0.003)) ** 2
+        variance += np.einsum("nii->ni", fit.parameter_covariance(read))
+        found.append((fit.transform(read) - points) / np.sqrt(variance))
         factors.append(fit.chi2)
     return np.array(found).reshape(-1, 2), np.array(factors), fit.dof
 
@@ -155,23 +159,23 @@ def check_coverage(trials, kind, figure):
 
 def test_few_marks():
     for kind, fewest in KINDS.items():
-        found = transformation(CORNERS[:fewest], CORNERS[:fewest], 0.003, kind)
+        found = fit_transformation(CORNERS[:fewest], CORNERS[:fewest], 0.003, kind)
         assert found.dof == 0
         assert np.isnan(found.sigma0)
         with pytest.raises(SolutionError, match="marks"):
-            transformation(CORNERS[: fewest - 1], CORNERS[: fewest - 1], 0.003, kind)
+            fit_transformation(CORNERS[: fewest - 1], CORNERS[: fewest - 1], 0.003, kind)
     on_a_line = np.array([[0, 0], [1, 1], [2, 2], [5, 5.0]])
     with pytest.raises(SolutionError, match="on one line"):
-        transformation(on_a_line, on_a_line, 0.003)
+        fit_transformation(on_a_line, on_a_line, 0.003)
 
 
 def test_a_mirrored_plate():
-    fit = transformation(readings_of(CORNERS, mirrored=True), CORNERS, 0.003)
+    fit = fit_transformation(readings_of(CORNERS, mirrored=True), CORNERS, 0.003)
     assert fit.is_mirrored
     np.testing.assert_allclose(fit.residuals_mm, 0, atol=1e-11)
-    found = suspicion(readings_of(CORNERS, np.eye(2), mirrored=True), CORNERS, "similarity")
+    found = find_mark_error(readings_of(CORNERS, np.eye(2), mirrored=True), CORNERS, "similarity")
     assert found.what == "mirrored"
-    assert suspicion(readings_of(CORNERS, mirrored=True), CORNERS) is None
+    assert find_mark_error(readings_of(CORNERS, mirrored=True), CORNERS) is None
 
 
 @pytest.mark.parametrize("marks", [CORNERS, EIGHT])
@@ -180,11 +184,11 @@ def test_exchanged_marks_are_named(marks, kind):
     order = np.arange(len(marks))
     order[[0, 1]] = 1, 0
     read = readings_of(marks, 1.0003 * np.eye(2))
-    found = suspicion(read[order], marks, kind)
+    found = find_mark_error(read[order], marks, kind)
     assert (found.what, found.marks) == ("exchanged", ((0, 1),))
     order = np.arange(len(marks))
     order[[0, 2]] = 2, 0  # of four corners also the other diagonal, with a half turn
-    found = suspicion(read[order], marks, kind)
+    found = find_mark_error(read[order], marks, kind)
     assert found.what == "exchanged"
     assert (0, 2) in found.marks
     assert len(found.marks) == (2 if len(marks) == 4 else 1)
@@ -193,20 +197,20 @@ def test_exchanged_marks_are_named(marks, kind):
 def test_one_wrong_mark_is_named_where_the_others_tell():
     read = readings_of(EIGHT)
     read[5] += [2.0, -1.0]
-    assert suspicion(read, EIGHT).marks == ((5,),)
-    assert suspicion(read, EIGHT).what == "wrong"
+    assert find_mark_error(read, EIGHT).marks == ((5,),)
+    assert find_mark_error(read, EIGHT).what == "wrong"
     read = readings_of(CORNERS)
     read[2] += [2.0, -1.0]
-    assert suspicion(read, CORNERS).what == "misfit"
-    assert suspicion(readings_of(CORNERS), CORNERS) is None
+    assert find_mark_error(read, CORNERS).what == "misfit"
+    assert find_mark_error(readings_of(CORNERS), CORNERS) is None
 
 
 def test_another_unit_and_three_confused_marks():
-    found = suspicion(25.4 * readings_of(CORNERS), CORNERS)
+    found = find_mark_error(25.4 * readings_of(CORNERS), CORNERS)
     assert found.what == "unit"
     assert found.size == pytest.approx(1 / 25.4, rel=1e-3)
-    assert suspicion(readings_of(CORNERS)[[1, 2, 0]], CORNERS[:3]).what == "sheared"
-    assert suspicion(CORNERS[:2], CORNERS[:2]) is None  # too few to say anything
+    assert find_mark_error(readings_of(CORNERS)[[1, 2, 0]], CORNERS[:3]).what == "sheared"
+    assert find_mark_error(CORNERS[:2], CORNERS[:2]) is None  # too few to say anything
 
 
 def test_flattened_film_meets_the_rays():

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tankcal.camera.formats import reading, writing
-from tankcal.camera.formats.frame import frame_points, image_of, make_framed_camera, rays_of
-from tankcal.camera.formats.reading import cameras_of, read_camera
+from tankcal.camera.formats.frame import frame_points, make_framed_camera, project_rays, trace_rays
+from tankcal.camera.formats.reading import parse_cameras, read_camera
 from tankcal.camera.formats.texts import LONGEST
-from tankcal.camera.formats.writing import cameras_toml_entry, sd_key_of, value_key, write_camera
-from tankcal.camera.model import PARAMETERS, Form
+from tankcal.camera.formats.writing import cameras_toml_entry, make_sd_key, write_camera
+from tankcal.camera.model import KEYS, PARAMETERS, Form
 from tankcal.errors import InputError
 from tankcal.job.calibrations import read_cameras
 from tankcal.job.contract.registers import PARAMETER_KEYS, sd_key
@@ -75,7 +75,7 @@ GOOD = {"opencv": YAML, "colmap": COLMAP, "metashape": METASHAPE, "pix4d": PIX4D
 
 
 def read(text, pixel_um=5.0, size_px=SIZE, kind=None):
-    return cameras_of(text, "camera.txt", kind, pixel_um, size_px)
+    return parse_cameras(text, "camera.txt", kind, pixel_um, size_px)
 
 
 def problems_of(text, **arguments):
@@ -94,7 +94,7 @@ def test_written_file_is_read_back(kind, figure):
     assert np.array_equal(same.interior, back.interior)
     assert name in ("7", "1", "camera")
     points = frame_points(SIZE)
-    off = np.abs(image_of(back, rays_of(CAMERA, points)) - points).max()
+    off = np.abs(project_rays(back, trace_rays(CAMERA, points)) - points).max()
     figure(f"written as {kind} and read back", f"{off:.1e} px")
     assert off < SAME_PX
     assert write_camera(kind, [(name, back)], radius_mm=6.0).text.split() == pytest.approx(
@@ -284,10 +284,8 @@ def test_cameras_toml_reads_back_the_same(
 
 
 def test_keys_are_those_of_the_job():
-    assert {name: value_key(name) for name in PARAMETERS} == {
-        name: key for name, (key, _) in PARAMETER_KEYS.items()
-    }
-    assert [sd_key_of(name) for name in PARAMETERS] == [sd_key(name) for name in PARAMETERS]
+    assert {name: key for name, (key, _) in PARAMETER_KEYS.items()} == KEYS
+    assert [make_sd_key(name) for name in PARAMETERS] == [sd_key(name) for name in PARAMETERS]
 
 
 def test_a_name_that_no_camera_can_have():

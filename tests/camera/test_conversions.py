@@ -8,8 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tankcal.camera.formats import balanced, colmap, metashape, pix4d
-from tankcal.camera.formats.frame import frame_points, image_of, make_framed_camera, rays_of
-from tankcal.camera.formats.opencv import OpenCV, distort_rays, from_opencv, to_opencv
+from tankcal.camera.formats.frame import frame_points, make_framed_camera, project_rays, trace_rays
+from tankcal.camera.formats.opencv import (
+    OpenCV,
+    convert_from_opencv,
+    convert_to_opencv,
+    distort_rays,
+)
 from tankcal.camera.model import Form
 from tankcal.errors import SolutionError
 
@@ -56,14 +61,14 @@ def test_opencv_as_documented(camera, ratio):
     """Published: OpenCV's equations over 46 x 35 points; there and back within 1e-9 px."""
     size, f, cx, cy, k, p = camera
     matrix = np.array([[f * ratio, 0, cx], [0, f, cy], [0, 0, 1]])
-    own = from_opencv(OpenCV(matrix, np.array([k[0], k[1], *p, k[2]])), 0.004, size)
-    rays = rays_of(own, frame_points(size))
+    own = convert_from_opencv(OpenCV(matrix, np.array([k[0], k[1], *p, k[2]])), 0.004, size)
+    rays = trace_rays(own, frame_points(size))
     along, down = brown(rays, k[:3], *p)
     assert off_px(f * ratio * along + cx, f * down + cy, size) < SAME_PX
-    again = from_opencv(to_opencv(own), 0.004, size)
-    assert np.abs(image_of(again, rays) - frame_points(size)).max() < SAME_PX
+    again = convert_from_opencv(convert_to_opencv(own), 0.004, size)
+    assert np.abs(project_rays(again, rays) - frame_points(size)).max() < SAME_PX
     assert own.error_px < SAME_PX
-    assert to_opencv(own).error_px < SAME_PX
+    assert convert_to_opencv(own).error_px < SAME_PX
 
 
 RATIONAL = [-0.31, 0.12, 4e-4, -3e-4, -0.01, -0.02, 0.03, 0.004]
@@ -80,7 +85,7 @@ def test_opencv_projects_the_same(count, figure):
     cv2 = pytest.importorskip("cv2")
     matrix = np.array([[3300.0, 0, 2290], [0, 3320, 1750], [0, 0, 1]])
     k = np.array(LONG.get(count, [-0.03, 0.02, 5e-4, -4e-4, 0.01][:count]))
-    own = from_opencv(OpenCV(matrix, k), PIXEL, SIZE)
+    own = convert_from_opencv(OpenCV(matrix, k), PIXEL, SIZE)
     x, y = np.random.default_rng(2).uniform(-0.6, 0.6, (2, 400)) * [[1], [0.75]]
     points = np.column_stack([x, y, np.ones_like(x)])
     seen = cv2.projectPoints(points, np.zeros(3), np.zeros(3), matrix, k)[0][:, 0]
@@ -88,7 +93,7 @@ def test_opencv_projects_the_same(count, figure):
     full[:count] = k
     plane = np.column_stack(distort_rays(x, y, full)) * [3300, 3320] + [2290, 1750]
     assert np.abs(plane - seen).max() < SAME_PX
-    off = np.hypot(*(image_of(own, np.column_stack([x, -y])) - seen).T)
+    off = np.hypot(*(project_rays(own, np.column_stack([x, -y])) - seen).T)
     inside = np.all((seen >= 0) & (seen <= np.array(SIZE) - 1), axis=1)
     figure(f"OpenCV's {count} coefficients as tankcal's, over the frame", f"{own.error_px:.1e} px")
     assert off[inside].max() <= max(1.02 * own.error_px, SAME_PX)
@@ -105,17 +110,17 @@ def test_colmap_as_documented(camera, model):
     values |= {"k1": k[0], "k2": k[1], "k3": k[2], "k4": 0.0, "k5": 0.0, "k6": 0.0}
     names = colmap.MODELS[model]
     given_ = colmap.Colmap(model, size, tuple(float(values[name]) for name in names))
-    own = colmap.from_colmap(given_, 0.005)
-    rays = rays_of(own, frame_points(size))
+    own = colmap.convert_from_colmap(given_, 0.005)
+    rays = trace_rays(own, frame_points(size))
     has = {name: values[name] if name in names else 0.0 for name in values}
     along, down = brown(rays, (has["k1"], has["k2"], has["k3"]), has["p1"], has["p2"])
     u, v = (has["fx"] or f) * along + cx, f * down + cy
     assert off_px(u - 0.5, v - 0.5, size) < SAME_PX
-    back = colmap.to_colmap(own, model)
+    back = colmap.convert_to_colmap(own, model)
     assert back.error_px < SAME_PX
-    again = colmap.from_colmap(back, 0.005)
-    assert np.abs(image_of(again, rays) - frame_points(size)).max() < SAME_PX
-    simplest = colmap.to_colmap(own)
+    again = colmap.convert_from_colmap(back, 0.005)
+    assert np.abs(project_rays(again, rays) - frame_points(size)).max() < SAME_PX
+    simplest = colmap.convert_to_colmap(own)
     assert simplest.error_px < SAME_PX
     assert len(simplest.params) <= len(names)
 
@@ -124,9 +129,9 @@ def test_colmap_rational():
     """Second method: the rational model of FULL_OPENCV is that of OpenCV, half a pixel apart."""
     k = LONG[8]
     params = (3300.0, 3320.0, 2290.5, 1750.5, *k)
-    of_colmap = colmap.from_colmap(colmap.Colmap("FULL_OPENCV", SIZE, params), PIXEL)
+    of_colmap = colmap.convert_from_colmap(colmap.Colmap("FULL_OPENCV", SIZE, params), PIXEL)
     matrix = np.array([[3300.0, 0, 2290], [0, 3320, 1750], [0, 0, 1]])
-    of_opencv = from_opencv(OpenCV(matrix, np.array(k)), PIXEL, SIZE)
+    of_opencv = convert_from_opencv(OpenCV(matrix, np.array(k)), PIXEL, SIZE)
     assert of_colmap.interior == pytest.approx(of_opencv.interior, rel=1e-12)
 
 
@@ -155,11 +160,11 @@ def test_metashape_as_documented(camera, affinity, more):
     p34 = np.array(more) / [corner2, corner2**2]
     offset = (cx - size[0] / 2, cy - size[1] / 2)
     given_ = metashape.Metashape(size, f, *offset, affinity * f, 0.0, tuple(k), (*p, *p34))
-    own = metashape.from_metashape(given_, 0.003)
-    rays = rays_of(own, frame_points(size))
+    own = metashape.convert_from_metashape(given_, 0.003)
+    rays = trace_rays(own, frame_points(size))
     u, v = metashape_image(rays, given_)
     assert off_px(u - 0.5, v - 0.5, size) < SAME_PX
-    back = metashape.to_metashape(own)
+    back = metashape.convert_to_metashape(own)
     assert back.error_px < SAME_PX
     u, v = metashape_image(rays, back)
     assert off_px(u - 0.5, v - 0.5, size) < SAME_PX
@@ -171,16 +176,18 @@ def test_metashape_skew_states_its_error(figure):
     given_ = metashape.Metashape(
         SIZE, 3300.0, -20, 15, 1.5, 4.0, (-0.1, 0.05, 0, 0), (1e-3, 0, 0, 0)
     )
-    own = metashape.from_metashape(given_, PIXEL)
+    own = metashape.convert_from_metashape(given_, PIXEL)
     finer = frame_points(SIZE, (93, 71))
-    u, v = metashape_image(rays_of(own, finer), given_)
+    u, v = metashape_image(trace_rays(own, finer), given_)
     off = np.hypot(u - 0.5 - finer[:, 0], v - 0.5 - finer[:, 1]).max()
     figure("Metashape's B2 of 4 px as A and B, over the frame", f"{own.error_px:.1e} px")
     assert 1e-3 < own.error_px < 0.2
     assert off == pytest.approx(own.error_px, rel=0.05)
-    straight = metashape.from_metashape(replace(given_, k=(0, 0, 0, 0), p=(0, 0, 0, 0)), PIXEL)
+    straight = metashape.convert_from_metashape(
+        replace(given_, k=(0, 0, 0, 0), p=(0, 0, 0, 0)), PIXEL
+    )
     assert straight.error_px < SAME_PX  # without distortion B2 is an affinity like any other
-    back = metashape.to_metashape(straight)
+    back = metashape.convert_to_metashape(straight)
     assert (back.b1, back.b2, back.error_px) == pytest.approx((1.5, 4.0, 0), abs=1e-7)
 
 
@@ -193,12 +200,12 @@ def test_pix4d_as_documented(camera):
     pixel = 0.0024
     sensor = (size[0] * pixel, size[1] * pixel)
     given_ = pix4d.Pix4D(sensor, f * pixel, cx * pixel, cy * pixel, tuple(k[:3]), tuple(p))
-    own = pix4d.from_pix4d(given_, size)
-    rays = rays_of(own, frame_points(size))
+    own = pix4d.convert_from_pix4d(given_, size)
+    rays = trace_rays(own, frame_points(size))
     along, down = brown(rays, k[:3], *p)
     u, v = cx + f * along, cy + f * down
     assert off_px(u - 0.5, v - 0.5, size) < SAME_PX
-    back = pix4d.to_pix4d(own)
+    back = pix4d.convert_to_pix4d(own)
     assert back.error_px < SAME_PX
     assert back.t == pytest.approx(given_.t, rel=1e-9, abs=1e-15)
     assert (back.px_mm, back.py_mm) == pytest.approx((given_.px_mm, given_.py_mm), rel=1e-12)
@@ -225,13 +232,13 @@ def test_published_pix4d_camera_agrees_with_pessoa(figure):
     for s1 in (1, -1):
         for s2 in (1, -1):
             t1, t2 = FRAME_1.t
-            other = pix4d.from_pix4d(replace(FRAME_1, t=(s1 * t1, s2 * t2)), SIZE)
-            apart = (rays_of(own, points) - rays_of(other, points)) * own.interior[0] / pixel
+            other = pix4d.convert_from_pix4d(replace(FRAME_1, t=(s1 * t1, s2 * t2)), SIZE)
+            apart = (trace_rays(own, points) - trace_rays(other, points)) * own.interior[0] / pixel
             rms[s1, s2] = np.sqrt(np.mean(np.sum(apart**2, axis=1)))
     figure("P frame 1 against P table 6 set 2, rms", f"{rms[1, 1]:.1f} px")
     assert rms[1, 1] < 10
     assert min(value for signs, value in rms.items() if signs != (1, 1)) > 2 * rms[1, 1]
-    found = pix4d.from_pix4d(FRAME_1, SIZE).interior
+    found = pix4d.convert_from_pix4d(FRAME_1, SIZE).interior
     assert found[1:3] == pytest.approx([0.0683, 0.0383], abs=5e-5)
     assert found[7:9] == pytest.approx(SET_2[7:9], rel=0.15)
 
@@ -252,18 +259,18 @@ def test_balanced_form_of_aicon():
     plain = np.array([24.1, 0.1, -0.05, -1e-4, 1.2e-7, -3e-11, 0, 4e-6, -3e-6, 0, 0, 1e-4, -5e-5])
     own = make_framed_camera(plain, Form(), 0.006, (6000, 4000))
     points = frame_points(own.size_px)
-    rays = rays_of(own, points)
+    rays = trace_rays(own, points)
     for radius in (0.0, 12.0, 14.5):
-        found = balanced.to_balanced(own, radius)
+        found = balanced.convert_to_balanced(own, radius)
         assert found.values["Ck"] < 0
         assert found.error_px < SAME_PX
         x, y = aicon_image(rays, found.values)
         assert off_px(x / 0.006 + 2999.5, -y / 0.006 + 1999.5, own.size_px) < SAME_PX
-        back = balanced.from_balanced(found, 0.006, own.size_px)
-        assert np.abs(image_of(back, rays) - points).max() < SAME_PX
-        again = balanced.to_balanced(back, 0.0)
+        back = balanced.convert_from_balanced(found, 0.006, own.size_px)
+        assert np.abs(project_rays(back, rays) - points).max() < SAME_PX
+        again = balanced.convert_to_balanced(back, 0.0)
         assert [again.values[key] for key in balanced.KEYS] == pytest.approx(
-            [balanced.to_balanced(own, 0.0).values[key] for key in balanced.KEYS], rel=1e-11
+            [balanced.convert_to_balanced(own, 0.0).values[key] for key in balanced.KEYS], rel=1e-11
         )
 
 
@@ -272,11 +279,11 @@ def test_balanced_form_leaves_out_k4_and_carries_sds():
     own = make_framed_camera(
         [24.1, 0, 0, -1e-4, 0, 0, 1e-12, 0, 0, 0, 0, 0, 0], Form(), 0.006, (6000, 4000)
     )
-    assert 0.01 < balanced.to_balanced(own, 12.0).error_px < 30
+    assert 0.01 < balanced.convert_to_balanced(own, 12.0).error_px < 30
     variance = np.zeros(13)
     variance[:4] = np.array([3e-3, 1e-3, 2e-3, 1e-7]) ** 2
     simple = make_framed_camera([*own.interior[:6], *np.zeros(7)], Form(), 0.006, (6000, 4000))
-    found = balanced.to_balanced(simple, 12.0, covariance=np.diag(variance))
+    found = balanced.convert_to_balanced(simple, 12.0, covariance=np.diag(variance))
     s = 1 - 1e-4 * 144  # c K1 of the plain form at R0, to the first order
     assert np.sqrt(found.covariance[1, 1]) == pytest.approx(1e-3)
     assert np.sqrt(found.covariance[0, 0]) == pytest.approx(3e-3 * s, rel=0.02)
@@ -286,6 +293,8 @@ def test_a_distortion_that_folds_is_reported():
     """Property: barrel distortion that turns back within the frame has no rays there."""
     matrix = np.array([[2000.0, 0, 2000], [0, 2000, 1500], [0, 0, 1]])
     with pytest.raises(SolutionError, match="folds the image at column"):
-        from_opencv(OpenCV(matrix, np.array([-0.4, 0, 0, 0, 0])), 0.005, (4001, 3001))
+        convert_from_opencv(OpenCV(matrix, np.array([-0.4, 0, 0, 0, 0])), 0.005, (4001, 3001))
     with pytest.raises(SolutionError, match="folds the image at column"):
-        from_opencv(OpenCV(matrix, np.array([-0.4, 0, 0, 0, 0, 0.1, 0, 0])), 0.005, (4001, 3001))
+        convert_from_opencv(
+            OpenCV(matrix, np.array([-0.4, 0, 0, 0, 0, 0.1, 0, 0])), 0.005, (4001, 3001)
+        )

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from jacobians import assert_derivative
 
-from tankcal.camera.formats.fitting import rows_of_fit
+from tankcal.camera.formats.fitting import linearise_fit
 from tankcal.camera.formats.frame import (
     frame_points,
-    image_of,
     make_framed_camera,
     pixels_to_mm,
-    rays_of,
+    project_rays,
+    trace_rays,
 )
 from tankcal.camera.formats.published import (
     PUBLISHED,
@@ -77,7 +77,7 @@ def test_every_form_into_every_other(to_form):
         q = np.array(GIVEN)
         if form.affinity != "both_x" and to_form.affinity != "both_x":
             q[12] = -2e-4
-        rays = rays_of(make_framed_camera(q, form, PIXEL, SIZE), PLACES)
+        rays = trace_rays(make_framed_camera(q, form, PIXEL, SIZE), PLACES)
         assert misclosure_px(PLACES, rays, q, form).max() < SAME_PX
         found = convert_camera(q, form, to_form, SIZE, PIXEL)
         off = misclosure_px(PLACES, rays, found.interior, to_form)
@@ -90,7 +90,7 @@ def test_every_form_into_every_other(to_form):
         if found.is_exact:
             assert off.max() < SAME_PX
             back = convert_camera(found.interior, to_form, form, SIZE, PIXEL)
-            seen = image_of(make_framed_camera(back.interior, form, PIXEL, SIZE), rays)
+            seen = project_rays(make_framed_camera(back.interior, form, PIXEL, SIZE), rays)
             assert np.abs(seen - PLACES).max() < SAME_PX
         else:
             assert 0.7 * found.error_px < off.max() < 1.3 * found.error_px + SAME_PX
@@ -107,9 +107,9 @@ def test_derivatives_of_the_fit(form):
     pixel = np.array([PIXEL, 1.1 * PIXEL])
 
     def off(scaled):
-        return rows_of_fit(scaled * size, rays, np.zeros((4, 2)), pixel, form)[0]
+        return linearise_fit(scaled * size, rays, np.zeros((4, 2)), pixel, form)[0]
 
-    jacobian = rows_of_fit(values, rays, np.zeros((4, 2)), pixel, form)[1]
+    jacobian = linearise_fit(values, rays, np.zeros((4, 2)), pixel, form)[1]
     assert_derivative(off, values / size, jacobian * size)
 
 
@@ -148,7 +148,7 @@ def test_the_published_calibrations_as_the_plain_form(shared, figure):
     """Published: P tables 6-9; what the inverse of a polynomial leaves, and what a turn takes."""
     for name, q in seven(shared).items():
         form = PUBLISHED["pessoa"]
-        rays = rays_of(make_framed_camera(q, form, PIXEL, SIZE), PLACES)
+        rays = trace_rays(make_framed_camera(q, form, PIXEL, SIZE), PLACES)
         for to_name, bound in (("plain", 2.0), ("silva", 0.8)):
             kept = convert_camera(q, form, PUBLISHED[to_name], SIZE, PIXEL)
             turned = convert_camera(q, form, PUBLISHED[to_name], SIZE, PIXEL, may_turn=True)

@@ -7,7 +7,7 @@ import pytest
 from networks import INTERIOR
 from surveyed import by_photographs, places
 
-from tankcal.camera.focus import Lens, depth_factor, radial_at, refer_to_focus
+from tankcal.camera.focus import Lens, depth_factor, refer_to_focus
 from tankcal.camera.model import CONVENTIONS, Form, correct_image_points, distort_image_points
 from tankcal.survey import adjust_survey
 
@@ -17,11 +17,16 @@ RADIAL = np.array([[1.1e-7, -2e-12, 3e-17], [1.6e-7, -3e-12, 1e-17]])
 LENS = Lens(F, 8000.0, np.array([NEAR, FAR]), RADIAL)
 
 
+def radial_at(distance_mm, distances_mm, radial):
+    """K1, K2, K3 at a distance, from two calibrations of a lens with the focal length F."""
+    return Lens(F, np.inf, np.array(distances_mm), np.array(radial)).radial_at(distance_mm)
+
+
 def test_the_calibrations_come_back():
     """Property (methods, S 48-51): S = S1 gives K(S1), S = S2 gives K(S2)."""
     np.testing.assert_allclose(LENS.radial_at([NEAR, FAR]), RADIAL, rtol=1e-14)
-    turned = radial_at(8000.0, [FAR, NEAR], RADIAL[::-1], F)
-    np.testing.assert_allclose(turned, LENS.focused, rtol=1e-14)
+    turned = radial_at(8000.0, [FAR, NEAR], RADIAL[::-1])
+    np.testing.assert_allclose(turned, LENS.radial_in_focus, rtol=1e-14)
 
 
 def test_the_formula_as_it_is_printed():
@@ -35,25 +40,25 @@ def test_the_formula_as_it_is_printed():
 
     near, far = unscaled(RADIAL[0], NEAR), unscaled(RADIAL[1], FAR)
     expected = (1 - F / s) ** (2 * i + 1) * (alpha * near + (1 - alpha) * far)
-    np.testing.assert_allclose(LENS.focused, expected, rtol=1e-13)
+    np.testing.assert_allclose(LENS.radial_in_focus, expected, rtol=1e-13)
 
 
 def test_the_second_distance_may_be_infinite():
     """Limit (S 52-55): the formula at S2 = infinity is that for a very large S2, and at s too."""
     at = [NEAR, np.inf]
     np.testing.assert_allclose(
-        radial_at(8000.0, at, RADIAL, F), radial_at(8000.0, [NEAR, 1e15], RADIAL, F), rtol=1e-11
+        radial_at(8000.0, at, RADIAL), radial_at(8000.0, [NEAR, 1e15], RADIAL), rtol=1e-11
     )
-    np.testing.assert_allclose(radial_at(np.inf, at, RADIAL, F), RADIAL[1], rtol=1e-14)
+    np.testing.assert_allclose(radial_at(np.inf, at, RADIAL), RADIAL[1], rtol=1e-14)
     alpha = (NEAR - F) / (8000.0 - F)  # S 52
     k = (1 - F / 8000.0) ** 3 * (alpha * RADIAL[0, 0] / (1 - F / NEAR) ** 3
                                 + (1 - alpha) * RADIAL[1, 0])  # fmt: skip
-    assert radial_at(8000.0, at, RADIAL, F)[0] == pytest.approx(k, rel=1e-13)
+    assert radial_at(8000.0, at, RADIAL)[0] == pytest.approx(k, rel=1e-13)
 
 
 def test_two_calibrations_at_one_distance_are_refused():
     with pytest.raises(ValueError, match="same distance"):
-        radial_at(5000.0, [NEAR, NEAR], RADIAL, F)
+        radial_at(5000.0, [NEAR, NEAR], RADIAL)
 
 
 def test_depth_factor():
@@ -77,8 +82,12 @@ def test_in_depth_by_similar_triangles():
     gamma = depth_factor(depth, LENS.focus_mm, F)
     powers = np.array([3, 5, 7])
     there = ((gamma * r)[:, None] ** powers) @ LENS.radial_at(depth) / gamma
-    np.testing.assert_allclose(r[:, None] ** powers @ LENS.in_depth(depth), there, rtol=1e-13)
-    np.testing.assert_allclose(LENS.in_depth(np.array([8000.0]))[0], LENS.focused, rtol=1e-14)
+    np.testing.assert_allclose(
+        r[:, None] ** powers @ LENS.radial_in_depth(depth), there, rtol=1e-13
+    )
+    np.testing.assert_allclose(
+        LENS.radial_in_depth(np.array([8000.0]))[0], LENS.radial_in_focus, rtol=1e-14
+    )
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
@@ -88,9 +97,9 @@ def test_images_as_in_focus(convention):
     form = Form(convention, "both_y")
     ideal, depth = rng.uniform(-70, 70, (40, 2)), rng.uniform(3000, 30000, 40)
     interior = np.zeros(13)
-    interior[[0, 1, 2, 3, 4, 5, 7, 8, 11]] = 101, 0.1, -0.2, *LENS.focused, 1e-6, 2e-6, 1e-4
+    interior[[0, 1, 2, 3, 4, 5, 7, 8, 11]] = 101, 0.1, -0.2, *LENS.radial_in_focus, 1e-6, 2e-6, 1e-4
     own = np.tile(interior, (40, 1))
-    own[:, 3:6] = LENS.in_depth(depth)
+    own[:, 3:6] = LENS.radial_in_depth(depth)
     images = distort_image_points(ideal, own, form)
     depth[7], images[7] = np.nan, distort_image_points(ideal[7:8], interior, form)[0]
     found = refer_to_focus(images, depth, interior, form, LENS)
@@ -107,7 +116,7 @@ FOCUS = Lens(F, 11000.0, np.array([6000.0, 25000.0]),
 def simulated(seed=0, noise=1.0, lens=FOCUS):
     """Measurements whose images have the distortion of their depths; and the Truth."""
     interior = INTERIOR.copy()
-    interior[3:6] = lens.focused
+    interior[3:6] = lens.radial_in_focus
     found, truth = by_photographs(seed, noise=noise, interior=interior)
     images = found.image_points
     photo = np.array([int(name[1:]) for name in images.photo])
@@ -115,7 +124,7 @@ def simulated(seed=0, noise=1.0, lens=FOCUS):
     away = truth.xyz_m[point] - truth.photo_xyz_m[photo]
     depth = -1000 * np.sum(truth.rotation[photo, 2] * away, axis=1)
     own = np.tile(interior, (len(depth), 1))
-    own[:, 3:6] = lens.in_depth(depth)
+    own[:, 3:6] = lens.radial_in_depth(depth)
     ideal = correct_image_points(images.xy_mm, interior, Form())
     setup = replace(found.cameras[0], lens=lens)
     return (
@@ -151,7 +160,7 @@ def test_the_outer_iteration_finds_the_truth_without_noise(figure):
     assert 2 <= found.depth.rounds <= 8
     assert sum("for their depth" in line for line in lines) == found.depth.rounds - 1
     values = found.adjusted.camera(0)[0]
-    assert values["K1"] == pytest.approx(FOCUS.focused[0], rel=1e-4)
+    assert values["K1"] == pytest.approx(FOCUS.radial_in_focus[0], rel=1e-4)
     figure("depth of field, rms of points, mm, left alone", f"{rms_mm(without, truth):.3f}")
     figure("depth of field, rms of points, mm, corrected", f"{rms_mm(found, truth):.1e}")
     figure("depth of field, rounds; largest correction, um",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tankcal
-from tankcal.calibration.interiors import framed_in
+from tankcal.calibration.interiors import read_framed_cameras
 from tankcal.camera.formats.published import convert_camera
 from tankcal.camera.model import Form
 from tankcal.cli import main
@@ -463,7 +463,7 @@ def test_convert_a_record_with_its_correlations(record, capsys):
     command = ["camera", "convert", str(record), "--to", "cameras.toml", "--pixel-um", "10"]
     assert main([*command, "--as", "plain"]) == 0
     found = tomllib.loads(capsys.readouterr().out)["cameras"]["UMK"]
-    ((_, camera),), (covariance,) = framed_in(load_record(record), 0.01)
+    ((_, camera),), (covariance,) = read_framed_cameras(load_record(record), 0.01)
     known = np.nan_to_num(covariance)
     frame = (camera.size_px, camera.pixel_mm)
     after = convert_camera(

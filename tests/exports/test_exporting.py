@@ -90,7 +90,7 @@ def test_the_bound_holds_at_any_dip(shape, tmp_path):
     for points, decimals in ((8, 1), (20, 3)):
         export = export_record(path, replace(OURS, volume_decimals=decimals), points=points)
         assert_bound_holds(export, volume, top, 20_000, points)
-        assert export.error_m3 > export.own_m3
+        assert export.error_m3 > export.interpolation_m3
 
 
 @pytest.mark.study
@@ -136,7 +136,7 @@ def test_zero_row_offsets_order_and_marks(lying_record):
     height = np.arange(49) / 20
     np.testing.assert_allclose(found[:, 0], height + 0.25, atol=1e-12)
     np.testing.assert_allclose(found[:, 1], lying(height) + 0.5, atol=0.0006)
-    assert export.error_m3 - export.own_m3 <= 0.000501
+    assert export.error_m3 - export.interpolation_m3 <= 0.000501
     without = export_record(lying_record, replace(find_profile("csv"), zero_row="forbidden"))
     assert read_rows(without.data, ",")[0][0] == 0.05
 

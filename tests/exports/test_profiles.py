@@ -5,7 +5,7 @@ from fractions import Fraction
 import pytest
 
 from tankcal.errors import InputError
-from tankcal.exports.marks import increments_of, to_quanta
+from tankcal.exports.marks import count_increments, to_quanta
 from tankcal.exports.profiles import find_profile, parse_profile, shipped_profiles
 from tankcal.job.tables import Log
 from tankcal.tank.dips import parse_dip
@@ -45,8 +45,8 @@ def test_limits_of_shipped_profiles():
 
 def test_increments():
     """Published: 5 ft 3 3/16 in at 1/16 in is 1011, 5.5 m at 1/100 m is 550."""
-    assert increments_of(parse_dip("5 ft 3 3/16 in", "ft-in-16"), "1/16 in") == 1011
-    assert increments_of(5.5, "1/100 m") == 550
+    assert count_increments(parse_dip("5 ft 3 3/16 in", "ft-in-16"), "1/16 in") == 1011
+    assert count_increments(5.5, "1/100 m") == 550
 
 
 @pytest.mark.parametrize("value", [0.1, 1e-9, 123456.7895, 0.0005, 7.0])

@@ -109,12 +109,12 @@ def test_the_sd_of_a_transformed_coordinate(film):
     images = job.measurements.image_points
     fit = {one.photo: one.transformation for one in job.measurements.fiducials}[images.photo[0]]
     read = np.linalg.solve(fit.matrix, images.xy_mm[0] - fit.shift_mm)
-    added = np.diag(fit.added_covariance(read[None])[0])
+    added = np.diag(fit.parameter_covariance(read[None])[0])
     used = found.adjusted.survey.image_points
     place = (found.adjusted.survey.photos.names.index(images.photo[0]),
              found.adjusted.survey.points.index(images.point[0]))  # fmt: skip
     row = np.flatnonzero((used.photo == place[0]) & (used.point == place[1]))[0]
-    own = fit.turned(np.full((1, 2), 0.005))[0]
+    own = fit.propagate_sds(np.full((1, 2), 0.005))[0]
     np.testing.assert_allclose(used.sd[row] ** 2, own**2 + added, rtol=1e-9)
 
 
@@ -257,8 +257,8 @@ def test_a_camera_with_two_focus_calibrations(tmp_path):
         99,
         [5e3, 25e3],
     )
-    assert found.cameras[0].camera.values[3] == lens.focused[0]
-    assert 1.1e-7 < lens.focused[0] < 1.4e-7
+    assert found.cameras[0].camera.values[3] == lens.radial_in_focus[0]
+    assert 1.1e-7 < lens.radial_in_focus[0] < 1.4e-7
     assert found.cameras[1].lens is None
     assert found.settings.depth_of_field
     same = load(write_book(tmp_path / "job.xlsx", parts)).measurements.cameras[0].lens

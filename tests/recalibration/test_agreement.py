@@ -7,13 +7,13 @@ import pytest
 from tables_of_s1 import RADII, new_s1, rings_m3
 
 from tankcal.recalibration.agreement import (
-    coverage_factor_of,
+    compare_deliveries,
+    coverage_factor,
     critical_correlation,
-    deliveries_between,
+    find_worst_by_error,
+    find_worst_by_share,
+    interpolate_uncertainty,
     normalized_error,
-    uncertainty_at,
-    worst_by_error,
-    worst_by_share,
 )
 
 K95 = 1.959963984540054
@@ -83,16 +83,16 @@ def test_other_coverage_factors():
     """U with k = 3 counts two thirds of itself beside k = 2; of a record by its probability."""
     dips = np.linspace(0.0, 8.0, 81)
     table = new_s1(dips, k=3.0, U_m3=np.full(81, 0.9), volume_quantum_m3=0.0)
-    assert uncertainty_at(table, dips, table.volume_m3, 2.0).rows() == pytest.approx(0.6)
+    assert interpolate_uncertainty(table, dips, table.volume_m3, 2.0).rows() == pytest.approx(0.6)
     record = {"job": {"table": {"coverage_probability": 0.95}}}
-    assert coverage_factor_of(SimpleNamespace(record=record)) == pytest.approx(K95)
+    assert coverage_factor(SimpleNamespace(record=record)) == pytest.approx(K95)
 
 
 def test_the_last_digit_counts():
     """Closed form: U of 0.1 and k q / sqrt(12)."""
     dips = np.linspace(0.0, 8.0, 81)
     table = new_s1(dips, U_m3=np.full(81, 0.1), volume_quantum_m3=0.1)
-    U = uncertainty_at(table, dips, table.volume_m3, 2.0)
+    U = interpolate_uncertainty(table, dips, table.volume_m3, 2.0)
     assert U.rows() == pytest.approx(np.hypot(0.1, 2 * 0.1 / np.sqrt(12)))
 
 
@@ -101,20 +101,20 @@ def test_U_of_a_delivery_by_what_is_known():
     low, high = np.array([10]), np.array([50])
     volumes = rings_m3(dips, RADII)
     delivered = volumes[50] - volumes[10]
-    in_percent = uncertainty_at(new_s1(dips, U_m3=0.002 * volumes), dips, volumes, 2.0)
+    in_percent = interpolate_uncertainty(new_s1(dips, U_m3=0.002 * volumes), dips, volumes, 2.0)
     assert in_percent.deliveries_by == "proportional"
     assert in_percent.deliveries(low, high) == pytest.approx(0.002 * delivered)
-    same = uncertainty_at(new_s1(dips, U_m3=np.full(81, 0.3)), dips, volumes, 2.0)
+    same = interpolate_uncertainty(new_s1(dips, U_m3=np.full(81, 0.3)), dips, volumes, 2.0)
     assert same.deliveries_by == "independent_rows"
     assert same.deliveries(low, high) == pytest.approx(0.3 * np.sqrt(2))
     factor = np.column_stack([0.1 * np.ones(81), 1e-3 * volumes])
     u = np.linalg.norm(factor, axis=1)
-    known = uncertainty_at(
+    known = interpolate_uncertainty(
         new_s1(dips, U_m3=2 * u, factor_m3=factor), dips, volumes, 2.0
     )  # fmt: skip
     assert known.deliveries_by == "record"
     assert known.deliveries(low, high) == pytest.approx(2e-3 * delivered)  # the zero cancels
-    nothing = uncertainty_at(new_s1(dips, U_m3=None), dips, volumes, 2.0)
+    nothing = interpolate_uncertainty(new_s1(dips, U_m3=None), dips, volumes, 2.0)
     assert np.isnan(nothing.deliveries(low, high)).all()
 
 
@@ -128,13 +128,17 @@ def uneven(seed, rows=70):
     volumes = 120 * dips + 3 * np.sin(dips)
     new = volumes + 0.02 * np.cumsum(rng.normal(size=rows))
     use = (dips < 1.1) | (dips > 1.5)
-    basis = SimpleNamespace(height_m=dips, on_basis_m3=volumes, new_m3=new, for_use=use)
+    basis = SimpleNamespace(height_m=dips, on_basis_m3=volumes, new_m3=new, usable=use)
     table = new_s1(dips, U_m3=np.full(rows, 0.2))
-    return basis, uncertainty_at(table, dips, volumes, 2.0), uncertainty_at(table, dips, new, 2.0)
+    return (
+        basis,
+        interpolate_uncertainty(table, dips, volumes, 2.0),
+        interpolate_uncertainty(table, dips, new, 2.0),
+    )
 
 
 def all_pairs(basis, minimum):
-    use = np.flatnonzero(basis.for_use)
+    use = np.flatnonzero(basis.usable)
     return [
         (i, j) for i in use for j in use if basis.height_m[j] - basis.height_m[i] >= minimum - 1e-9
     ]
@@ -152,19 +156,19 @@ def test_the_worst_delivery_is_that_of_all_pairs(seed, minimum):
         return abs(d[j] - d[i]) / (basis.on_basis_m3[j] - basis.on_basis_m3[i])
 
     expected = max(all_pairs(basis, minimum), key=share)
-    assert share(worst_by_share(basis, minimum)) == pytest.approx(share(expected), rel=1e-12)
+    assert share(find_worst_by_share(basis, minimum)) == pytest.approx(share(expected), rel=1e-12)
 
 
 def test_the_worst_error_is_no_smaller_than_that_of_the_pairs_asked_for():
     basis, one, two = uneven(1)
-    pair = worst_by_share(basis, 1.5)
-    asked = deliveries_between(basis, one, two, 0.3, *pair)
-    found = worst_by_error(basis, one, two, 0.3, 1.5, also=(pair,))
+    pair = find_worst_by_share(basis, 1.5)
+    asked = compare_deliveries(basis, one, two, 0.3, *pair)
+    found = find_worst_by_error(basis, one, two, 0.3, 1.5, also=(pair,))
     assert abs(found.E_n[0]) >= abs(asked.E_n[0])
     assert basis.height_m[found.high[0]] - basis.height_m[found.low[0]] >= 1.5 - 1e-9
 
 
 def test_a_tank_lower_than_the_delivery():
     basis, one, two = uneven(2)
-    assert worst_by_share(basis, 99.0) is None
-    assert worst_by_error(basis, one, two, 0.0, 99.0) is None
+    assert find_worst_by_share(basis, 99.0) is None
+    assert find_worst_by_error(basis, one, two, 0.0, 99.0) is None

@@ -59,8 +59,8 @@ def test_a_roof_in_a_lighter_liquid(weighing):
         assert at(basis, 8.39, 3)[4] == -7.345
     assert at(basis, 8.39, 6)[4] == pytest.approx(-expected, abs=1e-6)
     assert at(basis, 1.0)[4] == 0.0
-    assert not basis.for_use[np.argmin(np.abs(basis.height_m - 1.6))]
-    assert basis.for_use[[0, -1]].all()
+    assert not basis.usable[np.argmin(np.abs(basis.height_m - 1.6))]
+    assert basis.usable[[0, -1]].all()
 
 
 # ---- invariance

@@ -168,7 +168,7 @@ def test_derivatives_of_bulging_courses():
     )  # fmt: skip
     dips = np.linspace(0.105, 3.497, 41)
     assert_derivative(
-        lambda x: state.with_unknowns(x).volume_m3(dips), state.unknowns, state.design(dips)
+        lambda x: state.replace_unknowns(x).volume_m3(dips), state.unknowns, state.design(dips)
     )
 
 

@@ -7,12 +7,12 @@ import tankcal
 from tankcal.errors import InputError
 from tankcal.recalibration.former import FormerTable
 from tankcal.recalibration.solid_geometry import (
-    declared_sizes,
-    declared_uncertainties,
     fit_lying,
     fit_sphere,
+    size_sections,
+    uncertainty_rows,
 )
-from tankcal.recalibration.table_job import job_of_solid
+from tankcal.recalibration.table_job import make_solid_job
 from tankcal.report.table_job import write_job
 
 SLICES = 4000
@@ -101,7 +101,7 @@ def test_sizes_and_ends_of_simulated_tables(ends):
     volumes = lying(dips + 0.012, 2.6, 9.5, *ENDS[ends])
     found = fit_lying(table(dips, volumes))
     assert found.best.ends == ends
-    assert set(found.not_told_apart) <= {"ellipsoidal"}  # of any depth: it has them in it
+    assert set(found.equally_good_ends) <= {"ellipsoidal"}  # of any depth: it has them in it
     for name, truth in (("diameter", 2.6), ("length", 9.5), ("zero", 0.012)):
         assert within(found.best, name, truth)
 
@@ -114,7 +114,7 @@ def test_a_tilt_is_found_where_nothing_else_explains_the_rows():
     assert found.best is found.tilted
     for name, truth in (("diameter", 2.4), ("length", 9.0), ("zero", 0.004), ("tilt", 0.010)):
         assert within(found.best, name, truth)
-    other = found.best.mirrored  # the same volumes from a tilt the other way
+    other = found.best.mirror_image  # the same volumes from a tilt the other way
     assert other == pytest.approx((-0.010, 0.004 - 2 * 0.010 * 3.0), abs=1e-3)
     again = lying(dips[::10] + other[1], 2.4, 9.0, tilt=other[0], place=1.5)
     assert again == pytest.approx(volumes[::10], abs=2e-3)
@@ -170,7 +170,7 @@ def test_the_job_gives_the_table_back(kind, tmp_path):
             dips, lying(dips + zero, 2.6, 8.0, *ENDS["torispherical_din_28011"]), **known
         )
         fit = fit_lying(former).best
-    write_job(job_of_solid(former, fit, tank_id="T-1"), tmp_path / "job")
+    write_job(make_solid_job(former, fit, tank_id="T-1"), tmp_path / "job")
     result = tankcal.run(tankcal.load(tmp_path / "job"))
     new = result.table.volume_m3[: len(dips)]
     assert result.table.height_m[: len(dips)] == pytest.approx(dips, abs=1e-9)
@@ -193,13 +193,13 @@ def test_the_job_gives_the_table_back(kind, tmp_path):
 def test_a_zero_below_the_bottom_is_told():
     dips = np.arange(0, 98) / 10
     fit = fit_sphere(table(dips, sphere_volumes(np.maximum(dips - 0.015, 0), 5.0)))
-    assert fit.below_bottom_m == pytest.approx(0.015, abs=1e-4)
-    assert declared_sizes(fit)["datum"]["dip_plate_z_m"] == 0
+    assert fit.zero_depth_m == pytest.approx(0.015, abs=1e-4)
+    assert size_sections(fit)["datum"]["dip_plate_z_m"] == 0
 
 
 def test_U_of_the_former_table_becomes_one_of_the_diameter():
     dips = np.arange(1, 98) / 10
     volumes = sphere_volumes(dips, 5.0)
     former = table(dips, volumes, U_m3=0.003 * volumes, k=2.0)
-    rows = {row["input"]: row["u"] for row in declared_uncertainties(fit_sphere(former), former)}
+    rows = {row["input"]: row["u"] for row in uncertainty_rows(fit_sphere(former), former)}
     assert rows["diameter"] == pytest.approx(1e4 * 0.0015 / 3, rel=0.01)  # mm, V as D cubed

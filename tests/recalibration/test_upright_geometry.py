@@ -12,15 +12,14 @@ from former_tables import SimulatedTank, draw_tank, table_of
 from jacobians import assert_derivative
 from numpy.testing import assert_allclose
 
-from tankcal.recalibration.fittings import Fitting, find_fittings, in_other_pairs
+from tankcal.recalibration.fittings import Fitting, find_fittings, pair_kinks_again
 from tankcal.recalibration.former import FormerRoof, FormerTable
-from tankcal.recalibration.rounding import sd_of_rows
-from tankcal.recalibration.seams import find_seams
+from tankcal.recalibration.rounding import row_sds
+from tankcal.recalibration.seams import find_seams, find_zeros
 from tankcal.recalibration.table_fit import Rows, State
 from tankcal.recalibration.upright_geometry import read_upright
-from tankcal.recalibration.upright_search import without_phantoms
+from tankcal.recalibration.upright_search import drop_phantom_fittings
 from tankcal.recalibration.upright_shell import Rings
-from tankcal.recalibration.zero import find_zeros
 
 HEIGHTS = np.array([1.8, 1.8, 1.8, 1.5, 1.5])
 PLATES = np.array([9.0, 8, 7, 6, 6]) / 1000
@@ -142,21 +141,21 @@ def test_seams_elsewhere_than_declared_are_found():
     tank = steps(density_kg_m3=800.0)
     wrong = tank.heights_m + np.array([0.0, 0.03, -0.03])
     found = read_upright(table_of(tank), wrong, tank.thickness_m)
-    assert found.seams_are == "found"
+    assert found.seams_source == "found"
     assert_allclose([one.value for one in found.seams_m], [1.9, 3.9], atol=5e-3)
 
 
 def test_undeclared_seams():
     tank = steps(density_kg_m3=800.0)
     former = table_of(tank)
-    seams = find_seams(former.height_m, former.volume_m3, sd_of_rows(former), 2)
+    seams = find_seams(former.height_m, former.volume_m3, row_sds(former), 2)
     assert_allclose(seams, [1.9, 3.9], atol=0.011)
 
 
 def test_zero_by_its_seams():
     tank = steps(density_kg_m3=800.0, zero_m=0.05, deadwood=((1.7, 2.2, -0.3),))
     former = table_of(tank)
-    zeros = find_zeros(former.height_m, former.volume_m3, sd_of_rows(former), np.array([1.9, 3.9]))
+    zeros = find_zeros(former.height_m, former.volume_m3, row_sds(former), np.array([1.9, 3.9]))
     assert min(abs(zero - 0.05) for zero in zeros) < 0.011
 
 
@@ -180,14 +179,14 @@ def test_derivatives_of_a_state():
     )  # fmt: skip
     dips = np.linspace(0.105, 3.497, 41)
     assert_derivative(
-        lambda x: state.with_unknowns(x).volume_m3(dips), state.unknowns, state.design(dips)
+        lambda x: state.replace_unknowns(x).volume_m3(dips), state.unknowns, state.design(dips)
     )
 
 
 def test_kinks_in_other_pairs():
     """Two things whose kinks were crossed are two things again."""
     crossed = (Fitting(1.0, 2.2, -1.2), Fitting(1.5, 2.0, 0.5))
-    again = in_other_pairs(crossed, 0.016, 0.03)
+    again = pair_kinks_again(crossed, 0.016, 0.03)
     assert_allclose([(f.bottom_m, f.top_m) for f in again], [(1.0, 1.5), (2.0, 2.2)])
     assert_allclose([f.volume_m3 for f in again], [-0.5, -0.2])
 
@@ -195,11 +194,11 @@ def test_kinks_in_other_pairs():
 def test_a_thing_whose_u_is_beyond_it_is_none():
     """Simulated without things: one that was put beside free seams has a u of any size."""
     former = table_of(SimulatedTank(6.5 - PLATES, HEIGHTS, PLATES, density_kg_m3=850.0))
-    rows = Rows(former.height_m, former.volume_m3, sd_of_rows(former))
+    rows = Rows(former.height_m, former.volume_m3, row_sds(former))
     state = read_upright(former, HEIGHTS, PLATES).state
     phantom = Fitting(1.85, 2.9, -0.0002)
     found = rows.adjust(replace(state, fittings=(phantom,), free=state.free | {"seams"} - {"zero"}))
-    left = without_phantoms(rows, found, 0.001)
+    left = drop_phantom_fittings(rows, found, 0.001)
     assert (len(found.state.fittings), left.state.fittings) == (1, ())
     assert abs(found.state.fittings[0].volume_m3) < found.sd("fittings")[2]
 

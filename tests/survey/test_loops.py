@@ -46,7 +46,7 @@ def test_image_points_side_by_side_are_those_of_arrays(form, in_ideal):
         rng.uniform(100, 300, (RAYS, 2)), active,
     )  # fmt: skip
     found = []
-    for run in (imaging._loop, imaging._arrays):
+    for run in (imaging._compute_rows_in_loops, imaging._compute_rows_in_arrays):
         w, jac = np.zeros((RAYS, 2)), np.zeros((RAYS, 2, 9 + len(active)))
         run(*given, w, jac, in_ideal)
         alone = np.zeros_like(w)

@@ -6,15 +6,15 @@ import numpy as np
 
 from tankcal.adjust import gauss_newton
 from tankcal.calibration.product.check import ALPHA, ProductCheck, check_product
-from tankcal.calibration.product.differences import differences_of
+from tankcal.calibration.product.differences import collect_differences
 from tankcal.camera.model import PARAMETERS, UNITS, Form
 from tankcal.geometry.rotations import apply_small_rotation, rotation_vector
 from tankcal.survey.network.assembly import assemble
 from tankcal.survey.network.datum import null_space
 from tankcal.survey.network.results import GlobalTest
 
-ROUNDS = 20  # largest number of iterations of the alignment
-SETTLED = 1e-13  # largest last step of the alignment, relative to the size of the block
+MAX_ITERATIONS = 20  # largest number of iterations of the alignment
+CONVERGENCE = 1e-13  # largest last step of the alignment, relative to the size of the block
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ class Block:
     check : ProductCheck or None
         Check points, or None if there are no check points.
     centre_m : ndarray, shape (3,)
-        Centre of the rotations in `ways`, m.
-    ways : ndarray, shape (7, d)
+        Centre of the rotations in `free_motions`, m.
+    free_motions : ndarray, shape (7, d)
         Motions that the observations do not determine, as combinations of translation, rotation and
         scale.
     """
@@ -95,20 +95,34 @@ class Block:
     images: ImageResiduals | None
     check: ProductCheck | None
     centre_m: np.ndarray
-    ways: np.ndarray
+    free_motions: np.ndarray
 
 
-def block_of(adjustment, setup, alpha=ALPHA):
-    """Create the Block of a survey.Adjustment, for the job.CameraSetup of its camera."""
+def make_block(adjustment, setup, alpha=ALPHA):
+    """Create the Block of an adjustment.
+
+    Parameters
+    ----------
+    adjustment : survey.Adjustment
+        The adjusted survey.
+    setup : job.CameraSetup
+        Camera whose calibration is compared.
+    alpha : float, optional
+        Significance level of the tests at check points.
+
+    Returns
+    -------
+    Block
+    """
     adjusted = adjustment.adjusted
     photos = adjusted.survey.photos
     place, _, _ = adjusted.photos
     check_points = adjustment.check_points
-    differences = None if check_points is None else differences_of(adjustment)
-    ways, centre = _undetermined_motions(adjustment)
+    differences = None if check_points is None else collect_differences(adjustment)
+    free_motions, centre = _find_free_motions(adjustment)
     return Block(
         points=adjustment.names,
-        xyz_m=np.where(adjustment.fixed & (not ways.size), np.nan, adjustment.xyz_m),
+        xyz_m=np.where(adjustment.fixed & (not free_motions.size), np.nan, adjustment.xyz_m),
         photos=tuple(photos.names),
         place_m=place,
         rotation=adjusted.solution.unknowns.rotation,
@@ -121,11 +135,11 @@ def block_of(adjustment, setup, alpha=ALPHA):
         if differences is None
         else check_product(differences.difference_m, names=differences.names, alpha=alpha),
         centre_m=centre,
-        ways=ways,
+        free_motions=free_motions,
     )
 
 
-def _undetermined_motions(adjustment):
+def _find_free_motions(adjustment):
     """Motions (7, d) that the block can make without its datum, and their centre (3,), m.
 
     There is no such motion (d = 0) if control points define the frame, fixed or not.
@@ -163,6 +177,7 @@ def _interior_values(adjustment, setup):
 
 
 def _image_residuals(adjustment, setup):
+    """ImageResiduals of the photos of a camera, or None without image points in use."""
     names = adjustment.adjusted.survey.photos.names
     own_photos = {names[i] for i in _photos_of_camera(adjustment, setup)}
     readings = adjustment.readings
@@ -192,7 +207,7 @@ def _image_residuals(adjustment, setup):
 
 
 @dataclass(frozen=True)
-class Moved:
+class PositionChanges:
     """Differences of n positions, m; nan without positions.
 
     Attributes
@@ -216,7 +231,7 @@ class Moved:
 
 
 @dataclass(frozen=True)
-class PhotosMoved(Moved):
+class PhotoChanges(PositionChanges):
     """Differences of the positions and orientations of photos.
 
     Attributes
@@ -235,46 +250,46 @@ class PhotosMoved(Moved):
     largest_turn_name: str | None
 
 
-def differences(one, other):
-    """Differences between two blocks, other minus one.
+def compare_blocks(first, second):
+    """Differences between two blocks, second minus first.
 
-    Motions that the observations do not determine (`one.ways`) are first removed by a least-squares
-    fit to the common points.
+    Motions that the observations do not determine (`first.free_motions`) are first removed by a
+    least-squares fit to the common points.
 
     Parameters
     ----------
-    one, other : Block
+    first, second : Block
         Blocks to compare.
 
     Returns
     -------
-    points : Moved
+    points : PositionChanges
         Differences of the points.
-    photos : PhotosMoved
+    photos : PhotoChanges
         Differences of the photos.
     aligned : int
         Number of motions removed.
     """
-    points = [name for name in one.points if name in set(other.points)]
-    photos = [name for name in one.photos if name in set(other.photos)]
-    a, b = (_select_rows(block.points, points, block.xyz_m) for block in (one, other))
-    p, q = (_select_rows(block.photos, photos, block.place_m) for block in (one, other))
-    r, s = (_select_rows(block.photos, photos, block.rotation) for block in (one, other))
-    if one.ways.shape[1]:
-        b, q, s = _align(one, a, b, q, s)
+    points = [name for name in first.points if name in set(second.points)]
+    photos = [name for name in first.photos if name in set(second.photos)]
+    a, b = (_select_rows(block.points, points, block.xyz_m) for block in (first, second))
+    p, q = (_select_rows(block.photos, photos, block.place_m) for block in (first, second))
+    r, s = (_select_rows(block.photos, photos, block.rotation) for block in (first, second))
+    if first.free_motions.shape[1]:
+        b, q, s = _align(first, a, b, q, s)
     turn = rotation_vector(s @ r.transpose(0, 2, 1)) if photos else np.zeros((0, 3))
     angle = np.linalg.norm(turn, axis=1)
     of_photos = _summarise(q - p, photos)
     return (
         _summarise(b - a, points),
-        PhotosMoved(
+        PhotoChanges(
             **vars(of_photos),
             rms_rad=_rms(turn),
             rms_turn_rad=float(_rms(angle)),
             largest_turn_rad=float(angle.max()) if photos else np.nan,
             largest_turn_name=photos[int(angle.argmax())] if photos else None,
         ),
-        one.ways.shape[1],
+        first.free_motions.shape[1],
     )
 
 
@@ -291,17 +306,17 @@ def _rms(values):
 
 
 def _summarise(difference_m, names):
-    """Summarise differences (n, 3) as Moved; nan for fixed coordinates."""
+    """Summarise differences (n, 3) as PositionChanges; nan for fixed coordinates."""
     is_known = np.isfinite(difference_m)
     known = np.flatnonzero(is_known.any(axis=1))
     nan = np.full(3, np.nan)
     if not len(known):
-        return Moved(0, nan, nan, np.nan, np.nan, None)
+        return PositionChanges(0, nan, nan, np.nan, np.nan, None)
     magnitude = np.where(is_known, np.abs(difference_m), 0.0)
     size = np.linalg.norm(magnitude[known], axis=1)
     largest = np.where(is_known.any(axis=0), magnitude.max(axis=0), np.nan)
     worst = names[known[int(size.argmax())]]
-    return Moved(
+    return PositionChanges(
         len(known), _rms(difference_m), largest, float(_rms(size)), float(size.max()), worst
     )
 
@@ -309,8 +324,8 @@ def _summarise(difference_m, names):
 def _align(reference, target, xyz, place, rotation):
     """Align points, projection centres and rotations of a block with the target.
 
-    Only the motions `reference.ways` are allowed. The Gauss-Newton step is dX = t + r x X + s X
-    about the centre, where (t, r, s) is a combination of these motions.
+    Only the motions `reference.free_motions` are allowed. The Gauss-Newton step is
+    dX = t + r x X + s X about the centre, where (t, r, s) is a combination of these motions.
     """
     centre, is_known = reference.centre_m, np.isfinite(target) & np.isfinite(xyz)
     if not is_known.any():
@@ -319,12 +334,13 @@ def _align(reference, target, xyz, place, rotation):
     # Rotations and scale are multiplied by the size of the block, so that all steps are lengths.
     size = max(float(np.nanmax(np.abs(target - centre))), 1e-9)
     scale = np.array([1, 1, 1, *(1 / size,) * 4])
-    ways = reference.ways / np.linalg.norm(reference.ways / scale[:, None], axis=0)
+    motions = reference.free_motions
+    motions = motions / np.linalg.norm(motions / scale[:, None], axis=0)
 
     def step_at(block, _):
-        design = _motion_derivatives(block[0]) @ ways
+        design = _motion_derivatives(block[0]) @ motions
         misclosure = (target - centre - block[0])[is_known]
-        return ways @ np.linalg.lstsq(design[is_known], misclosure, rcond=None)[0]
+        return motions @ np.linalg.lstsq(design[is_known], misclosure, rcond=None)[0]
 
     def move(block, step):
         xyz, place, rotation = block
@@ -336,8 +352,8 @@ def _align(reference, target, xyz, place, rotation):
         step_at,
         (xyz, place, rotation),
         move=move,
-        is_small=lambda step: np.abs(step / scale).max() < SETTLED * size,
-        most_steps=ROUNDS,
+        is_small=lambda step: np.abs(step / scale).max() < CONVERGENCE * size,
+        most_steps=MAX_ITERATIONS,
     )
     return xyz + centre, place + centre, rotation
 

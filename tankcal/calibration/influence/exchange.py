@@ -51,7 +51,7 @@ def select_camera(job, camera=None):
     raise InputError(Problem(FILE, expected))
 
 
-def refuse_others(setup, calibrations, file=FILE):
+def refuse_unsuitable(setup, calibrations, file=FILE):
     """Raise InputError, with all problems, for calibrations that cannot replace a camera.
 
     Parameters
@@ -106,7 +106,7 @@ def refuse_others(setup, calibrations, file=FILE):
         raise InputError(problems)
 
 
-def counted_in(setup, calibrations):
+def add_pixel_size(setup, calibrations):
     """Return the setup with a pixel size for the residuals.
 
     A setup without a pixel size takes the common pixel size of the calibrations, if there is one.
@@ -131,7 +131,7 @@ def _format_pair(values):
     return " x ".join(f"{value:.6g}" for value in values)
 
 
-def free_parameters(setup, calibrations):
+def select_free_parameters(setup, calibrations):
     """Names of the parameters adjusted in all runs "free".
 
     These are the parameters in the model of the job and those with a value in a calibration.

@@ -15,17 +15,23 @@ from itertools import combinations
 import numpy as np
 
 from tankcal.calibration.capacity_at_top import TopOfTank, TopVolume
-from tankcal.calibration.influence.blocks import Block, Moved, PhotosMoved, block_of, differences
+from tankcal.calibration.influence.blocks import (
+    Block,
+    PhotoChanges,
+    PositionChanges,
+    compare_blocks,
+    make_block,
+)
 from tankcal.calibration.influence.exchange import (
     FILE,
     STATES,
+    add_pixel_size,
     can_be_weighted,
-    counted_in,
     exchange_calibration,
-    free_parameters,
     leave_out_readings,
-    refuse_others,
+    refuse_unsuitable,
     select_camera,
+    select_free_parameters,
 )
 from tankcal.calibration.product.check import ALPHA
 from tankcal.errors import TankcalError
@@ -34,7 +40,7 @@ from tankcal.pipeline.chain import adjust_job
 
 REFERENCE = "reference"
 REASON_LINES = 3  # number of lines kept of the reason why there is no volume
-BAD_END = (TankcalError, np.linalg.LinAlgError)
+EXPECTED_ERRORS = (TankcalError, np.linalg.LinAlgError)
 
 
 @dataclass(frozen=True)
@@ -83,7 +89,7 @@ class Pair:
     ----------
     one, other : int
         Indices of the runs.
-    points, photos : Moved, PhotosMoved
+    points, photos : PositionChanges, PhotoChanges
         Differences of points and photos.
     aligned : int
         Number of motions that the observations do not determine, removed from the differences.
@@ -93,8 +99,8 @@ class Pair:
 
     one: int
     other: int
-    points: Moved
-    photos: PhotosMoved
+    points: PositionChanges
+    photos: PhotoChanges
     aligned: int
     volume_m3: float | None
     volume_percent: float | None
@@ -184,14 +190,14 @@ def influence(
         raise ValueError(f"found states {states!r}; expected some of {', '.join(STATES)}")
     calibrations = tuple(calibrations)
     setup = select_camera(job, camera)
-    refuse_others(setup, calibrations, file)
-    calibrations = tuple(counted_in(item, calibrations) for item in calibrations)
-    free = free_parameters(setup, calibrations)
+    refuse_unsuitable(setup, calibrations, file)
+    calibrations = tuple(add_pixel_size(item, calibrations) for item in calibrations)
+    free = select_free_parameters(setup, calibrations)
     progress = progress or (lambda text, done, total: None)
     total = 1 + len(calibrations) * len(states)
     progress(message("camera_reference_run", "reference"), 0, total)
-    top = TopOfTank(job) if volume and _is_whole(job) else None
-    reference, removed = _run_reference(job, counted_in(setup, calibrations), alpha, top)
+    top = TopOfTank(job) if volume and _has_tank(job) else None
+    reference, removed = _run_reference(job, add_pixel_size(setup, calibrations), alpha, top)
     common = leave_out_readings(job.measurements, removed)
     runs = [reference]
     for item in calibrations:
@@ -203,6 +209,7 @@ def influence(
             )
             runs.append(_run_calibration(job, common, setup, item, state, free, alpha, top))
     progress(message("camera_runs_done", "done"), total, total)
+    adjusted = [number for number, run in enumerate(runs) if run.block is not None]
     return Influence(
         camera=setup.camera.name,
         states=states,
@@ -211,7 +218,7 @@ def influence(
         removed=removed,
         free=free,
         runs=tuple(runs),
-        pairs=_make_pairs(runs),
+        pairs=tuple(_make_pair(i, j, runs[i], runs[j]) for i, j in combinations(adjusted, 2)),
     )
 
 
@@ -247,39 +254,34 @@ def _adjust_and_record(job, setup, alpha, initial, top):
     """
     try:
         adjustment = adjust_job(job)
-    except BAD_END as error:
+    except EXPECTED_ERRORS as error:
         return replace(initial, message=str(error)), None
     volume = failed = None
     if top is not None:
         try:
-            volume = top.of(adjustment)
-        except BAD_END as error:
+            volume = top.compute_volume(adjustment)
+        except EXPECTED_ERRORS as error:
             failed = "; ".join(str(error).splitlines()[:REASON_LINES])
     result = replace(
         initial,
         outcome="adjusted",
-        block=block_of(adjustment, setup, alpha),
+        block=make_block(adjustment, setup, alpha),
         volume=volume,
         volume_failed=failed,
     )
     return result, adjustment
 
 
-def _is_whole(job):
+def _has_tank(job):
     """Whether a job contains a complete tank, not only its survey."""
     parts = (job.tank, job.survey, job.datum, job.table)
     shell = job.courses or job.horizontal or job.sphere or job.mesh
     return None not in parts and bool(shell)
 
 
-def _make_pairs(runs):
-    """Create a Pair for any two adjusted runs."""
-    numbers = [i for i, run in enumerate(runs) if run.block is not None]
-    return tuple(_make_pair(i, j, runs[i], runs[j]) for i, j in combinations(numbers, 2))
-
-
 def _make_pair(i, j, first, second):
-    points, photos, aligned = differences(first.block, second.block)
+    """Create the Pair of two adjusted runs with the numbers i and j."""
+    points, photos, aligned = compare_blocks(first.block, second.block)
     volume = percent = None
     if first.volume is not None and second.volume is not None:
         volume = second.volume.value_m3 - first.volume.value_m3

@@ -9,20 +9,21 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.calibration.interiors import (
-    interiors_in,
-    interiors_of,
-    photos_in,
+    collect_interiors,
+    read_interiors,
+    read_photos,
     refuse_unknown,
     select_interiors,
 )
-from tankcal.calibration.parameters.dropping import Dropping, interior_after
-from tankcal.calibration.parameters.findings import Choices, Statistics
+from tankcal.calibration.parameters.dropping import Dropping, read_interior_after
 from tankcal.calibration.parameters.judgement import (
+    Choices,
+    Statistics,
     add_joint_trial,
-    adjusted_rows,
     advise,
     advise_together,
-    hold_one_back,
+    find_adjusted_rows,
+    hold_back_worst,
     judge_parameters,
     remove_joint_trial,
 )
@@ -53,9 +54,9 @@ def analyse_record(record, choices=None, *, camera=None, photo=None):
         If the record contains no adjustment with cameras, no adjusted parameter, or no such camera
         or photo.
     """
-    interiors = interiors_in(record)
+    interiors = read_interiors(record)
     if camera is not None or photo is not None:
-        interiors = select_interiors(interiors, photos_in(record), camera, photo)
+        interiors = select_interiors(interiors, read_photos(record), camera, photo)
     return _judge_all(interiors, _read_statistics(record), choices or Choices(), "record.json")
 
 
@@ -136,14 +137,15 @@ def analyse_job(
         adjustment = adjust_job(job)
     groups = [(g.kind, g.name, g.count, g.redundancy, g.rms) for g in adjustment.groups]
     statistics = Statistics(adjustment.sigma0, adjustment.redundancy, adjustment.cov_scale, groups)
-    interiors = interiors_of(adjustment, job.measurements)
+    interiors = collect_interiors(adjustment, job.measurements)
     interiors = select_interiors(interiors, photos, camera, photo)
     analyses = _judge_all(interiors, statistics, choices or Choices(), "cameras.toml", source="job")
     return _run_trials(analyses, job, adjustment, progress) if dropping else analyses
 
 
 def _judge_all(interiors, statistics, choices, file, source="record"):
-    judged = [interior for interior in interiors if len(adjusted_rows(interior))]
+    """Analyse all sets with adjusted parameters; raise InputError if there are none."""
+    judged = [interior for interior in interiors if len(find_adjusted_rows(interior))]
     if not judged:
         text = message(
             "camera_nothing_adjusted",
@@ -162,7 +164,8 @@ def _run_trials(analyses, job, adjustment, progress):
     progress(message("camera_volume_all", "computing the volume with all parameters"), 0, total)
     dropping = Dropping(job, adjustment)
 
-    def with_outcomes_of(stage):
+    def run_stage(stage):
+        """Change the trials by `stage`, run the new trials, and update the recommendations."""
         staged = tuple(stage(analysis) for analysis in analyses)
         for analysis in staged:
             for trial in analysis.trials:
@@ -183,14 +186,14 @@ def _run_trials(analyses, job, adjustment, progress):
 
     # First drop parameters singly or in groups, then all that are recommended together. While
     # these change the product, hold back one more parameter.
-    analyses = with_outcomes_of(remove_joint_trial)
-    analyses = with_outcomes_of(add_joint_trial)
+    analyses = run_stage(remove_joint_trial)
+    analyses = run_stage(add_joint_trial)
     while any(
         fewer is not analysis
-        for fewer, analysis in zip(map(hold_one_back, analyses), analyses, strict=True)
+        for fewer, analysis in zip(map(hold_back_worst, analyses), analyses, strict=True)
     ):
-        analyses = tuple(advise(hold_one_back(analysis)) for analysis in analyses)
-        analyses = with_outcomes_of(add_joint_trial)
+        analyses = tuple(advise(hold_back_worst(analysis)) for analysis in analyses)
+        analyses = run_stage(add_joint_trial)
     progress("done", total, total)
     return tuple(advise_together(analysis) for analysis in analyses)
 
@@ -201,7 +204,7 @@ def _add_outcomes(analysis, outcomes, adjustment, dropping):
     for trial in analysis.trials:
         outcome, after = outcomes[analysis.interior.camera, trial.names], None
         if outcome.adjustment is not None:
-            values, names, cofactors = interior_after(outcome, analysis.interior)
+            values, names, cofactors = read_interior_after(outcome, analysis.interior)
             factor = adjustment.sigma0**2 if analysis.scale == "a_posteriori" else 1.0
             after = names, values, factor * cofactors
         trials.append(replace(trial, outcome=outcome, after=after))

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from tankcal.calibration.parameters.significance import cholesky_of
+from tankcal.calibration.parameters.significance import factor_correlations
 from tankcal.survey.network import correlations
 
 MATRICES = ("correlation", "covariance")
@@ -95,7 +95,7 @@ def components(names, covariance, values=None, *, of="correlation", unscaled=Fal
         raise ValueError(f"of {of!r}: expected one of {', '.join(MATRICES)}")
     matrix = _check_matrix(names, covariance)
     sd = np.sqrt(np.diag(matrix))
-    lower = cholesky_of(matrix)
+    lower = factor_correlations(matrix)
     weight = np.ones_like(sd) if of == "correlation" else sd
     eigenvalues, vectors = _decompose(correlations(matrix), lower, weight)
     # Loadings c_ij sqrt(lambda_j) / sd(x_i)
@@ -103,9 +103,9 @@ def components(names, covariance, values=None, *, of="correlation", unscaled=Fal
     loadings = vectors * root / weight[:, None]
     vectors, loadings = _orient(vectors, loadings, weight)
     share = 100 * eigenvalues / eigenvalues.sum()
-    given = np.full(len(sd), np.nan) if values is None else np.asarray(values, dtype=float)
+    x = np.full(len(sd), np.nan) if values is None else np.asarray(values, dtype=float)
     if of == "correlation" and not unscaled:
-        given = given / sd
+        x = x / sd
     return Components(
         names=tuple(names),
         of=of,
@@ -115,7 +115,7 @@ def components(names, covariance, values=None, *, of="correlation", unscaled=Fal
         cumulative_percent=np.cumsum(share),
         vectors=vectors,
         loadings=loadings,
-        values=vectors.T @ given,
+        values=vectors.T @ x,
         unscaled=unscaled,
     )
 

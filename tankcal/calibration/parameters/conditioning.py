@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from tankcal.calibration.parameters.significance import cholesky_of
+from tankcal.calibration.parameters.significance import factor_correlations
 from tankcal.survey.network import correlations
 
 
 @dataclass(frozen=True)
-class Without:
+class Prediction:
     """Parameters that are kept when others are held at zero.
 
     Attributes
@@ -68,7 +68,7 @@ def drop_parameters(names, covariance, dropped, values=None):
 
     Returns
     -------
-    Without
+    Prediction
 
     Raises
     ------
@@ -87,10 +87,10 @@ def drop_parameters(names, covariance, dropped, values=None):
         covariance[np.ix_(is_dropped, is_dropped)],
         covariance[np.ix_(~is_dropped, is_dropped)],
     )
-    lower = cholesky_of(c_dd)
+    lower = factor_correlations(c_dd)
     if lower is None:
         unknown_values = np.full((len(kept), len(kept)), np.nan)
-        return Without(
+        return Prediction(
             dropped_names,
             kept,
             unknown_values.diagonal().copy(),
@@ -102,4 +102,4 @@ def drop_parameters(names, covariance, dropped, values=None):
     half = scipy.linalg.solve_triangular(lower, (cross / sd).T, lower=True)
     pull = scipy.linalg.solve_triangular(lower, x[is_dropped] / sd, lower=True, check_finite=False)
     c_kept = covariance[np.ix_(~is_dropped, ~is_dropped)] - half.T @ half
-    return Without(dropped_names, kept, x[~is_dropped] - half.T @ pull, (c_kept + c_kept.T) / 2)
+    return Prediction(dropped_names, kept, x[~is_dropped] - half.T @ pull, (c_kept + c_kept.T) / 2)

@@ -1,10 +1,10 @@
 """New adjustments of a survey without some parameters of a camera, and their effect on the volume.
 
-The dropped parameters are held at zero. The readings are the same: outliers remain rejected, and no
-other reading is rejected. The results therefore differ only by the parameters, and an inadequate
-model appears in sigma0 rather than in rejected readings. The points of the wall are also the same.
+The dropped parameters are held at zero. The readings do not change: outliers remain rejected, and
+no other reading is rejected. The results therefore differ only by the parameters, and an inadequate
+model appears in sigma0 rather than in rejected readings. The points of the wall do not change.
 
-`surveys.adjust_survey` is not used, because it searches for outliers: a camera that lacks a
+`survey.adjust_survey` is not used, because it searches for outliers: a camera that lacks a
 parameter would produce apparent outliers.
 """
 
@@ -25,7 +25,7 @@ from tankcal.survey.results import causes_of
 
 
 @dataclass(frozen=True)
-class Moved:
+class PointChanges:
     """Change of adjusted points between two adjustments; fixed coordinates have zero change.
 
     Attributes
@@ -69,7 +69,7 @@ class Outcome:
         Reason of a failure, or None.
     adjustment : survey.Adjustment or None
         Points, covariances and statistics, without readings; None if the adjustment failed.
-    moved : Moved or None
+    changes : PointChanges or None
         Change of the points by dropping the parameters; None if the adjustment failed.
     volume : TopVolume or None
         Volume, or None if there is no tank or the capacity cannot be computed.
@@ -79,7 +79,7 @@ class Outcome:
     names: tuple
     failed: str | None = None
     adjustment: Adjustment | None = None
-    moved: Moved | None = None
+    changes: PointChanges | None = None
     volume: TopVolume | None = None
 
 
@@ -110,7 +110,7 @@ class Dropping:
         self.volume, self.no_volume, self._top = None, None, TopOfTank(job)
         if job.tank is not None:
             try:
-                self.volume = self._top.of(adjustment)
+                self.volume = self._top.compute_volume(adjustment)
             except TankcalError as error:
                 self.no_volume = str(error)
 
@@ -121,19 +121,19 @@ class Dropping:
         principal distance c cannot be dropped.
         """
         try:
-            adjusted = self.adjusted(_drop_from_cameras(self._survey.cameras, camera, names))
-            moved = movement(self.adjustment, adjusted)
+            adjusted = self.adjust_cameras(_drop_from_cameras(self._survey.cameras, camera, names))
+            changes = compare_points(self.adjustment, adjusted)
         except SolutionError as error:
             return Outcome(camera, tuple(names), str(error))
         if self.volume is None:
-            return Outcome(camera, tuple(names), None, adjusted, moved)
+            return Outcome(camera, tuple(names), None, adjusted, changes)
         try:
-            volume = self._top.of(adjusted)
+            volume = self._top.compute_volume(adjusted)
         except TankcalError as error:
-            return Outcome(camera, tuple(names), str(error), adjusted, moved)
-        return Outcome(camera, tuple(names), None, adjusted, moved, volume)
+            return Outcome(camera, tuple(names), str(error), adjusted, changes)
+        return Outcome(camera, tuple(names), None, adjusted, changes, volume)
 
-    def adjusted(self, cameras):
+    def adjust_cameras(self, cameras):
         """Adjust the survey with other cameras (network.Camera), in the order of the survey.
 
         The returned survey.Adjustment contains points, covariances and statistics. Its readings,
@@ -159,7 +159,7 @@ class Dropping:
         )
 
 
-def movement(before, after):
+def compare_points(before, after):
     """Compare the common points of two Adjustments, in standard deviations of the first."""
     places = {name: i for i, name in enumerate(after.names)}
     pairs = [(i, places[name]) for i, name in enumerate(before.names) if name in places]
@@ -173,7 +173,7 @@ def movement(before, after):
     relative = np.abs(np.divide(change, sd, out=np.zeros_like(change), where=has_sd))
     size = np.linalg.norm(change, axis=1)
     far, worst = int(np.argmax(size)), int(np.argmax(relative.max(axis=1)))
-    return Moved(
+    return PointChanges(
         count=len(pairs),
         rms_m=float(np.sqrt(np.mean(size**2))),
         largest_m=float(size[far]),
@@ -186,7 +186,7 @@ def movement(before, after):
     )
 
 
-def interior_after(outcome, interior):
+def read_interior_after(outcome, interior):
     """Parameters of a set after an Outcome.
 
     Parameters

@@ -22,7 +22,7 @@ WITHOUT_DECISION = ("c",)  # no camera has c = 0, so that a test against 0 is me
 
 
 @dataclass(frozen=True)
-class AgainstZero:
+class ZeroTest:
     """Test of a parameter or of a group against zero.
 
     Attributes
@@ -57,17 +57,32 @@ class AgainstZero:
 
 
 def critical_f(parameters, dof, alpha=ALPHA):
-    """Quantile F(1 - alpha; parameters, dof); dof may be infinite."""
-    _refuse_level(alpha)
+    """Critical value F(1 - alpha; parameters, dof).
+
+    Parameters
+    ----------
+    parameters : int
+        Number of parameters p.
+    dof : float
+        Degrees of freedom of sigma0; infinite if it is not estimated.
+    alpha : float, optional
+        Significance level.
+
+    Returns
+    -------
+    float
+    """
+    if not 0 < alpha < 1:
+        raise ValueError(f"alpha {alpha}: expected a probability between 0 and 1")
     if np.isinf(dof):
         return float(chdtri(parameters, alpha) / parameters)
     return float(fdtri(parameters, dof, 1 - alpha))
 
 
-def f_of_group(values, covariance):
+def compute_f(values, covariance):
     """Statistic x' C^-1 x / p of values (p,) and covariance (p, p); nan if C is not definite."""
     values, covariance = np.asarray(values, dtype=float), np.asarray(covariance, dtype=float)
-    lower = cholesky_of(covariance)
+    lower = factor_correlations(covariance)
     if lower is None:
         return np.nan
     scaled = values / np.sqrt(np.diag(covariance))
@@ -75,7 +90,7 @@ def f_of_group(values, covariance):
     return float(whitened @ whitened / len(values))
 
 
-def cholesky_of(covariance):
+def factor_correlations(covariance):
     """Lower Cholesky factor (p, p) of the correlations, or None if not positive definite."""
     variance = np.diag(covariance)
     if not (np.isfinite(covariance).all() and (variance > 0).all()):
@@ -90,7 +105,7 @@ def cholesky_of(covariance):
     return lower if (np.diag(lower) ** 2 > rounding).all() else None
 
 
-def against_zero(names, chosen, values, covariance, dof, alpha=ALPHA):
+def run_zero_test(names, chosen, values, covariance, dof, alpha=ALPHA):
     """Test some parameters together against zero.
 
     Parameters
@@ -108,45 +123,40 @@ def against_zero(names, chosen, values, covariance, dof, alpha=ALPHA):
 
     Returns
     -------
-    AgainstZero
+    ZeroTest
     """
     rows = [names.index(name) for name in chosen]
-    f = f_of_group(np.asarray(values)[rows], np.asarray(covariance)[np.ix_(rows, rows)])
+    f = compute_f(np.asarray(values)[rows], np.asarray(covariance)[np.ix_(rows, rows)])
     p, critical = len(rows), critical_f(len(rows), dof, alpha)
     if np.isnan(f):
-        return AgainstZero(tuple(chosen), f, critical, np.nan, positive_definite=False)
+        return ZeroTest(tuple(chosen), f, critical, np.nan, positive_definite=False)
     tail = chdtrc(p, p * f) if np.isinf(dof) else fdtrc(p, dof, f)
-    return AgainstZero(tuple(chosen), f, critical, float(tail))
+    return ZeroTest(tuple(chosen), f, critical, float(tail))
 
 
 def single_tests(names, values, covariance, dof, alpha=ALPHA):
-    """Test each parameter alone against zero, with the arguments of `against_zero`."""
-    return tuple(against_zero(names, (name,), values, covariance, dof, alpha) for name in names)
+    """Test each parameter alone against zero, with the arguments of `run_zero_test`."""
+    return tuple(run_zero_test(names, (name,), values, covariance, dof, alpha) for name in names)
 
 
 def group_tests(names, values, covariance, dof, alpha=ALPHA, groups=None):
-    """Test groups of parameters against zero, with the arguments of `against_zero`.
+    """Test groups of parameters against zero, with the arguments of `run_zero_test`.
 
     By default the groups of GROUPS with two or more of the parameters are tested. Unknown names in
     `groups` raise ValueError.
     """
     if groups is None:
-        groups = groups_among(names)
+        groups = select_groups(names)
     unknown = {name for group in groups for name in group} - set(names)
     if unknown:
         raise ValueError(
             f"no adjusted parameter {', '.join(sorted(unknown))}; expected some of "
             + ", ".join(names)
         )
-    return tuple(against_zero(names, group, values, covariance, dof, alpha) for group in groups)
+    return tuple(run_zero_test(names, group, values, covariance, dof, alpha) for group in groups)
 
 
-def groups_among(names):
+def select_groups(names):
     """Return the groups of GROUPS with two or more of these names."""
     present = (tuple(name for name in group if name in names) for group in GROUPS)
     return tuple(group for group in present if len(group) > 1)
-
-
-def _refuse_level(alpha):
-    if not 0 < alpha < 1:
-        raise ValueError(f"alpha {alpha}: expected a probability between 0 and 1")

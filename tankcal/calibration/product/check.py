@@ -259,7 +259,7 @@ def check_product(
     """
     d = np.asarray(difference_m, dtype=float).reshape(-1, len(axes))
     names = tuple(str(i + 1) for i in range(len(d))) if names is None else tuple(names)
-    _refuse(d, axes, names, alpha, expected_sd_m)
+    _check_arguments(d, axes, names, alpha, expected_sd_m)
     sigma = (None,) * len(axes) if expected_sd_m is None else expected_sd_m
     checks = tuple(
         _check_axis(axis, column, names, alpha, sd)
@@ -270,7 +270,16 @@ def check_product(
         for name in ("plan", "height")
         if (part := _check_part(name, d, axes, checks)) is not None
     )
-    verdicts = () if limits is None else _make_verdicts(limits, checks, parts, alpha)
+    known = {part.part: part for part in parts}
+    verdicts = (
+        ()
+        if limits is None
+        else tuple(
+            _make_verdict(limit, limits.share, known[limit.part], checks, alpha)
+            for limit in limits.limits
+            if limit.part in known
+        )
+    )
     return ProductCheck(
         names=names,
         axes=tuple(axes),
@@ -294,7 +303,8 @@ def chi2_limit(n, alpha=ALPHA):
     return float(chdtri(n - 1, alpha))
 
 
-def _refuse(d, axes, names, alpha, expected_sd_m):
+def _check_arguments(d, axes, names, alpha, expected_sd_m):
+    """Raise ValueError for invalid arguments of `check_product`."""
     known = [axis for axis in axes if axis in AXES]
     if not axes or len(known) != len(set(axes)) or len(set(axes)) != len(axes):
         raise ValueError(f"found axes {axes!r}; expected some of x, y, z, each once")
@@ -338,6 +348,7 @@ def _check_axis(axis, column, names, alpha, expected_sd_m):
 
 
 def _test_precision(axis, sd_m, n, sigma_m, alpha):
+    """Test a standard deviation of n differences against the expected one, sigma_m."""
     if sd_m is None:
         return Precision(axis, sigma_m, None, None, None)
     chi2, limit = (n - 1) * (sd_m / sigma_m) ** 2, chi2_limit(n, alpha)
@@ -359,17 +370,8 @@ def _check_part(name, d, axes, checks):
     return PartCheck(name, len(values), size, unbiased)
 
 
-def _make_verdicts(table, checks, parts, alpha):
-    """Create a Verdict for each limit of a known part."""
-    known = {part.part: part for part in parts}
-    return tuple(
-        _make_verdict(limit, table.share, known[limit.part], checks, alpha)
-        for limit in table.limits
-        if limit.part in known
-    )
-
-
 def _make_verdict(limit, share, part, checks, alpha):
+    """Create the Verdict of a limit; `share` of the points must be within its tolerance."""
     part_checks = [axis_check for axis_check in checks if axis_check.part == limit.part]
     # The standard error of the plan applies to both coordinates together.
     sigma = limit.sd_m / np.sqrt(len(part_checks))

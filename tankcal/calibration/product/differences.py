@@ -34,7 +34,7 @@ class Differences:
     names: tuple
     difference_m: np.ndarray
 
-    def of_known_axes(self):
+    def select_known_axes(self):
         """Return the k axes with at least one known value, and their differences (n, k), m."""
         known = np.isfinite(self.difference_m).any(axis=0)
         return tuple(axis for axis, has in zip(AXES, known, strict=True) if has), (
@@ -42,7 +42,7 @@ class Differences:
         )
 
 
-def differences_of(adjustment):
+def collect_differences(adjustment):
     """Return the differences at the check points of an adjustment or of a record.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Four tests whether two calibrations of a camera give the same bundle of rays.
+"""Four tests whether two calibrations of a camera give equal bundles of rays.
 
 A grid of image points is corrected with both calibrations. With the ideal points (x1, y1), (x2, y2)
 and the focal lengths c1, c2, the figure of a pair, in pixels, is
@@ -27,13 +27,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tankcal.calibration.stability.checks import check_options, check_size, common_frame
-from tankcal.calibration.stability.expected import covariance_of, expected_px, ideal_derivatives
-from tankcal.calibration.stability.fits import resection, rotation_between
+from tankcal.calibration.stability.fits import (
+    camera_covariance,
+    compute_expected_px,
+    fit_resection,
+    fit_rotation,
+    ideal_derivatives,
+)
 from tankcal.calibration.stability.grids import Grid, default_grid
 from tankcal.calibration.stability.terrains import SEED, TERRAINS, Terrain
 from tankcal.camera.model import correct_image_points, distort_image_points
-from tankcal.errors import SolutionError
+from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.rotations import angles_of
 from tankcal.messages import message
 from tankcal.survey.measurements import CameraSetup
@@ -41,6 +45,10 @@ from tankcal.survey.measurements import CameraSetup
 METHODS = ("mis", "zrot", "rot", "spr")
 THRESHOLDS_PX = (0.5, 0.33)  # thresholds of Pessoa
 UNKNOWNS = {"mis": 0, "zrot": 0, "rot": 3, "spr": 6}  # number of unknowns of each method
+# Largest relative difference of pixel sizes; programs with two focal lengths give slightly
+# different pixels for each calibration
+SAME_PIXEL = 2e-3
+MOST_DIFFERENCES = 20_000_000  # largest number of pairs times grid points
 UNDONE_MM = 1e-9  # tolerance of a point after correction and renewed distortion, mm
 
 
@@ -183,10 +191,10 @@ def compare(
         If the adjustment of a pair has no solution.
     """
     setups = tuple(setups)
-    check_options(method, METHODS, threshold_px, seed)
-    format_px = common_frame(setups, file)
+    _check_options(method, threshold_px, seed)
+    format_px = _find_common_frame(setups, file)
     grid = grid or default_grid(format_px)
-    check_size(len(setups), grid, UNKNOWNS[method], file)
+    _check_size(len(setups), grid, UNKNOWNS[method], file)
     terrain = (terrain or TERRAINS["I"]) if method == "spr" else None
     sets = [_correct_grid(setup, grid, format_px) for setup in setups]
     depths_m = terrain and [terrain.depths_m(grid.size, seed, i) for i in range(terrain.drawn)]
@@ -199,7 +207,9 @@ def compare(
     return Stability(
         method=method,
         as_published=as_published,
-        conventions=_conventions(method, as_published, sets, grid, terrain, seed, pairs, known),
+        conventions=_list_conventions(
+            method, as_published, sets, grid, terrain, seed, pairs, known
+        ),
         grid=grid,
         format_px=format_px,
         threshold_px=float(threshold_px),
@@ -208,6 +218,123 @@ def compare(
         setups=setups,
         pairs=pairs,
     )
+
+
+def _check_options(method, threshold_px, seed):
+    """Raise InputError for an invalid method, threshold (px) or seed."""
+    problems = []
+    if method not in METHODS:
+        expected = message(
+            "compare_method",
+            "found {found!r}; expected {methods}",
+            found=str(method)[:60],
+            methods=", ".join(METHODS),
+        )
+        problems.append(Problem("--method", expected))
+    if not (np.isfinite(threshold_px) and threshold_px > 0):
+        expected = message(
+            "compare_threshold",
+            "found {found}; expected pixels above 0, such as 0.5 or 0.33",
+            found=threshold_px,
+        )
+        problems.append(Problem("--threshold", expected))
+    if seed < 0:
+        problems.append(
+            Problem(
+                "--seed",
+                message(
+                    "compare_seed", "found {seed}; expected a whole number, 0 or more", seed=seed
+                ),
+            )
+        )
+    if problems:
+        raise InputError(problems)
+
+
+def _check_size(cameras, grid, unknowns, file):
+    """Raise InputError for too few points for the unknowns, or too many differences for memory.
+
+    Parameters
+    ----------
+    cameras : int
+        Number of calibrations.
+    grid : Grid
+        Grid of image points.
+    unknowns : int
+        Number of unknowns of the method.
+    file : str
+        Name of the file of the calibrations in messages.
+    """
+    if 2 * grid.size <= unknowns:
+        expected = message(
+            "compare_few_points",
+            "{count} points; expected more than {least} for this method",
+            count=grid.size,
+            least=unknowns // 2,
+        )
+        raise InputError(Problem("--grid", expected))
+    count = cameras * (cameras - 1) // 2
+    if count * grid.size > MOST_DIFFERENCES:
+        expected = message(
+            "compare_too_many",
+            "{count} pairs of {points} points; expected fewer calibrations or points",
+            count=count,
+            points=grid.size,
+        )
+        raise InputError(Problem(file, expected))
+
+
+def _find_common_frame(setups, file):
+    """Common frame (columns, lines); raise InputError if the frames differ."""
+    if len(setups) < 2:
+        expected = message(
+            "compare_too_few",
+            "{count} calibration; expected two or more to compare",
+            count=len(setups) or message("compare_none", "no"),
+        )
+        raise InputError(Problem(file, expected))
+    lacking = [setup.camera.name for setup in setups if setup.pixel_mm is None]
+    if lacking:
+        expected = message(
+            "compare_no_pixel", "the size of a pixel is not known; expected format_px with pixel_um"
+        )
+        raise InputError([Problem(file, expected, None, name) for name in lacking])
+    first, frame = setups[0], setups[0].format_px
+    problems = []
+    for setup_to_check in setups[1:]:
+        complaint = _why_not_comparable(setup_to_check, first, frame)
+        if complaint:
+            problems.append(Problem(file, complaint, None, setup_to_check.camera.name))
+    if problems:
+        raise InputError(problems)
+    return int(frame[0]), int(frame[1])
+
+
+def _why_not_comparable(setup, first, frame):
+    """Message why a setup cannot be compared with the first, or None."""
+    first_name = first.camera.name
+    if np.any(setup.format_px != frame):
+        return message(
+            "compare_frame",
+            "a frame of {found} px; expected {frame}, as {first} has",
+            found=_format_sides(setup.format_px),
+            frame=_format_sides(frame),
+            first=first_name,
+        )
+    if np.all(np.abs(setup.pixel_mm / first.pixel_mm - 1) <= SAME_PIXEL):
+        return None
+    return message(
+        "compare_pixel",
+        "a pixel of {found} micrometres; expected that of {first}, {pixel}, within {percent:g} %",
+        found=_format_sides(1000 * setup.pixel_mm),
+        first=first_name,
+        pixel=_format_sides(1000 * first.pixel_mm),
+        percent=100 * SAME_PIXEL,
+    )
+
+
+def _format_sides(pair):
+    return f"{pair[0]:.8g} x {pair[1]:.8g}"
 
 
 @dataclass(frozen=True)
@@ -229,7 +356,7 @@ class _CorrectedSet:
     def pixel_mm(self):
         return self.setup.pixel_mm
 
-    def in_pixels_of(self, other):
+    def scale_to_pixels(self, other):
         """Ideal points (n, 2), mm, scaled to the pixels of another set.
 
         For comparisons of images rather than rays. Programs with two focal lengths in pixels give
@@ -252,6 +379,7 @@ class _MethodResult:
 
 
 def _correct_grid(setup, grid, format_px):
+    """Correct the grid with a calibration; raise SolutionError if it folds the frame."""
     camera = setup.camera
     points_mm = grid.image_points_mm(format_px, setup.pixel_mm)
     with np.errstate(all="ignore"):
@@ -273,6 +401,7 @@ def _correct_grid(setup, grid, format_px):
 
 
 def _make_pair(pair, method, as_published, threshold_px, ground, known):
+    """Compare two corrected sets; `ground` is the terrain and its depths, or None and None."""
     result = _compare_pair(pair, method, as_published, *ground)
     return Pair(
         a=pair[0].name,
@@ -280,7 +409,7 @@ def _make_pair(pair, method, as_published, threshold_px, ground, known):
         figure_px=result.figure_px,
         similar=result.figure_px < threshold_px,
         difference_px=result.difference_px,
-        expected_px=_expected_figure(pair, method, as_published, result, known),
+        expected_px=_compute_expected_figure(pair, method, as_published, result, known),
         scale=result.scale,
         rotation_rad=result.rotation_rad,
         shift_m=result.shift_m,
@@ -289,6 +418,7 @@ def _make_pair(pair, method, as_published, threshold_px, ground, known):
 
 
 def _compare_pair(pair, method, as_published, terrain, depths_m):
+    """_MethodResult of a pair; an error names both calibrations."""
     try:
         if method == "rot":
             return _compare_rotation(*pair, as_published)
@@ -309,7 +439,7 @@ def _compare_pair(pair, method, as_published, terrain, depths_m):
 def _compare_coordinates(first, second, method, as_published):
     """Compare image points without a fit (mis and zrot)."""
     scale = first.c_mm / second.c_mm if method == "zrot" else None
-    second_mm = second.in_pixels_of(first) if scale is None else second.ideal_mm * scale
+    second_mm = second.scale_to_pixels(first) if scale is None else second.ideal_mm * scale
     difference = (second_mm - first.ideal_mm) / first.pixel_mm
     squares = np.sum(difference**2, axis=1)
     is_mean = as_published and method == "zrot"
@@ -320,8 +450,8 @@ def _compare_coordinates(first, second, method, as_published):
 def _compare_rotation(first, second, as_published):
     second_mm, second_c = second.ideal_mm, second.c_mm
     if as_published:
-        second_mm, second_c = second.in_pixels_of(first), first.c_mm
-    fit = rotation_between(first.ideal_mm, first.c_mm, second_mm, second_c, first.pixel_mm)
+        second_mm, second_c = second.scale_to_pixels(first), first.c_mm
+    fit = fit_rotation(first.ideal_mm, first.c_mm, second_mm, second_c, first.pixel_mm)
     return _MethodResult(
         fit.sigma0_px, fit.residuals_px, (fit.design_px,), rotation_rad=angles_of(fit.rotation.T)
     )
@@ -342,7 +472,7 @@ def _compare_resections(first, second, terrain, depths_m):
 
 def _compare_resection(first, second, terrain, depth_m):
     object_m = terrain.object_points_m(first.ideal_mm, first.c_mm, depth_m)
-    fit = resection(object_m, second.ideal_mm, second.c_mm, first.pixel_mm, terrain.position_m)
+    fit = fit_resection(object_m, second.ideal_mm, second.c_mm, first.pixel_mm, terrain.position_m)
     return _MethodResult(
         fit.sigma0_px,
         -fit.residuals_px,
@@ -352,18 +482,15 @@ def _compare_resection(first, second, terrain, depth_m):
     )
 
 
-def _has_own_focal_lengths(method, as_published):
-    return method in ("zrot", "spr") or (method == "rot" and not as_published)
-
-
-def _expected_figure(pair, method, as_published, result, known):
+def _compute_expected_figure(pair, method, as_published, result, known):
     """Expected figure of a pair, px, or None if a calibration has no standard deviations."""
-    needs_c = _has_own_focal_lengths(method, as_published)
+    # Figures of these methods depend on the focal lengths of both bundles.
+    needs_c = method in ("zrot", "spr") or (method == "rot" and not as_published)
     covariances = [
-        covariance_of(calibration.setup.camera, known.get(calibration.name), needs_c)
+        camera_covariance(calibration.setup.camera, known.get(calibration.name), needs_c)
         for calibration in pair
     ]
-    if any(calibration is None for calibration in covariances):
+    if any(covariance is None for covariance in covariances):
         return None
     first, second = pair
     parts = [
@@ -372,7 +499,7 @@ def _expected_figure(pair, method, as_published, result, known):
         )
         for calibration in pair
     ]
-    # The figures of these methods depend on both focal lengths, at the scale of the first.
+    # Derivatives by both focal lengths, at the scale of the first.
     if needs_c:
         parts[0][:, :, 0] = -first.ideal_mm / first.c_mm
         parts[1][:, :, 0] = -second.ideal_mm / second.c_mm
@@ -382,13 +509,14 @@ def _expected_figure(pair, method, as_published, result, known):
     unknowns = UNKNOWNS[method]
     divisor = 2 * points - unknowns if unknowns else points
     figures = [
-        expected_px(zip(in_pixels, covariances, strict=True), design, divisor)
+        compute_expected_px(zip(in_pixels, covariances, strict=True), design, divisor)
         for design in result.designs_px
     ]
     return float(np.sqrt(np.mean(np.square(figures))))
 
 
-def _conventions(method, as_published, sets, grid, terrain, seed, pairs, known):
+def _list_conventions(method, as_published, sets, grid, terrain, seed, pairs, known):
+    """Conventions that the figures of all pairs depend on, in the order of reading."""
     unknowns = UNKNOWNS[method]
     if unknowns:
         figure = Convention("figure_sigma0", {"points": grid.size, "unknowns": unknowns})

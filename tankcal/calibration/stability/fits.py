@@ -1,17 +1,25 @@
-"""Differences between two bundles of rays after the fit of a rotation or of an orientation.
+"""Fit of two bundles of rays, and the difference expected from their standard deviations.
 
 With (u, v, w) = R (X - S) the ideal image of a point X is -c u / w, -c v / w (see
 tankcal.camera.model). The rotation R, and optionally the projection centre S, are adjusted to image
 points:
 
-    rotation_between   X: the rays (x, y, -c) of the second bundle; image: that of the first
-    resection          X: object points; image: that of the second bundle
+    fit_rotation     X: the rays (x, y, -c) of the second bundle; image: that of the first
+    fit_resection    X: object points; image: that of the second bundle
 
 by least squares in pixels, sigma0 = sqrt(v'v / (2n - u)), u = 3 or 6 unknowns. The initial rotation
 minimises the distances between the unit vectors of the rays (Wahba's problem, solved by singular
 values), so that the rotation may have any size.
 
-Source: Pessoa 2017 (17-19); Habib, Pullivelli, Mitishita, Ghanma & Kim 2006; Markley 1988.
+The ideal point xi of a measured point m(xi, q) depends on the interior parameters q:
+d xi = -(d m / d xi)^-1 (d m / d q) dq. J contains these derivatives over the grid, in pixels. P is
+the projection that removes the fitted parameters. To first order, the standard deviations of both
+calibrations alone give
+
+    expected = sqrt(trace(P (J1 C1 J1' + J2 C2 J2') P) / divisor)
+
+Source: Pessoa 2017 (17-19); Habib, Pullivelli, Mitishita, Ghanma & Kim 2006; Markley 1988; JCGM
+100.
 """
 
 from dataclasses import dataclass
@@ -19,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.adjust import adjust
-from tankcal.camera.imaging import ideal_point
+from tankcal.camera.imaging import ideal_point, image_point_derivatives
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import apply_small_rotation, vector_derivatives
 from tankcal.messages import message
@@ -55,7 +63,7 @@ def rays(ideal_mm, c_mm):
     return np.column_stack([ideal_mm, np.full(len(ideal_mm), -float(c_mm))])
 
 
-def nearest_rotation(to, of):
+def find_nearest_rotation(to, of):
     """Rotation R (3, 3) that minimises |to - R of|^2, with `to` and `of` (n, 3) as unit vectors."""
     to, of = (vectors / np.linalg.norm(vectors, axis=1)[:, None] for vectors in (to, of))
     # The sign makes the determinant +1, a rotation without reflection.
@@ -64,7 +72,7 @@ def nearest_rotation(to, of):
     return left @ np.diag([1.0, 1.0, sign]) @ right
 
 
-def rotation_between(first_mm, first_c_mm, second_mm, second_c_mm, pixel_mm):
+def fit_rotation(first_mm, first_c_mm, second_mm, second_c_mm, pixel_mm):
     """Fit the rotation of the second bundle onto the first, in the image of the first.
 
     Parameters
@@ -86,11 +94,11 @@ def rotation_between(first_mm, first_c_mm, second_mm, second_c_mm, pixel_mm):
         If the points do not determine the rotation.
     """
     second = rays(second_mm, second_c_mm)
-    start = nearest_rotation(rays(first_mm, first_c_mm), second)
-    return _fit(second, first_mm, first_c_mm, pixel_mm, start, None)
+    start = find_nearest_rotation(rays(first_mm, first_c_mm), second)
+    return _fit_orientation(second, first_mm, first_c_mm, pixel_mm, start, None)
 
 
-def resection(object_m, image_mm, c_mm, pixel_mm, position_m):
+def fit_resection(object_m, image_mm, c_mm, pixel_mm, position_m):
     """Fit rotation and projection centre of an image of object points.
 
     Parameters
@@ -115,11 +123,13 @@ def resection(object_m, image_mm, c_mm, pixel_mm, position_m):
     SolutionError
         If the points do not determine the orientation.
     """
-    start = nearest_rotation(rays(image_mm, c_mm), object_m - position_m)
-    return _fit(object_m, image_mm, c_mm, pixel_mm, start, np.asarray(position_m, dtype=float))
+    start = find_nearest_rotation(rays(image_mm, c_mm), object_m - position_m)
+    return _fit_orientation(
+        object_m, image_mm, c_mm, pixel_mm, start, np.asarray(position_m, dtype=float)
+    )
 
 
-def orientation_model(place, c_mm, start, pixel_mm):
+def make_orientation_model(place, c_mm, start, pixel_mm):
     """Create the model of an orientation for `adjust`.
 
     The unknowns are the rotation vector d of exp([d]x) start and, if there are six, the projection
@@ -166,8 +176,9 @@ def orientation_model(place, c_mm, start, pixel_mm):
     return model
 
 
-def _fit(place, image_mm, c_mm, pixel_mm, start, position):
-    model = orientation_model(place, c_mm, start, pixel_mm)
+def _fit_orientation(place, image_mm, c_mm, pixel_mm, start, position):
+    """Fit the rotation, and the projection centre unless `position` is None; return a Fit."""
+    model = make_orientation_model(place, c_mm, start, pixel_mm)
     unknowns = np.zeros(3) if position is None else np.append(np.zeros(3), position)
     image = (image_mm / pixel_mm).ravel()
     if len(image) <= len(unknowns):
@@ -189,3 +200,83 @@ def _fit(place, image_mm, c_mm, pixel_mm, start, position):
         sigma0_px=float(np.sqrt(misclosure @ misclosure / adjusted.dof)),
         design_px=design,
     )
+
+
+def ideal_derivatives(ideal_mm, interior, form):
+    """Derivatives of ideal image points by PARAMETERS, for fixed measured points.
+
+    Parameters
+    ----------
+    ideal_mm : ndarray, shape (n, 2)
+        Ideal image points relative to the principal point, mm.
+    interior : array_like, shape (13,)
+        Interior parameters.
+    form : tankcal.camera.model.Form
+        Form of the distortion model.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 13)
+        Derivatives; zero for c, because the points are in mm and not directions.
+    """
+    is_of_ideal = form.convention == "distortion_of_ideal"
+    q = tuple(np.asarray(interior, dtype=float))
+    rays = (*(ideal_mm.T / q[0]), -np.ones(len(ideal_mm)))
+    rows = image_point_derivatives(rays, np.eye(3).ravel(), q, form.numbers, is_of_ideal)[2:]
+    derivatives = np.stack([np.column_stack(np.broadcast_arrays(*row)) for row in rows], axis=1)
+    by_point, by_parameters = derivatives[:, :, :2] / q[0], derivatives[:, :, 6:]
+    by_parameters[:, :, 0] = 0.0
+    return -np.linalg.solve(by_point, by_parameters)
+
+
+def camera_covariance(camera, known=None, needs_c=True):
+    """Covariance matrix of the parameters of a camera.
+
+    Parameters
+    ----------
+    camera : network.Camera
+        Camera with values and standard deviations. A parameter with value 0 and without standard
+        deviation is not in the model.
+    known : array_like, shape (13, 13), optional
+        Covariance matrix; by default the parameters are uncorrelated.
+    needs_c : bool, optional
+        Whether the figure depends on c. If not, c needs no standard deviation.
+
+    Returns
+    -------
+    ndarray, shape (13, 13), or None
+        None if a standard deviation is missing.
+    """
+    if known is not None:
+        return np.asarray(known, dtype=float)
+    sd = np.where(np.isnan(camera.sd) & (np.asarray(camera.values) == 0), 0.0, camera.sd)
+    if not needs_c:
+        sd[0] = 0.0
+    return None if np.any(np.isnan(sd)) or not np.any(sd) else np.diag(sd**2)
+
+
+def compute_expected_px(parts, design_px, divisor):
+    """Expected figure of stability (see the module docstring), px.
+
+    Parameters
+    ----------
+    parts : iterable of tuple
+        Derivatives (2n, 13) and covariance matrix (13, 13) of each calibration.
+    design_px : ndarray, shape (2n, u), or None
+        Design matrix of the fit of the method.
+    divisor : float
+        Degrees of freedom of the fit, or number of points without a fit.
+
+    Returns
+    -------
+    float
+    """
+    total = 0.0
+    # P = I - Q Q', with an orthonormal basis Q of the design matrix
+    basis = None
+    if design_px is not None:
+        basis = np.linalg.qr(design_px / np.linalg.norm(design_px, axis=0))[0]
+    for derivatives, covariance in parts:
+        projected = derivatives if basis is None else derivatives - basis @ (basis.T @ derivatives)
+        total += float(np.sum((projected @ covariance) * projected))
+    return float(np.sqrt(max(total, 0.0) / divisor))

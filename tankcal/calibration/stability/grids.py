@@ -117,7 +117,7 @@ def default_grid(format_px):
     return Grid(int(columns), int(rows), tuple(start.tolist()), step)
 
 
-def parse(text):
+def parse_grid(text):
     """Parse a grid from a text such as 46x35,50,50,100.
 
     Raises
@@ -127,7 +127,7 @@ def parse(text):
 
     Examples
     --------
-    >>> print(parse("46x35,50,50,100"))
+    >>> print(parse_grid("46x35,50,50,100"))
     46x35,50,50,100
     """
     match = _FORM.fullmatch(text.replace(" ", "")) if len(text) <= 80 else None

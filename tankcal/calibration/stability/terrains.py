@@ -45,12 +45,40 @@ class Terrain:
         return DRAWN if self.range_m else 1
 
     def depths_m(self, points, seed, number=0):
-        """Depths (points,) of the terrain below the camera, m, reproducible by seed and number."""
+        """Random depths of the terrain below the camera.
+
+        Parameters
+        ----------
+        points : int
+            Number of points.
+        seed, number : int
+            Seed, and number of the terrain; they reproduce the depths.
+
+        Returns
+        -------
+        ndarray, shape (points,)
+            Depths, m.
+        """
         rng = np.random.default_rng((seed, number) if number else seed)
         return self.position_m[2] - self.low_m - rng.random(points) * self.range_m
 
     def object_points_m(self, ideal_mm, c_mm, depth_m):
-        """Object points (n, 3), m, of ideal image points (n, 2) at depths (n,) below the camera."""
+        """Object points on the rays of image points.
+
+        Parameters
+        ----------
+        ideal_mm : ndarray, shape (n, 2)
+            Ideal image points, mm.
+        c_mm : float
+            Focal length, mm.
+        depth_m : ndarray, shape (n,)
+            Depths below the camera, m.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Object points, m.
+        """
         along = np.column_stack([ideal_mm / c_mm, np.full(len(ideal_mm), -1.0)])
         return np.asarray(self.position_m) + along * depth_m[:, None]
 

@@ -2,21 +2,27 @@
 
 from tankcal.calibration.targets.circles import eccentricity_px, read_circles
 from tankcal.calibration.targets.coded import read_coded
-from tankcal.calibration.targets.dictionaries import target_image
-from tankcal.calibration.targets.found import REASONS, Circle, Found, Marker, Refused
-from tankcal.calibration.targets.reading import Reading, Wanted, read_photographs
-from tankcal.calibration.targets.writing import ImagePoint, PhotoReading, write_image_points
+from tankcal.calibration.targets.opencv import target_image
+from tankcal.calibration.targets.reading import (
+    ImagePoint,
+    PhotoReading,
+    TargetReport,
+    TargetSettings,
+    read_photographs,
+    write_image_points,
+)
+from tankcal.calibration.targets.results import REASONS, Circle, Marker, PhotoTargets, RefusedTarget
 
 __all__ = [
     "REASONS",
     "Circle",
-    "Found",
     "ImagePoint",
     "Marker",
     "PhotoReading",
-    "Reading",
-    "Refused",
-    "Wanted",
+    "PhotoTargets",
+    "RefusedTarget",
+    "TargetReport",
+    "TargetSettings",
     "eccentricity_px",
     "read_circles",
     "read_coded",

@@ -11,8 +11,8 @@ import numpy as np
 import scipy
 from scipy.special import ndtr
 
-from tankcal.calibration.targets.found import Circle, Found, Refused
 from tankcal.calibration.targets.opencv import opencv
+from tankcal.calibration.targets.results import Circle, PhotoTargets, RefusedTarget
 
 WINDOWS = (0.03, 0.1, 0.3)  # windows of the local threshold, as shares of the smaller side
 THRESHOLD_GREY = 7  # local threshold, grey values
@@ -43,7 +43,7 @@ def read_circles(image, smallest_px=6.0, largest_px=None):
 
     Returns
     -------
-    Found
+    PhotoTargets
         Circles without names, from top to bottom, and refused candidates.
 
     Raises
@@ -56,10 +56,10 @@ def read_circles(image, smallest_px=6.0, largest_px=None):
         largest_px = max(30.0, min(image.shape) / 10)
     kept, refused = [], []
     for start in _propose_ellipses(image, smallest_px, largest_px):
-        if not _stands_out(image, *start):
+        if not _is_distinct(image, *start):
             continue
         item = _measure_circle(image, start, smallest_px)
-        if isinstance(item, Refused):
+        if isinstance(item, RefusedTarget):
             refused.append(item)
         elif not any(_is_same(item, other) for other in kept):
             kept.append(item)
@@ -71,7 +71,7 @@ def read_circles(image, smallest_px=6.0, largest_px=None):
         )
     ]
     kept.sort(key=lambda item: tuple(item.centre_px[::-1]))
-    return Found(tuple(kept), tuple(refused), image.shape[::-1])
+    return PhotoTargets(tuple(kept), tuple(refused), image.shape[::-1])
 
 
 def _is_same(circle, other):
@@ -90,7 +90,7 @@ def _propose_ellipses(image, smallest, largest):
             grey, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, window, -THRESHOLD_GREY
         )
         for outline in cv2.findContours(bright, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)[0]:
-            ellipse = _ellipse_of(outline[:, 0], smallest, largest)
+            ellipse = _fit_outline(outline[:, 0], smallest, largest)
             if ellipse is None:
                 continue
             row = np.array([*ellipse[0], *ellipse[1]])
@@ -100,7 +100,7 @@ def _propose_ellipses(image, smallest, largest):
             yield ellipse
 
 
-def _ellipse_of(outline, smallest, largest):
+def _fit_outline(outline, smallest, largest):
     """Return (centre, semi-axes, rotation) of an outline (n, 2), or None if it is no ellipse."""
     extent = outline.max(axis=0) - outline.min(axis=0) + 1
     if len(outline) < 8 or extent.max() > 1.2 * largest or extent.max() < smallest - 1:
@@ -138,32 +138,32 @@ def _distances(places, elements):
 
 
 def _measure_circle(image, start, smallest):
-    """Fit a candidate twice; return a Circle, or Refused with the reason."""
+    """Fit a candidate twice; return a Circle, or RefusedTarget with the reason."""
     centre, axes, turn = start
     blur = START_BLUR_PX
     for _ in range(2):
         distance = _distance_from_border(image, centre, axes)
         if distance < BORDER_PX:
-            return Refused("at_border", centre, None, {"room_px": distance})
+            return RefusedTarget("at_border", centre, None, {"room_px": distance})
         fit = _fit_ellipse(image, centre, axes, turn, blur)
         if fit is None:
-            return Refused("edges", centre, None, {"half_axis_px": float(axes[1])})
+            return RefusedTarget("edges", centre, None, {"half_axis_px": float(axes[1])})
         centre, axes, turn, blur, white, black, rms, sd = fit
     contrast = white - black
     if contrast < LEAST_CONTRAST:
-        return Refused("contrast", centre, None, {"contrast": contrast})
+        return RefusedTarget("contrast", centre, None, {"contrast": contrast})
     if 2 * axes[1] < smallest:
-        return Refused("too_small", centre, None, {"smaller_axis_px": float(2 * axes[1])})
+        return RefusedTarget("too_small", centre, None, {"smaller_axis_px": float(2 * axes[1])})
     if axes[1] < LEAST_RATIO * axes[0]:
-        return Refused("shape", centre, None, {"ratio": float(axes[1] / axes[0])})
+        return RefusedTarget("shape", centre, None, {"ratio": float(axes[1] / axes[0])})
     unevenness = max(rms, _unevenness(image, centre, axes, turn, blur))
     if unevenness > MOST_RESIDUAL * contrast:
-        return Refused("edges", centre, None, {"rms": unevenness, "contrast": contrast})
+        return RefusedTarget("edges", centre, None, {"rms": unevenness, "contrast": contrast})
     sd = float(np.hypot(sd, SD_FLOOR_PX))
     return Circle(centre, sd, axes, float(turn % np.pi), blur, contrast, rms)
 
 
-def _stands_out(image, centre, axes, turn):
+def _is_distinct(image, centre, axes, turn):
     """Whether the contrast of inside and surroundings exceeds the scatter of both."""
     places, grey = _pixels_around(image, centre, 1.6 * axes[0] + 2)
     share = _distances(places, _ellipse_matrix(axes, turn)) / axes[1]
@@ -221,13 +221,15 @@ def _fit_ellipse(image, centre, axes, turn, blur):
     beyond = BEYOND_SEEN * np.ptp(grey)
     if not (fit.x[6] < grey.max() + beyond and fit.x[7] > grey.min() - beyond):
         return None
-    return _result_of_fit(fit, centre, elements, len(grey))
+    return _evaluate_fit(fit, centre, elements, len(grey))
 
 
-def _result_of_fit(fit, centre, elements, count):
+def _evaluate_fit(fit, centre, elements, count):
+    """Results of a fit as in `_fit_ellipse`, or None for an implausible or undetermined ellipse."""
     e, dof = fit.x, count - len(fit.x)
     blur = float(np.exp(np.clip(e[5], -3, 3)))
-    values, vectors = np.linalg.eigh(_full_matrix(elements * (1 + e[2:5])))
+    p, q, r = elements * (1 + e[2:5])
+    values, vectors = np.linalg.eigh([[p, q], [q, r]])
     if dof < 5 or not np.isfinite(e).all() or values[0] <= 0 or blur > MOST_BLUR_PX:
         return None
     axes = 1 / values
@@ -245,11 +247,6 @@ def _result_of_fit(fit, centre, elements, count):
     sd = float(np.sqrt(variance * (rows**2).sum() / 2))
     turn = np.arctan2(vectors[1, 0], vectors[0, 0])
     return centre + e[:2], axes, turn, blur, float(e[6]), float(e[7]), np.sqrt(variance), sd
-
-
-def _full_matrix(elements):
-    p, q, r = elements
-    return np.array([[p, q], [q, r]])
 
 
 def _unevenness(image, centre, axes, turn, blur):

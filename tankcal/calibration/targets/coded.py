@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.calibration.targets.dictionaries import dictionary_of
-from tankcal.calibration.targets.edges import NoEdge, corners_of
-from tankcal.calibration.targets.found import Found, Marker, Refused
-from tankcal.calibration.targets.opencv import opencv
+from tankcal.calibration.targets.edges import NoEdge, fit_corners
+from tankcal.calibration.targets.opencv import load_dictionary, opencv
+from tankcal.calibration.targets.results import Marker, PhotoTargets, RefusedTarget
 
 CELL_PX = 2.5  # least mean width of a cell, px
 LEAST_CLARITY = 0.7  # least correlation of the cells with the code
@@ -27,7 +26,7 @@ SAMPLES = np.linspace(-0.25, 0.25, 3)  # positions of the samples within a cell
 
 
 @dataclass(frozen=True)
-class _Reading:
+class _Search:
     """Photograph, dictionary of its targets, and limits."""
 
     image: np.ndarray
@@ -54,7 +53,7 @@ def read_coded(image, dictionary="DICT_4X4_50", listed=None, bit_errors=0, small
 
     Returns
     -------
-    Found
+    PhotoTargets
         Markers in the order of their ids, and refused candidates.
 
     Raises
@@ -62,37 +61,37 @@ def read_coded(image, dictionary="DICT_4X4_50", listed=None, bit_errors=0, small
     InputError
         If the dictionary is unknown or OpenCV is missing.
     """
-    known = dictionary_of(dictionary)
+    known = load_dictionary(dictionary)
     smallest = CELL_PX * known.cells.shape[1] if smallest_px is None else smallest_px
-    reading = _Reading(np.asarray(image), known, bit_errors, smallest)
+    search = _Search(np.asarray(image), known, bit_errors, smallest)
     measured = [
-        _measure_marker(reading, number, corners)
-        for number, corners in _propose_squares(reading, False)
+        _measure_marker(search, number, corners)
+        for number, corners in _propose_squares(search, False)
     ]
     targets = [target for target in measured if isinstance(target, Marker)]
-    refused = [target for target in measured if isinstance(target, Refused)]
-    targets, doubled = _separate(targets)
-    refused += doubled + _find_mirrored(reading, targets + refused)
-    targets, doubts = _refuse_doubtful(reading, targets, refused, listed)
-    size = reading.image.shape[::-1]
+    refused = [target for target in measured if isinstance(target, RefusedTarget)]
+    targets, doubled = _merge_repeated(targets)
+    refused += doubled + _find_mirrored(search, targets + refused)
+    targets, doubts = _refuse_doubtful(search, targets, refused, listed)
+    size = search.image.shape[::-1]
     doubtful = tuple(target.id for target in targets if target.id in known.mirrored)
-    return Found(
+    return PhotoTargets(
         tuple(sorted(targets, key=lambda target: target.id)), (*refused, *doubts), size, doubtful
     )
 
 
-def _propose_squares(reading, is_flipped):
+def _propose_squares(search, is_flipped):
     """Squares [(id, corners (4, 2))] that OpenCV proposes, in the photo or its mirror image."""
     cv2 = opencv()
-    aruco, image = cv2.aruco, reading.image
+    aruco, image = cv2.aruco, search.image
     if image.dtype != np.uint8:
         image = np.clip(np.round(image), 0, 255).astype(np.uint8)
     settings = aruco.DetectorParameters()
     settings.cornerRefinementMethod = aruco.CORNER_REFINE_NONE
     settings.errorCorrectionRate = DETECTION_ERRORS
-    settings.minMarkerPerimeterRate = min(3.0 * reading.smallest_px / max(image.shape), 1.0)
+    settings.minMarkerPerimeterRate = min(3.0 * search.smallest_px / max(image.shape), 1.0)
     settings.minDistanceToBorder = 1
-    codes = aruco.getPredefinedDictionary(getattr(aruco, reading.dictionary.name))
+    codes = aruco.getPredefinedDictionary(getattr(aruco, search.dictionary.name))
     if is_flipped:
         image = np.ascontiguousarray(image[:, ::-1])
     corners, numbers, _ = aruco.ArucoDetector(codes, settings).detectMarkers(image)
@@ -102,53 +101,50 @@ def _propose_squares(reading, is_flipped):
     return list(zip((int(number) for number in np.ravel(numbers)), places, strict=True))
 
 
-def _measure_marker(reading, number, corners):
-    """Measure a proposed square; return a Marker, or Refused with the reason."""
-    cells = reading.dictionary.cells[number]
-    code, detail = _check_shape(reading, corners)
+def _measure_marker(search, number, corners):
+    """Measure a proposed square; return a Marker, or RefusedTarget with the reason."""
+    cells = search.dictionary.cells[number]
+    code, detail = _check_shape(search, corners)
     if code:
-        return Refused(code, corners.mean(axis=0), number, detail)
+        return RefusedTarget(code, corners.mean(axis=0), number, detail)
     try:
-        fitted, covariance, edges = corners_of(reading.image, corners, cells)
+        fitted, covariance, edges = fit_corners(search.image, corners, cells)
     except NoEdge as reason:
-        return Refused("edges", corners.mean(axis=0), number, {str(reason): 1})
+        return RefusedTarget("edges", corners.mean(axis=0), number, {str(reason): 1})
     contrast = float(np.mean([edge.contrast for edge in edges]))
     rms = max(edge.rms for edge in edges)
     if contrast < max(LEAST_CONTRAST, LEAST_TO_NOISE * rms):
         detail = {"contrast": contrast, "rms": rms}
-        return Refused("contrast", fitted.mean(axis=0), number, detail)
-    code, detail = _check_shape(reading, fitted)
+        return RefusedTarget("contrast", fitted.mean(axis=0), number, detail)
+    code, detail = _check_shape(search, fitted)
     if code:
-        return Refused(code, fitted.mean(axis=0), number, detail)
-    errors, clarity = _read_cells(reading.image, fitted, cells)
-    if errors > reading.bit_errors:
-        return Refused("bit_errors", fitted.mean(axis=0), number, {"bit_errors": errors})
+        return RefusedTarget(code, fitted.mean(axis=0), number, detail)
+    errors, clarity = _read_cells(search.image, fitted, cells)
+    if errors > search.bit_errors:
+        return RefusedTarget("bit_errors", fitted.mean(axis=0), number, {"bit_errors": errors})
     if clarity < LEAST_CLARITY:
-        return Refused("unclear_cells", fitted.mean(axis=0), number, {"clarity": clarity})
+        return RefusedTarget("unclear_cells", fitted.mean(axis=0), number, {"clarity": clarity})
     sd = np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2 + SD_FLOOR_PX**2)
     blur = float(np.mean([edge.blur_px for edge in edges]))
-    return Marker(number, fitted, sd, errors, _side(fitted), blur, clarity)
+    side = float(np.hypot(*(np.roll(fitted, -1, axis=0) - fitted).T).mean())
+    return Marker(number, fitted, sd, errors, side, blur, clarity)
 
 
-def _side(corners):
-    return float(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T).mean())
-
-
-def _check_shape(reading, corners):
+def _check_shape(search, corners):
     """Return (code, detail) for a shape to refuse, or (None, None)."""
     sides = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(*sides.T)
     if not lengths.min() > 0:
         return "shape", {"side_px": 0.0}
     side = float(lengths.mean())
-    if side < reading.smallest_px:
+    if side < search.smallest_px:
         return "too_small", {"side_px": side}
     units = sides / lengths[:, None]
     following = np.roll(units, -1, axis=0)
     turns = units[:, 0] * following[:, 1] - units[:, 1] * following[:, 0]
     if turns.min() < MOST_SLANTED:
         return "shape", {"sine": float(turns.min())}
-    last = np.array(reading.image.shape[::-1]) - 1
+    last = np.array(search.image.shape[::-1]) - 1
     distance = float(min(corners.min(), (last - corners).min()))
     if distance < BORDER_PX:
         return "at_border", {"room_px": distance}
@@ -180,7 +176,7 @@ def _read_cells(image, corners, cells):
     return errors, clarity
 
 
-def _separate(targets):
+def _merge_repeated(targets):
     """Merge squares proposed twice, and refuse different codes in one place."""
     kept, refused = [], []
     for target in targets:
@@ -195,33 +191,35 @@ def _separate(targets):
     for i, target in enumerate(kept):
         near = np.hypot(*(middles - middles[i]).T) < NEAR * target.side_px
         if near.sum() > 1:
-            refused.append(Refused("overlap", middles[i], target.id, {"targets": int(near.sum())}))
+            refused.append(
+                RefusedTarget("overlap", middles[i], target.id, {"targets": int(near.sum())})
+            )
     bad = {tuple(target.place_px) for target in refused}
     return [target for target in kept if tuple(target.centre_px) not in bad], refused
 
 
-def _find_mirrored(reading, known):
+def _find_mirrored(search, known):
     """Refuse codes that can be read in the mirror image only."""
     places = np.array(
         [target.centre_px if isinstance(target, Marker) else target.place_px for target in known]
     ).reshape(-1, 2)
-    last = reading.image.shape[1] - 1
-    flipped = replace(reading, image=reading.image[:, ::-1], bit_errors=0)
+    last = search.image.shape[1] - 1
+    flipped = replace(search, image=search.image[:, ::-1], bit_errors=0)
     refused = []
-    for number, corners in _propose_squares(reading, True):
+    for number, corners in _propose_squares(search, True):
         target = _measure_marker(flipped, number, corners)
-        if isinstance(target, Refused):
+        if isinstance(target, RefusedTarget):
             continue
         place = target.centre_px * [-1, 1] + [last, 0]
         if len(places) and np.hypot(*(places - place).T).min() < NEAR * target.side_px:
             continue
-        refused.append(Refused("mirrored", place, number, {"side_px": target.side_px}))
+        refused.append(RefusedTarget("mirrored", place, number, {"side_px": target.side_px}))
     return refused
 
 
-def _refuse_doubtful(reading, targets, refused, listed):
+def _refuse_doubtful(search, targets, refused, listed):
     """Refuse codes that are not listed, occur twice, or have no unique orientation."""
-    known = reading.dictionary
+    known = search.dictionary
     counts = {}
     seen = [
         *targets,
@@ -244,5 +242,5 @@ def _refuse_doubtful(reading, targets, refused, listed):
         if code is None:
             kept.append(target)
         else:
-            doubts.append(Refused(code, target.centre_px, target.id, detail))
+            doubts.append(RefusedTarget(code, target.centre_px, target.id, detail))
     return kept, doubts

@@ -24,10 +24,10 @@ CURVED_FROM_PX = 40.0  # length from which a curvature is estimated; below, nois
 BAND_PX = 6.0  # largest half-width of the band of pixels used, px
 CELL_SHARE = 0.95  # largest half-width of the band, as a share of a cell
 BEYOND_WEIGHT = 0.02  # weight of the weak condition `beyond = high`
-MOST_ROUNDS = 20  # largest number of iterations
-SAME_PIXELS_FROM = 3  # iteration from which the pixels are fixed; changes would prevent convergence
-NEARLY_STILL_PX = 0.05  # largest accepted last change of a corner, px
-STANDS_STILL_PX, STANDS_STILL = 0.002, 0.1  # change at convergence, px, and in standard deviations
+MAX_ITERATIONS = 20  # largest number of iterations
+FIXED_PIXELS_FROM = 3  # iteration from which the pixels are fixed, to allow convergence
+LARGEST_LAST_PX = 0.05  # largest accepted last change of a corner, px
+CONVERGED_PX, CONVERGED_SDS = 0.002, 0.1  # change at convergence, px, and in standard deviations
 MOST_MOVED_PX = 6.0  # largest change in one iteration, px
 SHORTEST_PX = 5.0  # least length of an edge between the excluded ends, px
 START_BLUR_PX = 1.2  # initial blur, px
@@ -86,7 +86,7 @@ class Edge:
         return distance, self.inward - slope * self.along, row @ self.cofactor_px2 @ row
 
 
-def corners_of(image, corners, cells):
+def fit_corners(image, corners, cells):
     """Measure the corners of a marker as intersections of its fitted edges.
 
     Parameters
@@ -114,16 +114,16 @@ def corners_of(image, corners, cells):
     """
     places, blur = np.asarray(corners, dtype=float), START_BLUR_PX
     edges, pixels = [None] * 4, [None] * 4
-    for iteration in range(MOST_ROUNDS):
+    for iteration in range(MAX_ITERATIONS):
         lines = [_reference_line(places, side, len(cells)) for side in range(4)]
-        if iteration <= SAME_PIXELS_FROM:
+        if iteration <= FIXED_PIXELS_FROM:
             margin = 2.5 * max(blur, 0.7) + (0.5 if iteration else 1.5)
-            reach = [_band(line, blur, iteration > 0) for line in lines]
             pixels = [
-                _pixels(image, line, margin, band) for line, band in zip(lines, reach, strict=True)
+                _select_pixels(image, line, margin, _band_width(line, blur, iteration > 0))
+                for line in lines
             ]
         edges = [
-            _fit(image, lines[side], pixels[side], np.rot90(cells, side)[1], edges[side], blur)
+            _fit_edge(image, lines[side], pixels[side], np.rot90(cells, side)[1], edges[side], blur)
             for side in range(4)
         ]
         blur = float(np.median([edge.blur_px for edge in edges]))
@@ -134,9 +134,9 @@ def corners_of(image, corners, cells):
         if not moved < MOST_MOVED_PX:
             break
         sd = np.sqrt(np.trace(covariance, axis1=1, axis2=2).min() / 2)
-        if iteration > 1 and moved < max(STANDS_STILL_PX, STANDS_STILL * sd):
+        if iteration > 1 and moved < max(CONVERGED_PX, CONVERGED_SDS * sd):
             break
-    if not moved < NEARLY_STILL_PX:
+    if not moved < LARGEST_LAST_PX:
         raise NoEdge("unsteady")
     return places, covariance + moved**2 * np.eye(2), edges
 
@@ -173,7 +173,7 @@ def _reference_line(corners, side, cells):
     return _Line(start, along, inward, length, _inner_line(corners, cells), cells)
 
 
-def _fit(image, line, pixels, bits, before, blur):
+def _fit_edge(image, line, pixels, bits, before, blur):
     """Fit an Edge along a _Line to pixels (lines, columns), starting from the edge `before`."""
     x, y = pixels[1] - line.start[0], pixels[0] - line.start[1]
     t = x * line.along[0] + y * line.along[1]
@@ -185,11 +185,11 @@ def _fit(image, line, pixels, bits, before, blur):
     t = 2 * t / line.length - 1
     model = _Model(t, d, grey, depth, columns, bits, line.cells / line.length)
     levels = None if before is None else before.levels
-    solved = model.solved(blur, levels, line.length >= CURVED_FROM_PX)
-    return Edge(line.start, line.along, line.inward, line.length, *solved)
+    result = model.fit(blur, levels, line.length >= CURVED_FROM_PX)
+    return Edge(line.start, line.along, line.inward, line.length, *result)
 
 
-def _band(line, blur, is_final):
+def _band_width(line, blur, is_final):
     """Half-width of the band of pixels used, px."""
     wanted = min(3.5 * blur + 0.5 if is_final else BAND_PX, BAND_PX)
     return max(min(wanted, CELL_SHARE * float(line.depths.min())), 2.0)
@@ -207,7 +207,7 @@ def _inner_line(corners, count):
     return (p0 + u[:, None] * across + v * down) / (1 + g * u + h * v)[:, None]
 
 
-def _pixels(image, line, margin, band):
+def _select_pixels(image, line, margin, band):
     """Lines and columns of the pixels near an edge, except near its ends."""
     margin = min(margin, max(line.length / 4, (line.length - SHORTEST_PX) / 2))
     ends = line.start + np.outer([0, line.length], line.along)
@@ -234,12 +234,12 @@ class _Model:
         self.columns, self.bits, self.cells_per_px = columns, bits, cells_per_px
         self.rows = np.column_stack([np.ones_like(t), t, t * t - 1 / 3])
 
-    def solved(self, blur, levels, is_curved):
+    def fit(self, blur, levels, is_curved):
         """Fit the model; return curve, cofactor, blur, levels and rms as in Edge."""
         self.degree = k = 3 if is_curved else 2
-        self.row_of_code = self._row_of_code(blur)
+        self.row_of_code = self._blur_code(blur)
         if levels is None:
-            levels = self._levels()
+            levels = self._estimate_levels()
         start = np.concatenate([np.zeros(k), [np.log(blur)], levels])
         fit = scipy.optimize.least_squares(
             self.residuals, start, self.jacobian, method="lm", x_scale="jac", max_nfev=60
@@ -254,20 +254,20 @@ class _Model:
         curve = np.append(e[:k], np.zeros(3 - k))
         return curve, cofactor, blur, e[k + 1 :], np.sqrt(variance)
 
-    def _levels(self):
+    def _estimate_levels(self):
         outside, inside = self.grey[self.d < -1], self.grey[self.d > 1]
         if not (len(outside) and len(inside)):
             raise NoEdge("short")
         high, low = np.percentile(outside, 75), np.percentile(inside, 25)
         return np.array([high, low, 0.0, high])
 
-    def _row_of_code(self, blur):
+    def _blur_code(self, blur):
         """Row of code cells next to the border, blurred along the edge, at each pixel (n,)."""
         s = max(blur, 0.3) * self.cells_per_px
         steps = ndtr((self.columns[:, None] - np.arange(len(self.bits) + 1)) / s)
         return (steps[:, :-1] - steps[:, 1:]) @ self.bits
 
-    def _parts(self, e):
+    def _evaluate(self, e):
         k = self.degree
         s = np.exp(np.clip(e[k], -3, 3))
         z = (self.d - self.rows[:, :k] @ e[:k]) / s
@@ -277,7 +277,7 @@ class _Model:
 
     def residuals(self, e):
         """Computed minus measured grey values, and the weak condition `beyond = high`."""
-        k, *_, dark, out = self._parts(e)
+        k, *_, dark, out = self._evaluate(e)
         high, low, gradient, beyond = e[k + 1 :]
         grey = high + (low - high) * dark + (beyond - high) * out
         misclosure = (1 + gradient * self.t) * grey - self.grey
@@ -285,7 +285,7 @@ class _Model:
 
     def jacobian(self, e):
         """Derivatives of the residuals by the parameters, shape (n + 1, parameters)."""
-        k, s, z, inner, outer, dark, out = self._parts(e)
+        k, s, z, inner, outer, dark, out = self._evaluate(e)
         high, low, gradient, beyond = e[k + 1 :]
         gain = 1 + gradient * self.t
         # The derivative of F is the normal density; the chain rule applies to each term.

@@ -16,8 +16,15 @@ from tankcal.job.fields import Field
 from tankcal.job.tables import read_bytes
 from tankcal.messages import message
 
-# Size and orientation are read from the header alone, before the picture is decoded.
+MOST_PIXELS = 250_000_000  # largest number of pixels of a picture
+LEAST_SIDE_PX = 32  # least number of columns and of lines
+MOST_BYTES = 1_000_000_000  # largest size of a picture file
+KINDS = message("targets_kinds", "a JPEG, PNG, TIFF or BMP picture")
+PHOTO = Field("photo", "name", "the photo")
+ENCODINGS = ("by_file", "linear", "srgb")
+JPEG_START = b"\xff\xd8"
 
+# Size and orientation are read from the header alone, before the picture is decoded.
 JPEG_SIZES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # start of frame
 JPEG_ALONE = frozenset({0x01, *range(0xD0, 0xD9)})  # markers without a length
 TIFF_WIDTH, TIFF_HEIGHT, TIFF_TURN = 256, 257, 274
@@ -32,15 +39,15 @@ class Header:
     orientation: int = 1
 
 
-def header_of(data):
+def read_header(data):
     """Return the Header of a JPEG, PNG, TIFF or BMP file (bytes), or None for other files."""
     try:
         if data[:8] == b"\x89PNG\r\n\x1a\n" and data[12:16] == b"IHDR":
             return Header(struct.unpack(">II", data[16:24]))
         if data[:2] == b"\xff\xd8":
-            return _jpeg(data)
+            return _read_jpeg_header(data)
         if data[:4] in (b"II*\0", b"MM\0*"):
-            return _tiff(data)
+            return _read_tiff_header(data)
         if data[:2] == b"BM":
             columns, lines = struct.unpack("<ii", data[18:26])
             return Header((abs(columns), abs(lines)))
@@ -49,7 +56,8 @@ def header_of(data):
     return None
 
 
-def _jpeg(data):
+def _read_jpeg_header(data):
+    """Header of a JPEG file from its segments, or None without a start of frame."""
     place, turn = 2, 1
     while data[place] == 0xFF:
         kind = data[place + 1]
@@ -61,19 +69,19 @@ def _jpeg(data):
             lines, columns = struct.unpack(">HH", data[place + 5 : place + 9])
             return Header((columns, lines), turn)
         if kind == 0xE1 and data[place + 4 : place + 10] == b"Exif\0\0":
-            turn = _tags(data[place + 10 : place + 2 + length]).get(TIFF_TURN, 1)
+            turn = _read_tags(data[place + 10 : place + 2 + length]).get(TIFF_TURN, 1)
         place += 2 + length
     return None
 
 
-def _tiff(data):
-    tags = _tags(data)
+def _read_tiff_header(data):
+    tags = _read_tags(data)
     if TIFF_WIDTH not in tags or TIFF_HEIGHT not in tags:
         return None
     return Header((tags[TIFF_WIDTH], tags[TIFF_HEIGHT]), tags.get(TIFF_TURN, 1))
 
 
-def _tags(data):
+def _read_tags(data):
     """Return {tag: number} of the first directory of a TIFF structure, for short and long tags."""
     order = {b"II": "<", b"MM": ">"}.get(data[:2])
     if order is None:
@@ -91,15 +99,6 @@ def _tags(data):
     except struct.error:
         pass
     return tags
-
-
-MOST_PIXELS = 250_000_000  # largest number of pixels of a picture
-LEAST_SIDE_PX = 32  # least number of columns and of lines
-MOST_BYTES = 1_000_000_000  # largest size of a picture file
-KINDS = message("targets_kinds", "a JPEG, PNG, TIFF or BMP picture")
-PHOTO = Field("photo", "name", "the photo")
-ENCODINGS = ("by_file", "linear", "srgb")
-JPEG_START = b"\xff\xd8"
 
 
 @dataclass(frozen=True)
@@ -148,7 +147,7 @@ def read_picture(path, log, encoding="by_file"):
     data = read_bytes(path, log, MOST_BYTES)
     if data is None:
         return None
-    header = header_of(data)
+    header = read_header(data)
     if header is None:
         return log.problem(
             path.name,
@@ -187,7 +186,7 @@ def read_picture(path, log, encoding="by_file"):
         log.warning(path.name, message("targets_doubtful_jpeg", template, report=report.strip()))
     if encoding == "by_file":
         encoding = "srgb" if data.startswith(JPEG_START) else "linear"
-    return Picture(_light(image, encoding), encoding, header.orientation)
+    return Picture(_convert_to_light(image, encoding), encoding, header.orientation)
 
 
 def _decode(data):
@@ -198,13 +197,13 @@ def _decode(data):
     cv2 = opencv()
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     image = None
-    with _captured_error_stream() as printed, suppress(cv2.error):
+    with _capture_error_stream() as printed, suppress(cv2.error):
         image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
     return image, printed.text
 
 
 @contextmanager
-def _captured_error_stream():
+def _capture_error_stream():
     """Collect in `text` what C libraries print to the standard error stream of the process."""
     printed = SimpleNamespace(text="")
     with TemporaryFile() as file:
@@ -223,7 +222,7 @@ def _captured_error_stream():
             printed.text = file.read().decode("utf-8", "replace")
 
 
-def _light(image, encoding):
+def _convert_to_light(image, encoding):
     """Grey values from 0 to 255, float32; pictures of 16 bits are scaled to their maximum."""
     most = {"uint8": 255.0, "uint16": 65535.0}.get(str(image.dtype))
     light = image.astype(np.float32)

@@ -1,13 +1,18 @@
-"""Measurement of targets in photographs, from picture files to image_points.csv."""
+"""Measurement of targets in photographs, from picture files to image_points.csv.
 
+image_points.csv and the list of refused candidates are written both, or neither.
+"""
+
+import io
+import os
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from tankcal.calibration.targets.circles import read_circles
 from tankcal.calibration.targets.coded import read_coded
-from tankcal.calibration.targets.dictionaries import dictionary_of
-from tankcal.calibration.targets.found import Refused
 from tankcal.calibration.targets.naming import (
     CORNERS,
     match_circles_to_places,
@@ -15,24 +20,23 @@ from tankcal.calibration.targets.naming import (
     read_places,
     warn_of_unused,
 )
-from tankcal.calibration.targets.opencv import opencv
+from tankcal.calibration.targets.opencv import load_dictionary, opencv
 from tankcal.calibration.targets.pictures import ENCODINGS, photo_name, read_picture
-from tankcal.calibration.targets.writing import (
-    ImagePoint,
-    PhotoReading,
-    check_free,
-    write_image_points,
-)
-from tankcal.job.fields import Refused as BadName
+from tankcal.calibration.targets.results import REASONS, RefusedTarget
+from tankcal.errors import InputError, Problem, reason_of
+from tankcal.job.fields import Refused as InvalidName
 from tankcal.job.tables import Log, shown
 from tankcal.messages import join_with_or, message
+from tankcal.text.spreadsheets import write_guarded
 
 WHAT = ("corners", "centres", "circles")
+HEADINGS = ("photo", "point", "column_px", "line_px", "s_px")
+REFUSED_HEADINGS = ("photo", "code", "id", "column_px", "line_px", "detail", "reason")
 WARNED_CHANCE = 1e-4  # probability of a code in random cells above which a warning is given
 
 
 @dataclass(frozen=True)
-class Wanted:
+class TargetSettings:
     """Settings of the measurement.
 
     Attributes
@@ -70,7 +74,44 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Reading:
+class ImagePoint:
+    """Measured image point: name, column and line (2,), standard deviation of each, px."""
+
+    point: str
+    place_px: np.ndarray
+    sd_px: float
+
+
+@dataclass(frozen=True)
+class PhotoReading:
+    """Result of the measurement of one photo.
+
+    Attributes
+    ----------
+    photo : str
+        Name of the photo.
+    size_px : tuple of int
+        Columns and lines.
+    orientation : int
+        Orientation tag of the file (1: no rotation). It is not applied.
+    targets : tuple of str
+        Names of the targets, without suffixes of corners.
+    points : tuple of ImagePoint
+        Image points.
+    refused : tuple of RefusedTarget
+        RefusedTarget candidates.
+    """
+
+    photo: str
+    size_px: tuple
+    orientation: int
+    targets: tuple
+    points: tuple
+    refused: tuple
+
+
+@dataclass(frozen=True)
+class TargetReport:
     """Result of the measurement of several photos.
 
     Attributes
@@ -96,7 +137,7 @@ class Reading:
     warnings: tuple
 
 
-def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
+def read_photographs(paths, out_csv, settings=None, replace=False, progress=None):
     """Measure targets in photographs and write image_points.csv.
 
     No file is written if there is a problem.
@@ -107,7 +148,7 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
         Picture files; the name of a photo is its file name without extension.
     out_csv : path-like
         Path of image_points.csv; refused candidates are written to ..._refused.csv in its folder.
-    wanted : Wanted, optional
+    settings : TargetSettings, optional
         Settings; by default the corners of coded targets are measured.
     replace : bool, optional
         Whether existing files may be overwritten.
@@ -116,32 +157,34 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
 
     Returns
     -------
-    Reading
+    TargetReport
 
     Raises
     ------
     InputError
         If files, names or settings are invalid; the error lists all problems.
     """
-    wanted, log = wanted or Wanted(), Log()
+    settings, log = settings or TargetSettings(), Log()
     opencv()
-    names, places = _read_settings(wanted, log)
+    names, places = _read_settings(settings, log)
     check_free(out_csv, replace, log)
     titles = _name_photos(paths, log)
     if places:
-        warn_of_unused(places, [title for _, title in titles], Path(wanted.places).name, log)
+        warn_of_unused(places, [title for _, title in titles], Path(settings.places).name, log)
     photos, encodings = [], Counter()
     for done, (path, title) in enumerate(titles):
         if progress:
             progress(title, done, len(titles))
-        picture = read_picture(path, log, wanted.encoding if wanted.encoding in ENCODINGS else None)
+        picture = read_picture(
+            path, log, settings.encoding if settings.encoding in ENCODINGS else None
+        )
         if picture is not None:
             encodings[picture.encoding] += 1
         if picture is not None and not log.problems:
-            photos.append(_measure_photo(title, picture, wanted, names, places, log))
+            photos.append(_measure_photo(title, picture, settings, names, places, log))
     log.stop_if_problems()
-    _warn(photos, wanted, names, log)
-    if encodings["srgb"] and wanted.encoding == "by_file":
+    _warn_of_photos(photos, settings, names, log)
+    if encodings["srgb"] and settings.encoding == "by_file":
         expected = message(
             "targets_srgb",
             "JPEG files ({count}): grey values are taken as sRGB; if that is wrong, edges "
@@ -152,7 +195,7 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
     written = write_image_points(photos, out_csv, replace)
     if progress:
         progress(message("targets_done", "done"), len(titles), len(titles))
-    return Reading(
+    return TargetReport(
         tuple(photos),
         *written,
         sum(len(photo.targets) for photo in photos),
@@ -162,11 +205,11 @@ def read_photographs(paths, out_csv, wanted=None, replace=False, progress=None):
     )
 
 
-def _read_settings(wanted, log):
+def _read_settings(settings, log):
     """Return {id: name} or None, and {photo: [Place]}; problems of the settings are logged."""
     for value, known, name in (
-        (wanted.what, WHAT, "what"),
-        (wanted.encoding, ENCODINGS, "encoding"),
+        (settings.what, WHAT, "what"),
+        (settings.encoding, ENCODINGS, "encoding"),
     ):
         if value not in known:
             expected = message(
@@ -177,7 +220,7 @@ def _read_settings(wanted, log):
             )
             log.problem(name, expected)
     for name in ("reach_px", "smallest_px", "largest_px", "bit_errors"):
-        value = getattr(wanted, name)
+        value = getattr(settings, name)
         if value is not None and not 0 <= value < 1e5:
             log.problem(
                 name,
@@ -185,16 +228,19 @@ def _read_settings(wanted, log):
                     "targets_number", "found {found:g}; expected a number of 0 or more", found=value
                 ),
             )
-    return _places_of_circles(wanted, log) if wanted.what == "circles" else _names(wanted, log)
+    if settings.what == "circles":
+        return _read_circle_places(settings, log)
+    return _read_code_names(settings, log)
 
 
-def _places_of_circles(wanted, log):
-    if wanted.names is not None:
+def _read_circle_places(settings, log):
+    """Return None and {photo: [Place]}; problems of the settings are logged."""
+    if settings.names is not None:
         log.problem(
             "names",
             message("targets_names_of_circles", "only for coded targets; circles have `places`"),
         )
-    if wanted.places is None:
+    if settings.places is None:
         log.problem(
             "places",
             message(
@@ -203,19 +249,20 @@ def _places_of_circles(wanted, log):
             ),
         )
         return None, {}
-    return None, read_places(Path(wanted.places), log)
+    return None, read_places(Path(settings.places), log)
 
 
-def _names(wanted, log):
-    if wanted.places is not None:
+def _read_code_names(settings, log):
+    """Return {id: name} or None, and no positions; problems of the settings are logged."""
+    if settings.places is not None:
         log.problem(
             "places",
             message("targets_places_of_codes", "only for circles; coded targets have `names`"),
         )
-    known = dictionary_of(wanted.dictionary)
-    if wanted.names is None:
+    known = load_dictionary(settings.dictionary)
+    if settings.names is None:
         return None, {}
-    names = read_names(Path(wanted.names), log, CORNERS if wanted.what == "corners" else ())
+    names = read_names(Path(settings.names), log, CORNERS if settings.what == "corners" else ())
     beyond = [number for number in names if number >= len(known.cells)]
     if beyond:
         listed = ", ".join(str(number) for number in beyond[:5])
@@ -226,7 +273,7 @@ def _names(wanted, log):
             last=len(known.cells) - 1,
             dictionary=known.name,
         )
-        log.problem(Path(wanted.names).name, expected, column="id")
+        log.problem(Path(settings.names).name, expected, column="id")
     return names, {}
 
 
@@ -236,7 +283,7 @@ def _name_photos(paths, log):
     for path in map(Path, paths):
         try:
             title = photo_name(path)
-        except BadName as refusal:
+        except InvalidName as refusal:
             log.problem(
                 path.name,
                 message("targets_photo_name", "as the name of a photo: {refusal}", refusal=refusal),
@@ -260,17 +307,18 @@ def _name_photos(paths, log):
     return titles
 
 
-def _measure_photo(title, picture, wanted, names, places, log):
+def _measure_photo(title, picture, settings, names, places, log):
     """Measure one picture; return a PhotoReading."""
-    if wanted.what == "circles":
-        return _measure_circles(title, picture, wanted, places.get(title, []), log)
-    found = read_coded(
-        picture.image, wanted.dictionary, names, wanted.bit_errors, wanted.smallest_px
+    if settings.what == "circles":
+        return _measure_circles(title, picture, settings, places.get(title, []), log)
+    measured = read_coded(
+        picture.image, settings.dictionary, names, settings.bit_errors, settings.smallest_px
     )
     named = [
-        (target, str(target.id) if names is None else names[target.id]) for target in found.targets
+        (target, str(target.id) if names is None else names[target.id])
+        for target in measured.targets
     ]
-    if wanted.what == "centres":
+    if settings.what == "centres":
         points = [ImagePoint(name, target.centre_px, target.centre_sd_px) for target, name in named]
     else:
         points = [
@@ -279,8 +327,8 @@ def _measure_photo(title, picture, wanted, names, places, log):
             for corner, place, sd in zip(CORNERS, target.corners_px, target.sd_px, strict=True)
         ]
     targets = tuple(name for _, name in named)
-    if found.doubtful:
-        listed = ", ".join(str(number) for number in found.doubtful[:10])
+    if measured.doubtful:
+        listed = ", ".join(str(number) for number in measured.doubtful[:10])
         expected = message(
             "targets_mirror",
             "ids that read the same in a mirror image, with corners exchanged: {numbers}",
@@ -288,39 +336,40 @@ def _measure_photo(title, picture, wanted, names, places, log):
         )
         log.warning(title, expected)
     return PhotoReading(
-        title, found.size_px, picture.orientation, targets, tuple(points), found.refused
+        title, measured.size_px, picture.orientation, targets, tuple(points), measured.refused
     )
 
 
-def _measure_circles(title, picture, wanted, places, log):
-    found = read_circles(picture.image, wanted.smallest_px or 6.0, wanted.largest_px)
-    named, refused, missing = match_circles_to_places(found.targets, places, wanted.reach_px)
+def _measure_circles(title, picture, settings, places, log):
+    """Measure circles in one picture and name them by positions; return a PhotoReading."""
+    measured = read_circles(picture.image, settings.smallest_px or 6.0, settings.largest_px)
+    named, refused, missing = match_circles_to_places(measured.targets, places, settings.reach_px)
     if missing:
         listed = ", ".join(repr(name) for name in missing[:5])
         expected = message(
             "targets_no_circle",
             "no circle within {reach:g} px of {count} places: {names}",
-            reach=wanted.reach_px,
+            reach=settings.reach_px,
             count=len(missing),
             names=listed,
         )
         log.warning(title, expected)
     points = tuple(ImagePoint(name, circle.centre_px, circle.sd_px) for name, circle in named)
     refused = [
-        Refused(code, circle.centre_px, None, {"half_axis_px": float(circle.semi_axes_px[0])})
+        RefusedTarget(code, circle.centre_px, None, {"half_axis_px": float(circle.semi_axes_px[0])})
         for code, circle in refused
     ]
     return PhotoReading(
         title,
-        found.size_px,
+        measured.size_px,
         picture.orientation,
         tuple(name for name, _ in named),
         points,
-        (*found.refused, *refused),
+        (*measured.refused, *refused),
     )
 
 
-def _warn(photos, wanted, names, log):
+def _warn_of_photos(photos, settings, names, log):
     """Log warnings about photos without targets, rotation tags, sizes, names and chance codes."""
     for photo in photos:
         if not photo.targets:
@@ -344,9 +393,9 @@ def _warn(photos, wanted, names, log):
                 sizes=listed,
             ),
         )
-    _warn_of_names(photos, wanted, names, log)
-    if wanted.what != "circles" and names is None:
-        chance = dictionary_of(wanted.dictionary).chance
+    _warn_of_names(photos, settings, names, log)
+    if settings.what != "circles" and names is None:
+        chance = load_dictionary(settings.dictionary).chance
         if chance > WARNED_CHANCE:
             expected = message(
                 "targets_chance",
@@ -357,7 +406,7 @@ def _warn(photos, wanted, names, log):
             log.warning("dictionary", expected)
 
 
-def _warn_of_names(photos, wanted, names, log):
+def _warn_of_names(photos, settings, names, log):
     """Log warnings about targets in a single photo, and listed names in no photo."""
     times = Counter(name for photo in photos for name in photo.targets)
     once = [name for name, count in times.items() if count == 1]
@@ -376,7 +425,7 @@ def _warn_of_names(photos, wanted, names, log):
     if unseen:
         listed = ", ".join(repr(name) for name in unseen[:10])
         log.warning(
-            Path(wanted.names).name,
+            Path(settings.names).name,
             message(
                 "targets_unseen",
                 "listed, but found in no photo: {count}: {names}",
@@ -384,3 +433,105 @@ def _warn_of_names(photos, wanted, names, log):
                 names=listed,
             ),
         )
+
+
+def make_refused_path(path):
+    """Path of the list of refused candidates: image_points_refused.csv for image_points.csv."""
+    path = Path(path)
+    return path.with_name(f"{path.stem}_refused.csv")
+
+
+def _message_exists():
+    return message(
+        "targets_there_already",
+        "already exists; expected another name, or the choice to replace it",
+    )
+
+
+def check_free(path, replace, log):
+    """Log a problem if the folder is missing, or if a file exists and `replace` is false."""
+    for file in (Path(path), make_refused_path(path)):
+        if not file.parent.is_dir():
+            log.problem(file.name, message("targets_no_folder", "its folder does not exist"))
+            return
+        if file.exists() and not replace:
+            log.problem(file.name, _message_exists())
+
+
+def write_image_points(photos, path, replace=False):
+    """Write image_points.csv and the list of refused candidates.
+
+    Parameters
+    ----------
+    photos : sequence of PhotoReading
+        Results of the photos, in the order of the rows.
+    path : path-like
+        Path of image_points.csv.
+    replace : bool, optional
+        Whether existing files may be overwritten.
+
+    Returns
+    -------
+    tuple of Path
+        Paths of both files.
+
+    Raises
+    ------
+    InputError
+        If a file exists or cannot be written. No file is then written.
+    """
+    existing = [item.name for item in (Path(path), make_refused_path(path)) if item.exists()]
+    if existing and not replace:
+        expected = _message_exists()
+        raise InputError([Problem(name, expected) for name in existing])
+    rows = [
+        (photo.photo, item.point, *(f"{x:.4f}" for x in item.place_px), f"{item.sd_px:.4f}")
+        for photo in photos
+        for item in photo.points
+    ]
+    refused = [_format_refused(photo.photo, item) for photo in photos for item in photo.refused]
+    texts = {
+        make_refused_path(path): _format_csv(REFUSED_HEADINGS, refused),
+        Path(path): _format_csv(HEADINGS, rows),
+    }
+    drafts = {target: target.with_name(f".{target.name}.part") for target in texts}
+    try:
+        for target, text in texts.items():
+            drafts[target].write_text(text, encoding="utf-8", newline="")
+        for target, draft in drafts.items():
+            os.replace(draft, target)
+    except OSError as error:
+        for draft in drafts.values():
+            draft.unlink(missing_ok=True)
+        raise InputError(
+            Problem(
+                Path(path).name,
+                message(
+                    "targets_not_written", "cannot be written ({reason})", reason=reason_of(error)
+                ),
+            )
+        ) from None
+    return Path(path), make_refused_path(path)
+
+
+def _format_refused(photo, refused):
+    """Cells of a refused candidate in the order of REFUSED_HEADINGS."""
+    column, line = refused.place_px
+    detail = "; ".join(f"{key} {value:.3g}" for key, value in refused.detail.items())
+    number = "" if refused.id is None else refused.id
+    return (
+        photo,
+        refused.code,
+        number,
+        f"{column:.1f}",
+        f"{line:.1f}",
+        detail,
+        REASONS[refused.code],
+    )
+
+
+def _format_csv(headings, rows):
+    """Format rows as CSV; a cell with a comma is quoted, and no cell contains a line break."""
+    stream = io.StringIO()
+    write_guarded(stream, [headings, *rows])
+    return stream.getvalue()

@@ -9,7 +9,7 @@ published
 brown
     common model in pixels of the programs below
 opencv, colmap, metashape, pix4d, balanced
-    form of each program; filestorage: text of OpenCV
+    form of each program, and the text of its files
 reading, writing
     interface for files of all programs, and cameras.toml; texts: shared functions of the readers
 """

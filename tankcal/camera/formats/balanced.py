@@ -20,7 +20,7 @@ import numpy as np
 from tankcal.camera.formats.fitting import USUAL
 from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
 from tankcal.camera.formats.published import convert_camera
-from tankcal.camera.formats.texts import exact_text, given_twice, short_text
+from tankcal.camera.formats.texts import duplicate_message, exact_text, short_text
 from tankcal.camera.model import Form
 from tankcal.messages import message
 
@@ -56,7 +56,7 @@ class Balanced:
     covariance: np.ndarray | None = None
 
 
-def from_balanced(camera, pixel_mm, size_px):
+def convert_from_balanced(camera, pixel_mm, size_px):
     """Convert to a FramedCamera with equal numbers, except for the sign of Ck.
 
     Parameters
@@ -76,7 +76,7 @@ def from_balanced(camera, pixel_mm, size_px):
     return make_framed_camera(*_interior_of(camera), pixel_mm, size_px)
 
 
-def film_from_balanced(camera, format_mm):
+def convert_film_from_balanced(camera, format_mm):
     """Convert to a FramedCamera on film of a given width and height (2,), mm."""
     return make_film_camera(*_interior_of(camera), format_mm)
 
@@ -91,7 +91,7 @@ def _interior_of(camera):
     return interior, Form(camera.convention, "b1_b2", float(camera.values["R0"]))
 
 
-def to_balanced(camera, radius_mm, convention="distortion_of_ideal", covariance=None):
+def convert_to_balanced(camera, radius_mm, convention="distortion_of_ideal", covariance=None):
     """Convert a FramedCamera, exactly for K4 = P3 = P4 = 0 and a suitable convention.
 
     Parameters
@@ -145,17 +145,17 @@ def parse(text, notes):
             continue
         key = words[0]
         if len(words) != 2:
-            notes.tell(
+            notes.add(
                 message("convert_key_and_number", "expected a key and one number"),
                 row,
                 short_text(key),
             )
         elif key in values:
-            notes.tell(given_twice(), row, key)
+            notes.add(duplicate_message(), row, key)
         elif key == "convention":
             convention = words[1]
             if convention not in CONVENTIONS_OF:
-                notes.tell(
+                notes.add(
                     message(
                         "convert_conventions",
                         "expected one of {names}",
@@ -170,7 +170,7 @@ def parse(text, notes):
             lower_limit = 0 if key in FRAME_KEYS else None
             values[key] = notes.number(words[1], row, key, above=lower_limit)
         else:
-            notes.tell(
+            notes.add(
                 message(
                     "convert_balanced_unknown",
                     "unknown; expected {known}",
@@ -189,7 +189,7 @@ def _check_values(values, notes):
     """Check required keys and signs; problems are added to `notes`."""
     for key in ("Ck", "R0"):
         if key not in values:
-            notes.tell(
+            notes.add(
                 message(
                     "convert_balanced_missing",
                     "missing; expected a number (R0 is 0 when not balanced)",
@@ -197,7 +197,7 @@ def _check_values(values, notes):
                 key=key,
             )
     if values.get("Ck", -1) >= 0:
-        notes.tell(
+        notes.add(
             message(
                 "convert_balanced_ck",
                 "found {found:g}; expected a negative number, mm",
@@ -207,7 +207,7 @@ def _check_values(values, notes):
         )
     for key in FILM_KEYS:
         if values.get(key, 0) > LARGEST_FILM_MM:
-            notes.tell(
+            notes.add(
                 message(
                     "convert_balanced_film",
                     "found {found:g}; expected mm, at most {most}",
@@ -217,15 +217,10 @@ def _check_values(values, notes):
                 key=key,
             )
     if values.get("R0", 0) < 0:
-        notes.tell(message("convert_balanced_radius", "below 0; expected a radius in mm"), key="R0")
+        notes.add(message("convert_balanced_radius", "below 0; expected a radius in mm"), key="R0")
 
 
-def _format_value(value):
-    """Text of an integer or of a float with all digits."""
-    return str(value) if isinstance(value, int) else exact_text(value)
-
-
-def text_of(camera, framed_camera):
+def format_text(camera, framed_camera):
     """Text of a Balanced camera and of its frame."""
     lines = ["# camera in the balanced form: mm, x to the right, y up"]
     lines += [f"{key} {exact_text(value)}" for key, value in camera.values.items()]
@@ -235,5 +230,6 @@ def text_of(camera, framed_camera):
     if frame is None:
         keys = [key for key in FRAME_KEYS if key not in FILM_KEYS]
         frame = (*framed_camera.size_px, *framed_camera.pixel_mm)
-    lines += [f"{key} {_format_value(value)}" for key, value in zip(keys, frame, strict=True)]
+    for key, value in zip(keys, frame, strict=True):
+        lines.append(f"{key} {value if isinstance(value, int) else exact_text(value)}")
     return "\n".join(lines) + "\n"

@@ -17,14 +17,13 @@ import numpy as np
 
 from tankcal.camera.formats.fitting import fit
 from tankcal.camera.formats.frame import (
-    FramedCamera,
     differences_px,
     frame_points,
     make_framed_camera,
     pixels_to_mm,
-    rays_of,
+    trace_rays,
 )
-from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balanced_about
+from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balance_about
 
 RADIAL = ("K1", "K2", "K3", "K4")
 DECENTRING = ("P1", "P2", "P3", "P4")
@@ -54,7 +53,7 @@ class Brown:
 
 
 @dataclass(frozen=True)
-class Has:
+class Terms:
     """Terms of a program, in addition to one focal length and the principal point.
 
     Attributes
@@ -71,7 +70,7 @@ class Has:
     skew: bool = True
 
 
-def image_of_brown(brown, rays):
+def project_brown(brown, rays):
     """Columns and lines (n, 2) of rays (n, 2), which have the axes of tankcal (y up)."""
     x, y = rays[:, 0], -rays[:, 1]
     r2 = x * x + y * y
@@ -86,7 +85,7 @@ def image_of_brown(brown, rays):
     )
 
 
-def from_brown(brown, pixel_mm, size_px):
+def convert_from_brown(brown, pixel_mm, size_px):
     """Convert to a FramedCamera in the plain Form().
 
     Parameters
@@ -112,7 +111,7 @@ def from_brown(brown, pixel_mm, size_px):
     without_skew = make_framed_camera(_interior(brown, pixel, size_px), Form(), pixel, size_px)
     # The image without its skew has the rays of the camera without skew.
     unskewed = points - np.outer(points[:, 1] - brown.cy, [brown.skew / brown.fy, 0])
-    rays = rays_of(without_skew, unskewed)
+    rays = trace_rays(without_skew, unskewed)
     interior = without_skew.interior
     if brown.skew:
         used = [name for name, value in zip(PARAMETERS, interior, strict=True) if value]
@@ -135,14 +134,14 @@ def _interior(brown, pixel_mm, size_px):
     return np.array([c, x0, y0, *radial, p2 / c, -p1 / c, p3 / c**2, p4 / c**4, 0, 0])
 
 
-def to_brown(camera, has=None):
+def convert_to_brown(camera, terms=None):
     """Convert a FramedCamera, exactly if the terms allow it, else by a fit over the frame.
 
     Parameters
     ----------
     camera : FramedCamera
         The camera.
-    has : Has, optional
+    terms : Terms, optional
         Available terms; None: all.
 
     Returns
@@ -151,38 +150,38 @@ def to_brown(camera, has=None):
     error : float
         Largest error over the frame, px.
     """
-    has = has or Has()
+    terms = terms or Terms()
     points = frame_points(camera.size_px)
-    rays = rays_of(camera, points)
+    rays = trace_rays(camera, points)
     # The error is evaluated in the same way for both methods.
-    brown = _convert_exactly(camera, has)
+    brown = _convert_exactly(camera, terms)
     if brown is None:
-        brown = _fit_brown(camera, has, rays, points)
-    distances = np.hypot(*(image_of_brown(brown, rays) - points).T)
+        brown = _fit_brown(camera, terms, rays, points)
+    distances = np.hypot(*(project_brown(brown, rays) - points).T)
     return brown, float(distances.max())
 
 
-def _convert_exactly(camera: FramedCamera, has):
+def _convert_exactly(camera, terms):
     """Brown by formula, or None if a required term is not available."""
     if CONVENTIONS[camera.form.convention]:
         return None
-    q = balanced_about(camera.interior, camera.form, 0.0)[0]
+    q = balance_about(camera.interior, camera.form, 0.0)[0]
     # Parameters without a counterpart must be zero.
-    missing = [*q[3 + has.radial : 7], *q[7 + has.decentring : 11], *q[11:]]
+    missing = [*q[3 + terms.radial : 7], *q[7 + terms.decentring : 11], *q[11:]]
     width, height = camera.pixel_mm
-    if np.any(missing) or (width != height and not has.two_focals):
+    if np.any(missing) or (width != height and not terms.two_focals):
         return None
     return _create_brown(q, 0.0, 0.0, camera)
 
 
-def _fit_brown(camera, has, rays, points):
+def _fit_brown(camera, terms, rays, points):
     """Brown by a fit with square pixels of the height of the camera's pixels."""
     side = camera.pixel_mm[1]
-    start = balanced_about(camera.interior, camera.form, 0.0)[0]
+    start = balance_about(camera.interior, camera.form, 0.0)[0]
     if CONVENTIONS[camera.form.convention] > 0:
         # A correction added to the measured point has the opposite sign of a distortion.
         start[3:9] *= -1
-    used = ("c", "x0", "y0", *RADIAL[: has.radial], *DECENTRING[: has.decentring])
+    used = ("c", "x0", "y0", *RADIAL[: terms.radial], *DECENTRING[: terms.decentring])
     start[[i for i, name in enumerate(PARAMETERS) if name not in used]] = 0.0
     usual_names = {"K1", "K2", "K3", "P1", "P2"}
     lens = [
@@ -192,7 +191,7 @@ def _fit_brown(camera, has, rays, points):
     ]
     extras = [
         name
-        for name, is_available in (("scale", has.two_focals), ("skew", has.skew))
+        for name, is_available in (("scale", terms.two_focals), ("skew", terms.skew))
         if is_available
     ]
     square = np.array([side, side])

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.formats.brown import Has, to_brown
-from tankcal.camera.formats.opencv import OpenCV, from_opencv
+from tankcal.camera.formats.brown import Terms, convert_to_brown
+from tankcal.camera.formats.opencv import OpenCV, convert_from_opencv
 from tankcal.camera.formats.texts import exact_text, short_text
 from tankcal.messages import message
 
@@ -52,7 +52,7 @@ class Colmap:
     error_px: float = 0.0
 
 
-def from_colmap(camera, pixel_mm):
+def convert_from_colmap(camera, pixel_mm):
     """Convert to a FramedCamera in the plain Form().
 
     Parameters
@@ -76,10 +76,10 @@ def from_colmap(camera, pixel_mm):
     # COLMAP counts from the corner of the first pixel, OpenCV from its centre.
     matrix = [[fx, 0, values["cx"] - HALF], [0, fy, values["cy"] - HALF], [0, 0, 1]]
     coefficients = np.array([values.get(name, 0.0) for name in ORDER])
-    return from_opencv(OpenCV(np.array(matrix), coefficients), pixel_mm, camera.size_px)
+    return convert_from_opencv(OpenCV(np.array(matrix), coefficients), pixel_mm, camera.size_px)
 
 
-def to_colmap(camera, model=None):
+def convert_to_colmap(camera, model=None):
     """Convert a FramedCamera, exactly if the model has all terms, else by a fit.
 
     Parameters
@@ -106,13 +106,13 @@ def to_colmap(camera, model=None):
 def _convert_to_model(camera, model):
     """Convert a FramedCamera to a model of COLMAP."""
     names = MODELS[model]
-    has = Has(
+    terms = Terms(
         radial=sum(name in names for name in ("k1", "k2", "k3")),
         decentring=2 if "p1" in names else 0,
         two_focals="fx" in names,
         skew=False,
     )
-    brown, error = to_brown(camera, has)
+    brown, error = convert_to_brown(camera, terms)
     values = {
         "f": brown.fy,
         "fx": brown.fx,
@@ -138,7 +138,7 @@ def parse(text, notes):
         name = notes.name(words[0], row, "CAMERA_ID")
         # A repeated camera is reported, but kept, so that all problems are found.
         if name in [other for other, _ in cameras]:
-            notes.tell(
+            notes.add(
                 message(
                     "convert_colmap_twice",
                     "camera {name} is given twice; expected each camera once",
@@ -149,7 +149,7 @@ def parse(text, notes):
             )
         cameras.append((name, camera))
     if not cameras and not notes.problems:
-        notes.tell(
+        notes.add(
             message(
                 "convert_colmap_none",
                 "no camera; expected lines such as 1 OPENCV 4000 3000 and its parameters",
@@ -161,7 +161,7 @@ def parse(text, notes):
 def _parse_camera(words, row, notes):
     """Colmap from the words of a line, or None; problems are added to `notes`."""
     if len(words) < 4:
-        notes.tell(
+        notes.add(
             message(
                 "convert_colmap_cut",
                 "incomplete line; expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS",
@@ -177,7 +177,7 @@ def _parse_camera(words, row, notes):
             model=short_text(model),
             models=", ".join(MODELS),
         )
-        notes.tell(expected, row, "MODEL")
+        notes.add(expected, row, "MODEL")
         return None
     names, texts = MODELS[model], words[4:]
     if len(texts) != len(names):
@@ -189,7 +189,7 @@ def _parse_camera(words, row, notes):
             expected=len(names),
             names=" ".join(names),
         )
-        notes.tell(expected, row, "PARAMS")
+        notes.add(expected, row, "PARAMS")
         return None
     size = (notes.count(words[2], row, "WIDTH"), notes.count(words[3], row, "HEIGHT"))
     params = tuple(
@@ -199,7 +199,7 @@ def _parse_camera(words, row, notes):
     return Colmap(model, size, params)
 
 
-def text_of(cameras):
+def format_text(cameras):
     """Text of a cameras.txt for [(name, Colmap)]; names that are no numbers become numbers."""
     # Cameras are numbered unless every name is a number.
     are_numbers = all(name.isdecimal() and name.isascii() for name, _ in cameras)

@@ -79,7 +79,7 @@ def fit(rays, image_mm, pixel_mm, form, start, used, extras=()):
     unknown = [PARAMETERS.index(name) for name in PARAMETERS if name in used]
     unknown += [len(PARAMETERS) + EXTRAS.index(name) for name in EXTRAS if name in extras]
     values = np.concatenate([np.asarray(start, dtype=float), np.zeros(len(EXTRAS))])
-    misclosures, jacobian = rows_of_fit(values, rays, image_mm, pixel_mm, form)
+    misclosures, jacobian = linearise_fit(values, rays, image_mm, pixel_mm, form)
     for _ in range(ROUNDS):
         columns = jacobian[:, unknown]
         # Columns of length one make the rank independent of the units.
@@ -124,7 +124,7 @@ def _apply_step(values, step_values, misclosures, jacobian, arguments):
     for halving in range(30):
         trial = values + step_values * 0.5**halving
         with np.errstate(all="ignore"):
-            new_misclosures, new_jacobian = rows_of_fit(trial, *arguments)
+            new_misclosures, new_jacobian = linearise_fit(trial, *arguments)
         if (
             np.all(np.isfinite(new_jacobian))
             and new_misclosures @ new_misclosures <= previous_sum * ROUNDING
@@ -133,7 +133,7 @@ def _apply_step(values, step_values, misclosures, jacobian, arguments):
     return values, misclosures, jacobian, False
 
 
-def rows_of_fit(values, rays, image_mm, pixel_mm, form):
+def linearise_fit(values, rays, image_mm, pixel_mm, form):
     """Misclosures (2 n,) and derivatives (2 n, 16), px; all rows of x precede those of y.
 
     Parameters

@@ -113,20 +113,34 @@ def frame_points(size_px, counts=GRID):
 
 
 def pixels_to_mm(points_px, pixel_mm, size_px):
-    """Coordinates (n, 2) from the middle of the frame, y up, mm, for columns and lines (n, 2)."""
+    """Convert columns and lines to coordinates from the middle of the frame.
+
+    Parameters
+    ----------
+    points_px : array_like, shape (n, 2)
+        Columns and lines.
+    pixel_mm : array_like, shape (2,)
+        Width and height of a pixel, mm.
+    size_px : sequence of two int
+        Columns and lines of the frame.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Coordinates, y up, mm.
+    """
     # Lines count downwards, y upwards, hence the sign.
     middle = (np.array(size_px, dtype=float) - 1) / 2
     return (np.asarray(points_px, dtype=float) - middle) * pixel_mm * [1, -1]
 
 
 def mm_to_pixels(points_mm, pixel_mm, size_px):
-    """Columns and lines (n, 2) for coordinates (n, 2) from the middle of the frame, y up, mm."""
-    # Inverse of pixels_to_mm.
+    """Convert coordinates (n, 2), mm, to columns and lines (n, 2): inverse of `pixels_to_mm`."""
     middle = (np.array(size_px, dtype=float) - 1) / 2
     return np.asarray(points_mm, dtype=float) / pixel_mm * [1, -1] + middle
 
 
-def image_of(camera, rays):
+def project_rays(camera, rays):
     """Columns and lines (n, 2) of the images of rays (n, 2)."""
     image_mm = distort_image_points(
         np.asarray(rays) * camera.interior[0], camera.interior, camera.form
@@ -134,7 +148,7 @@ def image_of(camera, rays):
     return mm_to_pixels(image_mm, camera.pixel_mm, camera.size_px)
 
 
-def rays_of(camera, points_px):
+def trace_rays(camera, points_px):
     """Rays (n, 2) of image points.
 
     Parameters
@@ -157,7 +171,7 @@ def rays_of(camera, points_px):
     with np.errstate(all="ignore"):
         rays = correct_image_points(image_mm, camera.interior, camera.form) / camera.interior[0]
         # A ray is valid only if its image is the given point.
-        distances = np.hypot(*(image_of(camera, rays) - points_px).T)
+        distances = np.hypot(*(project_rays(camera, rays) - points_px).T)
     refuse_folds(points_px, distances)
     return rays
 
@@ -191,4 +205,4 @@ def refuse_folds(points_px, off_px):
 
 def differences_px(camera, rays, points_px):
     """Distances (n,) between the images of rays (n, 2) and points_px (n, 2), px."""
-    return np.hypot(*(image_of(camera, rays) - points_px).T)
+    return np.hypot(*(project_rays(camera, rays) - points_px).T)

@@ -16,12 +16,12 @@ of PhotoScan 1.2 to 1.4.
 
 from dataclasses import dataclass
 
-from tankcal.camera.formats.brown import Brown, from_brown, to_brown
+from tankcal.camera.formats.brown import Brown, convert_from_brown, convert_to_brown
 from tankcal.camera.formats.texts import (
+    duplicate_message,
     exact_text,
-    given_twice,
+    report_wrong_root,
     short_text,
-    tell_outermost,
     xml_root,
 )
 from tankcal.messages import message
@@ -58,7 +58,7 @@ class Metashape:
     error_px: float = 0.0
 
 
-def from_metashape(camera, pixel_mm):
+def convert_from_metashape(camera, pixel_mm):
     """Convert to a FramedCamera in the plain Form(), exactly except for B2.
 
     Parameters
@@ -93,10 +93,10 @@ def from_metashape(camera, pixel_mm):
         tuple(camera.k),
         (p2, p1, p3, p4),
     )
-    return from_brown(brown, pixel_mm, camera.size_px)
+    return convert_from_brown(brown, pixel_mm, camera.size_px)
 
 
-def to_metashape(camera):
+def convert_to_metashape(camera):
     """Convert a FramedCamera, exactly in its plain form without affinity, else by a fit.
 
     Parameters
@@ -108,7 +108,7 @@ def to_metashape(camera):
     -------
     Metashape
     """
-    brown, error = to_brown(camera)
+    brown, error = convert_to_brown(camera)
     columns, lines = camera.size_px
     p1, p2, p3, p4 = brown.p
     # cx and cy count from the middle of the image.
@@ -130,21 +130,21 @@ def parse(text, notes):
     root = _calibration_root(text, notes)
     if root is None:
         return None
-    found = {}
+    texts = {}
     for child in root:
-        if child.tag in found:
-            notes.tell(given_twice(), key=short_text(child.tag))
+        if child.tag in texts:
+            notes.add(duplicate_message(), key=short_text(child.tag))
         elif child.tag not in (*TERMS, *OTHERS, *OLD):
-            notes.tell(
+            notes.add(
                 message(
                     "convert_metashape_unknown", "unknown; expected the keys of a frame camera"
                 ),
                 key=short_text(child.tag),
             )
-        found[child.tag] = (child.text or "").strip()
-    kind = found.get("projection", "frame")
+        texts[child.tag] = (child.text or "").strip()
+    kind = texts.get("projection", "frame")
     if kind != "frame":
-        notes.tell(
+        notes.add(
             message(
                 "convert_metashape_kind",
                 "{kind}; only frame cameras are read",
@@ -154,23 +154,23 @@ def parse(text, notes):
         )
         return None
     # PhotoScan before 1.2 wrote fx, fy and skew.
-    if any(key in found for key in OLD):
+    if any(key in texts for key in OLD):
         expected = message(
             "convert_metashape_old",
             "a form of PhotoScan before 1.2; open it in Metashape and save it again",
         )
-        notes.tell(expected, key=next(key for key in OLD if key in found))
+        notes.add(expected, key=next(key for key in OLD if key in texts))
         return None
-    # Values that are missing or wrong are replaced, so that all problems are found in one run.
-    size = tuple(_read_required(found, key, notes.count, notes) for key in ("width", "height"))
+    # Values that are missing or wrong are replaced, so that one run reports all problems.
+    size = tuple(_read_required(texts, key, notes.count, notes) for key in ("width", "height"))
     f = _read_required(
-        found, "f", lambda text_of_f, key: notes.number(text_of_f, key=key, above=0), notes
+        texts, "f", lambda text_of_f, key: notes.number(text_of_f, key=key, above=0), notes
     )
-    terms = [notes.number(found[key], key=key) if key in found else 0.0 for key in TERMS]
+    terms = [notes.number(texts[key], key=key) if key in texts else 0.0 for key in TERMS]
     camera = Metashape(size, f, *terms[:4], tuple(terms[4:8]), tuple(terms[8:]))
     # f + B1 is the focal length in x, which must be positive.
     if f + terms[2] <= 0:
-        notes.tell(
+        notes.add(
             message(
                 "convert_metashape_shear",
                 "{found:g} beside f = {f:g}; expected less in magnitude",
@@ -190,7 +190,7 @@ def _calibration_root(text, notes):
             "convert_metashape_root",
             "expected calibration: save it in Tools, Camera Calibration, as Agisoft XML",
         )
-        tell_outermost(root, expected, notes)
+        report_wrong_root(root, expected, notes)
         return None
     return root
 
@@ -198,12 +198,12 @@ def _calibration_root(text, notes):
 def _read_required(texts, key, read, notes):
     """Value of a required key, read by `read`; 2 for a missing value, with a problem."""
     if texts.get(key, "") == "":
-        notes.tell(message("convert_metashape_missing", "missing; expected a number"), key=key)
+        notes.add(message("convert_metashape_missing", "missing; expected a number"), key=key)
         return 2
     return read(texts[key], key=key)
 
 
-def text_of(camera):
+def format_text(camera):
     """XML of a Metashape camera; k4, p3 and p4 are omitted if zero."""
     values = dict(zip(TERMS, (camera.cx, camera.cy, camera.b1, camera.b2), strict=False))
     values |= dict(zip(TERMS[4:], (*camera.k, *camera.p), strict=True))

@@ -20,7 +20,7 @@ and T2 agree.
 import re
 from dataclasses import dataclass
 
-from tankcal.camera.formats.brown import Brown, Has, from_brown, to_brown
+from tankcal.camera.formats.brown import Brown, Terms, convert_from_brown, convert_to_brown
 from tankcal.camera.formats.texts import exact_text, short_text
 from tankcal.messages import message
 
@@ -58,7 +58,7 @@ class Pix4D:
     error_px: float = 0.0
 
 
-def from_pix4d(camera, size_px):
+def convert_from_pix4d(camera, size_px):
     """Convert to a FramedCamera in the plain Form(), exactly.
 
     Parameters
@@ -86,10 +86,10 @@ def from_pix4d(camera, size_px):
     # The printed width may differ slightly from the width of the pixels; the middle is kept.
     shift = (size_px[0] - camera.sensor_mm[0] / pixel) / 2
     brown = Brown(f, f, middle[0] + shift, middle[1], 0.0, (k1, k2, k3, 0.0), (*camera.t, 0.0, 0.0))
-    return from_brown(brown, pixel, size_px)
+    return convert_from_brown(brown, pixel, size_px)
 
 
-def to_pix4d(camera):
+def convert_to_pix4d(camera):
     """Convert a FramedCamera, exactly in its plain form with square pixels, else by a fit.
 
     Parameters
@@ -101,7 +101,9 @@ def to_pix4d(camera):
     -------
     Pix4D
     """
-    brown, error = to_brown(camera, Has(radial=3, decentring=2, two_focals=False, skew=False))
+    brown, error = convert_to_brown(
+        camera, Terms(radial=3, decentring=2, two_focals=False, skew=False)
+    )
     pixel = float(camera.pixel_mm[1])
     # Square pixels with the height of the camera's pixels.
     sensor = (camera.size_px[0] * pixel, camera.size_px[1] * pixel)
@@ -127,7 +129,7 @@ def parse(text, notes):
                 "the form for Inpho; expected "
                 "PROJECT_pix4d_calibrated_internal_camera_parameters.cam, beside it",
             )
-            notes.tell(expected, row)
+            notes.add(expected, row)
             return []
         if head:
             name = notes.name(head[1], row) if head[1] else str(len(parts))
@@ -136,7 +138,7 @@ def parse(text, notes):
         elif parts:
             parts[-1][2].append((row, line.strip()))
         elif line.strip():
-            notes.tell(
+            notes.add(
                 message(
                     "convert_pix4d_first",
                     "{found}; expected Pix4D camera calibration file 0",
@@ -146,7 +148,7 @@ def parse(text, notes):
             )
             return []
     if not parts:
-        notes.tell(
+        notes.add(
             message(
                 "convert_pix4d_none", "no camera; expected a line Pix4D camera calibration file 0"
             )
@@ -168,7 +170,7 @@ def _parse_camera(head_row, lines, notes):
         if not line:
             continue
         if key not in KEYS:
-            notes.tell(
+            notes.add(
                 message(
                     "convert_pix4d_unknown", "unknown; expected {known}", known=", ".join(KEYS)
                 ),
@@ -176,7 +178,7 @@ def _parse_camera(head_row, lines, notes):
                 short_text(key),
             )
         elif key in values:
-            notes.tell(
+            notes.add(
                 message("convert_pix4d_twice", "given twice; expected once for each camera"),
                 row,
                 key,
@@ -185,7 +187,7 @@ def _parse_camera(head_row, lines, notes):
             values[key] = notes.number(value.strip(), row, key, above=0 if key == "F" else None)
     for key in KEYS:
         if key not in values:
-            notes.tell(
+            notes.add(
                 message("convert_pix4d_missing", "missing; is the file complete?"), head_row, key
             )
             # A substitute value lets the remaining keys be checked.
@@ -196,7 +198,7 @@ def _parse_camera(head_row, lines, notes):
             "missing; expected a remark such as #Focal Length mm assuming a sensor width of "
             "6.17x4.63mm",
         )
-        notes.tell(expected, head_row, "sensor width")
+        notes.add(expected, head_row, "sensor width")
         sensor = (1.0, 1.0)
     f, px, py, *k, t1, t2 = (values[key] for key in KEYS)
     return Pix4D(sensor, f, px, py, tuple(k), (t1, t2))
@@ -209,7 +211,7 @@ def frame_fits_sensor(camera, size_px):
     return abs(width * size_px[1] / (height * size_px[0]) - 1) <= SAME_SHAPE
 
 
-def text_of(cameras):
+def format_text(cameras):
     """Text of a .cam file for [(name, Pix4D)]."""
     lines = []
     for name, camera in cameras:

@@ -25,9 +25,9 @@ from tankcal.camera.formats.frame import (
     frame_points,
     make_framed_camera,
     pixels_to_mm,
-    rays_of,
+    trace_rays,
 )
-from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balanced_about, rescale_interior
+from tankcal.camera.model import CONVENTIONS, PARAMETERS, Form, balance_about, rescale_interior
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
@@ -41,7 +41,7 @@ TURNS_ROUND = (3, 4, 5, 6, 7, 8)  # parameters K1..K4, P1, P2, which change thei
 
 
 @dataclass(frozen=True)
-class Converted:
+class Conversion:
     """Camera in another form.
 
     Attributes
@@ -95,7 +95,7 @@ def convert_camera(
 
     Returns
     -------
-    Converted
+    Conversion
 
     Raises
     ------
@@ -110,7 +110,7 @@ def convert_camera(
     converted, turn, is_exact = convert(camera.interior)
     points = frame_points(size_px)
     # Errors compare the images of equal rays.
-    rays = _rotate_rays(rays_of(camera, points), turn)
+    rays = _rotate_rays(trace_rays(camera, points), turn)
     distances = differences_px(
         make_framed_camera(converted, to_form, camera.pixel_mm, size_px), rays, points
     )
@@ -120,12 +120,12 @@ def convert_camera(
         new_covariance = propagate_by_differences(
             lambda values: convert(values)[0], camera.interior, covariance
         )
-    return Converted(
+    return Conversion(
         converted, to_form, float(distances.max()), rms, is_exact, new_covariance, turn
     )
 
 
-def camera_in_form(camera, name, covariance=None):
+def convert_to_publication(camera, name, covariance=None):
     """Convert a FramedCamera to the form of a publication.
 
     Parameters
@@ -191,7 +191,7 @@ def _restore_unknown(new_covariance, camera, values, covariance):
 def _effect_px(camera, changes):
     """Largest change (13,) of the image over the frame for each change (13,) of a parameter, px."""
     points = frame_points(camera.size_px)
-    rays = rays_of(camera, points)
+    rays = trace_rays(camera, points)
     changed = camera.interior + np.diag(changes)
     return np.array(
         [
@@ -272,28 +272,24 @@ def _convert_values(values, camera, to_form, used, may_turn):
     source = make_framed_camera(values, camera.form, camera.pixel_mm, camera.size_px)
     points = frame_points(camera.size_px)
     image_mm = pixels_to_mm(points, camera.pixel_mm, camera.size_px)
-    names = tuple(used) if used is not None else _usual_names(values)
+    if used is None:
+        used = (*USUAL, *(name for name, value in zip(PARAMETERS, values, strict=True) if value))
     start = _first_values(values, camera.form, to_form)
     start[excluded] = 0.0
     # The fit uses the form without a balance; balancing afterwards is exact.
     plain = Form(to_form.convention, to_form.affinity)
     extras = ("turn",) if may_turn else ()
-    result = fit(rays_of(source, points), image_mm, camera.pixel_mm, plain, start, names, extras)
+    result = fit(trace_rays(source, points), image_mm, camera.pixel_mm, plain, start, used, extras)
     return (
-        balanced_about(result.interior, plain, to_form.radial_balance_mm)[0],
+        balance_about(result.interior, plain, to_form.radial_balance_mm)[0],
         result.turn_rad,
         False,
     )
 
 
-def _usual_names(values):
-    """Parameters of a fit: the usual parameters and all non-zero parameters."""
-    return USUAL + tuple(name for name, value in zip(PARAMETERS, values, strict=True) if value)
-
-
 def _first_values(values, form, to_form):
     """Start values (13,) of the form without a balance: first-order, without A and B."""
-    plain = balanced_about(values, form, 0.0)[0]
+    plain = balance_about(values, form, 0.0)[0]
     if (CONVENTIONS[form.convention] > 0) != (CONVENTIONS[to_form.convention] > 0):
         plain[list(TURNS_ROUND)] *= -1
     plain[[11, 12]] = 0.0
@@ -306,7 +302,7 @@ def _convert_exactly(values, form, to_form):
     # A distortion of the ideal point has no closed inverse.
     if abs(sign) != abs(to_sign):
         return None
-    plain = balanced_about(values, form, 0.0)[0]
+    plain = balance_about(values, form, 0.0)[0]
     if sign != to_sign:
         plain[list(TURNS_ROUND)] *= -1
         if form.affinity != "before_distortion":
@@ -315,7 +311,7 @@ def _convert_exactly(values, form, to_form):
     if plain is None:
         return None
     unbalanced_form = Form(to_form.convention, to_form.affinity)
-    return balanced_about(plain, unbalanced_form, to_form.radial_balance_mm)[0]
+    return balance_about(plain, unbalanced_form, to_form.radial_balance_mm)[0]
 
 
 def _replace_affinity(plain, affinity, to_form):

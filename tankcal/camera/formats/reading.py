@@ -10,11 +10,11 @@ aicon      lines of the balanced form, such as Ck -24.1
 The files of OpenCV, COLMAP and Metashape do not contain the size of a pixel.
 """
 
+from functools import partial
 from pathlib import Path
 
-from tankcal.camera.formats import balanced, colmap, filestorage, metashape, pix4d
-from tankcal.camera.formats.opencv import from_opencv
-from tankcal.camera.formats.texts import LONGEST, Notes, only_letters, short_text
+from tankcal.camera.formats import balanced, colmap, metashape, opencv, pix4d
+from tankcal.camera.formats.texts import LONGEST, Notes, make_valid_name, short_text
 from tankcal.errors import SolutionError, reason_of
 from tankcal.messages import message
 from tankcal.text.decoding import decode_text
@@ -51,11 +51,11 @@ def read_camera(path, kind=None, pixel_um=None, size_px=None):
     path = Path(path)
     notes = Notes(path.name or str(path))
     text = _read_text(path, notes)
-    notes.stop()
-    return cameras_of(text, notes.file, kind, pixel_um, size_px)
+    notes.raise_problems()
+    return parse_cameras(text, notes.file, kind, pixel_um, size_px)
 
 
-def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
+def parse_cameras(text, file, kind=None, pixel_um=None, size_px=None):
     """Read the cameras from the text of a file.
 
     Parameters
@@ -79,7 +79,7 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
     notes = Notes(file)
     _check_arguments(kind, pixel_um, size_px, notes)
     kind = kind or _recognise_kind(text, notes)
-    notes.stop()
+    notes.raise_problems()
     parsed = _PARSERS[kind](text, notes, file, size_px)
     # Only files of Pix4D and AICON can determine the size of a pixel.
     needs_pixel = kind not in ("pix4d", "aicon")
@@ -89,8 +89,8 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
             "missing; a file of kind {form} does not hold it: give it in micrometres",
             form=kind,
         )
-        notes.tell(expected, key="pixel_um")
-    notes.stop()
+        notes.add(expected, key="pixel_um")
+    notes.raise_problems()
     pixel_mm = None if pixel_um is None else pixel_um * 1e-3
     # Conversion starts only after all problems of the text are known.
     cameras = []
@@ -104,15 +104,15 @@ def cameras_of(text, file, kind=None, pixel_um=None, size_px=None):
                 camera=short_text(name),
                 error=error.texts[0],
             )
-            notes.tell(text)
-    notes.stop()
+            notes.add(text)
+    notes.raise_problems()
     return cameras
 
 
 def _check_arguments(kind, pixel_um, size_px, notes):
     """Check kind, pixel and size; problems are added to `notes`."""
     if kind is not None and kind not in KINDS:
-        notes.tell(
+        notes.add(
             message(
                 "convert_kind",
                 "{found} as the kind of file; expected one of {known}",
@@ -124,7 +124,7 @@ def _check_arguments(kind, pixel_um, size_px, notes):
         pixel_um is not None
         and not PIXELS_UM[0] <= notes.number(pixel_um, key="pixel_um") <= PIXELS_UM[1]
     ):
-        notes.tell(
+        notes.add(
             message(
                 "convert_pixel_range",
                 "{found}; expected micrometres, 0.1 to 100",
@@ -141,12 +141,12 @@ def _read_text(path, notes):
     """Text of a file, or None; problems are added to `notes`."""
     try:
         if not path.is_file():
-            notes.tell(message("convert_not_found", "not found; expected a file of cameras"))
+            notes.add(message("convert_not_found", "not found; expected a file of cameras"))
             return None
         with path.open("rb") as stream:
             data = stream.read(LONGEST + 1)
     except (OSError, ValueError) as error:
-        notes.tell(
+        notes.add(
             message(
                 "convert_not_readable",
                 "cannot be read ({reason})",
@@ -156,7 +156,7 @@ def _read_text(path, notes):
         return None
     # One byte more than the limit is read, to detect a longer file.
     if len(data) > LONGEST:
-        notes.tell(
+        notes.add(
             message(
                 "convert_too_long",
                 "more than {most} bytes; expected a file of cameras",
@@ -167,13 +167,13 @@ def _read_text(path, notes):
     try:
         text = decode_text(data)
     except UnicodeDecodeError as error:
-        notes.tell(
+        notes.add(
             message("convert_no_utf8", "a letter that is not UTF-8"),
             data[: error.start].count(b"\n") + 1,
         )
         return None
     if "\0" in text:
-        notes.tell(message("convert_no_text", "not text; expected a text file (UTF-8)"))
+        notes.add(message("convert_no_text", "not text; expected a text file (UTF-8)"))
         return None
     return text
 
@@ -185,7 +185,7 @@ def _recognise_kind(text, notes):
     lines = [line.split() for line in text.splitlines()[:200]]
     words = [line[0] for line in lines if line and not line[0].startswith("#")]
     if start.startswith("<"):
-        return "opencv" if f"<{filestorage.XML_ROOT}" in text else "metashape"
+        return "opencv" if f"<{opencv.XML_ROOT}" in text else "metashape"
     if start.startswith(("%YAML", "{")) or "opencv-matrix" in text or "camera_matrix:" in text:
         return "opencv"
     if "camera calibration file" in start.lower() or "camera_calibration_file" in start.lower():
@@ -197,7 +197,7 @@ def _recognise_kind(text, notes):
         "CAMERA_ID" in start
     ):
         return "colmap"
-    notes.tell(
+    notes.add(
         message(
             "convert_not_known",
             "not a known kind of camera file; expected one of {known}",
@@ -209,22 +209,20 @@ def _recognise_kind(text, notes):
 
 def _read_opencv(text, notes, file, size_px):
     """Name and converter of an OpenCV camera, as a list."""
-    parsed = filestorage.parse(text, notes)
+    parsed = opencv.parse(text, notes)
     if parsed is None:
         return []
     camera, size = parsed
     size = _resolve_size(size, size_px, notes)
-    return [(_stem(file), lambda pixel: from_opencv(camera, pixel, size))]
+    return [(_name_from_file(file), partial(opencv.convert_from_opencv, camera, size_px=size))]
 
 
 def _read_colmap(text, notes, _file, _size):
     """Names and converters of the cameras of a cameras.txt."""
-
-    def converter(camera):
-        return lambda pixel: colmap.from_colmap(camera, pixel)
-
-    # A function for each camera binds the camera of its own iteration.
-    return [(name, converter(camera)) for name, camera in colmap.parse(text, notes)]
+    return [
+        (name, partial(colmap.convert_from_colmap, camera))
+        for name, camera in colmap.parse(text, notes)
+    ]
 
 
 def _read_metashape(text, notes, file, _size):
@@ -232,18 +230,11 @@ def _read_metashape(text, notes, file, _size):
     camera = metashape.parse(text, notes)
     if camera is None:
         return []
-    return [(_stem(file), lambda pixel: metashape.from_metashape(camera, pixel))]
+    return [(_name_from_file(file), partial(metashape.convert_from_metashape, camera))]
 
 
 def _read_pix4d(text, notes, _file, size_px):
     """Names and converters of the cameras of a .cam file."""
-
-    def converter(camera):
-        def convert(pixel_mm):
-            _refuse_other_pixel(camera.sensor_mm[1] / size_px[1], pixel_mm)
-            return pix4d.from_pix4d(camera, size_px)
-
-        return convert
 
     cameras = pix4d.parse(text, notes)
     # The file contains the sensor in mm, but no columns and lines.
@@ -266,8 +257,14 @@ def _read_pix4d(text, notes, _file, size_px):
                 height=height,
                 camera=name,
             )
-            notes.tell(expected, key="columns")
-    return [(name, converter(camera)) for name, camera in cameras]
+            notes.add(expected, key="columns")
+    return [(name, partial(_convert_pix4d, camera, size_px)) for name, camera in cameras]
+
+
+def _convert_pix4d(camera, size_px, pixel_mm):
+    """FramedCamera of a Pix4D camera; a given size of a pixel is compared with the file."""
+    _refuse_other_pixel(camera.sensor_mm[1] / size_px[1], pixel_mm)
+    return pix4d.convert_from_pix4d(camera, size_px)
 
 
 def _read_balanced(text, notes, file, size_px):
@@ -275,7 +272,7 @@ def _read_balanced(text, notes, file, size_px):
     camera, frame = balanced.parse(text, notes)
     film_mm = [frame[key] for key in balanced.FILM_KEYS if key in frame]
     if len(film_mm) == 1:
-        notes.tell(
+        notes.add(
             message(
                 "convert_one_side_of_film",
                 "only one side of a film; expected format_width and format_height",
@@ -284,7 +281,7 @@ def _read_balanced(text, notes, file, size_px):
         )
     # A film has no pixels, so that both statements contradict each other.
     if len(film_mm) == 2 and len(frame) > 2:
-        notes.tell(
+        notes.add(
             message(
                 "convert_film_and_pixels",
                 "given together with pixels; expected a format, or pixels",
@@ -292,7 +289,7 @@ def _read_balanced(text, notes, file, size_px):
             key="format_width",
         )
     if film_mm:
-        return [(_stem(file), _film_converter(camera, film_mm))]
+        return [(_name_from_file(file), partial(_convert_film, camera, film_mm))]
     size_in_file = (
         (frame["columns"], frame["lines"]) if {"columns", "lines"} <= set(frame) else None
     )
@@ -300,48 +297,40 @@ def _read_balanced(text, notes, file, size_px):
     # A single side of a pixel leaves the other side undefined.
     sides = [frame[key] for key in ("pixel_width", "pixel_height") if key in frame]
     if len(sides) == 1:
-        notes.tell(
+        notes.add(
             message(
                 "convert_one_side_of_pixel",
                 "only one side of a pixel; expected pixel_width and pixel_height",
             ),
             key="pixel_width",
         )
-
-    def convert(pixel_mm):
-        if pixel_mm is None and not sides:
-            raise SolutionError(
-                message(
-                    "convert_no_pixel", "the size of a pixel is missing; give it in micrometres"
-                )
-            )
-        if sides:
-            _refuse_other_pixel(sides[-1], pixel_mm)
-        return balanced.from_balanced(camera, sides or pixel_mm, size)
-
-    return [(_stem(file), convert)]
+    return [(_name_from_file(file), partial(_convert_balanced, camera, sides, size))]
 
 
-def _film_converter(camera, film_mm):
-    """Converter of a Balanced camera on film.
+def _convert_balanced(camera, sides, size_px, pixel_mm):
+    """FramedCamera of a Balanced camera with the sides of a pixel in the file, or given."""
+    if sides:
+        _refuse_other_pixel(sides[-1], pixel_mm)
+    elif pixel_mm is None:
+        raise SolutionError(
+            message("convert_no_pixel", "the size of a pixel is missing; give it in micrometres")
+        )
+    return balanced.convert_from_balanced(camera, sides or pixel_mm, size_px)
 
-    The converter accepts the size of a pixel in mm, or None, and returns a FramedCamera.
-    """
 
-    def convert(pixel_mm):
-        if pixel_mm is None:
-            return balanced.film_from_balanced(camera, film_mm)
-        # Scanned film: the number of pixels follows from the format.
-        size_px = [max(2, round(side / pixel_mm)) for side in film_mm]
-        return balanced.from_balanced(camera, pixel_mm, size_px)
-
-    return convert
+def _convert_film(camera, film_mm, pixel_mm):
+    """FramedCamera of a Balanced camera on film; without a size of a pixel, it has no pixels."""
+    if pixel_mm is None:
+        return balanced.convert_film_from_balanced(camera, film_mm)
+    # Scanned film: the number of pixels follows from the format.
+    size_px = [max(2, round(side / pixel_mm)) for side in film_mm]
+    return balanced.convert_from_balanced(camera, pixel_mm, size_px)
 
 
 def _resolve_size(size_in_file, given_size, notes):
     """Columns and lines of the file, or as given; both may not be missing or differ."""
     if size_in_file is None and given_size is None:
-        notes.tell(
+        notes.add(
             message(
                 "convert_no_size", "missing; the file does not hold it: give columns and lines"
             ),
@@ -360,7 +349,7 @@ def _resolve_size(size_in_file, given_size, notes):
             given_columns=given_size[0],
             given_lines=given_size[1],
         )
-        notes.tell(expected, key="format_px")
+        notes.add(expected, key="format_px")
     return size_in_file or given_size
 
 
@@ -378,8 +367,8 @@ def _refuse_other_pixel(of_file_mm, given_mm):
         )
 
 
-def _stem(file):
-    return only_letters(Path(file).stem)
+def _name_from_file(file):
+    return make_valid_name(Path(file).stem)
 
 
 _PARSERS = {

@@ -28,11 +28,11 @@ class Notes:
         self.file = file
         self.problems = []
 
-    def tell(self, expected, row=None, key=None):
+    def add(self, expected, row=None, key=None):
         """Add a problem."""
         self.problems.append(Problem(self.file, expected, row, key))
 
-    def stop(self):
+    def raise_problems(self):
         """Raise InputError if any problem was added."""
         if self.problems:
             raise InputError(self.problems)
@@ -60,7 +60,7 @@ class Notes:
             value = math.nan
         # Python accepts "1_000" as a number; camera files do not.
         if not math.isfinite(value) or (isinstance(text, str) and "_" in text):
-            self.tell(
+            self.add(
                 message(
                     "convert_finite", "{found}; expected a finite number", found=short_text(text)
                 ),
@@ -69,7 +69,7 @@ class Notes:
             )
             return math.nan
         if above is not None and value <= above:
-            self.tell(
+            self.add(
                 message(
                     "convert_above",
                     "{found}; expected a number above {least:g}",
@@ -89,7 +89,7 @@ class Notes:
         if len(self.problems) > problem_count:
             return 2
         if value != round(value) or not 2 <= value <= MOST_PIXELS:
-            self.tell(
+            self.add(
                 message(
                     "convert_pixels",
                     "{found}; expected whole pixels, 2 to {most}",
@@ -107,7 +107,7 @@ class Notes:
         text = text.strip()
         if is_name(text):
             return text
-        self.tell(
+        self.add(
             message(
                 "convert_name",
                 "{found}; expected {expected}",
@@ -125,7 +125,7 @@ def xml_root(text, notes):
     # Entities can expand without limit.
     lower = text.lower()
     if "<!doctype" in lower or "<!entity" in lower:
-        notes.tell(
+        notes.add(
             message(
                 "convert_doctype",
                 "a document type or entities; expected XML as the program saves it",
@@ -136,7 +136,7 @@ def xml_root(text, notes):
         return ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError, RecursionError) as error:
         row = getattr(error, "position", (None,))[0]
-        notes.tell(
+        notes.add(
             message(
                 "convert_no_xml", "not readable XML ({error}); is the file complete?", error=error
             ),
@@ -145,9 +145,9 @@ def xml_root(text, notes):
         return None
 
 
-def tell_outermost(root, expected, notes):
+def report_wrong_root(root, expected, notes):
     """Add a problem for an XML file with the wrong root element."""
-    notes.tell(
+    notes.add(
         message(
             "convert_outermost",
             "{found} as the outermost element; {expected}",
@@ -157,7 +157,7 @@ def tell_outermost(root, expected, notes):
     )
 
 
-def given_twice():
+def duplicate_message():
     """Message for a repeated key."""
     return message("convert_given_twice", "given twice; expected once")
 
@@ -168,7 +168,7 @@ def short_text(value):
     return text if len(text) <= 40 else text[:37] + "..."
 
 
-def only_letters(text, instead="camera"):
+def make_valid_name(text, instead="camera"):
     """Valid name derived from a file name, or `instead` if no valid character remains."""
     # Characters outside the rules for names become underscores.
     name = re.sub(r"[^\w .()/#-]", "_", text).strip(" ._-()/#")[:MAX_NAME]

@@ -9,18 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.formats import balanced, colmap, filestorage, metashape, pix4d
-from tankcal.camera.formats.opencv import to_opencv
+from tankcal.camera.formats import balanced, colmap, metashape, opencv, pix4d
 from tankcal.camera.formats.texts import NAME_IS, exact_text, short_text
-from tankcal.camera.model import PARAMETERS, UNITS
+from tankcal.camera.model import KEYS, PARAMETERS, UNITS
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.text.naming import is_name
 
-# In an entry of cameras.toml, every number reads back as the same number.
-#
-# The size of a pixel, which is converted to micrometres, may differ by its last bit.
-
+# Every number in cameras.toml reads back without a change. Only the size of a pixel, which is
+# converted to micrometres, may differ by its last bit.
 NEIGHBOURS = 4  # neighbouring numbers tried for an exact text in micrometres
 
 
@@ -57,19 +54,18 @@ def cameras_toml_entry(name, interior, form, size_px, pixel_mm, sds=None, film_m
     -----
     Parameters with the value 0 and without a standard deviation are omitted, except c, x0 and y0.
     """
-    frame = (
-        _frame_lines(size_px, pixel_mm)
-        if film_mm is None
-        else [f"format_mm = {_format_pair(film_mm)}"]
-    )
-    lines = [f"[cameras.{_quote_name(name)}]", *frame]
+    lines = [f"[cameras.{_quote_name(name)}]"]
+    if film_mm is None:
+        lines += _frame_lines(size_px, pixel_mm)
+    else:
+        lines.append(f"format_mm = [{', '.join(map(exact_text, film_mm))}]")
     for place, parameter in enumerate(PARAMETERS):
         sd = np.nan if sds is None else float(sds[place])
         # c, x0 and y0 are always written.
         if place < 3 or interior[place] or np.isfinite(sd):
-            lines.append(f"{value_key(parameter)} = {exact_text(interior[place])}")
+            lines.append(f"{KEYS[parameter]} = {exact_text(interior[place])}")
         if np.isfinite(sd):
-            lines.append(f"{sd_key_of(parameter)} = {exact_text(sd)}")
+            lines.append(f"{make_sd_key(parameter)} = {exact_text(sd)}")
     lines.append(f'affinity = "{form.affinity}"')
     lines.append(f"radial_balance_mm = {exact_text(form.radial_balance_mm)}")
     lines.append(f'convention = "{form.convention}"')
@@ -79,28 +75,13 @@ def cameras_toml_entry(name, interior, form, size_px, pixel_mm, sds=None, film_m
 def _frame_lines(size_px, pixel_mm):
     """Lines that describe the frame of a camera with pixels."""
     width, height = np.broadcast_to(pixel_mm, 2)
-    # A single number for square pixels, else width and height.
-    sizes = (
-        [_format_micrometres(width)]
-        if width == height
-        else list(map(_format_micrometres, (width, height)))
-    )
-    pixel = sizes[0] if len(sizes) == 1 else f"[{', '.join(sizes)}]"
+    pixel = _format_micrometres(width)
+    if width != height:
+        pixel = f"[{pixel}, {_format_micrometres(height)}]"
     return [f"format_px = [{int(size_px[0])}, {int(size_px[1])}]", f"pixel_um = {pixel}"]
 
 
-def _format_pair(values):
-    """Text of an array of two numbers."""
-    return f"[{', '.join(map(exact_text, values))}]"
-
-
-def value_key(parameter):
-    """Key of a parameter in cameras.toml: name and unit."""
-    unit = UNITS[parameter]
-    return f"{parameter}_{unit}" if unit else parameter
-
-
-def sd_key_of(parameter):
+def make_sd_key(parameter):
     """Key of the standard deviation of a parameter in cameras.toml."""
     return f"s_{parameter}_mm" if UNITS[parameter] == "mm" else f"s_{parameter}"
 
@@ -137,7 +118,7 @@ def _quote_name(name):
 
 
 @dataclass(frozen=True)
-class Written:
+class CameraText:
     """Text of a camera file.
 
     Attributes
@@ -170,7 +151,7 @@ def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
 
     Returns
     -------
-    Written
+    CameraText
 
     Raises
     ------
@@ -209,7 +190,7 @@ def write_camera(kind, cameras, sds=None, radius_mm=0.0, file="cameras"):
         return _write_register(cameras, sds)
     if kind == "aicon":
         return _write_balanced(cameras, radius_mm)
-    return _WRITERS[kind](cameras)
+    return _write_in_pixels(kind, cameras)
 
 
 def _refuse_film(kind, cameras, file):
@@ -238,55 +219,40 @@ def _write_register(cameras, sds):
         )
         for (name, camera), sd in zip(cameras, sds, strict=True)
     ]
-    return Written("\n".join(entries), tuple(camera.error_px for _, camera in cameras))
+    return CameraText("\n".join(entries), tuple(camera.error_px for _, camera in cameras))
 
 
 def _write_balanced(cameras, radius_mm):
     """Text of a camera in the balanced form."""
     camera = cameras[0][1]
-    converted = balanced.to_balanced(camera, radius_mm)
-    return Written(balanced.text_of(converted, camera), (converted.error_px,))
+    converted = balanced.convert_to_balanced(camera, radius_mm)
+    return CameraText(balanced.format_text(converted, camera), (converted.error_px,))
 
 
-def _write_opencv(cameras):
-    """FileStorage YAML of an OpenCV camera."""
-    camera = cameras[0][1]
-    converted = to_opencv(camera)
-    return Written(filestorage.text_of(converted, camera.size_px), (converted.error_px,))
+def _write_in_pixels(kind, cameras):
+    """Text of a file in pixels; a kind in SINGLE has one camera."""
+    converted = [(name, _CONVERTERS[kind](camera)) for name, camera in cameras]
+    first, size_px = converted[0][1], cameras[0][1].size_px
+    if kind == "opencv":
+        text = opencv.format_text(first, size_px)
+    elif kind == "opencv-json":
+        text = opencv.format_json(first, size_px)
+    elif kind == "metashape":
+        text = metashape.format_text(first)
+    elif kind == "colmap":
+        text = colmap.format_text(converted)
+    else:
+        text = pix4d.format_text(converted)
+    return CameraText(text, tuple(camera.error_px for _, camera in converted))
 
 
-def _write_opencv_json(cameras):
-    """JSON of an OpenCV camera."""
-    camera = cameras[0][1]
-    converted = to_opencv(camera)
-    return Written(filestorage.json_of(converted, camera.size_px), (converted.error_px,))
-
-
-def _write_metashape(cameras):
-    """XML of a Metashape camera."""
-    converted = metashape.to_metashape(cameras[0][1])
-    return Written(metashape.text_of(converted), (converted.error_px,))
-
-
-def _write_colmap(cameras):
-    """Text of a cameras.txt of COLMAP."""
-    converted = [(name, colmap.to_colmap(camera)) for name, camera in cameras]
-    return Written(colmap.text_of(converted), tuple(camera.error_px for _, camera in converted))
-
-
-def _write_pix4d(cameras):
-    """Text of a .cam file of Pix4D."""
-    converted = [(name, pix4d.to_pix4d(camera)) for name, camera in cameras]
-    return Written(pix4d.text_of(converted), tuple(camera.error_px for _, camera in converted))
-
-
-_WRITERS = {
-    "opencv": _write_opencv,
-    "opencv-json": _write_opencv_json,
-    "colmap": _write_colmap,
-    "metashape": _write_metashape,
-    "pix4d": _write_pix4d,
+_CONVERTERS = {
+    "opencv": opencv.convert_to_opencv,
+    "opencv-json": opencv.convert_to_opencv,
+    "colmap": colmap.convert_to_colmap,
+    "metashape": metashape.convert_to_metashape,
+    "pix4d": pix4d.convert_to_pix4d,
 }
 SINGLE = ("opencv", "opencv-json", "metashape", "aicon")  # kinds with one camera in a file
 IN_MM = ("cameras.toml", "aicon")  # kinds that do not require pixels
-KINDS = ("cameras.toml", *_WRITERS, "aicon")
+KINDS = ("cameras.toml", *_CONVERTERS, "aicon")

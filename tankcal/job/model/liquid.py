@@ -36,7 +36,7 @@ class Meter:
     factor: float
     u_factor: float
     repeatability: float
-    fixed_m3: float
+    fixed_m3: float = 0.0
     certificate: str = ""
     prover: str = ""
     flow_min_m3_h: float | None = None

@@ -54,7 +54,7 @@ class Ring:
 
     name: str
     length_m: float
-    thickness_m: float
+    thickness_m: float = 0.0
     paint_m: float = 0.0
     lap: str | None = None
 

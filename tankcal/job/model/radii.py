@@ -59,6 +59,6 @@ class Change:
         Common component of the errors of the former radii and of the new survey, m.
     """
 
-    common_m: float
-    own_m: float
+    common_m: float = 0.0
+    own_m: float = 0.0
     shared_m: float = 0.0

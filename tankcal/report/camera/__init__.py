@@ -1,7 +1,7 @@
-"""What a user sees of the camera's analyses: lines in the terminal, a report, tables, JSON.
+"""Output of the camera analyses: lines in the terminal, papers, CSV tables and JSON.
 
-A result is the dict that `tankcal.record.camera_<kind>.as_json` gives; under "made_from" it
-may say what it was made from. Nothing here computes a number.
+A result is the dict of `tankcal.record.camera_<kind>.as_json`. Its optional key "made_from" names
+the input files. This package computes no number.
 """
 
 import json
@@ -13,11 +13,11 @@ from tankcal.messages import message
 from tankcal.record import manifest
 from tankcal.record.camera_versions import KINDS
 from tankcal.report import folders
-from tankcal.report.camera.paper import CameraPaper, made_from
+from tankcal.report.camera.paper import CameraPaper, describe_origin
 from tankcal.report.outputs.csv_files import write_rows
 from tankcal.report.terminal import lines_of
 
-__all__ = ["CameraPaper", "lines", "made_from", "refuse_foreign", "write"]
+__all__ = ["CameraPaper", "describe_origin", "lines", "refuse_foreign", "write"]
 
 RECORD = "camera.json"
 TEMPLATE = "camera.ipynb"
@@ -40,30 +40,45 @@ FILES = (RECORD, *TABLES, "report.ipynb", "report.pdf", "report.html", manifest.
 
 
 def lines(result, language=None):
-    """What is printed in the terminal: lines of text, tables aligned, in a language or English."""
+    """Lines of text for the terminal, with aligned tables, in a language or English."""
     paper = CameraPaper(result, language)
-    return lines_of(_of_kind(result).summary(paper))
+    return lines_of(_load_module(result).summary(paper))
 
 
 def write(result, directory, progress=None, language=None):
-    """Write JSON, CSV tables, notebook, PDF and web page of a result, all or nothing.
+    """Write JSON, CSV tables, notebook, PDF and web page of a result, all or none of them.
 
-    directory  made when missing; earlier results of these analyses there are replaced, and a
-               folder that holds anything else is refused
-    progress   called as progress(text, done, total)
-    language   of notebook, PDF and web page, one of languages.LANGUAGES; None: English
-    Returns the paths. Raises InputError for a folder that is not tankcal's to replace, and
-    TankcalError for a language without words.
+    Parameters
+    ----------
+    result : dict
+        Result of an analysis.
+    directory : path-like
+        Folder, created if missing. Earlier results of these analyses in it are replaced.
+    progress : callable, optional
+        Called as progress(text, done, total).
+    language : str, optional
+        Language of notebook, PDF and web page, one of languages.LANGUAGES; by default English.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        If the folder contains other files.
+    TankcalError
+        If the language has no words.
     """
     refuse_foreign(directory)
-    from tankcal.report.notebook import joined  # not for lines in a terminal: it takes a second
+    from tankcal.report.notebook import joined  # the import takes a second
 
     kind = CameraPaper(result, language).result["kind"]
     progress = progress or (lambda text, done, total: None)
     with folders.replaced(directory, language) as temporary:
         text = json.dumps(result, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
         (temporary / RECORD).write_text(text + "\n", encoding="utf-8")
-        for name, rows in _of_kind(result).tables(result).items():
+        for name, rows in _load_module(result).tables(result).items():
             if rows:
                 write_rows(rows, temporary / name)
         others = [other for other in KINDS if other != kind]
@@ -80,9 +95,10 @@ def write(result, directory, progress=None, language=None):
 
 
 def refuse_foreign(directory):
-    """Raise InputError when `directory` exists and holds anything but results of write()."""
+    """Raise InputError if `directory` exists and contains files other than those of write()."""
     folders.refuse_foreign(directory, FILES)
 
 
-def _of_kind(result):
+def _load_module(result):
+    """Module that presents results of this kind."""
     return import_module(f"tankcal.report.camera.{result['kind']}")

@@ -1,7 +1,7 @@
-"""Influence of the calibration on a survey: sentences, tables and rows for CSV files."""
+"""Influence of calibrations on a survey: sentences, tables and rows for CSV files."""
 
 from tankcal.report import blocks, numbers
-from tankcal.report.camera.naming import short
+from tankcal.report.camera.paper import shorten
 from tankcal.report.camera.product import axes_table, decimals_of_axes, unit_of
 from tankcal.report.camera.stability import DISTORTION, INTERIOR
 from tankcal.report.tables import Column, Table
@@ -12,7 +12,7 @@ MOST_PAIRS, MOST_PAIRS_ON_TERMINAL = 40, 15
 
 
 def summary(paper):
-    """What the terminal shows: each run, what it changes, check points, volumes, pairs."""
+    """Blocks for the terminal: runs, their changes, check points, volumes and pairs."""
     return [
         *facts(paper),
         *runs(paper),
@@ -25,21 +25,21 @@ def summary(paper):
 
 
 def facts(paper):
-    """What was replaced, how large the survey is, and what its search for blunders rejected."""
-    found = paper.result
-    states = ", ".join(paper.words["states"].get(state, state) for state in found["states"])
+    """Replaced camera, size of the survey, and number of rejected readings."""
+    result = paper.result
+    states = ", ".join(paper.words["states"].get(state, state) for state in result["states"])
     search = paper.text("not_searched")
-    if found["search"]["searched"]:
-        search = paper.text("searched", count=len(found["search"]["removed"]))
+    if result["search"]["searched"]:
+        search = paper.text("searched", count=len(result["search"]["removed"]))
     return [
         paper.facts(
             [
-                ("camera", found["camera"]),
-                ("calibrations", list_names(paper.words, map(short, found["calibrations"]))),
+                ("camera", result["camera"]),
+                ("calibrations", list_names(paper.words, map(shorten, result["calibrations"]))),
                 ("states", states),
-                ("free", paper.parameters(found["free"])),
-                ("photos", paper.number(found["photos"], decimals=0)),
-                ("adjusted_points", paper.number(found["points"], decimals=0)),
+                ("free", paper.parameters(result["free"])),
+                ("photos", paper.number(result["photos"], decimals=0)),
+                ("adjusted_points", paper.number(result["points"], decimals=0)),
                 ("search", search),
             ]
         )
@@ -47,23 +47,23 @@ def facts(paper):
 
 
 def label(paper, run):
-    """A run's name: the reference, or a calibration with what is held of it."""
+    """Name of a run: the reference, or a calibration with its state."""
     if run["calibration"] is None:
         return paper.text("reference")
     state = paper.words["states"].get(run["state"], run["state"])
-    return paper.text("run", name=short(run["calibration"]), state=state)
+    return paper.text("run", name=shorten(run["calibration"]), state=state)
 
 
-def adjusted(paper):
-    """The runs that could be adjusted."""
+def list_adjusted_runs(paper):
+    """Runs with an adjustment."""
     return [run for run in paper.result["runs"] if run["outcome"] == "adjusted"]
 
 
 def runs(paper):
-    """How well each adjustment fits, and the residuals of its images."""
-    rows = [_run(paper, run) for run in paper.result["runs"]]
-    seen = [row for row in rows if row["largest_um"] is not None]
-    in_pixels = bool(seen) and all(row["rms_x_px"] is not None for row in seen)
+    """Table of the global test and the residuals of the images of each run."""
+    rows = [_run_cells(paper, run) for run in paper.result["runs"]]
+    with_images = [row for row in rows if row["largest_um"] is not None]
+    in_pixels = bool(with_images) and all(row["rms_x_px"] is not None for row in with_images)
     unit, column = ("px", "px") if in_pixels else ("um", "um")
     columns = [
         Column("run"),
@@ -78,7 +78,8 @@ def runs(paper):
     return [paper.table("runs", rows, columns)]
 
 
-def _run(paper, run):
+def _run_cells(paper, run):
+    """Cells of a run for its global test and the residuals of its images."""
     quality, images = run["quality"] or {}, run["images"] or {}
     row = {
         "run": label(paper, run),
@@ -99,7 +100,7 @@ def _run(paper, run):
 
 
 def troubles(paper):
-    """A sentence for each run that failed, was left out, or has no volume; for what was held."""
+    """Sentences about runs that failed, were skipped, have no volume, or have fixed parameters."""
     sentences = []
     for run in paper.result["runs"]:
         name = label(paper, run)
@@ -117,14 +118,18 @@ def troubles(paper):
 
 
 def shifts(paper):
-    """How far points and photographs move against the reference."""
-    rows = [_shift(label(paper, run), run["shifts"]) for run in adjusted(paper) if run["shifts"]]
+    """Table of the changes of points and photos against the reference."""
+    rows = [
+        _shift_cells(run["shifts"]) | {"run": label(paper, run)}
+        for run in list_adjusted_runs(paper)
+        if run["shifts"]
+    ]
     if not rows:
         return [paper.paragraph("no_shifts")]
-    found = [paper.show(SHIFTS, rows)]
-    if any(run["shifts"] and run["shifts"]["aligned"] for run in adjusted(paper)):
-        found.append(paper.paragraph("aligned"))
-    return found
+    content = [paper.show(SHIFTS, rows)]
+    if any(run["shifts"] and run["shifts"]["aligned"] for run in list_adjusted_runs(paper)):
+        content.append(paper.paragraph("aligned"))
+    return content
 
 
 SHIFTS = Table(
@@ -144,11 +149,10 @@ SHIFTS = Table(
 )  # fmt: skip
 
 
-def _shift(name, shift):
+def _shift_cells(shift):
     points, photos = shift["points"], shift["photos"]
     row = {f"points_{axis}_mm": v for axis, v in zip("xyz", points["rms_mm"], strict=True)}
     return row | {
-        "run": name,
         "points_largest_mm": points["largest_xyz_mm"],
         "largest_point": points["largest_point"],
         "photos_mm": photos["rms_xyz_mm"],
@@ -157,28 +161,28 @@ def _shift(name, shift):
 
 
 def checks(paper):
-    """Check points of each run: RMSE and bias of each axis, before and after the bias."""
-    done = [run for run in adjusted(paper) if run["product"]]
-    if not done:
+    """Table of the check points of each run: bias of each axis, RMSE with and without it."""
+    runs = [run for run in list_adjusted_runs(paper) if run["product"]]
+    if not runs:
         return [paper.paragraph("no_check_points")]
-    unit = "m" if "m" in {unit_of(run["product"]) for run in done} else "mm"
-    decimals = max(decimals_of_axes(run["product"], unit) for run in done)
+    unit = "m" if "m" in {unit_of(run["product"]) for run in runs} else "mm"
+    decimals = max(decimals_of_axes(run["product"], unit) for run in runs)
     rows = [
         row | {"run": label(paper, run) if number == 0 else ""}
-        for run in done
+        for run in runs
         for number, row in enumerate(run["product"]["axes"])
     ]
-    level = paper.percent(done[0]["product"]["alpha"])
+    level = paper.percent(runs[0]["product"]["alpha"])
     return [paper.show(axes_table(unit, decimals), rows, on="checks_of_runs", level=level)]
 
 
 def volumes(paper):
-    """Volume of each run, and its difference from the reference."""
-    done = [run for run in adjusted(paper) if run["volume"]]
-    if not done:
+    """Table of the volume of each run, and its difference from the reference."""
+    runs = [run for run in list_adjusted_runs(paper) if run["volume"]]
+    if not runs:
         return []
     rows = []
-    for run in done:
+    for run in runs:
         change = (run["shifts"] or {}).get("volume") or {}
         rows.append(
             run["volume"]
@@ -200,17 +204,17 @@ def volumes(paper):
 
 
 def pairs(paper, most=MOST_PAIRS):
-    """Pairs of runs, those with the largest movement of points first, and how many there are."""
-    every = paper.result["runs"]
+    """Table of pairs of runs, those with the largest changes of points first."""
+    all_runs = paper.result["runs"]
     rows = [
-        _shift("", pair)
+        _shift_cells(pair)
         | {
-            "one": label(paper, every[pair["one"]]),
-            "other": label(paper, every[pair["other"]]),
+            "one": label(paper, all_runs[pair["one"]]),
+            "other": label(paper, all_runs[pair["other"]]),
             "change_m3": (pair["volume"] or {}).get("difference_m3"),
         }
         for pair in paper.result["pairs"]
-        if pair["one"] != 0 and not _are_free(every[pair["one"]], every[pair["other"]])
+        if pair["one"] != 0 and not _are_free(all_runs[pair["one"]], all_runs[pair["other"]])
     ]
     if not rows:
         return []
@@ -218,19 +222,19 @@ def pairs(paper, most=MOST_PAIRS):
     if all(row["change_m3"] is None for row in rows):
         rows = [{key: row[key] for key in row if key != "change_m3"} for row in rows]
     shown = rows[:most]
-    found = [paper.show(SHIFTS, shown, on="pairs_of_runs")]
+    content = [paper.show(SHIFTS, shown, on="pairs_of_runs")]
     if len(rows) > len(shown):
-        found.append(paper.paragraph("only_largest", shown=len(shown), all=len(rows)))
-    return found
+        content.append(paper.paragraph("only_largest", shown=len(shown), all=len(rows)))
+    return content
 
 
-def _are_free(one, other):
-    """Whether both start values only: the same adjustment."""
-    return one["state"] == other["state"] == "free"
+def _are_free(first, second):
+    """Whether calibrations are only initial values in both runs, so that the results agree."""
+    return first["state"] == second["state"] == "free"
 
 
-def removed(paper):
-    """The readings that the reference rejected, and that all runs do without."""
+def rejections(paper):
+    """Table of the readings that the reference rejected; no run uses them."""
     rows = [
         {
             "observation": observation_name(paper.words, row),
@@ -257,17 +261,18 @@ def removed(paper):
 
 
 def interiors(paper):
-    """The interior parameters after each adjustment."""
-    done = [run for run in adjusted(paper) if run["interior"]]
-    units = {one["parameter"]: one["unit"] for run in done for one in run["interior"]}
+    """Tables of the interior parameters after each adjustment, and of different forms."""
+    runs = [run for run in list_adjusted_runs(paper) if run["interior"]]
+    units = {item["parameter"]: item["unit"] for run in runs for item in run["interior"]}
     parts = [[name for name in part if name in units] for part in (INTERIOR, *DISTORTION)]
-    forms = {(run["convention"], run["affinity"]) for run in done}
-    found = [_interior(paper, done, part, units) for part in parts if part]
-    return found if len(forms) < 2 else [*found, _models(paper, done)]
+    tables = [_interior_table(paper, runs, part, units) for part in parts if part]
+    if len({(run["convention"], run["affinity"]) for run in runs}) > 1:
+        tables.append(_forms_table(paper, runs))
+    return tables
 
 
-def _models(paper, runs):
-    """What the parameters of each run mean: calibrations of different forms stand side by side."""
+def _forms_table(paper, runs):
+    """Table of the form of distortion of each run, which defines its parameters."""
     rows = [{**run, "run": label(paper, run)} for run in runs]
     columns = [
         Column("run"),
@@ -277,23 +282,25 @@ def _models(paper, runs):
     return paper.table("models_of_runs", rows, columns)
 
 
-def _interior(paper, done, names, units):
+def _interior_table(paper, runs, names, units):
     rows = []
-    for run in done:
-        own = {one["parameter"]: one for one in run["interior"]}
-        rows.append([label(paper, run), *(_interior_value(paper, own.get(name)) for name in names)])
+    for run in runs:
+        values = {item["parameter"]: item for item in run["interior"]}
+        cells = (_format_interior(paper, values.get(name)) for name in names)
+        rows.append([label(paper, run), *cells])
     heads = [[paper.word("table_headings.run"), ""]]
     heads += [[paper.parameters([name]), numbers.powers(units[name] or "")] for name in names]
     align = ["left", *["right"] * len(names)]
     return blocks.table(heads, rows, paper.word("captions.interiors"), align)
 
 
-def _interior_value(paper, one):
-    if one is None:
+def _format_interior(paper, item):
+    """Text of a parameter with its standard deviation; NOTHING if it is not in the model."""
+    if item is None:
         return NOTHING
-    if not one["sd"]:
-        return paper.plain(one["value"])
-    return numbers.concise(one["value"], one["sd"], paper.marks)
+    if not item["sd"]:
+        return paper.plain(item["value"])
+    return numbers.concise(item["value"], item["sd"], paper.marks)
 
 
 # ---- CSV files
@@ -304,11 +311,13 @@ def tables(result):
     return {
         "runs.csv": [_run_row(run) for run in result["runs"]],
         "pairs.csv": [
-            {key: result["runs"][pair[key]]["label"] for key in ("one", "other")} | _moved(pair)
+            {key: result["runs"][pair[key]]["label"] for key in ("one", "other")} | _shift_row(pair)
             for pair in result["pairs"]
         ],
         "cameras.csv": [
-            {"run": run["label"], **one} for run in result["runs"] for one in run["interior"] or []
+            {"run": run["label"], **item}
+            for run in result["runs"]
+            for item in run["interior"] or []
         ],
         "axes.csv": [
             {"run": run["label"]} | {key: row[key] for key in row if key != "precision"}
@@ -324,17 +333,19 @@ def _run_row(run):
     row |= {key: run[key] for key in ("calibration", "state", "outcome", "message")}
     row |= {key: quality.get(key) for key in ("sigma0", "chi2", "redundancy", "passed")}
     row |= {key: (run["volume"] or {}).get(key) for key in ("volume_m3", "U_m3", "k", "height_m")}
-    return row | _moved(run["shifts"])
+    return row | _shift_row(run["shifts"])
 
 
-def _moved(shift):
-    points, photos = (shift or {}).get("points", {}), (shift or {}).get("photos", {})
-    volume = (shift or {}).get("volume") or {}
+def _shift_row(shift):
+    """CSV cells of the changes between two runs; None without changes."""
+    shift = shift or {}
+    points, photos = shift.get("points", {}), shift.get("photos", {})
+    volume = shift.get("volume") or {}
     row = {}
-    for what, of in (("points", points), ("photos", photos)):
-        values = of.get("rms_mm") or [None] * 3
+    for what, changes in (("points", points), ("photos", photos)):
+        values = changes.get("rms_mm") or [None] * 3
         row |= {f"{what}_rms_{axis}_mm": v for axis, v in zip("xyz", values, strict=True)}
-        row[f"{what}_largest_mm"] = of.get("largest_xyz_mm")
+        row[f"{what}_largest_mm"] = changes.get("largest_xyz_mm")
     row["photos_rms_turn_arcsec"] = photos.get("rms_turn_arcsec")
     row["volume_difference_m3"] = volume.get("difference_m3")
     row["volume_difference_percent"] = volume.get("percent")

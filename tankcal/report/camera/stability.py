@@ -1,32 +1,31 @@
-"""Comparison of calibrations: its sentences, tables and rows for CSV files."""
+"""Comparison of calibrations: sentences, tables and rows for CSV files."""
 
-from tankcal.camera.model import PARAMETERS, UNITS
+from tankcal.camera.model import KEYS, UNITS
 from tankcal.report import blocks, numbers
-from tankcal.report.camera.naming import numbered, short
+from tankcal.report.camera.paper import number_names, shorten
 from tankcal.report.plain import Column
 from tankcal.text.digits import NOTHING, decimals_of, fixed
 
-KEYS = {name: f"{name}_{UNITS[name]}" if UNITS[name] else name for name in PARAMETERS}
-MOST_LISTED = 12  # pairs that a sentence lists
+MOST_LISTED = 12  # pairs in a sentence
 INTERIOR = ("c", "x0", "y0")
 DISTORTION = (("K1", "K2", "K3", "K4"), ("P1", "P2", "P3", "P4", "A", "B"))
-MOST_DECIMALS = 3  # of a figure in pixels; fewer where it scatters from terrain to terrain
+MOST_DECIMALS = 3  # of a figure in pixels; fewer if it scatters between terrains
 _SAME = "\N{NO-BREAK SPACE}="
 _NOT_SAME = "\N{NO-BREAK SPACE}\N{FIGURE SPACE}"
 
 
 def summary(paper):
-    """What the terminal shows: how it was compared, the verdicts, all pairs."""
+    """Blocks for the terminal: conventions, verdicts and pairs."""
     return [*method(paper), *verdicts(paper), *pairs(paper)]
 
 
 def method(paper):
-    """How the calibrations were compared, each convention named."""
-    found, grid = paper.result, paper.result["grid"]
-    width, height = found["cameras"][0]["format_px"]
+    """Method of the comparison, and its conventions."""
+    result, grid = paper.result, paper.result["grid"]
+    width, height = result["cameras"][0]["format_px"]
     facts = [
-        ("method", paper.word(f"methods.{found['method']}")),
-        ("published", paper.text("as_published" if found["as_published"] else "by_default")),
+        ("method", paper.word(f"methods.{result['method']}")),
+        ("published", paper.text("as_published" if result["as_published"] else "by_default")),
         (
             "grid",
             paper.text(
@@ -42,17 +41,22 @@ def method(paper):
         ),
         ("threshold", threshold(paper)),
     ]
-    return [paper.facts(facts), blocks.listing(_convention(paper, c) for c in found["conventions"])]
+    return [
+        paper.facts(facts),
+        blocks.listing(_convention(paper, c) for c in result["conventions"]),
+    ]
 
 
 def threshold(paper):
-    """The threshold with its unit."""
+    """Threshold with its unit."""
     return paper.plain(paper.result["threshold_px"], "px")
 
 
 def _convention(paper, convention):
     code = convention["code"]
-    values = {key: _shown(paper, key, value) for key, value in convention.items() if key != "code"}
+    values = {
+        key: _format_value(paper, key, value) for key, value in convention.items() if key != "code"
+    }
     if code == "direction" and paper.result["method"] == "spr":
         code = "direction_spr"
     if code == "terrain_random":
@@ -60,9 +64,9 @@ def _convention(paper, convention):
     return paper.word(f"conventions_of_comparison.{code}", **values)
 
 
-def _shown(paper, key, value):
+def _format_value(paper, key, value):
     if key == "cameras":
-        return ", ".join(short(name) for name in value)
+        return ", ".join(map(shorten, value))
     if key == "position_m":
         return paper.text("position", **dict(zip("xyz", map(paper.plain, value), strict=True)))
     if key == "points":
@@ -73,7 +77,7 @@ def _shown(paper, key, value):
 
 
 def verdicts(paper):
-    """One sentence on all pairs, and one on those that the declared sds explain."""
+    """Sentences about all pairs, and about pairs explained by declared standard deviations."""
     rows = paper.result["pairs"]
     similar = sum(row["similar"] for row in rows)
     code = "verdicts"
@@ -81,10 +85,12 @@ def verdicts(paper):
         code = "all_pairs_similar" if similar else "no_pair_similar"
     if len(rows) == 1:
         code = "one_pair_similar" if similar else "one_pair_different"
-    found = [paper.paragraph(code, similar=similar, all=len(rows), threshold=threshold(paper))]
-    known = _with_covariance(paper)
+    content = [paper.paragraph(code, similar=similar, all=len(rows), threshold=threshold(paper))]
+    # Without correlations, the expected figure is too large to explain a difference.
+    conventions = {item["code"]: item for item in paper.result["conventions"]}
+    known = set(conventions.get("covariance_known", {}).get("cameras", ()))
     explained = [
-        f"{short(row['a'])} – {short(row['b'])}"
+        f"{shorten(row['a'])} – {shorten(row['b'])}"
         for row in rows
         if {row["a"], row["b"]} <= known and row["figure_px"] <= row["expected_px"]
     ]
@@ -93,26 +99,22 @@ def verdicts(paper):
         names = "; ".join(explained[:MOST_LISTED])
         if more > 0:
             names = paper.text("and_more", names=names, more=more)
-        found.append(paper.paragraph("within_expectation", pairs=names))
-    return found
-
-
-def _with_covariance(paper):
-    """Names of the sets whose correlations are known; without them too much is explained."""
-    conventions = {one["code"]: one for one in paper.result["conventions"]}
-    return set(conventions.get("covariance_known", {}).get("cameras", ()))
+        content.append(paper.paragraph("within_expectation", pairs=names))
+    return content
 
 
 def matrix(paper):
-    """Rows the later set, columns the earlier ones, as in the published tables."""
+    """Matrix of the figures, later sets in rows and earlier sets in columns, as published."""
     names = [camera["name"] for camera in paper.result["cameras"]]
-    labels, heads = numbered(names)
-    first = 0 if labels != heads else 1  # a number is explained by its row
+    labels, heads = number_names(names)
+    first = 0 if labels != heads else 1  # the first row explains the number of the first set
     figure = {frozenset((row["a"], row["b"])): row for row in paper.result["pairs"]}
     rows = []
     for i, later in enumerate(names[first:], first):
         cells = [figure.get(frozenset((earlier, later))) for earlier in names[:i]]
-        rows.append([labels[i], *(_cell(paper, cell) for cell in cells), *[""] * (len(names) - i)])
+        rows.append(
+            [labels[i], *(_figure_cell(paper, cell) for cell in cells), *[""] * (len(names) - i)]
+        )
     caption = paper.word(
         "captions.matrix",
         method=paper.word(f"short_methods.{paper.result['method']}"),
@@ -123,7 +125,7 @@ def matrix(paper):
     return blocks.table(["", *heads[:-1]], [row[:width] for row in rows], caption, align)
 
 
-def _cell(paper, row):
+def _figure_cell(paper, row):
     if row is None:
         return NOTHING
     decimals = min(decimals_of(row.get("scatter_px")), MOST_DECIMALS)
@@ -131,9 +133,9 @@ def _cell(paper, row):
 
 
 def pairs(paper):
-    """The matrix, where there are three sets or more, and one row for each pair."""
-    drawn = [matrix(paper)] if len(paper.result["cameras"]) > 2 else []
-    rows = [_row_of_pair(row) for row in paper.result["pairs"]]
+    """Matrix of three sets or more, and a table with a row for each pair."""
+    tables = [matrix(paper)] if len(paper.result["cameras"]) > 2 else []
+    rows = [_pair_row(row) for row in paper.result["pairs"]]
     expected = any(row["expected_px"] is not None for row in rows)
     scattered = any(row["scatter_px"] is not None for row in rows)
     columns = [
@@ -147,34 +149,33 @@ def pairs(paper):
         Column("mean_px", "px", decimals=2),
         *_columns_of_method(rows),
     ]
-    return [*drawn, paper.table("pairs" if expected else "pairs_plain", rows, columns)]
+    return [*tables, paper.table("pairs" if expected else "pairs_plain", rows, columns)]
 
 
 def _columns_of_method(rows):
-    """Columns of what a method estimates beside the figure."""
-    found = [("scale", Column("scale", decimals=6))]
-    for angle in ("omega", "phi", "kappa"):
-        found.append((f"{angle}_deg", Column(f"{angle}_deg", "deg arcsec", decimals=1)))
-    for axis in "xyz":
-        found.append((f"shift_{axis}_m", Column(f"shift_{axis}_m", "m", decimals=3)))
-    return [column for key, column in found if any(row[key] is not None for row in rows)]
+    """Columns of the scale, rotation and shift that a method estimates."""
+    columns = {"scale": Column("scale", decimals=6)}
+    for angle in ("omega_deg", "phi_deg", "kappa_deg"):
+        columns[angle] = Column(angle, "deg arcsec", decimals=1)
+    for shift in ("shift_x_m", "shift_y_m", "shift_z_m"):
+        columns[shift] = Column(shift, "m", decimals=3)
+    return [column for key, column in columns.items() if any(row[key] is not None for row in rows)]
 
 
-def _row_of_pair(row):
+def _pair_row(row):
     rotation = row["rotation_deg"] or [None] * 3
     shift = row["shift_m"] or [None] * 3
     angles = dict(zip(("omega_deg", "phi_deg", "kappa_deg"), rotation, strict=True))
     shifts = {f"shift_{axis}_m": value for axis, value in zip("xyz", shift, strict=True)}
-    return (
-        {"scatter_px": None} | row | angles | shifts | {"a": short(row["a"]), "b": short(row["b"])}
-    )
+    names = {key: shorten(row[key]) for key in "ab"}
+    return {"scatter_px": None} | row | angles | shifts | names
 
 
 def calibrations(paper):
-    """Tables of the values of every set, with their standard deviations."""
+    """Tables of the parameters of all calibrations, with standard deviations, and of models."""
     cameras = paper.result["cameras"]
     parts = [("interior", INTERIOR), *(("distortion", part) for part in DISTORTION)]
-    found = [_values(paper, name, keys) for name, keys in parts]
+    values = [_values_table(paper, name, parameters) for name, parameters in parts]
     rows = [
         {
             "calibration": label,
@@ -183,9 +184,11 @@ def calibrations(paper):
             "frame": paper.text(
                 "frame", width=camera["format_px"][0], height=camera["format_px"][1]
             ),
-            "pixel": paper.text("pixel", **_pixel(paper, camera)),
+            "pixel": paper.text(
+                "pixel", **dict(zip("xy", map(paper.plain, camera["pixel_um"]), strict=True))
+            ),
         }
-        for label, camera in zip(numbered_labels(paper), cameras, strict=True)
+        for label, camera in zip(number_calibrations(paper), cameras, strict=True)
     ]
     columns = [
         Column("calibration"),
@@ -194,21 +197,16 @@ def calibrations(paper):
         Column("frame"),
         Column("pixel"),
     ]
-    return [*(table for table in found if table), paper.table("model", rows, columns)]
+    return [*(table for table in values if table), paper.table("model", rows, columns)]
 
 
-def numbered_labels(paper):
-    """The names of the calibrations, numbered where the matrix numbers them."""
-    return numbered([camera["name"] for camera in paper.result["cameras"]])[0]
+def number_calibrations(paper):
+    """Names of the calibrations, with the numbers of the matrix, if any."""
+    return number_names([camera["name"] for camera in paper.result["cameras"]])[0]
 
 
-def _pixel(paper, camera):
-    sides = (paper.plain(side) for side in camera["pixel_um"])
-    return dict(zip("xy", sides, strict=True))
-
-
-def _values(paper, name, parameters):
-    """One row a calibration, one column a parameter that any of them has."""
+def _values_table(paper, name, parameters):
+    """Table with a row for each calibration and a column for each parameter in use, or None."""
     cameras = paper.result["cameras"]
     used = [p for p in parameters if any(camera[KEYS[p]] for camera in cameras)]
     if not used:
@@ -216,7 +214,7 @@ def _values(paper, name, parameters):
     rows = [
         [label]
         + [numbers.concise(camera[KEYS[p]], camera["sd"][KEYS[p]], paper.marks) for p in used]
-        for label, camera in zip(numbered_labels(paper), cameras, strict=True)
+        for label, camera in zip(number_calibrations(paper), cameras, strict=True)
     ]
     heads = [[paper.word("table_headings.calibration"), ""]]
     heads += [[paper.word(f"parameters.{p}"), numbers.powers(UNITS[p])] for p in used]
@@ -225,9 +223,9 @@ def _values(paper, name, parameters):
 
 
 def remarks_on_bands(paper):
-    """A sentence on the bands of the curves, where there are any."""
-    given = any(camera["sd"][KEYS["K1"]] for camera in paper.result["cameras"])
-    return [paper.paragraph("bands_uncorrelated")] if given else []
+    """A sentence about the bands of the curves, if there are bands."""
+    has_bands = any(camera["sd"][KEYS["K1"]] for camera in paper.result["cameras"])
+    return [paper.paragraph("bands_uncorrelated")] if has_bands else []
 
 
 def tables(result):
@@ -235,10 +233,16 @@ def tables(result):
     return {
         "cameras.csv": [_camera_row(camera) for camera in result["cameras"]],
         "pairs.csv": [
-            {key: value for key, value in _flat(row).items() if not key.startswith("difference")}
+            {key: value for key, value in _pair_row(row).items() if not _is_array(key)}
+            | {"a": row["a"], "b": row["b"]}
             for row in result["pairs"]
         ],
     }
+
+
+def _is_array(key):
+    """Whether a key of a pair contains a map or a vector; CSV rows have its elements."""
+    return key.startswith("difference") or key in ("rotation_deg", "shift_m")
 
 
 def _camera_row(camera):
@@ -250,10 +254,3 @@ def _camera_row(camera):
     for axis, size, pixel in sizes:
         frame |= {f"format_{axis}_px": size, f"pixel_{axis}_um": pixel}
     return {"name": camera["name"], **values, **sds, **model, **frame}
-
-
-def _flat(pair):
-    """A pair with its names as they are and its vectors one number a key."""
-    names = {"a": pair["a"], "b": pair["b"]}
-    row = _row_of_pair(pair) | names
-    return {key: value for key, value in row.items() if key not in ("rotation_deg", "shift_m")}

@@ -29,6 +29,7 @@ EXCHANGED = 7  # control points up to which all pairs are exchanged
 CONTROL = "control.csv"
 MOST_SETUPS = 30  # set-ups whose circles are tried in another unit
 MOST = 12  # photos left out one at a time
+MOST_FAILURES = 20  # trials without a solution; more would only add to the waiting time
 ALIKE_FAILURES = 6  # trials that fail like the survey itself: readings are then missing
 
 
@@ -50,15 +51,15 @@ def likely_mistake(measurements, sigma0, run, failure=None):
     list of Problem
     """
     limit = min(BETTER * sigma0, SOUND)
-    explained, alike = [], 0
+    explained, failures, alike = [], 0, 0
     mistakes = (_mirror_mistakes, _files_in_other_unit, _name_exchanges, _setup_in_other_unit)
     for suppositions in mistakes:
         for problem, changed in suppositions(measurements):
             try:
                 trial_sigma0 = run(changed)[0].sigma0
             except (SolutionError, InputError) as error:
-                alike += str(error) == failure
-                if alike == ALIKE_FAILURES and not explained:
+                failures, alike = failures + 1, alike + (str(error) == failure)
+                if not explained and (alike == ALIKE_FAILURES or failures == MOST_FAILURES):
                     return []
                 continue
             if trial_sigma0 < limit:

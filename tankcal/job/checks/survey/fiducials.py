@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import chdtri
 
-from tankcal.camera.comparator import GROSS, KINDS, suspicion
+from tankcal.camera.comparator import GROSS, KINDS, find_mark_error
 from tankcal.errors import SolutionError
 from tankcal.job.checking import has_rows, is_not_given, tell
 from tankcal.job.checks.survey.files import refuse_undefined, tell_rows
@@ -170,7 +170,7 @@ def _is_possible(files, table, photo, readings):
         files.log.problem(table.file, expected, row, "mark")
         return False
     repeated = readings.repeats
-    suspected = suspicion(repeated.mean, readings.marks_mm[repeated.first], readings.kind)
+    suspected = find_mark_error(repeated.mean, readings.marks_mm[repeated.first], readings.kind)
     if suspected is None:
         try:
             readings.fit(photo, None)
@@ -190,7 +190,7 @@ def _is_possible(files, table, photo, readings):
 
 
 def _suspected(photo, suspicion_of_marks, names):
-    """Message about a comparator.Suspicion."""
+    """Message about a comparator.MarkError."""
     listed = [join_with_and([repr(names[i]) for i in group]) for group in suspicion_of_marks.marks]
     if suspicion_of_marks.what == "unit":
         times = 1 / suspicion_of_marks.size

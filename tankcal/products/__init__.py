@@ -1,0 +1,1 @@
+"""Products: commands beside the main job, each in its own package."""

@@ -1,0 +1,328 @@
+"""Volume correction of crude oil, petroleum products and lubricating oils (ASTM D1250).
+
+The factor VCF = rho(t) / rho(base) converts a volume at the temperature t to the base temperature.
+Two editions are in use. They differ by 0.00001, in the transition zone of products by 0.00006:
+
+- 1980: tables 5, 6, 23, 24, 53, 54 (base 60 degF or 15 degC) and 59, 60 (20 degC);
+- 2004: one procedure for all bases, with the pressure (API MPMS 11.1-2004 with the addendum of
+  2007).
+
+The texts of the standards were not read. Equations and constants are those of independent public
+implementations; the tests compare them with published values of the tables.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.errors import SolutionError
+from tankcal.products.quantity.ranges import refuse_outside
+
+EDITIONS, GROUPS = (1980, 2004), ("crude", "products", "lubricants")
+BASES_C = {"15C": 15.0, "20C": 20.0, "60F": (60.0 - 32.0) / 1.8}
+WATER_1980, WATER_2004 = 999.012, 999.016  # kg/m3 at 60 degF, of the API gravity
+KPA_PER_PSI = 6.894757
+KPA_PER_BAR = 100.0
+
+MOST_ROUNDS = 200  # of the fixed-point iteration for a density at the base
+ROUNDS_OF_GROUPS = 30  # later rounds keep the group of products, so that it cannot alternate
+CONVERGED = 1e-13  # relative change of the density
+
+
+def density_of_gravity(api, water=WATER_1980):
+    """Density at 60 degF, kg/m3, of an API gravity: 141.5 W / (131.5 + API).
+
+    Parameters
+    ----------
+    api : float or ndarray
+        Gravity, degrees API.
+    water : float, optional
+        Density W of water at 60 degF, kg/m3: `WATER_1980` or `WATER_2004`.
+
+    Returns
+    -------
+    float or ndarray
+
+    Examples
+    --------
+    >>> round(density_of_gravity(35.0), 3)
+    849.01
+    """
+    return 141.5 * water / (131.5 + api)
+
+
+# Ranges of the density at the base, kg/m3, and coefficients K0, K1, K2 of the expansion
+# a = K0 / rho^2 + K1 / rho + K2, per degree of the base. A product between two groups belongs to
+# the group whose bound is nearer; the bounds of 1980 are half a step of the tables, 0.25 kg/m3.
+_GROUPS_15C = {
+    "crude": (610.5, (1075.0, 613.9723, 0.0, 0.0)),
+    "products": (
+        653.0,
+        (770.25, 346.4228, 0.4388, 0.0),  # gasolines
+        (787.75, 2680.3206, 0.0, -0.00336312),  # transition
+        (838.75, 594.5418, 0.0, 0.0),  # jet fuels, kerosenes, solvents
+        (1075.0, 186.9696, 0.4862, 0.0),  # diesel, heating and fuel oils
+    ),
+    "lubricants": (800.0, (1164.0, 0.0, 0.6278, 0.0)),
+}
+_GROUPS_60F = {
+    "crude": (density_of_gravity(100.0), (density_of_gravity(0.0), 341.0957, 0.0, 0.0)),
+    "products": (
+        density_of_gravity(85.0),
+        (density_of_gravity(52.0), 192.4571, 0.2438, 0.0),
+        (density_of_gravity(48.0), 1489.0670, 0.0, -0.00186840),
+        (density_of_gravity(37.0), 330.3010, 0.0, 0.0),
+        (density_of_gravity(0.0), 103.8720, 0.2701, 0.0),
+    ),
+    "lubricants": (800.0, (1164.0, 0.0, 0.34878, 0.0)),
+}
+_GROUPS_2004 = {
+    "crude": (610.6, (1163.5, 341.0957, 0.0, 0.0)),
+    "products": (
+        610.6,
+        (770.3520, 192.4571, 0.2438, 0.0),
+        (787.5195, 1489.0670, 0.0, -0.00186840),
+        (838.3127, 330.3010, 0.0, 0.0),
+        (1163.5, 103.8720, 0.2701, 0.0),
+    ),
+    "lubricants": (800.9, (1163.5, 0.0, 0.34878, 0.0)),
+}
+_ALPHA_1980_PER_F, _ALPHA_2004_PER_F = (270e-6, 930e-6), (230e-6, 930e-6)
+
+# Temperatures of the 1980 tables: lowest, and highest for light, middle and heavy products, degF,
+# with the gravities between them. From memory, not read in the tables.
+_LOWEST_F, _HIGHEST_F = 0.0, (200.0, 250.0, 300.0)
+_LIGHT_KG_M3, _MIDDLE_KG_M3 = density_of_gravity(50.0), density_of_gravity(40.0)
+_LIMITS_2004_C, _MOST_PSI = (-50.0, 150.0), 1500.0
+
+# 2004: polynomial of the difference between the scales ITS-90 and IPTS-68, and the temperature
+# 60 degF (ITS-90) in IPTS-68.
+_SCALES = (-0.148759, -0.267408, 1.080760, 1.269056, -4.089591, -1.871251, 7.438081, -3.536296)
+_DELTA_60, _ZERO_68_F = 0.01374979547, 60.0068749
+
+
+@dataclass(frozen=True)
+class Petroleum:
+    """Volume correction by ASTM D1250.
+
+    Attributes
+    ----------
+    edition : {1980, 2004}
+    group : {"crude", "products", "lubricants"} or None
+        None: the coefficient of expansion is given.
+    base : {"15C", "20C", "60F"}
+        Base temperature.
+    alpha_per_k : float, optional
+        Coefficient of expansion at the base (at 60 degF for the edition of 2004), 1/K, instead of a
+        group (tables C).
+
+    Examples
+    --------
+    >>> diesel = Petroleum(2004, "products", "20C")
+    >>> round(float(diesel.factor(842.0, 34.2)), 6)
+    0.988
+    """
+
+    edition: int
+    group: str | None
+    base: str
+    alpha_per_k: float | None = None
+
+    @property
+    def base_c(self):
+        """Base temperature, degC."""
+        return BASES_C[self.base]
+
+    @property
+    def name(self):
+        """Name of the edition and the group, for reports."""
+        group = self.group or f"alpha = {self.alpha_per_k:g}/K"
+        return f"ASTM D1250-{self.edition % 100:02d}, {group}, base {self.base}"
+
+    def factor(self, density, temperature_c, pressure_kpa=0.0):
+        """Volume correction factor from a temperature and gauge pressure to the base.
+
+        Parameters
+        ----------
+        density : float or ndarray
+            Density at the base, kg/m3.
+        temperature_c : float or ndarray
+            Temperature of the liquid, degC.
+        pressure_kpa : float or ndarray, optional
+            Gauge pressure, kPa; only with the edition of 2004.
+
+        Returns
+        -------
+        float or ndarray
+            rho(t, p) / rho(base), without a unit.
+
+        Raises
+        ------
+        InputError
+            For a value outside the range of the correction.
+        """
+        self._refuse_outside(density, temperature_c, pressure_kpa)
+        return self._factor(density, temperature_c, pressure_kpa)
+
+    def base_density(self, density, temperature_c, pressure_kpa=0.0):
+        """Density at the base, kg/m3, of a density at another temperature and pressure.
+
+        Parameters
+        ----------
+        density : float or ndarray
+            Density of the sample at its temperature, kg/m3. A reading of a glass hydrometer is
+            corrected before by `glass_correction`.
+        temperature_c, pressure_kpa
+            As for `factor`, of the sample.
+
+        Returns
+        -------
+        float or ndarray
+
+        Raises
+        ------
+        InputError
+            If the density at the base or another value is outside the range.
+        SolutionError
+            If the iteration does not converge.
+        """
+        base = self._iterate(
+            density, lambda rho, bound: self._factor(rho, temperature_c, pressure_kpa, bound)
+        )
+        self._refuse_outside(base, temperature_c, pressure_kpa)
+        return base
+
+    def _factor(self, density, temperature_c, pressure_kpa=0.0, bound=None):
+        """VCF without a check of the range; `bound`: density that decides the group."""
+        if self.edition == 1980:
+            return self._factor_1980(density, temperature_c, bound)
+        # All bases are reached through 60 degF: CTPL(t, p) over CTL(base).
+        if self.base == "60F":
+            return self._ctpl(density, temperature_c, pressure_kpa, bound)
+        at_60 = self._iterate(density, lambda rho, group: self._ctpl(rho, self.base_c, 0.0, group))
+        actual, base = (
+            self._ctpl(at_60, t, p) for t, p in ((temperature_c, pressure_kpa), (self.base_c, 0.0))
+        )
+        return actual / base
+
+    def _factor_1980(self, density, temperature_c, bound=None):
+        if self.base == "20C":
+            # The tables for 20 degC follow from those for 15 degC.
+            at_15 = Petroleum(1980, self.group, "15C", self.alpha_per_k)
+            rho_15 = at_15._iterate(
+                density, lambda rho, group: at_15._factor_1980(rho, 20.0, group)
+            )
+            return at_15._factor_1980(rho_15, temperature_c) / at_15._factor_1980(rho_15, 20.0)
+        is_fahrenheit = self.base == "60F"
+        step = (temperature_c - self.base_c) * (1.8 if is_fahrenheit else 1.0)
+        if self.group is None:
+            alpha = self.alpha_per_k / (1.8 if is_fahrenheit else 1.0)
+        else:
+            groups = _GROUPS_60F if is_fahrenheit else _GROUPS_15C
+            alpha, _ = _expansion(groups[self.group], density, bound)
+        # VCF = exp(-a dt (1 + 0.8 a dt)).
+        return np.exp(-alpha * step * (1 + 0.8 * alpha * step))
+
+    def _ctpl(self, density, temperature_c, pressure_kpa, bound=None):
+        """CTL CPL of 2004, from a temperature and pressure to 60 degF and no gauge pressure."""
+        # Step 1: ITS-90 to IPTS-68, the scale of the measurements behind the constants.
+        tau = temperature_c / 630.0
+        shift = 0.0
+        for coefficient in reversed(_SCALES):
+            shift = tau * (coefficient + shift)
+        scaled = 1.8 * (temperature_c - shift) + 32.0
+        # Steps 2 and 3: alpha at the density of 60 degF on that scale.
+        if self.group is None:
+            alpha = self.alpha_per_k / 1.8
+            shifted = density * np.exp(0.5 * alpha * _DELTA_60 * (1 + 0.4 * alpha * _DELTA_60))
+        else:
+            alpha, (k0, k1, k2) = _expansion(_GROUPS_2004[self.group], density, bound)
+            a = _DELTA_60 / 2 * alpha
+            b = (2 * k0 + k1 * density) / (k0 + (k1 + k2 * density) * density)
+            shifted = density * (1 + np.expm1(a * (1 + 0.8 * a)) / (1 + a * (1 + 1.6 * a) * b))
+            alpha = (k0 / shifted + k1) / shifted + k2
+        # Step 4: CTL.
+        step = scaled - _ZERO_68_F
+        ctl = np.exp(-alpha * step * (1 + 0.8 * alpha * (step + _DELTA_60)))
+        # Step 5: compressibility F, 1e-5 per psi, and CPL.
+        compressibility = np.exp(
+            -1.9947 + 0.00013427 * scaled + (793920.0 + 2326.0 * scaled) / shifted**2
+        )
+        return ctl / (1 - 1e-5 * compressibility * pressure_kpa / KPA_PER_PSI)
+
+    def _iterate(self, density, factor):
+        """Density at the base with rho = density / factor(rho), by fixed-point iteration.
+
+        The factor changes slowly with the density, so each round gains one digit or more.
+        """
+        base, bound = density + 0.0 * density, None
+        for rounds in range(MOST_ROUNDS):
+            before = base
+            base = density / factor(before, bound)
+            if rounds == ROUNDS_OF_GROUPS:
+                bound = np.real(base)
+            if np.all(np.abs(base - before) <= CONVERGED * np.abs(base)):
+                return base
+        raise SolutionError(f"the density at {self.base} of {density} did not converge")
+
+    def _refuse_outside(self, density, temperature_c, pressure_kpa):
+        if self.edition == 1980:
+            high = np.select(
+                [np.real(density) < _LIGHT_KG_M3, np.real(density) < _MIDDLE_KG_M3],
+                _HIGHEST_F[:2],
+                _HIGHEST_F[2],
+            )
+            limits = (_LOWEST_F - 32) / 1.8, (high - 32) / 1.8
+            groups = _GROUPS_60F if self.base == "60F" else _GROUPS_15C
+            most_kpa = 0.0
+        else:
+            limits, groups, most_kpa = _LIMITS_2004_C, _GROUPS_2004, _MOST_PSI * KPA_PER_PSI
+        refuse_outside("temperature_c", temperature_c, *limits, "degC", self.name)
+        refuse_outside("pressure_kpa", pressure_kpa, 0.0, most_kpa, "kPa", self.name)
+        if self.group is None:
+            per_f = _ALPHA_1980_PER_F if self.edition == 1980 else _ALPHA_2004_PER_F
+            low, high = (1.8 * limit for limit in per_f)
+            refuse_outside("alpha_per_k", self.alpha_per_k, low, high, "1/K", self.name)
+            return
+        least, *parts = groups[self.group]
+        refuse_outside("density_kg_m3", density, least, parts[-1][0], "kg/m3", self.name)
+
+
+def _expansion(groups, density, bound=None):
+    """Coefficient of expansion per degree, and K0, K1, K2, of the group of a density.
+
+    The group is that of the density `bound`, by default of the density itself.
+    """
+    _, *parts = groups
+    real = np.real(density) if bound is None else bound
+    # The number of upper bounds below the density is the place of its group.
+    place = np.searchsorted([high for high, *_ in parts[:-1]], real)
+    constants = tuple(np.array(parts)[:, 1:].T[:, place])
+    k0, k1, k2 = constants
+    return (k0 / density + k1) / density + k2, constants
+
+
+def glass_correction(temperature_c, scale):
+    """Factor on the reading of a glass hydrometer for the expansion of the glass.
+
+    Parameters
+    ----------
+    temperature_c : float or ndarray
+        Temperature of the sample, degC.
+    scale : {"15C", "20C", "60F"}
+        Temperature of the scale of the hydrometer.
+
+    Returns
+    -------
+    float or ndarray
+
+    Examples
+    --------
+    >>> round(glass_correction(25.0, "15C"), 6)
+    0.999768
+    """
+    if scale == "60F":
+        step = 1.8 * (temperature_c - BASES_C["60F"])
+        return 1 - 0.00001278 * step - 0.0000000062 * step**2
+    step = temperature_c - BASES_C[scale]
+    return 1 - 0.000023 * step - 0.00000002 * step**2

@@ -1,0 +1,434 @@
+"""Reading of tickets: ticket.toml for one ticket, a CSV file beside it for many."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tankcal.job.checking import missing_beside
+from tankcal.job.contract.shorthand import choice, number, positive
+from tankcal.job.entries import read_columns, read_section, unknown_section
+from tankcal.job.fields import Field
+from tankcal.job.folder import MAX_SETTINGS_BYTES, read_csv, read_toml
+from tankcal.job.tables import NOT_KNOWN, Log, read_bytes
+from tankcal.messages import message
+from tankcal.products.quantity.chain import Gauging, Product
+from tankcal.products.quantity.corrections import CORRECTIONS
+from tankcal.products.quantity.petroleum import BASES_C, GROUPS, glass_correction
+from tankcal.products.quantity.ranges import OutsideRangeError
+from tankcal.products.quantity.transfer import STATES, UNCERTAINTIES, Transfer
+
+MOST_TICKETS = 100_000
+GLASS = {"glass 15C": "15C", "glass 20C": "20C", "glass 60F": "60F"}
+COMPARED = ("gov_m3", "gsv_m3", "nsv_m3", "mass_kg", "weight_kg")
+COEFFICIENT = "coefficient"
+
+TICKET = (
+    Field("number", "text", "number of the ticket"),
+    Field("date", "date", "day of the transfer, year-month-day"),
+    Field("by", "text", "person who gauged the tank"),
+    Field("note", "text", "remark; printed"),
+    number("coverage_probability", "coverage probability; blank: 0.95", 0.5, 0.9999),
+)
+PRODUCT = (
+    Field("name", "text", "name of the product"),
+    choice("correction", "volume correction by this standard", (*CORRECTIONS,), required=True),
+    choice("group", "group of the product in D1250", (*GROUPS, COEFFICIENT)),
+    choice("base", "base temperature", (*BASES_C,)),
+    positive("alpha_per_k", "coefficient of expansion of the liquid at the base, 1/K", 0.01),
+    positive("density_kg_m3", "density, kg/m3", 2000),
+    choice(
+        "density_is", "base: at the base temperature; observed: at density_temperature_c",
+        ("base", "observed"), required=True,
+    ),
+    number("density_temperature_c", "temperature of the sample, degrees Celsius", -60, 200),
+    choice("hydrometer", "glass hydrometer by its scale; blank: none", (*GLASS,)),
+    number("sw_percent", "suspended sediment and water, percent of the volume; blank: 0", 0, 20),
+    positive("air_kg_m3", "density of the air for the weight in air, kg/m3; blank: 1.2", 2),
+    positive("weights_kg_m3", "density of the weights, kg/m3; blank: 8000", 20_000),
+)  # fmt: skip
+SHELL = (
+    Field("insulated", "flag", "the shell is insulated; blank: no"),
+    positive("expansion_per_k", "coefficient of linear expansion, 1/K; blank: of the table", 1e-3),
+)
+GAUGING = (
+    number("dip_m", "dip of the liquid, metres", 0, 200),
+    number("ullage_m", "ullage, in place of the dip, metres", 0, 200),
+    number("water_dip_m", "dip of the free water, metres; blank: none", 0, 200),
+    number("temperature_c", "mean temperature of the liquid, degrees Celsius", -60, 200),
+    number("ambient_c", "temperature of the air, degrees Celsius", -60, 70),
+    number("pressure_kpa", "gauge pressure above the liquid, kPa; blank: 0", 0, 20_000),
+)
+COMPARISON = (
+    choice("quantity", "quantity of the other party", COMPARED),
+    positive("value", "its value, m3 or kg", 1e9),
+    number("U", "its expanded uncertainty, m3 or kg; blank: not known", 0, 1e9),
+    Field("source", "text", "meter or party with this value"),
+)
+_HIGH = {"u_tape_ppm": 10_000, "u_sw_percent": 10, "u_vcf_percent": 10, "u_expansion_per_k": 1e-4}
+UNCERTAINTY = tuple(
+    number(name, "standard uncertainty; blank: assumed value", 0, _HIGH.get(name, 100))
+    for name in UNCERTAINTIES
+)
+SECTIONS = {
+    "ticket": TICKET,
+    "product": PRODUCT,
+    "shell": SHELL,
+    **dict.fromkeys(STATES, GAUGING),
+    "compared": COMPARISON,
+    "uncertainty": UNCERTAINTY,
+}
+# Columns of a CSV file replace the keys of the TOML file for each ticket.
+_PRODUCT_KEYS = tuple(field.name for field in PRODUCT)
+_OF_PRODUCT = ("density_kg_m3", "density_temperature_c", "sw_percent")
+ROWS = (
+    Field("ticket", "name", "number of the ticket", required=True),
+    *(
+        Field(f"{state}_{field.name}", field.kind, field.note, low=field.low, high=field.high)
+        for state in STATES
+        for field in GAUGING
+    ),
+    *(field for field in PRODUCT if field.name in _OF_PRODUCT),
+    positive("compared_value", "quantity of the other party, m3 or kg", 1e9),
+)
+
+# Slips of the hand: limits of a plausible input.
+HOTTEST_C = 60.0  # a hotter light product is probably in degrees Fahrenheit
+COLDEST_HEAVY = 900.0  # kg/m3; heavier products are heated
+LEAST_SW_PERCENT = 0.005  # a smaller value is probably a fraction
+LEAST_DENSITY = 300.0  # kg/m3; a smaller value is a relative density, or in g/cm3
+
+
+@dataclass(frozen=True)
+class Tickets:
+    """Checked tickets of one tank.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Name of each ticket.
+    sections : dict
+        {section: {key: value}} of the TOML file.
+    transfer : Transfer
+    compared : tuple or None
+        (quantity, values (n,), U or None, source) of the other party.
+    warnings : tuple of Problem
+    """
+
+    names: tuple[str, ...]
+    sections: dict
+    transfer: Transfer
+    compared: tuple | None
+    warnings: tuple = ()
+
+
+def read_tickets(table, settings, rows=None):
+    """Read and check tickets of a tank.
+
+    Parameters
+    ----------
+    table : TankTable
+    settings : Path
+        ticket.toml.
+    rows : Path, optional
+        CSV file with one ticket in each row; its columns replace keys of `settings`.
+
+    Returns
+    -------
+    Tickets
+
+    Raises
+    ------
+    InputError
+        With every problem of the files.
+    """
+    log = Log()
+    sections, places = _read_settings(Path(settings), log)
+    columns = None if rows is None else _read_rows(Path(rows), log)
+    log.stop_if_problems()
+    source = _Source(Path(settings).name, sections, places, columns, log)
+    correction = _correction(source)
+    names = ("1",) if columns is None else tuple(columns.of("ticket"))
+    if columns is None:
+        names = (sections["ticket"]["number"] or "1",)
+    states = [state for state in STATES if source.has(f"{state}.temperature_c")]
+    if "closing" not in states:
+        source.tell("closing.temperature_c", message("ticket_no_closing", "missing; expected the "
+                    "gauging after the transfer, or of the stock"))  # fmt: skip
+    log.stop_if_problems()
+    gaugings, taped = {}, {}
+    for state in states:
+        gaugings[state], taped[state] = _gauging(source, state, table)
+    product = _product(source, correction, table)
+    log.stop_if_problems()
+    _refuse_outside_correction(source, gaugings, product)
+    _warn_of_slips(source, gaugings, product)
+    log.stop_if_problems()
+    given = sections["uncertainty"]
+    u = {
+        name: assumed.value if given[name] is None else given[name]
+        for name, assumed in UNCERTAINTIES.items()
+    }
+    if given["u_sw_percent"] is None:  # without a measurement, no sediment is part of the ticket
+        is_measured = np.isfinite(source.numbers("product.sw_percent"))
+        u["u_sw_percent"] = np.where(is_measured, u["u_sw_percent"], 0.0)
+    probability = sections["ticket"]["coverage_probability"] or 0.95
+    transfer = Transfer(table, gaugings, taped, product, u, probability)
+    _refuse_negative(source, transfer)
+    log.stop_if_problems()
+    return Tickets(names, sections, transfer, _compared(source, states), tuple(log.warnings))
+
+
+def _read_settings(path, log):
+    """({section: {key: value}}, {"section.key": row}) of ticket.toml."""
+    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+    settings, rows = (None, {}) if data is None else read_toml(path.name, data, log)
+    log.stop_if_problems()
+    for section in settings:
+        if section not in SECTIONS:
+            log.problem(path.name, unknown_section(section, SECTIONS), rows.get(section),
+                        f"[{section}]")  # fmt: skip
+    values, places = {}, {}
+    for section, fields in SECTIONS.items():
+        entries = settings.get(section, {})
+        values[section] = read_section(path.name, section, fields, entries, rows.get(section), log)
+        places |= {f"{section}.{key}": entry.row for key, entry in entries.items()}
+    return values, places
+
+
+def _read_rows(path, log):
+    """`ColumnValues` of a CSV file of tickets; None after a problem."""
+    data = read_bytes(path, log)
+    raw = None if data is None else read_csv(path.name, data, ",", NOT_KNOWN, log)
+    if raw is None:
+        return None
+    columns = read_columns(None, raw, log, ROWS)
+    if columns.is_empty:
+        log.problem(path.name, message("ticket_no_rows", "no rows; expected a ticket in each row"))
+    if len(columns.rows) > MOST_TICKETS:
+        expected = message("ticket_many_rows", "{count} tickets; expected at most {most}",
+                           count=len(columns.rows), most=MOST_TICKETS)  # fmt: skip
+        log.problem(path.name, expected)
+    return columns
+
+
+class _Source:
+    """Values of the keys for all tickets, from the CSV file if it has the column."""
+
+    def __init__(self, file, sections, places, columns, log):
+        self.file, self.sections, self.places = file, sections, places
+        self.columns, self.log = columns, log
+        self.count = 1 if columns is None else len(columns.rows)
+
+    def column(self, key):
+        """Name of the column of "section.key", or None if the CSV file does not have it."""
+        section, _, name = key.partition(".")
+        column = f"{section}_{name}" if section in STATES else name
+        is_there = self.columns is not None and self.columns.columns.get(column) is not None
+        return column if is_there else None
+
+    def has(self, key):
+        """Whether the key or its column has a value."""
+        section, _, name = key.partition(".")
+        return self.column(key) is not None or self.sections[section][name] is not None
+
+    def numbers(self, key, default=np.nan):
+        """Values (n,) of a key; blank: the default."""
+        section, _, name = key.partition(".")
+        fixed = self.sections[section][name]
+        values = np.full(self.count, default if fixed is None else fixed, dtype=float)
+        column = self.column(key)
+        if column is not None:
+            given = self.columns.numbers(column)
+            values = np.where(np.isnan(given), values, given)
+        return values
+
+    def tell(self, key, expected, ticket=0, *, is_warning=False):
+        """Report on a key of a ticket, in the row of the file that contains it."""
+        report = self.log.warning if is_warning else self.log.problem
+        column = self.column(key)
+        if column is None:
+            report(self.file, expected, self.places.get(key), key)
+        else:
+            report(self.columns.file, expected, self.columns.rows[ticket], column)
+
+    def tell_each(self, key, is_wrong, expected, *, is_warning=False):
+        """Report on each ticket with `is_wrong`; expected(ticket) is its message."""
+        for ticket in np.flatnonzero(is_wrong):
+            self.tell(key, expected(ticket), ticket, is_warning=is_warning)
+            if self.column(key) is None:
+                return
+
+
+def _correction(source):
+    """Volume correction of the section [product]; None after a problem."""
+    product = source.sections["product"]
+    if product["correction"] is None:
+        return None
+    make, needed = CORRECTIONS[product["correction"]]
+    given = {key: product[key] for key in needed}
+    if "group" in needed and product["group"] == COEFFICIENT:
+        given |= {"group": None, "alpha_per_k": product["alpha_per_k"]}
+        needed = (*needed, "alpha_per_k")
+    is_complete = True
+    for key in needed:
+        if product[key] is None:
+            source.tell(f"product.{key}", missing_beside(f"correction = {product['correction']}"))
+            is_complete = False
+    return make(**given) if is_complete else None
+
+
+def _gauging(source, state, table):
+    """(`Gauging` of a state, lengths read on the tape)."""
+    dip, ullage = source.numbers(f"{state}.dip_m"), source.numbers(f"{state}.ullage_m")
+    both = np.isfinite(dip) & np.isfinite(ullage)
+    text = message("ticket_dip_and_ullage", "given together with a dip; expected only one of them")
+    source.tell_each(f"{state}.ullage_m", both, lambda _: text)
+    neither = np.isnan(dip) & np.isnan(ullage)
+    text = message("ticket_no_dip", "missing; expected the dip, or the ullage")
+    source.tell_each(f"{state}.dip_m", neither, lambda _: text)
+    by_ullage = np.isfinite(ullage)
+    if by_ullage.any() and table.reference_height_m is None:
+        text = message("ticket_no_reference", "found an ullage, but the record has no reference "
+                       "height; expected a dip")  # fmt: skip
+        source.tell_each(f"{state}.ullage_m", by_ullage, lambda _: text)
+        by_ullage[:] = False
+    level = np.where(by_ullage, (table.reference_height_m or 0.0) - ullage, dip)
+    _refuse_levels(source, state, table, level, by_ullage)
+    temperature = source.numbers(f"{state}.temperature_c")
+    text = message("ticket_no_temperature", "missing; expected the temperature of the liquid")
+    source.tell_each(f"{state}.temperature_c", np.isnan(temperature), lambda _: text)
+    ambient = source.numbers(f"{state}.ambient_c")
+    if not source.sections["shell"]["insulated"]:
+        text = message("ticket_no_ambient", "missing; expected the temperature of the air, because "
+                       "the shell is not insulated")  # fmt: skip
+        source.tell_each(f"{state}.ambient_c", np.isnan(ambient), lambda _: text)
+    water = source.numbers(f"{state}.water_dip_m")
+    water = np.where(water > table.height_m[0], water, np.nan)  # none above the lowest row
+    gauging = Gauging(
+        level, water, temperature, ambient, source.numbers(f"{state}.pressure_kpa", 0)
+    )
+    return gauging, np.where(by_ullage, -ullage, level)
+
+
+def _refuse_levels(source, state, table, level, by_ullage):
+    """Refuse dips outside the table, in the critical zone of a roof, and below the water."""
+    low, high = table.height_m[0], table.height_m[-1]
+
+    def outside(ticket):
+        return message("ticket_outside_table", "the dip is {dip:.4f} m; expected a dip in the table"
+                       ", {low:.4f} to {high:.4f} m", dip=level[ticket], low=low,
+                       high=high)  # fmt: skip
+
+    def key_of(is_ullage):
+        return f"{state}.ullage_m" if is_ullage else f"{state}.dip_m"
+
+    is_outside = np.isfinite(level) & table.is_outside(level)
+    for is_ullage in (False, True):
+        source.tell_each(key_of(is_ullage), is_outside & (by_ullage == is_ullage), outside)
+    if table.roof is not None:
+        text = message(
+            "ticket_critical",
+            "the floating roof does not float below {top:.4f} m; expected a dip above",
+            top=table.roof.critical_top_m,
+        )
+        is_critical = ~is_outside & table.is_critical(level)
+        for is_ullage in (False, True):
+            source.tell_each(key_of(is_ullage), is_critical & (by_ullage == is_ullage),
+                             lambda _: text)  # fmt: skip
+    water = source.numbers(f"{state}.water_dip_m")
+    text = message(
+        "ticket_water_above", "above the liquid; expected a dip below the dip of the liquid"
+    )
+    source.tell_each(f"{state}.water_dip_m", water >= level, lambda _: text)
+
+
+def _product(source, correction, table):
+    """`Product` of the tickets."""
+    given = source.sections["product"]
+    density = source.numbers("product.density_kg_m3")
+    text = message("ticket_no_density", "missing; expected the density of the product")
+    source.tell_each("product.density_kg_m3", np.isnan(density), lambda _: text)
+    text = message("ticket_density_unit", "expected kg/m3: is it a relative density, or in g/cm3?")
+    source.tell_each("product.density_kg_m3", density < LEAST_DENSITY, lambda _: text)
+    sample, glass = None, np.ones(source.count)
+    if given["density_is"] == "observed":
+        sample = source.numbers("product.density_temperature_c")
+        text = message("ticket_no_sample", "missing; expected the temperature of the sample, "
+                       "because the density is an observed density")  # fmt: skip
+        source.tell_each("product.density_temperature_c", np.isnan(sample), lambda _: text)
+        if given["hydrometer"] is not None:
+            glass = glass_correction(sample, GLASS[given["hydrometer"]])
+    elif given["hydrometer"] is not None or source.has("product.density_temperature_c"):
+        text = message("ticket_density_at_base", "given with a density at the base; expected "
+                       "density_is = observed, or no temperature of a sample and no hydrometer"
+                       )  # fmt: skip
+        key = "hydrometer" if given["hydrometer"] is not None else "density_temperature_c"
+        source.tell(f"product.{key}", text)
+    expansion = source.sections["shell"]["expansion_per_k"] or table.expansion_per_k
+    return Product(
+        correction,
+        density,
+        sample,
+        glass,
+        source.numbers("product.sw_percent", 0.0) / 100,
+        np.full(source.count, expansion),
+        bool(source.sections["shell"]["insulated"]),
+        given["air_kg_m3"] or 1.2,
+        given["weights_kg_m3"] or 8000.0,
+    )
+
+
+def _warn_of_slips(source, gaugings, product):
+    """Warn of inputs that are probably in another unit or of another kind."""
+    for state, gauging in gaugings.items():
+        is_hot = (gauging.temperature_c > HOTTEST_C) & (product.density < COLDEST_HEAVY)
+        text = message("ticket_hot", "more than {limit:g} degC for a light product: is it in "
+                       "degrees Fahrenheit?", limit=HOTTEST_C)  # fmt: skip
+        source.tell_each(f"{state}.temperature_c", is_hot, lambda _, text=text: text,
+                         is_warning=True)  # fmt: skip
+    share = 100 * product.water_share
+    text = message("ticket_sw_fraction", "less than {limit:g} %: is it a fraction?",
+                   limit=LEAST_SW_PERCENT)  # fmt: skip
+    source.tell_each("product.sw_percent", (share > 0) & (share < LEAST_SW_PERCENT), lambda _: text,
+                     is_warning=True)  # fmt: skip
+
+
+def _refuse_outside_correction(source, gaugings, product):
+    """Report tickets outside the range of the volume correction."""
+    try:
+        base = product.base_density()
+    except OutsideRangeError as error:
+        key = "density_temperature_c" if error.quantity == "temperature_c" else error.quantity
+        expected = error.expected
+        source.tell_each(f"product.{key}", error.is_outside, lambda _: expected)
+        return
+    for state, gauging in gaugings.items():
+        try:
+            product.correction.factor(base, gauging.temperature_c, gauging.pressure_kpa)
+        except OutsideRangeError as error:
+            owner = "product" if error.quantity in _PRODUCT_KEYS else state
+            expected = error.expected
+            source.tell_each(
+                f"{owner}.{error.quantity}", error.is_outside, lambda _, text=expected: text
+            )
+
+
+def _refuse_negative(source, transfer):
+    """Refuse dips at which water and roof leave no volume of the product."""
+    text = message("ticket_negative", "the volume without water is not above 0; expected a dip "
+                   "further above the water and the roof")  # fmt: skip
+    for state, steps in transfer.steps().items():
+        source.tell_each(f"{state}.dip_m", ~(steps.gov_m3 > 0), lambda _: text)
+
+
+def _compared(source, states):
+    """(quantity, values (n,), U or None, source) of the other party, or None."""
+    given = source.sections["compared"]
+    column = None if source.columns is None else source.columns.columns.get("compared_value")
+    if given["quantity"] is None or (given["value"] is None and column is None):
+        return None
+    values = np.full(source.count, np.nan if given["value"] is None else given["value"])
+    if column is not None:
+        values = source.columns.numbers("compared_value")
+    return given["quantity"], values, given["U"], given["source"] or ""

@@ -1,0 +1,148 @@
+"""Capacity table of a record: volumes at any dip, and their covariance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal import record as records
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+from tankcal.record.covariance_factor import factor_of
+from tankcal.tank.fittings import FloatingRoof, floating_roof
+
+
+@dataclass(frozen=True)
+class TankTable:
+    """Capacity table of one tank.
+
+    Attributes
+    ----------
+    tank : str
+        Name of the tank.
+    kind : str
+        Kind of tank: "vertical", "horizontal", "sphere" or "mesh".
+    height_m, volume_m3 : ndarray, shape (rows,)
+        Dips, ascending, and volumes at the reference temperature of the shell.
+    factor_m3 : ndarray, shape (rows, inputs)
+        Factor F of the covariance F F' of the volumes.
+    dof : ndarray, shape (rows,)
+        Degrees of freedom of the rows.
+    interpolation_m3 : float
+        Largest error of linear interpolation between two rows.
+    temperature_c : float
+        Reference temperature of the shell.
+    expansion_per_k : float
+        Coefficient of linear expansion of the shell, 1/K.
+    zero_m : float
+        Height of the zero of the dips above the bottom of the tank.
+    roof : FloatingRoof or None
+        Floating roof whose displacement is subtracted in the table.
+    reference_height_m : float or None
+        Height of the reference point above the zero of the dips, for ullages.
+    number, digest : str
+        Number of the certificate ("" if none) and SHA-256 of the record.
+    """
+
+    tank: str
+    kind: str
+    height_m: np.ndarray
+    volume_m3: np.ndarray
+    factor_m3: np.ndarray
+    dof: np.ndarray
+    interpolation_m3: float
+    temperature_c: float
+    expansion_per_k: float
+    zero_m: float = 0.0
+    roof: FloatingRoof | None = None
+    reference_height_m: float | None = None
+    number: str = ""
+    digest: str = ""
+
+    def volume(self, level_m):
+        """Volume at each dip, m3, linear between two rows; (n,) real or complex dips."""
+        row, share = self._place(level_m)
+        low, high = self.volume_m3[row], self.volume_m3[row + 1]
+        return low + share * (high - low)
+
+    def factor(self, level_m):
+        """Factor of the covariance of the volumes at (n,) dips, shape (n, inputs), m3."""
+        row, share = self._place(np.real(level_m))
+        return self.factor_m3[row] + share[:, None] * (
+            self.factor_m3[row + 1] - self.factor_m3[row]
+        )
+
+    def dof_at(self, level_m):
+        """Degrees of freedom at each dip: the smaller value of the two neighbouring rows."""
+        row, _ = self._place(np.real(level_m))
+        return np.minimum(self.dof[row], self.dof[row + 1])
+
+    def is_outside(self, level_m):
+        """Whether each dip is below the first or above the last row, shape (n,)."""
+        return ~((level_m >= self.height_m[0]) & (level_m <= self.height_m[-1]))
+
+    def is_critical(self, level_m):
+        """Whether each dip is below the level from which the roof floats, shape (n,)."""
+        if self.roof is None:
+            return np.zeros(np.shape(level_m), dtype=bool)
+        return level_m < self.roof.critical_top_m
+
+    def _place(self, level_m):
+        """Row below each dip, and position between this row and the next one, 0 to 1."""
+        row = np.searchsorted(self.height_m, np.real(level_m), side="right") - 1
+        row = np.clip(row, 0, len(self.height_m) - 2)
+        low, high = self.height_m[row], self.height_m[row + 1]
+        return row, (level_m - low) / (high - low)
+
+
+def read_table(path):
+    """Read the table of a record.
+
+    Parameters
+    ----------
+    path : Path
+        A record.json.
+
+    Returns
+    -------
+    TankTable
+
+    Raises
+    ------
+    InputError
+        If the file is no record, or contains no capacity table.
+    """
+    import hashlib
+
+    record = records.load(path)
+    capacity, job = record["capacity"], record["job"]
+    if not capacity:
+        expected = message(
+            "ticket_no_table", "the record of a survey without a tank; expected one with a table"
+        )
+        raise InputError(Problem(path.name, expected))
+    roof = job.get("roof")
+    interpolation = record.get("interpolation")
+    return TankTable(
+        tank=job["tank"]["id"],
+        kind=job["tank"]["kind"],
+        height_m=np.array(capacity["height_m"]),
+        volume_m3=np.array(capacity["volume_m3"]),
+        factor_m3=factor_of(capacity),
+        dof=np.array([np.inf if dof is None else dof for dof in capacity["dof"]]),
+        interpolation_m3=interpolation["largest_m3"] if interpolation else 0.0,
+        temperature_c=job["table"]["reference_temperature_c"],
+        expansion_per_k=job["material"]["expansion_per_k"],
+        zero_m=capacity["zero_m"],
+        roof=None
+        if roof is None
+        else floating_roof(
+            roof["mass_kg"],
+            roof["critical_bottom_m"],
+            roof["critical_top_m"],
+            roof["reference_density_kg_m3"],
+            roof["weighing"],
+        ),
+        reference_height_m=job["datum"]["reference_height_m"],
+        number=str(job["certificate"].get("number") or ""),
+        digest=hashlib.sha256(path.read_bytes()).hexdigest(),
+    )

@@ -1,0 +1,232 @@
+"""Quantities of a transfer between two gaugings of a tank, with their uncertainty.
+
+Opening and closing share the table, the tape, the thermometer, the density and the volume
+correction. Their errors partly cancel in the difference; the covariance of the table does so
+exactly. Sensitivities are complex steps through the whole chain.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tankcal.gum.coverage import coverage_factor, dof_of
+from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, Steps, follow_chain
+from tankcal.products.quantity.table import TankTable
+
+STEP = 1e-30  # of complex steps; far below rounding, so that derivatives are exact
+STATES = ("opening", "closing")
+
+
+@dataclass(frozen=True)
+class Assumed:
+    """Standard uncertainty of one input of a ticket, if the ticket does not declare it.
+
+    Attributes
+    ----------
+    value : float or None
+        None: by a rule, or no uncertainty.
+    source : str
+        Code of the source, printed in the reports.
+    """
+
+    value: float | None
+    source: str
+
+
+# From memory: practice of manual gauging, class II tapes, ISO 4268 thermometers, reproducibility of
+# hydrometers and of the centrifuge. None of these texts was read. "assumed": our own choice.
+UNCERTAINTIES = {
+    "u_dip_mm": Assumed(1.0, "memory"),
+    "u_tape_ppm": Assumed(115.0, "memory"),
+    "u_water_dip_mm": Assumed(1.5, "assumed"),
+    "u_temperature_k": Assumed(0.25, "assumed"),
+    "u_thermometer_k": Assumed(0.15, "memory"),
+    "u_ambient_k": Assumed(3.0, "assumed"),
+    "u_density_kg_m3": Assumed(0.5, "memory"),
+    "u_sw_percent": Assumed(0.1, "memory"),
+    "u_vcf_percent": Assumed(None, "memory"),
+    "u_expansion_per_k": Assumed(1e-6, "assumed"),
+}
+# Expanded uncertainty (95 %) of the volume correction at temperatures, percent of the volume; from
+# memory of the 1980 edition, for 60 degF. Below the first point it grows in proportion to the
+# distance from the base, which is our own rule.
+_VCF_AT_K = np.array([0.0, 22.2, 50.0, 77.8, 105.6])
+_VCF_PERCENT = np.array([0.0, 0.05, 0.15, 0.25, 0.35])
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """Quantities of n tickets of one tank.
+
+    Attributes
+    ----------
+    table : TankTable
+    gaugings : dict
+        {"opening": Gauging, "closing": Gauging}; "closing" alone for a stock.
+    taped_m : dict
+        {state: length (n,) read on the tape}; negative for an ullage, which lowers the level.
+    product : Product
+    u : dict
+        {name of UNCERTAINTIES: value, or (n,) values}; None only for u_vcf_percent: by its rule.
+    probability : float
+        Coverage probability.
+    """
+
+    table: TankTable
+    gaugings: dict[str, Gauging]
+    taped_m: dict[str, np.ndarray]
+    product: Product
+    u: dict
+    probability: float = 0.95
+
+    def steps(self):
+        """{state: Steps} without errors."""
+        return self._evaluate({})
+
+    def quantities(self):
+        """`Quantities` of each state, and of the difference closing - opening ("moved").
+
+        Returns
+        -------
+        dict of {str: Quantities}
+        """
+        steps = self.steps()
+        results = {state: _values(steps[state]) for state in self.gaugings}
+        inputs = list(self._standard_uncertainties(steps))
+        slopes = {name: self._slopes(name) for name, _ in inputs}
+        contributions = {state: {} for state in self.gaugings}
+        for name, u in inputs:
+            for state in self.gaugings:
+                contributions[state][name] = slopes[name][state] * np.reshape(u, (-1, 1))
+        by_table = self._table_columns(slopes)
+        dof = {
+            state: self.table.dof_at(gauging.level_m) for state, gauging in self.gaugings.items()
+        }
+        if len(self.gaugings) == 2:
+            opening, closing = STATES
+            results["moved"] = results[closing] - results[opening]
+            contributions["moved"] = {
+                name: contributions[closing][name] - contributions[opening][name]
+                for name, _ in inputs
+            }
+            by_table["moved"] = by_table[closing] - by_table[opening]
+            dof["moved"] = np.minimum(dof[opening], dof[closing])
+        return {
+            state: _combine(
+                results[state], contributions[state], by_table[state], dof[state], self.probability
+            )
+            for state in results
+        }
+
+    def _evaluate(self, errors):
+        """{state: Steps} with the errors {name: complex number} of the inputs."""
+        product = replace(
+            self.product,
+            density=self.product.density + errors.get("density", 0.0),
+            water_share=self.product.water_share + errors.get("sw", 0.0),
+            expansion_per_k=self.product.expansion_per_k + errors.get("expansion", 0.0),
+        )
+        result = {}
+        for state, gauging in self.gaugings.items():
+            shifted = replace(
+                gauging,
+                level_m=gauging.level_m
+                + errors.get(f"dip {state}", 0.0)
+                + errors.get("tape", 0.0) * self.taped_m[state],
+                water_m=gauging.water_m + errors.get(f"water dip {state}", 0.0),
+                temperature_c=gauging.temperature_c
+                + errors.get(f"temperature {state}", 0.0)
+                + errors.get("thermometer", 0.0),
+                ambient_c=gauging.ambient_c + errors.get("ambient", 0.0),
+                table_error_m3=errors.get(f"interpolation {state}", 0.0),
+            )
+            vcf_error = errors.get("vcf", 0.0) * self._vcf_scale(gauging.temperature_c)
+            result[state] = follow_chain(self.table, shifted, product, vcf_error)
+        return result
+
+    def _vcf_scale(self, temperature_c):
+        """Standard uncertainty of the volume correction at each temperature, relative, (n,)."""
+        if self.u["u_vcf_percent"] is not None:
+            return self.u["u_vcf_percent"] / 100
+        distance = np.abs(temperature_c - self.product.correction.base_c)
+        # The model error has the sign of the distance from the base.
+        percent = np.interp(distance, _VCF_AT_K, _VCF_PERCENT)
+        return np.sign(temperature_c - self.product.correction.base_c) * percent / 100 / 1.96
+
+    def _standard_uncertainties(self, steps):
+        """Yield (name, standard uncertainty (n,)) of each input."""
+        u = self.u
+        for state, gauging in self.gaugings.items():
+            yield f"dip {state}", u["u_dip_mm"] / 1000
+            yield f"temperature {state}", u["u_temperature_k"]
+            has_water = np.isfinite(gauging.water_m)
+            if has_water.any():
+                yield f"water dip {state}", np.where(has_water, u["u_water_dip_mm"] / 1000, 0.0)
+            # The error of a straight line between two rows, at most that of the record.
+            yield f"interpolation {state}", self.table.interpolation_m3 / np.sqrt(3)
+        yield "tape", u["u_tape_ppm"] / 1e6
+        yield "thermometer", u["u_thermometer_k"]
+        if not self.product.is_insulated:
+            yield "ambient", u["u_ambient_k"]
+        yield "density", u["u_density_kg_m3"]
+        yield "sw", u["u_sw_percent"] / 100
+        yield "expansion", u["u_expansion_per_k"]
+        yield "vcf", 1.0
+
+    def _slopes(self, name):
+        """{state: derivative of each quantity by an input}, shape (n, quantities) each."""
+        steps = self._evaluate({name: STEP * 1j})
+        return {state: _values(steps[state], np.imag) / STEP for state in steps}
+
+    def _table_columns(self, slopes):
+        """{state: contribution of each input of the table}, shape (n, quantities, inputs)."""
+        columns = {}
+        for state, gauging in self.gaugings.items():
+            # An error of the table acts like one of interpolation, at the liquid and at the water.
+            factor = self.table.factor(gauging.level_m)
+            has_water = np.isfinite(gauging.water_m)
+            water_m = np.where(has_water, gauging.water_m, self.table.height_m[0])
+            factor = factor - has_water[:, None] * self.table.factor(water_m)
+            columns[state] = (
+                slopes[f"interpolation {state}"][state][:, :, None] * factor[:, None, :]
+            )
+        return columns
+
+
+@dataclass(frozen=True)
+class Quantities:
+    """Quantities of n tickets in one state, in the order of QUANTITIES.
+
+    Attributes
+    ----------
+    value, u, k, U : ndarray, shape (n, quantities)
+        Value, standard uncertainty, coverage factor and expanded uncertainty; m3, kg.
+    dof : ndarray, shape (n, quantities)
+        Effective degrees of freedom.
+    contributions : dict
+        {name of the input: contribution (n, quantities) to u, with its sign}; "table" without sign.
+    """
+
+    value: np.ndarray
+    u: np.ndarray
+    k: np.ndarray
+    U: np.ndarray
+    dof: np.ndarray
+    contributions: dict
+
+
+def _values(steps: Steps, part=np.real):
+    """Real or imaginary parts of the quantities, shape (n, quantities)."""
+    return np.column_stack([part(getattr(steps, name)) for name in QUANTITIES])
+
+
+def _combine(value, contributions, by_table, dof_of_table, probability):
+    """`Quantities` from the contributions of independent inputs and of the table."""
+    table_variance = np.sum(by_table**2, axis=2)
+    variance = table_variance + sum(part**2 for part in contributions.values())
+    # Only the table has finite degrees of freedom; all other u are of type B.
+    fourths = table_variance**2 / dof_of_table[:, None]
+    dof = dof_of(variance, fourths)
+    u, k = np.sqrt(variance), coverage_factor(probability, dof)
+    parts = {"table": np.sqrt(table_variance), **contributions}
+    return Quantities(value, u, k, k * u, dof, parts)

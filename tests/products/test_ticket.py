@@ -1,0 +1,308 @@
+"""`tankcal ticket`: the chain, the uncertainty of transfers, reading, and the command."""
+
+import csv
+import json
+
+import numpy as np
+import plain_quantity
+import pytest
+from draws import draws
+
+from tankcal.cli import main
+from tankcal.errors import InputError
+from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, follow_chain
+from tankcal.products.quantity.petroleum import Petroleum
+from tankcal.products.quantity.reading import read_tickets
+from tankcal.products.quantity.table import TankTable, read_table
+from tankcal.products.quantity.transfer import UNCERTAINTIES, Transfer
+from tankcal.tank.fittings import floating_roof
+
+NSV = QUANTITIES.index("nsv_m3")
+M3_PER_M = 131.0  # of the cylinder
+
+
+def _cylinder(*, with_roof=False, relative_u=3e-4):
+    """Table of a cylinder with a scale error and an error of the bottom."""
+    height = np.linspace(0.0, 12.0, 1201)
+    volume = M3_PER_M * height
+    factor = np.column_stack([volume * relative_u, np.full(len(height), 0.05)])
+    roof = floating_roof(42_000.0, 1.0, 1.5, 850.0, "vacuum") if with_roof else None
+    return TankTable(
+        "TK-1", "vertical", height, volume, factor, np.full(len(height), np.inf), 1e-4, 20.0,
+        1.116e-5, 0.0, roof, 12.6,
+    )  # fmt: skip
+
+
+def _gauging(level, water=np.nan, celsius=20.0, ambient=20.0):
+    return Gauging(
+        *(np.atleast_1d(np.asarray(part, float)) for part in (level, water, celsius, ambient, 0.0))
+    )
+
+
+def _product(density=842.0, share=0.0, count=1):
+    correction = Petroleum(2004, "products", "20C")
+    one = np.ones(count)
+    return Product(correction, one * density, None, one, one * share, one * 1.116e-5)
+
+
+def test_chain_to_its_last_printed_digit():
+    """A transfer worked by another author from the equations alone."""
+    table = _cylinder(with_roof=True)
+    gauging = _gauging(1369.710 / M3_PER_M, 2.315 / M3_PER_M, 34.2, 27.0)
+    steps = follow_chain(table, gauging, _product(share=0.0005))
+    expected = {
+        "tov_m3": (1369.710, 3), "fw_m3": (2.315, 3), "shell_c": (33.3, 1), "ctsh": (1.000297, 6),
+        "vcf": (0.988000, 6), "observed_density": (831.8959, 4), "fra_m3": (-1.0753, 4),
+        "gov_m3": (1366.7256, 4), "gsv_m3": (1350.3248, 4), "nsv_m3": (1349.6496, 4),
+        "mass_kg": (1_136_405.0, 1), "weight_kg": (1_134_955.6, 1),
+    }  # fmt: skip
+    for name, (value, decimals) in expected.items():
+        assert round(float(getattr(steps, name)[0]), decimals) == value, name
+
+
+def test_chain_against_a_plain_implementation():
+    rng = np.random.default_rng(7)
+    table = _cylinder(with_roof=True)
+    for _ in range(20):
+        level, water = rng.uniform(2, 11), rng.uniform(0.01, 0.5)
+        celsius, ambient, density = rng.uniform(-5, 50), rng.uniform(-10, 40), rng.uniform(700, 950)
+        steps = follow_chain(
+            table, _gauging(level, water, celsius, ambient), _product(density, 0.002)
+        )
+        expected = plain_quantity.net_standard_volume(
+            lambda at: M3_PER_M * at, level, water, celsius, ambient, density, 0.002,
+            group="products", base_c=20.0, expansion=1.116e-5, table_c=20.0, roof=(42_000.0, 850.0),
+        )  # fmt: skip
+        assert steps.nsv_m3[0] == pytest.approx(expected, rel=1e-10)
+
+
+def _transfer(table, opening, closing, product, **u):
+    declared = {name: assumed.value for name, assumed in UNCERTAINTIES.items()} | u
+    gaugings = {"opening": opening, "closing": closing}
+    taped = {state: gauging.level_m for state, gauging in gaugings.items()}
+    return Transfer(table, gaugings, taped, product, declared)
+
+
+def test_budget_adds_up():
+    transfer = _transfer(
+        _cylinder(), _gauging(2.0, 0.02, 28.0, 25.0), _gauging(9.0, 0.02, 31.0, 27.0),
+        _product(share=0.001),
+    )  # fmt: skip
+    for result in transfer.quantities().values():
+        total = sum(part**2 for part in result.contributions.values())
+        np.testing.assert_allclose(np.sqrt(total), result.u, rtol=1e-12)
+        np.testing.assert_allclose(result.U, result.k * result.u, rtol=1e-12)
+
+
+def test_equal_dips_share_their_errors():
+    """Nothing was moved: shared errors cancel, the errors of both dips do not."""
+    same = _gauging(6.0, np.nan, 30.0, 25.0)
+    result = _transfer(_cylinder(), same, same, _product()).quantities()["moved"]
+    assert result.value[0, NSV] == 0
+    for name in ("table", "tape", "thermometer", "density", "vcf", "expansion"):
+        assert abs(result.contributions[name][0, NSV]) < 1e-12
+    each = result.contributions["dip opening"][0, NSV]
+    assert abs(each) == pytest.approx(M3_PER_M * 1e-3, rel=0.02)
+
+
+def simulate_transfers(count, seed, *, is_density_shared=True):
+    """Share of `count` simulated transfers whose true NSV moved lies within U.
+
+    Truth is computed by the plain implementation, from true dips, temperatures, density and table.
+    """
+    rng = np.random.default_rng(seed)
+    table = _cylinder()
+    held = 0
+    for _ in range(count):
+        truth = {
+            "opening": (rng.uniform(1, 4), rng.uniform(15, 35), rng.uniform(10, 30)),
+            "closing": (rng.uniform(7, 11), rng.uniform(15, 35), rng.uniform(10, 30)),
+        }
+        density, share = rng.uniform(790, 870), 0.005
+        scale, bottom = 1 + 3e-4 * rng.standard_normal(), 0.05 * rng.standard_normal()
+        tape, thermometer = 115e-6 * rng.standard_normal(), 0.15 * rng.standard_normal()
+        density_error = 0.5 * rng.standard_normal()
+        vcf_error, air_error = rng.standard_normal(), 3.0 * rng.standard_normal()
+        expansion = 1.116e-5 + 1e-6 * rng.standard_normal()
+        share_error = 1e-3 * rng.standard_normal()
+        true_nsv, read = {}, {}
+        for state, (level, celsius, ambient) in truth.items():
+            if not is_density_shared:
+                density_error = 0.5 * rng.standard_normal()
+            distance = celsius - 20.0
+            u_vcf = np.sign(distance) * np.interp(abs(distance), [0, 22.2, 50], [0, 5e-4, 15e-4])
+            true_nsv[state] = plain_quantity.net_standard_volume(
+                lambda at, scale=scale, bottom=bottom: M3_PER_M * at * scale + bottom,
+                level, None, celsius, ambient, density, share, group="products", base_c=20.0,
+                expansion=expansion, table_c=20.0, vcf_error=vcf_error * u_vcf / 1.96,
+            )  # fmt: skip
+            read[state] = _gauging(
+                level * (1 - tape) + 1e-3 * rng.standard_normal(), np.nan,
+                celsius + 0.25 * rng.standard_normal() + thermometer, ambient + air_error,
+            )  # fmt: skip
+        product = _product(density + density_error, share + share_error)
+        result = _transfer(table, read["opening"], read["closing"], product).quantities()["moved"]
+        error = result.value[0, NSV] - (true_nsv["closing"] - true_nsv["opening"])
+        held += abs(error) <= result.U[0, NSV]
+    return held / count
+
+
+def test_intervals_of_transfers_hold():
+    """A small part of the study: 300 transfers, of which fewer than 0.90 or more than 0.99 are
+    held by chance in less than one of 1000 runs.
+    """
+    assert 0.90 <= simulate_transfers(300, 1) <= 0.99
+
+
+@pytest.mark.study
+def test_intervals_of_transfers_hold_study(figure):
+    count = draws(1000, 10_000)
+    share = simulate_transfers(count, 2)
+    figure(f"NSV of {count} transfers held", f"{share:.4f}")
+    assert abs(share - 0.95) < 0.01 + 3 * np.sqrt(0.95 * 0.05 / count)
+
+
+SETTINGS = """
+[ticket]
+number = "T-1"
+[product]
+correction = "D1250-04"
+group = "products"
+base = "20C"
+density_kg_m3 = 842.0
+density_is = "base"
+sw_percent = 0.05
+[opening]
+dip_m = 2.0
+water_dip_m = 0.015
+temperature_c = 28.0
+ambient_c = 24.0
+[closing]
+dip_m = 9.0
+water_dip_m = 0.015
+temperature_c = 31.0
+ambient_c = 27.0
+[compared]
+quantity = "nsv_m3"
+value = 905.0
+U = 2.0
+source = "FT-12"
+"""
+
+
+@pytest.fixture
+def settings(tmp_path):
+    """ticket.toml of a transfer, and a function that changes its text."""
+    path = tmp_path / "ticket.toml"
+
+    def write(*changes, text=SETTINGS):
+        for before, after in changes:
+            assert before in text
+            text = text.replace(before, after, 1)
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    write()
+    return write
+
+
+def test_ullage_gives_the_quantities_of_the_dip(settings):
+    by_dip = read_tickets(_cylinder(), settings()).transfer.quantities()["moved"]
+    by_ullage = read_tickets(
+        _cylinder(), settings(("dip_m = 9.0", "ullage_m = 3.6"))
+    ).transfer.quantities()["moved"]
+    np.testing.assert_allclose(by_ullage.value, by_dip.value, rtol=1e-12)
+    # A longer tape raises a level by dip and lowers a level by ullage.
+    tape = by_ullage.contributions["tape"][0, NSV], by_dip.contributions["tape"][0, NSV]
+    assert tape[0] < 0 < tape[1]
+
+
+@pytest.mark.parametrize(
+    ("change", "place", "text"),
+    [
+        (("dip_m = 9.0", ""), "closing.dip_m", "missing"),
+        (("dip_m = 9.0", "dip_m = 9.0\nullage_m = 3.6"), "closing.ullage_m", "only one"),
+        (("dip_m = 9.0", "dip_m = 13.0"), "closing.dip_m", "0.0000 to 12.0000"),
+        (("water_dip_m = 0.015", "water_dip_m = 2.5"), "opening.water_dip_m", "above the liquid"),
+        (("temperature_c = 31.0", "temperature_c = 190.0"), "closing.temperature_c", "-50 to 150"),
+        (("ambient_c = 27.0", ""), "closing.ambient_c", "not insulated"),
+        (("842.0", "0.842"), "product.density_kg_m3", "kg/m3"),
+        (("842.0", "560.0"), "product.density_kg_m3", "range of ASTM D1250-04"),
+        (('base = "20C"', ""), "product.base", "missing"),
+        (('density_is = "base"', 'density_is = "observed"'), "density_temperature_c", "missing"),
+        (("sw_percent", 'hydrometer = "glass 20C"\nsw_percent'), "product.hydrometer", "base"),
+        (("[closing]", "[closng]"), "[closng]", "closing"),
+        (("D1250-04", "D1250"), "product.correction", "D1250-80"),
+    ],
+)
+def test_bad_tickets_are_refused_in_one_line(settings, change, place, text):
+    with pytest.raises(InputError) as refused:
+        read_tickets(_cylinder(), settings(change))
+    lines = [str(line) for line in refused.value.texts]
+    assert any(place in line and text in line for line in lines), lines
+    assert all("ticket.toml" in line for line in lines)
+
+
+def test_dip_in_the_critical_zone_is_refused(settings):
+    with pytest.raises(InputError, match=r"does not float below 1\.5000 m"):
+        read_tickets(_cylinder(with_roof=True), settings(("dip_m = 2.0", "dip_m = 1.4")))
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (("temperature_c = 31.0", "temperature_c = 88.0"), "Fahrenheit"),
+        (("sw_percent = 0.05", "sw_percent = 0.0005"), "fraction"),
+    ],
+)
+def test_slips_are_warned_of(settings, change, text):
+    warnings = read_tickets(_cylinder(), settings(change)).warnings
+    assert any(text in str(warning.text) for warning in warnings)
+
+
+def test_rows_replace_keys(settings, tmp_path):
+    rows = tmp_path / "tickets.csv"
+    rows.write_text("ticket;closing_dip_m;density_kg_m3\nA;9,0;842\nB;8,5;830\n", encoding="utf-8")
+    tickets = read_tickets(_cylinder(), settings(), rows)
+    result = tickets.transfer.quantities()["moved"]
+    single = read_tickets(_cylinder(), settings()).transfer.quantities()["moved"]
+    assert tickets.names == ("A", "B")
+    np.testing.assert_allclose(result.value[0], single.value[0], rtol=1e-13)
+    assert result.value[1, NSV] < result.value[0, NSV]
+
+
+def test_bad_rows_are_named_by_row_and_column(settings, tmp_path):
+    rows = tmp_path / "tickets.csv"
+    rows.write_text(
+        "ticket,closing_dip_m,closing_temperature_c\nA,9.0,30\nB,19.0,30\nC,9.0,900\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError) as refused:
+        read_tickets(_cylinder(), settings(), rows)
+    assert str(refused.value.texts[0]).startswith("tickets.csv, row 4")
+
+
+def test_command_prints_the_quantities(settings, example_record, tmp_path, capsys):
+    path = settings(("dip_m = 9.0", "dip_m = 8.5"))
+    out = tmp_path / "out.csv"
+    assert main(["ticket", str(example_record), str(path), "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert "net standard volume" in text
+    assert "E_n" in text
+    with out.open(encoding="utf-8") as stream:
+        (row,) = csv.DictReader(stream)
+    assert main(["ticket", str(example_record), str(path), "--json"]) == 0
+    (ticket,) = json.loads(capsys.readouterr().out)["tickets"]
+    assert float(row["moved_nsv_m3"]) == pytest.approx(ticket["moved_nsv_m3"], rel=1e-12)
+    table = read_table(example_record)
+    direct = read_tickets(table, path).transfer.quantities()["moved"]
+    assert ticket["moved_U_nsv_m3"] == pytest.approx(direct.U[0, NSV], rel=1e-12)
+
+
+@pytest.mark.parametrize("language", ["pt-BR", "es"])
+def test_command_speaks_the_language(settings, example_record, language, capsys):
+    path = settings(("dip_m = 9.0", "dip_m = 8.5"))
+    assert main(["ticket", str(example_record), str(path), "--language", language]) == 0
+    text = capsys.readouterr().out
+    assert "net standard volume" not in text
+    assert "{" not in text
