@@ -7,8 +7,8 @@ import numpy as np
 from tankcal.geometry.rotations import rotation_of_view
 from tankcal.planning.model import Instrumented, Photograph, Shell, Targets, Tie
 from tankcal.quadrature import panels
+from tankcal.units import ARCSEC
 
-ARCSEC = np.pi / 180 / 3600
 # Default rows of targets per course, and default distance of targets from welds.
 LEVELS, CLEARANCE_M = 2, 0.3
 TOUCH_M = 0.02  # smallest distance between two target rows

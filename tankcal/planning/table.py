@@ -15,8 +15,8 @@ from tankcal.pipeline.table import ComputedTable, compute_table
 from tankcal.pipeline.tanks.vertical import volume_by_points
 from tankcal.pipeline.wall import find_wall
 from tankcal.planning.covariance import PredictedCovariance
-from tankcal.survey.causes import causes_of
 from tankcal.survey.points import Points
+from tankcal.survey.results import causes_of
 from tankcal.survey.wall import move_to_wall
 
 MANY = 400  # largest number of points whose dense covariance weights the outlines

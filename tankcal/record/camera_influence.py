@@ -2,16 +2,14 @@
 
 from typing import Literal
 
-import numpy as np
-
 from tankcal.calibration.influence.blocks import InteriorValue
 from tankcal.record.camera_product import ProductFile, product_of
 from tankcal.record.camera_versions import CameraFile
 from tankcal.record.plain_data import to_plain
 from tankcal.record.schema import Saved, filled_from, key
+from tankcal.units import ARCSEC_PER_RAD
 
 MM, UM = 1e3, 1e3
-ARCSEC = np.degrees(1.0) * 3600
 
 
 class ReadingSetAside(Saved):
@@ -92,9 +90,9 @@ class PhotoShifts(Saved):
     rms_xyz_mm: float = key("of the magnitudes", of="rms_xyz_m", times=MM)
     largest_xyz_mm: float = key("magnitude", of="largest_xyz_m", times=MM)
     largest_photo: str | None = key("that differs most", of="largest_name")
-    rms_arcsec: list[float] = key("about x, y, z", of="rms_rad", times=ARCSEC)
-    rms_turn_arcsec: float = key("of the whole turns", of="rms_turn_rad", times=ARCSEC)
-    largest_turn_arcsec: float = key("whole turn", of="largest_turn_rad", times=ARCSEC)
+    rms_arcsec: list[float] = key("about x, y, z", of="rms_rad", times=ARCSEC_PER_RAD)
+    rms_turn_arcsec: float = key("of the whole turns", of="rms_turn_rad", times=ARCSEC_PER_RAD)
+    largest_turn_arcsec: float = key("whole turn", of="largest_turn_rad", times=ARCSEC_PER_RAD)
     largest_turn_photo: str | None = key("that turns most", of="largest_turn_name")
 
 

@@ -8,8 +8,8 @@ from tankcal.record.cloud_inside import InsideSeen, inside_of
 from tankcal.record.cloud_map import CloudMap, map_of
 from tankcal.record.hits import SharedByHits, shared_of
 from tankcal.record.schema import Finite, Saved, key
+from tankcal.units import ARCSEC
 
-ARCSEC = np.pi / 180 / 3600
 SHARED = {"instrument_offset", "instrument_scale", "incidence", "registration"}  # kinds of inputs
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 
 from tankcal.record.schema import Finite, Saved, key
-from tankcal.survey.control_drift import HOUR_S, drifts_of, repeats_of
+from tankcal.survey.control_drift import drifts_of, repeats_of
+from tankcal.units import HOUR_S
 
 CLASS_DEG, LAST_DEG = 10, 90  # of the histogram of incidence
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.line_checks import compare_leans, levels_and_lean
 from tankcal.record.schema import Saved, key
 from tankcal.survey.reference_line import collimation_by_faces
+from tankcal.units import FULL_TURN
 
 
 class OffsetReading(Saved):

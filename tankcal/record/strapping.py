@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.survey import radius_sd, surveyed_shell
+from tankcal.units import FULL_TURN
 
 
 class StrapReading(Saved):

@@ -5,11 +5,11 @@ from functools import partial
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import mean_radii
 from tankcal.record.columns import ArrayColumns, ArrayRows, plain_if_short
 from tankcal.record.schema import Finite, Saved, filled_from, key
+from tankcal.units import FULL_TURN
 
 EVEN = 720  # azimuths; they resolve products of an outline with the highest mode of the form
 

@@ -22,9 +22,8 @@ from wall_plan_folders import HITS, LINES, TANGENTS, fill, plan_of
 import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.geometry.field.amplitudes import assumed_amplitudes
+from tankcal.geometry.field.amplitudes import assumed_amplitudes, likelihood_of
 from tankcal.geometry.field.estimate import WallField
-from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.information import expect_amplitudes
 from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.surveying import find_survey

@@ -20,7 +20,7 @@ from tankcal.clouds.wall.features import (
 from tankcal.clouds.wall.growing import OFF_TREND, WALL, grow_wall, off_trend
 from tankcal.clouds.wall.refusals import refuse_no_wall, two_surfaces_in
 from tankcal.errors import InputError
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 LEAST_SD_M = 5e-5  # least standard deviation of the mean of a cell, m
 # Distance of cells without common noise along a scan line, m; least number of values for a scatter

@@ -5,8 +5,8 @@ import numpy as np
 from tankcal.clouds.wall.growing import EMPTY, FEW, FEWEST, REFINE_BINS, WALL
 from tankcal.clouds.wall.screens import FILE, two_surfaces
 from tankcal.errors import InputError, Problem
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
+from tankcal.units import FULL_TURN
 
 # Share of cells with a second mode that shows a second surface; number of sectors; least share of
 # the sectors in which this surface is seen

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.geometry.field.information import expect_amplitudes
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.surveying import find_survey
 from tankcal.planning.wall.foreseen_tables import OFF_WALL_M
 from tankcal.planning.wall.nominal_filling import with_nominal_batches
@@ -18,6 +17,7 @@ from tankcal.planning.wall.tank_walls import RoundWall, plates_of
 from tankcal.survey.readings import read_distance_m
 from tankcal.survey.sighting import bias_by_incidence, rays
 from tankcal.survey.strapping import reduce_straps
+from tankcal.units import FULL_TURN
 
 CLOSE_M, ROUNDS = 1e-12, 20  # convergence limit and largest number of iterations
 MILLIMETRES = 3  # decimals to which heights of hits are rounded to form levels

@@ -15,8 +15,8 @@ from tankcal.record.plan import PLAN
 from tankcal.record.wall_plan import WALL_PLAN
 from tankcal.text.decoding import read_json
 from tankcal.text.languages import DEFAULT
+from tankcal.units import ARCSEC_PER_DEG
 
-ARCSEC = 3600.0
 MEASURED = (
     *("survey.date", "survey.shell_temperature_c", "survey.liquid_level_m"),
     *("survey.liquid_density_kg_m3", "datum.bottom_z_m", "datum.dip_plate_z_m", "datum.dip_x_m"),
@@ -165,7 +165,7 @@ def _bases(plan):
     rows = []
     for one in plan.bases:
         row = {"setup": one.setup, "to": one.to, "bar": one.bar}
-        row |= {"s_arcsec": short(ARCSEC * degrees(one.angle_sd_rad), 6)}
+        row |= {"s_arcsec": short(ARCSEC_PER_DEG * degrees(one.angle_sd_rad), 6)}
         rows += [row] * one.readings
     return tuple(rows)
 
@@ -193,7 +193,7 @@ def _sd(table, setup):
     if table == "slope_distances":
         return {"s_mm": _mm(setup.distance_sd_m)}
     sd = setup.direction_sd_rad if table == "directions" else setup.zenith_sd_rad
-    return {"s_arcsec": short(ARCSEC * degrees(sd), 6)}
+    return {"s_arcsec": short(ARCSEC_PER_DEG * degrees(sd), 6)}
 
 
 def as_given(table):
