@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import TankcalError
+from tankcal.planning.assembly import tape_of
 from tankcal.planning.bases import by_ends, new_bases
 from tankcal.planning.model import Known, Plan
-from tankcal.planning.patterns import places_around, row_heights_m, tape_of
+from tankcal.planning.places import places_around, row_heights_m
 from tankcal.planning.wall.changes import WALL_ITEMS, wall_changes_of, wall_count
 from tankcal.planning.wall.model import WallPlan
 

@@ -11,13 +11,11 @@ import numpy as np
 from tankcal.errors import TankcalError
 from tankcal.messages import message
 from tankcal.planning.changes import ITEMS, Change, changes_of, cost_of
-from tankcal.planning.checks.placed import refuse_misplaced
-from tankcal.planning.checks.seen import refuse_blind
-from tankcal.planning.limits import limited_u
 from tankcal.planning.measurements import measurements_of, nominal_of
+from tankcal.planning.position_checks import refuse_misplaced
 from tankcal.planning.prediction import Prediction, predict
-from tankcal.planning.table import predicted_table, recompute_table
-from tankcal.planning.visibility import visible
+from tankcal.planning.table import limited_u, predicted_table, recompute_table
+from tankcal.planning.visibility import refuse_blind, visible
 from tankcal.planning.wall.changes import SEARCHED
 from tankcal.planning.wall.model import WallPlan
 from tankcal.survey import predict_survey

@@ -17,6 +17,8 @@ from tankcal.survey.measurements import ImageReadings, KnownPoints, Photo, Readi
 from tankcal.survey.observations import KINDS
 from tankcal.survey.readings import read_distance_m
 
+BLUNDER_SDS = 20.0  # size of a simulated blunder, in standard deviations of its reading
+
 
 def nominal_of(plan):
     """Return the surveys.Nominal of a Plan."""
@@ -30,11 +32,11 @@ def measurements_of(plan, seen):
 
     Repeated readings are one value with the standard deviation of their mean.
     """
-    given, counts = plan.job.measurements, measurable(plan, seen)
+    counts = measurable(plan, seen)
     seen = replace(seen, on_photo=seen.on_photo & counts, on_setup=seen.on_setup & counts)
     determined = {name for name, is_there in zip(seen.points, counts, strict=True) if is_there}
     return replace(
-        given,
+        plan.job.measurements,
         photos=tuple(_photo(photo) for photo in plan.photos),
         image_points=_image_points(plan, seen),
         control=_control(plan),
@@ -229,3 +231,9 @@ def _instrument_reading(true_m, name, tools, off):
         return true_m
     scale, offset = off[name]
     return read_distance_m(true_m * (1.0 + scale) + offset, tools[name])
+
+
+def draw_blunders(rng, share, count):
+    """Draw errors (count,) in standard deviations: 0, or a blunder for a share of the readings."""
+    sign = np.where(rng.random(count) < 0.5, -1.0, 1.0)
+    return BLUNDER_SDS * sign * (rng.random(count) < share)

@@ -273,7 +273,7 @@ class Plan:
         "control_point", "target", "reading".
     folder : str
         Name of the folder.
-    given : RawJob or None
+    raw : RawJob or None
         Content of the folder as read (`job.tables.RawJob`).
     """
 
@@ -293,7 +293,7 @@ class Plan:
     amplitudes: Amplitudes = field(default_factory=assumed_amplitudes)
     costs: dict = field(default_factory=dict)
     folder: str = ""
-    given: RawJob | None = None
+    raw: RawJob | None = None
     warnings: tuple = ()
 
     @property

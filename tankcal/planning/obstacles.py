@@ -10,21 +10,21 @@ from tankcal.messages import message
 from tankcal.planning.model import Box, Pillar
 
 
-def check_obstacles(given, log):
+def check_obstacles(plan_input, log):
     """Check the keys of boxes and cylinders in a `Given`."""
     needed = {"box": {"from_m": 3, "to_m": 3}, "cylinder": {"axis_m": 2}}
     numbers = {"box": (), "cylinder": ("radius_m", "low_m", "high_m")}
-    for entry in given.repeated["obstacles"]:
+    for entry in plan_input.repeated["obstacles"]:
         for key, count in needed.get(entry["kind"], {}).items():
             if not entry.is_refused(key) and len(entry[key] or ()) != count:
-                entry.tell(
+                entry.report(
                     log.problem,
                     key,
                     message("plan_numbers_metres", "expected {count} numbers, metres", count=count),
                 )
         for key in numbers.get(entry["kind"], ()):
             if key not in entry.filled:
-                entry.tell(
+                entry.report(
                     log.problem,
                     key,
                     message("plan_number_metres", "missing; expected a number, metres"),
@@ -36,18 +36,18 @@ def check_obstacles(given, log):
                 high=entry["high_m"],
                 low=entry["low_m"],
             )
-            entry.tell(log.problem, "high_m", expected)
+            entry.report(log.problem, "high_m", expected)
         if any(a == b for a, b in zip(entry["from_m"] or (), entry["to_m"] or (), strict=False)):
             expected = message(
                 "plan_flat_box",
                 "in a plane with from_m; expected a corner that differs in x, y and z",
             )
-            entry.tell(log.problem, "to_m", expected)
+            entry.report(log.problem, "to_m", expected)
 
 
-def obstacles_of(given):
+def obstacles_of(plan_input):
     """Return the `Box`es and `Pillar`s of valid [[obstacles]], a tuple."""
-    return tuple(map(_obstacle, given.repeated["obstacles"]))
+    return tuple(map(_obstacle, plan_input.repeated["obstacles"]))
 
 
 def _obstacle(entry):

@@ -47,14 +47,19 @@ from tankcal.job.tables import (
 from tankcal.job.tables import TABLES as JOB_FILES
 from tankcal.messages import message
 from tankcal.planning.assembly import assemble_plan, limits_of
-from tankcal.planning.checks.given import check_given
-from tankcal.planning.checks.placed import check_plan
-from tankcal.planning.contract import JOB_TABLES, REPEATED, SINGLE, TABLES
-from tankcal.planning.fields import Count
-from tankcal.planning.given import PLAN_FILE, Entry, Given
+from tankcal.planning.contract import (
+    JOB_TABLES,
+    REPEATED,
+    SINGLE,
+    TABLES,
+    WALL_SECTIONS,
+    WALL_TABLES,
+    Count,
+)
+from tankcal.planning.entries import PLAN_FILE, Entry, PlanInput
+from tankcal.planning.input_checks import check_input
+from tankcal.planning.position_checks import check_positions
 from tankcal.planning.wall.checks import check_sections
-from tankcal.planning.wall.contract import OF_WALL
-from tankcal.planning.wall.contract import TABLES as WALL_TABLES
 from tankcal.planning.wall.reading import is_wall_plan, wall_plan_of
 from tankcal.text.numerals import NUMBER
 
@@ -81,47 +86,47 @@ def load_plan(path):
     log = Log()
     folder = _folder(Path(path), log)
     log.stop_if_problems()
-    raw, given = _read(folder, log)
+    raw, plan_input = _read(folder, log)
     values = read_settings(raw, log)
-    _check_kind(raw, given, log)
+    _check_kind(raw, plan_input, log)
     registers = {name: read_register(raw, name, log) for name in REGISTERS}
     tables = _job_tables(raw, log)
-    given = replace(given, control=tables["control"])
-    if given.is_wall:
-        return _wall_plan(raw, values, tables, given, folder, log)
-    _check(raw, values, tables | _measured(given), registers, given, log)
+    plan_input = replace(plan_input, control=tables["control"])
+    if plan_input.is_wall:
+        return _wall_plan(raw, values, tables, plan_input, folder, log)
+    _check(raw, values, tables | _measured(plan_input), registers, plan_input, log)
     log.stop_if_problems()
     job = _job(raw, values, tables, registers, log)
     log.stop_if_problems()
-    plan = assemble_plan(job, given, bars_of(registers), folder.resolve().name)
-    check_plan(plan, given, raw, log)
+    plan = assemble_plan(job, plan_input, bars_of(registers), folder.resolve().name)
+    check_positions(plan, plan_input, raw, log)
     log.stop_if_problems()
-    return replace(plan, given=_with_points(raw), warnings=tuple(log.warnings))
+    return replace(plan, raw=_with_points(raw), warnings=tuple(log.warnings))
 
 
-def _wall_plan(raw, values, tables, given, folder, log):
+def _wall_plan(raw, values, tables, plan_input, folder, log):
     """Return the WallPlan of a plan that measures the bare wall."""
     courses = None if tables["courses"] is None else tuple(tables["courses"].of("course"))
     diameter = values["tank"]["nominal_diameter_m"]
-    check_sections(given, courses, None if diameter is None else diameter / 2, raw, log)
+    check_sections(plan_input, courses, None if diameter is None else diameter / 2, raw, log)
     log.stop_if_problems()
     warnings = tuple(log.warnings)
     raw = _with_points(raw)
     check_tank(values, tables, raw, log)
     log.stop_if_problems()
-    limits = limits_of(given.single["limits"])
+    limits = limits_of(plan_input.single["limits"])
     name = folder.resolve().name
-    plan = wall_plan_of(raw, values, tables, given, limits, name)
+    plan = wall_plan_of(raw, values, tables, plan_input, limits, name)
     return replace(plan, warnings=(*warnings, *plan.warnings))
 
 
-def _check_kind(raw, given, log):
+def _check_kind(raw, plan_input, log):
     """Check the kind of tank: upright, unless the plan measures by liquid only."""
     kind = kind_of(raw)
     if kind in (None, "vertical"):
         return
-    is_filled = bool(given.repeated["runs"])
-    others = [name for name in OF_WALL if given.repeated.get(name) or _is_filled(given, name)]
+    is_filled = bool(plan_input.repeated["runs"])
+    others = [name for name in WALL_SECTIONS if plan_input.has(name)]
     if is_filled and not others and kind in OF_LIQUID:
         return
     if is_filled and kind in OF_LIQUID:
@@ -138,10 +143,6 @@ def _check_kind(raw, given, log):
         found=kind,
     )
     log.problem(PLAN_FILE, expected, None, "tank.kind")
-
-
-def _is_filled(given, name):
-    return name in given.single and bool(given.single[name].filled)
 
 
 def _with_points(raw):
@@ -186,7 +187,7 @@ def _folder(path, log):
 
 
 def _read(folder, log):
-    """Return the RawJob and the Given of a plan's folder."""
+    """Return the RawJob and the PlanInput of a plan's folder."""
     files = []
 
     def content(name, limit=None):
@@ -241,7 +242,7 @@ def _read(folder, log):
         files=tuple(files), registers=registers, is_planned=True,
     )  # fmt: skip
     ties = {name: _table(name, tables.get(name), log) for name in TABLES}
-    return raw, Given(single, repeated, ties, ties.pop("stadia"), is_wall=is_wall)
+    return raw, PlanInput(single, repeated, ties, ties.pop("stadia"), is_wall=is_wall)
 
 
 def _refuse_misspelt(content, rows, text, log):
@@ -375,7 +376,7 @@ def _entry(name, fields, entries, row, rows, log, is_needed=False):
     checked = Entry(name, values, filled, row, rows)
     for field in fields:
         if isinstance(field, Count) and not _is_whole(values[field.name]):
-            checked.tell(log.problem, field.name, _not_whole(field, values[field.name]))
+            checked.report(log.problem, field.name, _not_whole(field, values[field.name]))
     return checked
 
 
@@ -406,20 +407,20 @@ def _job_tables(raw, log):
     return tables
 
 
-def _measured(given):
+def _measured(plan_input):
     """Return the tables of the plan, and a placeholder for image points."""
-    return given.ties | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
+    return plan_input.ties | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
 
 
-def _check(raw, values, tables, registers, given, log):
+def _check(raw, values, tables, registers, plan_input, log):
     """Check all values that do not depend on positions."""
     check_tank(values, tables, raw, log)
     files = SurveyFiles(values, tables, registers, raw, log)
     check_cameras(files)
     check_instruments(files)
-    if has_rows(given.stadia):
-        check_bars(files, given.stadia)
-    check_given(values, registers, given, raw, log)
+    if has_rows(plan_input.stadia):
+        check_bars(files, plan_input.stadia)
+    check_input(values, registers, plan_input, raw, log)
 
 
 def _job(raw, values, tables, registers, log):

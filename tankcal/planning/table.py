@@ -1,25 +1,96 @@
-"""Predict the table of a surveyed tank: wall, volumes and U of every row."""
+"""Predict the table of a surveyed tank: wall, volumes and U of every row, and the limit of a plan.
+
+The covariance of many predicted points is an operator; the dense matrix is not formed. The volume
+needs only products of the covariance with a few columns. Q M follows from the reduced normal
+equations with 3n times d numbers instead of 3n times 3n.
+
+Common translations and the common rotation about the vertical are removed with D and A of
+`wall.s_transform`: C' = C - D A' - A D'.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse
 
-from tankcal.errors import SolutionError
+from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model import Job
 from tankcal.messages import message
-from tankcal.pipeline.statements import statements
+from tankcal.pipeline.point_covariance import common_motions, s_transform_factors
+from tankcal.pipeline.statements import MINIMA_M, statements
 from tankcal.pipeline.survey_warnings import refuse_undetermined
 from tankcal.pipeline.surveyed_wall import Wall
 from tankcal.pipeline.table import ComputedTable, compute_table
 from tankcal.pipeline.tanks.vertical import volume_by_points
 from tankcal.pipeline.wall import find_wall
-from tankcal.planning.covariance import PredictedCovariance
+from tankcal.solver.effects import covariances
 from tankcal.survey.causes import causes_of
 from tankcal.survey.points import Points
 from tankcal.survey.wall import move_to_wall
 
 MANY = 400  # largest number of points whose dense covariance weights the outlines
+
+
+@dataclass(frozen=True)
+class PredictedCovariance:
+    """Covariance (3n, 3n) of selected points of a predicted network.
+
+    adjusted: network.Adjusted; points: indices (n,) of the points in the network.
+    """
+
+    adjusted: object
+    points: np.ndarray
+
+    @property
+    def shape(self):
+        """Shape of the covariance, (3n, 3n)."""
+        return (3 * len(self.points),) * 2
+
+    def __matmul__(self, matrix):
+        """Product of C' and a matrix, shape (3n, d)."""
+        return (
+            self._in_frame(matrix)
+            - self._basis @ (self._across.T @ matrix)
+            - (self._across @ (self._basis.T @ matrix))
+        )
+
+    def _in_frame(self, matrix):
+        """Product of C, in the datum of the network, and a matrix."""
+        columns = self.adjusted.problem.layout.points[self.points].ravel()
+        product = covariances(self.adjusted.solution.cofactor, columns, matrix.T)
+        return np.vstack([product, np.zeros((1, product.shape[1]))])[columns]
+
+    @cached_property
+    def _basis(self):
+        return common_motions(self.adjusted.xyz_m[self.points])
+
+    @cached_property
+    def _across(self):
+        trace = np.einsum("nii->", self.adjusted.point_covariances_m2[self.points])
+        # The trace of C determines s2 of A = C D - D (D'C D + s2 I) / 2.
+        return s_transform_factors(self._basis, self._in_frame(self._basis), trace)
+
+    def among(self, column):
+        """Effects (3n,) of one cause on the points, without the common motions."""
+        return column - self._basis @ (self._basis.T @ column)
+
+    def diagonal(self):
+        """Variances, shape (3n,)."""
+        return self.of_each_point().diagonal()
+
+    def written_out(self):
+        """Dense covariance (3n, 3n); for few points only."""
+        cross = self._basis @ self._across.T  # D A'
+        return self.adjusted.covariance_m2(self.points) - cross - cross.T
+
+    def of_each_point(self):
+        """Sparse matrix (3n, 3n) of the covariance blocks of single points, no correlations."""
+        n = len(self.points)
+        basis, across = (part.reshape(n, 3, 4) for part in (self._basis, self._across))
+        cross = basis @ np.swapaxes(across, 1, 2)
+        block = self.adjusted.point_covariances_m2[self.points] - cross - np.swapaxes(cross, 1, 2)
+        return scipy.sparse.bsr_array((block, np.arange(n), np.arange(n + 1))).tocsr()
 
 
 @dataclass(frozen=True)
@@ -121,3 +192,52 @@ def _points(plan, indices, covariance):
         causes=_causes(covariance),
         from_adjustment=True,
     )
+
+
+# ---- the limit of a plan
+
+
+def limited_u(tabled, limits):
+    """U over volume of the full tank, or of the worst delivery of the smallest minimum."""
+    if limits.of == "delivery":
+        return float(tabled.stated.worst[0].relative.relative)
+    table = tabled.made.table
+    return float(table.U_m3[-1] / table.volume_m3[-1])
+
+
+class OfTable:
+    """Mixin: properties of a prediction from its table (`tabled`) and its plan (`plan`)."""
+
+    @property
+    def table(self):
+        """Capacity table with U of every row (`capacity.Capacity`)."""
+        return self.tabled.made.table
+
+    @property
+    def relative_u(self):
+        """U over volume of the limited quantity: the full tank or the worst delivery."""
+        return limited_u(self.tabled, self.plan.limits)
+
+    @property
+    def meets(self):
+        """Whether the limit is met; None if the plan has no limit."""
+        limit = self.plan.limits.relative_u
+        return None if limit is None else bool(self.relative_u <= limit)
+
+
+def refuse_without_delivery(plan, tabled, tall):
+    """Raise InputError if the limit is for deliveries and no delivery of the table is long enough.
+
+    tall: height of the shell, m.
+    """
+    if plan.limits.of == "delivery" and not tabled.stated.worst:
+        least = min(plan.job.table.minimum_delivery_m or MINIMA_M)
+        file, row, name = plan.limits.place
+        expected = message(
+            "plan_no_delivery",
+            "no delivery of {least:g} m or more in a shell of {tall:g} m; expected "
+            "top, or a smaller table.minimum_delivery_m",
+            least=least,
+            tall=tall,
+        )
+        raise InputError(Problem(file, expected, row, name))

@@ -1,16 +1,23 @@
-"""Visibility of points: inside the frame, incidence within the limit, line of sight free."""
+"""Visibility of points: inside the frame, incidence within the limit, line of sight free.
+
+Also photographs and set-ups that see too little, and groups of set-ups that are not connected.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from tankcal.camera.model import distort_image_points
+from tankcal.job.tables import Log
+from tankcal.messages import message
 from tankcal.planning.model import Pillar
 from tankcal.planning.obstacles import find_hidden
 
-FEWEST_READINGS = 3  # for the three coordinates of a point  # for the three coordinates of a point
+FEWEST_READINGS = 3  # for the three coordinates of a point
+FEWEST_POINTS = 3  # fewest points on a photograph
+FEWEST_SHARED = 2  # fewest common points that connect two levelled set-ups
 AHEAD_M = 0.1  # smallest depth of a point in front of a camera
-ROOM = 1.3  # half formats; limit of undistorted image coordinates of points in the frame
+WIDEST = 1.3  # half formats; limit of undistorted image coordinates of points in the frame
 GRAZE_M = 1e-3  # reduction of the tank radius, so that the tank does not hide its own targets
 
 
@@ -108,7 +115,7 @@ def find_in_frame(setup, photo, xyz_m):
     ahead = w < -AHEAD_M
     ideal = -camera.values[0] * np.column_stack([u, v]) / np.where(ahead, w, -1.0)[:, None]
     # Far outside the frame the distortion polynomial can fold points back into the frame.
-    near = ahead & (np.abs(ideal) < ROOM * half).all(axis=1)
+    near = ahead & (np.abs(ideal) < WIDEST * half).all(axis=1)
     image = np.full((len(xyz_m), 2), np.nan)
     image[near] = distort_image_points(ideal[near], camera.values, camera.form)
     return image, near & (np.abs(np.nan_to_num(image, nan=np.inf)) < half).all(axis=1)
@@ -147,3 +154,115 @@ def find_in_sight(plan, place_m, xyz_m, normals):
     for obstacle in plan.obstacles:
         seen &= ~find_hidden(obstacle, place_m, xyz_m)
     return seen
+
+
+def refuse_blind(plan, seen):
+    """Raise InputError for photographs and set-ups that see too few points.
+
+    One message per ring.
+    """
+    log, blind = Log(), {}
+    for k, photo in enumerate(plan.photos):
+        count, targets = (int(seen.on_photo[k, :n].sum()) for n in (None, len(plan.targets.names)))
+        if count < FEWEST_POINTS or not targets:
+            text = _seen(count, targets)
+            blind.setdefault(photo.place, []).append(
+                (message("plan_a_photograph", "photograph {photo}", photo=photo.name), text)
+            )
+    for k, setup in enumerate(plan.setups):
+        if not seen.on_setup[k].any():
+            blind.setdefault(setup.place, []).append(
+                (message("plan_a_setup", "set-up {setup}", setup=setup.name), "nothing")
+            )
+    for (file, row, name), ones in blind.items():
+        who, text = ones[0]
+        more = (
+            message("plan_more_of_ring", ", and {more} more of this ring", more=len(ones) - 1)
+            if len(ones) > 1
+            else ""
+        )
+        log.problem(
+            file,
+            message(
+                "plan_sees_too_little",
+                "{who} sees {found}{more}: targets are outside its frame, behind it, seen at too "
+                "flat an angle (limits.incidence_deg) or hidden; expected it to see 3 points or "
+                "more, targets among them",
+                who=who,
+                found=text,
+                more=more,
+            ),
+            row,
+            name,
+        )
+    log.stop_if_problems()
+
+
+def _seen(count, targets):
+    if not count:
+        return _nothing()
+    if not targets:
+        return message("plan_no_target", "no target (other points: {count})", count=count)
+    if count == 1:
+        return message("plan_one_point_only", "{count} point only", count=count)
+    return message("plan_points_only", "{count} points only", count=count)
+
+
+def _nothing():
+    return message("plan_nothing", "nothing")
+
+
+def find_separate_bodies(plan, seen):
+    """Return the groups of connected set-ups, each a tuple of names.
+
+    Parameters
+    ----------
+    plan : Plan
+    seen : Visibility
+
+    Notes
+    -----
+    A set-up is a body: the points that it sees and its own position. Points known in x, y and z are
+    another body. Bodies with two common points are merged.
+    """
+    bodies = [
+        (
+            [],
+            {
+                control_point.name
+                for control_point in plan.known
+                if np.isfinite(control_point.sd_m).all()
+            },
+        )
+    ]
+    for k, setup in enumerate(plan.setups):
+        seen_there = {seen.points[i] for i in np.flatnonzero(seen.on_setup[k])}
+        bodies.append(([setup.name], seen_there | {setup.name}))
+    while (pair := _find_linked(bodies)) is not None:
+        first, second = pair
+        bodies = [body for body in bodies if body is not first and body is not second]
+        bodies.append((first[0] + second[0], first[1] | second[1]))
+    return tuple(tuple(names) for names, _ in bodies if names)
+
+
+def _find_linked(bodies):
+    """Return two bodies with enough common points, or None."""
+    for i, body in enumerate(bodies):
+        for earlier in bodies[:i]:
+            if len(body[1] & earlier[1]) >= FEWEST_SHARED:
+                return earlier, body
+    return None
+
+
+def describe_separate_bodies(groups):
+    """Return the message about the groups that `find_separate_bodies` returns."""
+    listed = "; ".join(", ".join(names) for names in groups)
+    return message(
+        "plan_apart",
+        "{count} groups of set-ups are not connected to the others: {told}; they share fewer "
+        "than {shared} points and do not see each other: add marks or control points that "
+        "neighbours both see, or set-ups between them",
+        count=len(groups),
+        told=listed,
+        shared=FEWEST_SHARED,
+    )

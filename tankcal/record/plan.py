@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.planning.bases import by_ends
-from tankcal.planning.doubtful import GroupReliability
 from tankcal.planning.prediction import PointOutlook, SectionOutlook
+from tankcal.planning.reliability import GroupReliability
 from tankcal.record.plain_data import to_plain
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Saved, filled_from, key

@@ -21,7 +21,7 @@ import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict, smallest, what_helps
-from tankcal.planning.wall.filling_changes import changes_of_runs
+from tankcal.planning.wall.changes import changes_of_runs
 from tankcal.planning.wall.prediction import foresee_table
 from tankcal.record.wall_plan import WALL_PLAN
 from tankcal.report.planning import empty_job

@@ -10,7 +10,7 @@ from tankcal.errors import InputError
 from tankcal.geometry.rotations import view_of_rotation
 from tankcal.planning import load_plan, predict
 from tankcal.planning.changes import changes_of
-from tankcal.planning.patterns import row_heights_m
+from tankcal.planning.places import row_heights_m
 from tankcal.planning.visibility import visible
 
 

@@ -13,8 +13,7 @@ from tankcal.pipeline.plot_style import INK, RED
 from tankcal.planning import load_plan, predict
 from tankcal.planning.improvements import what_helps
 from tankcal.planning.model import Pillar, Tie
-from tankcal.planning.patterns import full_turn
-from tankcal.planning.places import place_of
+from tankcal.planning.places import full_turn, place_of
 from tankcal.report.planning import figures, files, rows, sketches, workbook
 from tankcal.report.planning.field_sheets import sheets
 from tankcal.report.planning.outlook import outlook

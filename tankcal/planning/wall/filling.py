@@ -8,8 +8,7 @@ import numpy as np
 
 from tankcal.job.checks.liquid import MOST_ROWS
 from tankcal.messages import message
-from tankcal.planning.fields import too_many_sections
-from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.entries import PLAN_FILE, too_many_sections
 from tankcal.planning.wall.model import PlannedRun
 
 LEAST_STEP_M = 0.001  # smallest step between two dips
@@ -17,9 +16,9 @@ LEAST_BATCH_M3 = 1e-3  # replaces a batch volume that is zero or unknown
 MOST_RUNS = 50
 
 
-def check_runs(given, is_run_declared, log):
+def check_runs(plan_input, is_run_declared, log):
     """Check [[runs]] and [filling]; is_run_declared: whether [liquid] has a run_ppm."""
-    runs, filling = given.repeated["runs"], given.single["filling"]
+    runs, filling = plan_input.repeated["runs"], plan_input.single["filling"]
     if filling.filled and not runs:
         expected = message(
             "plan_filling_alone",
@@ -30,7 +29,7 @@ def check_runs(given, is_run_declared, log):
         log.problem(PLAN_FILE, too_many_sections(len(runs), MOST_RUNS), None, "runs")
     for entry in runs:
         _check_steps(entry, log)
-    _check_run_effect(given, is_run_declared, log)
+    _check_run_effect(plan_input, is_run_declared, log)
     rows = sum(len(run.dips_m) + 1 for run in map(_planned, runs) if run is not None)
     if rows > MOST_ROWS:
         expected = message(
@@ -51,7 +50,7 @@ def _check_steps(run, log):
             "plan_step_or_steps",
             "expected one of them: step_m, the way from dip to dip, or steps, how many",
         )
-        run.tell(log.problem, "step_m", expected)
+        run.report(log.problem, "step_m", expected)
         return
     if None in (first, last):
         return  # reported already
@@ -62,7 +61,7 @@ def _check_steps(run, log):
             " liquid is drawn off",
             last=last,
         )
-        run.tell(log.problem, "last_dip_m", expected)
+        run.report(log.problem, "last_dip_m", expected)
         return
     way = abs(last - first) / steps if steps else step
     if way is not None and way < LEAST_STEP_M and last != first:
@@ -72,12 +71,12 @@ def _check_steps(run, log):
             step=1000 * way,
             least=1000 * LEAST_STEP_M,
         )
-        run.tell(log.problem, "steps" if steps else "step_m", expected)
+        run.report(log.problem, "steps" if steps else "step_m", expected)
 
 
-def _check_run_effect(given, is_declared, log):
+def _check_run_effect(plan_input, is_declared, log):
     """Check that the run effect is declared, or that at least two runs determine it."""
-    runs, filling = given.repeated["runs"], given.single["filling"]
+    runs, filling = plan_input.repeated["runs"], plan_input.single["filling"]
     expected_ppm = filling["expected_run_ppm"]
     if expected_ppm is not None and is_declared:
         expected = message(
@@ -85,7 +84,7 @@ def _check_run_effect(given, is_declared, log):
             "given beside liquid.run_ppm; expected one of them: what is declared is not shown by"
             " the runs",
         )
-        filling.tell(log.problem, "expected_run_ppm", expected)
+        filling.report(log.problem, "expected_run_ppm", expected)
     if len(runs) > 1 and expected_ppm is None and not is_declared:
         expected = message(
             "plan_run_effect_missing",

@@ -10,7 +10,7 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.pipeline.liquid_alone import filled_range_m
 from tankcal.pipeline.liquid_body import join_body
-from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.entries import PLAN_FILE
 from tankcal.uncertainty import combine
 
 LEAST_SHARE = 0.01  # smallest relative reduction of the u of a cause that is listed

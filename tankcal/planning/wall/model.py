@@ -227,7 +227,7 @@ class WallPlan:
     obstacles : tuple of Box or Pillar
         Obstacles to lines of sight.
     folder : str
-    given : RawJob
+    raw : RawJob
         Content of the folder as read.
     warnings : tuple of Problem
     """
@@ -242,12 +242,12 @@ class WallPlan:
     holds: object = None
     obstacles: tuple = ()
     folder: str = ""
-    given: RawJob | None = None
+    raw: RawJob | None = None
     warnings: tuple = ()
 
     def with_instrument(self, name, values, of="instruments"):
-        """Return `given` with new values {key: value} of an instrument or meter."""
-        register = self.given.registers[of]
+        """Return `raw` with new values {key: value} of an instrument or meter."""
+        register = self.raw.registers[of]
         entry = register.entries[name] | {key: Value(value) for key, value in values.items()}
         register = replace(register, entries=register.entries | {name: entry})
-        return replace(self.given, registers=self.given.registers | {of: register})
+        return replace(self.raw, registers=self.raw.registers | {of: register})

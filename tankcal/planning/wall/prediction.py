@@ -21,14 +21,14 @@ from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
 from tankcal.pipeline.tangent_checks import judge_tangents
-from tankcal.planning.limits import OfTable, refuse_without_delivery
+from tankcal.planning.table import OfTable, refuse_without_delivery
 from tankcal.planning.wall.filling_outlook import (
     FillingOutlook,
     outlook_of_filling,
     refuse_other_dips,
 )
 from tankcal.planning.wall.model import WallPlan
-from tankcal.planning.wall.telling import told_of_plan
+from tankcal.planning.wall.reading import locate_in_plan
 from tankcal.quadrature import panels
 
 OF_READINGS = (  # warnings that need real readings or a drawing; not predicted
@@ -160,7 +160,7 @@ class WallPrediction(OfTable):
         problems = (
             *self.plan.warnings,
             *self.plan.job.warnings,
-            *told_of_plan(of_run, self.plan.design),
+            *locate_in_plan(of_run, self.plan.design),
         )
         return tuple(
             problem for problem in dict.fromkeys(problems) if _code(problem) not in OF_READINGS
@@ -187,7 +187,7 @@ def predict_wall(plan):
     try:
         tabled = foresee_table(plan.job, plan.amplitudes)
     except InputError as error:
-        raise InputError(told_of_plan(error.problems, plan.design)) from error
+        raise InputError(locate_in_plan(error.problems, plan.design)) from error
     tall = sum(course.height_m for course in plan.job.courses) or tabled.made.top_m
     refuse_without_delivery(plan, tabled, tall)
     refuse_other_dips(plan.dips_m, tabled.made)

@@ -8,10 +8,11 @@ from tankcal.job.building import job_of
 from tankcal.job.checking import zero_z
 from tankcal.job.checks.sized_volumes import volume_by_sizes
 from tankcal.job.checks.survey.stadia import is_bar
-from tankcal.job.tables import Log, Value
+from tankcal.job.tables import SETTINGS_FILE, Log, Value
+from tankcal.planning.contract import MEASURING
+from tankcal.planning.entries import PLAN_FILE
 from tankcal.planning.obstacles import obstacles_of
-from tankcal.planning.wall.checks import percents_of
-from tankcal.planning.wall.contract import MEASURING
+from tankcal.planning.wall.checks import percents_of, refuse_cut, warnings_of_obstacles
 from tankcal.planning.wall.filling import runs_of
 from tankcal.planning.wall.foreseen_tables import Foreseen
 from tankcal.planning.wall.model import (
@@ -24,10 +25,30 @@ from tankcal.planning.wall.model import (
     WallPlan,
 )
 from tankcal.planning.wall.nominal_readings import with_nominal_readings
-from tankcal.planning.wall.obstructed import refuse_cut, warnings_of_obstacles
-from tankcal.planning.wall.telling import told_of_plan
 
 USUAL_HEIGHT_M = 1.6  # default height of an instrument above the bottom
+SECTION_OF_TABLE = {  # tables that a design generates, and the section that messages name
+    "circumferences.csv": "straps",
+    "lines.csv": "lines",
+    "offsets.csv": "lines",
+    "wall_hits.csv": "hits",
+    "setups.csv": "hits",
+    "control.csv": "hits",
+    "control_readings.csv": "control_targets",
+    "directions.csv": "setup_ties",
+    "zenith_angles.csv": "setup_ties",
+    "slope_distances.csv": "setup_ties",
+    "tangents.csv": "tangents",
+    "liquid.csv": "runs",
+}
+SECTION_OF_TRAVERSE = {  # sections of tables if limbs are sighted from traverse stations
+    "setups.csv": "tangents",
+    "control.csv": "tangents",
+    "directions.csv": "traverse",
+    "zenith_angles.csv": "traverse",
+    "slope_distances.csv": "traverse",
+    "stadia.csv": "traverse",
+}
 
 
 def is_wall_plan(sections):
@@ -38,25 +59,25 @@ def is_wall_plan(sections):
     return any(name in sections for name in MEASURING)
 
 
-def design_of(given, courses, celsius=None):
+def design_of(plan_input, courses, celsius=None):
     """Return the `Design` of valid sections for the given courses.
 
     celsius: temperature of the table.
     """
     straps = (
         PlannedStrap(course, percent, entry["s_mm"], int(entry["readings"] or 1), _more(entry))
-        for entry in given.repeated["straps"]
+        for entry in plan_input.repeated["straps"]
         for course in entry["courses"] or courses
         for percent in percents_of(entry)
     )
     return Design(
         straps=tuple(straps),
-        lines=_lines(given.single["lines"]),
-        hits=tuple(_hits(entry, courses) for entry in given.repeated["hits"]),
-        ties=_ties(given.single["setup_ties"]),
-        control=_control(given.single["control_targets"]),
-        tangents=_tangents(given.single["tangents"], given.single["traverse"]),
-        runs=runs_of(given.repeated["runs"], celsius),
+        lines=_lines(plan_input.single["lines"]),
+        hits=tuple(_hits(entry, courses) for entry in plan_input.repeated["hits"]),
+        ties=_ties(plan_input.single["setup_ties"]),
+        control=_control(plan_input.single["control_targets"]),
+        tangents=_tangents(plan_input.single["tangents"], plan_input.single["traverse"]),
+        runs=runs_of(plan_input.repeated["runs"], celsius),
     )
 
 
@@ -130,7 +151,7 @@ def _bar(traverse):
     return None if sd is None else (traverse["bar"], sd)
 
 
-def wall_plan_of(raw, values, tables, given, limits, folder):
+def wall_plan_of(raw, values, tables, plan_input, limits, folder):
     """Return the WallPlan of valid sections; its job is read like any other job.
 
     Raises InputError. Problems of generated tables are reported for the sections that generate
@@ -141,56 +162,56 @@ def wall_plan_of(raw, values, tables, given, limits, folder):
     if table is not None:
         courses = tuple(zip(table.of("course"), table.of("height_m"), strict=True))
     celsius = values["table"]["reference_temperature_c"]
-    design = design_of(given, tuple(name for name, _ in courses), celsius)
-    wall, filling = given.single["wall"], given.single["filling"]
+    design = design_of(plan_input, tuple(name for name, _ in courses), celsius)
+    wall, filling = plan_input.single["wall"], plan_input.single["filling"]
     sizes = (
         None if wall[key] is None else wall[key] / 1000 for key in ("form_mm", "common_form_mm")
     )
     amplitudes = assumed_amplitudes(*sizes, smoothed=design.is_smoothed)
     bottom, diameter = values["datum"]["bottom_z_m"], values["tank"]["nominal_diameter_m"]
     zero = 0.0 if bottom is None else zero_z(values) - bottom
-    obstacles = () if bottom is None else obstacles_of(given)
+    obstacles = () if bottom is None else obstacles_of(plan_input)
     tank = (courses, diameter and diameter / 2, bottom, zero, holds, obstacles)
     warnings = ()
     if obstacles:
         foreseen = Foreseen(design, *tank, bars=lengths_of_bars(raw))
-        refuse_cut(foreseen, _rows_of(given))
-        warnings = warnings_of_obstacles(foreseen, _rows_of(given))
+        refuse_cut(foreseen, _rows_of(plan_input))
+        warnings = warnings_of_obstacles(foreseen, _rows_of(plan_input))
     ppm = filling["expected_run_ppm"]
     expected = None if ppm is None else ppm / 1e6
     return WallPlan(
-        job=job_of_design(raw, design, tank, (amplitudes, expected), _rows_of(given)),
+        job=job_of_design(raw, design, tank, (amplitudes, expected), _rows_of(plan_input)),
         design=design,
         limits=limits,
         amplitudes=amplitudes,
-        costs={key: value or 0.0 for key, value in given.single["costs"].values.items()},
+        costs={key: value or 0.0 for key, value in plan_input.single["costs"].values.items()},
         dips_m=tuple(sorted(set(filling["dips_m"] or ()))),
         expected_run=expected,
         holds=holds,
         obstacles=obstacles,
         folder=folder,
-        given=raw,
+        raw=raw,
         warnings=warnings,
     )
 
 
-def _rows_of(given):
+def _rows_of(plan_input):
     """Return {section: first row in plan.toml}."""
-    rows = {name: entry.row for name, entry in given.single.items()}
-    return rows | {name: entries[0].row for name, entries in given.repeated.items() if entries}
+    rows = {name: entry.row for name, entry in plan_input.single.items()}
+    return rows | {name: entries[0].row for name, entries in plan_input.repeated.items() if entries}
 
 
 def changed(plan, design=None, raw=None):
     """Return the WallPlan with another Design or other instruments."""
-    design, raw = design or plan.design, raw or plan.given
+    design, raw = design or plan.design, raw or plan.raw
     expected = plan.amplitudes, plan.expected_run
     job = job_of_design(raw, design, _tank_of(plan), expected)
-    return replace(plan, job=job, design=design, given=raw)
+    return replace(plan, job=job, design=design, raw=raw)
 
 
 def tables_of(plan):
     """Return {name: Table} of all readings; their values are not defined."""
-    bars = lengths_of_bars(plan.given)
+    bars = lengths_of_bars(plan.raw)
     return Foreseen(plan.design, *_tank_of(plan), bars=bars).tables()
 
 
@@ -240,9 +261,9 @@ def job_of_design(raw, design, tank, expected, rows=None):
     try:
         job = job_of(whole, Log())
     except InputError as error:
-        raise InputError(told_of_plan(error.problems, design, rows)) from error
+        raise InputError(locate_in_plan(error.problems, design, rows)) from error
     job = with_nominal_readings(job, *expected)
-    return replace(job, warnings=told_of_plan(job.warnings, design, rows))
+    return replace(job, warnings=locate_in_plan(job.warnings, design, rows))
 
 
 def datum_of(design):
@@ -250,3 +271,34 @@ def datum_of(design):
     if design.tangents is not None:
         return "minimal"
     return None if design.ties is None else "inner"
+
+
+def locate_in_plan(problems, design, rows=None):
+    """Return problems of generated tables as problems of the sections that generate them.
+
+    Parameters
+    ----------
+    problems : iterable of Problem
+    design : Design
+        Design that generated the tables.
+    rows : dict, optional
+        {section: row of plan.toml}.
+
+    Returns
+    -------
+    tuple of Problem
+        Without duplicates.
+    """
+    section_of = SECTION_OF_TABLE
+    if design.tangents is not None:
+        section_of = SECTION_OF_TABLE | SECTION_OF_TRAVERSE
+    located = []
+    for problem in problems:
+        if problem.file in section_of:
+            section = section_of[problem.file]
+            row = (rows or {}).get(section)
+            problem = replace(problem, file=PLAN_FILE, row=row, column=section, cell=None)
+        elif problem.file == SETTINGS_FILE:
+            problem = replace(problem, file=PLAN_FILE)
+        located.append(problem)
+    return tuple(dict.fromkeys(located))

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.planning.simulations import blunders_in_sds
+from tankcal.planning.measurements import draw_blunders
 from tankcal.survey.observations import KINDS
 
 UNKNOWN_OFFSET_M = 2e-3  # sd of the offset of an instrument without a prior
@@ -18,7 +18,7 @@ class Errors:
     """Errors of one simulated survey.
 
     rng is a numpy generator; blunders is the share of readings with an error of
-    `simulations.BLUNDER_SDS` standard deviations.
+    `measurements.BLUNDER_SDS` standard deviations.
     """
 
     def __init__(self, rng, blunders=0.0):
@@ -29,7 +29,7 @@ class Errors:
         sd = np.asarray(sd, dtype=float)
         errors = self._rng.standard_normal(sd.shape)
         if self._blunders:
-            errors += blunders_in_sds(self._rng, self._blunders, len(sd))
+            errors += draw_blunders(self._rng, self._blunders, len(sd))
         return errors * sd
 
     def of_cause(self, kind, name):

@@ -98,7 +98,7 @@ def simulate_walls(prediction: WallPrediction, runs=500, seed=1, blunders=0.0, p
     runs, seed : int, optional
         Number of surveys, and seed of their walls and errors.
     blunders : float, optional
-        Share of readings with an error of `simulations.BLUNDER_SDS` standard deviations.
+        Share of readings with an error of `measurements.BLUNDER_SDS` standard deviations.
     progress : callable, optional
         progress(text, done, total).
 

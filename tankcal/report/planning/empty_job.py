@@ -92,7 +92,7 @@ def form_of(prediction):
         plan,
         kind="vertical",
         survey=_kind_of_survey(plan),
-        settings=_settings_of(plan.given),
+        settings=_settings_of(plan.raw),
         copied=COPIED,
         tables=tables,
         more=tuple(name for name in COLUMNS if name in filled),
@@ -101,7 +101,7 @@ def form_of(prediction):
 
 def _form(plan, *, kind, survey, settings, copied, tables, more):
     """Return the FilledForm of a Plan or WallPlan with its settings, tables and registers."""
-    raw = plan.given
+    raw = plan.raw
     given = {name: rows_of_table(raw.tables[name]) for name in copied if name in raw.tables}
     return FilledForm(
         kind=kind,
@@ -240,7 +240,7 @@ def _sd_of_sight(table, setup):
 
 def form_of_wall(plan):
     """Return the FilledForm of a WallPlan: a row for each reading, without its value."""
-    design, settings = plan.design, _settings_of(plan.given)
+    design, settings = plan.design, _settings_of(plan.raw)
     datum = datum_of(design)
     if datum is not None:
         settings.setdefault("adjustment.datum", datum)

@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.planning.bases import by_ends
 from tankcal.planning.changes import cost_of
-from tankcal.planning.simulations import BLUNDER_SDS
+from tankcal.planning.measurements import BLUNDER_SDS
 from tankcal.report import blocks
 from tankcal.report.numbers import unit
 from tankcal.report.plain import Column

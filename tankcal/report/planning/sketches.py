@@ -14,8 +14,7 @@ from tankcal.pipeline.plot_style import (
     styled,
 )
 from tankcal.planning.model import TAPED
-from tankcal.planning.patterns import full_turn
-from tankcal.planning.places import joints_m, place_of, reference_rad
+from tankcal.planning.places import full_turn, joints_m, place_of, reference_rad
 from tankcal.report.planning.rows import lost_points
 
 GREEN, OCHRE = "#2e7d5b", "#b9770e"

@@ -175,7 +175,7 @@ def _columns_of_offsets(plan):
 
 def _instruments(plan):
     """Return a row for each instrument in use and each master of a tape, from instruments.toml."""
-    register = plan.given.registers.get("instruments")
+    register = plan.raw.registers.get("instruments")
     used, rows = instruments_read(plan.job), []
     for name, entry in {} if register is None else register.entries.items():
         values = {key: value.raw for key, value in entry.items()}
@@ -290,7 +290,7 @@ def _bases(plan):
     ring = plan.design.tangents
     if ring is None or ring.bar is None:
         return []
-    read, lengths = _readings_of_traverse(plan)["distances"], lengths_of_bars(plan.given)
+    read, lengths = _readings_of_traverse(plan)["distances"], lengths_of_bars(plan.raw)
     sights = zip(_traverse(plan), read.value, read.instrument, strict=True)
     return [
         {

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from tankcal.messages import message
+
 PLAN_FILE = "plan.toml"
 
 
@@ -41,13 +43,13 @@ class Entry:
         """Whether the value of a key is invalid; that problem has already been reported."""
         return key in self.filled and self.values[key] is None
 
-    def tell(self, to, key, expected):
+    def report(self, to, key, expected):
         """Report a problem of one key with log.problem or log.warning."""
         to(PLAN_FILE, expected, self.rows.get(key, self.row), f"{self.name}.{key}")
 
 
 @dataclass(frozen=True)
-class Given:
+class PlanInput:
     """The sections and tables of a plan.
 
     Attributes
@@ -72,3 +74,44 @@ class Given:
     stadia: object = None
     control: object = None
     is_wall: bool = False
+
+    def entries(self, section):
+        """Return the entries of a section, repeated or not, as a list."""
+        return self.repeated[section] if section in self.repeated else [self.single[section]]
+
+    def has(self, section):
+        """Whether a section has content."""
+        if section in self.repeated:
+            return bool(self.repeated[section])
+        return bool(self.single[section].filled)
+
+
+def no_such_name(found, file, hint=""):
+    """Return the message about a name that a file does not define."""
+    return message(
+        "plan_no_such_name",
+        "found {found!r}; expected a name of {file}{hint}",
+        found=found,
+        file=file,
+        hint=hint,
+    )
+
+
+def too_many_sections(count, most):
+    """Return the message about too many sections of one kind."""
+    return message(
+        "plan_many_sections", "{count} of them; expected at most {most}", count=count, most=most
+    )
+
+
+def check_form(section, log):
+    """Check that the common ovality of the shell does not exceed the ovality of a course."""
+    whole, common = section["form_mm"] or 0.0, section["common_form_mm"] or 0.0
+    if common > whole and not section.is_refused("form_mm"):
+        expected = message(
+            "plan_form_part",
+            "found {common:g}, which is a part of form_mm; expected at most {whole:g}",
+            common=common,
+            whole=whole,
+        )
+        section.report(log.problem, "common_form_mm", expected)
