@@ -13,11 +13,11 @@ from tankcal.job.measuring import ARCSEC
 from tankcal.planning.bases import bases_of
 from tankcal.planning.entries import PLAN_FILE
 from tankcal.planning.model import (
-    Instrumented,
-    Known,
+    ControlPoint,
     Limits,
     Photograph,
     Plan,
+    PlannedSetup,
     Shell,
     Targets,
     Tie,
@@ -49,16 +49,16 @@ def assemble_plan(job, plan_input, bars, folder):
     -------
     Plan
     """
-    pattern = plan_input.single["pattern"]
+    pattern = plan_input.sections["pattern"]
     shell = shell_of(job, pattern)
     targets = targets_of(pattern, shell, job.courses)
     settings = job.measurements.settings
     photos, setups, ties, extra, facing = [], [], [], {}, {}
-    for number, ring in enumerate(plan_input.repeated["photo_rings"], 1):
+    for number, ring in enumerate(plan_input.sections["photo_rings"], 1):
         photos += photographs_of(ring, number, shell, settings.image_sd_mm, ring.place)
-    for number, ring in enumerate(plan_input.repeated["setup_rings"], 1):
+    for number, ring in enumerate(plan_input.sections["setup_rings"], 1):
         setups += setups_of(ring, number, shell, ring.place)
-    for tape in plan_input.repeated["tapes"]:
+    for tape in plan_input.sections["tapes"]:
         tie, ends, out = tape_of(tape, shell)
         ties.append(tie)
         extra |= ends
@@ -85,7 +85,7 @@ def assemble_plan(job, plan_input, bars, folder):
         extra=extra,
         facing=facing,
         obstacles=obstacles_of(plan_input),
-        limits=limits_of(plan_input.single["limits"]),
+        limits=limits_of(plan_input.sections["limits"]),
         bases=bases_of(plan_input.stadia, bars),
         bars={
             name: bar["length_m"]
@@ -93,7 +93,7 @@ def assemble_plan(job, plan_input, bars, folder):
             if bar["length_m"] and bar["u_mm"] is not None
         },
         amplitudes=_amplitudes(pattern),
-        costs={key: value or 0.0 for key, value in plan_input.single["costs"].values.items()},
+        costs={key: value or 0.0 for key, value in plan_input.sections["costs"].values.items()},
         folder=folder,
     )
 
@@ -111,7 +111,7 @@ def shell_of(job, pattern):
         radius_m=job.tank.nominal_diameter_m / 2 + plate,
         low_m=low,
         high_m=low + sum(course.height_m for course in job.courses),
-        outside=outside,
+        is_outside=outside,
     )
 
 
@@ -120,8 +120,7 @@ def targets_of(pattern, shell, courses):
 
     Parameters
     ----------
-    plan_input : dict
-        {key: value}; None if blank.
+    pattern : Entry
     shell : Shell
     courses : sequence of Course
         Courses of the job.
@@ -142,8 +141,8 @@ def targets_of(pattern, shell, courses):
     azimuth = _clear_of_welds(azimuth, welds, clearance / shell.radius_m)
     offset = _value_or(pattern["offset_mm"], 0.0) / 1000
     row, line = (index.ravel() for index in np.indices((len(rows), n)))
-    side = 1.0 if shell.outside else -1.0
-    plates = np.array([plate_m(course, shell.outside) for course in courses])
+    side = 1.0 if shell.is_outside else -1.0
+    plates = np.array([plate_m(course, shell.is_outside) for course in courses])
     radius = shell.radius_m + (plates - plates[0])[course]
     out = np.zeros((len(row), 3))
     out[:, :2] = side * places_around((0.0, 0.0), azimuth[line], 1.0)
@@ -192,7 +191,7 @@ def ring_radius_m(ring, shell):
     """Distance of a ring's stations from the axis, m; `distance_m` is measured from the wall."""
     if ring["radius_m"] is not None:
         return ring["radius_m"]
-    return shell.radius_m + (ring["distance_m"] if shell.outside else -ring["distance_m"])
+    return shell.radius_m + (ring["distance_m"] if shell.is_outside else -ring["distance_m"])
 
 
 def photographs_of(ring, number, shell, image_sd_mm, place):
@@ -216,7 +215,7 @@ def photographs_of(ring, number, shell, image_sd_mm, place):
     sd = image_sd_mm if ring["s_um"] is None else ring["s_um"] / 1000
     height = _value_or(ring["aim_height_m"], (shell.high_m - shell.low_m) / 2)
     radius = ring_radius_m(ring, shell)
-    far = radius - shell.radius_m if shell.outside else radius + shell.radius_m
+    far = radius - shell.radius_m if shell.is_outside else radius + shell.radius_m
     for azimuth, xyz, i, level in _stands(ring, shell):
         station = f"R{number}-{i + 1}" + (f"-{level + 1}" if len(ring["heights_m"]) > 1 else "")
         tilt = np.arctan2(shell.low_m + height - xyz[2], max(far, 1e-9))
@@ -253,7 +252,7 @@ def setups_of(entry, number, shell, place):
     for at, (_, xyz, _, level) in enumerate(stands):
         ring = [name for name, stand in zip(names, stands, strict=True) if stand[3] == level]
         setups.append(
-            Instrumented(
+            PlannedSetup(
                 name=names[at],
                 instrument=entry["instrument"],
                 xyz_m=xyz,
@@ -294,9 +293,9 @@ def tape_of(tape, shell):
         Horizontal unit vector from the wall to the observer.
     """
     azimuth, length = np.radians(tape["azimuth_deg"]), tape["length_m"]
-    side = 1.0 if shell.outside else -1.0
+    side = 1.0 if shell.is_outside else -1.0
     radius = shell.radius_m + side * _value_or(tape["off_m"], 0.1)
-    if tape["kind"] == "horizontal" and not shell.outside:
+    if tape["kind"] == "horizontal" and not shell.is_outside:
         radius = np.sqrt(max(radius**2 - (length / 2) ** 2, 0.0))
     middle, low = places_around(shell.axis_m, azimuth, radius), shell.low_m + tape["low_m"]
     if tape["kind"] == "vertical":
@@ -343,7 +342,7 @@ def _known_points(control, places):
     sds = np.where(control.check[:, None], np.nan, control.sd_m)
     for name, xyz, sd in zip(control.point, control.xyz_m, sds, strict=True):
         nominal = places.get(name, np.full(3, np.nan))
-        known.append(Known(name, np.where(np.isnan(xyz), nominal, xyz), sd))
+        known.append(ControlPoint(name, np.where(np.isnan(xyz), nominal, xyz), sd))
     return known
 
 
@@ -353,7 +352,7 @@ def limits_of(section):
     return Limits(
         incidence_rad=float(np.radians(incidence)),
         relative_u=section["relative_u"],
-        of=section["of"] or "top",
+        quantity=section["of"] or "top",
         rays=int(section["rays"] or RAYS),
         place=(PLAN_FILE, section.rows.get("of", section.row), "limits.of"),
     )

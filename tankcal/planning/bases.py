@@ -78,7 +78,7 @@ def readings_of_bases(plan, point_names):
     )
 
 
-def by_ends(bases):
+def group_by_ends(bases):
     """Group `Base`s by their two ends, whichever end each is read from: {names of ends: bases}."""
     groups = {}
     for base in bases:

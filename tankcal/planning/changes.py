@@ -6,8 +6,8 @@ import numpy as np
 
 from tankcal.errors import TankcalError
 from tankcal.planning.assembly import tape_of
-from tankcal.planning.bases import by_ends, new_bases
-from tankcal.planning.model import Known, Plan
+from tankcal.planning.bases import group_by_ends, new_bases
+from tankcal.planning.model import ControlPoint, Plan
 from tankcal.planning.places import places_around, row_heights_m
 from tankcal.planning.wall.changes import WALL_ITEMS, wall_changes_of, wall_count
 from tankcal.planning.wall.model import WallPlan
@@ -100,7 +100,7 @@ def changes_of(plan, actions=("add", "drop", "repeat"), items=ITEMS):
         return tuple(_changes_of_wall(plan, actions, WALL_ITEMS if items is ITEMS else items))
     changes = []
     for item in items:
-        changes += [change for change in _OF[item](plan) if change[0] in actions]
+        changes += [change for change in _CHANGES_OF[item](plan) if change[0] in actions]
     before = cost_of(plan)
     return tuple(
         Change(action, item, name, after, cost_of(after) - before)
@@ -126,7 +126,7 @@ def _stations(plan):
         if kept_photos or plan.setups:
             yield "drop", "photo_station", station, replace(plan, photos=kept_photos)
     places = {photo.station: photo.xyz_m for photo in plan.photos}
-    for station, _, place in _between(plan, places):
+    for station, _, place in _halfway_positions(plan, places):
         first = next(photo for photo in plan.photos if photo.station == station)
         copied = [photo for photo in plan.photos if photo.station == station]
         name = f"{NEW}{station}"
@@ -136,7 +136,7 @@ def _stations(plan):
         added = tuple(
             replace(
                 copied_photo, name=f"{name}.{k + 1}", station=name, xyz_m=place,
-                rotation=copied_photo.rotation @ _about_z(turn).T,
+                rotation=copied_photo.rotation @ _rotation_about_z(turn).T,
             )
             for k, copied_photo in enumerate(copied)
         )  # fmt: skip
@@ -148,13 +148,13 @@ def _azimuth(plan, place):
     return np.arctan2(x, y)
 
 
-def _about_z(turn):
+def _rotation_about_z(turn):
     """Rotation matrix (3, 3) that turns positions clockwise as seen from above."""
     c, s = np.cos(turn), np.sin(turn)
     return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def _between(plan, places):
+def _halfway_positions(plan, places):
     """Yield (name, next name, position (3,)) half-way in azimuth between neighbours of one height.
 
     places: {name: position (3,)}.
@@ -191,7 +191,7 @@ def _setups(plan):
                 replace(plan, setups=kept_setups, ties=ties, bases=bases),
             )
     places = {setup.name: setup.xyz_m for setup in plan.setups}
-    for name, other, place in _between(plan, places):
+    for name, other, place in _halfway_positions(plan, places):
         template = next(setup for setup in plan.setups if setup.name == name)
         new = f"{NEW}{name}"
         if new in places:
@@ -207,7 +207,7 @@ def _setups(plan):
 
 def _tapes(plan):
     for tie in plan.ties:
-        yield "drop", "tape", tie.name, _without_tie(plan, tie)
+        yield "drop", "tape", tie.name, _drop_tie(plan, tie)
         again = replace(tie, readings=2 * tie.readings)
         ties = tuple(again if other_tie is tie else other_tie for other_tie in plan.ties)
         if again.readings <= MOST_READINGS:
@@ -215,7 +215,7 @@ def _tapes(plan):
     yield from _new_tapes(plan)
 
 
-def _without_tie(plan, tie):
+def _drop_tie(plan, tie):
     """Return the Plan without a tape, and without marks at its ends that no other item uses."""
     kept_ties = tuple(kept for kept in plan.ties if kept is not tie)
     needed = {control_point.name for control_point in plan.known}.union(
@@ -257,7 +257,7 @@ def _new_tapes(plan):
 
 def _bases(plan):
     """Yield changes of bases; the readings of a base from either end change together."""
-    for ends, group in by_ends(plan.bases).items():
+    for ends, group in group_by_ends(plan.bases).items():
         name = "-".join(ends)
         kept_bases = tuple(base for base in plan.bases if base not in group)
         yield "drop", "base", name, replace(plan, bases=kept_bases)
@@ -281,7 +281,7 @@ def _control(plan):
     for number in _spread_targets(plan, 8):
         name = plan.targets.names[number]
         if name not in names:
-            point = Known(name, plan.targets.xyz_m[number], np.full(3, sd))
+            point = ControlPoint(name, plan.targets.xyz_m[number], np.full(3, sd))
             yield "add", "control_point", name, replace(plan, known=(*plan.known, point))
 
 
@@ -298,15 +298,15 @@ def _rows(plan):
     """Yield changes of target rows: drop one unless it is the last of a course, or add one."""
     targets = plan.targets
     for course in dict.fromkeys(targets.course.tolist()):
-        after = _with_row(plan, course)
+        after = _add_row(plan, course)
         if after is not None:
             name = f"{OF_COURSE}{plan.job.courses[course].name}"
             yield "add", "target_row", name, after
     for name in dict.fromkeys(targets.section):
         in_row = np.array([section == name for section in targets.section])
-        rest = targets.taken(~in_row)
+        rest = targets.select(~in_row)
         if set(rest.course) == set(targets.course):
-            gone = set(targets.taken(in_row).names)
+            gone = set(targets.select(in_row).names)
             known = tuple(
                 control_point for control_point in plan.known if control_point.name not in gone
             )
@@ -315,7 +315,7 @@ def _rows(plan):
             yield "drop", "target_row", f"{ROW}{name}", after
 
 
-def _with_row(plan, course):
+def _add_row(plan, course):
     """Return the Plan with another row in a course, all rows at Gauss levels; None if too low."""
     targets = plan.targets
     in_course = targets.course == course
@@ -332,7 +332,7 @@ def _with_row(plan, course):
         xyz[row, 2] += below + level - height
         heights[row] = below + level
     moved = replace(targets, xyz_m=xyz, height_m=heights)
-    last = moved.taken([name == rows[-1][1] for name in moved.section])
+    last = moved.select([name == rows[-1][1] for name in moved.section])
     section, rise = f"{NEW}{len(set(targets.section)) + 1}", levels[-1] - levels[-2]
     added = replace(
         last,
@@ -346,7 +346,7 @@ def _with_row(plan, course):
         replace(control_point, xyz_m=places.get(control_point.name, control_point.xyz_m))
         for control_point in plan.known
     )
-    return replace(plan, targets=moved.followed_by(added), known=known)
+    return replace(plan, targets=moved.append(added), known=known)
 
 
 def _readings(plan):
@@ -358,7 +358,7 @@ def _readings(plan):
         yield "repeat", "reading", SETS, replace(plan, setups=setups)
 
 
-_OF = {
+_CHANGES_OF = {
     "photo_station": _stations,
     "setup": _setups,
     "tape": _tapes,

@@ -17,7 +17,7 @@ class Entry:
         Name used in messages: "pattern", "tapes[2]".
     values : dict
         {key: value}; None if blank or invalid.
-    filled : frozenset of str
+    filled_keys : frozenset of str
         Keys that are not blank, valid or not.
     row : int or None
         First row of the section.
@@ -27,7 +27,7 @@ class Entry:
 
     name: str
     values: dict
-    filled: frozenset
+    filled_keys: frozenset
     row: int | None
     rows: dict
 
@@ -41,7 +41,7 @@ class Entry:
 
     def is_refused(self, key):
         """Whether the value of a key is invalid; that problem has already been reported."""
-        return key in self.filled and self.values[key] is None
+        return key in self.filled_keys and self.values[key] is None
 
     def report(self, to, key, expected):
         """Report a problem of one key with log.problem or log.warning."""
@@ -54,10 +54,8 @@ class PlanInput:
 
     Attributes
     ----------
-    single : dict
-        {section: Entry} of each [section].
-    repeated : dict
-        {section: [Entry]} of each [[section]].
+    sections : dict
+        {section: Entry} of each [section], and {section: [Entry]} of each [[section]].
     ties : dict
         {name: ColumnValues or None} of tapes, levels and plumb lines.
     stadia : ColumnValues or None
@@ -68,22 +66,21 @@ class PlanInput:
         Whether the bare wall is measured instead of targets.
     """
 
-    single: dict
-    repeated: dict
+    sections: dict
     ties: dict
     stadia: object = None
     control: object = None
     is_wall: bool = False
 
     def entries(self, section):
-        """Return the entries of a section, repeated or not, as a list."""
-        return self.repeated[section] if section in self.repeated else [self.single[section]]
+        """Return the entries of a [section] or [[section]] as a list."""
+        content = self.sections[section]
+        return content if isinstance(content, list) else [content]
 
     def has(self, section):
-        """Whether a section has content."""
-        if section in self.repeated:
-            return bool(self.repeated[section])
-        return bool(self.single[section].filled)
+        """Whether a section is in the plan; an empty [section] is not."""
+        content = self.sections[section]
+        return bool(content if isinstance(content, list) else content.filled_keys)
 
 
 def no_such_name(found, file, hint=""):

@@ -37,15 +37,15 @@ def check_input(values, registers, plan_input, raw, log):
         ("tapes", "instrument", "instruments"),
     ):
         known = registers[register]
-        for entry in plan_input.repeated[section]:
+        for entry in plan_input.sections[section]:
             if entry[key] is not None and entry[key] not in known:
                 hint = nearest(entry[key], known)
                 entry.report(log.problem, key, no_such_name(entry[key], f"{register}.toml", hint))
     _check_kinds(registers["instruments"], plan_input, log)
-    _check_pattern(plan_input.single["pattern"], log)
+    _check_pattern(plan_input.sections["pattern"], log)
     for section in ("photo_rings", "setup_rings"):
-        for ring in plan_input.repeated[section]:
-            if len(ring.filled & {"distance_m", "radius_m"}) != 1:
+        for ring in plan_input.sections[section]:
+            if len(ring.filled_keys & {"distance_m", "radius_m"}) != 1:
                 expected = message(
                     "plan_one_radius",
                     "expected one of distance_m (from the wall) and radius_m (from the axis)",
@@ -61,7 +61,7 @@ def check_input(values, registers, plan_input, raw, log):
 def _check_kinds(instruments, plan_input, log):
     """Check that set-ups use total stations and tapes use tapes."""
     for section, unfit in UNFIT.items():
-        for entry in plan_input.repeated[section]:
+        for entry in plan_input.sections[section]:
             kind = (instruments.get(entry["instrument"]) or {}).get("kind")
             if kind in unfit:
                 fit = message("plan_total_station", "a total station or a theodolite")
@@ -90,7 +90,7 @@ def _check_pattern(pattern, log):
             advised=ADVISED_POINTS,
         )
         pattern.report(log.problem, "generatrices", expected)
-    if {"levels", "heights_m"} <= pattern.filled:
+    if {"levels", "heights_m"} <= pattern.filled_keys:
         expected = message(
             "plan_levels_or_heights", "given together with heights_m; expected one of the two"
         )
@@ -100,7 +100,7 @@ def _check_pattern(pattern, log):
 
 def _check_tapes(plan_input, log):
     seen = set()
-    for entry in plan_input.repeated["tapes"]:
+    for entry in plan_input.sections["tapes"]:
         if entry["name"] in seen:
             entry.report(
                 log.problem,
@@ -143,8 +143,8 @@ def _check_tables(plan_input, log):
 def _check_accuracies(values, plan_input, raw, log):
     """Check that each ring states its precision, and that not all readings are exact."""
     has_common = values is None or not is_not_given(raw, "adjustment", "image_sd_um")
-    for entry in plan_input.repeated["photo_rings"]:
-        if "s_um" not in entry.filled and not has_common:
+    for entry in plan_input.sections["photo_rings"]:
+        if "s_um" not in entry.filled_keys and not has_common:
             expected = message(
                 "plan_image_sd_missing", "missing; expected s_um here, or adjustment.image_sd_um"
             )
@@ -156,8 +156,8 @@ def _check_accuracies(values, plan_input, raw, log):
             )
             entry.report(log.problem, "s_um", expected)
     keys = ("s_direction_arcsec", "s_zenith_arcsec", "s_mm")
-    for ring in plan_input.repeated["setup_rings"]:
-        if not ring.filled & {*keys}:
+    for ring in plan_input.sections["setup_rings"]:
+        if not ring.filled_keys & {*keys}:
             expected = message(
                 "plan_measures_nothing",
                 "measures nothing; expected at least one of {keys}",
@@ -170,7 +170,7 @@ def _check_accuracies(values, plan_input, raw, log):
                 "an accuracy of zero for everything: expected standard deviations above 0",
             )
             log.problem(PLAN_FILE, expected, ring.row, ring.name)
-        if "s_mm" in ring.filled and "s_zenith_arcsec" not in ring.filled:
+        if "s_mm" in ring.filled_keys and "s_zenith_arcsec" not in ring.filled_keys:
             expected = message(
                 "plan_zenith_missing",
                 "missing; expected zenith angles together with slope distances (s_mm)",
@@ -184,7 +184,7 @@ def _warn_of_units(plan_input, raw, values, log):
     if common and common < TINY["um"]:
         tell(log.warning, raw, "adjustment", "image_sd_um", tiny_sd("um", common))
     for section, units in UNITS_OF_SDS.items():
-        for entry in plan_input.repeated[section]:
+        for entry in plan_input.sections[section]:
             for key, unit in units.items():
                 if entry[key] and entry[key] < TINY[unit]:
                     entry.report(log.warning, key, tiny_sd(unit, entry[key]))
@@ -193,7 +193,7 @@ def _warn_of_units(plan_input, raw, values, log):
         sds = np.empty(0) if table is None else table.numbers(f"s_{unit}")
         if (sds > 0).any() and sds[sds > 0].max() < TINY[unit]:
             log.warning(table.file, tiny_sd(unit, sds[sds > 0].max()), None, f"s_{unit}")
-    limit = plan_input.single["limits"]
+    limit = plan_input.sections["limits"]
     if (limit["relative_u"] or 0.0) > LOOSE:
         text = message(
             "plan_limit_loose",

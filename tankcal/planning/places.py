@@ -52,7 +52,7 @@ def place_of(plan, xyz_m):
     off = np.hypot(east, north) - wall_radius_m(plan, xyz_m[2] - shell.low_m)
     arc = full_turn(azimuth - reference_rad(plan)) * shell.radius_m
     height = float(xyz_m[2] - shell.low_m)
-    return Place(float(arc), float(azimuth), float(off if shell.outside else -off), height)
+    return Place(float(arc), float(azimuth), float(off if shell.is_outside else -off), height)
 
 
 def reference_rad(plan):
@@ -75,7 +75,7 @@ def reference_rad(plan):
 
 def wall_radius_m(plan, height_m):
     """Radius of the wall on the side of the survey, m, at a height above the bottom."""
-    courses, outside = plan.job.courses, plan.shell.outside
+    courses, outside = plan.job.courses, plan.shell.is_outside
     course = courses[np.searchsorted(joints_m(plan)[1:-1], height_m, side="right")]
     return plan.shell.radius_m + plate_m(course, outside) - plate_m(courses[0], outside)
 

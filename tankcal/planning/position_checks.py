@@ -10,7 +10,12 @@ from tankcal.messages import join_with_and, list_some, message
 from tankcal.planning.bases import STADIA_FILE, base_m
 from tankcal.planning.entries import PLAN_FILE
 from tankcal.planning.model import Box, Pillar
-from tankcal.planning.obstacles import find_hidden, in_an_obstacle, line_cut, misplaced
+from tankcal.planning.obstacles import (
+    find_hidden,
+    message_of_cut_line,
+    message_of_misplaced_station,
+    message_of_obstacle_at,
+)
 from tankcal.planning.places import TOUCH_M, joints_m, plate_m
 from tankcal.planning.visibility import GRAZE_M, find_in_sight
 from tankcal.survey.stadia import distance_of_angle_m
@@ -33,7 +38,7 @@ def check_positions(plan, plan_input, raw, log):
             message("plan_no_station", "no station; expected [[photo_rings]] or [[setup_rings]]"),
         )
         return
-    pattern = plan_input.single["pattern"]
+    pattern = plan_input.sections["pattern"]
     _check_targets(plan, pattern, log)
     _check_stations(plan, (*plan.photos, *plan.setups), log)
     _check_fixed_photo(plan, raw, log)
@@ -96,11 +101,11 @@ def _check_stations(plan, stands, log):
     """
     reported = set()
     for stand in stands:
-        why = _misplaced(plan, stand.xyz_m)
+        why = _explain_misplacement(plan, stand.xyz_m)
         if why and stand.place not in reported:
             reported.add(stand.place)
             file, row, name = stand.place
-            log.problem(file, misplaced(_station(stand), why), row, name)
+            log.problem(file, message_of_misplaced_station(_station(stand), why), row, name)
 
 
 def _station(stand):
@@ -108,7 +113,7 @@ def _station(stand):
     return getattr(stand, "station", stand.name)
 
 
-def _misplaced(plan, xyz):
+def _explain_misplacement(plan, xyz):
     shell = plan.shell
     away = np.hypot(*(xyz[:2] - shell.axis_m))
     level = shell.low_m <= xyz[2] <= shell.high_m
@@ -121,7 +126,7 @@ def _misplaced(plan, xyz):
             radius=shell.radius_m,
             near=NEAR_M,
         )
-    if shell.outside and away < shell.radius_m and level:
+    if shell.is_outside and away < shell.radius_m and level:
         return message(
             "plan_in_the_tank",
             "stands inside the tank, {away:.3f} m from its axis (radius {radius:.3f} "
@@ -129,7 +134,7 @@ def _misplaced(plan, xyz):
             away=away,
             radius=shell.radius_m,
         )
-    if shell.outside and away < shell.radius_m and xyz[2] < shell.low_m:
+    if shell.is_outside and away < shell.radius_m and xyz[2] < shell.low_m:
         return message(
             "plan_under_the_floor",
             "stands under the floor of the tank, {away:.3f} m from its axis, z = "
@@ -137,7 +142,7 @@ def _misplaced(plan, xyz):
             away=away,
             z=xyz[2],
         )
-    if not shell.outside and (away > shell.radius_m or not level):
+    if not shell.is_outside and (away > shell.radius_m or not level):
         return message(
             "plan_outside_the_tank",
             "stands outside the tank, {away:.3f} m from its axis (radius {radius:.3f} m), z = "
@@ -146,7 +151,7 @@ def _misplaced(plan, xyz):
             radius=shell.radius_m,
             z=xyz[2],
         )
-    return in_an_obstacle(plan.obstacles, xyz)
+    return message_of_obstacle_at(plan.obstacles, xyz)
 
 
 # ---- targets: within the shell, apart from each other and from welds
@@ -177,7 +182,7 @@ def _check_lines(plan, pattern, log):
     targets, radius = plan.targets, plan.shell.radius_m
     first = [name == targets.section[0] for name in targets.section]
     names = [name for name, is_first in zip(targets.generatrix, first, strict=True) if is_first]
-    east, north, _ = targets.outwards[first].T * (1.0 if plan.shell.outside else -1.0)
+    east, north, _ = targets.outwards[first].T * (1.0 if plan.shell.is_outside else -1.0)
     azimuth = np.arctan2(east, north)
     order = np.argsort(azimuth)
     gap = np.diff(azimuth[order], append=azimuth[order[0]] + 2 * np.pi) * radius
@@ -194,7 +199,7 @@ def _check_lines(plan, pattern, log):
             "lines {names} come nearer than {touch_mm:g} mm to one another when they are "
             "kept {clearance:g} mm from welds; expected fewer generatrices, another "
             "first_azimuth_deg or a smaller weld_clearance_mm",
-            names=_first(touching),
+            names=_list_first(touching),
             touch_mm=1000 * TOUCH_M,
             clearance=clearance,
         )
@@ -203,7 +208,7 @@ def _check_lines(plan, pattern, log):
     off = np.abs(np.angle(np.exp(1j * (azimuth[:, None] - welds)))) * radius
     close = (off < targets.clearance_m - ROUNDING_M).any(axis=1)
     if close.any():
-        near = _first([names[i] for i in np.flatnonzero(close)])
+        near = _list_first([names[i] for i in np.flatnonzero(close)])
         expected = message(
             "plan_lines_on_weld",
             "lines {names} are as near as {off_mm:.0f} mm to a weld, moved away from another one; "
@@ -222,7 +227,7 @@ def _check_rows(plan, pattern, log):
     rows = np.sort(pattern["heights_m"])
     touching = np.flatnonzero(np.diff(rows) < TOUCH_M)
     if len(touching):
-        pairs = _first(
+        pairs = _list_first(
             [
                 message("plan_two_rows", "{low:g} and {high:g} m", low=rows[i], high=rows[i + 1])
                 for i in touching
@@ -250,7 +255,7 @@ def _check_rows(plan, pattern, log):
         pattern.report(log.warning, "heights_m", text)
 
 
-def _first(names):
+def _list_first(names):
     """Return the first names of a sequence and the number of the remaining names."""
     return message("plan_first", "{names}", names=list_some(names, SHOWN))
 
@@ -289,18 +294,18 @@ def _rows(plan, table):
 
 def _check_distances(plan, plan_input, log):
     for row, ends, xyz in _rows(plan, plan_input.ties["distances"]):
-        if why := _through(plan, ends, xyz):
+        if why := _explain_barred_tape(plan, ends, xyz):
             log.problem("distances.csv", why, row, "to")
-    for entry in plan_input.repeated["tapes"]:
+    for entry in plan_input.sections["tapes"]:
         ends = [f"{entry['name']}{end}" for end in "ab"]
-        if why := _through(plan, ends, np.array([plan.extra[name] for name in ends])):
+        if why := _explain_barred_tape(plan, ends, np.array([plan.extra[name] for name in ends])):
             entry.report(log.problem, "length_m", why)
 
 
-def _through(plan, ends, xyz):
+def _explain_barred_tape(plan, ends, xyz):
     """Return the reason why no tape can connect two positions (2, 3); "" if it can."""
     shell, (start, end) = plan.shell, ends
-    if shell.outside:
+    if shell.is_outside:
         plates = [plate_m(course, True) for course in plan.job.courses]
         radius = shell.radius_m + min(plates) - plates[0] - THINNER_M
         tank = Pillar(shell.axis_m, radius, shell.low_m, shell.high_m, "tank")
@@ -390,14 +395,14 @@ def _check_bases(plan, plan_input, log):
         for column, name, known in (("setup", base.setup, setups), ("to", base.to, stations)):
             if name not in known:
                 is_sound = False
-                log.problem(STADIA_FILE, _no_such(column, name, known), base.row, column)
+                log.problem(STADIA_FILE, _unknown_station(column, name, known), base.row, column)
         if base.setup == base.to:
             refuse_itself(log, plan_input.stadia, base.row, base.to)
-        elif is_sound and (why := _out_of_reach(plan, base)):
+        elif is_sound and (why := _explain_unreadable_bar(plan, base)):
             log.problem(STADIA_FILE, why, base.row, "to")
 
 
-def _no_such(column, name, known):
+def _unknown_station(column, name, known):
     hint = nearest(name, known)
     if column == "setup":
         return message(
@@ -414,7 +419,7 @@ def _no_such(column, name, known):
     )
 
 
-def _out_of_reach(plan, base):
+def _explain_unreadable_bar(plan, base):
     """Return the reason why the bar of a Base cannot be read; "" if it can."""
     length, distance = plan.bars[base.bar], base_m(plan, base)
     least, most = distance_of_angle_m(np.array([WIDEST_RAD, NARROWEST_RAD]), length)
@@ -430,11 +435,11 @@ def _out_of_reach(plan, base):
         )
     here, there = plan.points[base.setup], plan.points[base.to]
     if not find_in_sight(plan, here, there[None], np.full((1, 3), np.nan))[0]:
-        return line_cut(base.setup, base.to)
+        return message_of_cut_line(base.setup, base.to)
     ends = _ends(here, there, length)
     off = np.hypot(*(ends - plan.shell.axis_m).T) - plan.shell.radius_m
     is_level = plan.shell.low_m <= there[2] <= plan.shell.high_m
-    if is_level and (off < GRAZE_M if plan.shell.outside else off > -GRAZE_M).any():
+    if is_level and (off < GRAZE_M if plan.shell.is_outside else off > -GRAZE_M).any():
         return message(
             "plan_bar_in_wall",
             "the bar over {other}, square to the sight from {one}, would reach through the wall;"
@@ -475,8 +480,8 @@ def _warn_of_places(plan, plan_input, log):
             top_m=float(shell.high_m),
             obstacles=list_some(far, SHOWN),
         )
-        log.warning(PLAN_FILE, text, plan_input.repeated["obstacles"][0].row, "obstacles")
-    for entry in plan_input.repeated["tapes"]:
+        log.warning(PLAN_FILE, text, plan_input.sections["obstacles"][0].row, "obstacles")
+    for entry in plan_input.sections["tapes"]:
         _warn_of_tape(plan, entry, log)
 
 

@@ -94,7 +94,7 @@ def load_plan(path):
     plan_input = replace(plan_input, control=tables["control"])
     if plan_input.is_wall:
         return _wall_plan(raw, values, tables, plan_input, folder, log)
-    _check(raw, values, tables | _measured(plan_input), registers, plan_input, log)
+    _check(raw, values, tables | _tables_of_measurements(plan_input), registers, plan_input, log)
     log.stop_if_problems()
     job = _job(raw, values, tables, registers, log)
     log.stop_if_problems()
@@ -114,7 +114,7 @@ def _wall_plan(raw, values, tables, plan_input, folder, log):
     raw = _with_points(raw)
     check_tank(values, tables, raw, log)
     log.stop_if_problems()
-    limits = limits_of(plan_input.single["limits"])
+    limits = limits_of(plan_input.sections["limits"])
     name = folder.resolve().name
     plan = wall_plan_of(raw, values, tables, plan_input, limits, name)
     return replace(plan, warnings=(*warnings, *plan.warnings))
@@ -125,7 +125,7 @@ def _check_kind(raw, plan_input, log):
     kind = kind_of(raw)
     if kind in (None, "vertical"):
         return
-    is_filled = bool(plan_input.repeated["runs"])
+    is_filled = bool(plan_input.sections["runs"])
     others = [name for name in WALL_SECTIONS if plan_input.has(name)]
     if is_filled and not others and kind in OF_LIQUID:
         return
@@ -149,7 +149,7 @@ def _with_points(raw):
     """Return the RawJob with decimal points in its tables and no declared marks."""
     settings = {name: entries for name, entries in raw.settings.items() if name != "csv"}
     tables = {
-        name: replace(table, decimal=".", rows=tuple(map(_in_points, table.rows)))
+        name: replace(table, decimal=".", rows=tuple(map(_row_with_points, table.rows)))
         if table is not None and table.decimal is not None
         else table
         for name, table in raw.tables.items()
@@ -157,7 +157,7 @@ def _with_points(raw):
     return replace(raw, settings=settings, tables=tables)
 
 
-def _in_points(row):
+def _row_with_points(row):
     """Return a row of cells with decimal points."""
     numbers = ((cell or "").strip().replace(",", ".") for cell in row)
     return tuple(
@@ -201,17 +201,17 @@ def _read(folder, log):
     log.stop_if_problems()
     text, (whole, rows) = decode(PLAN_FILE, data, log), parsed
     rows, text = _refuse_misspelt(whole, rows, text, log)
-    own_sections = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
-    _refuse_nothing_measured(own_sections, log)
+    plan_sections = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
+    _refuse_nothing_measured(plan_sections, log)
     settings, sections = flattened(PLAN_FILE, whole, rows, log)
-    needed = () if is_wall_plan(own_sections) else ("pattern",)
-    single = {
-        name: _single(name, own_sections.get(name, {}), rows, log, name in needed)
+    needed = () if is_wall_plan(plan_sections) else ("pattern",)
+    checked = {
+        name: _single(name, plan_sections.get(name, {}), rows, log, name in needed)
         for name in SINGLE
     }
-    repeated = {name: _repeated(name, own_sections.get(name, []), text, log) for name in REPEATED}
+    checked |= {name: _repeated(name, plan_sections.get(name, []), text, log) for name in REPEATED}
     marks = declared_marks(PLAN_FILE, settings, log)
-    is_wall = is_wall_plan(own_sections)
+    is_wall = is_wall_plan(plan_sections)
     beside = tuple(table_name for table_name in JOB_TABLES if table_name != "control") + WALL_TABLES
     tables, known = (
         {},
@@ -242,7 +242,7 @@ def _read(folder, log):
         files=tuple(files), registers=registers, is_planned=True,
     )  # fmt: skip
     ties = {name: _table(name, tables.get(name), log) for name in TABLES}
-    return raw, PlanInput(single, repeated, ties, ties.pop("stadia"), is_wall=is_wall)
+    return raw, PlanInput(checked, ties, ties.pop("stadia"), is_wall=is_wall)
 
 
 def _refuse_misspelt(content, rows, text, log):
@@ -407,7 +407,7 @@ def _job_tables(raw, log):
     return tables
 
 
-def _measured(plan_input):
+def _tables_of_measurements(plan_input):
     """Return the tables of the plan, and a placeholder for image points."""
     return plan_input.ties | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
 

@@ -23,7 +23,7 @@ SIMULATING = message("plan_simulating", "simulating surveys")
 
 
 @dataclass(frozen=True)
-class Simulated:
+class SimulatedSurveys:
     """Results of many simulated surveys of a plan.
 
     Attributes
@@ -100,29 +100,27 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
         If fewer than two surveys have a solution.
     """
     rng, failed = np.random.default_rng(seed), []
-    found, volumes, aside = [], [], []
+    adjusted, volumes, aside = [], [], []
     for run in range(1, runs + 1):
         if progress:
             progress(SIMULATING, run, runs)
-        drawn = draw_measurements(
-            prediction.plan, prediction.measurements, prediction.predicted, rng
-        )
+        drawn = draw_measurements(prediction.plan, prediction.measurements, prediction.network, rng)
         try:
             adjustment, volume = _adjust_drawn(prediction.plan, _add_blunders(drawn, blunders, rng))
         except TankcalError as error:
             failed.append(error.texts[0])
             continue
-        found.append(dict(zip(adjustment.names, adjustment.xyz_m, strict=True)))
+        adjusted.append(dict(zip(adjustment.names, adjustment.xyz_m, strict=True)))
         volumes.append(volume)
         aside.append(len(adjustment.removed))
     refuse_failed(failed, runs)
-    names = tuple(name for name in found[0] if all(name in result for result in found))
-    xyz = np.array([[result[name] for name in names] for result in found])
+    names = tuple(name for name in adjusted[0] if all(name in result for result in adjusted))
+    xyz = np.array([[result[name] for name in names] for result in adjusted])
     sds = {point.name: point.sd_m for point in prediction.points}
-    return Simulated(
+    return SimulatedSurveys(
         seed=seed,
         blunders=blunders,
-        runs=len(found),
+        runs=len(adjusted),
         failed=tuple(failed),
         names=names,
         scatter_m=xyz.std(axis=0, ddof=1),

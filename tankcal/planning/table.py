@@ -71,20 +71,20 @@ class PredictedCovariance:
         # The trace of C determines s2 of A = C D - D (D'C D + s2 I) / 2.
         return s_transform_factors(self._basis, self._in_frame(self._basis), trace)
 
-    def among(self, column):
+    def remove_common_motions(self, column):
         """Effects (3n,) of one cause on the points, without the common motions."""
         return column - self._basis @ (self._basis.T @ column)
 
     def diagonal(self):
         """Variances, shape (3n,)."""
-        return self.of_each_point().diagonal()
+        return self.block_diagonal().diagonal()
 
-    def written_out(self):
+    def dense(self):
         """Dense covariance (3n, 3n); for few points only."""
         cross = self._basis @ self._across.T  # D A'
         return self.adjusted.covariance_m2(self.points) - cross - cross.T
 
-    def of_each_point(self):
+    def block_diagonal(self):
         """Sparse matrix (3n, 3n) of the covariance blocks of single points, no correlations."""
         n = len(self.points)
         basis, across = (part.reshape(n, 3, 4) for part in (self._basis, self._across))
@@ -103,27 +103,29 @@ class PredictedTable:
 
     job: Job
     wall: Wall
-    made: ComputedTable
+    computed_table: ComputedTable
     covariance: PredictedCovariance
 
     @cached_property
     def stated(self):
         """Budgets and worst deliveries (`statements.Statements`)."""
-        return statements(self.job, self.made.table, self.made.straightness.largest_m3)
+        return statements(
+            self.job, self.computed_table.table, self.computed_table.straightness.largest_m3
+        )
 
     @property
     def by_points_m2(self):
         """Derivative (3n,) of the full tank's volume by coordinates of the accepted points."""
-        return volume_by_points(self.job, self.wall, [self.made.body.highest_m])[0]
+        return volume_by_points(self.job, self.wall, [self.computed_table.body.highest_m])[0]
 
 
-def predicted_table(plan, predicted):
+def predict_table(plan, network):
     """Return the PredictedTable of a Plan and its surveys.Predicted.
 
     Raises SolutionError if the vertical or the scale is not determined, and InputError if a section
     or course keeps too few targets.
     """
-    targets, covariance = _covered(plan, predicted)
+    targets, covariance = _find_determined(plan, network)
     job = replace(plan.job, points=_points(plan, targets, covariance), measurements=None)
     wall = find_wall(job, lambda text: None, amplitudes=plan.amplitudes)
     if len(wall.accepted) < len(targets):
@@ -132,13 +134,13 @@ def predicted_table(plan, predicted):
     return PredictedTable(job, wall, compute_table(job, wall), covariance)
 
 
-def recompute_table(plan, predicted, before):
+def recompute_table(plan, network, before):
     """Return the PredictedTable of a Plan with the wall of another plan; None if the walls differ.
 
     `before` is the PredictedTable of a plan with the same targets and tank. Outlines keep their
     weights; uncertainties are propagated with the new covariance.
     """
-    targets, covariance = _covered(plan, predicted)
+    targets, covariance = _find_determined(plan, network)
     known = before.job.points
     names = tuple(plan.targets.names[i] for i in targets)
     if names != known.names or len(before.wall.accepted) < len(names):
@@ -149,10 +151,10 @@ def recompute_table(plan, predicted, before):
     return PredictedTable(job, wall, compute_table(job, wall), covariance)
 
 
-def _covered(plan, predicted):
+def _find_determined(plan, network):
     """Return the indices of the determined targets, and their PredictedCovariance."""
-    refuse_undetermined(predicted.frame.report)
-    adjusted = predicted.adjusted
+    refuse_undetermined(network.frame.report)
+    adjusted = network.adjusted
     place = {name: i for i, name in enumerate(adjusted.survey.points)}
     indices = [i for i, name in enumerate(plan.targets.names) if name in place]
     indices = [i for i in indices if not adjusted.problem.set_aside[place[plan.targets.names[i]]]]
@@ -167,7 +169,10 @@ def _covered(plan, predicted):
 def _causes(covariance):
     """Return the common causes of error of the wall points, without their common motions."""
     causes = causes_of(covariance.adjusted, covariance.points, 1.0)
-    return tuple(replace(cause, column_m=covariance.among(cause.column_m)) for cause in causes)
+    return tuple(
+        replace(cause, column_m=covariance.remove_common_motions(cause.column_m))
+        for cause in causes
+    )
 
 
 def _points(plan, indices, covariance):
@@ -179,8 +184,8 @@ def _points(plan, indices, covariance):
     targets, adjusted = plan.targets, covariance.adjusted
     section = tuple(targets.section[i] for i in indices)
     is_small = len(indices) <= MANY
-    written = covariance.written_out() if is_small else covariance.of_each_point()
-    outwards = targets.offset_m * (1.0 if plan.shell.outside else -1.0)
+    written = covariance.dense() if is_small else covariance.block_diagonal()
+    outwards = targets.offset_m * (1.0 if plan.shell.is_outside else -1.0)
     return Points(
         names=tuple(targets.names[i] for i in indices),
         xyz_m=move_to_wall(adjusted.xyz_m[covariance.points], np.full(len(indices), outwards)),
@@ -197,26 +202,26 @@ def _points(plan, indices, covariance):
 # ---- the limit of a plan
 
 
-def limited_u(tabled, limits):
+def relative_u_of(result, limits):
     """U over volume of the full tank, or of the worst delivery of the smallest minimum."""
-    if limits.of == "delivery":
-        return float(tabled.stated.worst[0].relative.relative)
-    table = tabled.made.table
+    if limits.quantity == "delivery":
+        return float(result.stated.worst[0].relative.relative)
+    table = result.computed_table.table
     return float(table.U_m3[-1] / table.volume_m3[-1])
 
 
-class OfTable:
+class TableResults:
     """Mixin: properties of a prediction from its table (`tabled`) and its plan (`plan`)."""
 
     @property
     def table(self):
         """Capacity table with U of every row (`capacity.Capacity`)."""
-        return self.tabled.made.table
+        return self.result.computed_table.table
 
     @property
     def relative_u(self):
         """U over volume of the limited quantity: the full tank or the worst delivery."""
-        return limited_u(self.tabled, self.plan.limits)
+        return relative_u_of(self.result, self.plan.limits)
 
     @property
     def meets(self):
@@ -225,12 +230,12 @@ class OfTable:
         return None if limit is None else bool(self.relative_u <= limit)
 
 
-def refuse_without_delivery(plan, tabled, tall):
+def refuse_without_delivery(plan, result, tall):
     """Raise InputError if the limit is for deliveries and no delivery of the table is long enough.
 
     tall: height of the shell, m.
     """
-    if plan.limits.of == "delivery" and not tabled.stated.worst:
+    if plan.limits.quantity == "delivery" and not result.stated.worst:
         least = min(plan.job.table.minimum_delivery_m or MINIMA_M)
         file, row, name = plan.limits.place
         expected = message(

@@ -49,17 +49,17 @@ class Visibility:
 
         Exposures from one position are one ray.
         """
-        return self.from_places.sum(axis=0) + self.on_setup.sum(axis=0)
+        return self.photo_views.sum(axis=0) + self.on_setup.sum(axis=0)
 
     @property
-    def from_places(self):
+    def photo_views(self):
         """Mask (positions, points): whether a photograph from the position shows the point."""
         mask = np.zeros((len(set(self.place.tolist())), len(self.points)), dtype=bool)
         np.logical_or.at(mask, self.place, self.on_photo)
         return mask
 
 
-def visible(plan):
+def find_visible(plan):
     """Return the Visibility of all points of a Plan from its photographs and set-ups."""
     points = plan.points
     xyz = np.array(list(points.values()), dtype=float).reshape(-1, 3)
@@ -86,14 +86,14 @@ def visible(plan):
     return Visibility(tuple(points), place, on_photo, image, on_setup)
 
 
-def measurable(plan, seen):
+def find_measurable(plan, seen):
     """Mask (points,): points with at least three readings, known coordinates included.
 
     Photographs from one position give no depth, however many there are. They therefore count once;
     otherwise a tape between two such points would seem to determine both.
     """
     names = {name: i for i, name in enumerate(seen.points)}
-    count = 2 * seen.from_places.sum(axis=0)
+    count = 2 * seen.photo_views.sum(axis=0)
     for k, setup in enumerate(plan.setups):
         kinds = (setup.direction_sd_rad, setup.zenith_sd_rad, setup.distance_sd_m)
         count = count + seen.on_setup[k] * sum(sd is not None for sd in kinds)
@@ -144,7 +144,7 @@ def find_in_sight(plan, place_m, xyz_m, normals):
         cosine = np.einsum("ni,ni->n", normals, back) / distance
     on_wall = np.isfinite(normals[:, 0])
     seen = (distance > 0) & np.where(on_wall, cosine > np.cos(plan.limits.incidence_rad), True)
-    if plan.shell.outside:
+    if plan.shell.is_outside:
         shell = plan.shell
         tank = Pillar(shell.axis_m, shell.radius_m - GRAZE_M, shell.low_m, shell.high_m, "tank")
         seen &= on_wall | ~find_hidden(tank, place_m, xyz_m)
@@ -238,14 +238,14 @@ def find_separate_bodies(plan, seen):
     for k, setup in enumerate(plan.setups):
         seen_there = {seen.points[i] for i in np.flatnonzero(seen.on_setup[k])}
         bodies.append(([setup.name], seen_there | {setup.name}))
-    while (pair := _find_linked(bodies)) is not None:
+    while (pair := _find_connected(bodies)) is not None:
         first, second = pair
         bodies = [body for body in bodies if body is not first and body is not second]
         bodies.append((first[0] + second[0], first[1] | second[1]))
     return tuple(tuple(names) for names, _ in bodies if names)
 
 
-def _find_linked(bodies):
+def _find_connected(bodies):
     """Return two bodies with enough common points, or None."""
     for i, body in enumerate(bodies):
         for earlier in bodies[:i]:

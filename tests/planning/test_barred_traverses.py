@@ -14,7 +14,7 @@ from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict, what_helps
 from tankcal.planning.changes import changes_of, cost_of
-from tankcal.planning.wall.prediction import foresee_table
+from tankcal.planning.wall.prediction import predict_wall_table
 from tankcal.report.planning import empty_job
 from tankcal.report.planning.wall_paper import WallPaper, wall_sheets
 from tankcal.report.planning.wall_rows import field_tables_of_wall
@@ -36,7 +36,7 @@ def test_the_empty_job_filled_in_is_the_plan(prediction, tmp_path):
     empty_job.write_wall(prediction, tmp_path / "job")
     assert not (tmp_path / "job" / "slope_distances.csv").read_text().count("\n1,")
     fill(tmp_path / "job", plan.job, DAY)
-    found = foresee_table(tankcal.load(tmp_path / "job"), plan.amplitudes).made.table
+    found = predict_wall_table(tankcal.load(tmp_path / "job"), plan.amplitudes).computed_table.table
     np.testing.assert_allclose(found.U_m3, prediction.table.U_m3, rtol=1e-8)
     np.testing.assert_allclose(found.volume_m3, prediction.table.volume_m3, rtol=1e-9)
 

@@ -98,10 +98,10 @@ def test_where_all_is_seen_nothing_is_said_of_it(prediction):
 
 
 def test_only_set_ups_that_can_be_seen_are_to_be_sighted(stationed):
-    seen = stationed.seen
+    seen = stationed.visibility
     on_setup = seen.on_setup.copy()
     on_setup[0, seen.points.index("T1-2")] = False
-    found = rows.setups(replace(stationed, seen=replace(seen, on_setup=on_setup)))
+    found = rows.setups(replace(stationed, visibility=replace(seen, on_setup=on_setup)))
     assert found[0]["sights"] == ["T1-6"]
 
 

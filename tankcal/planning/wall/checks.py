@@ -13,7 +13,12 @@ from tankcal.job.checks.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_t
 from tankcal.job.tables import Log
 from tankcal.messages import list_some, message
 from tankcal.planning.entries import PLAN_FILE, check_form, no_such_name, too_many_sections
-from tankcal.planning.obstacles import check_obstacles, in_an_obstacle, line_cut, misplaced
+from tankcal.planning.obstacles import (
+    check_obstacles,
+    message_of_cut_line,
+    message_of_misplaced_station,
+    message_of_obstacle_at,
+)
 from tankcal.planning.wall.filling import check_runs
 from tankcal.planning.wall.model import USUAL_AT, even_radius_m, evenness_of_limbs
 
@@ -47,21 +52,21 @@ def check_sections(plan_input, courses, nominal_m, raw, log):
     """
     for name in OF_POINTS:
         for section in plan_input.entries(name):
-            if section.filled:
+            if section.filled_keys:
                 expected = message(
                     "plan_points_and_wall",
                     "given together with straps, lines, hits, tangents or runs of liquid; expected"
                     " only one of them: a plan is of targets or of the bare wall",
                 )
                 log.problem(PLAN_FILE, expected, section.row, section.name)
-    for entry in (*plan_input.repeated["straps"], *plan_input.repeated["hits"]):
+    for entry in (*plan_input.sections["straps"], *plan_input.sections["hits"]):
         for course in entry["courses"] or ():
             if courses and course not in courses:
                 entry.report(log.problem, "courses", no_such_name(course, "courses.csv"))
     _check_rings(plan_input, nominal_m, log)
     if courses:
-        _check_hits(plan_input.repeated["hits"], courses, log)
-    check_form(plan_input.single["wall"], log)
+        _check_hits(plan_input.sections["hits"], courses, log)
+    check_form(plan_input.sections["wall"], log)
     check_obstacles(plan_input, log)
     _check_lines_and_ties(plan_input, log)
     _check_tangents(plan_input, nominal_m, log)
@@ -73,10 +78,10 @@ def check_sections(plan_input, courses, nominal_m, raw, log):
 def _check_rings(plan_input, nominal_m, log):
     """Check the number of sections, and that set-ups stand clear of the wall."""
     for name in ("straps", "hits"):
-        if len(plan_input.repeated[name]) > MOST_SECTIONS:
-            expected = too_many_sections(len(plan_input.repeated[name]), MOST_SECTIONS)
+        if len(plan_input.sections[name]) > MOST_SECTIONS:
+            expected = too_many_sections(len(plan_input.sections[name]), MOST_SECTIONS)
             log.problem(PLAN_FILE, expected, None, name)
-    for entry in plan_input.repeated["hits"]:
+    for entry in plan_input.sections["hits"]:
         radius = entry["radius_m"]
         if None not in (radius, nominal_m) and abs(radius - nominal_m) < CLEAR_M:
             expected = message(
@@ -120,34 +125,34 @@ def _check_hits(rings, courses, log):
 
 
 def _check_lines_and_ties(plan_input, log):
-    lines = plan_input.single["lines"]
-    if lines.filled and not plan_input.repeated["straps"]:
+    lines = plan_input.sections["lines"]
+    if lines.filled_keys and not plan_input.sections["straps"]:
         expected = message(
             "plan_lines_alone",
             "given without [[straps]]; expected a circumference of one course at least: lines tell"
             " differences of radii alone",
         )
         log.problem(PLAN_FILE, expected, lines.row, "lines")
-    ties = plan_input.single["setup_ties"]
-    if ties.filled and not plan_input.repeated["hits"]:
+    ties = plan_input.sections["setup_ties"]
+    if ties.filled_keys and not plan_input.sections["hits"]:
         expected = message("plan_ties_alone", "given without [[hits]]; expected set-ups to be tied")
         log.problem(PLAN_FILE, expected, ties.row, "setup_ties")
     _check_control(plan_input, log)
-    if ties.filled:
+    if ties.filled_keys:
         _need(ties, ("s_mm", "s_arcsec"), log)
 
 
 def _need(entry, keys, log):
     """Report missing numbers that a section needs."""
     for key in keys:
-        if key not in entry.filled:
+        if key not in entry.filled_keys:
             expected = message("plan_number_missing", "missing; expected a number above 0")
             entry.report(log.problem, key, expected)
 
 
 def _check_control(plan_input, log):
-    control = plan_input.single["control_targets"]
-    if control.filled and not plan_input.repeated["hits"]:
+    control = plan_input.sections["control_targets"]
+    if control.filled_keys and not plan_input.sections["hits"]:
         expected = message(
             "plan_control_alone",
             "given without [[hits]]; expected set-ups of hits that read control targets",
@@ -166,34 +171,34 @@ def _check_control(plan_input, log):
 
 def _check_tangents(plan_input, nominal_m, log):
     """Check that neighbouring stations see each other, and that no other sights exist."""
-    ring, traverse = plan_input.single["tangents"], plan_input.single["traverse"]
-    if traverse.filled and not ring.filled:
+    ring, traverse = plan_input.sections["tangents"], plan_input.sections["traverse"]
+    if traverse.filled_keys and not ring.filled_keys:
         expected = message(
             "plan_traverse_alone",
             "given without [tangents]; expected limbs that are sighted from it",
         )
         log.problem(PLAN_FILE, expected, traverse.row, "traverse")
-    if not ring.filled:
+    if not ring.filled_keys:
         return
-    if not traverse.filled:
+    if not traverse.filled_keys:
         expected = message(
             "plan_tangents_untied",
             "given without [traverse]; expected s_mm and s_arcsec of the readings between its"
             " stations: they tie the sights",
         )
         log.problem(PLAN_FILE, expected, ring.row, "tangents")
-    elif not traverse.filled & {"s_mm", "s_bar_arcsec"}:
+    elif not traverse.filled_keys & {"s_mm", "s_bar_arcsec"}:
         expected = message(
             "plan_traverse_without_scale",
             "no distance is measured; expected s_mm, or s_bar_arcsec of a stadia: nothing else"
             " tells the scale",
         )
         traverse.report(log.problem, "s_mm", expected)
-    elif "bar" in traverse.filled:
+    elif "bar" in traverse.filled_keys:
         _need(traverse, ("s_bar_arcsec",), log)
     for name in ("lines", "hits"):
         other_section = next(iter(plan_input.entries(name)), None)
-        if other_section is not None and other_section.filled:
+        if other_section is not None and other_section.filled_keys:
             expected = message(
                 "plan_tangents_beside",
                 "given together with [tangents]; expected only one of them: tankcal does not join"
@@ -247,18 +252,18 @@ def _check_totals(plan_input, courses, log):
     """Check that no kind has too many readings."""
     straps = sum(
         len(entry["courses"] or courses) * len(percents_of(entry)) * int(entry["readings"] or 1)
-        for entry in plan_input.repeated["straps"]
+        for entry in plan_input.sections["straps"]
     )
     if straps > MOST_STRAPS:
         log.problem(PLAN_FILE, too_many_straps(straps), None, "straps")
-    lines, ring = plan_input.single["lines"], plan_input.single["tangents"]
+    lines, ring = plan_input.sections["lines"], plan_input.sections["tangents"]
     levels = len(courses) * len(percents_of(lines))
     offsets = int((lines["count"] or 0) * (lines["faces"] or 2) * (lines["readings"] or 1)) * levels
-    if lines.filled and offsets > MOST_OFFSETS:
+    if lines.filled_keys and offsets > MOST_OFFSETS:
         log.problem(PLAN_FILE, too_many_offsets(offsets), lines.row, "lines")
     levels = len(courses) * len(percents_of(ring))
     tangents = int((ring["stations"] or 0) * (ring["readings"] or 1)) * levels * len(LIMBS)
-    if ring.filled and tangents > MOST_TANGENTS:
+    if ring.filled_keys and tangents > MOST_TANGENTS:
         log.problem(PLAN_FILE, too_many_tangents(tangents), ring.row, "tangents")
 
 
@@ -270,22 +275,24 @@ def percents_of(entry):
 # ---- obstacles: hidden sights are left out
 
 
-def refuse_cut(foreseen, rows):
+def refuse_cut(design_tables, rows):
     """Raise InputError for stations in obstacles, cut lines between stations, and no sights left.
 
-    foreseen: Foreseen; rows: {section: row of plan.toml}.
+    design_tables: DesignTables; rows: {section: row of plan.toml}.
     """
     log = Log()
-    section = "hits" if foreseen.design.hits else "tangents"
-    for name, place in foreseen.stands():
-        why = in_an_obstacle(foreseen.obstacles, place)
+    section = "hits" if design_tables.design.hits else "tangents"
+    for name, place in design_tables.stands():
+        why = message_of_obstacle_at(design_tables.obstacles, place)
         if why:
-            log.problem(PLAN_FILE, misplaced(name, why), rows.get(section), section)
+            log.problem(
+                PLAN_FILE, message_of_misplaced_station(name, why), rows.get(section), section
+            )
     log.stop_if_problems()
-    for ends in foreseen.lines_cut():
-        log.problem(PLAN_FILE, line_cut(*ends), rows.get("traverse"), "traverse")
-    every = _sights(foreseen, ())
-    for name, count in _sights(foreseen, foreseen.obstacles).items():
+    for ends in design_tables.cut_lines():
+        log.problem(PLAN_FILE, message_of_cut_line(*ends), rows.get("traverse"), "traverse")
+    every = _sights(design_tables, ())
+    for name, count in _sights(design_tables, design_tables.obstacles).items():
         if not count:
             section, sights = SIGHTS[name]
             text = message(
@@ -298,13 +305,13 @@ def refuse_cut(foreseen, rows):
     log.stop_if_problems()
 
 
-def warnings_of_obstacles(foreseen, rows):
+def warnings_of_obstacles(design_tables, rows):
     """Warn of the number of sights left out, and of obstacles that hide none; a tuple of Problem.
 
     Parameters are those of `refuse_cut`.
     """
-    every, problems = _sights(foreseen, ()), []
-    for name, count in _sights(foreseen, foreseen.obstacles).items():
+    every, problems = _sights(design_tables, ()), []
+    for name, count in _sights(design_tables, design_tables.obstacles).items():
         section, sights = SIGHTS[name]
         if count < every[name]:
             text = message(
@@ -316,7 +323,9 @@ def warnings_of_obstacles(foreseen, rows):
             )
             problems.append(Problem(PLAN_FILE, text, rows.get(section), section))
     idle = [
-        obstacle.name for obstacle in foreseen.obstacles if _sights(foreseen, (obstacle,)) == every
+        obstacle.name
+        for obstacle in design_tables.obstacles
+        if _sights(design_tables, (obstacle,)) == every
     ]
     if idle:
         text = message(
@@ -329,8 +338,8 @@ def warnings_of_obstacles(foreseen, rows):
     return tuple(problems)
 
 
-def _sights(foreseen, obstacles):
+def _sights(design_tables, obstacles):
     """Return {table: number of sights} with given obstacles."""
-    without = copy(foreseen)
+    without = copy(design_tables)
     without.obstacles = obstacles
     return {name: len(table.rows) for name, table in without.tables().items() if name in SIGHTS}

@@ -18,8 +18,8 @@ MOST_RUNS = 50
 
 def check_runs(plan_input, is_run_declared, log):
     """Check [[runs]] and [filling]; is_run_declared: whether [liquid] has a run_ppm."""
-    runs, filling = plan_input.repeated["runs"], plan_input.single["filling"]
-    if filling.filled and not runs:
+    runs, filling = plan_input.sections["runs"], plan_input.sections["filling"]
+    if filling.filled_keys and not runs:
         expected = message(
             "plan_filling_alone",
             "given without [[runs]]; expected runs of liquid from dip to dip",
@@ -45,7 +45,7 @@ def _check_steps(run, log):
     first, last, step, steps = (
         run[key] for key in ("first_dip_m", "last_dip_m", "step_m", "steps")
     )
-    if {"step_m", "steps"} <= run.filled or not {"step_m", "steps"} & run.filled:
+    if {"step_m", "steps"} <= run.filled_keys or not {"step_m", "steps"} & run.filled_keys:
         expected = message(
             "plan_step_or_steps",
             "expected one of them: step_m, the way from dip to dip, or steps, how many",
@@ -76,7 +76,7 @@ def _check_steps(run, log):
 
 def _check_run_effect(plan_input, is_declared, log):
     """Check that the run effect is declared, or that at least two runs determine it."""
-    runs, filling = plan_input.repeated["runs"], plan_input.single["filling"]
+    runs, filling = plan_input.sections["runs"], plan_input.sections["filling"]
     expected_ppm = filling["expected_run_ppm"]
     if expected_ppm is not None and is_declared:
         expected = message(

@@ -153,18 +153,18 @@ class FillingOutlook:
     run_dof: float | None
 
 
-def outlook_of_filling(plan, measured, result, table):
+def outlook_of_filling(plan, metering, result, table):
     """Return the `FillingOutlook` of a WallPlan.
 
     Parameters
     ----------
     plan : WallPlan
-    measured : Measured
+    metering : Measured
     result : LiquidResult
     table : ComputedTable
     """
     dips = _dips_of(plan, table)
-    bodies = _bodies(measured)
+    bodies = _bodies(metering)
     rows = _rows(plan, bodies, dips, table)
     dof = result.run_dof
     return FillingOutlook(
@@ -172,7 +172,7 @@ def outlook_of_filling(plan, measured, result, table):
         batches=len(result.steps.row),
         dips=rows,
         differences=_differences(bodies, dips, table),
-        causes=_causes(measured.joint),
+        causes=_causes(metering.joint),
         readings=_readings(result),
         redundancy=result.dof,
         detectable_radius_m=None if plan.design.is_metered_alone else result.detectable_radius_m,
@@ -204,15 +204,15 @@ def refuse_other_dips(dips_m, table):
         raise InputError(Problem(PLAN_FILE, expected, None, "filling.dips_m"))
 
 
-def _bodies(measured):
+def _bodies(metering):
     """Return {"geometry", "liquid", "joint": Body}.
 
     None if liquid only does not determine the tank.
     """
-    joint = measured.joint.known
+    joint = metering.joint.known
     return {
         "geometry": joint.geometry.moved_to({}).body(),
-        "liquid": None if measured.alone is None else join_body(measured.alone.known),
+        "liquid": None if metering.alone is None else join_body(metering.alone.known),
         "joint": join_body(joint),
     }
 

@@ -13,8 +13,8 @@ from tankcal.planning.contract import MEASURING
 from tankcal.planning.entries import PLAN_FILE
 from tankcal.planning.obstacles import obstacles_of
 from tankcal.planning.wall.checks import percents_of, refuse_cut, warnings_of_obstacles
+from tankcal.planning.wall.design_tables import DesignTables
 from tankcal.planning.wall.filling import runs_of
-from tankcal.planning.wall.foreseen_tables import Foreseen
 from tankcal.planning.wall.model import (
     Design,
     PlannedControl,
@@ -24,7 +24,7 @@ from tankcal.planning.wall.model import (
     PlannedTangents,
     WallPlan,
 )
-from tankcal.planning.wall.nominal_readings import with_nominal_readings
+from tankcal.planning.wall.nominal_readings import set_nominal_readings
 
 USUAL_HEIGHT_M = 1.6  # default height of an instrument above the bottom
 SECTION_OF_TABLE = {  # tables that a design generates, and the section that messages name
@@ -66,18 +66,18 @@ def design_of(plan_input, courses, celsius=None):
     """
     straps = (
         PlannedStrap(course, percent, entry["s_mm"], int(entry["readings"] or 1), _more(entry))
-        for entry in plan_input.repeated["straps"]
+        for entry in plan_input.sections["straps"]
         for course in entry["courses"] or courses
         for percent in percents_of(entry)
     )
     return Design(
         straps=tuple(straps),
-        lines=_lines(plan_input.single["lines"]),
-        hits=tuple(_hits(entry, courses) for entry in plan_input.repeated["hits"]),
-        ties=_ties(plan_input.single["setup_ties"]),
-        control=_control(plan_input.single["control_targets"]),
-        tangents=_tangents(plan_input.single["tangents"], plan_input.single["traverse"]),
-        runs=runs_of(plan_input.repeated["runs"], celsius),
+        lines=_lines(plan_input.sections["lines"]),
+        hits=tuple(_hits(entry, courses) for entry in plan_input.sections["hits"]),
+        ties=_ties(plan_input.sections["setup_ties"]),
+        control=_control(plan_input.sections["control_targets"]),
+        tangents=_tangents(plan_input.sections["tangents"], plan_input.sections["traverse"]),
+        runs=runs_of(plan_input.sections["runs"], celsius),
     )
 
 
@@ -87,7 +87,7 @@ def _more(entry):
 
 
 def _lines(entry):
-    if not entry.filled:
+    if not entry.filled_keys:
         return None
     return PlannedLines(
         count=int(entry["count"]),
@@ -116,7 +116,7 @@ def _hits(entry, courses):
 
 
 def _ties(entry):
-    if not entry.filled:
+    if not entry.filled_keys:
         return None
     return int(entry["targets"]), entry["s_mm"], entry["s_arcsec"]
 
@@ -130,7 +130,7 @@ def _control(entry):
 
 
 def _tangents(entry, traverse):
-    if not entry.filled:
+    if not entry.filled_keys:
         return None
     return PlannedTangents(
         stations=int(entry["stations"]),
@@ -163,7 +163,7 @@ def wall_plan_of(raw, values, tables, plan_input, limits, folder):
         courses = tuple(zip(table.of("course"), table.of("height_m"), strict=True))
     celsius = values["table"]["reference_temperature_c"]
     design = design_of(plan_input, tuple(name for name, _ in courses), celsius)
-    wall, filling = plan_input.single["wall"], plan_input.single["filling"]
+    wall, filling = plan_input.sections["wall"], plan_input.sections["filling"]
     sizes = (
         None if wall[key] is None else wall[key] / 1000 for key in ("form_mm", "common_form_mm")
     )
@@ -174,9 +174,9 @@ def wall_plan_of(raw, values, tables, plan_input, limits, folder):
     tank = (courses, diameter and diameter / 2, bottom, zero, holds, obstacles)
     warnings = ()
     if obstacles:
-        foreseen = Foreseen(design, *tank, bars=lengths_of_bars(raw))
-        refuse_cut(foreseen, _rows_of(plan_input))
-        warnings = warnings_of_obstacles(foreseen, _rows_of(plan_input))
+        design_tables = DesignTables(design, *tank, bars=lengths_of_bars(raw))
+        refuse_cut(design_tables, _rows_of(plan_input))
+        warnings = warnings_of_obstacles(design_tables, _rows_of(plan_input))
     ppm = filling["expected_run_ppm"]
     expected = None if ppm is None else ppm / 1e6
     return WallPlan(
@@ -184,7 +184,7 @@ def wall_plan_of(raw, values, tables, plan_input, limits, folder):
         design=design,
         limits=limits,
         amplitudes=amplitudes,
-        costs={key: value or 0.0 for key, value in plan_input.single["costs"].values.items()},
+        costs={key: value or 0.0 for key, value in plan_input.sections["costs"].values.items()},
         dips_m=tuple(sorted(set(filling["dips_m"] or ()))),
         expected_run=expected,
         holds=holds,
@@ -197,11 +197,11 @@ def wall_plan_of(raw, values, tables, plan_input, limits, folder):
 
 def _rows_of(plan_input):
     """Return {section: first row in plan.toml}."""
-    rows = {name: entry.row for name, entry in plan_input.single.items()}
-    return rows | {name: entries[0].row for name, entries in plan_input.repeated.items() if entries}
+    first = {name: plan_input.entries(name)[:1] for name in plan_input.sections}
+    return {name: entries[0].row for name, entries in first.items() if entries}
 
 
-def changed(plan, design=None, raw=None):
+def change_plan(plan, design=None, raw=None):
     """Return the WallPlan with another Design or other instruments."""
     design, raw = design or plan.design, raw or plan.raw
     expected = plan.amplitudes, plan.expected_run
@@ -212,7 +212,7 @@ def changed(plan, design=None, raw=None):
 def tables_of(plan):
     """Return {name: Table} of all readings; their values are not defined."""
     bars = lengths_of_bars(plan.raw)
-    return Foreseen(plan.design, *_tank_of(plan), bars=bars).tables()
+    return DesignTables(plan.design, *_tank_of(plan), bars=bars).tables()
 
 
 def lengths_of_bars(raw):
@@ -252,7 +252,7 @@ def job_of_design(raw, design, tank, expected, rows=None):
     rows : dict, optional
         {section: row of plan.toml}, for messages.
     """
-    tables = Foreseen(design, *tank, bars=lengths_of_bars(raw)).tables()
+    tables = DesignTables(design, *tank, bars=lengths_of_bars(raw)).tables()
     settings = dict(raw.settings)
     datum = datum_of(design)
     if datum is not None:
@@ -262,7 +262,7 @@ def job_of_design(raw, design, tank, expected, rows=None):
         job = job_of(whole, Log())
     except InputError as error:
         raise InputError(locate_in_plan(error.problems, design, rows)) from error
-    job = with_nominal_readings(job, *expected)
+    job = set_nominal_readings(job, *expected)
     return replace(job, warnings=locate_in_plan(job.warnings, design, rows))
 
 

@@ -13,7 +13,7 @@ from tankcal.geometry.field.sites import spans_of
 from tankcal.geometry.girth import girth_of, tangent_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.wall_straps import area_term
-from tankcal.planning.wall.foreseen_tables import azimuth_of_axis, limb_of_circle
+from tankcal.planning.wall.design_tables import azimuth_of_axis, limb_of_circle
 from tankcal.quadrature import panels
 
 PANELS, NODES = 4, 6  # Gauss panels per course and nodes per panel for the volume of a drawn wall

@@ -1,4 +1,4 @@
-"""Papers of a plan: prediction, field sheets, an empty job, files for programs.
+"""Documents of a plan: prediction, field sheets, an empty job, files for programs.
 
 This package computes no results.
 """
@@ -33,7 +33,7 @@ def write(
     language=None,
     workbook=False,
 ):
-    """Write all files and papers of a prediction to a folder, all or nothing.
+    """Write all files and documents of a prediction to a folder, all or nothing.
 
     Parameters
     ----------
@@ -45,11 +45,11 @@ def write(
     effects : sequence of Effect, optional
         Effects of the evaluated changes.
     design : Path, optional
-        Search for a design; its last plan has its papers in a folder of its own.
+        Search for a design; the documents of its last plan are in a folder of their own.
     simulated : Simulated or SimulatedWall, optional
         Simulated surveys of the prediction.
     language : str, optional
-        Language of papers and workbook, one of languages.LANGUAGES; None: that of the plan.
+        Language of documents and workbook, one of languages.LANGUAGES; None: that of the plan.
     workbook : bool, optional
         Write the empty job as job.xlsx instead of text files.
 

@@ -2,7 +2,7 @@
 
 from math import ceil
 
-from tankcal.planning.bases import by_ends
+from tankcal.planning.bases import group_by_ends
 from tankcal.report import blocks
 from tankcal.report.planning import sketches
 from tankcal.report.planning.rows import field_tables, lost_ties
@@ -38,7 +38,7 @@ def _overview(paper, tables):
         "setups": len(plan.setups),
         "tapes": len(plan.ties),
         "lost_ties": len(lost_ties(paper.prediction)),
-        "bases": len(by_ends(plan.bases)),
+        "bases": len(group_by_ends(plan.bases)),
         "control_points": len(plan.known),
     }
     shown = [

@@ -34,7 +34,7 @@ def uncertainty(paper):
     share = 100 * table.U_m3[some] / table.volume_m3[some]
     right.plot(table.height_m[some], share, color=INK)
     right.set_ylabel(paper.word("axes.relative_u"))
-    if limits.relative_u is not None and limits.of == "top":
+    if limits.relative_u is not None and limits.quantity == "top":
         right.axhline(100 * limits.relative_u, color=RED, linewidth=0.9)
     for ax in (left, right):
         ax.set_xlabel(paper.word("axes.dip"))
@@ -49,7 +49,7 @@ def uncertainty(paper):
 
 def _by_geometry(paper, some):
     """Return ((dips, U), (dips, U over volume in percent)) by geometry only; () without liquid."""
-    liquid = getattr(paper.prediction.tabled, "liquid", None)
+    liquid = getattr(paper.prediction.result, "liquid", None)
     if liquid is None:
         return ()
     before, dips = liquid.tables["geometry"], paper.prediction.table.height_m

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.planning.bases import by_ends
+from tankcal.planning.bases import group_by_ends
 from tankcal.planning.changes import cost_of
 from tankcal.planning.measurements import BLUNDER_SDS
 from tankcal.report import blocks
@@ -66,7 +66,7 @@ def result(paper):
     limits = paper.plan.limits
     if limits.relative_u is not None:
         verdict = paper.word(
-            f"texts.limit_{limits.of}_{'met' if prediction.meets else 'missed'}",
+            f"texts.limit_{limits.quantity}_{'met' if prediction.meets else 'missed'}",
             limit=paper.three_digits(limits.relative_u),
             share=paper.three_digits(prediction.relative_u),
         )
@@ -76,7 +76,7 @@ def result(paper):
 
 def _facts(paper):
     prediction, plan = paper.prediction, paper.plan
-    solution, datum = prediction.predicted.adjusted.solution, prediction.datum
+    solution, datum = prediction.network.adjusted.solution, prediction.datum
     cost = cost_of(plan)
     ranges = [paper.number(float(sd), "mm", digits=2) for sd in prediction.precision.range_m]
     homogeneity = ", ".join(f"{axis} {text}" for axis, text in zip("xyz", ranges, strict=True))
@@ -88,7 +88,7 @@ def _facts(paper):
             ("setups", paper.count(len(plan.setups))),
             ("tapes", paper.count(len(plan.ties))),
             ("lost_ties", paper.count(len(lost_ties(prediction)))),
-            ("bases", paper.count(len(by_ends(plan.bases)))),
+            ("bases", paper.count(len(group_by_ends(plan.bases)))),
             ("control_points", paper.count(len(plan.known))),
             ("targets", paper.count(len(plan.targets.names))),
             ("unseen_targets", paper.count(count_unseen_targets(prediction))),
@@ -108,7 +108,7 @@ def _facts(paper):
 
 def table(paper):
     """Return the blocks of U against the dip, some rows, the worst deliveries and the budget."""
-    table, stated = paper.prediction.table, paper.prediction.tabled.stated
+    table, stated = paper.prediction.table, paper.prediction.result.stated
     last = len(table.height_m) - 1
     places = dict.fromkeys(np.linspace(0, last, DIPS + 1).round().astype(int)[1:].tolist())
     rows = [
@@ -401,7 +401,7 @@ def design(paper):
         after=paper.three_digits(path.relative_u),
         cost_before=paper.plain(path.start_cost),
         cost=paper.plain(path.cost),
-        tried=path.tried,
+        tried=path.evaluations,
     )
     missed = []
     if path.prediction.meets is False:
@@ -411,5 +411,5 @@ def design(paper):
         return [paper.heading("design"), paper.paragraph("no_step"), text, *missed]
     columns = EFFECTS_ON_WALL if paper.is_wall else EFFECTS_WITH_PLACE
     steps = paper.table("design", _rows_of_effects(paper, path.steps), columns)
-    papers = paper.paragraph("design_has_papers", folder=DESIGN)
-    return [paper.heading("design"), text, *missed, papers, steps]
+    folder = paper.paragraph("design_has_papers", folder=DESIGN)
+    return [paper.heading("design"), text, *missed, folder, steps]

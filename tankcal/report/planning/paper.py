@@ -12,7 +12,7 @@ from tankcal.report.planning.rows import find_by_name
 from tankcal.text.languages import DEFAULT
 from tankcal.text.words import load_words, message_sentence
 
-DESIGN = "design"  # folder of the papers of the smallest design
+DESIGN = "design"  # folder of the documents of the smallest design
 
 
 class PlanPaper(PlainPaper):
@@ -42,7 +42,7 @@ class PlanPaper(PlainPaper):
         super().__init__(words_with_part(words, "planning"))
 
     def subject(self):
-        """Subject of the papers: the tank."""
+        """Subject of the documents: the tank."""
         return f"{self.word('page.tank')} {self.plan.job.tank.id}"
 
     def day(self, iso=None):

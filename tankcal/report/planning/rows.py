@@ -173,7 +173,7 @@ def stations(plan):
 def photographs(prediction):
     """Return a row for each exposure, with its orientation and the number of visible points."""
     plan, rows = prediction.plan, []
-    for photo, seen in zip(plan.photos, prediction.seen.on_photo, strict=True):
+    for photo, seen in zip(plan.photos, prediction.visibility.on_photo, strict=True):
         turn, tilt, roll = map(float, _angles(plan, photo))
         rows.append(
             {
@@ -196,7 +196,7 @@ def _angles(plan, photo):
 def setups(prediction):
     """Return a row for each set-up of a total station, with the other set-ups in sight."""
     plan = prediction.plan
-    number = {name: i for i, name in enumerate(prediction.seen.points)}
+    number = {name: i for i, name in enumerate(prediction.visibility.points)}
     return [
         {
             "setup": setup.name, "instrument": setup.instrument, "sets": setup.sets,
@@ -205,7 +205,7 @@ def setups(prediction):
         }
         | {key: getattr(setup, key) for key in SD_KEYS}
         | _position(plan, setup.xyz_m)
-        for setup, seen in zip(plan.setups, prediction.seen.on_setup, strict=True)
+        for setup, seen in zip(plan.setups, prediction.visibility.on_setup, strict=True)
     ]  # fmt: skip
 
 

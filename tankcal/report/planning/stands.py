@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from tankcal.pipeline.plot_style import GREY, INK, PALE, WIDTH, round_factor, styled
-from tankcal.planning.bases import by_ends
+from tankcal.planning.bases import group_by_ends
 from tankcal.planning.model import TAPED, Box
 from tankcal.planning.places import reference_rad
 from tankcal.report.planning.sketches import (
@@ -138,7 +138,7 @@ def _ties(ax, paper, table):
 def _bases(ax, paper):
     """Draw lines between the stations of each base of a stadia."""
     plan, label = paper.plan, paper.word("legend.bases")
-    for ends in by_ends(plan.bases):
+    for ends in group_by_ends(plan.bases):
         line = np.array([plan.points[name][:2] for name in ends])
         ax.plot(*line.T, linestyle="-.", color=OCHRE, linewidth=1.2, zorder=2, label=label)
         label = None
@@ -198,7 +198,7 @@ def _name_beside(ax, plan, place, name, share, colour=GREY, gap=0.0):
     The distance is a share of the radius of the tank plus a gap, m.
     """
     out = place - plan.shell.axis_m
-    out = out / max(np.linalg.norm(out), 1e-9) * (1.0 if plan.shell.outside else -1.0)
+    out = out / max(np.linalg.norm(out), 1e-9) * (1.0 if plan.shell.is_outside else -1.0)
     step = share * max(plan.shell.radius_m, 0.25 * np.ptp(ax.get_ylim())) + gap
     beside = "center" if abs(out[0]) < STEEP else "left" if out[0] > 0 else "right"
     add_text(ax, *(place + step * out), name, color=colour, ha=beside,

@@ -4,7 +4,7 @@ import datetime
 
 import numpy as np
 
-from tankcal.planning.wall.changes import instruments_read
+from tankcal.planning.wall.changes import instruments_in_use
 from tankcal.planning.wall.nominal_readings import place_stations
 from tankcal.planning.wall.reading import lengths_of_bars, tables_of
 from tankcal.report.plain import Column
@@ -176,7 +176,7 @@ def _columns_of_offsets(plan):
 def _instruments(plan):
     """Return a row for each instrument in use and each master of a tape, from instruments.toml."""
     register = plan.raw.registers.get("instruments")
-    used, rows = instruments_read(plan.job), []
+    used, rows = instruments_in_use(plan.job), []
     for name, entry in {} if register is None else register.entries.items():
         values = {key: value.raw for key, value in entry.items()}
         scale = values.get("u_scale_ppm")

@@ -26,7 +26,7 @@ FIRST_ROUND = datetime.datetime(2000, 1, 1)  # arbitrary origin of times; only i
 CONTROL_SIGHT = {"zenith_deg": 88.0, "distance_m": 10.0}
 
 
-class Foreseen:
+class DesignTables:
     """Tables of a design on a tank.
 
     Attributes
@@ -272,7 +272,7 @@ class Foreseen:
         if self.design.tangents is not None:
             yield from self._stands()
 
-    def lines_cut(self):
+    def cut_lines(self):
         """Return pairs of neighbouring traverse stations with an obstacle between them."""
         stands = [] if self.design.tangents is None else list(self._stands())
         for k, (name, station) in enumerate(stands):
