@@ -11,7 +11,7 @@ from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.rotations import rotation_of_view
 from tankcal.job.measuring import ARCSEC
 from tankcal.planning.bases import bases_of
-from tankcal.planning.entries import PLAN_FILE
+from tankcal.planning.entries import PLAN_FILE, forms_m
 from tankcal.planning.model import (
     ControlPoint,
     Limits,
@@ -92,7 +92,7 @@ def assemble_plan(job, plan_input, bars, folder):
             for name, bar in bars.items()
             if bar["length_m"] and bar["u_mm"] is not None
         },
-        amplitudes=_amplitudes(pattern),
+        amplitudes=assumed_amplitudes(*forms_m(pattern)),
         costs={key: value or 0.0 for key, value in plan_input.sections["costs"].values.items()},
         folder=folder,
     )
@@ -177,8 +177,8 @@ def _clear_of_welds(azimuth, welds, clearance):
     return azimuth
 
 
-def _stands(ring, shell):
-    """Yield (azimuth, position (3,), station, height index) of each stand of a ring, by height."""
+def _positions(ring, shell):
+    """Yield (azimuth, position (3,), number of station, number of height) of a ring, by height."""
     n = int(ring["stations"])
     azimuth = np.radians(_value_or(ring["start_azimuth_deg"], 0.0)) + 2 * np.pi * np.arange(n) / n
     for level, height in enumerate(ring["heights_m"]):
@@ -216,7 +216,7 @@ def photographs_of(ring, number, shell, image_sd_mm, place):
     height = _value_or(ring["aim_height_m"], (shell.high_m - shell.low_m) / 2)
     radius = ring_radius_m(ring, shell)
     far = radius - shell.radius_m if shell.is_outside else radius + shell.radius_m
-    for azimuth, xyz, i, level in _stands(ring, shell):
+    for azimuth, xyz, i, level in _positions(ring, shell):
         station = f"R{number}-{i + 1}" + (f"-{level + 1}" if len(ring["heights_m"]) > 1 else "")
         tilt = np.arctan2(shell.low_m + height - xyz[2], max(far, 1e-9))
         exposures = [
@@ -247,10 +247,10 @@ def photographs_of(ring, number, shell, image_sd_mm, place):
 def setups_of(entry, number, shell, place):
     """Return the set-ups of the `number`th [[setup_rings]]."""
     setups = []
-    stands = list(_stands(entry, shell))
-    names = [f"T{number}-{i + 1}" + (f"-{k + 1}" if k else "") for _, _, i, k in stands]
-    for at, (_, xyz, _, level) in enumerate(stands):
-        ring = [name for name, stand in zip(names, stands, strict=True) if stand[3] == level]
+    positions = list(_positions(entry, shell))
+    names = [f"T{number}-{i + 1}" + (f"-{k + 1}" if k else "") for _, _, i, k in positions]
+    for at, (_, xyz, _, level) in enumerate(positions):
+        ring = [name for name, place in zip(names, positions, strict=True) if place[3] == level]
         setups.append(
             PlannedSetup(
                 name=names[at],
@@ -355,14 +355,6 @@ def limits_of(section):
         quantity=section["of"] or "top",
         rays=int(section["rays"] or RAYS),
         place=(PLAN_FILE, section.rows.get("of", section.row), "limits.of"),
-    )
-
-
-def _amplitudes(pattern):
-    """Return the `Amplitudes` of the wall: assumed values unless the plan states others."""
-    forms_mm = (pattern[key] for key in ("form_mm", "common_form_mm"))
-    return assumed_amplitudes(
-        *(None if form_mm is None else form_mm / 1000 for form_mm in forms_mm)
     )
 
 

@@ -112,3 +112,9 @@ def check_form(section, log):
             whole=whole,
         )
         section.report(log.problem, "common_form_mm", expected)
+
+
+def forms_m(section):
+    """Expected ovality of a course and its part common to the shell, m; None if blank."""
+    sizes_mm = (section[key] for key in ("form_mm", "common_form_mm"))
+    return tuple(None if size_mm is None else size_mm / 1000 for size_mm in sizes_mm)

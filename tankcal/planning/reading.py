@@ -64,6 +64,8 @@ from tankcal.planning.wall.reading import is_wall_plan, wall_plan_of
 from tankcal.text.numerals import NUMBER
 
 OF_LIQUID = ("horizontal", "sphere")  # kinds of tank that a plan may measure by liquid only
+# Placeholder of a table with one row, so that the checks of a job see a survey with readings.
+NO_IMAGE_POINTS = {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
 
 
 def load_plan(path):
@@ -94,7 +96,7 @@ def load_plan(path):
     plan_input = replace(plan_input, control=tables["control"])
     if plan_input.is_wall:
         return _wall_plan(raw, values, tables, plan_input, folder, log)
-    _check(raw, values, tables | _tables_of_measurements(plan_input), registers, plan_input, log)
+    _check(raw, values, tables | plan_input.ties | NO_IMAGE_POINTS, registers, plan_input, log)
     log.stop_if_problems()
     job = _job(raw, values, tables, registers, log)
     log.stop_if_problems()
@@ -407,11 +409,6 @@ def _job_tables(raw, log):
     return tables
 
 
-def _tables_of_measurements(plan_input):
-    """Return the tables of the plan, and a placeholder for image points."""
-    return plan_input.ties | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
-
-
 def _check(raw, values, tables, registers, plan_input, log):
     """Check all values that do not depend on positions."""
     check_tank(values, tables, raw, log)
@@ -432,5 +429,5 @@ def _job(raw, values, tables, registers, log):
     attached = Attached(None, None, None if rule is None else find_rule(raw, rule, log))
     log.stop_if_problems()
     measurements = make_measurements(values, tables, registers)
-    tables = tables | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
+    tables = tables | NO_IMAGE_POINTS
     return make_job(raw, values, tables, attached, measurements, tuple(log.warnings))

@@ -184,9 +184,9 @@ def assess_reliability(plan, network, covariance, by_points_m2):
     adjusted = network.adjusted
     problem, solution = adjusted.problem, adjusted.solution
     # Q g' is common to all readings; j Q g' is the effect of a whitened unit error.
-    pull = _covariance_with(
-        solution, problem.layout.points[covariance.points].ravel(), by_points_m2
-    )
+    # The last element belongs to fixed unknowns.
+    columns = problem.layout.points[covariance.points].ravel()
+    pull = np.append(covariances(solution.cofactor, columns, by_points_m2[None])[:, 0], 0.0)
     groups = []
     for number, table in enumerate(problem.observations):
         if table.trace is None:
@@ -198,14 +198,6 @@ def assess_reliability(plan, network, covariance, by_points_m2):
         single = single_readings(plan, table)
         groups += _group_by_name(table, single, single.redundancy(r), effect)
     return tuple(groups)
-
-
-def _covariance_with(solution, columns, gradient):
-    """Product Q g' of a gradient g, shape (unknowns + 1,).
-
-    The last element (fixed unknowns) is 0.
-    """
-    return np.append(covariances(solution.cofactor, columns, gradient[None])[:, 0], 0.0)
 
 
 def _group_by_name(table, single, redundancy, effect):

@@ -165,7 +165,7 @@ def refuse_blind(plan, seen):
     for k, photo in enumerate(plan.photos):
         count, targets = (int(seen.on_photo[k, :n].sum()) for n in (None, len(plan.targets.names)))
         if count < FEWEST_POINTS or not targets:
-            text = _seen(count, targets)
+            text = _describe_view(count, targets)
             blind.setdefault(photo.place, []).append(
                 (message("plan_a_photograph", "photograph {photo}", photo=photo.name), text)
             )
@@ -174,11 +174,11 @@ def refuse_blind(plan, seen):
             blind.setdefault(setup.place, []).append(
                 (message("plan_a_setup", "set-up {setup}", setup=setup.name), "nothing")
             )
-    for (file, row, name), ones in blind.items():
-        who, text = ones[0]
+    for (file, row, name), views in blind.items():
+        who, text = views[0]
         more = (
-            message("plan_more_of_ring", ", and {more} more of this ring", more=len(ones) - 1)
-            if len(ones) > 1
+            message("plan_more_of_ring", ", and {more} more of this ring", more=len(views) - 1)
+            if len(views) > 1
             else ""
         )
         log.problem(
@@ -198,18 +198,15 @@ def refuse_blind(plan, seen):
     log.stop_if_problems()
 
 
-def _seen(count, targets):
+def _describe_view(count, targets):
+    """Return the number of visible points in words; targets: number of targets among them."""
     if not count:
-        return _nothing()
+        return message("plan_nothing", "nothing")
     if not targets:
         return message("plan_no_target", "no target (other points: {count})", count=count)
     if count == 1:
         return message("plan_one_point_only", "{count} point only", count=count)
     return message("plan_points_only", "{count} points only", count=count)
-
-
-def _nothing():
-    return message("plan_nothing", "nothing")
 
 
 def find_separate_bodies(plan, seen):

@@ -8,7 +8,7 @@ import numpy as np
 from tankcal.job.checks.liquid import MOST_ROWS
 from tankcal.job.checks.tangents import FEWEST_SETUPS
 from tankcal.planning.wall.checks import least_ring_m
-from tankcal.planning.wall.filling import LEAST_STEP_M
+from tankcal.planning.wall.filling import LEAST_STEP_M, SAME_M
 from tankcal.planning.wall.model import USUAL_AT, PlannedStrap, even_radius_m
 from tankcal.planning.wall.reading import change_plan, lengths_of_bars
 
@@ -24,7 +24,6 @@ NUMBERED = ("level", "station")  # items named by a number with a decimal point
 MORE_LINES, BAR_SD_ARCSEC = 4, 1.0  # number of added lines; sd of an added angle to a stadia
 BETTER = ("u_scale_ppm", "u_offset_mm", "u_collimation_arcsec", "u_incidence_mm", "u_mm")
 MOST_FACES, MOST_READINGS, FEWEST_LINES = 2, 20, 4
-SAME_M = 1e-6  # largest difference of equal dips
 
 
 def wall_changes_of(plan):

@@ -282,7 +282,7 @@ def refuse_cut(design_tables, rows):
     """
     log = Log()
     section = "hits" if design_tables.design.hits else "tangents"
-    for name, place in design_tables.stands():
+    for name, place in design_tables.instrument_positions():
         why = message_of_obstacle_at(design_tables.obstacles, place)
         if why:
             log.problem(

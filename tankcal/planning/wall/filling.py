@@ -14,6 +14,7 @@ from tankcal.planning.wall.model import PlannedRun
 LEAST_STEP_M = 0.001  # smallest step between two dips
 LEAST_BATCH_M3 = 1e-3  # replaces a batch volume that is zero or unknown
 MOST_RUNS = 50
+SAME_M = 1e-6  # largest difference of equal dips
 
 
 def check_runs(plan_input, is_run_declared, log):
@@ -128,10 +129,10 @@ def _dips(first, last, step, steps):
     return tuple(np.round(dips, 4).tolist())
 
 
-def rows_of_runs(runs, holds):
+def rows_of_runs(runs, volume_at):
     """Return the rows of liquid.csv, {column: value} each.
 
-    holds: function of a dip, m, that returns the approximate volume, m3.
+    volume_at: function of a dip, m, that returns the approximate volume, m3.
     """
     for number, run in enumerate(runs, 1):
         common = {"run": str(number), "meter": run.meter}
@@ -143,15 +144,11 @@ def rows_of_runs(runs, holds):
             yield common | {"volume_m3": 0.0}
             before = 0.0
         for dip in run.dips_m:
-            below = holds(dip)
+            below = volume_at(dip)
             if before is None:
                 yield common | sd | warm | {"volume_m3": 0.0, "dip_m": dip}
             else:
                 way = below - before
-                way = np.copysign(max(abs(way), LEAST_BATCH_M3), _sign(run))
+                way = np.copysign(max(abs(way), LEAST_BATCH_M3), run.dips_m[-1] - run.dips_m[0])
                 yield common | sd | at_meter | {"volume_m3": float(way), "dip_m": dip}
             before = below
-
-
-def _sign(run):
-    return run.dips_m[-1] - run.dips_m[0] if len(run.dips_m) > 1 else 1.0

@@ -11,11 +11,11 @@ from tankcal.messages import message
 from tankcal.pipeline.liquid_alone import filled_range_m
 from tankcal.pipeline.liquid_body import join_body
 from tankcal.planning.entries import PLAN_FILE
+from tankcal.planning.wall.filling import SAME_M
 from tankcal.uncertainty import combine
 
 LEAST_SHARE = 0.01  # smallest relative reduction of the u of a cause that is listed
 UNCONTROLLED = 1e-4  # redundancy
-SAME_M = 1e-6  # largest difference of equal dips
 OF_INSTRUMENTS = "instrument"  # part of the kinds of causes whose note names the instrument
 
 
@@ -240,8 +240,14 @@ def _rows(plan, bodies, dips, table):
     volumes = bodies["joint"].volume_m3(np.clip(levels, None, bodies["joint"].highest_m))
     columns = (dips, volumes, U_of["geometry"], liquid, U_of["joint"])
     return tuple(
-        DipOutlook(float(dip), float(volume), float(by_geometry), _or_none(alone), float(U))
-        for dip, volume, by_geometry, alone, U in zip(*columns, strict=True)
+        DipOutlook(
+            float(dip),
+            float(volume),
+            float(by_geometry),
+            float(by_liquid) if np.isfinite(by_liquid) else None,
+            float(U),
+        )
+        for dip, volume, by_geometry, by_liquid, U in zip(*columns, strict=True)
     )
 
 
@@ -257,10 +263,6 @@ def _differences(bodies, dips, table):
         DifferenceOutlook(float(low), float(high), float(volume), float(by_geometry), float(U))
         for (low, high), volume, by_geometry, U in zip(*columns, strict=True)
     )
-
-
-def _or_none(number):
-    return float(number) if np.isfinite(number) else None
 
 
 def _causes(result):

@@ -222,7 +222,7 @@ class WallPlan:
         Dips listed with their volumes and differences; (): those of the runs and the full tank.
     expected_run : float or None
         Relative standard deviation of the run effect that the runs are to estimate.
-    holds : callable or None
+    volume_at : callable or None
         Function of a dip, m, that returns the approximate volume, m3, of a tank to be filled.
     obstacles : tuple of Box or Pillar
         Obstacles to lines of sight.
@@ -239,7 +239,7 @@ class WallPlan:
     costs: dict = field(default_factory=dict)
     dips_m: tuple = ()
     expected_run: float | None = None
-    holds: object = None
+    volume_at: object = None
     obstacles: tuple = ()
     folder: str = ""
     raw: RawJob | None = None

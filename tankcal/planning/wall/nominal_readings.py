@@ -41,17 +41,15 @@ def set_nominal_readings(job, amplitudes, expected_run=None):
     """
     if job.tank.kind == "vertical":
         if job.tangents is not None:
-            amplitudes = _expect_amplitudes(_set_nominal_wall(job, amplitudes), amplitudes)
+            # Tangents are reduced with amplitudes of the precision that the readings would reach.
+            first = _set_nominal_wall(job, amplitudes)
+            survey = find_survey(first, lambda text: None, amplitudes).survey
+            amplitudes = expect_amplitudes(survey.field)
         job = _set_nominal_wall(job, amplitudes)
     if job.liquid is None:
         return job
     survey = find_survey(job, lambda text: None, amplitudes).survey
     return _set_nominal_batches(job, survey, expected_run)
-
-
-def _expect_amplitudes(job, amplitudes):
-    """Return `Amplitudes` with the precision of the readings, to reduce the tangents."""
-    return expect_amplitudes(find_survey(job, lambda text: None, amplitudes).survey.field)
 
 
 def _set_nominal_wall(job, amplitudes):

@@ -165,12 +165,10 @@ class WallPrediction(TableResults):
             *locate_in_plan(of_run, self.plan.design),
         )
         return tuple(
-            problem for problem in dict.fromkeys(problems) if _code(problem) not in OF_READINGS
+            problem
+            for problem in dict.fromkeys(problems)
+            if getattr(problem.expected, "code", None) not in OF_READINGS
         )
-
-
-def _code(problem):
-    return getattr(problem.expected, "code", None)
 
 
 def predict_wall(plan):
@@ -259,10 +257,10 @@ def readings_of(result):
     if result.job.tangents is not None:
         tests = judge_tangents(result.job, result.wall, result.sighting)
         tested.append(("tangents", tests.mdb_m[~result.job.tangents.check]))
-    return tuple(_outlook(kind, mdb) for kind, mdb in tested if len(mdb))
-
-
-def _outlook(kind, mdb_m):
-    known = mdb_m[np.isfinite(mdb_m)]
-    largest = float(known.max()) if len(known) else float("nan")
-    return ReadingsOutlook(kind, len(mdb_m), len(mdb_m) - len(known), largest)
+    outlooks = []
+    for kind, mdb_m in tested:
+        if len(mdb_m):
+            known = mdb_m[np.isfinite(mdb_m)]  # the others are uncontrolled
+            largest = float(known.max()) if len(known) else float("nan")
+            outlooks.append(ReadingsOutlook(kind, len(mdb_m), len(mdb_m) - len(known), largest))
+    return tuple(outlooks)

@@ -10,7 +10,7 @@ from tankcal.job.checks.sized_volumes import volume_by_sizes
 from tankcal.job.checks.survey.stadia import is_bar
 from tankcal.job.tables import SETTINGS_FILE, Log, Value
 from tankcal.planning.contract import MEASURING
-from tankcal.planning.entries import PLAN_FILE
+from tankcal.planning.entries import PLAN_FILE, forms_m
 from tankcal.planning.obstacles import obstacles_of
 from tankcal.planning.wall.checks import percents_of, refuse_cut, warnings_of_obstacles
 from tankcal.planning.wall.design_tables import DesignTables
@@ -70,11 +70,12 @@ def design_of(plan_input, courses, celsius=None):
         for course in entry["courses"] or courses
         for percent in percents_of(entry)
     )
+    ties = plan_input.sections["setup_ties"]
     return Design(
         straps=tuple(straps),
         lines=_lines(plan_input.sections["lines"]),
         hits=tuple(_hits(entry, courses) for entry in plan_input.sections["hits"]),
-        ties=_ties(plan_input.sections["setup_ties"]),
+        ties=(int(ties["targets"]), ties["s_mm"], ties["s_arcsec"]) if ties.filled_keys else None,
         control=_control(plan_input.sections["control_targets"]),
         tangents=_tangents(plan_input.sections["tangents"], plan_input.sections["traverse"]),
         runs=runs_of(plan_input.sections["runs"], celsius),
@@ -115,12 +116,6 @@ def _hits(entry, courses):
     )
 
 
-def _ties(entry):
-    if not entry.filled_keys:
-        return None
-    return int(entry["targets"]), entry["s_mm"], entry["s_arcsec"]
-
-
 def _control(entry):
     values = {"targets": entry["targets"], "every_min": entry["every_min"]}
     values = {key: value for key, value in values.items() if value is not None}
@@ -132,23 +127,19 @@ def _control(entry):
 def _tangents(entry, traverse):
     if not entry.filled_keys:
         return None
+    bar_sd = traverse["s_bar_arcsec"]
     return PlannedTangents(
         stations=int(entry["stations"]),
         radius_m=entry["radius_m"],
         at_percent=percents_of(entry),
         sd_arcsec=entry["s_arcsec"],
         traverse=(traverse["s_mm"], traverse["s_arcsec"]),
-        bar=_bar(traverse),
+        bar=None if bar_sd is None else (traverse["bar"], bar_sd),
         start_deg=entry["start_azimuth_deg"] or 0.0,
         height_m=USUAL_HEIGHT_M if entry["height_m"] is None else entry["height_m"],
         readings=int(entry["readings"] or 1),
         instrument=entry["instrument"],
     )
-
-
-def _bar(traverse):
-    sd = traverse["s_bar_arcsec"]
-    return None if sd is None else (traverse["bar"], sd)
 
 
 def wall_plan_of(raw, values, tables, plan_input, limits, folder):
@@ -157,21 +148,18 @@ def wall_plan_of(raw, values, tables, plan_input, limits, folder):
     Raises InputError. Problems of generated tables are reported for the sections that generate
     them.
     """
-    table, holds = tables["courses"], volume_by_sizes(values, raw)
+    table, volume_at = tables["courses"], volume_by_sizes(values, raw)
     courses = ()
     if table is not None:
         courses = tuple(zip(table.of("course"), table.of("height_m"), strict=True))
     celsius = values["table"]["reference_temperature_c"]
     design = design_of(plan_input, tuple(name for name, _ in courses), celsius)
     wall, filling = plan_input.sections["wall"], plan_input.sections["filling"]
-    sizes = (
-        None if wall[key] is None else wall[key] / 1000 for key in ("form_mm", "common_form_mm")
-    )
-    amplitudes = assumed_amplitudes(*sizes, smoothed=design.is_smoothed)
+    amplitudes = assumed_amplitudes(*forms_m(wall), smoothed=design.is_smoothed)
     bottom, diameter = values["datum"]["bottom_z_m"], values["tank"]["nominal_diameter_m"]
     zero = 0.0 if bottom is None else zero_z(values) - bottom
     obstacles = () if bottom is None else obstacles_of(plan_input)
-    tank = (courses, diameter and diameter / 2, bottom, zero, holds, obstacles)
+    tank = (courses, diameter and diameter / 2, bottom, zero, volume_at, obstacles)
     warnings = ()
     if obstacles:
         design_tables = DesignTables(design, *tank, bars=lengths_of_bars(raw))
@@ -187,7 +175,7 @@ def wall_plan_of(raw, values, tables, plan_input, limits, folder):
         costs={key: value or 0.0 for key, value in plan_input.sections["costs"].values.items()},
         dips_m=tuple(sorted(set(filling["dips_m"] or ()))),
         expected_run=expected,
-        holds=holds,
+        volume_at=volume_at,
         obstacles=obstacles,
         folder=folder,
         raw=raw,
@@ -234,7 +222,7 @@ def _tank_of(plan):
     datum, diameter = job.datum, job.tank.nominal_diameter_m
     radius, bottom = diameter and diameter / 2, datum.bottom_z_m
     zero = 0.0 if bottom is None else datum.plate_level_m
-    return courses, radius, bottom, zero, plan.holds, plan.obstacles
+    return courses, radius, bottom, zero, plan.volume_at, plan.obstacles
 
 
 def job_of_design(raw, design, tank, expected, rows=None):
