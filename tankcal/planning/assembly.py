@@ -245,7 +245,20 @@ def photographs_of(ring, number, shell, image_sd_mm, place):
 
 
 def setups_of(entry, number, shell, place):
-    """Return the set-ups of the `number`th [[setup_rings]]."""
+    """Return the set-ups of the `number`th [[setup_rings]].
+
+    Parameters
+    ----------
+    entry : Entry
+    number : int
+    shell : Shell
+    place : tuple
+        (file, row, column) of the ring, for messages.
+
+    Returns
+    -------
+    list of PlannedSetup
+    """
     setups = []
     positions = list(_positions(entry, shell))
     names = [f"T{number}-{i + 1}" + (f"-{k + 1}" if k else "") for _, _, i, k in positions]

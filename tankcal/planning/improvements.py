@@ -266,7 +266,19 @@ def _candidates(effects, now, limit, add):
 
 
 def count_poor_targets(plan, seen, result):
-    """Number of targets of a plan that are not determined, or have fewer rays than the limit."""
+    """Number of targets of a plan that are not determined, or have fewer rays than the limit.
+
+    Parameters
+    ----------
+    plan : Plan
+    seen : Visibility
+    result : PredictedTable
+
+    Returns
+    -------
+    int
+        With set-ups, rays are not counted, as one set-up determines a target.
+    """
     count = len(plan.targets.names)
     lost = count - len(result.covariance.points)
     wanted = 0 if plan.setups else plan.limits.rays

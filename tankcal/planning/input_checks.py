@@ -30,7 +30,19 @@ _NAMED = {
 
 
 def check_input(values, registers, plan_input, raw, log):
-    """Check that names are defined, combinations of keys are valid, and not all sds are zero."""
+    """Check that names are defined, combinations of keys are valid, and not all sds are zero.
+
+    Parameters
+    ----------
+    values : dict or None
+        {section: {key: value}} of the settings of the job; None if unreadable.
+    registers : dict
+        {register: {name: values}} of cameras and instruments.
+    plan_input : PlanInput
+    raw : RawJob
+        Content of the plan's folder.
+    log : Log
+    """
     for section, key, register in (
         ("photo_rings", "camera", "cameras"),
         ("setup_rings", "instrument", "instruments"),

@@ -234,6 +234,19 @@ def _instrument_reading(true_m, name, tools, off):
 
 
 def draw_blunders(rng, share, count):
-    """Draw errors (count,) in standard deviations: 0, or a blunder for a share of the readings."""
+    """Draw errors in standard deviations: 0, or a blunder for a share of the readings.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    share : float
+        Probability of a blunder, 0 to 1.
+    count : int
+        Number of readings.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+    """
     sign = np.where(rng.random(count) < 0.5, -1.0, 1.0)
     return BLUNDER_SDS * sign * (rng.random(count) < share)

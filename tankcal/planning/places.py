@@ -118,7 +118,22 @@ def full_turn(angle_rad):
 
 
 def places_around(axis_m, azimuth_rad, radius_m):
-    """Positions (..., 2) at azimuths (clockwise from +y) and distances from an axis."""
+    """Positions at azimuths and distances from an axis.
+
+    Parameters
+    ----------
+    axis_m : array_like, shape (2,)
+        Position of the axis, m.
+    azimuth_rad : array_like
+        Azimuths, clockwise from +y, rad.
+    radius_m : array_like
+        Distances, m; broadcast against the azimuths.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        m.
+    """
     azimuth, radius = np.broadcast_arrays(azimuth_rad, radius_m)
     return np.asarray(axis_m) + radius[..., None] * np.stack(
         [np.sin(azimuth), np.cos(azimuth)], axis=-1

@@ -31,7 +31,17 @@ FAR_M = 1000.0  # largest plausible distance of an obstacle from the wall
 
 
 def check_positions(plan, plan_input, raw, log):
-    """Check all positions: stations in the wall, targets above the shell, obstructed ties."""
+    """Check all positions: stations in the wall, targets above the shell, obstructed ties.
+
+    Parameters
+    ----------
+    plan : Plan
+    plan_input : PlanInput
+        Valid sections and tables, for the places of messages.
+    raw : RawJob
+        Content of the plan's folder.
+    log : Log
+    """
     if not plan.photos and not plan.setups:
         log.problem(
             PLAN_FILE,

@@ -135,10 +135,22 @@ def predict_table(plan, network):
 
 
 def recompute_table(plan, network, before):
-    """Return the PredictedTable of a Plan with the wall of another plan; None if the walls differ.
+    """Return the PredictedTable of a Plan with the wall of another plan.
 
-    `before` is the PredictedTable of a plan with the same targets and tank. Outlines keep their
-    weights; uncertainties are propagated with the new covariance.
+    Outlines keep their weights; uncertainties are propagated with the new covariance.
+
+    Parameters
+    ----------
+    plan : Plan
+    network : Predicted
+        Predicted network of the plan.
+    before : PredictedTable
+        Prediction of a plan with the same targets and tank.
+
+    Returns
+    -------
+    PredictedTable or None
+        None if the walls differ.
     """
     targets, covariance = _find_determined(plan, network)
     known = before.job.points
@@ -233,7 +245,12 @@ class TableResults:
 def refuse_without_delivery(plan, result, tall):
     """Raise InputError if the limit is for deliveries and no delivery of the table is long enough.
 
-    tall: height of the shell, m.
+    Parameters
+    ----------
+    plan : Plan or WallPlan
+    result : PredictedTable or WallTable
+    tall : float
+        Height of the shell, m.
     """
     if plan.limits.quantity == "delivery" and not result.stated.worst:
         least = min(plan.job.table.minimum_delivery_m or MINIMA_M)

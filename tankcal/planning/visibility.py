@@ -105,9 +105,22 @@ def find_measurable(plan, seen):
 
 
 def find_in_frame(setup, photo, xyz_m):
-    """Image coordinates (n, 2), mm, of points (n, 3), and whether they lie in the frame.
+    """Find the points in the frame of a photograph.
 
-    setup is the job.CameraSetup of the photograph.
+    Parameters
+    ----------
+    setup : CameraSetup
+        Camera of the photograph.
+    photo : Photograph
+    xyz_m : ndarray, shape (n, 3)
+        Points, m.
+
+    Returns
+    -------
+    image : ndarray, shape (n, 2)
+        Image coordinates, mm; nan far outside the frame.
+    inside : ndarray of bool, shape (n,)
+        Whether the points lie in the frame.
     """
     # camera coordinates; the camera looks along -w
     u, v, w = photo.rotation @ (xyz_m - photo.xyz_m).T

@@ -348,7 +348,21 @@ def _azimuths_of_ring(start_deg, count):
 def tangent_sight(station, z, radius_m, is_right):
     """Return {column: value} of a sight from a station to a limb of a circle about the origin.
 
-    The zero of the horizontal circle is +y; z is the height of the limb.
+    Parameters
+    ----------
+    station : array_like, shape (3,)
+        Position of the instrument, m.
+    z : float
+        Height of the limb, m.
+    radius_m : float
+        Radius of the circle, m.
+    is_right : bool
+        Whether the right limb is sighted.
+
+    Returns
+    -------
+    dict
+        Direction from +y and zenith angle, degrees.
     """
     azimuth, length = limb_of_circle(station[:2], radius_m, is_right=is_right)
     return {
@@ -358,7 +372,20 @@ def tangent_sight(station, z, radius_m, is_right):
 
 
 def limb_of_circle(station_m, radius_m, *, is_right):
-    """Azimuth and length of a sight from a station (2,) to a limb of a circle about the origin."""
+    """Sight from a station to a limb of a circle about the origin.
+
+    Parameters
+    ----------
+    station_m : array_like, shape (2,)
+    radius_m : float
+    is_right : bool
+        Whether the right limb is sighted.
+
+    Returns
+    -------
+    azimuth_rad, length_m : float
+        Azimuth of the sight, clockwise from +y, and its length.
+    """
     away = np.hypot(*station_m)
     turn = np.arcsin(radius_m / away) * (1 if is_right else -1)
     return azimuth_of_axis(station_m) + turn, np.sqrt(away**2 - radius_m**2)

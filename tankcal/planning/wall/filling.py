@@ -18,7 +18,15 @@ SAME_M = 1e-6  # largest difference of equal dips
 
 
 def check_runs(plan_input, is_run_declared, log):
-    """Check [[runs]] and [filling]; is_run_declared: whether [liquid] has a run_ppm."""
+    """Check [[runs]] and [filling].
+
+    Parameters
+    ----------
+    plan_input : PlanInput
+    is_run_declared : bool
+        Whether [liquid] has a run_ppm.
+    log : Log
+    """
     runs, filling = plan_input.sections["runs"], plan_input.sections["filling"]
     if filling.filled_keys and not runs:
         expected = message(

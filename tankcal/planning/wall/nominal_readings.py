@@ -64,7 +64,17 @@ def _set_nominal_wall(job, amplitudes):
 def set_readings(job, wall, errors=EXACT):
     """Return the job with the circumferences, offsets, hits and limbs of a wall of its tank.
 
-    wall is a RoundWall or DrawnWall; errors are the Errors of the readings.
+    Parameters
+    ----------
+    job : Job
+        Job with readings at the planned places; their values are replaced.
+    wall : RoundWall or DrawnWall
+    errors : Errors, optional
+        Errors of the readings; default: none.
+
+    Returns
+    -------
+    Job
     """
     return replace(
         job,

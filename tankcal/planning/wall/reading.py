@@ -60,9 +60,19 @@ def is_wall_plan(sections):
 
 
 def design_of(plan_input, courses, celsius=None):
-    """Return the `Design` of valid sections for the given courses.
+    """Return the `Design` of valid sections.
 
-    celsius: temperature of the table.
+    Parameters
+    ----------
+    plan_input : PlanInput
+    courses : tuple of str
+        Names of the courses, from the bottom up.
+    celsius : float, optional
+        Temperature of the table.
+
+    Returns
+    -------
+    Design
     """
     straps = (
         PlannedStrap(course, percent, entry["s_mm"], int(entry["readings"] or 1), _more(entry))
@@ -145,8 +155,27 @@ def _tangents(entry, traverse):
 def wall_plan_of(raw, values, tables, plan_input, limits, folder):
     """Return the WallPlan of valid sections; its job is read like any other job.
 
-    Raises InputError. Problems of generated tables are reported for the sections that generate
-    them.
+    Parameters
+    ----------
+    raw : RawJob
+        Content of the plan's folder.
+    values : dict
+        {section: {key: value}} of the settings of the job.
+    tables : dict
+        {name: ColumnValues or None} of the tables of the job.
+    plan_input : PlanInput
+    limits : Limits
+    folder : str
+        Name of the folder.
+
+    Returns
+    -------
+    WallPlan
+
+    Raises
+    ------
+    InputError
+        Problems of generated tables are reported for the sections that generate them.
     """
     table, volume_at = tables["courses"], volume_by_sizes(values, raw)
     courses = ()
@@ -190,7 +219,24 @@ def _rows_of(plan_input):
 
 
 def change_plan(plan, design=None, raw=None):
-    """Return the WallPlan with another Design or other instruments."""
+    """Return the WallPlan with another design or other instruments, and its new job.
+
+    Parameters
+    ----------
+    plan : WallPlan
+    design : Design, optional
+    raw : RawJob, optional
+        Content of the folder with other instruments.
+
+    Returns
+    -------
+    WallPlan
+
+    Raises
+    ------
+    InputError
+        If the readings of the new design are no valid job.
+    """
     design, raw = design or plan.design, raw or plan.raw
     expected = plan.amplitudes, plan.expected_run
     job = job_of_design(raw, design, _tank_of(plan), expected)

@@ -163,10 +163,24 @@ def _draw_sizes(job, known, rng):
 
 
 def compare_survey(prediction, wall, job):
-    """Return error and U of the full tank, share of rows within U, and number of rejected readings.
+    """Compare the table of a simulated survey with the true volumes of its wall.
 
-    wall is the simulated wall (`tank_walls.DrawnWall` or another with a known volume); job is the
-    Job with its readings.
+    Parameters
+    ----------
+    prediction : WallPrediction
+    wall : DrawnWall
+        Simulated wall, or another wall with a known volume.
+    job : Job
+        Job with the readings of the wall.
+
+    Returns
+    -------
+    error_m3, U_m3 : float
+        Error and U by the survey of the full tank, m3.
+    within : float
+        Share of the rows within U of the true volume.
+    rejected : int
+        Number of rejected readings.
     """
     surveyed = find_survey(job, lambda text: None)
     table = compute_table(surveyed.job, surveyed.survey).table

@@ -36,12 +36,24 @@ BATCHES = (  # columns left blank in liquid.csv
 
 
 def write(prediction, directory, workbook=False):
-    """Write the empty job of a Prediction into a new folder, as text files or as job.xlsx."""
+    """Write the empty job of a plan of targets.
+
+    Parameters
+    ----------
+    prediction : Prediction
+    directory : path
+        New folder.
+    workbook : bool, optional
+        Write job.xlsx instead of text files.
+    """
     write_form(directory, form_of(prediction), workbook)
 
 
 def write_wall(prediction, directory, workbook=False):
-    """Write the empty job of a WallPrediction into a new folder, as text files or as job.xlsx."""
+    """Write the empty job of a plan of the bare wall.
+
+    Parameters are those of `write`, with a WallPrediction.
+    """
     write_form(directory, form_of_wall(prediction.plan), workbook)
 
 

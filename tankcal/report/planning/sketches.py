@@ -48,9 +48,20 @@ def wall(paper):
 
 
 def unrolled_wall(paper, high=2.8, named=False):
-    """Return (figure, axes) of the unrolled wall with courses and welds, arc by height.
+    """Draw the unrolled wall with courses and welds, arc by height.
 
-    high is the height of the figure, inches; named: whether welds have names for a legend.
+    Parameters
+    ----------
+    paper : PlanPaper
+    high : float, optional
+        Height of the figure, inches.
+    named : bool, optional
+        Whether welds have names for a legend.
+
+    Returns
+    -------
+    figure : Figure
+    ax : Axes
     """
     plan, joints = paper.plan, joints_m(paper.plan)
     around = 2 * np.pi * plan.shell.radius_m
