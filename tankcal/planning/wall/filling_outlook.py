@@ -270,32 +270,22 @@ def _causes(result):
     adjusted, fill = result.adjusted, result.fill
     metering = result.known.geometry.job.liquid
     outlooks = []
-    columns = dict(zip(fill.meters, _columns(adjusted, "meter_factor", len(fill.meters)),
-                       strict=True))  # fmt: skip
-    for name in fill.meters:
+    effects = (effect for effect in adjusted.effects if effect.kind == "meter_factor")
+    columns = next((effect.columns.T for effect in effects), None)
+    for number, name in enumerate(fill.meters):
         u = 1e6 * metering.meters[name].u_factor
-        outlooks.append(
-            CauseOutlook("meter_factor", name, "ppm", u, u * _left(adjusted, columns[name]))
-        )
+        left = 1.0 if columns is None else _left(adjusted, columns[number])
+        outlooks.append(CauseOutlook("meter_factor", name, "ppm", u, u * left))
     of_geometry = [source for source in result.known.sources if not source.parts]
     of_liquid = [cause for cause in result.known.liquid if cause.kind != "meter_factor"]
     for cause in (*of_geometry, *of_liquid):
         if cause.u and cause.unit and cause.columns_m3.shape[1] == 1:
             left = _left(adjusted, cause.columns_m3[:, 0])
             if left < 1 - LEAST_SHARE:
-                name, u = (
-                    cause.note if cause.kind.startswith(OF_INSTRUMENTS) else "",
-                    float(cause.u),
-                )
+                name = cause.note if cause.kind.startswith(OF_INSTRUMENTS) else ""
+                u = float(cause.u)
                 outlooks.append(CauseOutlook(cause.kind, name, cause.unit, u, u * left))
     return tuple(outlooks)
-
-
-def _columns(adjusted, kind, count):
-    for effect in adjusted.effects:
-        if effect.kind == kind:
-            return effect.columns.T
-    return [None] * count
 
 
 def _left(adjusted, column):
@@ -303,8 +293,8 @@ def _left(adjusted, column):
 
     Column (n,): effect of one u on the misclosures.
     """
-    if column is None:
-        return 1.0
+    # A cause with prior variance 1 has the posterior variance 1 - c' M c, with the weights M of
+    # all tests (`tank.liquid.adjustment`).
     return float(np.sqrt(max(1.0 - column @ adjusted.weight @ column, 0.0)))
 
 

@@ -101,10 +101,12 @@ def _read_straps(job, wall, errors):
     shell_c = job.survey.shell_temperature_c
     girth = np.array([wall.girth_m(strap.course, strap.level_m) for strap in strapping.straps])
     reduced = reduce_straps(strapping, shell_c, diameter)
+    # Errors are added to the reduced perimeters, in which the standard deviations are defined.
     girth += errors.draw([strap.sd_m for strap in reduced])
     girth += [
         sum(errors.draw_cause(e.kind, e.name) * e.by_m for e in strap.effects) for strap in reduced
     ]
+    # The reduction (temperature, tension, friction) depends on the reading: invert by iteration.
     for _ in range(ROUNDS):
         reduced = reduce_straps(strapping, shell_c, diameter)
         short = girth - [strap.circumference_m for strap in reduced]
@@ -171,6 +173,7 @@ def _read_hits(job, wall, errors):
         distance[of_kind], cosine[of_kind] = _intersect(
             wall, station[of_kind], ray[of_kind], level, inside=within
         )
+    # Distances with their common errors, then the inverse of the corrections by the certificate.
     known = [hits.instruments[name] for name in hits.instrument]
     bias = [errors.draw_cause("incidence", tool.name) * tool.u_incidence_m for tool in known]
     distance *= 1 + np.array([errors.scale(tool) for tool in known])
@@ -188,10 +191,12 @@ def _read_hits(job, wall, errors):
 
 def _intersect(wall, station_m, ray, level, *, inside):
     """Distance along horizontal rays (n, 2) to a level of the wall, and cosine of incidence."""
+    # First the circle of nominal radius: |station + far ray|^2 = R^2, a quadratic in far.
     square, along = np.sum(ray**2, axis=1), np.sum(station_m * ray, axis=1)
     beyond = along**2 - square * (np.sum(station_m**2, axis=1) - wall.nominal_m**2)
     root = np.sqrt(np.maximum(beyond, 0.0))
     far = (-along + (root if inside else -root)) / square
+    # Then Newton: the distance from the axis changes by the slope (cosine of incidence) per metre.
     for _ in range(ROUNDS):
         x, y = (station_m + far[:, None] * ray).T
         away = np.hypot(x, y)

@@ -1,5 +1,6 @@
 """Predict a plan of a bare wall: compute its job with nominal readings."""
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -225,6 +226,8 @@ def courses_of(result):
         return ()
     job, field = result.job, result.wall.field
     courses = len(job.courses)
+    # Mean radius of a course: Gauss weights over its height. Its variance has two parts: the
+    # part of each component of the wall that the readings do not show, and their noise.
     mean = np.kron(np.eye(courses), panels([0.0, 1.0], LEVELS)[1])
     weights = mean @ field.means.weights
     covariance = sum(mean @ field.means.unseen(i) @ mean.T for i in range(len(COMPONENTS)))
@@ -232,17 +235,14 @@ def courses_of(result):
     noise = field.noise_m2 if isinstance(wall, StrappedWall) else noise_of_wall(wall)
     sds = np.sqrt(np.diag(covariance) + np.einsum("ij,jk,ik->i", weights, noise, weights))
     names = [course.name for course in job.courses]
-    counts = {kind: dict.fromkeys(names, 0) for kind in ("straps", "offsets", "hits", "tangents")}
-    for reading in () if job.strapping is None else job.strapping.straps:
-        counts["straps"][reading.course] += 1
-    for reading in () if job.lines is None else job.lines.offsets:
-        counts["offsets"][reading.course] += 1
-    for course in () if job.hits is None else job.hits.course:
-        counts["hits"][course] += 1
-    for course in () if job.tangents is None else job.tangents.course:
-        counts["tangents"][course] += 1
+    straps = Counter(
+        () if job.strapping is None else (strap.course for strap in job.strapping.straps)
+    )
+    offsets = Counter(() if job.lines is None else (offset.course for offset in job.lines.offsets))
+    hits = Counter(() if job.hits is None else job.hits.course)
+    tangents = Counter(() if job.tangents is None else job.tangents.course)
     return tuple(
-        CourseOutlook(name, *(counts[kind][name] for kind in counts), float(sd))
+        CourseOutlook(name, straps[name], offsets[name], hits[name], tangents[name], float(sd))
         for name, sd in zip(names, sds, strict=True)
     )
 

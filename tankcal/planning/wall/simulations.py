@@ -153,6 +153,7 @@ def _draw_sizes(job, known, rng):
 
     A shape declared in the job determines the size of the ovality.
     """
+    # Sizes are positive and known to a factor: their logarithms are normal.
     sizes = np.exp(rng.multivariate_normal(np.log(known.likely_m2), known.log_covariance))
     shape_m = None if job.strapping is None else job.strapping.shape_sd_m
     if shape_m is not None:
