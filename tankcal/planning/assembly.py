@@ -68,9 +68,9 @@ def assemble_plan(job, plan_input, bars, folder):
     places |= {setup.name: setup.xyz_m for setup in setups}
     known = _known_points(job.measurements.control, places)
     extra |= {
-        control_point.name: control_point.xyz_m
-        for control_point in known
-        if control_point.name not in places and np.isfinite(control_point.xyz_m).all()
+        point.name: point.xyz_m
+        for point in known
+        if point.name not in places and np.isfinite(point.xyz_m).all()
     }
     return Plan(
         job=replace(job, measurements=replace(job.measurements, control=None)),
@@ -79,9 +79,7 @@ def assemble_plan(job, plan_input, bars, folder):
         photos=tuple(photos),
         setups=tuple(setups),
         ties=tuple(ties),
-        known=tuple(
-            control_point for control_point in known if np.isfinite(control_point.sd_m).any()
-        ),
+        known=tuple(point for point in known if np.isfinite(point.sd_m).any()),
         extra=extra,
         facing=facing,
         obstacles=obstacles_of(plan_input),

@@ -73,9 +73,9 @@ def _control(plan):
     if not plan.known:
         return None
     return KnownPoints(
-        point=tuple(control_point.name for control_point in plan.known),
-        xyz_m=np.array([control_point.xyz_m for control_point in plan.known]),
-        sd_m=np.array([control_point.sd_m for control_point in plan.known]),
+        point=tuple(point.name for point in plan.known),
+        xyz_m=np.array([point.xyz_m for point in plan.known]),
+        sd_m=np.array([point.sd_m for point in plan.known]),
         system=(None,) * len(plan.known),
         check=np.zeros(len(plan.known), dtype=bool),
     )

@@ -98,9 +98,9 @@ def find_measurable(plan, seen):
         kinds = (setup.direction_sd_rad, setup.zenith_sd_rad, setup.distance_sd_m)
         count = count + seen.on_setup[k] * sum(sd is not None for sd in kinds)
         count[names[setup.name]] += FEWEST_READINGS
-    for control_point in plan.known:
-        if control_point.name in names:
-            count[names[control_point.name]] += np.isfinite(control_point.sd_m).sum()
+    for point in plan.known:
+        if point.name in names:
+            count[names[point.name]] += np.isfinite(point.sd_m).sum()
     return count >= FEWEST_READINGS
 
 
@@ -235,16 +235,8 @@ def find_separate_bodies(plan, seen):
     A set-up is a body: the points that it sees and its own position. Points known in x, y and z are
     another body. Bodies with two common points are merged.
     """
-    bodies = [
-        (
-            [],
-            {
-                control_point.name
-                for control_point in plan.known
-                if np.isfinite(control_point.sd_m).all()
-            },
-        )
-    ]
+    fixed = {point.name for point in plan.known if np.isfinite(point.sd_m).all()}
+    bodies = [([], fixed)]
     for k, setup in enumerate(plan.setups):
         seen_there = {seen.points[i] for i in np.flatnonzero(seen.on_setup[k])}
         bodies.append(([setup.name], seen_there | {setup.name}))

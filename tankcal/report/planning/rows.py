@@ -139,20 +139,10 @@ def others(prediction):
     plan, lost = prediction.plan, lost_points(prediction)
     setup_names = {setup.name for setup in plan.setups}
     return [
-        {"point": name, "done": "unseen" if name in lost else None} | _position(plan, xyz)
+        {"point": name, "done": "unseen" if name in lost else None} | vars(place_of(plan, xyz))
         for name, xyz in plan.extra.items()
         if name not in setup_names
     ]
-
-
-def _position(plan, xyz_m):
-    place = place_of(plan, xyz_m)
-    return {
-        "arc_m": place.arc_m,
-        "azimuth_rad": place.azimuth_rad,
-        "off_m": place.off_m,
-        "height_m": place.height_m,
-    }
 
 
 def stations(plan):
@@ -166,7 +156,7 @@ def stations(plan):
         first = exposures[0]
         row = {"station": name, "camera": first.camera, "photographs": len(exposures)}
         row["rolls"] = ", ".join(f"{roll}°" for roll in rolls)
-        rows.append(row | _position(plan, first.xyz_m))
+        rows.append(row | vars(place_of(plan, first.xyz_m)))
     return rows
 
 
@@ -204,7 +194,7 @@ def setups(prediction):
             "points": int(seen.sum()),
         }
         | {key: getattr(setup, key) for key in SD_KEYS}
-        | _position(plan, setup.xyz_m)
+        | vars(place_of(plan, setup.xyz_m))
         for setup, seen in zip(plan.setups, prediction.visibility.on_setup, strict=True)
     ]  # fmt: skip
 
@@ -277,7 +267,7 @@ def control(plan):
             f"s{axis}_m": float(sd) if np.isfinite(sd) else None
             for axis, sd in zip("xyz", known.sd_m, strict=True)
         }
-        | _position(plan, known.xyz_m)
+        | vars(place_of(plan, known.xyz_m))
         for known in plan.known
     ]
 
@@ -337,7 +327,7 @@ def place_of_change(change):
         xyz = np.array([*ends[:, :2].mean(axis=0), ends[:, 2].min()])
     else:
         return {}
-    return _position(plan, xyz)
+    return vars(place_of(plan, xyz))
 
 
 def find_by_name(items, name):

@@ -165,16 +165,7 @@ def _filling(paper):
 
 
 def _dips(paper, filling):
-    rows = [
-        {
-            "dip_m": dip.dip_m,
-            "volume_m3": dip.volume_m3,
-            "U_geometry_m3": dip.U_geometry_m3,
-            "U_liquid_m3": dip.U_liquid_m3,
-            "U_m3": dip.U_m3,
-        }
-        for dip in filling.dips
-    ]
+    rows = [vars(dip) for dip in filling.dips]
     liquid = Column("U_liquid_m3", "m3", digits=2)
     columns = [DIP, Column("volume_m3", "m3", u="U_m3"), U_GEOMETRY, liquid, U_JOINT]
     return _table(paper, "filled_dips", rows, columns)
@@ -182,14 +173,7 @@ def _dips(paper, filling):
 
 def _differences(paper, filling):
     rows = [
-        {
-            "low_m": difference.low_m,
-            "high_m": difference.high_m,
-            "volume_m3": difference.volume_m3,
-            "U_geometry_m3": difference.U_geometry_m3,
-            "U_m3": difference.U_m3,
-            "relative": difference.U_m3 / difference.volume_m3,
-        }
+        vars(difference) | {"relative": difference.U_m3 / difference.volume_m3}
         for difference in filling.differences
     ]
     ends = [Column(key, "m", height=True) for key in ("low_m", "high_m")]

@@ -192,6 +192,12 @@ def _instruments(plan):
     return rows
 
 
+def _polar(x, y):
+    """Return azimuth and distance of a position from the axis of the tank."""
+    azimuth = np.arctan2(x, y) % (2 * np.pi)
+    return {"azimuth_rad": float(azimuth), "from_axis_m": float(np.hypot(x, y))}
+
+
 def _setups(plan):
     hits = plan.job.hits
     rows = []
@@ -200,8 +206,7 @@ def _setups(plan):
         rows.append(
             {
                 "setup": name,
-                "azimuth_rad": float(np.arctan2(x, y) % (2 * np.pi)),
-                "from_axis_m": float(np.hypot(x, y)),
+                **_polar(x, y),
                 "height_m": setup.height_m,
                 "instrument": setup.instrument,
             }
@@ -253,13 +258,12 @@ def _stations(plan):
     return [
         {
             "setup": name,
-            "azimuth_rad": float(np.arctan2(x, y) % (2 * np.pi)),
-            "from_axis_m": float(np.hypot(x, y)),
-            "height_m": tangents.setups[name].height_m,
+            **_polar(*places[name][:2]),
+            "height_m": setup.height_m,
             "expected_m": to_neighbour[name],
-            "instrument": tangents.setups[name].instrument,
+            "instrument": setup.instrument,
         }
-        for name, (x, y, _) in places.items()
+        for name, setup in tangents.setups.items()
     ]
 
 
