@@ -114,15 +114,10 @@ def _check_tapes(plan_input, log):
     seen = set()
     for entry in plan_input.sections["tapes"]:
         if entry["name"] in seen:
-            entry.report(
-                log.problem,
-                "name",
-                message(
-                    "plan_tape_twice",
-                    "found {found!r} again; expected it once",
-                    found=entry["name"],
-                ),
+            expected = message(
+                "plan_tape_twice", "found {found!r} again; expected it once", found=entry["name"]
             )
+            entry.report(log.problem, "name", expected)
         seen.add(entry["name"])
 
 

@@ -17,18 +17,14 @@ def check_obstacles(plan_input, log):
     for entry in plan_input.sections["obstacles"]:
         for key, count in needed.get(entry["kind"], {}).items():
             if not entry.is_refused(key) and len(entry[key] or ()) != count:
-                entry.report(
-                    log.problem,
-                    key,
-                    message("plan_numbers_metres", "expected {count} numbers, metres", count=count),
+                expected = message(
+                    "plan_numbers_metres", "expected {count} numbers, metres", count=count
                 )
+                entry.report(log.problem, key, expected)
         for key in numbers.get(entry["kind"], ()):
             if key not in entry.filled_keys:
-                entry.report(
-                    log.problem,
-                    key,
-                    message("plan_number_metres", "missing; expected a number, metres"),
-                )
+                expected = message("plan_number_metres", "missing; expected a number, metres")
+                entry.report(log.problem, key, expected)
         if None not in (entry["low_m"], entry["high_m"]) and entry["high_m"] <= entry["low_m"]:
             expected = message(
                 "plan_high_low",

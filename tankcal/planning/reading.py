@@ -201,38 +201,35 @@ def _read(folder, log):
     data = content(PLAN_FILE, MAX_SETTINGS_BYTES)
     parsed = None if data is None else parsed_toml(PLAN_FILE, data, log)
     log.stop_if_problems()
-    text, (whole, rows) = decode(PLAN_FILE, data, log), parsed
+    whole, rows = parsed
+    text = decode(PLAN_FILE, data, log)
     rows, text = _refuse_misspelt(whole, rows, text, log)
     plan_sections = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
     _refuse_nothing_measured(plan_sections, log)
     settings, sections = flattened(PLAN_FILE, whole, rows, log)
-    needed = () if is_wall_plan(plan_sections) else ("pattern",)
+    is_wall = is_wall_plan(plan_sections)
+    needed = () if is_wall else ("pattern",)
     checked = {
-        name: _single(name, plan_sections.get(name, {}), rows, log, name in needed)
+        name: _read_section(name, plan_sections.get(name, {}), rows, log, name in needed)
         for name in SINGLE
     }
-    checked |= {name: _repeated(name, plan_sections.get(name, []), text, log) for name in REPEATED}
+    for name in REPEATED:
+        checked[name] = _read_sections(name, plan_sections.get(name, []), text, log)
     marks = declared_marks(PLAN_FILE, settings, log)
-    is_wall = is_wall_plan(plan_sections)
-    beside = tuple(table_name for table_name in JOB_TABLES if table_name != "control") + WALL_TABLES
-    tables, known = (
-        {},
-        [f"{table_name}.csv" for table_name in (beside if is_wall else (*JOB_TABLES, *TABLES))],
-    )
+    # The design of a bare wall generates its control.
+    of_wall = (*(name for name in JOB_TABLES if name != "control"), *WALL_TABLES)
+    known = [f"{name}.csv" for name in (of_wall if is_wall else (*JOB_TABLES, *TABLES))]
+    tables = {}
     for path in sorted(folder.glob("*.csv")):
         if path.name not in known:
-            log.problem(
-                path.name,
-                message(
-                    "plan_unknown_file", "unknown file; expected {known}", known=", ".join(known)
-                ),
+            expected = message(
+                "plan_unknown_file", "unknown file; expected {known}", known=", ".join(known)
             )
+            log.problem(path.name, expected)
             continue
-        table = content(path.name)
-        is_readable = table is not None and marks is not None
-        tables[path.stem] = (
-            read_csv(path.name, table, *marks, log, PLAN_FILE) if is_readable else None
-        )
+        table, tables[path.stem] = content(path.name), None
+        if table is not None and marks is not None:
+            tables[path.stem] = read_csv(path.name, table, *marks, log, PLAN_FILE)
     registers = {}
     for name in REGISTERS:
         if (folder / f"{name}.toml").exists():
@@ -251,18 +248,18 @@ def _refuse_misspelt(content, rows, text, log):
     """Report sections with misspelt names; return (rows, text) with the corrected names.
 
     Reading continues under the corrected name, so that the section is not also reported as missing.
-    A name that would appear twice, or with other brackets, is removed from `whole`.
+    A name that would appear twice, or with other brackets, is removed from `content`.
     """
-    of_jobs = {name.partition(".")[0] for name in KEYS}
-    known = (*of_jobs, *SINGLE, *REPEATED)
-    for name in [section_name for section_name in content if section_name not in known]:
-        entries = content[name] if isinstance(content[name], list) else [content[name]]
+    sections_of_jobs = {name.partition(".")[0] for name in KEYS}
+    known = (*sections_of_jobs, *SINGLE, *REPEATED)
+    for name in [section for section in content if section not in known]:
+        is_list = isinstance(content[name], list)
+        entries = content[name] if is_list else [content[name]]
         right = meant(name, known)
         if right is None or not all(isinstance(entry, dict) for entry in entries):
             continue
         places = _rows_of(re.escape(name), text)
         row = places[0][0] if places else rows.get(name)
-        is_list = isinstance(content[name], list)
         column = f"[[{name}]]" if is_list else f"[{name}]"
         log.problem(PLAN_FILE, unknown_section(name, known), row, column)
         entries = content.pop(name)
@@ -299,43 +296,36 @@ def _table(name, table, log):
     for field in TABLES[name]:
         if isinstance(field, Count):
             for row, count in zip(values.rows, values.of(field.name), strict=True):
-                if not _is_whole(count):
-                    log.problem(values.file, _not_whole(field, count), row, field.name)
+                if why := _explain_fraction(field, count):
+                    log.problem(values.file, why, row, field.name)
     return values
 
 
-def _single(section, entries, rows, log, is_needed):
+def _read_section(section, entries, rows, log, is_needed):
+    """Return the Entry of a [section] of a plan."""
     if not isinstance(entries, dict):
-        log.problem(
-            PLAN_FILE,
-            message("plan_one_section", "expected one [{section}]", section=section),
-            rows.get(section),
-            section,
-        )
+        expected = message("plan_one_section", "expected one [{section}]", section=section)
+        log.problem(PLAN_FILE, expected, rows.get(section), section)
         entries = {}
     key_rows = {key: rows.get(f"{section}.{key}") for key in entries}
-    return _entry(section, SINGLE[section], entries, rows.get(section), key_rows, log, is_needed)
+    return _check_entry(
+        section, SINGLE[section], entries, rows.get(section), key_rows, log, is_needed
+    )
 
 
-def _repeated(section, entries, text, log):
+def _read_sections(section, entries, text, log):
     """Return the list of Entry of a [[section]] of a plan."""
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        log.problem(
-            PLAN_FILE,
-            message(
-                "plan_double_brackets",
-                "expected [[{section}]], in double brackets",
-                section=section,
-            ),
-            None,
-            section,
+        expected = message(
+            "plan_double_brackets", "expected [[{section}]], in double brackets", section=section
         )
+        log.problem(PLAN_FILE, expected, None, section)
         return []
     result, places = [], _rows_of(section, text)
     for number, entry in enumerate(entries):
         row, rows = places[number] if number < len(places) else (None, {})
         name = f"{section}[{number + 1}]"
-        result.append(_entry(name, REPEATED[section], entry, row, rows, log, is_needed=True))
+        result.append(_check_entry(name, REPEATED[section], entry, row, rows, log, is_needed=True))
     return result
 
 
@@ -355,7 +345,8 @@ def _rows_of(section, text):
     return sections
 
 
-def _entry(name, fields, entries, row, rows, log, is_needed=False):
+def _check_entry(name, fields, entries, row, rows, log, is_needed=False):
+    """Return the Entry of the checked keys of a section; rows: {key: row} for messages."""
     known = [field.name for field in fields]
     for key in entries:
         if key not in known:
@@ -374,19 +365,18 @@ def _entry(name, fields, entries, row, rows, log, is_needed=False):
         )
         for field in fields
     }
-    filled = frozenset(key for key, value in entries.items() if not is_blank(value))
-    checked = Entry(name, values, filled, row, rows)
+    filled_keys = frozenset(key for key, value in entries.items() if not is_blank(value))
+    checked = Entry(name, values, filled_keys, row, rows)
     for field in fields:
-        if isinstance(field, Count) and not _is_whole(values[field.name]):
-            checked.report(log.problem, field.name, _not_whole(field, values[field.name]))
+        if isinstance(field, Count) and (why := _explain_fraction(field, values[field.name])):
+            checked.report(log.problem, field.name, why)
     return checked
 
 
-def _is_whole(value):
-    return value is None or float(value).is_integer()
-
-
-def _not_whole(field, value):
+def _explain_fraction(field, value):
+    """Return the message about a value that is no whole number; "" if it is whole or blank."""
+    if value is None or float(value).is_integer():
+        return ""
     return message(
         "plan_not_whole",
         "found {found:g}; expected {expected}",
