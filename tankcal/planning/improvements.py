@@ -254,11 +254,11 @@ def _candidates(effects, now, limit, add):
 
     Dropping an item must not add to the targets that are weak already.
     """
-    works, before = [effect for effect in effects if not effect.why], now.relative_u
+    possible, before = [effect for effect in effects if not effect.why], now.relative_u
     if add:
-        gains = [effect for effect in works if effect.relative_u < (1 - LEAST_GAIN) * before]
+        gains = [effect for effect in possible if effect.relative_u < (1 - LEAST_GAIN) * before]
         return sorted(gains, key=lambda gain: _worth(gain, before), reverse=True)
-    keeps = [effect for effect in works if limit is not None and effect.relative_u <= limit]
+    keeps = [effect for effect in possible if limit is not None and effect.relative_u <= limit]
     if not isinstance(now.plan, WallPlan):
         poor = count_poor_targets(now.plan, now.visibility, now.result)
         keeps = [effect for effect in keeps if effect.poor <= poor]

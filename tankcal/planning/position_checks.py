@@ -361,7 +361,7 @@ def _check_control(plan, control, log):
     """
     points, setups = plan.points, [setup.name for setup in plan.setups]
     placed = {name: points[name] for name in (*plan.targets.names, *plan.facing, *setups)}
-    acting = {control_point.name for control_point in plan.known}
+    constraining = {point.name for point in plan.known}
     stated = np.column_stack([control.numbers(f"{axis}_m") for axis in "xyz"])
     for row, name, xyz in zip(control.rows, control.of("point"), stated, strict=True):
         if name in placed:
@@ -379,7 +379,7 @@ def _check_control(plan, control, log):
                 )
                 column = f"{'xyz'[np.argmax(np.abs(off))]}_m"
                 log.problem(control.file, expected, row, column)
-        elif name in acting and np.isnan(xyz).any():
+        elif name in constraining and np.isnan(xyz).any():
             expected = message(
                 "plan_control_no_target",
                 "{point} is no target of the plan; expected all its coordinates",
@@ -401,14 +401,14 @@ def _check_bases(plan, plan_input, log):
     setups = [setup.name for setup in plan.setups]
     stations = [name for name in plan.points if name not in plan.targets.names]
     for base in plan.bases:
-        is_sound = True
+        is_known = True
         for column, name, known in (("setup", base.setup, setups), ("to", base.to, stations)):
             if name not in known:
-                is_sound = False
+                is_known = False
                 log.problem(STADIA_FILE, _unknown_station(column, name, known), base.row, column)
         if base.setup == base.to:
             refuse_itself(log, plan_input.stadia, base.row, base.to)
-        elif is_sound and (why := _explain_unreadable_bar(plan, base)):
+        elif is_known and (why := _explain_unreadable_bar(plan, base)):
             log.problem(STADIA_FILE, why, base.row, "to")
 
 
