@@ -35,7 +35,7 @@ def asked_language(path):
 
 def asked_of_plan(path):
     """Return the language of a plan for `load_plan`, or None."""
-    from tankcal.planning.given import PLAN_FILE
+    from tankcal.planning.entries import PLAN_FILE
 
     path = Path(path)
     try:

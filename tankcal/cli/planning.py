@@ -209,15 +209,15 @@ def _simulated(prediction, options, show):
 
 def _summary(prediction):
     """Yield the items of the plan and the predicted quality of its points."""
-    from tankcal.planning.bases import by_ends
+    from tankcal.planning.bases import group_by_ends
 
     plan = prediction.plan
-    solution = prediction.predicted.adjusted.solution
+    solution = prediction.network.adjusted.solution
     counts = {
         "photographs": len(plan.photos),
         "setups": len(plan.setups),
         "ties": len(plan.ties),
-        "bases": len(by_ends(plan.bases)),
+        "bases": len(group_by_ends(plan.bases)),
         "control": len(plan.known),
         "targets": len(plan.targets.names),
     }
@@ -258,7 +258,7 @@ def _verdict(prediction):
     """Yield the top of the table, the worst delivery, and the limit."""
     plan = prediction.plan
     yield _top(prediction.table)
-    for delivery in prediction.tabled.stated.worst[:1]:
+    for delivery in prediction.result.stated.worst[:1]:
         worst = delivery.relative
         yield message(
             "plan_worst",
@@ -373,7 +373,7 @@ def _design(path):
     values = {
         "before": _percent(path.start_u),
         "after": _percent(path.relative_u),
-        "tried": path.tried,
+        "tried": path.evaluations,
     }
     if path.start_cost or path.cost:
         yield message(

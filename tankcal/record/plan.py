@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.planning.bases import by_ends
-from tankcal.planning.doubtful import GroupReliability
+from tankcal.planning.bases import group_by_ends
 from tankcal.planning.prediction import PointOutlook, SectionOutlook
+from tankcal.planning.reliability import GroupReliability
 from tankcal.record.plain_data import to_plain
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Saved, filled_from, key
@@ -150,25 +150,27 @@ def parts_of_any_plan(prediction):
     """{key: its value} of what files of all plans have: limit, table, sources, warnings."""
     table, limits = prediction.table, prediction.plan.limits
     return {
-        "limit": PlanLimit(limits.relative_u, limits.of, prediction.relative_u, prediction.meets),
+        "limit": PlanLimit(
+            limits.relative_u, limits.quantity, prediction.relative_u, prediction.meets
+        ),
         "table": filled_from(PlannedTable, table),
         "sources": [
             PlannedSource(one.kind, np.linalg.norm(one.columns_m3[-1])) for one in table.sources
         ],
         "worst_deliveries": [
-            filled_from(PlannedDelivery, one) for one in prediction.tabled.stated.worst
+            filled_from(PlannedDelivery, one) for one in prediction.result.stated.worst
         ],
         "warnings": warnings_of(prediction.warnings),
     }
 
 
 def _survey(prediction):
-    plan, solution = prediction.plan, prediction.predicted.adjusted.solution
+    plan, solution = prediction.plan, prediction.network.adjusted.solution
     return PlannedSurvey(
         photo_stations=len(plan.stations),
         photographs=len(plan.photos),
         setups=len(plan.setups),
-        ties=len(plan.ties) + len(by_ends(plan.bases)),
+        ties=len(plan.ties) + len(group_by_ends(plan.bases)),
         control_points=len(plan.known),
         targets=len(plan.targets.names),
         observations=solution.rows,
