@@ -6,7 +6,6 @@ import numpy as np
 
 from tankcal.job.checking import has_rows
 from tankcal.job.checks.survey.stadia import bars_used
-from tankcal.job.measuring import ARCSEC
 from tankcal.planning.model import Base
 from tankcal.survey.measurements import Readings
 from tankcal.survey.stadia import angle_of_distance_rad, distance_sd_m
