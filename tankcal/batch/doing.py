@@ -218,26 +218,26 @@ def _report(task, clock):
 
 def _compare(task, clock):
     from tankcal.recalibration.inputs import Asked, compare_files
-    from tankcal.record.comparison import plain_of_comparison
+    from tankcal.record.schema import to_plain
     from tankcal.report.comparison import write_comparison
 
     record, asked = _record(task), task.job.asked
     comparison = compare_files(Asked(former_of(task.job), record, rule=asked.compare_by))
     return write_comparison(
-        plain_of_comparison(comparison), _place(task, "compare"), _language(task, record), None,
+        to_plain(comparison), _place(task, "compare"), _language(task, record), None,
         _letterhead(asked),
     )  # fmt: skip
 
 
 def _inspect(task, clock):
     from tankcal.inspection.inspecting import Asked, inspect_files
-    from tankcal.record.inspection import plain_of_inspection
+    from tankcal.record.schema import to_plain
     from tankcal.report.inspection import write_inspection
 
     asked = task.job.asked
     source, rule, levelled = reading.source_of_inspection(task.job, _place(task, "run"))
     inspection = inspect_files(Asked(source, rule=asked.inspect_by or rule, **levelled))
-    plain = plain_of_inspection(inspection)
+    plain = to_plain(inspection)
     language = asked.language or reading.language_of(source)
     return write_inspection(plain, _place(task, "inspect"), language, None, _letterhead(asked))
 

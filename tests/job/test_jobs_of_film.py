@@ -15,9 +15,9 @@ from survey_builder import read_on_comparator, survey_parts
 
 import tankcal
 from tankcal.job import load
+from tankcal.record.adjusted import fiducials_of
 from tankcal.record.adjustment import adjustment_of
-from tankcal.record.images import fiducials_of
-from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import to_plain
 from tankcal.report.survey.images import images
 from tankcal.survey.network_of_survey import gather
 from tankcal.text.words import load_words

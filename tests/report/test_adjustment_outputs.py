@@ -30,7 +30,7 @@ from tankcal.memory import return_freed_memory, without_collection
 from tankcal.pipeline.chain import adjust_job
 from tankcal.record.adjusted import _edge_effect, adjusted_points_of
 from tankcal.record.adjustment import _group
-from tankcal.record.plain_data import rows_of
+from tankcal.record.columns import rows_of
 from tankcal.report import attachments, outputs, workbook
 from tankcal.report.document import blocks_of
 from tankcal.report.notebook import execute, joined

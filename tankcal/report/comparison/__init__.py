@@ -7,7 +7,8 @@ from functools import partial
 
 from tankcal.messages import message
 from tankcal.record import manifest, save
-from tankcal.record.comparison import COMPARISON, plain_of_comparison
+from tankcal.record.comparison import COMPARISON
+from tankcal.record.schema import to_plain
 from tankcal.report.comparison.paper import FILE, WORKBOOK, ComparisonPaper
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL
 from tankcal.report.saved_folder import SavedFolder, write_pages
@@ -64,7 +65,7 @@ def write_comparison(found, folder, language=None, progress=None, letterhead=Non
     InputError
         For a folder that is not tankcal's to replace, and what is no comparison.
     """
-    plain = found if isinstance(found, dict) else plain_of_comparison(found)
+    plain = found if isinstance(found, dict) else to_plain(found)
     paper = ComparisonPaper(plain, language, letterhead)
     return _FOLDER.write(folder, partial(_write, paper), language, progress)
 

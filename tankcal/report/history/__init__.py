@@ -7,7 +7,8 @@ from functools import partial
 
 from tankcal.messages import message
 from tankcal.record import manifest, save
-from tankcal.record.history import HISTORY, plain_of_history
+from tankcal.record.history import HISTORY
+from tankcal.record.schema import to_plain
 from tankcal.report.history.paper import FILE, WORKBOOK, HistoryPaper
 from tankcal.report.history.tables import (
     CERTIFICATES,
@@ -77,7 +78,7 @@ def write_history(found, folder, language=None, progress=None, letterhead=None):
     InputError
         For a folder that is not tankcal's to replace, and what is no history.
     """
-    plain = found if isinstance(found, dict) else plain_of_history(found)
+    plain = found if isinstance(found, dict) else to_plain(found)
     paper = HistoryPaper(plain, language, letterhead)
     return _FOLDER.write(folder, partial(_write, paper), language, progress)
 

@@ -5,7 +5,7 @@ import numpy as np
 import tankcal
 from tankcal.messages import as_plain
 from tankcal.planning.changes import IMAGES
-from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import to_plain
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper, words_with_part
 from tankcal.report.planning import rows

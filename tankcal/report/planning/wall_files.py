@@ -3,7 +3,7 @@
 from tankcal.job.starter import FilledForm, write_form
 from tankcal.planning.wall.reading import datum_of, tables_of
 from tankcal.record import save
-from tankcal.record.wall_plan import plain_of_wall
+from tankcal.record.plan import plain_of_wall
 from tankcal.report.planning.empty_job import AS_GIVEN, MEASURED, as_given, entries, short, text
 from tankcal.report.planning.files import write_capacity, write_effects
 from tankcal.text.languages import DEFAULT

@@ -1,6 +1,6 @@
 """The capacity table and its proportional parts, in the units of the job."""
 
-from tankcal.record.plain_data import rows_of
+from tankcal.record.columns import rows_of
 from tankcal.report import numbers
 from tankcal.report.tables.table import Column, Table
 from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, k_of_rows, stated_U_m3
