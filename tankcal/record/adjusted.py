@@ -8,7 +8,7 @@ from scipy.special import fdtri, gammaincinv
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.geometry.rotations import angle_derivatives, angles_of
 from tankcal.record.columns import ArrayColumns, ArrayRows, Texts, plain_if_short
-from tankcal.record.schema import Finite, Saved, filled_from, key
+from tankcal.record.schema import Finite, Saved, fill_from, key
 from tankcal.survey.network.quality import ellipsoid_factor, ellipsoids, precision
 
 ELLIPSE = 0.95  # probability of the ellipses and ellipsoids that are drawn and listed
@@ -200,7 +200,7 @@ def precision_of(adjustment):
     xyz, dof = np.asarray(adjustment.xyz_m)[free], adjustment.dof
     found = precision(xyz, np.asarray(adjustment.covariance_m2)[free])
     sd = np.sqrt(np.einsum("nii->ni", np.asarray(adjustment.covariance_m2)[free]))
-    return filled_from(
+    return fill_from(
         PointPrecision,
         found,
         points=int(free.sum()),
@@ -265,7 +265,7 @@ def _camera(interior):
     scope = dict(zip(PARAMETERS, interior.scope, strict=True))
     state = dict(zip(PARAMETERS, interior.state, strict=True))
     names = [name for name in PARAMETERS if scope[name] != "off"]
-    return filled_from(
+    return fill_from(
         AdjustedCamera,
         interior,
         parameters=names,
@@ -440,7 +440,7 @@ def image_readings_of(repeats):
     """`ImageReadings` of `RepeatedReadings`; None where each point was read once."""
     if repeats is None:
         return None
-    return filled_from(
+    return fill_from(
         ImageReadings,
         repeats,
         points=len(repeats.point),
@@ -469,7 +469,7 @@ def fiducials_of(fits):
 
 def _fit(fit):
     found = fit.transformation
-    return filled_from(
+    return fill_from(
         FiducialTransformation,
         fit,
         parameters=list(found.parameters),
@@ -494,7 +494,7 @@ def _fit(fit):
 
 def depth_of(depth):
     """`DepthCorrection` of a `DepthOfField`; None where it was not asked for."""
-    return filled_from(DepthCorrection, depth)
+    return fill_from(DepthCorrection, depth)
 
 
 def _rejected(cls, one):

@@ -28,7 +28,7 @@ from tankcal.record.adjusted import (
     systems_of,
 )
 from tankcal.record.columns import ArrayColumns, plain_if_short
-from tankcal.record.schema import Columns, Finite, Saved, filled_from, key
+from tankcal.record.schema import Columns, Finite, Saved, fill_from, key
 from tankcal.record.texts import Text, text_of
 from tankcal.survey.results import DatumReport, GroupOfReadings, Reading, Readings
 
@@ -167,7 +167,7 @@ def adjustment_of(adjustment, measurements=None):
     settings = getattr(measurements, "settings", None)
     test = adjustment.adjusted.test(CONFIDENCE)
     dof = adjustment.redundancy
-    return filled_from(
+    return fill_from(
         AdjustmentRecord,
         adjustment,
         chi2=test.chi2,
@@ -191,11 +191,11 @@ def adjustment_of(adjustment, measurements=None):
         depth_of_field=depth_of(adjustment.depth),
         instruments=instruments_of(adjustment, measurements),
         systems=systems_of(adjustment),
-        setups=[filled_from(AdjustedSetup, one) for one in getattr(measurements, "setups", ())],
+        setups=[fill_from(AdjustedSetup, one) for one in getattr(measurements, "setups", ())],
         points=adjusted_points_of(adjustment, measurements),
         precision=precision_of(adjustment),
         check_points=_check_points(adjustment.check_points),
-        causes=[filled_from(SharedCause, cause) for cause in adjustment.causes],
+        causes=[fill_from(SharedCause, cause) for cause in adjustment.causes],
         left_out=[text_of(one) for one in adjustment.aside],
     )
 
@@ -231,7 +231,7 @@ def _held(readings):
 
 def _held_value(reading, controlled):
     sd = reading.mdb / noncentrality(ALPHA, POWER) if controlled else None
-    return filled_from(
+    return fill_from(
         HeldValue,
         reading,
         released=reading.value + reading.w * sd if controlled else None,
@@ -278,7 +278,7 @@ def _check_points(found):
         )
         for name, difference, sd in rows
     ]
-    return filled_from(CheckedPoints, found, points=points)
+    return fill_from(CheckedPoints, found, points=points)
 
 
 def _largest(difference, sd):

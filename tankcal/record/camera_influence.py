@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.calibration.influence.blocks import InteriorValue
 from tankcal.record.camera_product import ProductFile, product_of
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.schema import Saved, filled_from, key, to_plain
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 
 MM, UM = 1e3, 1e3
 ARCSEC = np.degrees(1.0) * 3600
@@ -163,13 +163,13 @@ class InfluenceFile(CameraFile, kw_only=True):
 def as_json(influence):
     """The `InfluenceFile` of an Influence, as plain data."""
     block = influence.runs[0].block
-    found = filled_from(
+    found = fill_from(
         InfluenceFile,
         influence,
         photos=len(block.photos) if block else 0,
         points=len(block.points) if block else 0,
         search=BlunderSearch(
-            influence.searched, [filled_from(ReadingSetAside, one) for one in influence.removed]
+            influence.searched, [fill_from(ReadingSetAside, one) for one in influence.removed]
         ),
         runs=[_run(number, one, influence) for number, one in enumerate(influence.runs)],
         pairs=[_shifts(PairOfRuns, one, one=one.one, other=one.other) for one in influence.pairs],
@@ -180,17 +180,17 @@ def as_json(influence):
 def _run(number, run, influence):
     against = [one for one in influence.pairs if (one.one, one.other) == (0, number)]
     block = run.block
-    return filled_from(
+    return fill_from(
         AdjustedRun,
         run,
         skipped=Skipped(run.skipped) if run.skipped else None,
         quality=_quality(block),
-        images=block and filled_from(RunImages, block.images),
+        images=block and fill_from(RunImages, block.images),
         convention=block and block.form.convention,
         affinity=block and block.form.affinity,
         interior=block and block.interior,
         product=product_of(block.check) if block and block.check else None,
-        volume=filled_from(RunVolume, run.volume),
+        volume=fill_from(RunVolume, run.volume),
         shifts=_shifts(Shifts, against[0]) if against else None,
     )
 
@@ -199,7 +199,7 @@ def _quality(block):
     if block is None:
         return None
     test = block.test
-    return filled_from(
+    return fill_from(
         RunQuality,
         block,
         chi2_low=test.low if test.dof else None,
@@ -211,9 +211,9 @@ def _quality(block):
 
 def _shifts(cls, pair, **numbers):
     return cls(
-        points=filled_from(PointShifts, pair.points),
-        photos=filled_from(PhotoShifts, pair.photos),
+        points=fill_from(PointShifts, pair.points),
+        photos=fill_from(PhotoShifts, pair.photos),
         aligned=pair.aligned,
-        volume=None if pair.volume_m3 is None else filled_from(VolumeShift, pair),
+        volume=None if pair.volume_m3 is None else fill_from(VolumeShift, pair),
         **numbers,
     )

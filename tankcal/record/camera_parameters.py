@@ -35,7 +35,7 @@ from tankcal.calibration.edges import Shift
 from tankcal.calibration.parameters.recommendation import Advice
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.schema import Saved, filled_from, key, to_plain
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 
 MM = 1e3
 
@@ -246,13 +246,13 @@ def as_json(result):
     limit, parts = result.limit, result.components
     known = not math.isnan(limit.um) or not math.isnan(limit.px)
     unscaled = parts.unscaled or parts.of == "covariance"
-    found = filled_from(
+    found = fill_from(
         ParametersFile,
         result,
-        image_accuracy=filled_from(ImageAccuracy, limit) if known else None,
+        image_accuracy=fill_from(ImageAccuracy, limit) if known else None,
         parameters=[_parameter(result, name) for name in result.own],
-        groups=[filled_from(GroupTest, test) for test in result.groups],
-        components=filled_from(
+        groups=[fill_from(GroupTest, test) for test in result.groups],
+        components=fill_from(
             PrincipalComponents, parts, values_of="values" if unscaled else "standardised"
         ),
         without=[_without(result, trial) for trial in result.trials],
@@ -304,7 +304,7 @@ def _without(result, trial):
         values,
         sds,
         correlation,
-        outcome and filled_from(PointsMoved, outcome.moved),
+        outcome and fill_from(PointsMoved, outcome.moved),
         volume.value_m3 - base.value_m3 if volume and base else None,
         *_volume(volume),
     )
@@ -323,7 +323,7 @@ def _after(trial):
 
 def _volume(volume):
     """The values of `TopOfTable`, None of None."""
-    found = filled_from(TopOfTable, volume)
+    found = fill_from(TopOfTable, volume)
     return [None] * 5 if found is None else vars(found).values()
 
 
@@ -332,8 +332,8 @@ def _silva(rule):
         HighComponent(number + 1, share, [Loading(*one) for one in high])
         for number, share, high in rule.high
     ]
-    return filled_from(SilvasRule, rule, components=components)
+    return fill_from(SilvasRule, rule, components=components)
 
 
 def _pessoa(rule):
-    return filled_from(PessoasRule, rule, keep=[KeptBecause(*one) for one in rule.keep])
+    return fill_from(PessoasRule, rule, keep=[KeptBecause(*one) for one in rule.keep])

@@ -4,7 +4,7 @@ from typing import Literal
 
 from tankcal.calibration.product.check import ADVISED, AxisCheck, Precision, Reached
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.schema import Saved, filled_from, key, to_plain
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 
 
 class PartJudged(Saved):
@@ -86,16 +86,16 @@ class ProductFile(CameraFile, kw_only=True):
 
 def product_of(check):
     """The `ProductFile` of a ProductCheck."""
-    return filled_from(
+    return fill_from(
         ProductFile,
         check,
         n=len(check.names),
         axes=check.checks,
-        parts=[filled_from(PartJudged, one, largest_m=one.size_m.max()) for one in check.parts],
+        parts=[fill_from(PartJudged, one, largest_m=one.size_m.max()) for one in check.parts],
         notes=[ProductNote(*one) for one in check.notes],
         advised=ADVISED,
-        table=filled_from(LimitsUsed, check.table),
-        verdicts=[filled_from(ClassJudged, one) for one in check.verdicts],
+        table=fill_from(LimitsUsed, check.table),
+        verdicts=[fill_from(ClassJudged, one) for one in check.verdicts],
         best=_best(check),
         differences=[
             {"point": name}

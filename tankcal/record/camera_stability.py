@@ -22,7 +22,7 @@ import numpy as np
 
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.schema import Saved, filled_from, key, to_plain
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 
 DECIMALS = 4  # of a difference in pixels
 _KEYS = [f"{name}_{UNITS[name]}" if UNITS[name] else name for name in PARAMETERS]
@@ -110,12 +110,12 @@ class StabilityFile(CameraFile, kw_only=True):
 
 def as_json(result):
     """The `StabilityFile` of a Stability, as plain data."""
-    found = filled_from(
+    found = fill_from(
         StabilityFile,
         result,
         conventions=[{"code": one.code, **one.values} for one in result.conventions],
-        grid=filled_from(ComparisonGrid, result.grid),
-        terrain=result.terrain and filled_from(ComparisonTerrain, result.terrain, seed=result.seed),
+        grid=fill_from(ComparisonGrid, result.grid),
+        terrain=result.terrain and fill_from(ComparisonTerrain, result.terrain, seed=result.seed),
         cameras=[_camera(setup, result.format_px) for setup in result.setups],
         pairs=[_pair(pair, result) for pair in result.pairs],
     )
@@ -139,7 +139,7 @@ def summary(result):
 
 def _camera(setup, format_px):
     camera = setup.camera
-    return filled_from(
+    return fill_from(
         ComparedCamera,
         camera,
         **dict(zip(PARAMETERS, np.asarray(camera.values, dtype=float).tolist(), strict=True)),
@@ -152,7 +152,7 @@ def _camera(setup, format_px):
 def _pair(pair, result):
     length = np.hypot(*pair.difference_px.T)
     along, up = (_on_grid(part, result.grid) for part in pair.difference_px.T)
-    return filled_from(
+    return fill_from(
         ComparedPair,
         pair,
         method=result.method,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
-from tankcal.record.schema import Finite, Saved, filled_from, key
+from tankcal.record.schema import Finite, Saved, fill_from, key
 
 
 class MeterUsed(Saved):
@@ -171,7 +171,7 @@ def liquid_of(result):
         return None
     low, high = found.filled_m
     flex, bottom = found.bottom_flex, found.bottom_m3
-    return filled_from(
+    return fill_from(
         LiquidRecord,
         found,
         geometry=geometry_beside(result),
@@ -220,7 +220,7 @@ def _meters(found, metering):
         meter, mine = metering.meters[one.name], of == one.name
         flows = flow[mine & np.isfinite(flow)]
         told.append(
-            filled_from(
+            fill_from(
                 MeterUsed,
                 meter,
                 meter=one.name,
@@ -345,4 +345,4 @@ def _controls(found):
 
 
 def _volumes(table):
-    return filled_from(VolumesBeside, table)
+    return fill_from(VolumesBeside, table)

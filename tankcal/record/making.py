@@ -27,7 +27,7 @@ from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
 from tankcal.record.long_tables import LongTables
 from tankcal.record.radii import RadiiRecord, radii_of
-from tankcal.record.schema import Saved, filled_from, key, to_plain
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 from tankcal.record.ship import ShipRecord, ship_of
 from tankcal.record.strapping import StrappingRecord, strapping_of
 from tankcal.record.tangents import TangentsRecord, tangents_of
@@ -177,7 +177,7 @@ def record_of(result):
             courses=survey.courses_of(result),
             wall_shape=shape_record(job, result.wall),
             capacity=table.capacity_of(result),
-            interpolation=filled_from(table.InterpolationError, result.straightness),
+            interpolation=fill_from(table.InterpolationError, result.straightness),
             proportional_parts=table.proportional_parts_of(result),
             densities=table.densities_of(result),
             gross=table.gross_of(result),
@@ -222,5 +222,5 @@ def _beginning(job):
     return {
         "versions": versions,
         "files": job.files,
-        "job": filled_from(JobAsRead, job, inspection=job.inspection),
+        "job": fill_from(JobAsRead, job, inspection=job.inspection),
     }

@@ -11,7 +11,7 @@ from tankcal.planning.wall.changes import wall_count
 from tankcal.planning.wall.filling_outlook import FillingOutlook
 from tankcal.planning.wall.prediction import CourseOutlook, ReadingsOutlook
 from tankcal.record.saved_formats import SavedFormat
-from tankcal.record.schema import Saved, filled_from, key, to_plain
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 from tankcal.record.texts import WarningRecord, warnings_of
 
 PLAN = SavedFormat("tankcal-plan", 1, "plan.json")  # so far one version
@@ -138,14 +138,14 @@ def plain_of(prediction, simulated=None, job=()):
 
     simulated  `simulations.Simulated`, or None        job  [{file, sha256}] of the empty job
     """
-    found = filled_from(
+    found = fill_from(
         PlanFile,
         prediction,
         survey=_survey(prediction),
-        precision=filled_from(PlannedPrecision, prediction.precision),
+        precision=fill_from(PlannedPrecision, prediction.precision),
         **parts_of_any_plan(prediction),
     )
-    return to_plain(replace(found, simulated=filled_from(SimulatedPlan, simulated), job=job))
+    return to_plain(replace(found, simulated=fill_from(SimulatedPlan, simulated), job=job))
 
 
 def parts_of_any_plan(prediction):
@@ -153,12 +153,12 @@ def parts_of_any_plan(prediction):
     table, limits = prediction.table, prediction.plan.limits
     return {
         "limit": PlanLimit(limits.relative_u, limits.of, prediction.relative_u, prediction.meets),
-        "table": filled_from(PlannedTable, table),
+        "table": fill_from(PlannedTable, table),
         "sources": [
             PlannedSource(one.kind, np.linalg.norm(one.columns_m3[-1])) for one in table.sources
         ],
         "worst_deliveries": [
-            filled_from(PlannedDelivery, one) for one in prediction.tabled.stated.worst
+            fill_from(PlannedDelivery, one) for one in prediction.tabled.stated.worst
         ],
         "warnings": warnings_of(prediction.warnings),
     }
@@ -176,7 +176,7 @@ def _survey(prediction):
         observations=solution.rows,
         unknowns=solution.estimated,
         redundancy=solution.dof,
-        datum=filled_from(PlannedDatum, prediction.datum),
+        datum=fill_from(PlannedDatum, prediction.datum),
     )
 
 
@@ -246,13 +246,13 @@ def plain_of_wall(prediction, simulated=None, job=()):
 
     simulated  `SimulatedWall`, or None        job  [{file, sha256}] of the empty job
     """
-    found = filled_from(
+    found = fill_from(
         WallPlanFile,
         prediction,
         survey=survey_of(prediction.plan),
         **parts_of_any_plan(prediction),
     )
-    return to_plain(replace(found, simulated=filled_from(SimulatedWallPlan, simulated), job=job))
+    return to_plain(replace(found, simulated=fill_from(SimulatedWallPlan, simulated), job=job))
 
 
 def survey_of(plan):

@@ -10,7 +10,7 @@ from tankcal.pipeline.section_homogeneity import homogeneity_of
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import mean_radii
 from tankcal.record.columns import ArrayColumns, ArrayRows, plain_if_short
-from tankcal.record.schema import Finite, Saved, filled_from, key
+from tankcal.record.schema import Finite, Saved, fill_from, key
 
 EVEN = 720  # azimuths; they resolve products of an outline with the highest mode of the form
 
@@ -129,7 +129,7 @@ def shell_of(result):
         return None
     shell, sections = result.wall.shell, result.wall.sections
     residuals = np.concatenate([section.circle.residuals_m for section in sections])
-    return filled_from(
+    return fill_from(
         Wall,
         shell,
         x_m=shell.axis_m[0],
@@ -251,7 +251,7 @@ def _section_of(result, section):
     height = xyz[:, 2] - result.job.datum.bottom_z_m - group.height_m
     offset = xyz[:, :2] - np.outer(height, result.wall.shell.slope) - (circle.x_m, circle.y_m)
     modes, even = outline.modes_m(), np.arange(360.0)
-    return filled_from(
+    return fill_from(
         SectionCircle,
         section,
         course=result.job.courses[group.course].name,
@@ -309,7 +309,7 @@ def courses_of(result):
         height = top_m - shape.bottom_m
         volume, u = _partial(result, shape.bottom_m, top_m)
         rows.append(
-            filled_from(
+            fill_from(
                 CourseOfShell,
                 course,
                 bottom_m=shape.bottom_m,
@@ -440,8 +440,8 @@ def homogeneity_record(job, wall):
     found = None if wall is None else homogeneity_of(job, wall)
     if found is None:
         return None
-    sections = [filled_from(SectionTestRecord, one) for one in found.sections]
-    return filled_from(HomogeneityRecord, found, sections=sections)
+    sections = [fill_from(SectionTestRecord, one) for one in found.sections]
+    return fill_from(HomogeneityRecord, found, sections=sections)
 
 
 # ---- decisions against the search for blunders
@@ -485,7 +485,7 @@ def overrulings_of(result):
     found = result.overrulings
     if found is None:
         return None
-    return filled_from(
+    return fill_from(
         OverrulingsRecord,
         found,
         each=[

@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.pipeline.chain import PARTS
 from tankcal.record.covariance_factor import FactorBlock, blocks_of
-from tankcal.record.schema import Finite, Saved, filled_from, key
+from tankcal.record.schema import Finite, Saved, fill_from, key
 from tankcal.tank.budgets import budget
 from tankcal.tank.dips import ProportionalParts, dip_label
 
@@ -71,7 +71,7 @@ def capacity_of(result):
     kinds = [source.kind for source in table.sources for _ in range(source.columns_m3.shape[1])]
     counts = {kind: kinds.count(kind) for kind in kinds}
     numbers = [kinds[: i + 1].count(kind) for i, kind in enumerate(kinds)]
-    return filled_from(
+    return fill_from(
         CapacityTable,
         table,
         zero=zero_of(result),
@@ -318,7 +318,7 @@ def budget_of(result):
 def budget_lines(rows):
     """The `BudgetLine` of each `gum.BudgetRow`."""
     return [
-        filled_from(
+        fill_from(
             BudgetLine,
             one,
             unit=one.unit or None,
@@ -391,7 +391,7 @@ def _interval(U_m3, low_m3, high_m3, source):
 
 def _budget_of(one, asked, judged, interval):
     stated = asked.get((one.low_m, one.high_m))
-    return filled_from(
+    return fill_from(
         StatedBudget,
         one,
         **interval,
@@ -413,7 +413,7 @@ def monte_carlo_of(result):
     if simulation is None:
         return None
     rows = _of_volumes(simulation.found, simulation.judged)
-    return filled_from(
+    return fill_from(
         MonteCarlo,
         simulation,
         validated=int(np.sum(simulation.judged.validated)),
@@ -444,10 +444,10 @@ def intervals_of(result):
 
 def rule_of(verdict):
     """`TableJudged` of a `RuleVerdict`; None without one."""
-    return verdict and filled_from(
+    return verdict and fill_from(
         TableJudged,
         verdict,
-        rule=filled_from(RuleOfTable, verdict.rule),
-        uncertainty=[filled_from(UncertaintyJudged, one) for one in verdict.uncertainty],
-        deviation=[filled_from(DeviationJudged, one) for one in verdict.deviation],
+        rule=fill_from(RuleOfTable, verdict.rule),
+        uncertainty=[fill_from(UncertaintyJudged, one) for one in verdict.uncertainty],
+        deviation=[fill_from(DeviationJudged, one) for one in verdict.deviation],
     )

@@ -1,7 +1,7 @@
 """Texts with the code and the values that say them in another language, and problems."""
 
 from tankcal.messages import as_plain
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, fill_from, key
 
 
 class Text(Saved):
@@ -31,6 +31,6 @@ def text_of(message):
 def warnings_of(problems):
     """The `WarningRecord` of each `errors.Problem`."""
     return [
-        filled_from(WarningRecord, one, text=str(one.expected), **as_plain(one.expected))
+        fill_from(WarningRecord, one, text=str(one.expected), **as_plain(one.expected))
         for one in problems
     ]

@@ -13,7 +13,7 @@ from tankcal.planning import load_plan, predict
 from tankcal.record.camera_product import as_json
 from tankcal.record.camera_versions import CAMERA
 from tankcal.record.plan import PLAN, plain_of
-from tankcal.record.schema import checked, from_plain, to_plain
+from tankcal.record.schema import check_data, from_plain, to_plain
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera.paper import load
 from tankcal.report.planning import empty_job
@@ -34,7 +34,7 @@ def listed_keys(saved_format, version, kind="plan"):
 def assert_is_of_its_schema(saved, saved_format):
     """Every key is there, none is unknown, every value is of its type."""
     schema = saved_format.schema(saved.get("kind"))
-    assert checked(saved, schema, "kept") == ([], [])
+    assert check_data(saved, schema, "kept") == ([], [])
     unknown = keys_in(saved, FREE) - keys_of_schema(schema, optional=True)
     assert unknown == set()
 
