@@ -28,7 +28,7 @@ from tankcal.cli import main
 from tankcal.job.covariance import read_covariance
 from tankcal.memory import return_freed_memory, without_collection
 from tankcal.pipeline.chain import adjust_job
-from tankcal.record.adjusted import _edge_effect, adjusted_points_of
+from tankcal.record.adjusted import _edge_effect, point_results_of
 from tankcal.record.adjustment import _group
 from tankcal.record.columns import rows_of
 from tankcal.report import attachments, outputs, workbook
@@ -281,7 +281,7 @@ def made(covariance_m2, cov_scale=1.0, redundancy=10):
 
 def test_error_ellipsoid_and_ellipse_in_closed_form():
     """Closed form: axes of a diagonal covariance; published factors 2.80 (3-D) and 2.45 (2-D)."""
-    (point,) = adjusted_points_of(made(np.diag([1e-6, 9e-6, 4e-6])))
+    (point,) = point_results_of(made(np.diag([1e-6, 9e-6, 4e-6])))
     assert point["ellipsoid_m"] == pytest.approx([0.0083865, 0.0055910, 0.0027955], rel=1e-4)
     assert point["ellipse_m"] == pytest.approx([0.0073432, 0.0024477], rel=1e-4)
     assert point["ellipse_azimuth_deg"] == pytest.approx(0.0)
@@ -289,12 +289,12 @@ def test_error_ellipsoid_and_ellipse_in_closed_form():
     assert point["spherical_sd_m"] == pytest.approx(0.002)
     assert point["quadratic_sd_m"] == pytest.approx(np.sqrt(14e-6))
     turned = np.array([[5e-6, 4e-6, 0], [4e-6, 5e-6, 0], [0, 0, 1e-6]])
-    assert adjusted_points_of(made(turned))[0]["ellipse_azimuth_deg"] == pytest.approx(45.0)
+    assert point_results_of(made(turned))[0]["ellipse_azimuth_deg"] == pytest.approx(45.0)
 
 
 def test_ellipsoids_with_estimated_variance_factor_use_fisher():
     """Closed form: 3 F(0.95; 3, 10) in place of the chi-square."""
-    (point,) = adjusted_points_of(made(np.diag([1e-6] * 3), cov_scale=1.1))
+    (point,) = point_results_of(made(np.diag([1e-6] * 3), cov_scale=1.1))
     factor = np.sqrt(3 * scipy.stats.f.ppf(0.95, 3, 10))
     assert point["ellipsoid_m"] == pytest.approx([factor * 1e-3] * 3)
 
