@@ -1,7 +1,7 @@
 """What a user sees of the camera's analyses: lines in the terminal, a report, tables, JSON.
 
-A result is the dict that `tankcal.record.camera_<kind>.as_json` gives; under "made_from" it
-may say what it was made from. Nothing here computes a number.
+A result is the dict of `plain_<kind>` of `tankcal.record.camera_<kind>`, possibly with the key
+"made_from". Nothing here computes a number.
 """
 
 import json
