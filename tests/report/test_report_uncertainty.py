@@ -429,7 +429,7 @@ def test_the_differences_of_the_ends_are_drawn(record):
 def test_the_usual_sentence_on_k_is_of_the_rows_whose_U_is_k_u(record, k, dof, simulated, said):
     interval = ["monte_carlo" if one else "gum" for one in simulated]
     columns = {"k": k, "dof": dof, "U_m3": [0.1, 0.2, 0.3], "interval": interval}
-    found = method.on_k(Paper(changed(record, **columns)))
+    found = method.k_sentences(Paper(changed(record, **columns)))
     assert len(found) == (said is not None)
     for sentence in found:
         assert said in sentence

@@ -60,7 +60,7 @@ def write_tables(record, directory):
             "photos": (survey.PHOTOS, None),
             "cameras": (survey.camera_table(free), None),
             "groups": (readings.GROUPS, None),
-            "residuals": (readings.READINGS, readings.in_their_units(observed)),
+            "residuals": (readings.READINGS, readings.convert_units(observed)),
         }
     for name, (table, columns) in tables.items():
         rows = table.rows(record) if columns is None else columns

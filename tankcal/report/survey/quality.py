@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.record.columns import ArrayRows
 from tankcal.report import blocks
-from tankcal.report.tables.readings import GROUPS, MOST_IN_SHEET, READINGS, in_their_units
+from tankcal.report.tables.readings import GROUPS, MOST_IN_SHEET, READINGS, convert_units
 from tankcal.text import words
 from tankcal.text.digits import NOTHING
 
@@ -78,7 +78,7 @@ def readings_table(paper, name, rows, **values):
     """Table of readings called `name`, limited to the first MOST_ROWS; [] without rows."""
     if not rows:
         return []
-    shown = list(in_their_units(rows[:MOST_ROWS]).rows())
+    shown = list(convert_units(rows[:MOST_ROWS]).rows())
     return with_note(paper, paper.show(READINGS, shown, on=name, **values), shown, rows)
 
 

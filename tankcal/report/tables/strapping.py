@@ -36,7 +36,7 @@ STRAPS = Table(
 )  # fmt: skip
 
 
-def in_ppm(tape):
+def convert_to_ppm(tape):
     """Return a tape with its scale in ppm; values of a missing comparison are None."""
     shown = {key: 1e6 * tape[key] for key in ("correction", "u_scale", "u_comparison")}
     shown["certificate"] = tape["certificate"] or None
@@ -58,7 +58,7 @@ TAPES = Table(
         Column("master", heading="tape_master", sheet="tape_master"),
         Column("comparisons", decimals=0, heading="tape_comparisons", sheet="tape_comparisons"),
     ),
-    rows=lambda record: [in_ppm(tape) for tape in record["strapping"]["tapes"]],
+    rows=lambda record: [convert_to_ppm(tape) for tape in record["strapping"]["tapes"]],
 )  # fmt: skip
 
 STRAPPED_COURSES = Table(
@@ -135,5 +135,5 @@ CIRCLES = Table(
 TAPES_OF_SPHERE = Table(
     "tapes",
     TAPES.columns,
-    rows=lambda record: [in_ppm(tape) for tape in record["great_circles"]["tapes"]],
+    rows=lambda record: [convert_to_ppm(tape) for tape in record["great_circles"]["tapes"]],
 )

@@ -12,7 +12,7 @@ import numpy as np
 from tankcal.pipeline.plot_style import round_factor
 from tankcal.report.blocks import Block
 from tankcal.report.web.packing import pack_numbers
-from tankcal.report.web.wall_map import rejected_in_space
+from tankcal.report.web.wall_map import limit_rejected
 
 MOST_POINTS = 4000  # largest number of drawn points
 TENTH_MM = 1e4  # tenths of a millimetre per metre, the unit of outlines
@@ -58,7 +58,7 @@ def shell_of(record):
         "rings": _rings(record["courses"], sections, shell, bottom_z_m, radius_m),
         "exaggeration": exaggeration,
         "points": _points(record, bottom_z_m),
-        "rejected": rejected_in_space(record, largest),
+        "rejected": limit_rejected(record, largest),
     }
 
 

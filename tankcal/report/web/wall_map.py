@@ -124,7 +124,7 @@ def wall_map_view(paper):
     )
 
 
-def rejected_in_space(record, largest_m):
+def limit_rejected(record, largest_m):
     """Return points for the three-dimensional view, [{name, azimuth, height, off_m}].
 
     The distance is limited to LARGEST times `largest_m`.

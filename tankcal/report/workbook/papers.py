@@ -142,7 +142,7 @@ def ship_sheet(book, record):
     """Write the corrections for trim and list: range of the pipe, and a table for each list."""
     sheet = book.sheet("ship", book.word("texts.ship_subtitle"), landscape=True)
     tables = [(book.word("headings.ship_cells"), "ship_cells", columns_of(book, ship.CELLS))]
-    for number, (list_deg, cells) in enumerate(ship.by_list(record), 1):
+    for number, (list_deg, cells) in enumerate(ship.group_by_list(record), 1):
         title = book.word("texts.ship_list", list=f"{list_deg:g}")
         tables.append((title, f"ship_list_{number}", _corrections(book, record, cells)))
     write_tables(book, sheet, _HEAD_ROW, tables)
