@@ -156,9 +156,9 @@ def _extend_by_hints(clues, piece, sure, hints, least):
         motion = joint(local, piece, clues.rng) if common >= ENOUGH else None
         # A good joint shows that the hints only have another frame.
         if motion is not None and motion.misfit_m < BAD_JOINT * piece.extent:
-            joined = piece.filled_from(local.moved(motion))
+            joined = piece.fill_from(local.moved(motion))
             return grow_piece(clues, add_points(clues.sights, joined), least)
-    merged = _credible(clues, piece.filled_from(hints.piece), piece.oriented)
+    merged = _credible(clues, piece.fill_from(hints.piece), piece.oriented)
     return grow_piece(clues, merged, least)
 
 

@@ -166,7 +166,7 @@ def _add_by_tapes(clues, piece, free):
         # Distances do not determine the handedness, so both mirror images are tried.
         either = [_piece_of(clues, points, places * mirror) for mirror in ([1, 1, 1], [1, 1, -1])]
         if free and not known.any():
-            return piece.filled_from(either[0])
+            return piece.fill_from(either[0])
         joined = _join_mirror_image(clues, piece, either)
         if joined is not None:
             return joined
@@ -183,7 +183,7 @@ def _join_mirror_image(clues, piece, either):
     for image, motion in zip(either, motions, strict=True):
         if motion is None:
             continue
-        filled = piece.filled_from(image.moved(motion))
+        filled = piece.fill_from(image.moved(motion))
         new = np.flatnonzero(filled.known & ~piece.known)
         misfit = misfit_of_places(clues.survey, clues.plan, filled.xyz_m, new)
         candidates.append((misfit + motion.misfit_m, filled))

@@ -59,7 +59,7 @@ def join_local_frames(clues, piece, places, least):
         local = max(loose, key=lambda frame: frame.oriented.sum())
         # Without a place in common, align the largest frame to single known coordinates.
         motion = align_piece(clues.survey, local, piece.xyz_m, places)
-        piece = grow_piece(clues, piece.filled_from(local.moved(motion)), least)
+        piece = grow_piece(clues, piece.fill_from(local.moved(motion)), least)
         piece, loose = _attach_frames(
             clues, piece, [frame for frame in loose if frame is not local], least
         )
@@ -94,7 +94,7 @@ def _join(clues, local, onto):
     motion = joint(local, onto, clues.rng)
     if motion is None or motion.misfit_m > BAD_JOINT * max(local.extent * motion.scale, 1e-9):
         return None
-    return onto.filled_from(local.moved(motion))
+    return onto.fill_from(local.moved(motion))
 
 
 def _scale_about_photo(clues, piece, original, places):
@@ -132,7 +132,7 @@ def _scale_about_photo(clues, piece, original, places):
     scale = float(np.sum(away[common] * target_offsets[common])) / square if square > 0 else 0.0
     if not scale > 0:
         return piece
-    return original.filled_from(bare.moved(Motion(np.eye(3), hinge * (1 - scale), scale, 0.0)))
+    return original.fill_from(bare.moved(Motion(np.eye(3), hinge * (1 - scale), scale, 0.0)))
 
 
 def _held_points(survey):

@@ -59,7 +59,7 @@ class Piece:
             rotation=self.rotation @ motion.rotation.T,
         )
 
-    def filled_from(self, other):
+    def fill_from(self, other):
         """Add positions known only in another Piece of the same frame."""
         photos = self.oriented
         return replace(
