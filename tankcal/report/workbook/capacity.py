@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 from tankcal.report.tables.capacity import capacity_rows, capacity_table
 from tankcal.report.workbook.look import width_of, width_of_lines
+from tankcal.report.workbook.sections import HEAD_ROW
 from tankcal.report.workbook.tables import columns_of
 from tankcal.text.digits import decimals_of_height, shortest
 from tankcal.text.words import marks_of
@@ -20,7 +21,6 @@ NAMED = {
     "high_m3": "high",
     "interval": "interval",
 }
-_HEAD_ROW = 3  # row of the first headings, from 0
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,10 @@ def capacity_sheet(book, record):
         columns[place] = replace(columns[place], width=wide)
     book.widths(sheet, *map(width_of, columns))
     muted = [row for row, is_for_use in enumerate(capacity["for_use"]) if not is_for_use]
-    last = book.table(sheet, _HEAD_ROW, "capacity_table", columns, muted=muted)
+    last = book.table(sheet, HEAD_ROW, "capacity_table", columns, muted=muted)
     places = {NAMED[key]: place for place, key in enumerate(keys) if key in NAMED}
-    position = Rows(_HEAD_ROW + 1, last, places)
-    book.freeze(sheet, _HEAD_ROW)
+    position = Rows(HEAD_ROW + 1, last, places)
+    book.freeze(sheet, HEAD_ROW)
     for name in NAMED.values():
         if name in places:
             book.name(f"capacity_{name}", sheet, position.first, position.last, places[name])

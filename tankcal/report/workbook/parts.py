@@ -10,11 +10,11 @@ from tankcal.report.tables.tank import DEADWOOD
 from tankcal.report.uncertainty.sources import critical_zone
 from tankcal.report.uncertainty.stated import stated_U_m3
 from tankcal.report.workbook.look import Column, number_format
+from tankcal.report.workbook.sections import HEAD_ROW, SheetContent, cell_table, write_sheet
 from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import LITRE_DECIMALS, decimals_of_rows, format_significant, shortest
 from tankcal.text.words import marks_of
 
-_HEAD_ROW = 3  # row of the first headings, from 0
 _SAME_MM = 1e-6  # tolerance, mm, for a row at a whole millimetre
 _WIDTHS = (50, 16, 16, 16, 16)  # widths of the columns, letters
 
@@ -26,11 +26,10 @@ def proportional_parts_sheet(book, record):
         return
     largest = format_significant(1000 * parts["largest_m3"], 2, marks_of(book.words))
     subtitle = book.word("texts.parts_subtitle", largest=largest)
-    sheet = book.sheet("proportional_parts", subtitle, landscape=True, tab="result")
-    columns = columns_of(book, parts_table(record))
-    set_widths(book, sheet, columns)
-    book.table(sheet, _HEAD_ROW, "proportional_parts", columns)
-    book.freeze(sheet, _HEAD_ROW)
+    table = cell_table(book, parts_table(record), name="proportional_parts")
+    content = SheetContent("proportional_parts", [table], subtitle, tab="result")
+    sheet, _ = write_sheet(book, content)
+    book.freeze(sheet, HEAD_ROW)
 
 
 def densities_sheet(book, record):
@@ -54,10 +53,10 @@ def densities_sheet(book, record):
     ]
     muted = [row for row, is_for_use in enumerate(capacity["for_use"]) if not is_for_use]
     set_widths(book, sheet, columns)
-    last = book.table(sheet, _HEAD_ROW, "other_densities", columns, muted=muted)
-    book.freeze(sheet, _HEAD_ROW)
+    last = book.table(sheet, HEAD_ROW, "other_densities", columns, muted=muted)
+    book.freeze(sheet, HEAD_ROW)
     for place in range(2, 1 + len(tables)):
-        book.name(name_of_density(place), sheet, _HEAD_ROW + 1, last, place)
+        book.name(name_of_density(place), sheet, HEAD_ROW + 1, last, place)
 
 
 def name_of_density(place):
@@ -70,7 +69,7 @@ def inside_sheet(book, record):
     paper, corrections = book.paper, book.words["corrections"]
     sheet = book.sheet("inside")
     book.widths(sheet, *_WIDTHS)
-    row = _HEAD_ROW
+    row = HEAD_ROW
     if record["solid"]:
         row = _described(book, sheet, row, book.words["headings"]["dimensions"], record["solid"])
     for code in ("deadwood", "bottom", "top", "roof"):

@@ -1,4 +1,4 @@
-"""Declared tables in sheets: columns of cells, common widths, tables without rows."""
+"""Columns of cells for the declared tables, and their widths."""
 
 from itertools import zip_longest
 
@@ -148,29 +148,4 @@ def write_table(book, sheet, row, name, columns, **more):
     if columns[0].cells:
         return book.table(sheet, row, name, columns, **more)
     book.put(sheet, row, 0, book.word("texts.no_rows"))
-    return row
-
-
-def write_tables(book, sheet, row, tables):
-    """Write tables (title, name, columns) below each other; return the next row.
-
-    Parameters
-    ----------
-    book : Book
-        Workbook.
-    sheet : Sheet
-        Sheet of the tables.
-    row : int
-        First row, from 0.
-    tables : list of (str, str, list of Column)
-        Title, name and columns of each table.
-
-    Returns
-    -------
-    int
-    """
-    widths = set_widths(book, sheet, *(columns for _, _, columns in tables))
-    for title, name, columns in tables:
-        book.heading(sheet, row, title, len(columns))
-        row = write_table(book, sheet, row + 1, name, columns, widths=widths) + 2
     return row
