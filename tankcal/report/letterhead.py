@@ -16,10 +16,10 @@ from tankcal.job.fields import Field
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import Log, nearest, read_bytes
 from tankcal.messages import message
-from tankcal.report import LETTERHEAD
 from tankcal.report.logo import logo_problem
 from tankcal.text.decoding import read_json
 
+LETTERHEAD_FILE = "letterhead.json"  # saved beside a notebook whose papers have a letterhead
 PLACE = "place"  # value of a mark that is an empty frame
 LEAST_CONTRAST = 4.5  # smallest contrast of text with white paper: WCAG 2.2, 1.4.3
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
@@ -78,8 +78,8 @@ class Letterhead:
     def save(self, directory):
         """Write the letterhead into the folder of the notebook and return the file name."""
         text = json.dumps(self.data(), ensure_ascii=False, indent=1)
-        (Path(directory) / LETTERHEAD).write_text(text + "\n", encoding="utf-8")
-        return LETTERHEAD
+        (Path(directory) / LETTERHEAD_FILE).write_text(text + "\n", encoding="utf-8")
+        return LETTERHEAD_FILE
 
 
 def load(path):

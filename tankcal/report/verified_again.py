@@ -9,7 +9,7 @@ from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.record import long_tables
 from tankcal.record import manifest as manifests
-from tankcal.report import LETTERHEAD
+from tankcal.report.letterhead import LETTERHEAD_FILE, PLACE, Letterhead, Logo, read_saved
 from tankcal.report.paper_content import content_of_paper
 from tankcal.text.languages import LANGUAGES
 
@@ -21,9 +21,7 @@ def letterhead_of(folder):
 
     An invalid file raises InputError.
     """
-    from tankcal.report.letterhead import PLACE, Letterhead, Logo, read_saved
-
-    path = Path(folder) / LETTERHEAD
+    path = Path(folder) / LETTERHEAD_FILE
     if not path.is_file():
         return None
     data = read_saved(path)

@@ -8,8 +8,9 @@ import pytest
 import typst
 from paper_pages import filled, lone_headings, pages_of, sparse_pages
 
-from tankcal.report import blocks, build, page_tables
+from tankcal.report import blocks, page_tables
 from tankcal.report.page_tables import prepared
+from tankcal.report.papers import build
 from tankcal.report.pdf import pdf
 from tankcal.text.languages import LANGUAGES
 from tankcal.text.words import load_words

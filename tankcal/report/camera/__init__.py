@@ -8,13 +8,13 @@ import json
 from importlib import import_module
 from pathlib import Path
 
-from tankcal import report
 from tankcal.messages import message
 from tankcal.record import manifest
 from tankcal.record.camera_versions import KINDS
 from tankcal.report import folders
 from tankcal.report.camera.paper import CameraPaper, made_from
 from tankcal.report.outputs.csv_files import write_rows
+from tankcal.report.papers import write_papers
 from tankcal.report.terminal import lines_of
 
 __all__ = ["CameraPaper", "lines", "made_from", "refuse_foreign", "write"]
@@ -56,7 +56,9 @@ def write(result, directory, progress=None, language=None):
     TankcalError for a language without words.
     """
     refuse_foreign(directory)
-    from tankcal.report.notebook import joined  # not for lines in a terminal: it takes a second
+    from tankcal.report.notebook import (
+        join_templates,  # not for lines in a terminal: it takes a second
+    )
 
     kind = CameraPaper(result, language).result["kind"]
     progress = progress or (lambda text, done, total: None)
@@ -67,8 +69,8 @@ def write(result, directory, progress=None, language=None):
             if rows:
                 write_rows(rows, temporary / name)
         others = [other for other in KINDS if other != kind]
-        notebook = joined(RECORD, others, (TEMPLATE,), LANGUAGE=language)
-        report.set_papers(
+        notebook = join_templates(RECORD, others, (TEMPLATE,), LANGUAGE=language)
+        write_papers(
             notebook,
             temporary,
             (("report.pdf", ""),),
