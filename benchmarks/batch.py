@@ -145,23 +145,25 @@ def nothing(task):
 def measure_empty(rows, workers):
     """Print what the loop itself costs, and how its memory grows."""
     from tankcal.batch import running
-    from tankcal.batch.asked import Asked
-    from tankcal.batch.doing import Task
     from tankcal.batch.finding import BatchJob
-    from tankcal.batch.journal import opened_folder
+    from tankcal.batch.journal import open_folder
+    from tankcal.batch.options import Options
+    from tankcal.batch.steps import Task
     from tankcal.pipeline.cluster import open_client
 
-    asked, held = Asked(), []
+    options, held = Options(), []
 
     def tasks():
         for number in range(rows):
             if number % (rows // 5) == 0:
                 held.append(megabytes(os.getpid()))
             name = f"T-{number:06d}"
-            yield Task(BatchJob(name, name, f"/site/{name}", asked), {"run": "0" * 64}, "/out", "r")
+            yield Task(
+                BatchJob(name, name, f"/site/{name}", options), {"run": "0" * 64}, "/out", "r"
+            )
 
     running.do_job = nothing
-    with tempfile.TemporaryDirectory() as out, opened_folder(out) as journal, \
+    with tempfile.TemporaryDirectory() as out, open_folder(out) as journal, \
             open_client(workers) as client:  # fmt: skip
         before = resource.getrusage(resource.RUSAGE_SELF)
         running._ByWorkers(client, journal, lambda *row: None).do(tasks())

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from job_builder import write_job
 
-from tankcal.batch import doing
+from tankcal.batch import steps
 
 QUICK = {"table.step_m": 0.5, "certificate.number": "1"}
 DEADLY = "deadly"  # label of a job that ends its worker
@@ -32,17 +32,17 @@ def spoil(folder):
 def do_or_die(task):
     """`do_job`, but a job called DEADLY ends its worker once it has been begun."""
     if task.job.label == DEADLY:
-        doing._DOING = {**doing._DOING, "run": _end_worker}
-    return doing.do_job(task)
+        steps._STEP_FUNCTIONS = {**steps._STEP_FUNCTIONS, "run": _end_worker}
+    return steps.do_job(task)
 
 
 def do_slowly(task):
     """`do_job` after a while: so that a batch can be ended in the middle."""
-    doing._DOING = {**doing._DOING, "run": _run_slowly}
-    return doing.do_job(task)
+    steps._STEP_FUNCTIONS = {**steps._STEP_FUNCTIONS, "run": _run_slowly}
+    return steps.do_job(task)
 
 
-_RUN = doing._run
+_RUN = steps._run
 
 
 def _run_slowly(task, clock):

@@ -11,10 +11,12 @@ import re
 import zipfile
 from collections import Counter
 from dataclasses import dataclass
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
-from tankcal.batch.asked import OWN, Asked
+from tankcal.batch.options import LIST_OPTIONS, Options
+from tankcal.batch.outcomes import read_known_names
 from tankcal.errors import InputError, Problem, reason_of
 from tankcal.job.folder import (
     decode,
@@ -37,15 +39,16 @@ from tankcal.text.naming import file_name
 RECORD = "record.json"
 SAVED = (RECORD, "comparison.json", "inspection.json")
 BOOK = ".xlsx"
-OUTCOME, OF_BATCH = "outcome.json", ("report", "export")
+OUTCOME, OF_BATCH = "outcome.json", ("report", "export")  # file and folders of a job of a batch
 PATTERN = re.compile(r"[*?\[]")
-HEADINGS = ("job", "name", *OWN)  # headings of a list of jobs; only the first is required
+HEADINGS = ("job", "name", *LIST_OPTIONS)  # headings of a list of jobs; only the first is required
 DIGITS = 6  # hexadecimal digits of a digest appended to a name
 MOST_LIST_BYTES = 100_000_000
+ENDINGS = (".toml", ".csv", ".xlsx", ".pdf", ".json")  # of former tables named after jobs
 
 
 @dataclass(frozen=True)
-class Found:
+class NamedJob:
     """A job as named by the user.
 
     Attributes
@@ -53,12 +56,12 @@ class Found:
     source : Path
         Job folder, workbook, or saved file such as record.json. It may not exist; this is reported
         when it is read.
-    own : dict
-        Name and options of this job only, see `asked.OWN`.
+    overrides : dict
+        Name and options of this job only, see `options.LIST_OPTIONS`.
     """
 
     source: Path
-    own: dict
+    overrides: dict
 
 
 @dataclass(frozen=True)
@@ -73,16 +76,16 @@ class BatchJob:
         Name of the job, which other jobs may also have.
     source : str
         Absolute path.
-    asked : Asked
+    options : Options
     """
 
     name: str
     label: str
     source: str
-    asked: Asked
+    options: Options
 
 
-def find_jobs(arguments, asked, out=None, known=None):
+def find_jobs(arguments, options, out=None, known=None):
     """Return the jobs named by arguments, sorted by name.
 
     Parameters
@@ -90,7 +93,7 @@ def find_jobs(arguments, asked, out=None, known=None):
     arguments : sequence of str
         Job folders, workbooks, saved records, folders of any of these, shell patterns, lists
         (`@jobs.txt`, `jobs.csv`).
-    asked : Asked
+    options : Options
     out : str, optional
         Absolute path of the folder of the batch, which is not searched.
     known : dict, optional
@@ -106,69 +109,69 @@ def find_jobs(arguments, asked, out=None, known=None):
         A list cannot be read, or an argument names no job.
     """
     log, jobs = Log(), {}
-    wants = _Wanted(_kind_of_input(asked.do), out)
+    target = _Target(_kind_of_input(options.steps), out)
     for argument in arguments:
-        for job in _find_named(argument, wants, log):
+        for job in _find_of_argument(argument, target, log):
             jobs.setdefault(os.path.abspath(job.source), job)  # a link is a separate job
     log.stop_if_problems()
-    return _assign_names(jobs, asked, known or {})
+    return _assign_names(jobs, options, known or {})
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _Target:
     """Kind of objects to search for ("jobs", "records" or "either") and the folder to skip."""
 
     kind: str
     out: str | None
 
 
-def _kind_of_input(do):
+def _kind_of_input(steps):
     """Return the input of the steps: "jobs", "records", or "either" with jobs preferred."""
-    if "run" in do:
+    if "run" in steps:
         return "jobs"
-    return "either" if do == ("inspect",) else "records"
+    return "either" if steps == ("inspect",) else "records"
 
 
-def _find_named(argument, wants, log):
-    """Return the `Found` objects of an argument."""
+def _find_of_argument(argument, target, log):
+    """Return the `NamedJob` objects of an argument."""
     path = Path(argument.removeprefix("@"))
     if argument.startswith("@") or (path.suffix.lower() == ".csv" and path.is_file()):
-        return _find_listed(path, wants, log)
+        return _find_listed(path, target, log)
     if PATTERN.search(argument) and not os.path.lexists(argument):
         names = sorted(glob.glob(argument, recursive=True))
         if not names:
             text = message("batch_no_match", "no file or folder matches; expected jobs")
             log.problem(argument, text)
         return [
-            job for name in names for job in _find_in_path(Path(name), wants, log, strict=False)
+            job for name in names for job in _find_in_path(Path(name), target, log, strict=False)
         ]
-    return _find_in_path(path, wants, log)
+    return _find_in_path(path, target, log)
 
 
-def _find_in_path(path, wants, log, strict=True):
+def _find_in_path(path, target, log, strict=True):
     """Return the jobs of a path: the path itself, or the jobs in a folder.
 
     strict  whether a folder without jobs is a problem
     """
-    job_path = _job_of_path(path, wants)
+    job_path = _job_of_path(path, target)
     if job_path is not None:
-        return [Found(job_path, {})]
+        return [NamedJob(job_path, {})]
     if not path.is_dir():
-        return [Found(path, {})] if strict or path.suffix.lower() == BOOK else []
+        return [NamedJob(path, {})] if strict or path.suffix.lower() == BOOK else []
     try:
-        inside = _find_in_folder(path, wants)
+        inside = _find_in_folder(path, target)
     except OSError as error:
         text = message("batch_folder_unreadable", "the folder cannot be read ({reason})",
                        reason=reason_of(error))  # fmt: skip
         log.problem(error.filename or str(path), text)
         return []
     if not inside and strict:
-        results = None if wants.kind == "records" else results_given_as_job(path)
-        log.problem(str(path), results or _nothing_inside(wants.kind))
-    return [Found(source, {}) for source in inside]
+        results = None if target.kind == "records" else results_given_as_job(path)
+        log.problem(str(path), results or _empty_folder_message(target.kind))
+    return [NamedJob(source, {}) for source in inside]
 
 
-def _nothing_inside(kind):
+def _empty_folder_message(kind):
     """Return the message for a folder without jobs or results."""
     if kind == "records":
         return message(
@@ -182,24 +185,26 @@ def _nothing_inside(kind):
     )
 
 
-def _job_of_path(path, wants):
+def _job_of_path(path, target):
     """Return the job that a path is, or None."""
     if path.name == SETTINGS_FILE and path.is_file():
         path = path.parent
     if (path / SETTINGS_FILE).is_file():
-        if wants.kind != "records":
+        if target.kind != "records":
             return path
         return path / "results" / RECORD if (path / "results" / RECORD).is_file() else None
     if path.name in SAVED and path.is_file():
         return path
-    if wants.kind != "jobs" and path.is_dir():
+    if target.kind != "jobs" and path.is_dir():
         return next((path / name for name in SAVED if (path / name).is_file()), None)
     return (
-        path if wants.kind != "records" and path.suffix.lower() == BOOK and path.is_file() else None
+        path
+        if target.kind != "records" and path.suffix.lower() == BOOK and path.is_file()
+        else None
     )
 
 
-def _find_in_folder(folder, wants):
+def _find_in_folder(folder, target):
     """Return the sorted jobs below a folder, without hidden folders and contents of jobs."""
     sources = []
 
@@ -208,7 +213,7 @@ def _find_in_folder(folder, wants):
 
     for place, folders, names in os.walk(folder, onerror=fail):
         place = Path(place)
-        if os.path.abspath(place) == wants.out:
+        if os.path.abspath(place) == target.out:
             folders.clear()
             continue
         of_batch = OUTCOME in names  # a job of another batch: its reports are not jobs
@@ -218,13 +223,13 @@ def _find_in_folder(folder, wants):
             if folder_name[0] != "." and not (of_batch and folder_name in OF_BATCH)
         )
         saved = [name for name in SAVED if name in names]
-        if wants.kind == "records":
+        if target.kind == "records":
             sources += [place / name for name in saved]
         elif SETTINGS_FILE in names:
             sources.append(place)
             folders.clear()
         elif saved:
-            sources += [place / saved[0]] if wants.kind == "either" else []
+            sources += [place / saved[0]] if target.kind == "either" else []
             folders.clear()
         else:
             books = (place / name for name in sorted(names) if name[0] not in ".~")
@@ -245,24 +250,24 @@ def _is_job(book):
 # ---- lists
 
 
-def _find_listed(path, wants, log):
+def _find_listed(path, target, log):
     """Return the jobs of a list: one per line, or a CSV file with a column job."""
     data, is_csv = read_bytes(path, log, MOST_LIST_BYTES), path.suffix.lower() == ".csv"
     text = None if data is None else decode(path.name, data, log)
     if text is None:
         return []
     problems_before = len(log.problems)
-    rows = list(_rows(path, text, log)) if is_csv else _plain_rows(text.splitlines())
+    rows = list(_csv_rows(path, text, log)) if is_csv else _plain_rows(text.splitlines())
     jobs = []
     for cells in rows:
         job = cells.pop("job")
-        for name in OWN:  # files relative to the list, else names, such as a shipped rule
+        for name in LIST_OPTIONS:  # files relative to the list, else names, such as a shipped rule
             beside = path.parent / cells.get(name, "")
             if cells.get(name) and (name == "former" or beside.is_file()):
                 cells[name] = os.path.abspath(beside)
         source = path.parent / job
-        inside = _find_in_path(source, wants, log, strict=False) or [Found(source, {})]
-        jobs += [Found(job_found.source, cells) for job_found in inside]
+        inside = _find_in_path(source, target, log, strict=False) or [NamedJob(source, {})]
+        jobs += [NamedJob(named.source, cells) for named in inside]
     if not jobs and len(log.problems) == problems_before:
         log.problem(
             path.name,
@@ -277,7 +282,7 @@ def _plain_rows(lines):
     return [{"job": text} for text in stripped if text and not text.startswith("#")]
 
 
-def _rows(path, text, log):
+def _csv_rows(path, text, log):
     """Return a dict for each row of a CSV list; [] after adding a problem to `log`."""
     mark = separator_of_text(text, ",")
     lines = [(row, line) for row, line in enumerate(split_lines(text), 1) if is_row(line)]
@@ -305,10 +310,10 @@ def _rows(path, text, log):
         )
         log.problem(path.name, text, row)
         return []
-    return list(_dicts(path, headings, table[1:], log))
+    return list(_job_rows(path, headings, table[1:], log))
 
 
-def _dicts(path, headings, table, log):
+def _job_rows(path, headings, table, log):
     """Return {heading: cell} of each valid row."""
     for row, cells in table:
         if not any(cells):
@@ -330,20 +335,20 @@ def _dicts(path, headings, table, log):
 # ---- names
 
 
-def _assign_names(jobs_found, asked, known):
+def _assign_names(named_jobs, options, known):
     """Return a `BatchJob` with a unique name for each job."""
-    labels = {source: _label(job) for source, job in jobs_found.items()}
+    labels = {source: _label(job) for source, job in named_jobs.items()}
     taken = {name.casefold(): source for source, name in known.items() if os.path.exists(source)}
     counts = Counter(label.casefold() for label in labels.values())
     jobs = []
-    for source, job in jobs_found.items():
+    for source, job in named_jobs.items():
         label = labels[source]
         owner = taken.get(label.casefold(), source)
         name = known.get(source, label)
         if source not in known and (counts[label.casefold()] > 1 or owner != source):
             name = f"{label}~{sha256(source.encode(errors='replace')).hexdigest()[:DIGITS]}"
-        own_choices = {key: value for key, value in job.own.items() if key in OWN}
-        jobs.append(BatchJob(name, label, source, asked.with_own(own_choices)))
+        overrides = {key: value for key, value in job.overrides.items() if key in LIST_OPTIONS}
+        jobs.append(BatchJob(name, label, source, options.with_overrides(overrides)))
     _refuse_doubles(jobs)
     return sorted(jobs, key=lambda job: job.name)
 
@@ -363,8 +368,8 @@ def _refuse_doubles(jobs):
 
 def _label(job):
     """Return the name of a job: from its list, or from its folder or workbook."""
-    if job.own.get("name"):
-        return file_name(job.own["name"], "job")
+    if job.overrides.get("name"):
+        return file_name(job.overrides["name"], "job")
     path = Path(os.path.abspath(job.source))
     if path.name == WORKBOOK_FILE:
         path = path.parent
@@ -375,3 +380,50 @@ def _label(job):
         behind = "" if place.name == "results" else f"-{place.name}"
         return file_name(place.parent.name.removesuffix("-results") + behind, "job")
     return file_name(place.name.removesuffix("-results"), "job")
+
+
+# ---- former tables
+
+
+_names_in = lru_cache(maxsize=4)(read_known_names)  # cached: each job looks into the former batch
+
+
+def find_former_or_none(job):
+    """Return the former table of a job; None if there is no table, or no comparison."""
+    try:
+        return find_former(job)
+    except InputError:
+        return None
+
+
+def find_former(job):
+    """Return the path of the former table of a job; None if the job is not compared.
+
+    Raises
+    ------
+    InputError
+        A folder of former tables contains no table of this job.
+    """
+    options = job.options
+    if "compare" not in options.steps or options.former is None:
+        return None
+    folder = Path(os.path.abspath(options.former))
+    if not folder.is_dir():
+        return folder
+    if (folder / RECORD).is_file():
+        return folder / RECORD
+    names = (_names_in(str(folder)).get(job.source), job.name, job.label)
+    for name in dict.fromkeys(label for label in names if label):
+        places = [folder / name, folder / "jobs" / name / "results", folder / name / "results"]
+        tables = [folder / f"{name}{ending}" for ending in ENDINGS]
+        for path in (*(place / RECORD for place in places), *tables):
+            if path.is_file():
+                return path
+    text = message(
+        "batch_no_former",
+        "contains no former table of {name}; expected {name} with one of the endings "
+        "{endings}, or a folder {name} with record.json",
+        name=job.label,
+        endings=[*ENDINGS],
+    )
+    raise InputError(Problem(str(options.former), text))

@@ -25,7 +25,7 @@ NEVER_READ = (  # endings of files that no job reads
 )
 RESULTS = frozenset(("record.json", "comparison.json", "inspection.json", SETTINGS_FILE))
 MOST_UNPACKED_BYTES = 300_000_000  # largest unpacked workbook to search for names
-OF_STEP = {  # attributes of `Asked` that affect a step
+OF_STEP = {  # attributes of `Options` that affect a step
     "run": ("papers",),
     "report": ("language",),
     "compare": ("language",),
@@ -41,7 +41,7 @@ FILES_OF_STEP = {
 }
 
 
-def keys_of(job, former=None):
+def compute_keys(job, former=None):
     """Return {step: SHA-256} of all data that affect each step of a job.
 
     Parameters
@@ -55,26 +55,26 @@ def keys_of(job, former=None):
     OSError
         An input cannot be read.
     """
-    inputs, asked = inputs_of(job.source), job.asked
+    inputs, options = digest_inputs(job.source), job.options
     keys = {}
-    for step in asked.do:
+    for step in options.steps:
         bears = {
             "tankcal": tankcal.__version__,
             "step": step,
             "inputs": inputs,
-            **{name: getattr(asked, name) for name in OF_STEP[step]},
-            **{name: _digest_content(getattr(asked, name)) for name in FILES_OF_STEP[step]},
+            **{name: getattr(options, name) for name in OF_STEP[step]},
+            **{name: _digest_content(getattr(options, name)) for name in FILES_OF_STEP[step]},
         }
-        if step == "run" and not asked.papers:
+        if step == "run" and not options.papers:
             bears.pop("letterhead")
         if step == "compare":
-            bears["former"] = None if former is None else inputs_of(former)
+            bears["former"] = None if former is None else digest_inputs(former)
         text = json.dumps(bears, sort_keys=True)
         keys[step] = sha256(text.encode()).hexdigest()
     return keys
 
 
-def inputs_of(source):
+def digest_inputs(source):
     """Return [[name, SHA-256]] of the input files of a job; [] if there are none."""
     path = Path(source)
     if path.is_dir():

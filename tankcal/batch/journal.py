@@ -25,7 +25,7 @@ FILES = (LOCK, JOURNAL, JOBS, *SUMMARY)
 
 
 @contextmanager
-def opened_folder(out):
+def open_folder(out):
     """Lock the folder of a batch for this process, create it if missing, and yield its `Journal`.
 
     Raises

@@ -7,17 +7,23 @@ interrupted batch continues from these files.
 import json
 import os
 from dataclasses import asdict, dataclass, field
+from functools import cache
+from math import isfinite
 from pathlib import Path
 
-from tankcal.batch.asked import FOLDERS, STEPS
-from tankcal.batch.kept_data import is_step
+from tankcal.batch.options import FOLDERS, STEPS
 from tankcal.errors import InputError
 from tankcal.record import manifest
-from tankcal.report.batch.paper import STATUSES
+from tankcal.report.batch import OF_RULE, STATUSES
+from tankcal.text.words import load_words
 
 JOBS, FILE, FORMAT = "jobs", "outcome.json", "tankcal-outcome/1"
 FINAL = ("done", "unsound", "refused")  # statuses that the same input would give again
-MOST_TOLD = 20  # largest number of saved problems and warnings of a step
+MOST_REPORTED = 20  # largest number of saved problems and warnings of a step
+TEXTS = ("tank", "kind", "date", "rule", *OF_RULE)
+NUMBERS = ("height_m", "volume_m3", "U_m3", "former_m3", "of_tank_m3")
+PLACES = ("book", "column", "cell")
+PASSED = "global_test"  # the only Boolean verdict
 
 
 @dataclass(frozen=True)
@@ -36,7 +42,7 @@ class StepOutcome:
     values : dict
         Values for the summary.
     problems, warnings : list of dict
-        The first MOST_TOLD, in the form of `errors.problem_of`.
+        The first MOST_REPORTED, in the form of `errors.problem_of`.
     problem_count, warning_count : int
         Number of all problems and warnings.
     """
@@ -69,6 +75,12 @@ class Outcome:
         statuses = [self.steps[step].status for step in steps if step in self.steps]
         return max(statuses, key=STATUSES.index, default="failed")
 
+    def result(self, steps):
+        """Return the status, a list of at most one problem, and the number of all problems."""
+        reached = [self.steps[step] for step in steps if step in self.steps]
+        problems = [problem for step in reached for problem in step.problems]
+        return self.status(steps), problems[:1], sum(step.problem_count for step in reached)
+
     def is_settled_for(self, keys):
         """Return whether all steps of {step: key} have current results."""
         for step, key in keys.items():
@@ -79,14 +91,14 @@ class Outcome:
         return True
 
 
-def folder_of(out, name):
+def job_folder(out, name):
     """Return the folder of a job in the folder of its batch."""
     return Path(out) / JOBS / name
 
 
 def load_outcome(out, name):
     """Return the `Outcome` in the folder of a job; None if it is missing or invalid."""
-    folder = folder_of(out, name)
+    folder = job_folder(out, name)
     try:
         saved = json.loads((folder / FILE).read_bytes())
         if saved.get("format") != FORMAT:
@@ -96,13 +108,12 @@ def load_outcome(out, name):
         }
         if not (isinstance(saved["name"], str) and isinstance(saved["source"], str)):
             return None
-        whole = {step: outcome for step, outcome in steps.items() if is_step(outcome)}
-        there = {
+        valid = {
             step: outcome
-            for step, outcome in whole.items()
-            if _has_its_files(folder, step, outcome)
+            for step, outcome in steps.items()
+            if _is_step(outcome) and _has_its_files(folder, step, outcome)
         }
-        return Outcome(saved["name"], saved["source"], there)
+        return Outcome(saved["name"], saved["source"], valid)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return None
 
@@ -127,12 +138,12 @@ def save_outcome(out, outcome):
     """Write an outcome to the folder of its job, all or nothing."""
     steps = {step: asdict(outcome.steps[step]) for step in STEPS if step in outcome.steps}
     saved = {"format": FORMAT, "name": outcome.name, "source": outcome.source, "steps": steps}
-    folder = folder_of(out, outcome.name)
+    folder = job_folder(out, outcome.name)
     folder.mkdir(parents=True, exist_ok=True)
-    write_whole(folder / FILE, json.dumps(saved, ensure_ascii=False, indent=1) + "\n")
+    _write_whole(folder / FILE, json.dumps(saved, ensure_ascii=False, indent=1) + "\n")
 
 
-def write_whole(path, text):
+def _write_whole(path, text):
     """Write a text file to the disk by replacing it with a complete temporary file."""
     waiting = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
@@ -145,7 +156,7 @@ def write_whole(path, text):
         waiting.unlink(missing_ok=True)
 
 
-def known_names(out):
+def read_known_names(out):
     """Return {source: name} of the jobs in the folder of a batch."""
     names = {}
     try:
@@ -157,3 +168,97 @@ def known_names(out):
         if outcome is not None and outcome.name == name:
             names[outcome.source] = name
     return names
+
+
+# ---- validation of the outcomes and summary rows of an earlier batch
+#
+# Users can edit both files. Invalid data are treated as missing: the job is computed again, and no
+# change is reported.
+
+
+def _is_step(step):
+    """Return whether the attributes of a `StepOutcome` have valid types."""
+    return (
+        isinstance(step.key, str)
+        and isinstance(step.status, str)
+        and step.status in _codes("statuses")
+        and isinstance(step.files, list)
+        and all(isinstance(name, str) for name in step.files)
+        and isinstance(step.values, dict)
+        and _are_values(step.values)
+        and all(isinstance(rows, list) for rows in (step.problems, step.warnings))
+        and all(map(_is_problem, (*step.problems, *step.warnings)))
+        and all(map(_is_count, (step.problem_count, step.warning_count)))
+    )
+
+
+def is_summary_row(row):
+    """Return whether a row of a summary can be compared with another row."""
+    return (
+        isinstance(row, dict)
+        and isinstance(row.get("name"), str)
+        and isinstance(row.get("status"), str)
+        and row["status"] in _codes("statuses")
+        and _are_values(row)
+    )
+
+
+def _are_values(values):
+    """Return whether the numbers, texts and verdicts among values are valid."""
+    return (
+        all(_is_number(values.get(name)) for name in NUMBERS)
+        and all(_is_text(values.get(name)) for name in TEXTS if name != PASSED)
+        and isinstance(values.get(PASSED), bool | None)
+        and all(
+            values.get(name) is None or values[name].lower() in _codes(words)
+            for name, words in OF_RULE.items()
+            if name != PASSED
+        )
+    )
+
+
+def _is_problem(plain):
+    """Return whether plain data have the form of `errors.problem_of`."""
+    return (
+        isinstance(plain, dict)
+        and isinstance(plain.get("file"), str)
+        and all(_is_text(plain.get(name)) for name in PLACES)
+        and isinstance(plain.get("row"), int | None)
+        and _is_message(plain)
+    )
+
+
+def _is_message(plain):
+    """Return whether plain data contain a text with its code and with values that have words."""
+    return (
+        isinstance(plain.get("text"), str)
+        and _is_text(plain.get("code"))
+        and isinstance(plain.get("values"), dict)
+        and all(map(_has_words, plain["values"].values()))
+    )
+
+
+def _has_words(value):
+    """Return whether each message in a value, or in the lists in it, is valid."""
+    if isinstance(value, list):
+        return all(map(_has_words, value))
+    return _is_message(value) if isinstance(value, dict) else True
+
+
+def _is_number(value):
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return value is None or (is_number and abs(value) < 1e300 and isfinite(value))
+
+
+def _is_text(value):
+    return isinstance(value, str | None)
+
+
+def _is_count(value):
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
+@cache
+def _codes(words):
+    """Return the codes of the summary with words: of "statuses" or of a verdict."""
+    return frozenset(load_words("en")["batch"][words])

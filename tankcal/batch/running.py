@@ -11,19 +11,18 @@ import uuid
 from collections import Counter
 from dataclasses import dataclass, field, replace
 
-from tankcal.batch import asked as asking
-from tankcal.batch.doing import Task, do_job
-from tankcal.batch.finding import find_jobs
-from tankcal.batch.fingerprints import keys_of
-from tankcal.batch.formers import former_or_none
-from tankcal.batch.journal import opened_folder
+from tankcal.batch.finding import find_former_or_none, find_jobs
+from tankcal.batch.fingerprints import compute_keys
+from tankcal.batch.journal import open_folder
+from tankcal.batch.options import refuse_incomplete, refuse_unreadable
 from tankcal.batch.outcomes import (
     Outcome,
     StepOutcome,
-    known_names,
     load_outcome,
+    read_known_names,
     save_outcome,
 )
+from tankcal.batch.steps import Task, do_job
 from tankcal.batch.summary import write_summary
 from tankcal.errors import Problem, problem_of, reason_of
 from tankcal.messages import message
@@ -38,7 +37,7 @@ ALLOWED_FAILURES = "distributed.scheduler.allowed-failures"
 
 
 @dataclass(frozen=True)
-class Telling:
+class Callbacks:
     """Callbacks for the progress of a batch.
 
     Attributes
@@ -86,15 +85,15 @@ class Batch:
         return 3 if self.counts["unsound"] else 0
 
 
-def run_batch(arguments, asked, out, *, workers="local", worker_bytes=WORKER_BYTES,
-              language="en", telling=None):  # fmt: skip
+def run_batch(arguments, options, out, *, workers="local", worker_bytes=WORKER_BYTES,
+              language="en", callbacks=None):  # fmt: skip
     """Run the steps of each job without current result, and write the summary of all jobs.
 
     Parameters
     ----------
     arguments : sequence of str
         See `finding.find_jobs`.
-    asked : asked.Asked
+    options : options.Options
     out : path
         Folder of the batch.
     workers : "local", int or str
@@ -104,7 +103,7 @@ def run_batch(arguments, asked, out, *, workers="local", worker_bytes=WORKER_BYT
         Memory limit of a worker on this machine.
     language : str
         Language of the summary.
-    telling : Telling, optional
+    callbacks : Callbacks, optional
 
     Returns
     -------
@@ -118,17 +117,17 @@ def run_batch(arguments, asked, out, *, workers="local", worker_bytes=WORKER_BYT
     OSError
         The folder cannot be written to. Finished results are kept.
     """
-    telling, out = telling or Telling(), os.path.abspath(out)
-    asking.refuse_unreadable(asked)
-    telling.step(message("batch_looking", "looking for jobs"))
-    jobs = find_jobs(arguments, asked, out, known_names(out))
-    asking.refuse_incomplete(asked, jobs)
-    with opened_folder(out) as journal:
+    callbacks, out = callbacks or Callbacks(), os.path.abspath(out)
+    refuse_unreadable(options)
+    callbacks.step(message("batch_looking", "looking for jobs"))
+    jobs = find_jobs(arguments, options, out, read_known_names(out))
+    refuse_incomplete(options, jobs)
+    with open_folder(out) as journal:
         batch = Batch(total=len(jobs))
-        waiting = list(_select_tasks(jobs, journal, batch, telling))
+        waiting = list(_select_tasks(jobs, journal, batch, callbacks))
         if waiting:
             _run_tasks(
-                waiting, journal, batch, telling, _workers_for(workers, waiting), worker_bytes
+                waiting, journal, batch, callbacks, _workers_for(workers, waiting), worker_bytes
             )
         batch.rows, batch.files = write_summary(out, jobs, language)
         return batch
@@ -141,50 +140,43 @@ def _workers_for(workers, waiting):
     return workers
 
 
-def _select_tasks(jobs, journal, batch, telling):
+def _select_tasks(jobs, journal, batch, callbacks):
     """Yield a `Task` for each job with steps to run; count the other jobs."""
     looking = message("batch_comparing", "checking for finished jobs")
     for number, job in enumerate(jobs):
-        telling.part(looking, number, len(jobs))
+        callbacks.part(looking, number, len(jobs))
         task = Task(job, {}, str(journal.out), journal.run)
         try:
-            task = replace(task, keys=keys_of(job, former_or_none(job)))
+            task = replace(task, keys=compute_keys(job, find_former_or_none(job)))
         except OSError as error:
             text = message("batch_input_unreadable", "cannot be read ({reason})",
                            reason=reason_of(error))  # fmt: skip
             failure = fail_job(task, Problem(str(error.filename or job.source), text))
             batch.counts[failure[0]] += 1
-            telling.ended(job.name, *failure)
+            callbacks.ended(job.name, *failure)
             continue
         known = load_outcome(journal.out, job.name)
         if known is not None and known.is_settled_for(task.keys):
-            status = known.status(job.asked.do)
+            status, problems, count = known.result(job.options.steps)
             batch.skipped += 1
             batch.counts[status] += 1
             if status != "done":
-                _tell_known(known, job, status, telling)
+                callbacks.ended(job.name, status, problems, count)
         else:
             yield task
 
 
-def _tell_known(outcome, job, status, telling):
-    """Report a job that an earlier batch did not complete."""
-    steps = [outcome.steps[step] for step in job.asked.do if step in outcome.steps]
-    problems = [problem for step in steps for problem in step.problems]
-    telling.ended(job.name, status, problems[:1], sum(step.problem_count for step in steps))
-
-
-def _run_tasks(waiting, journal, batch, telling, workers, worker_bytes):
+def _run_tasks(waiting, journal, batch, callbacks, workers, worker_bytes):
     """Run all tasks, one after the other or by workers."""
     text = message("batch_doing", "jobs done")
 
     def ended(task, status, problems, count):
         batch.counts[status] += 1
         if status != "done":
-            telling.ended(task.job.name, status, problems, count)
-        telling.part(text, sum(batch.counts.values()), batch.total)
+            callbacks.ended(task.job.name, status, problems, count)
+        callbacks.part(text, sum(batch.counts.values()), batch.total)
 
-    telling.part(text, sum(batch.counts.values()), batch.total)
+    callbacks.part(text, sum(batch.counts.values()), batch.total)
     if workers == 0:
         for task in waiting:
             ended(task, *do_job(task))
@@ -198,7 +190,7 @@ class _ByWorkers:
     """Execution of tasks by workers: a few are submitted at a time."""
 
     def __init__(self, client, journal, ended):
-        self._client, self._journal, self._tell_ended = client, journal, ended
+        self._client, self._journal, self._report_ended = client, journal, ended
         self._watch, self._running, self._ended = Watch(client), {}, queue.SimpleQueue()
         self._deaths = Counter()
 
@@ -248,7 +240,7 @@ class _ByWorkers:
             result = None if error else future.result()
             future.release()
         if result is not None:
-            self._tell_ended(task, *result)
+            self._report_ended(task, *result)
         elif self._is_tried_again(task):
             self._submit(task)
         else:
@@ -258,7 +250,7 @@ class _ByWorkers:
                 "larger --worker-memory)",
                 count=TRIES,
             )
-            self._tell_ended(task, *fail_job(task, Problem(task.job.name, text)))
+            self._report_ended(task, *fail_job(task, Problem(task.job.name, text)))
 
     def _is_tried_again(self, task):
         """Return whether a job may have been on a dead worker without causing its death."""
@@ -275,7 +267,7 @@ def fail_job(task, problem):
     known = load_outcome(task.out, task.job.name) or Outcome(task.job.name, task.job.source)
     step = next(
         unsettled
-        for unsettled in task.job.asked.do
+        for unsettled in task.job.options.steps
         if not known.is_settled(unsettled, task.keys.get(unsettled, ""))
     )
     outcome = StepOutcome(task.keys.get(step, ""), "failed", problems=[plain], problem_count=1)

@@ -9,9 +9,8 @@ import tempfile
 from pathlib import Path
 
 import tankcal
-from tankcal.batch.asked import FOLDERS
-from tankcal.batch.kept_data import is_row
-from tankcal.batch.outcomes import JOBS, load_outcome
+from tankcal.batch.options import FOLDERS
+from tankcal.batch.outcomes import JOBS, is_summary_row, load_outcome
 from tankcal.report.batch import JSON, summary_files
 
 VALUES = (
@@ -23,7 +22,7 @@ PAPERS = (  # in order of priority: the summary links to the first
     *("certificate.pdf", "report.pdf", "comparison.pdf", "inspection.pdf", "capacity.xlsx"),
     *("capacity.csv", "record.json"),
 )
-MOST_TOLD = 1  # problems and warnings of a job in the summary
+MOST_REPORTED = 1  # problems and warnings of a job in the summary
 
 
 def write_summary(out, jobs, language):
@@ -45,10 +44,10 @@ def write_summary(out, jobs, language):
     rows = []
     for job in jobs:
         row = _row(out, job)
-        row["changes"] = None if former is None else changes_of(row, former.get(job.name))
+        row["changes"] = None if former is None else find_changes(row, former.get(job.name))
         rows.append(row)
     names = {row["name"] for row in rows}
-    steps = dict.fromkeys(step for job in jobs for step in job.asked.do)
+    steps = dict.fromkeys(step for job in jobs for step in job.options.steps)
     summary = {
         "format": "tankcal-batch/1",
         "tankcal": tankcal.__version__,
@@ -67,14 +66,14 @@ def _former_rows(path):
     """Return {name: row} of the last summary; None if it is missing or invalid."""
     try:
         rows = json.loads(path.read_bytes())["rows"]
-        return {row["name"]: row for row in rows} if all(map(is_row, rows)) else None
+        return {row["name"]: row for row in rows} if all(map(is_summary_row, rows)) else None
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return None
 
 
 def _row(out, job):
     """Return the summary row of a job, from its outcome only."""
-    outcome, steps = load_outcome(out, job.name), job.asked.do
+    outcome, steps = load_outcome(out, job.name), job.options.steps
     row = {"name": job.name, "source": job.source, "status": "failed", **dict.fromkeys(VALUES)}
     problems, warnings, papers, counts = [], [], [], [0, 0]
     for step in () if outcome is None else steps:
@@ -82,8 +81,8 @@ def _row(out, job):
         if done is None:
             continue
         row |= {key: done.values[key] for key in VALUES if done.values.get(key) is not None}
-        problems += done.problems[:MOST_TOLD]
-        warnings += done.warnings[:MOST_TOLD]
+        problems += done.problems[:MOST_REPORTED]
+        warnings += done.warnings[:MOST_REPORTED]
         counts[0] += done.problem_count
         counts[1] += done.warning_count
         papers += [f"{JOBS}/{job.name}/{FOLDERS[step]}/{name}" for name in done.files]
@@ -91,15 +90,15 @@ def _row(out, job):
         row["status"] = outcome.status(steps)
     best = [paper for name in PAPERS for paper in papers if paper.endswith(f"/{name}")]
     return row | {
-        "problems": problems[:MOST_TOLD],
+        "problems": problems[:MOST_REPORTED],
         "problem_count": counts[0],
-        "warnings": warnings[:MOST_TOLD],
+        "warnings": warnings[:MOST_REPORTED],
         "warning_count": counts[1],
         "papers": [*best, *(paper for paper in papers if paper not in best)][:1],
     }
 
 
-def changes_of(row, former):
+def find_changes(row, former):
     """Return the differences from the row of the last batch.
 
     Parameters
@@ -115,9 +114,9 @@ def changes_of(row, former):
 
     Examples
     --------
-    >>> from tankcal.batch.summary import changes_of
+    >>> from tankcal.batch.summary import find_changes
     >>> row = {"status": "done", "height_m": 9.5, "volume_m3": 100.5, "U_m3": 0.2}
-    >>> changes_of(row, row | {"volume_m3": 100.25})
+    >>> find_changes(row, row | {"volume_m3": 100.25})
     [{'code': 'volume_m3', 'by_m3': 0.25, 'U_m3': 0.2}]
     """
     if former is None:

@@ -108,11 +108,11 @@ def add(commands):
 def _batch(options):
     prepare_for_small_work()
     speak(options.language)
-    from tankcal.batch.asked import Asked, parse_steps
+    from tankcal.batch.options import Options, parse_steps
     from tankcal.batch.running import run_batch
 
-    asked = Asked(
-        do=parse_steps(options.do),
+    batch_options = Options(
+        steps=parse_steps(options.do),
         papers=not options.no_papers,
         **{
             name: getattr(options, name)
@@ -123,9 +123,9 @@ def _batch(options):
     workers = options.cluster or (options.workers if options.workers is not None else "local")
     try:
         batch = run_batch(
-            options.names, asked.absolute(), options.out, workers=workers,
+            options.names, batch_options.absolute(), options.out, workers=workers,
             worker_bytes=int(options.worker_memory * GIGABYTE), language=language_of_run(),
-            telling=progress,
+            callbacks=progress,
         )  # fmt: skip
     except KeyboardInterrupt as stop:
         progress.show.end()

@@ -15,9 +15,9 @@ import pytest
 from batch_jobs import bytes_of, jobs_in, journal_of, spoil, write_jobs
 from conftest import EXAMPLE
 
-from tankcal.batch import doing, journal, running
-from tankcal.batch.asked import Asked
-from tankcal.batch.summary import changes_of
+from tankcal.batch import journal, running, steps
+from tankcal.batch.options import Options
+from tankcal.batch.summary import find_changes
 from tankcal.cli import main
 from tankcal.cli.showing import speak
 
@@ -182,14 +182,14 @@ def test_a_survey_without_sound_solution(tmp_path, capsys, monkeypatch):
     from tankcal.errors import SolutionError
 
     write_jobs(tmp_path / "site", 2)
-    run = doing._DOING["run"]
+    run = steps._STEP_FUNCTIONS["run"]
 
     def fail(task, clock):
         if task.job.name == "T-1":
             raise SolutionError("singular")
         return run(task, clock)
 
-    monkeypatch.setitem(doing._DOING, "run", fail)
+    monkeypatch.setitem(steps._STEP_FUNCTIONS, "run", fail)
     assert main(batch_of(tmp_path)) == 3
     assert errors(capsys) == ["tankcal: T-1: T-1: singular"]
     spoil(tmp_path / "site" / "T-0")
@@ -211,7 +211,7 @@ def test_failures_are_tried_again(tmp_path, monkeypatch, capsys, error, code):
         raise error
 
     with monkeypatch.context() as patched:
-        patched.setitem(doing._DOING, "run", fail)
+        patched.setitem(steps._STEP_FUNCTIONS, "run", fail)
         assert main(batch_of(tmp_path)) == 2
     assert len(errors(capsys)) == 2
     row = summary(tmp_path / "out")["T-0"]
@@ -221,7 +221,7 @@ def test_failures_are_tried_again(tmp_path, monkeypatch, capsys, error, code):
 
 def test_a_full_disk_stops_in_one_line(tmp_path, monkeypatch, capsys):
     write_jobs(tmp_path / "site", 3)
-    run = doing._DOING["run"]
+    run = steps._STEP_FUNCTIONS["run"]
 
     def fill(task, clock):
         if task.job.name == "T-1":
@@ -229,7 +229,7 @@ def test_a_full_disk_stops_in_one_line(tmp_path, monkeypatch, capsys):
         return run(task, clock)
 
     with monkeypatch.context() as patched:
-        patched.setitem(doing._DOING, "run", fill)
+        patched.setitem(steps._STEP_FUNCTIONS, "run", fill)
         assert main(batch_of(tmp_path)) == 2
     (line,) = errors(capsys)
     assert "No space left on device" in line
@@ -256,7 +256,7 @@ def test_input_that_cannot_be_read(two, monkeypatch, capsys):
 
 def test_input_that_changes_meanwhile_is_computed_again(tmp_path, monkeypatch, capsys):
     site = write_jobs(tmp_path / "site", 1)
-    run = doing._DOING["run"]
+    run = steps._STEP_FUNCTIONS["run"]
 
     def meddle(task, clock):
         written = run(task, clock)
@@ -264,7 +264,7 @@ def test_input_that_changes_meanwhile_is_computed_again(tmp_path, monkeypatch, c
         return written
 
     with monkeypatch.context() as patched:
-        patched.setitem(doing._DOING, "run", meddle)
+        patched.setitem(steps._STEP_FUNCTIONS, "run", meddle)
         assert main(batch_of(tmp_path)) == 2
     assert "changed during" in errors(capsys)[0]
     assert main(batch_of(tmp_path)) == 0
@@ -299,7 +299,7 @@ def test_foreign_folders_are_refused(tmp_path, capsys):
 
 
 def test_two_batches_into_one_folder(two, capsys):
-    with journal.opened_folder(two[1]):
+    with journal.open_folder(two[1]):
         assert again(two) == 2
     (line,) = errors(capsys)
     assert "another batch" in line
@@ -309,8 +309,8 @@ def test_two_batches_into_one_folder(two, capsys):
 @pytest.mark.slow
 def test_a_lock_is_stale_after_kill_9(two):
     code = (
-        "import sys, time; from tankcal.batch.journal import opened_folder\n"
-        "with opened_folder(sys.argv[1]): print('locked', flush=True); time.sleep(60)"
+        "import sys, time; from tankcal.batch.journal import open_folder\n"
+        "with open_folder(sys.argv[1]): print('locked', flush=True); time.sleep(60)"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code, str(two[1])], stdout=subprocess.PIPE, text=True
@@ -406,7 +406,7 @@ DONE = {"status": "done", "height_m": 9.5, "volume_m3": 100.0, "U_m3": 0.2, "rul
     ],
 )
 def test_changes(former, codes):
-    assert [one["code"] for one in changes_of(DONE, former)] == codes
+    assert [one["code"] for one in find_changes(DONE, former)] == codes
 
 
 def test_the_example_is_a_batch_of_one(tmp_path, capsys):
@@ -504,18 +504,20 @@ def test_something_in_the_way_fails_that_job_alone(tmp_path, place, capsys):
 def test_a_job_that_cannot_be_read_is_told_once(two, monkeypatch):
     """The progress goes on with what it said before, not with the trouble of that job."""
     site, out = two
-    real, parts, ended = running.keys_of, [], []
+    real, parts, ended = running.compute_keys, [], []
 
-    def keys_of(job, former):
+    def compute_keys(job, former):
         if job.name == "T-0":
             raise PermissionError(errno.EACCES, "Permission denied", "points.csv")
         return real(job, former)
 
-    monkeypatch.setattr(running, "keys_of", keys_of)
-    telling = running.Telling(
+    monkeypatch.setattr(running, "compute_keys", compute_keys)
+    callbacks = running.Callbacks(
         part=lambda text, *_: parts.append(text.code), ended=lambda *told: ended.append(told)
     )
-    batch = running.run_batch([str(site)], Asked(papers=False), out, workers=0, telling=telling)
+    batch = running.run_batch(
+        [str(site)], Options(papers=False), out, workers=0, callbacks=callbacks
+    )
     assert parts == ["batch_comparing", "batch_comparing"]
     ((name, status, problems, _),) = ended
     assert (name, status, problems[0]["code"]) == ("T-0", "failed", "batch_input_unreadable")

@@ -26,14 +26,14 @@ from batch_jobs import (
 )
 
 from tankcal.batch import running
-from tankcal.batch.asked import Asked
-from tankcal.batch.running import Telling, run_batch
+from tankcal.batch.options import Options
+from tankcal.batch.running import Callbacks, run_batch
 from tankcal.errors import InputError
 
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
 
-LIGHT = Asked(papers=False)
+LIGHT = Options(papers=False)
 JOBS = 6
 BATCH = """
 import sys
@@ -91,7 +91,7 @@ def test_the_death_of_a_worker_loses_nothing(site, tmp_path, helpers, monkeypatc
     killer = threading.Thread(target=kill_one)
     killer.start()
     batch = run_batch([str(site / "jobs")], LIGHT, out, workers=2,
-                      telling=Telling(ended=lambda *row: told.append(row)))  # fmt: skip
+                      callbacks=Callbacks(ended=lambda *row: told.append(row)))  # fmt: skip
     killer.join()
     assert bytes_of(out) == bytes_of(site / "one")  # with 0 and 2 workers, one of which died
     assert [(name, status) for name, status, *_ in told] == [("T-3", "refused")]
@@ -106,7 +106,7 @@ def test_a_job_that_kills_its_workers_stops_no_other(site, tmp_path, helpers, mo
     out, told = tmp_path / "out", []
     sources = [str(tmp_path / DEADLY), *(str(site / "jobs" / f"T-{one}") for one in range(3))]
     batch = run_batch(sources, LIGHT, out, workers=1,
-                      telling=Telling(ended=lambda *row: told.append(row)))  # fmt: skip
+                      callbacks=Callbacks(ended=lambda *row: told.append(row)))  # fmt: skip
     assert batch.counts == {"done": 3, "failed": 1}
     ((name, status, problems, _),) = told
     assert (name, status, problems[0]["code"]) == (DEADLY, "failed", "batch_killer")

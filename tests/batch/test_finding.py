@@ -4,11 +4,11 @@ import pytest
 from batch_jobs import write_jobs
 from job_builder import write_workbook
 
-from tankcal.batch.asked import Asked, parse_steps, refuse_incomplete
 from tankcal.batch.finding import find_jobs
+from tankcal.batch.options import Options, parse_steps, refuse_incomplete
 from tankcal.errors import InputError
 
-RUN = Asked()
+RUN = Options()
 
 
 @pytest.fixture(scope="module")
@@ -28,13 +28,13 @@ def site(tmp_path_factory):
     return folder
 
 
-def names(arguments, asked=RUN, **more):
-    return [job.name for job in find_jobs([*map(str, arguments)], asked, **more)]
+def names(arguments, options=RUN, **more):
+    return [job.name for job in find_jobs([*map(str, arguments)], options, **more)]
 
 
-def codes(arguments, asked=RUN):
+def codes(arguments, options=RUN):
     with pytest.raises(InputError) as raised:
-        find_jobs([*map(str, arguments)], asked)
+        find_jobs([*map(str, arguments)], options)
     return [one.expected.code for one in raised.value.problems]
 
 
@@ -66,7 +66,7 @@ def test_jobs_of_arguments(site, arguments, expected):
     ],
 )
 def test_results_of_arguments(site, do, argument, expected):
-    assert names([site / argument], Asked(do=(do,))) == expected
+    assert names([site / argument], Options(steps=(do,))) == expected
 
 
 def test_a_folder_is_not_looked_for_in_the_batch_itself(site):
@@ -74,15 +74,15 @@ def test_a_folder_is_not_looked_for_in_the_batch_itself(site):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "asked", "code"),
+    ("arguments", "options", "code"),
     [
         (["empty"], RUN, "batch_no_jobs"),
-        (["empty"], Asked(do=("report",)), "batch_no_records"),
+        (["empty"], Options(steps=("report",)), "batch_no_records"),
         (["none*"], RUN, "batch_no_match"),
     ],
 )
-def test_arguments_that_name_nothing(site, arguments, asked, code):
-    assert codes([site / one for one in arguments], asked) == [code]
+def test_arguments_that_name_nothing(site, arguments, options, code):
+    assert codes([site / one for one in arguments], options) == [code]
 
 
 def test_a_plain_list(site):
@@ -97,8 +97,8 @@ def test_a_list_with_columns(site, mark, end):
     quote = '"' if '"' in mark else ""
     lines = ["# the north", *(quote + mark.join(one) + quote for one in rows), "", " "]
     (site / "jobs.csv").write_text(end.join(lines), newline="")
-    found = find_jobs([str(site / "jobs.csv")], Asked(profile="jd-edwards"))
-    assert [(one.name, one.asked.profile) for one in found] == [
+    found = find_jobs([str(site / "jobs.csv")], Options(profile="jd-edwards"))
+    assert [(one.name, one.options.profile) for one in found] == [
         ("First", "csv"),
         ("T-1", "jd-edwards"),
     ]
@@ -107,7 +107,7 @@ def test_a_list_with_columns(site, mark, end):
 def test_a_former_table_of_a_list_lies_beside_it(site):
     (site / "former.csv").write_text("job,former,compare_by\nkept/B-2,old.csv,house.toml\n")
     (site / "house.toml").write_text("")
-    job = find_jobs([str(site / "former.csv")], Asked(do=("compare",)))[0].asked
+    job = find_jobs([str(site / "former.csv")], Options(steps=("compare",)))[0].options
     assert job.former == str(site / "old.csv")
     assert job.compare_by == str(site / "house.toml")
 
@@ -177,7 +177,7 @@ def test_steps_stand_in_their_order():
 
 
 def test_what_steps_need(site):
-    asked = Asked(do=("compare", "export"))
+    options = Options(steps=("compare", "export"))
     with pytest.raises(InputError) as raised:
-        refuse_incomplete(asked, find_jobs([str(site / "kept")], asked))
+        refuse_incomplete(options, find_jobs([str(site / "kept")], options))
     assert [one.file for one in raised.value.problems] == ["--former", "--profile"]

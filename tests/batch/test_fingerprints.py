@@ -7,11 +7,11 @@ from batch_jobs import write_jobs
 from job_builder import write_workbook
 
 import tankcal
-from tankcal.batch.asked import Asked
 from tankcal.batch.finding import BatchJob
-from tankcal.batch.fingerprints import inputs_of, keys_of
+from tankcal.batch.fingerprints import compute_keys, digest_inputs
+from tankcal.batch.options import Options
 
-ALL = Asked(do=("run", "compare", "inspect"))
+ALL = Options(steps=("run", "compare", "inspect"))
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def job(tmp_path):
 
 
 def changed(job, before, **more):
-    return {step for step, key in keys_of(job, **more).items() if key != before[step]}
+    return {step for step, key in compute_keys(job, **more).items() if key != before[step]}
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def changed(job, before, **more):
     ],
 )
 def test_a_file_of_the_job(job, tmp_path, file, expected):
-    before = keys_of(job)
+    before = compute_keys(job)
     path = tmp_path / "T-0" / file
     path.parent.mkdir(exist_ok=True)
     path.write_bytes(b"other")
@@ -46,14 +46,14 @@ def test_a_file_of_the_job(job, tmp_path, file, expected):
 
 
 def test_the_time_of_a_file_does_not_count(job, tmp_path):
-    before = keys_of(job)
+    before = compute_keys(job)
     path = tmp_path / "T-0" / "points.csv"
     path.write_bytes(path.read_bytes())
     assert changed(job, before) == set()
 
 
 @pytest.mark.parametrize(
-    ("options", "expected"),
+    ("changes", "expected"),
     [
         ({"papers": False}, {"run"}),
         ({"language": "es"}, {"compare", "inspect"}),
@@ -61,20 +61,20 @@ def test_the_time_of_a_file_does_not_count(job, tmp_path):
         ({"compare_by": "other"}, {"compare"}),
     ],
 )
-def test_options(job, options, expected):
-    before = keys_of(job)
-    assert changed(replace(job, asked=replace(ALL, **options)), before) == expected
+def test_options(job, changes, expected):
+    before = compute_keys(job)
+    assert changed(replace(job, options=replace(ALL, **changes)), before) == expected
 
 
 def test_rule_and_letterhead_count_by_their_content(job, tmp_path):
     path = tmp_path / "house.toml"
     path.write_text("a = 1")
-    of_rule = replace(job, asked=replace(ALL, inspect_by=str(path)))
-    before = keys_of(of_rule)
+    of_rule = replace(job, options=replace(ALL, inspect_by=str(path)))
+    before = compute_keys(of_rule)
     path.write_text("a = 22")
     assert changed(of_rule, before) == {"inspect"}
-    headed = replace(job, asked=replace(ALL, letterhead=str(path)))
-    before = keys_of(headed)
+    headed = replace(job, options=replace(ALL, letterhead=str(path)))
+    before = compute_keys(headed)
     path.write_text("a = 333")
     assert changed(headed, before) == {"run", "compare", "inspect"}
 
@@ -85,13 +85,13 @@ def test_the_former_table(job, tmp_path):
     declared.write_text('[former]\nfile = "old.csv"\n')
     for path in (table, declared):
         table.write_text("a")
-        before = keys_of(job, path)
+        before = compute_keys(job, path)
         table.write_text("bb")
         assert changed(job, before, former=path) == {"compare"}
 
 
 def test_the_version(job, monkeypatch):
-    before = keys_of(job)
+    before = compute_keys(job)
     monkeypatch.setattr(tankcal, "__version__", "99")
     assert changed(job, before) == {"run", "compare", "inspect"}
 
@@ -102,5 +102,5 @@ def test_a_workbook_with_what_it_names(tmp_path):
     write_workbook(tmp_path / "T-2.xlsx")
     for name in ("tank.stl", "other.stl", "settlement.csv"):
         (tmp_path / name).write_text("x")
-    assert [name for name, _ in inputs_of(book)] == ["T-1.xlsx", "settlement.csv", "tank.stl"]
-    assert inputs_of(tmp_path / "none.xlsx") == []
+    assert [name for name, _ in digest_inputs(book)] == ["T-1.xlsx", "settlement.csv", "tank.stl"]
+    assert digest_inputs(tmp_path / "none.xlsx") == []

@@ -6,8 +6,8 @@ from filled_forms import fill_form, place_of
 from job_builder import SETTINGS, job_parts
 
 import tankcal
-from tankcal.batch.asked import Asked
 from tankcal.batch.finding import find_jobs
+from tankcal.batch.options import Options
 from tankcal.cli import main
 from tankcal.cli.asked_language import asked_language
 from tankcal.cli.showing import speak
@@ -151,7 +151,7 @@ def test_a_folder_with_a_workbook_alone_is_a_job(tmp_path, capsys):
     folder = tmp_path / "tk-21"
     fill_book(write_input_workbook(folder))
     assert tankcal.load(folder).tank.id == "T-1"
-    found = find_jobs([str(tmp_path)], Asked(do=("run",)))
+    found = find_jobs([str(tmp_path)], Options(steps=("run",)))
     assert [(one.label, one.source) for one in found] == [("tk-21", str(folder / "job.xlsx"))]
     assert main(["run", str(folder), "--no-papers", "--quiet"]) == 0
     assert (folder / "results" / "record.json").is_file()

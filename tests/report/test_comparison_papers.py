@@ -17,12 +17,16 @@ from paper_words import texts_in, texts_of
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.recalibration import verdict as verdicts
+from tankcal.report import comparison
 from tankcal.report.comparison import ComparisonPaper, rebuild, write_comparison
-from tankcal.report.comparison import paper as papers
-from tankcal.report.comparison.basis import side_rows
-from tankcal.report.comparison.pages import correlation, delivery_rows, pages
-from tankcal.report.comparison.tables import CODES, MOST_ROWS, selected, waterfall_of, worst_row
-from tankcal.report.comparison.verdict import verdict
+from tankcal.report.comparison.pages import correlation, delivery_rows, pages, side_rows, verdict
+from tankcal.report.comparison.tables import (
+    CODES,
+    MOST_ROWS,
+    select_rows,
+    waterfall_table,
+    worst_row,
+)
 from tankcal.report.comparison.workbook import write
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
@@ -39,7 +43,7 @@ def test_the_waterfall_adds_up():
     for one in found["waterfall"]:
         parts = [one[f"{key}_m3"] for key in ("former", *CODES, "tank")]
         assert sum(parts) == pytest.approx(one["new_m3"], abs=1e-9)
-    columns = waterfall_of(found).on_paper()
+    columns = waterfall_table(found).on_paper()
     printed = ComparisonPaper(found).table("waterfall", found["waterfall"], columns)
     for _, *cells in printed.data["rows"]:
         former, *parts, new = (float(one.replace("\N{MINUS SIGN}", "-")) for one in cells)
@@ -47,23 +51,23 @@ def test_the_waterfall_adds_up():
 
 
 def test_steps_that_move_nothing_have_no_column():
-    keys = [one.key for one in waterfall_of(plain()).columns]
+    keys = [one.key for one in waterfall_table(plain()).columns]
     assert "roof_m3" not in keys
     assert {"zero_m3", "temperature_m3", "head_m3", "tank_m3"} <= set(keys)
-    assert "roof_m3" in [one.key for one in waterfall_of(hostile()).columns]
+    assert "roof_m3" in [one.key for one in waterfall_table(hostile()).columns]
 
 
 def test_a_selection_has_ends_joints_and_the_worst_row():
     found = plain()
     dips = found["rows"]["height_m"]
-    chosen = [row["height_m"] for row in selected(found)]
+    chosen = [row["height_m"] for row in select_rows(found)]
     assert len(chosen) <= MOST_ROWS
     assert chosen == sorted(set(chosen))
     assert {dips[0], dips[-1], worst_row(found)["height_m"]} <= set(chosen)
     joints = [one["top_m"] for one in found["courses"]]
     assert all(min(abs(dip - joint) for dip in chosen) < 0.0501 for joint in joints)
     found["rows"] = {key: values[::60] for key, values in found["rows"].items()}
-    assert [row["height_m"] for row in selected(found)] == found["rows"]["height_m"]
+    assert [row["height_m"] for row in select_rows(found)] == found["rows"]["height_m"]
 
 
 def test_dips_in_inches_are_selected_evenly():
@@ -71,7 +75,7 @@ def test_dips_in_inches_are_selected_evenly():
     dips = 0.0254 * np.arange(4, 4 + 166)
     found["rows"]["height_m"] = dips.tolist()
     found["courses"] = []
-    chosen = [row["height_m"] for row in selected(found)]
+    chosen = [row["height_m"] for row in select_rows(found)]
     assert 20 <= len(chosen) <= MOST_ROWS
     assert np.ptp(np.diff(chosen)[2:-2]) < 0.2
 
@@ -182,7 +186,7 @@ def test_every_text_is_of_the_words(kind, monkeypatch):
     """An invented language: what stands outside its brackets is the user's, or a number."""
     english, found = load_words("en"), KINDS[kind]()
     words = bracketed(english) | {"language": english["language"]}
-    monkeypatch.setattr(papers, "load_words", lambda _: words)
+    monkeypatch.setattr(comparison, "load_words", lambda _: words)
     own = texts_in(found) | texts_in(english["language"]["dates"])
     for text in texts_of(pages(ComparisonPaper(found))):
         rest = without_brackets(text)

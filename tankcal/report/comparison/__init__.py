@@ -1,22 +1,30 @@
-"""What `tankcal compare` leaves behind: the comparison on paper, as a page, a workbook and CSV.
+"""Files of `tankcal compare`: the comparison as JSON, CSV, workbook, PDF and web page.
 
-Nothing here computes a number: all of it is made from comparison.json.
+All values come from comparison.json; no number is computed here.
 """
 
+from collections import defaultdict
 from functools import partial
+from typing import ClassVar
 
+from tankcal.job.rule_files import shipped_names, shipped_rule
 from tankcal.messages import message
 from tankcal.record import manifest, save
 from tankcal.record.comparison import COMPARISON, plain_of_comparison
-from tankcal.report.comparison.paper import FILE, WORKBOOK, ComparisonPaper
-from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL
+from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL, unit_symbol
+from tankcal.report.plain import words_with_part
 from tankcal.report.saved_folder import SavedFolder, write_pages
+from tankcal.report.saved_paper import SavedPaper, bearable, iso_day, signed_text
+from tankcal.text.digits import LITRE_DECIMALS, NOTHING
+from tankcal.text.languages import DEFAULT
+from tankcal.text.words import load_words
 
 __all__ = [
     *("FILES", "ComparisonPaper", "comparison_file", "rebuild", "refuse_foreign"),
     "write_comparison",
 ]
 
+FILE, WORKBOOK = "comparison.json", "comparison.xlsx"
 PDF, PAGE = "comparison.pdf", "comparison.html"
 TABLES = {
     "rows.csv": ROWS,
@@ -25,6 +33,15 @@ TABLES = {
     "courses.csv": COURSES,
 }
 FILES = (FILE, *TABLES, WORKBOOK, PDF, PAGE, manifest.FILE)
+UNITS = {"C": "degC", "%": "percent", "mm": "image mm"}  # {unit of the file: unit of the report}
+DECIMALS = {"C": 1, "kg/m3": 1, "mm": 2, "m": 4, "m3": 4, "%": 3}  # by unit of the file
+CODES = {  # {value of a reason: group of its words}
+    "steps": "steps",
+    "step": "steps",
+    "limit": "numbers",
+    "limits": "numbers",
+    "of": "ages",
+}
 _FOLDER = SavedFolder(
     COMPARISON,
     FILES,
@@ -38,22 +55,21 @@ _FOLDER = SavedFolder(
 refuse_foreign, comparison_file, load = _FOLDER.refuse_foreign, _FOLDER.file_of, _FOLDER.load
 
 
-def write_comparison(found, folder, language=None, progress=None, letterhead=None):
+def write_comparison(comparison, folder, language=None, progress=None, letterhead=None):
     """Write comparison.json, CSV files, workbook, PDF and web page, all or nothing.
 
     Parameters
     ----------
-    found : ComparisonFile or dict
-        Of `recalibration.comparison.compare`, or the same as plain data.
+    comparison : ComparisonFile or dict
+        Result of `recalibration.comparison.compare`, or the same as plain data.
     folder : path
-        Made when missing; an earlier comparison there is replaced, and a folder that holds
-        anything else is refused.
+        Created if missing. An earlier comparison in the folder is replaced.
     language : str, optional
-        Of papers and workbook, one of languages.LANGUAGES; None: English.
+        Language of papers and workbook, one of languages.LANGUAGES; None: English.
     progress : callable, optional
-        Called with a line of text as each step begins.
+        progress(text), called at the beginning of each step.
     letterhead : report.letterhead.Letterhead, optional
-        Of who compares.
+        Letterhead of the laboratory that compares.
 
     Returns
     -------
@@ -62,17 +78,17 @@ def write_comparison(found, folder, language=None, progress=None, letterhead=Non
     Raises
     ------
     InputError
-        For a folder that is not tankcal's to replace, and what is no comparison.
+        For a folder with other files, or for data that are not a comparison.
     """
-    plain = found if isinstance(found, dict) else plain_of_comparison(found)
+    plain = comparison if isinstance(comparison, dict) else plain_of_comparison(comparison)
     paper = ComparisonPaper(plain, language, letterhead)
     return _FOLDER.write(folder, partial(_write, paper), language, progress)
 
 
 def rebuild(source, folder, language=None, progress=None, letterhead=None):
-    """Write the same from a comparison.json alone; arguments as of `write_comparison`."""
+    """Write the files from a comparison.json; other arguments as in `write_comparison`."""
     return _FOLDER.rebuild(
-        source, lambda found: write_comparison(found, folder, language, progress, letterhead)
+        source, lambda plain: write_comparison(plain, folder, language, progress, letterhead)
     )
 
 
@@ -89,3 +105,117 @@ def _write(paper, folder, progress):
     workbook.write(paper, folder / WORKBOOK)
     progress(message("comparison_papers", "setting the papers"))
     write_pages(pages, paper, folder, PDF, PAGE)
+
+
+class ComparisonPaper(SavedPaper):
+    """Formatter of a `record.comparison.ComparisonFile` in a language.
+
+    Words are looked up in the part of a group under `comparison` first, then in the group.
+
+    Parameters
+    ----------
+    comparison : dict
+        The comparison as plain data; it is checked by its schema.
+    language : str, optional
+        One of languages.LANGUAGES; None: English.
+    letterhead : letterhead.Letterhead, optional
+        Letterhead of the laboratory that compares.
+    """
+
+    kind, file = "comparison", FILE
+    attached: ClassVar[dict] = {FILE: "comparison", WORKBOOK: "comparison_workbook"}
+
+    def __init__(self, comparison, language=None, letterhead=None):
+        super().__init__(words_with_part(load_words(language or DEFAULT), "comparison"))
+        self.saved = COMPARISON.migrated(comparison, COMPARISON.file)
+        rule = self.saved["rule"]
+        texts = self._texts_of_rule(rule)
+        clauses = texts.get("clauses", {})
+        of_rule = {key: text for key, text in texts.items() if key != "clauses"}
+        self.found = self.saved | {"rule": rule and rule | of_rule}
+        for key in ("legal", "ages"):
+            self.found[key] = [
+                entry | {"clause": clauses.get(entry["clause"], entry["clause"])}
+                for entry in self.saved[key]
+            ]
+        self.letterhead = letterhead.data() if letterhead else None
+
+    def _texts_of_rule(self, rule):
+        """Return the texts of a shipped rule in the language; {} for a file of the user."""
+        name = (rule or {}).get("file", "").removesuffix(".toml")
+        texts = self.words.get("rule_texts", {}).get(name)
+        if texts is None or name not in shipped_names():
+            return {}
+        return texts if shipped_rule(name).name == rule["name"] else {}
+
+    def subject(self):
+        """Return the tank, or the file of the former table if the tank is unknown."""
+        tank = self.found["tank"]
+        subject = f"{self.word('page.tank')} {tank}" if tank else self.found["former"]["name"]
+        return bearable(subject)
+
+    def date(self):
+        """Return the ISO date of the new table; "" if it is unknown or no date."""
+        return iso_day(self.found["new"]["date"])
+
+    # ---- values
+
+    def measure(self, value, unit, decimals=None):
+        """Return a value in a unit of the file; "not known" for None."""
+        if value is None:
+            return self.word("texts.not_known")
+        decimals = DECIMALS.get(unit, 4) if decimals is None else decimals
+        return self.number(value, UNITS.get(unit, unit), decimals=decimals)
+
+    def chosen(self, value, unit):
+        """Return a declared or printed value without final zeros; None for None."""
+        return self.plain(value, unit_symbol(unit))
+
+    def reason(self, reason):
+        """Return a reason {code, values} as a sentence; the code and the values without words."""
+        code, values = reason["code"], reason["values"]
+        texts = {  # places in words consist of letters: {d} is the place of d_m3
+            key.removesuffix("_m3"): self._value_of_reason(values, key) for key in values
+        }
+        template = self.words["reasons"].get(code + _variant(values))
+        if template is None:
+            listed = ", ".join(f"{key} {text}" for key, text in texts.items())
+            return f"{code}: {listed}" if listed else code
+        return template.format_map(defaultdict(lambda: NOTHING, texts))
+
+    def _value_of_reason(self, values, key):
+        """Return a code as its name, or a number in the unit of its key or in `unit`."""
+        value = values[key]
+        if value is None:
+            return "∞" if key == "E_n" else NOTHING
+        if key in CODES:
+            codes = value if isinstance(value, list) else [value]
+            return ", ".join(self.words[CODES[key]].get(code, code) for code in codes)
+        if isinstance(value, list):
+            return ", ".join(map(str, value))
+        if isinstance(value, str):
+            return value
+        if isinstance(value, int):
+            return self.number(value, decimals=0)
+        if key == "value":
+            return self.measure(value, values["unit"])
+        if key == "most":
+            return self.chosen(value, values["unit"])
+        if key.endswith("_m"):
+            return self.height(value)
+        if key.endswith("_m3"):
+            return signed_text(value, self.number(value, "m3", decimals=LITRE_DECIMALS))
+        if key == "age":
+            return self.number(value, decimals=1)
+        if key == "years":
+            return self.plain(value)
+        return self.number(value, decimals=2)
+
+
+def _variant(values):
+    """Return the suffix of the sentence: for a delivery, a limit of c, or missing values."""
+    if "low_m" in values:
+        return "_of_delivery"
+    if values.get("c_limit") is not None:
+        return "_with_limit"
+    return "_for_lack" if values.get("lacking") else ""

@@ -1,155 +1,510 @@
-"""What a comparison says, block by block: verdict, both tables, basis, differences, radii."""
+"""Blocks of the report of a comparison: verdict, both tables, basis, differences, radii, rows."""
 
 from tankcal.report import blocks
 from tankcal.report.comparison import figures
-from tankcal.report.comparison.basis import basis, read_out, sides
-from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, selected, worst_row
-from tankcal.report.comparison.verdict import legal, signed, verdict
+from tankcal.report.comparison.tables import (
+    COURSES,
+    DELIVERIES,
+    ROWS,
+    select_rows,
+    waterfall_table,
+    worst_row,
+)
 from tankcal.report.markdown import nodes
-from tankcal.report.saved_paper import signed_text
+from tankcal.report.plain import Column
+from tankcal.report.saved_paper import bearable, iso_day, shortened, signed_text
 from tankcal.text.digits import NOTHING
 
-HALF = 0.5  # the other correlation that E_n is told for
-FEW_ROWS = 5000  # of the page: more are only in workbook and CSV
+LEGAL = (
+    Column("number"), Column("value"), Column("as_printed"), Column("limit"), Column("verdict"),
+)  # fmt: skip
+SIDES = (Column("what"), Column("former"), Column("new"))
+FILE_COLUMNS = (Column("file"), Column("sha256"))
+BASIS = (
+    Column("step"), Column("former"), Column("new"), Column("source"),
+    Column("top_m3", "m3", decimals=4, heading="at_top"),
+    Column("largest_m3", "m3", decimals=4, heading="largest"),
+    Column("largest_at_m", "m", height=True, heading="at_dip"),
+)  # fmt: skip
+READ = (
+    Column("table"), Column("what"), Column("value", heading="read_value"), Column("u"),
+    Column("sure"), Column("used"),
+)  # fmt: skip
+DECIMALS_OF_LIMITS = {"%": 3, "mm": 1, "m3": 3}  # of values with a legal limit, by unit
+HALF = 0.5  # second correlation for which E_n is stated
+MOST_ROWS_OF_PAGE = 5000  # a page shows a selection of more rows; workbook and CSV have all
 
 
 def pages(paper, folder=None, whole=False):
-    """The blocks of a ComparisonPaper.
+    """Return the blocks of a ComparisonPaper.
 
-    folder  of the files that the PDF holds inside; None: none
-    whole   True: with every row, for the web page
+    Parameters
+    ----------
+    paper : ComparisonPaper
+    folder : Path, optional
+        Folder of the files that the PDF embeds; None: no files.
+    whole : bool, optional
+        Whether every row is shown, as on the web page.
+
+    Returns
+    -------
+    list of Block
     """
     return [
         *paper.head(folder),
         *verdict(paper),
-        *signed(paper),
-        *sides(paper),
-        *legal(paper),
-        *warnings(paper),
-        *basis(paper),
-        *differences(paper),
-        *deliveries(paper),
-        *courses(paper),
-        *read_out(paper),
-        *rows(paper, whole),
+        # The signature is beside the verdict: a page with signature lines only is not accepted.
+        blocks.signature([paper.word(f"signatures.{role}") for role in ("compared", "approved")]),
+        *_sides(paper),
+        *_legal(paper),
+        *_warnings(paper),
+        *_basis(paper),
+        *_differences(paper),
+        *_deliveries(paper),
+        *_courses(paper),
+        *_read_out(paper),
+        *_rows(paper, whole),
     ]
 
 
-def differences(paper):
-    """What is left at each dip, the worst row, E_n and the correlation that it is for."""
-    found = paper.found
-    known = any(one is not None for one in found["rows"]["E_n"])
+# ---- verdict and rule
+
+
+def verdict(paper):
+    """Return the verdict in its box, with its reasons and the rule."""
+    comparison, rule = paper.found, paper.found["rule"]
+    code = comparison["verdict"] or "none"
+    note = ""
+    if rule:
+        note = paper.word("texts.by_rule", rule=rule["name"], verified=_verified(paper, rule))
+    reasons = [paper.reason(reason) for reason in comparison["reasons"]]
+    return [
+        blocks.result(paper.word("labels.verdict"), paper.word(f"verdicts.{code}"), note),
+        blocks.paragraph(paper.word(f"texts.verdict_{code}")),
+        *([paper.heading("reasons"), blocks.listing(reasons)] if reasons else []),
+        *([_rule(paper, rule)] if rule else []),
+    ]
+
+
+def _rule(paper, rule):
+    return paper.facts(
+        [
+            ("rule", rule["name"]),
+            ("rule_file", rule["file"]),
+            ("rule_source", rule["source"]),
+            ("rule_verified", _verified(paper, rule)),
+            ("verdict_verified", _verified(paper, paper.found)),
+            ("rule_remark", rule["remark"]),
+            ("rule_asked", paper.word("texts.rule_default") if rule["is_default"] else None),
+        ]
+    )
+
+
+def _verified(paper, entry):
+    """Return whether an entry was verified in the text of the rule, in words."""
+    return paper.word(f"verified.{entry['verified']}")
+
+
+def _legal(paper):
+    """Return the limited values and periods of the rule, each with its limit and verdict."""
+    rows = [*_legal_rows(paper), *_age_rows(paper)]
+    if not rows:
+        return []
+    entries = [*paper.found["legal"], *paper.found["ages"]]
+    clauses = [f"{entry['clause']} ({_verified(paper, entry)})" for entry in entries]
+    return [
+        paper.heading("legal"),
+        paper.table("legal", rows, LEGAL),
+        paper.paragraph("legal"),
+        blocks.listing(list(dict.fromkeys(clauses))),
+    ]
+
+
+def _legal_rows(paper):
+    return [
+        {
+            "number": paper.word(f"numbers.{entry['code']}"),
+            "value": _limited_value(paper, entry["value"], entry["unit"]),
+            "as_printed": _limited_value(paper, entry["as_printed"], entry["unit"]),
+            "limit": f"±\N{NO-BREAK SPACE}{paper.chosen(entry['limit'], entry['unit'])}",
+            "verdict": paper.word(f"limits.{entry['verdict']}"),
+        }
+        for entry in paper.found["legal"]
+    ]
+
+
+def _limited_value(paper, value, unit):
+    if value is None:
+        return NOTHING
+    return signed_text(value, paper.measure(value, unit, DECIMALS_OF_LIMITS[unit]))
+
+
+def _age_rows(paper):
+    return [
+        {
+            "number": paper.word(f"ages.{entry['of']}"),
+            "value": NOTHING
+            if entry["age_years"] is None
+            else paper.word("texts.years", years=paper.number(entry["age_years"], decimals=1)),
+            "as_printed": NOTHING,
+            "limit": paper.word("texts.years", years=paper.plain(entry["years"])),
+            "verdict": paper.word(f"limits.{entry['verdict']}"),
+        }
+        for entry in paper.found["ages"]
+    ]
+
+
+# ---- both tables
+
+
+def _sides(paper):
+    """Return the facts of both tables, side by side, and the digests of their files."""
+    files = [
+        {"file": shortened(paper.found[side]["name"]), "sha256": paper.found[side]["sha256"]}
+        for side in ("former", "new")
+    ]
+    return [
+        paper.heading("tables"),
+        paper.table("sides", side_rows(paper), SIDES),
+        paper.table("files", files, FILE_COLUMNS),
+    ]
+
+
+def side_rows(paper):
+    """Return [{what, former, new}] of the facts that are known of at least one table."""
+    tables = [paper.found[name] for name in ("former", "new")]
+    former, new = (_table_facts(paper, table) for table in tables)
+    if not any(table["height_quantum_m"] for table in tables):
+        former["quantum_dip"] = new["quantum_dip"] = None
+    unknown = paper.word("texts.not_declared")
+    return [
+        {
+            "what": paper.label(key),
+            "former": bearable(former[key] or unknown),
+            "new": bearable(new[key] or unknown),
+        }
+        for key in former
+        if former[key] or new[key]
+    ]
+
+
+def _table_facts(paper, table):
+    """Return {key of a label: text or None} of one table."""
+    rows = paper.word(
+        "texts.rows_of", rows=table["rows"], low=paper.height(table["low_m"]),
+        high=paper.height(table["high_m"]),
+    )  # fmt: skip
+    return {
+        "file": table["name"],
+        "origin": paper.word(f"origins_of_tables.{table['origin']}"),
+        "laboratory": table["laboratory"],
+        "number": table["number"],
+        "date": _day(paper, table["date"]),
+        "method": table["method"],
+        "kind": table["kind"] and paper.word(f"kinds.{table['kind']}"),
+        "rows": rows,
+        "top_volume": paper.number(table["top_volume_m3"], "m3", decimals=3),
+        "quantum_dip": _quantum(paper, table["height_quantum_m"], "m"),
+        "quantum_volume": _quantum(paper, table["volume_quantum_m3"], "m3"),
+        "reference_temperature": paper.chosen(table["reference_temperature_c"], "C"),
+        "head_density": paper.word("texts.without_head")
+        if table["liquid_density_kg_m3"] == 0
+        else paper.chosen(table["liquid_density_kg_m3"], "kg/m3"),
+        "roof": _roof(paper, table["roof"]),
+        "reference_height": paper.height(table["reference_height_m"]),
+        "U_top": _stated_U(paper, table),
+        "U_of_deliveries": table["U_of_deliveries"]
+        and paper.word(f"U_of_deliveries.{table['U_of_deliveries']}"),
+    }
+
+
+def _day(paper, text):
+    """Return an ISO date in words; other texts are unchanged."""
+    return paper.day(text) if iso_day(text) == text else text
+
+
+def _stated_U(paper, table):
+    """Return U of the last row with its coverage factor, or None if one is unknown."""
+    if table["U_top_m3"] is None or table["k"] is None:
+        return None
+    U = paper.number(table["U_top_m3"], "m3", u=table["U_top_m3"])
+    return paper.word("texts.U_with_k", U=U, k=paper.number(table["k"], decimals=2))
+
+
+def _quantum(paper, value, unit):
+    """Return the value of the last digit, or "not rounded"."""
+    return paper.chosen(value, unit) if value else paper.word("texts.not_rounded")
+
+
+def _roof(paper, roof):
+    if roof is None:
+        return None
+    text = paper.word(
+        "texts.roof", mass=paper.chosen(roof["mass_kg"], "kg"),
+        density=paper.chosen(roof["density_kg_m3"], "kg/m3"),
+        weighing=paper.word(f"parts.{roof['weighing']}"),
+    )  # fmt: skip
+    if roof["critical_m"] is None:
+        return text
+    low, high = map(paper.height, roof["critical_m"])
+    return f"{text}; {paper.word('texts.critical', low=low, high=high)}"
+
+
+def _warnings(paper):
+    """Return the warnings of the comparison, and the limits of every comparison."""
+    texts = [paper.warning(warning) for warning in paper.found["warnings"]]
+    error_m3 = paper.found["interpolation_m3"]
+    if error_m3:
+        volume = paper.number(error_m3, "L", digits=2)
+        texts.append(paper.word("texts.interpolation", volume=volume))
+    texts += paper.words["standing_limits"].values()
+    return [paper.heading("limits"), blocks.listing(texts)]
+
+
+# ---- common basis
+
+
+def _basis(paper):
+    """Return the steps from the former basis to the new basis, and the waterfall."""
+    comparison = paper.found
+    table = waterfall_table(comparison)
+    material = comparison["material"]
+    return [
+        paper.heading("basis"),
+        paper.paragraph("basis"),
+        paper.table("basis", _basis_rows(paper), BASIS),
+        *_missing_values(paper),
+        _zero(paper),
+        paper.paragraph(
+            f"material_{material['source']}",
+            expansion=paper.number(material["expansion_per_k"], "1/K", digits=3),
+            modulus=paper.number(material["modulus_pa"], "GPa", digits=3),
+        ),
+        paper.figure(
+            figures.waterfall(paper), "waterfall_figure",
+            dip=paper.height(comparison["waterfall"][-1]["height_m"]),
+        ),
+        paper.table("waterfall", comparison["waterfall"], table.on_paper()),
+    ]  # fmt: skip
+
+
+def _basis_rows(paper):
+    """Return a row for each step, including steps without effect."""
+    return [
+        step
+        | {
+            "step": paper.word(f"steps.{step['code']}"),
+            "former": _step_value(paper, step, "former"),
+            "new": _step_value(paper, step, "new"),
+            "source": paper.word(f"sources.{step['source'] or step['state']}"),
+        }
+        for step in paper.found["steps"]
+    ]
+
+
+def _step_value(paper, step, side):
+    if step[side] is None:
+        return NOTHING
+    if step["code"] == "head" and step[side] == 0:
+        return paper.word("texts.without_head")
+    if step["code"] == "rounding":
+        return _quantum(paper, step[side], step["unit"])
+    return paper.measure(step[side], step["unit"])
+
+
+def _missing_values(paper):
+    """Return a paragraph with the keys that omitted steps require."""
+    keys = dict.fromkeys(key for step in paper.found["steps"] for key in step["lacking"])
+    return [paper.paragraph("lacking", keys=", ".join(keys))] if keys else []
+
+
+def _zero(paper):
+    """Return the height of the new zero above the former one, as used and by the volumes."""
+    zero = paper.found["zero"]
+    text = paper.word(
+        f"texts.zero_{zero['source']}", height=_millimetres(paper, zero["height_m"], zero["u_m"])
+    )
+    if zero["fitted_m"] is None or zero["source"] == "fitted":
+        return blocks.paragraph(text)
+    fitted = paper.word(
+        "texts.zero_by_volumes", height=_millimetres(paper, zero["fitted_m"], zero["fitted_u_m"])
+    )
+    return blocks.paragraph(f"{text} {fitted}")
+
+
+def _millimetres(paper, value_m, u_m):
+    text = paper.number(value_m, "mm", decimals=2)
+    if not u_m:
+        return text
+    return paper.word("texts.with_u", value=text, u=paper.number(u_m, "mm", digits=2))
+
+
+# ---- differences
+
+
+def _differences(paper):
+    """Return the remaining differences with U, the worst row, and E_n with its correlation."""
+    is_E_n_known = any(value is not None for value in paper.found["rows"]["E_n"])
     return [
         paper.heading("differences"),
         paper.figure(figures.differences(paper), "differences"),
-        *_worst_row(paper),
-        *([formula(paper)] if known else []),
+        _worst_row(paper),
+        *([_formula(paper)] if is_E_n_known else []),
         blocks.paragraph(correlation(paper)),
-        *([paper.figure(figures.normalised(paper), "normalised")] if known else []),
-        *_judged(paper),
+        *([paper.figure(figures.normalised(paper), "normalised")] if is_E_n_known else []),
+        *_lowest_judged_dip(paper),
     ]
-
-
-def formula(paper):
-    """E_n as a formula, its indices in the language."""
-    new, former = (rf"U_\mathrm{{{paper.word(f'texts.of_{one}')}}}" for one in ("new", "former"))
-    root = rf"\sqrt{{{new}^2 + {former}^2 - 2\,c\,{new}\,{former}}}"
-    source = rf"$$E_\mathrm{{n}} = \frac{{d}}{{{root}}}$$"
-    return blocks.Block({"kind": "markdown", "nodes": nodes(source)})
 
 
 def _worst_row(paper):
     row = worst_row(paper.found)
     if row is None:
-        return [paper.paragraph("no_row_judged")]
+        return paper.paragraph("no_row_judged")
     values = {
         "dip": paper.height(row["height_m"]),
         "d": signed_text(row["d_m3"], paper.number(row["d_m3"], "m3", decimals=3)),
     }
     if row["E_n"] is None:
-        return [paper.paragraph("worst_row_without_u", **values)]
-    return [paper.paragraph("worst_row", E_n=paper.number(row["E_n"], decimals=2), **values)]
+        return paper.paragraph("worst_row_without_u", **values)
+    return paper.paragraph("worst_row", E_n=paper.number(row["E_n"], decimals=2), **values)
+
+
+def _formula(paper):
+    """Return E_n as a formula, with indices in the language."""
+    new, former = (rf"U_\mathrm{{{paper.word(f'texts.of_{side}')}}}" for side in ("new", "former"))
+    root = rf"\sqrt{{{new}^2 + {former}^2 - 2\,c\,{new}\,{former}}}"
+    source = rf"$$E_\mathrm{{n}} = \frac{{d}}{{{root}}}$$"
+    return blocks.Block({"kind": "markdown", "nodes": nodes(source)})
 
 
 def correlation(paper):
-    """What c is, who says so, and what E_n would be with another."""
-    one = paper.found["correlation"]
-    if one["worst_E_n"] is None:
+    """Return sentences on c: its source, E_n for c = 0.5, and the c at which |E_n| is 1."""
+    entry = paper.found["correlation"]
+    if entry["worst_E_n"] is None:
         return paper.word("texts.no_E_n")
-    shown = {
-        key: NOTHING if one[key] is None else paper.number(one[key], decimals=2)
+    values = {
+        key: NOTHING if entry[key] is None else paper.number(entry[key], decimals=2)
         for key in ("c", "worst_E_n", "worst_E_n_at_half", "c_limit")
     }
-    said = [paper.word(f"texts.c_{one['source']}", **shown)]
-    if one["c"] != HALF:
-        said.append(paper.word("texts.c_at_half", **shown))
-    said.append(paper.word("texts.c_never" if one["c_limit"] is None else "texts.c_limit", **shown))
-    if one["coverage_k"] is not None:
-        k = paper.number(one["coverage_k"], decimals=2)
-        said.append(paper.word("texts.same_coverage", k=k))
-    return " ".join(said)
+    sentences = [paper.word(f"texts.c_{entry['source']}", **values)]
+    if entry["c"] != HALF:
+        sentences.append(paper.word("texts.c_at_half", **values))
+    limit = "texts.c_never" if entry["c_limit"] is None else "texts.c_limit"
+    sentences.append(paper.word(limit, **values))
+    if entry["coverage_k"] is not None:
+        k = paper.number(entry["coverage_k"], decimals=2)
+        sentences.append(paper.word("texts.same_coverage", k=k))
+    return " ".join(sentences)
 
 
-def _judged(paper):
-    lowest = paper.found["judged_from_m"]
-    if lowest <= paper.found["low_m"]:
+def _lowest_judged_dip(paper):
+    lowest_m = paper.found["judged_from_m"]
+    if lowest_m <= paper.found["low_m"]:
         return []
-    return [paper.paragraph("judged_from", dip=paper.height(lowest))]
+    return [paper.paragraph("judged_from", dip=paper.height(lowest_m))]
 
 
-def deliveries(paper):
-    """The worst deliveries of the least heights."""
-    if not paper.found["deliveries"]:
+def _deliveries(paper):
+    """Return the worst deliveries of each minimum height."""
+    rows = delivery_rows(paper)
+    if not rows:
         return []
     return [
         paper.heading("deliveries"),
-        paper.show(DELIVERIES, delivery_rows(paper)),
+        paper.show(DELIVERIES, rows),
         paper.paragraph("deliveries"),
     ]
 
 
 def delivery_rows(paper):
-    """The worst deliveries; one that is the worst by both is one row."""
-    found = {}
-    for one in paper.found["deliveries"]:
-        place = (one["minimum_m"], one["low_m"], one["high_m"])
-        known = found.get(place)
-        found[place] = one | ({"by": "both"} if known else {})
-    return list(found.values())
+    """Return the worst deliveries; a delivery that is worst by both criteria is one row."""
+    rows = {}
+    for delivery in paper.found["deliveries"]:
+        place = (delivery["minimum_m"], delivery["low_m"], delivery["high_m"])
+        rows[place] = delivery | ({"by": "both"} if place in rows else {})
+    return list(rows.values())
 
 
-def courses(paper):
-    """The radii of the courses in both tables."""
-    found = paper.found["courses"]
-    if not found:
+def _courses(paper):
+    """Return the radii of the courses in both tables."""
+    rows = paper.found["courses"]
+    if not rows:
         return [paper.heading("radii"), paper.paragraph("no_radii")]
-    return [paper.heading("radii"), paper.show(COURSES, found), paper.paragraph("radii")]
+    return [paper.heading("radii"), paper.show(COURSES, rows), paper.paragraph("radii")]
 
 
-def rows(paper, whole):
-    """A selection of the rows, or every row where there is room.
+# ---- values estimated from the tables
 
-    As a table in one column of the page: it never leaves a few rows alone on the last one.
-    """
-    every = ROWS.rows(paper.found)
-    if whole and len(every) <= FEW_ROWS:
-        columns = ROWS.on_paper()
-        return [paper.heading("rows"), paper.table("every_row", every, columns, across=1)]
-    some = selected(paper.found)
-    told = [paper.paragraph("selected_rows", shown=len(some), all=len(every))]
+
+def _read_out(paper):
+    """Return the values estimated from a table because they are not declared."""
+    entries = paper.found["read"]
+    if not entries:
+        return []
+    heads = [_head(paper, entry) for entry in entries if entry["code"].startswith("head_")]
     return [
-        paper.heading("rows"),
-        paper.show(ROWS, some, across=1),
-        *(told if len(some) < len(every) else []),
+        paper.heading("read"),
+        paper.table("read", _read_rows(paper), READ),
+        *([blocks.listing(heads)] if heads else []),
+        paper.paragraph("read"),
     ]
 
 
-def warnings(paper):
-    """Warnings, and what limits every comparison."""
-    said = [paper.warning(one) for one in paper.found["warnings"]]
-    lost_m3 = paper.found["interpolation_m3"]
-    if lost_m3:
-        volume = paper.number(lost_m3, "L", digits=2)
-        said.append(paper.word("texts.interpolation", volume=volume))
-    said += paper.words["standing_limits"].values()
-    return [paper.heading("limits"), blocks.listing(said)]
+def _head(paper, entry):
+    """Return a sentence on the head of the liquid in a table, with its density."""
+    return paper.word(
+        f"texts.{entry['code']}",
+        table=paper.word(f"of_tables.{entry['table']}"),
+        density=paper.measure(entry["value"], entry["unit"]),
+        u="" if entry["u"] is None else paper.number(entry["u"], entry["unit"], digits=2),
+    )
+
+
+def _read_rows(paper):
+    return [
+        {
+            "table": paper.word(f"sides_of_comparison.{entry['table']}"),
+            "what": paper.word(f"read.{entry['code']}"),
+            "value": _read_value(paper, entry),
+            "u": NOTHING
+            if entry["u"] is None
+            else paper.number(entry["u"], _printed_unit(entry), digits=2),
+            "sure": paper.word(f"sure.{entry['sure']}"),
+            "used": paper.words["yes_no"]["yes" if entry["used"] else "no"],
+        }
+        for entry in paper.found["read"]
+    ]
+
+
+def _read_value(paper, entry):
+    if entry["value"] is None:
+        return paper.word("texts.not_known")
+    if entry["code"].startswith("rounding"):
+        return _quantum(paper, entry["value"], entry["unit"])
+    decimals = None if entry["u"] else 2
+    return paper.number(entry["value"], _printed_unit(entry), u=entry["u"], decimals=decimals)
+
+
+def _printed_unit(entry):
+    return "mm" if entry["unit"] == "m" else entry["unit"]
+
+
+# ---- rows
+
+
+def _rows(paper, whole):
+    """Return a selection of the rows, or all rows if `whole` and if the page has space for them.
+
+    The table has one column of the page, so that the last column never contains only a few rows.
+    """
+    rows = ROWS.rows(paper.found)
+    if whole and len(rows) <= MOST_ROWS_OF_PAGE:
+        table = paper.table("every_row", rows, ROWS.on_paper(), across=1)
+        return [paper.heading("rows"), table]
+    selection = select_rows(paper.found)
+    note = [paper.paragraph("selected_rows", shown=len(selection), all=len(rows))]
+    return [
+        paper.heading("rows"),
+        paper.show(ROWS, selection, across=1),
+        *(note if len(selection) < len(rows) else []),
+    ]

@@ -1,25 +1,24 @@
-"""The tables of a comparison, declared once for paper, page, workbook and CSV; their rows."""
+"""Tables of a comparison, declared once for PDF, web page, workbook and CSV, and their rows."""
 
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import LITRE_DECIMALS
 
 CODES = ("zero", "temperature", "head", "roof", "rounding")  # of the steps, in their order
-DECIMALS = {"C": 1, "kg/m3": 1}  # of units of steps; else FINE
-FINE = 4  # decimals of what adds up: a tenth of a litre
-MOST_ROWS = 50  # of the selection that a PDF shows
-NICE_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0)  # between the dips of a selection
-NEAR_M = 1e-6
+DECIMALS = {"C": 1, "kg/m3": 1}  # decimals by unit of a step; FINE for other units
+FINE = 4  # decimals of volumes that add up: 0.1 L
+MOST_ROWS = 50  # number of rows in the selection of a PDF
+ROUND_STEPS_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0)  # steps of a selection
+NEAR_M = 1e-6  # largest distance of a dip from a round dip
 
-_LITRES = {"decimals": LITRE_DECIMALS}
 _SHOWN = {"sheet": True, "width": 11}
 
 
-def _volume(key, csv=True, **more):
-    return Column(key, "m3", **_LITRES, **_SHOWN, csv=key if csv else None, **more)
+def _volume(key, **more):
+    return Column(key, "m3", decimals=LITRE_DECIMALS, csv=key, **_SHOWN, **more)
 
 
-def symbol_of(unit):
-    """A unit of the file as it is printed."""
+def unit_symbol(unit):
+    """Return the printed symbol of a unit of the file."""
     return {"C": "°C", "m3": "m³", "kg/m3": "kg/m³"}.get(unit, unit)
 
 
@@ -34,7 +33,7 @@ STEPS = Table(
         Column("source", words="sources", sheet=True, width=24),
         Column("former", decimals=_decimals, sheet=True, width=12),
         Column("new", decimals=_decimals, sheet=True, width=12),
-        Column("unit", text=lambda paper, row: symbol_of(row["unit"]), sheet=True, width=9),
+        Column("unit", text=lambda paper, row: unit_symbol(row["unit"]), sheet=True, width=9),
         Column("top_m3", "m3", decimals=FINE, heading="at_top", **_SHOWN),
         Column("largest_m3", "m3", decimals=FINE, heading="largest", **_SHOWN),
         Column("largest_at_m", "m", height=True, heading="at_dip", **_SHOWN),
@@ -55,7 +54,7 @@ ROWS = Table(
         Column("c_limit", decimals=2, on="", csv="c_limit", **_SHOWN),
         Column("for_use", on="", csv="for_use", sheet=True, width=9),
     ),
-    rows=lambda found: rows_by_dip(found["rows"]),
+    rows=lambda comparison: rows_by_dip(comparison["rows"]),
 )
 
 WATERFALL = Table(
@@ -67,7 +66,7 @@ WATERFALL = Table(
             for key in ("former", *CODES, "tank", "new")
         ),
     ),
-    rows=lambda found: found["waterfall"],
+    rows=lambda comparison: comparison["waterfall"],
 )
 
 DELIVERIES = Table(
@@ -86,7 +85,7 @@ DELIVERIES = Table(
         Column("E_n", decimals=2, csv="E_n", **_SHOWN),
         Column("c_limit", decimals=2, on="", csv="c_limit", **_SHOWN),
     ),
-    rows=lambda found: found["deliveries"],
+    rows=lambda comparison: comparison["deliveries"],
 )
 
 COURSES = Table(
@@ -102,20 +101,20 @@ COURSES = Table(
         Column("u_rounding_m", "mm", decimals=3, csv="u_rounding_m", **_SHOWN),
         Column("w", decimals=2, csv="w", **_SHOWN),
     ),
-    rows=lambda found: found["courses"],
+    rows=lambda comparison: comparison["courses"],
 )
 
 
 def step_rows(paper):
-    """Rows of STEPS; what was not made says why in place of where its values are from."""
+    """Return rows of STEPS; the source of an omitted step is the reason for its omission."""
     return [
-        one | {"step": one["code"], "source": one["source"] or one["state"]}
-        for one in paper.found["steps"]
+        step | {"step": step["code"], "source": step["source"] or step["state"]}
+        for step in paper.found["steps"]
     ]
 
 
 def rows_by_dip(columns):
-    """The rows, a dict each, of what is saved column by column."""
+    """Return a dict for each row of a table saved by columns; empty columns are left out."""
     keys = [key for key, values in columns.items() if values]
     return [
         dict(zip(keys, values, strict=True))
@@ -123,24 +122,31 @@ def rows_by_dip(columns):
     ]
 
 
-def steps_done(found):
-    """Codes of the steps that move some volume or were made, in their order."""
-    return [one["code"] for one in found["steps"] if one["state"] == "done" or one["largest_m3"]]
+def shown_steps(comparison):
+    """Return the codes of the steps that were made or change a volume, in order."""
+    return [
+        step["code"]
+        for step in comparison["steps"]
+        if step["state"] == "done" or step["largest_m3"]
+    ]
 
 
-def waterfall_of(found):
-    """The table WATERFALL without the steps that move nothing."""
-    kept = steps_done(found)
-    left_out = {f"{code}_m3" for code in CODES if code not in kept}
-    return WATERFALL.only(*(one.key for one in WATERFALL.columns if one.key not in left_out))
+def waterfall_table(comparison):
+    """Return the table WATERFALL without the steps that change no volume."""
+    left_out = {f"{code}_m3" for code in CODES} - {f"{code}_m3" for code in shown_steps(comparison)}
+    keys = [column.key for column in WATERFALL.columns if column.key not in left_out]
+    return WATERFALL.only(*keys)
 
 
-def worst_row(found):
-    """The row with the largest |E_n| that is judged; by |d| where no U is known; None: no row."""
+def worst_row(comparison):
+    """Return the judged row with the largest |E_n|, or the largest |d| if no U is known.
+
+    None if no row is judged.
+    """
     judged = [
         row
-        for row in rows_by_dip(found["rows"])
-        if row["for_use"] and row["height_m"] >= found["judged_from_m"]
+        for row in rows_by_dip(comparison["rows"])
+        if row["for_use"] and row["height_m"] >= comparison["judged_from_m"]
     ]
     known = [row for row in judged if row["E_n"] is not None]
     if known:
@@ -148,33 +154,36 @@ def worst_row(found):
     return max(judged, key=lambda row: abs(row["d_m3"]), default=None)
 
 
-def selected(found, most=MOST_ROWS):
-    """Rows for a page: even dips, both ends, the joints of courses, the worst; all when few."""
-    rows = rows_by_dip(found["rows"])
+def select_rows(comparison, most=MOST_ROWS):
+    """Return rows for a page: even dips, both ends, the joints of courses and the worst row.
+
+    All rows are returned if there are at most `most`.
+    """
+    rows = rows_by_dip(comparison["rows"])
     if len(rows) <= most:
         return rows
-    joints = [one["top_m"] for one in found["courses"]]
-    chosen = {0, len(rows) - 1, *_even(rows, most - len(joints) - 3)}
-    chosen |= {_nearest(rows, joint) for joint in joints}
-    worst = worst_row(found)
+    joints = [course["top_m"] for course in comparison["courses"]]
+    # Three places are reserved: both ends and the worst row.
+    places = {0, len(rows) - 1, *_even_places(rows, most - len(joints) - 3)}
+    places |= {_nearest_place(rows, joint) for joint in joints}
+    worst = worst_row(comparison)
     if worst is not None:
-        chosen.add(_nearest(rows, worst["height_m"]))
-    return [rows[place] for place in sorted(chosen)]
+        places.add(_nearest_place(rows, worst["height_m"]))
+    return [rows[place] for place in sorted(places)]
 
 
-def _even(rows, most):
-    """Places of rows at round dips, evenly apart; of every so manyth row where there are none."""
+def _even_places(rows, most):
+    """Return the places of rows at round dips, or of every n-th row if few dips are round."""
     most = max(most, 2)
     span = rows[-1]["height_m"] - rows[0]["height_m"]
-    step = next((one for one in NICE_M if span / one <= most), span)
-    round_ones = [
-        place
-        for place, row in enumerate(rows)
-        if abs(row["height_m"] / step - round(row["height_m"] / step)) * step < NEAR_M
+    step = next((step for step in ROUND_STEPS_M if span / step <= most), span)
+    is_round = [
+        abs(row["height_m"] / step - round(row["height_m"] / step)) * step < NEAR_M for row in rows
     ]
-    every = -(-len(rows) // most)
-    return round_ones if len(round_ones) >= most // 4 else range(0, len(rows), every)
+    if sum(is_round) >= most // 4:
+        return [place for place in range(len(rows)) if is_round[place]]
+    return range(0, len(rows), -(-len(rows) // most))
 
 
-def _nearest(rows, height_m):
+def _nearest_place(rows, height_m):
     return min(range(len(rows)), key=lambda place: abs(rows[place]["height_m"] - height_m))

@@ -1,6 +1,6 @@
-"""The comparison as a workbook: every row, to sort and filter; numbers as numbers."""
+"""Workbook of a comparison: all rows, to sort and filter, with numbers as numbers."""
 
-from tankcal.report.comparison.basis import side_rows
+from tankcal.report.comparison.pages import DECIMALS_OF_LIMITS, side_rows
 from tankcal.report.comparison.tables import (
     COURSES,
     DECIMALS,
@@ -8,10 +8,9 @@ from tankcal.report.comparison.tables import (
     ROWS,
     STEPS,
     step_rows,
-    symbol_of,
-    waterfall_of,
+    unit_symbol,
+    waterfall_table,
 )
-from tankcal.report.comparison.verdict import DECIMALS_OF_LIMITED
 from tankcal.report.workbook.book import Book, about_saved
 from tankcal.report.workbook.look import Column as Cells
 from tankcal.report.workbook.tables import (
@@ -23,38 +22,36 @@ from tankcal.report.workbook.tables import (
 )
 
 WIDTHS = (30, 34, 34, 12, 12, 24, 40, 12)
+READ_DECIMALS = 6  # of values estimated from the tables, for units that DECIMALS lacks
 
 
 def write(paper, path):
-    """Write the workbook of a ComparisonPaper; the same comparison gives the same bytes."""
-    with Book(path, _about(paper.found), paper.words, about="comparison") as book:
-        book.paper = paper
-        _verdict(book, paper)
-        table_sheet(book, "rows", ROWS, ROWS.rows(paper.found))
-        _others(book, paper)
-
-
-def _about(found):
-    new = found["new"]
-    return about_saved(
-        found["tankcal"],
-        tank=found["tank"] or found["former"]["name"],
+    """Write the workbook of a ComparisonPaper; equal comparisons give equal bytes."""
+    comparison, new = paper.found, paper.found["new"]
+    about = about_saved(
+        comparison["tankcal"],
+        tank=comparison["tank"] or comparison["former"]["name"],
         date=new["date"],
-        notice=found["notice"],
+        notice=comparison["notice"],
         laboratory=new["laboratory"],
     )
+    with Book(path, about, paper.words, about="comparison") as book:
+        book.paper = paper
+        _verdict(book, paper)
+        table_sheet(book, "rows", ROWS, ROWS.rows(comparison))
+        _other_sheets(book, paper)
 
 
 def _verdict(book, paper):
-    """Verdict, reasons, both tables, the numbers of the rule, how sure what was read is."""
-    found = paper.found
+    """Write the verdict, its reasons, both tables, the limits of the rule and estimated values."""
+    comparison = paper.found
     sheet = book.sheet("verdict", landscape=True, tab="result")
     book.widths(sheet, *WIDTHS)
     row, bold = HEAD_ROW, {"bold": True, "font_size": 12}
-    code = found["verdict"] or "none"
-    said = [(paper.word(f"verdicts.{code}"), bold), (paper.word(f"texts.verdict_{code}"), {})]
-    said += [(f"– {paper.reason(one)}", {}) for one in found["reasons"]]
-    for text, look in said:
+    code = comparison["verdict"] or "none"
+    texts = [(paper.word(f"verdicts.{code}"), bold), (paper.word(f"texts.verdict_{code}"), {})]
+    texts += [(f"– {paper.reason(reason)}", {}) for reason in comparison["reasons"]]
+    for text, look in texts:
         book.paragraph(sheet, row, text, WIDTHS, **look)
         row += 1
     row, starts = row + 1, []
@@ -74,38 +71,42 @@ def _sides(paper):
 
 
 def _legal(paper):
-    """The numbers of the rule and its periods, numbers as numbers in the unit beside them."""
-    found, ages = paper.found["legal"], paper.found["ages"]
-    digits = [DECIMALS_OF_LIMITED[one["unit"]] for one in found] + [1] * len(ages)
-    verdicts = [paper.word(f"limits.{one['verdict']}") for one in (*found, *ages)]
-    years = [one["age_years"] for one in ages]
-    names = [paper.word(f"numbers.{one['code']}") for one in found]
-    units = [symbol_of(one["unit"]) for one in found]
+    """Return the columns of the limits and periods of the rule; each number with its unit."""
+    limits, ages = paper.found["legal"], paper.found["ages"]
+    digits = [DECIMALS_OF_LIMITS[limit["unit"]] for limit in limits] + [1] * len(ages)
+    names = [paper.word(f"numbers.{limit['code']}") for limit in limits]
+    names += [paper.word(f"ages.{age['of']}") for age in ages]
+    values = [limit["value"] for limit in limits] + [age["age_years"] for age in ages]
+    printed = [limit["as_printed"] for limit in limits] + [None] * len(ages)
+    largest = [limit["limit"] for limit in limits] + [age["years"] for age in ages]
+    units = [unit_symbol(limit["unit"]) for limit in limits]
+    units += [paper.word("texts.unit_years")] * len(ages)
+    entries = [*limits, *ages]
     return [
-        _column(paper, "number", names + [paper.word(f"ages.{one['of']}") for one in ages]),
-        _column(paper, "value", [one["value"] for one in found] + years, digits),
-        _column(paper, "as_printed", [one["as_printed"] for one in found] + [None for _ in ages],
-                digits),
-        _column(paper, "limit", [one["limit"] for one in found] + [one["years"] for one in ages],
-                digits),
-        _column(paper, "unit", units + [paper.word("texts.unit_years") for _ in ages]),
-        _column(paper, "verdict", verdicts),
-        _column(paper, "clause", [one["clause"] for one in (*found, *ages)]),
-        _column(paper, "verified", [one["verified"] for one in (*found, *ages)]),
-    ]  # fmt: skip
+        _column(paper, "number", names),
+        _column(paper, "value", values, digits),
+        _column(paper, "as_printed", printed, digits),
+        _column(paper, "limit", largest, digits),
+        _column(paper, "unit", units),
+        _column(paper, "verdict", [paper.word(f"limits.{entry['verdict']}") for entry in entries]),
+        _column(paper, "clause", [entry["clause"] for entry in entries]),
+        _column(paper, "verified", [entry["verified"] for entry in entries]),
+    ]
 
 
 def _read(paper):
-    found = paper.found["read"]
-    digits = [DECIMALS.get(one["unit"], 6) for one in found]
+    """Return the columns of the values estimated from the tables."""
+    entries = paper.found["read"]
+    digits = [DECIMALS.get(entry["unit"], READ_DECIMALS) for entry in entries]
+    sides = [paper.word(f"sides_of_comparison.{entry['table']}") for entry in entries]
     return [
-        _column(paper, "table", [paper.word(f"sides_of_comparison.{o['table']}") for o in found]),
-        _column(paper, "what", [paper.word(f"read.{one['code']}") for one in found]),
-        _column(paper, "read_value", [one["value"] for one in found], digits),
-        _column(paper, "u", [one["u"] for one in found], digits),
-        _column(paper, "unit", [symbol_of(one["unit"]) for one in found]),
-        _column(paper, "sure", [paper.word(f"sure.{one['sure']}") for one in found]),
-        _column(paper, "used", [one["used"] for one in found]),
+        _column(paper, "table", sides),
+        _column(paper, "what", [paper.word(f"read.{entry['code']}") for entry in entries]),
+        _column(paper, "read_value", [entry["value"] for entry in entries], digits),
+        _column(paper, "u", [entry["u"] for entry in entries], digits),
+        _column(paper, "unit", [unit_symbol(entry["unit"]) for entry in entries]),
+        _column(paper, "sure", [paper.word(f"sure.{entry['sure']}") for entry in entries]),
+        _column(paper, "used", [entry["used"] for entry in entries]),
     ]
 
 
@@ -113,13 +114,16 @@ def _column(paper, key, cells, digits=None):
     return Cells(paper.word(f"table_headings.{key}"), cells, digits)
 
 
-def _others(book, paper):
-    """Steps and waterfall, worst deliveries and radii, a sheet each."""
-    found = paper.found
+def _other_sheets(book, paper):
+    """Write steps and waterfall, worst deliveries and radii, each on its own sheet."""
+    comparison = paper.found
     sheets = {
-        "waterfall": ((STEPS, step_rows(paper)), (waterfall_of(found), found["waterfall"])),
-        "deliveries": ((DELIVERIES, found["deliveries"]),),
-        "courses": ((COURSES, found["courses"]),),
+        "waterfall": (
+            (STEPS, step_rows(paper)),
+            (waterfall_table(comparison), comparison["waterfall"]),
+        ),
+        "deliveries": ((DELIVERIES, comparison["deliveries"]),),
+        "courses": ((COURSES, comparison["courses"]),),
     }
     for code, tables in sheets.items():
         sheet, row = book.sheet(code, landscape=True), HEAD_ROW

@@ -1,14 +1,14 @@
-"""What `tankcal history` leaves behind: a tank over the years, on paper, as a page, in tables.
+"""Files of `tankcal history`: tables of a tank over the years as JSON, CSV, workbook, PDF, page.
 
-Nothing here computes a number: all of it is made from history.json.
+All values come from history.json; no number is computed here.
 """
 
 from functools import partial
+from typing import ClassVar
 
 from tankcal.messages import message
 from tankcal.record import manifest, save
 from tankcal.record.history import HISTORY, plain_of_history
-from tankcal.report.history.paper import FILE, WORKBOOK, HistoryPaper
 from tankcal.report.history.tables import (
     CERTIFICATES,
     CHANGES,
@@ -21,19 +21,24 @@ from tankcal.report.history.tables import (
     radius_rows,
     volume_rows,
 )
+from tankcal.report.plain import words_with_part
 from tankcal.report.saved_folder import SavedFolder, write_pages
+from tankcal.report.saved_paper import SavedPaper, bearable
+from tankcal.text.languages import DEFAULT
+from tankcal.text.words import load_words
 
 __all__ = [
     *("FILES", "HistoryPaper", "history_file", "rebuild", "refuse_foreign"),
     "write_history",
 ]
 
+FILE, WORKBOOK = "history.json", "history.xlsx"
 PDF, PAGE = "history.pdf", "history.html"
 TABLES = {
-    "certificates.csv": (CERTIFICATES, lambda found: found["certificates"]),
+    "certificates.csv": (CERTIFICATES, lambda history: history["certificates"]),
     "volumes.csv": (VOLUMES, volume_rows),
     "radii.csv": (RADII, radius_rows),
-    "changes.csv": (CHANGES, lambda found: found["changes"]),
+    "changes.csv": (CHANGES, lambda history: history["changes"]),
     "radius_changes.csv": (RADIUS_CHANGES, radius_change_rows),
     "inspections.csv": (CHECKS, check_rows),
 }
@@ -51,22 +56,21 @@ _FOLDER = SavedFolder(
 refuse_foreign, history_file, load = _FOLDER.refuse_foreign, _FOLDER.file_of, _FOLDER.load
 
 
-def write_history(found, folder, language=None, progress=None, letterhead=None):
+def write_history(history, folder, language=None, progress=None, letterhead=None):
     """Write history.json, CSV files, workbook, PDF and web page, all or nothing.
 
     Parameters
     ----------
-    found : HistoryFile or dict
-        Of `recalibration.history.history_of`, or the same as plain data.
+    history : HistoryFile or dict
+        Result of `recalibration.history.history_of`, or the same as plain data.
     folder : path
-        Made when missing; an earlier history there is replaced, and a folder that holds anything
-        else is refused.
+        Created if missing. An earlier history in the folder is replaced.
     language : str, optional
-        Of papers and workbook, one of languages.LANGUAGES; None: English.
+        Language of papers and workbook, one of languages.LANGUAGES; None: English.
     progress : callable, optional
-        Called with a line of text as each step begins.
+        progress(text), called at the beginning of each step.
     letterhead : report.letterhead.Letterhead, optional
-        Of who made it.
+        Letterhead of the author.
 
     Returns
     -------
@@ -75,17 +79,17 @@ def write_history(found, folder, language=None, progress=None, letterhead=None):
     Raises
     ------
     InputError
-        For a folder that is not tankcal's to replace, and what is no history.
+        For a folder with other files, or for data that are not a history.
     """
-    plain = found if isinstance(found, dict) else plain_of_history(found)
+    plain = history if isinstance(history, dict) else plain_of_history(history)
     paper = HistoryPaper(plain, language, letterhead)
     return _FOLDER.write(folder, partial(_write, paper), language, progress)
 
 
 def rebuild(source, folder, language=None, progress=None, letterhead=None):
-    """Write the same from a history.json alone; arguments as of `write_history`."""
+    """Write the files from a history.json; other arguments as in `write_history`."""
     return _FOLDER.rebuild(
-        source, lambda found: write_history(found, folder, language, progress, letterhead)
+        source, lambda plain: write_history(plain, folder, language, progress, letterhead)
     )
 
 
@@ -102,3 +106,46 @@ def _write(paper, folder, progress):
     workbook.write(paper, folder / WORKBOOK)
     progress(message("history_papers", "setting the papers of the history"))
     write_pages(pages, paper, folder, PDF, PAGE)
+
+
+class HistoryPaper(SavedPaper):
+    """Formatter of a `record.history.HistoryFile` in a language.
+
+    Words are looked up in the part of a group under `history` first, then in the group. The names
+    of checks and steps are those of inspections and comparisons.
+
+    Parameters
+    ----------
+    history : dict
+        The history as plain data; it is checked by its schema.
+    language : str, optional
+        One of languages.LANGUAGES; None: English.
+    letterhead : letterhead.Letterhead, optional
+    """
+
+    kind, file = "history", FILE
+    attached: ClassVar[dict] = {FILE: "history", WORKBOOK: "history_workbook"}
+
+    def __init__(self, history, language=None, letterhead=None):
+        words = load_words(language or DEFAULT)
+        super().__init__(words_with_part(words, "history"))
+        self.words["checks"] = words["inspection"]["checks"]
+        self.words["check_verdicts"] = words["inspection"]["verdicts"]
+        self.words["steps"] = words["comparison"]["steps"]
+        self.saved = self.found = HISTORY.migrated(history, HISTORY.file)
+        self.letterhead = letterhead.data() if letterhead else None
+
+    def subject(self):
+        """Return the tank, or the file of the newest table if the tank is unknown."""
+        tank = self.found["tank"]
+        name = f"{self.word('page.tank')} {tank}" if tank else self.newest["file"]
+        return bearable(name)
+
+    def date(self):
+        """Return the ISO date of the newest table."""
+        return self.newest["date"]
+
+    @property
+    def newest(self):
+        """The newest certificate."""
+        return self.found["certificates"][-1]

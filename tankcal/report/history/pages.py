@@ -1,4 +1,4 @@
-"""What a history says, block by block: certificates, volumes, radii, changes, inspections."""
+"""Blocks of the report of a history: certificates, volumes, radii, changes, inspections."""
 
 from tankcal.report import blocks
 from tankcal.report.history import figures
@@ -6,7 +6,6 @@ from tankcal.report.history.tables import (
     CERTIFICATES,
     CHANGES,
     CHECKS,
-    DIGEST,
     RADII,
     VOLUMES,
     check_rows,
@@ -16,51 +15,65 @@ from tankcal.report.history.tables import (
 from tankcal.report.plain import Column
 from tankcal.report.saved_paper import bearable
 
-MOST_ROWS = 60  # of one table of the PDF: workbook, page and CSV have the others
-FILES = (Column("certificate", decimals=0), Column("file"), Column("sha256"))
+MOST_ROWS = 60  # largest number of rows of a table in the PDF; workbook, page and CSV have all
+DIGEST = 12  # number of printed digits of a SHA-256
+FILE_COLUMNS = (Column("certificate", decimals=0), Column("file"), Column("sha256"))
 
 
 def pages(paper, folder=None, whole=False):
-    """The blocks of a HistoryPaper.
+    """Return the blocks of a HistoryPaper.
 
-    folder  of the files that the PDF holds inside; None: none
-    whole   True: with every row, for the web page
+    Parameters
+    ----------
+    paper : HistoryPaper
+    folder : Path, optional
+        Folder of the files that the PDF embeds; None: no files.
+    whole : bool, optional
+        Whether every row is shown, as on the web page.
+
+    Returns
+    -------
+    list of Block
     """
     return [
         *paper.head(folder),
         blocks.result(paper.word("labels.history"), _span(paper), _summary(paper)),
-        *certificates(paper),
-        *volumes(paper, whole),
-        *radii(paper, whole),
-        *changes(paper),
-        *inspections(paper),
-        *limits(paper),
-        *files(paper),
+        *_certificates(paper),
+        *_volumes(paper, whole),
+        *_radii(paper, whole),
+        *_changes(paper),
+        *_inspections(paper),
+        *_limits(paper),
+        *_files(paper),
     ]
 
 
 def _span(paper):
-    found = paper.found["certificates"]
-    values = {"first": paper.day(found[0]["date"]), "last": paper.day(found[-1]["date"])}
-    if len(found) == 1:
-        return paper.word("texts.one_certificate", **values)
-    return paper.word("texts.span", count=len(found), **values)
+    """Return the number of certificates, and the dates of the first and the last one."""
+    certificates = paper.found["certificates"]
+    dates = {
+        "first": paper.day(certificates[0]["date"]),
+        "last": paper.day(certificates[-1]["date"]),
+    }
+    if len(certificates) == 1:
+        return paper.word("texts.one_certificate", **dates)
+    return paper.word("texts.span", count=len(certificates), **dates)
 
 
 def _summary(paper):
-    """How many of the changes are more than the uncertainties explain."""
+    """Return how many changes exceed their uncertainty."""
     changes = paper.found["changes"]
-    known = [one for one in changes if one["worst_E_n"] is not None]
+    known = [change for change in changes if change["worst_E_n"] is not None]
     if not changes:
         return paper.word("texts.nothing_to_compare")
     if not known:
         return paper.word("texts.no_E_n_at_all")
-    beyond = [one for one in known if abs(one["worst_E_n"]) > 1]
+    beyond = [change for change in known if abs(change["worst_E_n"]) > 1]
     return paper.word("texts.changes_beyond", beyond=len(beyond), known=len(known))
 
 
-def certificates(paper):
-    """The list, and what each table is for; columns that say nothing are left out."""
+def _certificates(paper):
+    """Return the certificates and the basis of their tables, without empty columns."""
     rows = paper.found["certificates"]
     known = {key for row in rows for key, value in row.items() if value is not None}
     table = CERTIFICATES.only(*known)
@@ -71,24 +84,22 @@ def certificates(paper):
     ]
 
 
-def volumes(paper, whole):
-    """Volumes at some dips on one basis, and their figure."""
-    rows = volume_rows(paper.found)
-    newest = paper.newest
+def _volumes(paper, whole):
+    """Return the volumes at some dips on one basis, and their figure."""
     return [
         paper.heading("volumes"),
         paper.paragraph(
             "volumes",
-            date=paper.day(newest["date"]),
+            date=paper.day(paper.newest["date"]),
             k=paper.number(paper.found["coverage_k"], decimals=2),
         ),
         paper.figure(figures.volumes(paper), "volumes"),
-        *_table(paper, VOLUMES, rows, whole),
+        *_table(paper, VOLUMES, volume_rows(paper.found), whole),
     ]
 
 
-def radii(paper, whole):
-    """Radii of the courses on one basis, and their figure."""
+def _radii(paper, whole):
+    """Return the radii of the courses on one basis, and their figure."""
     rows = radius_rows(paper.found)
     if not rows:
         return [paper.heading("radii"), paper.paragraph("no_radii")]
@@ -100,73 +111,72 @@ def radii(paper, whole):
     ]
 
 
-def changes(paper):
-    """Each table against the one before."""
-    found = paper.found["changes"]
-    if not found:
+def _changes(paper):
+    """Return the comparisons of each table with the one before, and their omitted steps."""
+    changes = paper.found["changes"]
+    if not changes:
         return []
-    lacking = [one for one in found if one["not_made"]]
-    said = [
+    omissions = [
         paper.word(
             "texts.not_made",
-            former=str(one["former"]),
-            new=str(one["new"]),
-            steps=", ".join(paper.words["steps"].get(step, step) for step in one["not_made"]),
+            former=str(change["former"]),
+            new=str(change["new"]),
+            steps=", ".join(paper.words["steps"].get(step, step) for step in change["not_made"]),
         )
-        for one in lacking
+        for change in changes
+        if change["not_made"]
     ]
-    known = any(one["worst_E_n"] is not None for one in found)
+    is_E_n_known = any(change["worst_E_n"] is not None for change in changes)
     return [
         paper.heading("changes"),
         paper.paragraph("changes"),
-        *([paper.figure(figures.normalised(paper), "normalised")] if known else []),
-        paper.show(CHANGES, found),
-        *([blocks.listing(said)] if said else []),
+        *([paper.figure(figures.normalised(paper), "normalised")] if is_E_n_known else []),
+        paper.show(CHANGES, changes),
+        *([blocks.listing(omissions)] if omissions else []),
     ]
 
 
-def inspections(paper):
-    """The worst figure of each check of each inspection."""
+def _inspections(paper):
+    """Return the worst result of each check of each inspection."""
     rows = check_rows(paper.found)
     if not rows:
         return []
-    drawn = figures.limited_checks(paper.found)
+    has_figure = bool(figures.limited_checks(paper.found))
     return [
         paper.heading("inspections"),
         paper.paragraph("inspections"),
-        *([paper.figure(figures.checks(paper), "inspections")] if drawn else []),
+        *([paper.figure(figures.checks(paper), "inspections")] if has_figure else []),
         paper.show(CHECKS, rows),
     ]
 
 
-def limits(paper):
-    """What was left out, warnings, and what limits every history."""
-    found = paper.found
-    out = [paper.warning(one) for one in found["left_out"]]
-    said = [paper.warning(one) for one in found["warnings"]]
-    said += paper.words["standing_limits"].values()
+def _limits(paper):
+    """Return the files left out, the warnings, and the limits of every history."""
+    left_out = [paper.warning(entry) for entry in paper.found["left_out"]]
+    texts = [paper.warning(entry) for entry in paper.found["warnings"]]
+    texts += paper.words["standing_limits"].values()
     return [
-        *([paper.heading("left_out"), blocks.listing(out)] if out else []),
+        *([paper.heading("left_out"), blocks.listing(left_out)] if left_out else []),
         paper.heading("limits"),
-        blocks.listing(said),
+        blocks.listing(texts),
     ]
 
 
-def files(paper):
-    """Where each table was found, by its hash."""
+def _files(paper):
+    """Return the file of each table, with the first digits of its SHA-256."""
     rows = [
         {
-            "certificate": one["certificate"],
-            "file": bearable(one["file"]),
-            "sha256": f"{one['sha256'][:DIGEST]}…",
+            "certificate": entry["certificate"],
+            "file": bearable(entry["file"]),
+            "sha256": f"{entry['sha256'][:DIGEST]}…",
         }
-        for one in paper.found["certificates"]
+        for entry in paper.found["certificates"]
     ]
-    return [paper.heading("files"), paper.table("files", rows, FILES)]
+    return [paper.heading("files"), paper.table("files", rows, FILE_COLUMNS)]
 
 
 def _table(paper, table, rows, whole):
-    """A table, of its first rows where the page has no room for all of them."""
+    """Return a table, or its first rows and a note if the PDF has no space for all rows."""
     if whole or len(rows) <= MOST_ROWS:
         return [paper.show(table, rows, across=1 if len(rows) > MOST_ROWS else None)]
     return [

@@ -1,10 +1,9 @@
-"""The tables of a history, declared once for paper, page, workbook and CSV; their rows."""
+"""Tables of a history, declared once for PDF, web page, workbook and CSV, and their rows."""
 
 from tankcal.report.saved_paper import bearable
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import LITRE_DECIMALS
 
-DIGEST = 12  # letters of a SHA-256 on paper
 RADIUS_DECIMALS, MM_DECIMALS = 5, 2
 _SHOWN = {"sheet": True, "width": 11}
 
@@ -18,7 +17,7 @@ def _number(key="certificate"):
 
 
 def _text(key, width=22, on=None):
-    """A text of a user, of words that a column can hold."""
+    """Return the column of a user text; words too long for a column are shortened."""
     return Column(
         key,
         text=lambda paper, row: None if row[key] is None else bearable(row[key]),
@@ -29,11 +28,13 @@ def _text(key, width=22, on=None):
     )
 
 
-def _in_words(key, group, on=None):
-    def said(paper, row):
+def _code(key, group, on=None):
+    """Return the column of a code, shown as its word in a group; unknown codes are unchanged."""
+
+    def text(paper, row):
         return None if row[key] is None else paper.words[group].get(row[key], row[key])
 
-    return Column(key, text=said, csv=key, sheet=True, width=20, on=on)
+    return Column(key, text=text, csv=key, sheet=True, width=20, on=on)
 
 
 _FACTS = "certificate_facts"
@@ -66,7 +67,7 @@ CERTIFICATES = Table(
         Column("global_test_passed", words="passed_or_not", csv="global_test_passed", on="",
                **_SHOWN),
         _text("rule", width=30, on=""),
-        _in_words("rule_verdict", "rule_verdicts", on=_FACTS),
+        _code("rule_verdict", "rule_verdicts", on=_FACTS),
         _text("tank", on=""),
         _text("origin", width=9, on=""),
         _text("file", width=34, on=""),
@@ -131,7 +132,7 @@ CHANGES = Table(
         Column("not_made", text=lambda paper, row: _steps(paper, row), csv="not_made", on="",
                sheet=True, width=24),
         Column("low_m", "m", height=True, csv="low_m", on="", **_SHOWN),
-        _in_words("verdict", "verdicts"),
+        _code("verdict", "verdicts"),
         _text("rule", width=40, on=""),
     ),
 )  # fmt: skip
@@ -141,12 +142,12 @@ CHECKS = Table(
     (
         _day("date"),
         _text("file", width=34, on=""),
-        _in_words("code", "checks"),
+        _code("code", "checks"),
         Column("value", decimals=2, csv="value", **_SHOWN),
         Column("U", decimals=2, csv="U", **_SHOWN),
         Column("limit", decimals=2, csv="limit", **_SHOWN),
         Column("unit", csv="unit", **_SHOWN),
-        _in_words("verdict", "check_verdicts"),
+        _code("verdict", "check_verdicts"),
         _text("rule", width=30, on=""),
         _text("sha256", width=66, on=""),
     ),
@@ -154,50 +155,55 @@ CHECKS = Table(
 
 
 def _steps(paper, row):
-    return ", ".join(paper.words["steps"].get(one, one) for one in row["not_made"]) or None
+    names = paper.words["steps"]
+    return ", ".join(names.get(step, step) for step in row["not_made"]) or None
 
 
-def volume_rows(found):
-    """Rows of VOLUMES: by dip from the highest, then by certificate."""
-    days = _days(found)
-    rows = [one | {"date": days[one["certificate"]]} for one in found["volumes"]]
-    return sorted(rows, key=lambda one: (-one["height_m"], one["certificate"]))
+def volume_rows(history):
+    """Return rows of VOLUMES, by dip from the highest, then by certificate."""
+    days = _dates(history)
+    rows = [row | {"date": days[row["certificate"]]} for row in history["volumes"]]
+    return sorted(rows, key=lambda row: (-row["height_m"], row["certificate"]))
 
 
-def radius_rows(found):
-    """Rows of RADII: by course, then by certificate, with the change since the one before."""
-    days = _days(found)
-    changes = {(one["new"], radius["course"]): radius for one in found["changes"]
-               for radius in one["radii"]}  # fmt: skip
+def radius_rows(history):
+    """Return rows of RADII, by course, then by certificate, with the change since the last one."""
+    days = _dates(history)
+    changes = {
+        (change["new"], radius["course"]): radius
+        for change in history["changes"]
+        for radius in change["radii"]
+    }
     rows = []
-    for one in found["radii"]:
-        change = changes.get((one["certificate"], one["course"]), {})
+    for row in history["radii"]:
+        change = changes.get((row["certificate"], row["course"]), {})
         rows.append(
-            one
-            | {"date": days[one["certificate"]], "d_m": change.get("d_m")}
+            row
+            | {"date": days[row["certificate"]], "d_m": change.get("d_m")}
             | {"U_d_m": change.get("U_m"), "E_n": change.get("E_n")}
         )
-    return sorted(rows, key=lambda one: (one["course"], one["certificate"]))
+    return sorted(rows, key=lambda row: (row["course"], row["certificate"]))
 
 
-def radius_change_rows(found):
-    """Rows of RADIUS_CHANGES."""
+def radius_change_rows(history):
+    """Return rows of RADIUS_CHANGES."""
     return [
-        {"former": one["former"], "new": one["new"], **radius}
-        for one in found["changes"]
-        for radius in one["radii"]
+        {"former": change["former"], "new": change["new"], **radius}
+        for change in history["changes"]
+        for radius in change["radii"]
     ]
 
 
-def check_rows(found):
-    """Rows of CHECKS: every check of every inspection."""
-    kept = ("date", "file", "rule", "sha256")
+def check_rows(history):
+    """Return rows of CHECKS: each check of each inspection."""
+    keys = ("date", "file", "rule", "sha256")
     return [
-        {key: inspection[key] for key in kept} | check
-        for inspection in found["inspections"]
+        {key: inspection[key] for key in keys} | check
+        for inspection in history["inspections"]
         for check in inspection["checks"]
     ]
 
 
-def _days(found):
-    return {one["certificate"]: one["date"] for one in found["certificates"]}
+def _dates(history):
+    """Return {number of the certificate: ISO date}."""
+    return {entry["certificate"]: entry["date"] for entry in history["certificates"]}

@@ -1,4 +1,4 @@
-"""A history as a workbook: every certificate, volume, radius, change and check, to sort."""
+"""Workbook of a history: all certificates, volumes, radii, changes and checks, to sort."""
 
 from dataclasses import replace
 
@@ -15,8 +15,8 @@ from tankcal.report.history.tables import (
 from tankcal.report.workbook.book import Book, about_saved
 from tankcal.report.workbook.tables import HEAD_ROW, table_sheet
 
-OF_ORIGINS = ("certificate", "tank", "origin", "tankcal", "method", "file", "sha256")
-OF_TABLES = (
+ORIGIN_COLUMNS = ("certificate", "tank", "origin", "tankcal", "method", "file", "sha256")
+CERTIFICATE_COLUMNS = (
     "certificate", "date", "superseded", "number", "laboratory", "top_dip_m", "top_volume_m3",
     "U_top_m3", "k", "reference_temperature_c", "liquid_density_kg_m3", "reference_height_m",
     "nominal_diameter_m", "nominal_height_m", "zero", "sigma0", "global_test_passed",
@@ -25,43 +25,39 @@ OF_TABLES = (
 
 
 def write(paper, path):
-    """Write the workbook of a HistoryPaper; the same history gives the same bytes."""
-    found = paper.found
-    with Book(path, _about(paper), paper.words, about="history") as book:
+    """Write the workbook of a HistoryPaper; equal histories give equal bytes."""
+    history, newest = paper.found, paper.newest
+    about = about_saved(
+        history["tankcal"],
+        tank=history["tank"] or newest["file"],
+        date=newest["date"],
+        notice=history["notice"],
+        laboratory=newest["laboratory"],
+    )
+    certificates = history["certificates"]
+    origins = replace(CERTIFICATES.only(*ORIGIN_COLUMNS), name="origins")
+    sheets = {
+        "certificates": (CERTIFICATES.only(*CERTIFICATE_COLUMNS), certificates),
+        "volumes": (VOLUMES, volume_rows(history)),
+        "radii": (RADII, radius_rows(history)),
+        "changes": (CHANGES, history["changes"]),
+        "inspections": (CHECKS, check_rows(history)),
+        "origins": (origins, certificates),
+    }
+    with Book(path, about, paper.words, about="history") as book:
         book.paper = paper
-        certificates = found["certificates"]
-        sheets = {
-            "certificates": (CERTIFICATES.only(*OF_TABLES), certificates),
-            "volumes": (VOLUMES, volume_rows(found)),
-            "radii": (RADII, radius_rows(found)),
-            "changes": (CHANGES, found["changes"]),
-            "inspections": (CHECKS, check_rows(found)),
-            "origins": (replace(CERTIFICATES.only(*OF_ORIGINS), name="origins"), certificates),
-        }
         for code, (table, rows) in sheets.items():
             if rows:
                 table_sheet(book, code, table, rows)
         _warnings(book, paper)
 
 
-def _about(paper):
-    found, newest = paper.found, paper.newest
-    return about_saved(
-        found["tankcal"],
-        tank=found["tank"] or newest["file"],
-        date=newest["date"],
-        notice=found["notice"],
-        laboratory=newest["laboratory"],
-    )
-
-
 def _warnings(book, paper):
-    """What was left out, and what should be read."""
-    sheet, row = book.sheet("warnings"), HEAD_ROW
-    widths = (100,)
+    """Write the files left out, the warnings, and the limits of every history."""
+    sheet, widths = book.sheet("warnings"), (100,)
     book.widths(sheet, *widths)
-    found = paper.found
-    said = [paper.warning(one) for one in (*found["left_out"], *found["warnings"])]
-    for text in (*said, *paper.words["standing_limits"].values()):
+    entries = (*paper.found["left_out"], *paper.found["warnings"])
+    texts = [paper.warning(entry) for entry in entries]
+    texts += paper.words["standing_limits"].values()
+    for row, text in enumerate(texts, HEAD_ROW):
         book.paragraph(sheet, row, f"– {text}", widths)
-        row += 1

@@ -1,7 +1,7 @@
 """What an inspection says, block by block: result, checks, limits, wall, welds, bottom."""
 
 from tankcal.report import blocks
-from tankcal.report.comparison.basis import FILES
+from tankcal.report.comparison.pages import FILE_COLUMNS
 from tankcal.report.inspection.bottom import edges, points, settlements
 from tankcal.report.inspection.paper import UNVERIFIED, verdict_of
 from tankcal.report.inspection.tables import CHECKS, LIMITS, limit_rows
@@ -85,7 +85,7 @@ def subject(paper):
     return [
         paper.heading("subject"),
         paper.facts([*_tank(paper, tank), *_survey(paper, tank)]),
-        *([paper.table("files", _files(tank), FILES)] if tank["sha256"] else []),
+        *([paper.table("files", _files(tank), FILE_COLUMNS)] if tank["sha256"] else []),
         *([paper.facts(_rule(paper, rule))] if rule else []),
     ]
 

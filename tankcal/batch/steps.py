@@ -1,27 +1,30 @@
 """Steps of one job, run by a worker; each step writes all of its files or none."""
 
 import errno
+import json
 import os
+from collections import Counter
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tankcal.batch import reading
-from tankcal.batch.asked import FOLDERS
-from tankcal.batch.finding import RECORD, BatchJob
-from tankcal.batch.fingerprints import keys_of
-from tankcal.batch.formers import former_of, former_or_none
+from tankcal.batch.finding import RECORD, SAVED, BatchJob, find_former, find_former_or_none
+from tankcal.batch.fingerprints import compute_keys
 from tankcal.batch.journal import JOURNAL, Journal
+from tankcal.batch.options import FOLDERS
 from tankcal.batch.outcomes import (
-    MOST_TOLD,
+    MOST_REPORTED,
     Outcome,
     StepOutcome,
-    folder_of,
+    job_folder,
     load_outcome,
     save_outcome,
 )
 from tankcal.errors import InputError, Problem, TankcalError, problem_of, reason_of
+from tankcal.job.folder import OF_INSPECTIONS
+from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
+from tankcal.record.inspection import VERDICTS
 
 IN_THE_WAY = (errno.EEXIST, errno.EISDIR, errno.ENOTDIR)  # errors of one job, not of the batch
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
@@ -83,7 +86,7 @@ def do_job(task):
 
 def _report_obstacle(task, error):
     """Return the result of `do_job` if another object occupies the path of a folder or outcome."""
-    path = error.filename2 or error.filename or folder_of(task.out, task.job.name)
+    path = error.filename2 or error.filename or job_folder(task.out, task.job.name)
     text = message(
         "batch_in_the_way",
         "is not a file or folder of a batch ({reason}); expected a free path: move it away",
@@ -93,32 +96,26 @@ def _report_obstacle(task, error):
 
 
 def _do_steps(task):
-    """Return the result of `do_job`."""
-    name, steps = task.job.name, task.job.asked.do
+    """Run the steps of a job that have no current result, with an entry of each in the journal."""
+    name, steps = task.job.name, task.job.options.steps
     outcome = load_outcome(task.out, name) or Outcome(name, task.job.source)
     if not outcome.is_settled_for(task.keys):  # settled if a worker died before its answer
         journal, clock = Journal(task.out, task.run), Clock()
         journal.note("begun", name)
-        outcome = _after_steps(replace(outcome, source=task.job.source), task, clock)
+        outcome = _run_steps(replace(outcome, source=task.job.source), task, clock)
         journal.note("ended", name, status=outcome.status(steps), cpu_s=clock.seconds())
-    done, status = (
-        [outcome.steps[step] for step in steps if step in outcome.steps],
-        outcome.status(steps),
-    )
-    problems = [problem for step in done for problem in step.problems]
-    return status, problems[:1], sum(step.problem_count for step in done)
+    return outcome.result(steps)
 
 
-def _after_steps(outcome, task, clock):
+def _run_steps(outcome, task, clock):
     """Run the steps without current result; save and return the `Outcome` after each step."""
-    for step in task.job.asked.do:
+    for step in task.job.options.steps:
         if not outcome.is_settled(step, task.keys[step]):
-            outcome = replace(
-                outcome, steps={**outcome.steps, step: _outcome_of(step, task, clock)}
-            )
+            settled = _run_step(step, task, clock)
+            outcome = replace(outcome, steps={**outcome.steps, step: settled})
             save_outcome(task.out, outcome)
         if step == "run" and outcome.steps[step].status != "done":
-            break
+            break  # the other steps need the results of the run
     return outcome
 
 
@@ -137,15 +134,15 @@ def _check_folder(task):
         raise InputError(Problem("--out", text))
 
 
-def _outcome_of(step, task, clock):
+def _run_step(step, task, clock):
     """Run a step and return its `StepOutcome`, also for a step that fails."""
     key, name = task.keys[step], task.job.name
     try:
         with clock.step(step):
-            written = _DOING[step](task, clock)
+            written = _STEP_FUNCTIONS[step](task, clock)
         with clock.step("row"):
-            values, warnings = reading.values_of(step, folder_of(task.out, name) / FOLDERS[step])
-        if keys_of(task.job, former_or_none(task.job))[step] != key:
+            values, warnings = read_values(step, job_folder(task.out, name) / FOLDERS[step])
+        if compute_keys(task.job, find_former_or_none(task.job))[step] != key:
             text = message(
                 "batch_changed",
                 "input files changed during the computation; the next batch computes the job again",
@@ -176,14 +173,14 @@ def _outcome_of(step, task, clock):
         "done",
         files=sorted(Path(path).name for path in written),
         values=values,
-        warnings=warnings[:MOST_TOLD],
+        warnings=warnings[:MOST_REPORTED],
         warning_count=len(warnings),
     )
 
 
 def _make_failure(key, status, problems):
     """Return the `StepOutcome` of a step with problems."""
-    plain_problems = [problem_of(problem) for problem in problems[:MOST_TOLD]]
+    plain_problems = [problem_of(problem) for problem in problems[:MOST_REPORTED]]
     return StepOutcome(key, status, problems=plain_problems, problem_count=len(problems))
 
 
@@ -198,9 +195,9 @@ def _run(task, clock):
         job = tankcal.load(task.job.source)
     with clock.step("compute"):
         result = tankcal.run(job)
-    asked = task.job.asked
+    options = task.job.options
     return outputs.write(
-        result, _place(task, "run"), clock.progress, _letterhead(asked), papers=asked.papers
+        result, _place(task, "run"), clock.progress, _letterhead(options), papers=options.papers
     )
 
 
@@ -208,12 +205,12 @@ def _report(task, clock):
     from tankcal.report import outputs
     from tankcal.report.saved_rooms import room_of
 
-    source, asked = _record(task), task.job.asked
-    place, letterhead = _place(task, "report"), _letterhead(asked)
+    source, options = _record(task), task.job.options
+    place, letterhead = _place(task, "report"), _letterhead(options)
     room, saved = room_of(source)
     if room is not None:
-        return room.rebuild(saved, place, asked.language, None, letterhead)
-    return outputs.rebuild(source, place, clock.progress, asked.language, letterhead)
+        return room.rebuild(saved, place, options.language, None, letterhead)
+    return outputs.rebuild(source, place, clock.progress, options.language, letterhead)
 
 
 def _compare(task, clock):
@@ -221,11 +218,11 @@ def _compare(task, clock):
     from tankcal.record.comparison import plain_of_comparison
     from tankcal.report.comparison import write_comparison
 
-    record, asked = _record(task), task.job.asked
-    comparison = compare_files(Asked(former_of(task.job), record, rule=asked.compare_by))
+    record, options = _record(task), task.job.options
+    comparison = compare_files(Asked(find_former(task.job), record, rule=options.compare_by))
     return write_comparison(
         plain_of_comparison(comparison), _place(task, "compare"), _language(task, record), None,
-        _letterhead(asked),
+        _letterhead(options),
     )  # fmt: skip
 
 
@@ -234,12 +231,12 @@ def _inspect(task, clock):
     from tankcal.record.inspection import plain_of_inspection
     from tankcal.report.inspection import write_inspection
 
-    asked = task.job.asked
-    source, rule, levelled = reading.source_of_inspection(task.job, _place(task, "run"))
-    inspection = inspect_files(Asked(source, rule=asked.inspect_by or rule, **levelled))
+    options = task.job.options
+    source, rule, levelled = find_inspection_source(task.job, _place(task, "run"))
+    inspection = inspect_files(Asked(source, rule=options.inspect_by or rule, **levelled))
     plain = plain_of_inspection(inspection)
-    language = asked.language or reading.language_of(source)
-    return write_inspection(plain, _place(task, "inspect"), language, None, _letterhead(asked))
+    language = options.language or read_language(source)
+    return write_inspection(plain, _place(task, "inspect"), language, None, _letterhead(options))
 
 
 def _export(task, clock):
@@ -249,39 +246,39 @@ def _export(task, clock):
 
     record = _record(task)
     language = _language(task, record)
-    export = export_record(record, find_profile(task.job.asked.profile), language=language)
+    export = export_record(record, find_profile(task.job.options.profile), language=language)
     with folders.replaced(_place(task, "export")) as temporary:
         return write_export(export, temporary / default_name(export), language)
 
 
-_DOING = {
+_STEP_FUNCTIONS = {
     "run": _run, "report": _report, "compare": _compare, "inspect": _inspect, "export": _export,
 }  # fmt: skip
 
 
 def _place(task, step):
     """Return the folder of a step."""
-    return folder_of(task.out, task.job.name) / FOLDERS[step]
+    return job_folder(task.out, task.job.name) / FOLDERS[step]
 
 
 def _record(task):
     """Return the input file of a step: the record of this batch, or of the job."""
     record = _place(task, "run") / RECORD
-    return record if "run" in task.job.asked.do else Path(task.job.source)
+    return record if "run" in task.job.options.steps else Path(task.job.source)
 
 
 def _language(task, record):
     """Return the language of the output of a step."""
-    return task.job.asked.language or reading.language_of(record)
+    return task.job.options.language or read_language(record)
 
 
-def _letterhead(asked):
+def _letterhead(options):
     """Return the letterhead, or None."""
-    if asked.letterhead is None:
+    if options.letterhead is None:
         return None
     from tankcal.report.letterhead import load
 
-    return load(asked.letterhead)
+    return load(options.letterhead)
 
 
 class Clock:
@@ -325,3 +322,91 @@ class Clock:
 def _processor_s():
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
+
+
+# ---- results of the steps
+
+
+def read_values(step, folder):
+    """Return ({name: value} for the summary, warnings as plain data) from the folder of a step."""
+    saved = next((folder / name for name in SAVED if (folder / name).is_file()), None)
+    if saved is None:
+        return {}, []
+    results = json.loads(saved.read_bytes())
+    return _READERS[saved.name](results), results["warnings"]
+
+
+def _of_record(record):
+    job, table, adjustment = record["job"], record["capacity"], record["adjustment"]
+    tank = job["tank"] or {}
+    values = {
+        "tank": tank.get("id"),
+        "kind": tank.get("kind"),
+        "date": (job["survey"] or {}).get("date"),
+        "global_test": adjustment["passed"] if adjustment else None,
+        "rule": record["rule"]["rule"]["name"] if record.get("rule") else None,
+        "rule_verdict": record["rule"]["code"] if record.get("rule") else None,
+    }
+    if table:
+        values |= {
+            "height_m": table["height_m"][-1],
+            "volume_m3": table["volume_m3"][-1],
+            "U_m3": table["stated_U_m3"][-1],
+        }
+    return values
+
+
+def _read_comparison(comparison):
+    last = comparison["waterfall"][-1] if comparison["waterfall"] else None
+    return {
+        "comparison_verdict": comparison["verdict"] or "none",
+        "former_m3": last and last["former_m3"],
+        "of_tank_m3": last and last["tank_m3"],
+    }
+
+
+def _read_inspection(inspection):
+    counts = Counter(check["verdict"] for check in inspection["checks"])
+    worst = next((verdict for verdict in VERDICTS if counts[verdict]), None)
+    return {"tank": inspection["tank"]["id"], "inspection_verdict": worst}
+
+
+_READERS = dict(zip(SAVED, (_of_record, _read_comparison, _read_inspection), strict=True))
+
+
+def find_inspection_source(job, results):
+    """Return the input of the inspection of a job: (source, rule or None, {settlement, edges}).
+
+    An inspection uses the record computed by this batch in the folder `results`, with the levelling
+    tables and the rule beside the job. For clouds it uses the job, because a record contains no
+    welds.
+    """
+    record = results / RECORD
+    if "run" not in job.options.steps:
+        return job.source, None, {}
+    saved = json.loads(record.read_bytes())
+    if saved.get("clouds"):
+        return job.source, None, {}
+    path = Path(job.source)
+    folder = path if path.is_dir() else path.parent
+    levelled = {
+        name: folder / file if (folder / file).is_file() else None
+        for name, file in zip(("settlement", "edges"), OF_INSPECTIONS, strict=True)
+    }
+    rule = (saved["job"].get("inspection") or {}).get("rule")
+    is_file = rule is not None and rule.lower().endswith(".toml")
+    return record, str(folder / rule) if is_file else None, levelled
+
+
+def read_language(source):
+    """Return the language of a job, or of the job of a record; None if it cannot be read."""
+    path = Path(source)
+    if path.name in SAVED:
+        try:
+            return json.loads(path.read_bytes())["job"]["table"]["language"]
+        except (OSError, ValueError, LookupError, TypeError):
+            return None
+    import tankcal
+
+    job = tankcal.load(path.parent if path.name == SETTINGS_FILE else path)
+    return job.table.language

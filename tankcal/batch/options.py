@@ -18,12 +18,12 @@ FOLDERS = {
 
 
 @dataclass(frozen=True)
-class Asked:
+class Options:
     """Steps to run for each job, and their options.
 
     Attributes
     ----------
-    do : tuple of str
+    steps : tuple of str
         Some of STEPS, in their order.
     papers : bool
         False: `run` writes the record and the CSV files only.
@@ -39,7 +39,7 @@ class Asked:
         Name or file of the profile for `export`.
     """
 
-    do: tuple[str, ...] = ("run",)
+    steps: tuple[str, ...] = ("run",)
     papers: bool = True
     language: str | None = None
     letterhead: str | None = None
@@ -48,21 +48,22 @@ class Asked:
     inspect_by: str | None = None
     profile: str | None = None
 
-    def with_own(self, own):
+    def with_overrides(self, overrides):
         """Return a copy with the options of one job, {name: text}; blank texts are ignored."""
-        return replace(self, **{name: text for name, text in own.items() if text})
+        return replace(self, **{name: text for name, text in overrides.items() if text})
 
     def absolute(self):
         """Return a copy with absolute paths of existing files, for use in other processes."""
-        named = {name: getattr(self, name) for name in FILES}
-        there = {
-            name: os.path.abspath(path) for name, path in named.items() if path and exists(path)
+        texts = {name: getattr(self, name) for name in FILES}
+        paths = {
+            name: os.path.abspath(path) for name, path in texts.items() if path and exists(path)
         }
-        return replace(self, **there)
+        return replace(self, **paths)
 
 
 FILES = ("letterhead", "former", "compare_by", "inspect_by", "profile")
-OWN = ("former", "compare_by", "inspect_by", "profile", "language")  # columns of a list of jobs
+# Options that a list of jobs may state for each job, in columns of these names.
+LIST_OPTIONS = ("former", "compare_by", "inspect_by", "profile", "language")
 
 
 def parse_steps(text):
@@ -72,13 +73,13 @@ def parse_steps(text):
 
     Examples
     --------
-    >>> from tankcal.batch.asked import parse_steps
+    >>> from tankcal.batch.options import parse_steps
     >>> parse_steps("export, run")
     ('run', 'export')
     """
-    named = [part.strip() for part in text.split(",") if part.strip()]
-    unknown = [name for name in named if name not in STEPS]
-    if unknown or not named:
+    names = [part.strip() for part in text.split(",") if part.strip()]
+    unknown = [name for name in names if name not in STEPS]
+    if unknown or not names:
         expected = message(
             "batch_steps",
             "found {text!r}; expected one or more of {steps}, separated by commas",
@@ -86,10 +87,10 @@ def parse_steps(text):
             steps=[*STEPS],
         )
         raise InputError(Problem("--do", expected))
-    return tuple(step for step in STEPS if step in named)
+    return tuple(step for step in STEPS if step in names)
 
 
-def refuse_incomplete(asked, jobs):
+def refuse_incomplete(options, jobs):
     """Raise InputError if a job lacks the former table or the profile that a step requires."""
     former = message(
         "batch_needs_former",
@@ -107,51 +108,51 @@ def refuse_incomplete(asked, jobs):
     problems = [
         Problem(option, text)
         for step, name, option, text in needed
-        if step in asked.do and any(getattr(job.asked, name) is None for job in jobs)
+        if step in options.steps and any(getattr(job.options, name) is None for job in jobs)
     ]
     if problems:
         raise InputError(problems)
 
 
-def refuse_unreadable(asked):
+def refuse_unreadable(options):
     """Raise InputError for an invalid letterhead, rule or profile."""
     problems = []
-    for use in (_use_letterhead, _use_profile, _use_rules):
+    for check in (_check_letterhead, _check_profile, _check_rules):
         try:
-            use(asked)
+            check(options)
         except InputError as error:
             problems += error.problems
     if problems:
         raise InputError(problems)
 
 
-def _use_letterhead(asked):
-    """Check the letterhead."""
-    if asked.letterhead is not None:
+def _check_letterhead(options):
+    """Raise InputError for an invalid letterhead file."""
+    if options.letterhead is not None:
         from tankcal.report.letterhead import load
 
-        load(asked.letterhead)
+        load(options.letterhead)
 
 
-def _use_profile(asked):
-    """Check the profile."""
-    if asked.profile is not None and "export" in asked.do:
+def _check_profile(options):
+    """Raise InputError for a profile that does not exist or is invalid."""
+    if options.profile is not None and "export" in options.steps:
         from tankcal.exports.profiles import find_profile
 
-        find_profile(asked.profile)
+        find_profile(options.profile)
 
 
-def _use_rules(asked):
-    """Check the rules."""
+def _check_rules(options):
+    """Raise InputError for an invalid rule of `compare` or `inspect`."""
     from tankcal.job.tables import Log
 
     log = Log()
-    if asked.inspect_by is not None and "inspect" in asked.do:
+    if options.inspect_by is not None and "inspect" in options.steps:
         from tankcal.inspection.rules import find_rule
 
-        find_rule(asked.inspect_by, log)
-    if asked.compare_by is not None and "compare" in asked.do:
+        find_rule(options.inspect_by, log)
+    if options.compare_by is not None and "compare" in options.steps:
         from tankcal.job.rule_files import named_rule
 
-        named_rule(asked.compare_by, log)
+        named_rule(options.compare_by, log)
     log.stop_if_problems()
