@@ -24,8 +24,8 @@ from tankcal.planning import load_plan, predict, smallest, what_helps
 from tankcal.planning.wall.filling_changes import changes_of_runs
 from tankcal.planning.wall.prediction import foresee_table
 from tankcal.record.wall_plan import WALL_PLAN
-from tankcal.report.planning import wall_files
-from tankcal.report.planning.filling import rows_of_runs
+from tankcal.report.planning import empty_job
+from tankcal.report.planning.wall_rows import rows_of_runs
 from tankcal.tank.liquid.run_effect import averaged
 from tankcal.uncertainty import combine
 
@@ -241,14 +241,14 @@ def test_the_empty_job_filled_in_is_the_plan(tmp_path):
     """
     prediction = predict(load_plan(FILLING))
     plan, rng = prediction.plan, np.random.default_rng(4)
-    wall_files.write_empty_job(prediction, tmp_path / "job")
+    empty_job.write_wall(prediction, tmp_path / "job")
     with pytest.raises(InputError):  # nothing is read yet
         tankcal.load(tmp_path / "job")
     fill(tmp_path / "job", plan.job)
     found = foresee_table(tankcal.load(tmp_path / "job"), plan.amplitudes).made.table
     np.testing.assert_allclose(found.U_m3, prediction.table.U_m3, rtol=1e-8)
     np.testing.assert_allclose(found.volume_m3, prediction.table.volume_m3, rtol=1e-9)
-    wall_files.write_empty_job(prediction, tmp_path / "other")
+    empty_job.write_wall(prediction, tmp_path / "other")
     fill(tmp_path / "other", read_with_errors(plan.job, rng))
     job = tankcal.load(tmp_path / "other")
     found = foresee_table(job, plan.amplitudes).made.table
@@ -269,7 +269,7 @@ def test_liquid_alone_is_the_job_that_is_run(tmp_path):
     (folder / "meters.toml").write_text((FILLING / "meters.toml").read_text(), encoding="utf-8")
     plan = load_plan(folder)
     prediction, rng = predict(plan), np.random.default_rng(1)
-    wall_files.write_empty_job(prediction, tmp_path / "job")
+    empty_job.write_wall(prediction, tmp_path / "job")
     fill(tmp_path / "job", plan.job)
     job = tankcal.load(tmp_path / "job")
     table = tankcal.run(job, simulated=False).table

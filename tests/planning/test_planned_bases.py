@@ -241,7 +241,7 @@ def test_papers_of_a_base(prediction, tmp_path, language):
     rows = [[cell.value for cell in row] for row in sheet.iter_rows()]
     assert sum(row[:2] in (["T1-1", "T1-2"], ["T1-2", "T1-1"]) for row in rows) == 4
     for one in changes_of(prediction.plan, items=("base",)):
-        assert one.name in paper.change(one)
+        assert one.name in paper.describe_change(one)
 
 
 @pytest.mark.slow

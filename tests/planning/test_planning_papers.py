@@ -24,7 +24,7 @@ from tankcal.report.planning import rows, workbook
 from tankcal.report.planning.field_sheets import sheets
 from tankcal.report.planning.outlook import outlook
 from tankcal.report.planning.paper import PlanPaper
-from tankcal.report.planning.tables import field_tables
+from tankcal.report.planning.rows import field_tables
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 

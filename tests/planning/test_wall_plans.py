@@ -40,8 +40,8 @@ from tankcal.planning.wall.nominal_readings import with_nominal_readings
 from tankcal.planning.wall.prediction import foresee_table
 from tankcal.planning.wall.reading import changed, tables_of
 from tankcal.record.wall_plan import WALL_PLAN, plain_of_wall
-from tankcal.report.planning import figures, wall_files, workbook
-from tankcal.report.planning.wall_files import form_of_wall
+from tankcal.report.planning import empty_job, figures, workbook
+from tankcal.report.planning.empty_job import form_of_wall
 from tankcal.report.planning.wall_paper import WallPaper, wall_outlook, wall_sheets
 from tankcal.report.planning.wall_rows import field_tables_of_wall
 
@@ -72,7 +72,7 @@ def test_limbs_and_untied_setups_leave_sizes_that_tell_nothing_of_each_other(pre
 def test_the_empty_job_filled_in_is_the_plan(prediction, tmp_path):
     """Its U with the plan's amplitudes is the prediction's, in every row."""
     plan = prediction.plan
-    wall_files.write_empty_job(prediction, tmp_path / "job")
+    empty_job.write_wall(prediction, tmp_path / "job")
     settings = {
         "date": '"2026-07-01"',
         "shell_temperature_c": plan.job.survey.shell_temperature_c,
@@ -579,7 +579,7 @@ SHEETS = {  # of a plan: sheets of its workbook, and how many rows they have
 @pytest.mark.parametrize("folder", SHEETS, ids=lambda one: one.name)
 def test_field_sheets_as_a_workbook(folder, tmp_path):
     """A sheet for each table of the paper, a row for each reading."""
-    workbook.write_of_wall(WallPaper(predict(load_plan(folder)), "en"), tmp_path / "x.xlsx")
+    workbook.write_wall(WallPaper(predict(load_plan(folder)), "en"), tmp_path / "x.xlsx")
     book = openpyxl.load_workbook(tmp_path / "x.xlsx")
     for name, rows in SHEETS[folder].items():
         (table,) = book[name].tables.values()
@@ -593,7 +593,7 @@ def test_field_sheets_as_a_workbook(folder, tmp_path):
 def test_a_workbook_of_the_same_plan_has_the_same_bytes(tmp_path):
     paper = WallPaper(predict(load_plan(HITS)), "pt-BR")
     for name in ("one.xlsx", "two.xlsx"):
-        workbook.write_of_wall(paper, tmp_path / name)
+        workbook.write_wall(paper, tmp_path / name)
     assert (tmp_path / "one.xlsx").read_bytes() == (tmp_path / "two.xlsx").read_bytes()
 
 
