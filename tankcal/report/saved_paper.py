@@ -35,6 +35,11 @@ class SavedPaper(PlainPaper):
     found: dict
     letterhead: dict | None
 
+    @property
+    def record(self):
+        """Content of the saved file, from which declared tables take their rows."""
+        return self.found
+
     def head(self, folder=None):
         """Document block and head of the first page.
 

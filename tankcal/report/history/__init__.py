@@ -16,10 +16,6 @@ from tankcal.report.history.tables import (
     RADII,
     RADIUS_CHANGES,
     VOLUMES,
-    check_rows,
-    radius_change_rows,
-    radius_rows,
-    volume_rows,
 )
 from tankcal.report.plain import words_with_part
 from tankcal.report.saved_folder import SavedFolder, write_pages
@@ -35,12 +31,12 @@ __all__ = [
 FILE, WORKBOOK = "history.json", "history.xlsx"
 PDF, PAGE = "history.pdf", "history.html"
 TABLES = {
-    "certificates.csv": (CERTIFICATES, lambda history: history["certificates"]),
-    "volumes.csv": (VOLUMES, volume_rows),
-    "radii.csv": (RADII, radius_rows),
-    "changes.csv": (CHANGES, lambda history: history["changes"]),
-    "radius_changes.csv": (RADIUS_CHANGES, radius_change_rows),
-    "inspections.csv": (CHECKS, check_rows),
+    "certificates.csv": CERTIFICATES,
+    "volumes.csv": VOLUMES,
+    "radii.csv": RADII,
+    "changes.csv": CHANGES,
+    "radius_changes.csv": RADIUS_CHANGES,
+    "inspections.csv": CHECKS,
 }
 FILES = (FILE, *TABLES, WORKBOOK, PDF, PAGE, manifest.FILE)
 _FOLDER = SavedFolder(
@@ -100,8 +96,8 @@ def _write(paper, folder, progress):
 
     progress(message("history_tables", "writing the tables of the history"))
     save(paper.saved, folder / FILE)
-    for name, (table, rows_of) in TABLES.items():
-        if rows := rows_of(paper.found):
+    for name, table in TABLES.items():
+        if rows := table.rows(paper.found):
             write_table(table, folder / name, rows)
     workbook.write(paper, folder / WORKBOOK)
     progress(message("history_papers", "setting the papers of the history"))

@@ -1,4 +1,4 @@
-"""An inspection as a workbook: every check, place, weld and point, numbers as numbers."""
+"""Workbook of an inspection: all checks, places, welds and points, with numbers as numbers."""
 
 from tankcal.report.inspection.pages import counts, remarks
 from tankcal.report.inspection.tables import (
@@ -23,74 +23,63 @@ from tankcal.report.inspection.tables import (
     sheet_rows,
 )
 from tankcal.report.saved_paper import bearable
-from tankcal.report.workbook.book import Book, about_saved
-from tankcal.report.workbook.tables import HEAD_ROW, columns_of, set_widths, write_table
+from tankcal.report.workbook.book import workbook_head
+from tankcal.report.workbook.sections import (
+    FIRST_LINE,
+    Sentences,
+    SheetContent,
+    cell_table,
+    write_workbook,
+)
+
+# Tables of each sheet after the checks, with the function of their rows.
+SHEETS = {
+    "generatrices": ((GENERATRICES, generatrix_rows),),
+    "levels": ((LEVELS, level_rows), (COURSES, course_rows), (PLACES, place_rows)),
+    "welds": ((GAPS, gap_rows),),
+    "settlement": ((PLANES, plane_rows), (POINTS, point_rows)),
+    "edges": ((EDGES, EDGES.rows), (READINGS, reading_rows)),
+}
 
 
 def write(paper, path):
-    """Write the workbook of an InspectionPaper; the same inspection gives the same bytes."""
-    found = paper.found
-    with Book(path, _about(found), paper.words, about="inspection") as book:
-        book.paper = paper
-        _checks(book, paper)
-        sheets = {
-            "generatrices": ((GENERATRICES, generatrix_rows(found)),),
-            "levels": (
-                (LEVELS, level_rows(found)),
-                (COURSES, course_rows(found)),
-                (PLACES, place_rows(found)),
-            ),
-            "welds": ((GAPS, gap_rows(found)),),
-            "settlement": ((PLANES, plane_rows(found)), (POINTS, point_rows(found))),
-            "edges": ((EDGES, found["edges"]), (READINGS, reading_rows(found))),
-        }
-        for code, tables in sheets.items():
-            if any(rows for _, rows in tables):
-                _sheet(book, code, [(table, rows) for table, rows in tables if rows])
-
-
-def _about(found):
-    tank = found["tank"]
-    return about_saved(
-        found["tankcal"],
+    """Write the workbook of an InspectionPaper; equal inspections give equal bytes."""
+    inspection, tank = paper.found, paper.found["tank"]
+    head = workbook_head(
+        inspection["tankcal"],
         tank=bearable(tank["id"]),
         date=tank["survey_date"],
-        notice=found["notice"],
+        notice=inspection["notice"],
     )
+    write_workbook(paper, path, "inspection", head, sheets)
 
 
-def _checks(book, paper):
-    """What came out, what it is not, every check with its limit, remarks and warnings."""
-    sheet = book.sheet("checks", landscape=True, tab="result")
-    columns = columns_of(book, SHEET_OF_CHECKS, sheet_rows(paper))
-    widths = set_widths(book, sheet, columns)
-    found, row = paper.found, HEAD_ROW
-    rule = found["rule"]
-    by = paper.word("texts.no_rule")
+def sheets(book):
+    """Yield the content of each sheet, in order; tables without rows are omitted."""
+    yield _checks_sheet(book, book.paper)
+    for code, declared in SHEETS.items():
+        tables = [
+            cell_table(book, table, rows)
+            for table, rows_of in declared
+            if (rows := rows_of(book.paper.found))
+        ]
+        if tables:
+            is_single = len(tables) == 1
+            yield SheetContent(code, tables, is_filtered=is_single, repeats_headings=True)
+
+
+def _checks_sheet(book, paper):
+    """Return the result and its scope, all checks with their limits, remarks and warnings."""
+    inspection, rule = paper.found, paper.found["rule"]
+    by_rule = paper.word("texts.no_rule")
     if rule:
         verified = paper.word(f"verified.{rule['verified']}")
-        by = paper.word("texts.by_rule", rule=bearable(rule["name"]), verified=verified)
-    built = paper.word("texts.as_built" if found["as_built"] else "texts.as_built_unknown")
-    said = [counts(paper), by, paper.word("texts.not_of_certificate"), built]
-    for number, text in enumerate(said):
-        look = {} if number else {"bold": True, "font_size": 12}
-        book.paragraph(sheet, row, text, widths, **look)
-        row += 1
-    sheet.repeat_rows(row + 1)
-    row = write_table(book, sheet, row + 1, SHEET_OF_CHECKS.name, columns, widths=widths) + 2
-    for text in (*remarks(paper), *map(paper.warning, found["warnings"])):
-        book.paragraph(sheet, row, text, widths)
-        row += 1
-
-
-def _sheet(book, code, tables):
-    """Tables one below the other, the last with headings on every page; one alone keeps them."""
-    sheet, row = book.sheet(code, landscape=True), HEAD_ROW
-    columns = [columns_of(book, table, rows) for table, rows in tables]
-    widths = set_widths(book, sheet, *columns)
-    for (table, _), cells in zip(tables, columns, strict=True):
-        filtered = {"autofilter": True} if len(tables) == 1 else {}
-        sheet.repeat_rows(row)
-        row = write_table(book, sheet, row, table.name, cells, widths=widths, **filtered) + 2
-    if len(tables) == 1:
-        book.freeze(sheet, HEAD_ROW, 1)
+        by_rule = paper.word("texts.by_rule", rule=bearable(rule["name"]), verified=verified)
+    as_built = "as_built" if inspection["as_built"] else "as_built_unknown"
+    scope = [by_rule, paper.word("texts.not_of_certificate"), paper.word(f"texts.{as_built}")]
+    sections = [
+        (Sentences([counts(paper)], look=FIRST_LINE), Sentences(scope)),
+        cell_table(book, SHEET_OF_CHECKS, sheet_rows(paper)),
+        Sentences([*remarks(paper), *map(paper.warning, inspection["warnings"])]),
+    ]
+    return SheetContent("checks", sections, tab="result", repeats_headings=True)

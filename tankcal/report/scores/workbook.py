@@ -1,19 +1,27 @@
-"""Scores as a workbook: methods, tables and every row, numbers as numbers."""
+"""Workbook of scores: methods, tables and all rows, with numbers as numbers."""
 
 from tankcal.report.scores.tables import METHODS_SHEET, PARTICIPANTS, ROWS, TABLES
-from tankcal.report.workbook.book import Book, about_saved
-from tankcal.report.workbook.tables import table_sheet
+from tankcal.report.workbook.book import workbook_head
+from tankcal.report.workbook.sections import SheetContent, cell_table, write_workbook
 
-SHEETS = {"methods": METHODS_SHEET, "tables": TABLES, "rows": ROWS, "participants": PARTICIPANTS}
+SHEETS = {
+    "scored_methods": METHODS_SHEET,
+    "scored_tables": TABLES,
+    "scored_rows": ROWS,
+    "scored_participants": PARTICIPANTS,
+}
 
 
 def write(paper, path):
-    """Write the workbook of a ScoresPaper; the same scores give the same bytes."""
-    found = paper.found
-    about = about_saved(
-        found["tankcal"], source=paper.subject(), date=paper.date(), notice=found["notice"]
+    """Write the workbook of a ScoresPaper; equal scores give equal bytes."""
+    scores = paper.found
+    head = workbook_head(
+        scores["tankcal"], source=paper.subject(), date=paper.date(), notice=scores["notice"]
     )
-    with Book(path, about, paper.words, about="scores") as book:
-        book.paper = paper
-        for code, table in SHEETS.items():
-            table_sheet(book, f"scored_{code}", table, table.rows(found))
+    write_workbook(paper, path, "scores", head, sheets)
+
+
+def sheets(book):
+    """Yield the content of each sheet, in order."""
+    for code, table in SHEETS.items():
+        yield SheetContent(code, [cell_table(book, table)], tab="result", is_filtered=True)

@@ -39,7 +39,7 @@ def header_text(text):
     return " ".join(str(text).split())[:50].replace("&", "&&")
 
 
-def about_saved(version, *, tank=None, source="", date=None, notice="", laboratory=""):
+def workbook_head(version, *, tank=None, source="", date=None, notice="", laboratory=""):
     """Return the part of a record that a Book requires, for a saved file other than a record.
 
     Parameters
@@ -79,7 +79,7 @@ class Book(Writer):
     path : str or Path
         Path of the workbook.
     record : dict
-        Record, or the result of `about_saved`.
+        Record, or the result of `workbook_head`.
     words : dict
         Words of the language.
     about : str, optional

@@ -1,4 +1,4 @@
-"""Sheets declared as sections: facts, sentences and tables below each other.
+"""Sheets declared as sections: facts, sentences, tables and figures below each other.
 
 A `SheetContent` lists its sections in order, and `write_sheet` writes them with an empty row after
 each. A section is a part or a tuple of parts, which then have no empty row between them. Every
@@ -6,15 +6,23 @@ part can have a title. The sheets of all workbooks are declared in this way (doc
 for those with formulas, charts or names of ranges.
 """
 
+import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from xlsxwriter.utility import xl_range_abs
 
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.look import DATE, Column
 from tankcal.report.workbook.tables import columns_of, set_widths
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 HEAD_ROW = 3  # row of the first section, from 0
 FIRST_LINE = {"bold": True, "font_size": 12}  # look of the result in the first row of a sheet
+_DPI, _PT_PER_INCH, _MARGIN_PT = 110, 72.0, 8.0  # of figures: resolution, unit, margin of the row
 
 
 @dataclass(frozen=True)
@@ -109,6 +117,8 @@ class CellTable:
         Indices of rows in grey italics.
     links : sequence of (str, str)
         Address and text of the links in the last column, from the first row; "": no link.
+    is_editable : bool
+        True: the cells can be changed although the sheet is protected.
     """
 
     name: str
@@ -117,6 +127,7 @@ class CellTable:
     is_optional: bool = False
     muted: Iterable = ()
     links: Sequence = ()
+    is_editable: bool = False
 
     def write(self, book, sheet, row, widths, autofilter=False):
         """Write the table from a row and return the next row."""
@@ -131,11 +142,49 @@ class CellTable:
             if address:
                 column = len(self.columns) - 1
                 sheet.write_url(below, column, address, book.format(**look), text)
+        if self.is_editable:
+            cells = xl_range_abs(row, 0, last, len(self.columns) - 1)
+            sheet.unprotect_range(cells, self.name)
         return last + 1
 
     def is_empty(self):
         """Whether nothing is to be written."""
         return self.is_optional and not self.columns[0].cells
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Figure of matplotlib in one high row, which page breaks cannot divide.
+
+    Attributes
+    ----------
+    name : str
+        Name of the picture.
+    figure : Figure
+        Figure of matplotlib.
+    description : str
+        Alternative text.
+    title : str
+        Heading above the figure; "" for none.
+    """
+
+    name: str
+    figure: "Figure"
+    description: str
+    title: str = ""
+
+    def write(self, book, sheet, row, widths):
+        """Insert the figure into a row and return the next row."""
+        image = io.BytesIO()
+        self.figure.savefig(image, format="png", dpi=_DPI, metadata={"Software": None})
+        book.set_height(sheet, row, _PT_PER_INCH * self.figure.get_figheight() + _MARGIN_PT)
+        options = {"image_data": image, "description": self.description}
+        sheet.insert_image(row, 0, f"{self.name}.png", options)
+        return row + 1
+
+    def is_empty(self):
+        """Whether nothing is to be written."""
+        return False
 
 
 @dataclass(frozen=True)
@@ -194,8 +243,8 @@ class SheetContent:
     code : str
         Key of the name in [workbook.sheets] and of the title in [workbook.titles].
     sections : sequence
-        Sections in order: a part (`Facts`, `Sentences`, `CellTable`, `DrawnPart`) or a tuple of
-        parts.
+        Sections in order: a part (`Facts`, `Sentences`, `CellTable`, `Picture`, `DrawnPart`) or a
+        tuple of parts.
     subtitle, landscape, tab
         As in `Book.sheet`.
     widths : sequence of float
@@ -270,12 +319,12 @@ def write_sheet(book, content):
 
 
 def write_workbook(paper, path, kind, head, sheets, subject=None):
-    """Write the workbook of a saved file other than a record; equal files give equal bytes.
+    """Write a workbook of declared sheets; equal content gives equal bytes.
 
     Parameters
     ----------
     paper : PlainPaper
-        Formatter of the file in the language of the workbook.
+        Formatter of the content in the language of the workbook; `book.paper` of the sheets.
     path : str or Path
         Path of the workbook.
     kind : str
