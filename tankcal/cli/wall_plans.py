@@ -10,7 +10,7 @@ SCALES = ("meter_factor", "scale", "instrument_scale")  # parameters that metere
 
 def wall_summary(prediction):
     """Yield the items of the plan and the predicted u of the course radii."""
-    from tankcal.record.wall_plan import survey_of
+    from tankcal.record.plan import survey_of
 
     plan = prediction.plan
     has = survey_of(plan)

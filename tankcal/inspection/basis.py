@@ -14,8 +14,7 @@ from tankcal.pipeline.surveyed_wall import Wall
 from tankcal.pipeline.surveying import find_survey, placed
 from tankcal.pipeline.wall import warnings_of
 from tankcal.record.making import JobAsRead
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import filled_from
+from tankcal.record.schema import filled_from, to_plain
 from tankcal.record.texts import warnings_of as records_of
 from tankcal.record.wall_shape import shape_record
 

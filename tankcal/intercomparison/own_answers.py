@@ -6,7 +6,8 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem, TankcalError
 from tankcal.messages import message
-from tankcal.record.intercomparison import Answer, AnswersFile, Participant, version
+from tankcal.record.intercomparison import Answer, AnswersFile, Participant
+from tankcal.version import find_version
 
 
 def answer_package(folder, manifest, progress=None, run=None):
@@ -56,7 +57,7 @@ def answer_package(folder, manifest, progress=None, run=None):
     participant = Participant(
         name="tankcal",
         software="tankcal",
-        version=version(),
+        version=find_version(),
         date=datetime.date.today().isoformat(),
         contact=None,
         remarks=None,

@@ -30,9 +30,9 @@ from tankcal.record.intercomparison import (
     PackageFile,
     TrueTank,
     TruthFile,
-    plain_of,
-    version,
 )
+from tankcal.record.schema import to_plain
+from tankcal.version import find_version
 
 LICENCE = "CC0-1.0"  # SPDX identifier
 COVERAGE = 0.95  # coverage probability of the requested U
@@ -95,11 +95,11 @@ def make_package(count, seed, methods, *, secret="", nonce=None, is_open=False, 
             files |= {f"{folder}/{name}": data for name, data in job_files(parts).items()}
     progress(step, total, total)
     nonce = secrets.token_hex(32) if nonce is None else nonce
-    sealed = TruthFile(version(), nonce, secret, seed, list(methods), truth)
-    truth_bytes = as_bytes(plain_of(sealed))
+    sealed = TruthFile(find_version(), nonce, secret, seed, list(methods), truth)
+    truth_bytes = as_bytes(to_plain(sealed))
     files |= _documentation(used, is_open)
     manifest = PackageFile(
-        tankcal=version(),
+        tankcal=find_version(),
         open=is_open,
         licence=LICENCE,
         coverage_probability=COVERAGE,
@@ -108,7 +108,7 @@ def make_package(count, seed, methods, *, secret="", nonce=None, is_open=False, 
         jobs=jobs,
         files=[FileHash(name, digest(files[name])) for name in sorted(files)],
     )
-    files[PACKAGE.file] = as_bytes(plain_of(manifest))
+    files[PACKAGE.file] = as_bytes(to_plain(manifest))
     return Made(files, truth_bytes)
 
 

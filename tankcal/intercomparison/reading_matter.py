@@ -2,8 +2,8 @@
 
 from tankcal.intercomparison.observers.cloud import LAS_STEP_M
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
-from tankcal.record.intercomparison import version
 from tankcal.text.shipped import shipped_folder
+from tankcal.version import find_version
 
 SEALED = (
     "The true volumes are **sealed**: nobody but the organiser has them until all answers are in."
@@ -28,7 +28,7 @@ def readme_text(is_open):
         encoding="utf-8"
     )
     state = OPEN if is_open else SEALED
-    return text.replace("{state}", state).replace("{version}", version())
+    return text.replace("{state}", state).replace("{version}", find_version())
 
 
 def columns_text(used):

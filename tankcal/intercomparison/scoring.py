@@ -24,9 +24,9 @@ from tankcal.record.intercomparison import (
     ScoredTable,
     ScoresFile,
     TableForm,
-    version,
 )
 from tankcal.record.texts import warnings_of
+from tankcal.version import find_version
 
 EVERY = "*"  # replaces the method in scores of all methods
 SAME_M = 1e-6  # largest difference of heights that are treated as equal
@@ -71,7 +71,7 @@ def score(participants, truth, truth_sha256, coverage=0.95):
             if tables_of_method:
                 methods.append(score_method(number, method, tables_of_method, asked))
     return ScoresFile(
-        tankcal=version(),
+        tankcal=find_version(),
         truth_sha256=truth_sha256,
         coverage_probability=coverage,
         participants=[item.saved.participant for item in participants],

@@ -9,8 +9,8 @@ from tankcal.errors import InputError, Problem, reason_of
 from tankcal.memory import without_collection
 from tankcal.messages import message
 from tankcal.record import manifest
+from tankcal.record.columns import whole
 from tankcal.record.long_tables import attached, copy_record, split, without_tables
-from tankcal.record.plain_data import whole
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 from tankcal.text.decoding import read_json
 

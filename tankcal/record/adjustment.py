@@ -13,23 +13,21 @@ from tankcal.record.adjusted import (
     AdjustedPhoto,
     AdjustedPoint,
     ControlSystem,
+    DepthCorrection,
+    FiducialTransformation,
+    ImageReadings,
     PointPrecision,
     adjusted_points_of,
     cameras_of,
+    depth_of,
+    fiducials_of,
+    image_readings_of,
     instruments_of,
     photos_of,
     precision_of,
     systems_of,
 )
 from tankcal.record.columns import ArrayColumns, plain_if_short
-from tankcal.record.images import (
-    DepthCorrection,
-    FiducialTransformation,
-    ImageReadings,
-    depth_of,
-    fiducials_of,
-    image_readings_of,
-)
 from tankcal.record.schema import Columns, Finite, Saved, filled_from, key
 from tankcal.record.texts import Text, text_of
 from tankcal.survey.results import DatumReport, GroupOfReadings, Reading, Readings

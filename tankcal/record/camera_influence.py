@@ -7,8 +7,7 @@ import numpy as np
 from tankcal.calibration.influence.blocks import InteriorValue
 from tankcal.record.camera_product import ProductFile, product_of
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, filled_from, key, to_plain
 
 MM, UM = 1e3, 1e3
 ARCSEC = np.degrees(1.0) * 3600

@@ -35,8 +35,7 @@ from tankcal.calibration.edges import Shift
 from tankcal.calibration.parameters.recommendation import Advice
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, filled_from, key, to_plain
 
 MM = 1e3
 

@@ -4,8 +4,7 @@ from typing import Literal
 
 from tankcal.calibration.product.check import ADVISED, AxisCheck, Precision, Reached
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, filled_from, key, to_plain
 
 
 class PartJudged(Saved):

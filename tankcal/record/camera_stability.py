@@ -22,8 +22,7 @@ import numpy as np
 
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, filled_from, key, to_plain
 
 DECIMALS = 4  # of a difference in pixels
 _KEYS = [f"{name}_{UNITS[name]}" if UNITS[name] else name for name in PARAMETERS]

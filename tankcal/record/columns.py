@@ -253,3 +253,21 @@ def plain_if_short(found):
     if is_long(found):
         return found
     return dict(found) if isinstance(found, Mapping) else list(found)
+
+
+def whole(record):
+    """A record all of whose tables are lists and dicts, the long ones as well."""
+    if isinstance(record, ArrayColumns | dict):
+        return {key: whole(value) for key, value in record.items()}
+    return list(record) if isinstance(record, ArrayRows) else record
+
+
+def columns_of(rows, names=()):
+    """{key: values} of rows that have the same keys; of none, empty columns of these names."""
+    return {one: [row[one] for row in rows] for one in (rows[0] if rows else names)}
+
+
+def rows_of(columns):
+    """The rows of {key: values}, each a dict."""
+    names = tuple(columns)
+    return [dict(zip(names, values, strict=True)) for values in zip(*columns.values(), strict=True)]

@@ -4,7 +4,6 @@ What is said in words (steps, verdict, reasons, limits) stands here as codes wit
 sentences are the templates', in their language.
 """
 
-from tankcal.record.plain_data import to_plain
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.texts import WarningRecord
@@ -260,8 +259,3 @@ class ComparisonFile(Saved, kw_only=True):
     reasons: list[Reason] = key("of the verdict, the gravest first")
     read: list[ReadOut] = key("out of the tables")
     warnings: list[WarningRecord] = key("what should be read")
-
-
-def plain_of_comparison(comparison):
-    """A `ComparisonFile` as plain data."""
-    return to_plain(comparison)

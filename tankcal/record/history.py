@@ -5,7 +5,6 @@ compare` makes; what is judged between two tables is what that command says of t
 """
 
 import tankcal
-from tankcal.record.plain_data import to_plain
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.texts import WarningRecord
@@ -133,8 +132,3 @@ class HistoryFile(Saved, kw_only=True):
     inspections: list[InspectionInHistory] = key("by their dates, those without one last")
     left_out: list[WarningRecord] = key("files that are not in the history, and why")
     warnings: list[WarningRecord] = key("what should be read")
-
-
-def plain_of_history(history):
-    """A `HistoryFile` as plain data."""
-    return to_plain(history)

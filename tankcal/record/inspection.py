@@ -4,7 +4,6 @@ Every figure has its expanded uncertainty, every limit its source. What is said 
 verdicts, remarks) stands here as codes with their numbers; the sentences are the templates'.
 """
 
-from tankcal.record.plain_data import to_plain
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.texts import WarningRecord
@@ -208,8 +207,3 @@ class InspectionFile(Saved, kw_only=True):
     settlements: list[Settlement] = key("each epoch, then differences; none: not levelled")
     edges: list[EdgeProfile] = key("none: not levelled")
     warnings: list[WarningRecord] = key("what should be read")
-
-
-def plain_of_inspection(inspection):
-    """An `InspectionFile` as plain data."""
-    return to_plain(inspection)

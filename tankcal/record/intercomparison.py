@@ -1,7 +1,5 @@
 """A comparison of software as it is saved: package, sealed truth, answers and scores."""
 
-import tankcal
-from tankcal.record.plain_data import to_plain
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.texts import WarningRecord
@@ -195,13 +193,3 @@ class ScoresFile(Saved):
     methods: list[MethodScore] = key("by participant and method")
     warnings: list[WarningRecord] = key("of the answers")
     format: str = SCORES.format
-
-
-def plain_of(saved):
-    """Any of these files as plain data."""
-    return to_plain(saved)
-
-
-def version():
-    """The version that writes."""
-    return tankcal.__version__

@@ -17,24 +17,17 @@ from tankcal.job.model.settings import (
     Tank,
 )
 from tankcal.pipeline.corrections import Correction
-from tankcal.record import statements, survey, table, tank_parts, texts
+from tankcal.record import survey, table, tank_parts, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.choices import Choice, adjustment_choices, choices_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
 from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
 from tankcal.record.hits import HitsRecord, hits_of
-from tankcal.record.homogeneity import HomogeneityRecord, homogeneity_record
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
 from tankcal.record.long_tables import LongTables
-from tankcal.record.overrulings import (
-    OverrulingsRecord,
-    overrulings_of,
-    overrulings_of_adjustment,
-)
-from tankcal.record.plain_data import to_plain
 from tankcal.record.radii import RadiiRecord, radii_of
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, filled_from, key, to_plain
 from tankcal.record.ship import ShipRecord, ship_of
 from tankcal.record.strapping import StrappingRecord, strapping_of
 from tankcal.record.tangents import TangentsRecord, tangents_of
@@ -84,13 +77,13 @@ class Record(Saved, kw_only=True):
         "of an adjusted survey every adjusted point first; null: in the file of `long_tables`"
     )
     rejected: list[survey.RejectedPoint] = key("points that are not on the wall", default=())
-    overrulings: OverrulingsRecord | None = key(
+    overrulings: survey.OverrulingsRecord | None = key(
         "decisions against the search for blunders; left out where there are none",
         default=None,
         optional=True,
     )
     sections: list[survey.SectionCircle] = key("from the bottom up", default=())
-    homogeneity: HomogeneityRecord | None = key(
+    homogeneity: survey.HomogeneityRecord | None = key(
         "of the noise of the sections; left out where no section has a noise of its own",
         default=None,
         optional=True,
@@ -141,14 +134,14 @@ class Record(Saved, kw_only=True):
     )
     deadwood: list[Deadwood] = key("as declared, whether or not it is on", default=())
     roof: list[tank_parts.Detail] | None = key("the floating roof", default=None)
-    budget: list[statements.BudgetLine] = key("of the top row, by the table alone", default=())
+    budget: list[table.BudgetLine] = key("of the top row, by the table alone", default=())
     choices: list[Choice] = key("everything that was assumed")
     warnings: list[texts.WarningRecord] = key("what should be read")
     adjustment: AdjustmentRecord | None = key("null: points were handed in", default=None)
-    budgets: list[statements.StatedBudget] = key("stated volumes, then deliveries", default=())
+    budgets: list[table.StatedBudget] = key("stated volumes, then deliveries", default=())
     deliveries: list[WorstDeliveries] = key("the worst of each minimum height", default=())
-    rule: statements.TableJudged | None = key("null: the job has no decision rule", default=None)
-    monte_carlo: statements.MonteCarlo | None = key("null: it is off", default=None)
+    rule: table.TableJudged | None = key("null: the job has no decision rule", default=None)
+    monte_carlo: table.MonteCarlo | None = key("null: it is off", default=None)
     long_tables: LongTables | None = key(
         "the file that holds tables of more than 10 000 rows; left out where there are none",
         default=None,
@@ -169,9 +162,9 @@ def record_of(result):
             shell=survey.shell_of(result),
             points=survey.points_of(result),
             rejected=survey.rejected_of(result),
-            overrulings=overrulings_of(result),
+            overrulings=survey.overrulings_of(result),
             sections=survey.sections_of(result),
-            homogeneity=homogeneity_record(job, result.wall),
+            homogeneity=survey.homogeneity_record(job, result.wall),
             strapping=strapping_of(result),
             lines=lines_of(result),
             hits=hits_of(result),
@@ -194,14 +187,14 @@ def record_of(result):
             top=tank_parts.top_of(result),
             deadwood=job.deadwood,
             roof=tank_parts.roof_of(result),
-            budget=statements.budget_of(result),
+            budget=table.budget_of(result),
             choices=choices_of(result),
             warnings=texts.warnings_of(result.warnings),
             adjustment=adjustment and adjustment_of(adjustment, job.measurements),
-            budgets=statements.budgets_of(result),
+            budgets=table.budgets_of(result),
             deliveries=result.stated.worst,
-            rule=statements.rule_of(result.rule),
-            monte_carlo=statements.monte_carlo_of(result),
+            rule=table.rule_of(result.rule),
+            monte_carlo=table.monte_carlo_of(result),
         )
     )
 
@@ -213,7 +206,7 @@ def record_of_adjustment(job, adjustment):
         Record(
             **_beginning(job),
             points=survey.points_of_adjustment(adjustment),
-            overrulings=overrulings_of_adjustment(job),
+            overrulings=survey.overrulings_of_adjustment(job),
             choices=adjustment_choices(adjustment, measurements),
             warnings=texts.warnings_of(dict.fromkeys((*job.warnings, *adjustment.warnings))),
             adjustment=adjustment_of(adjustment, measurements),

@@ -18,7 +18,7 @@ from typing import Annotated, Any, Union, dataclass_transform, get_args, get_ori
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.messages import Message, message
+from tankcal.messages import Message, as_plain, message
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 MOST_TOLD = 20  # problems of one file
@@ -341,6 +341,66 @@ def _expected(names, value):
                    found=found, expected=expected)  # fmt: skip
 
 
+# ---- to plain data
+
+
+_AS_THEY_ARE = {str, int, bool, type(None)}
+
+
+def to_plain(value):
+    """What JSON can hold: dicts, lists, texts, numbers, and null for what is not a finite number.
+
+    Parameters
+    ----------
+    value : object
+        A dataclass (see `tankcal.record.schema`), or dicts, lists, tuples and arrays of anything
+        plain, and of dataclasses. `ArrayColumns` and `ArrayRows` stay as they are.
+    """
+    kind = type(value)  # of a million values most are these two
+    if kind is float:
+        return value if isfinite(value) else None
+    if kind in _AS_THEY_ARE:
+        return value
+    if isinstance(value, dict):
+        return {str(name): to_plain(item) for name, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return to_plain(value.tolist())
+    if isinstance(value, list | tuple):
+        types = set(map(type, value))  # a long column is of one type: it is looked at as a whole
+        if types <= _AS_THEY_ARE:
+            return list(value)
+        if types == {float}:
+            return [item if isfinite(item) else None for item in value]
+        return [to_plain(item) for item in value]
+    if is_dataclass(value):
+        return _object(value)
+    if isinstance(value, np.generic):
+        return to_plain(value.item())
+    if isinstance(value, str):  # a Message
+        return str(value)
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return value
+
+
+def _object(value):
+    keys = [one for one in keys_of(type(value)) if one.name]
+    found = {one.key: getattr(value, one.name) for one in keys}
+    told = [one for one in keys if one.type is Message]
+    plain = {
+        one.key: to_plain(found[one.key])
+        for one in keys
+        if one.required or found[one.key] is not None
+    }
+    for one in told:
+        said = as_plain(found[one.key])
+        plain[f"{one.key}_code"], plain[f"{one.key}_values"] = (
+            said["code"],
+            to_plain(said["values"]),
+        )
+    return plain
+
+
 # ---- from plain data
 
 
@@ -388,7 +448,7 @@ def _maker(kind):
     if kind is float:
         return lambda data: np.nan if data is None else float(data)
     if is_dataclass(kind):
-        return partial(_object, kind)
+        return partial(_made_object, kind)
     if origin in (tuple, list):
         if len(arguments) > 1 and Ellipsis not in arguments:
             pairs = partial(zip, arguments, strict=True)
@@ -406,7 +466,7 @@ def _array_of(data):
     return found if found.dtype != object else np.array(data, dtype=float)
 
 
-def _object(cls, data):
+def _made_object(cls, data):
     values = {}
     for one in keys_of(cls):
         if not one.name or one.key not in data:

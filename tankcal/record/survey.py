@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
+from tankcal.pipeline.section_homogeneity import homogeneity_of
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import mean_radii
 from tankcal.record.columns import ArrayColumns, ArrayRows, plain_if_short
@@ -404,3 +405,121 @@ def _partial(result, low_m, high_m):
     of_shell = [source for source in sources if source.kind != "datum"]  # joints know no zero
     variance = sum(np.sum(np.diff(source.columns_m3, axis=0) ** 2) for source in of_shell)
     return volume[1] - volume[0], np.sqrt(variance)
+
+
+# ---- noise of the sections
+
+
+class SectionTestRecord(Saved):
+    """Tests of the noise of a section."""
+
+    section: str = key("name")
+    noise_factor: float = key(
+        "variance of the noise apart from the form of the wall, over the stated one", of="factor"
+    )
+    noise_dof: float = key("its degrees of freedom", of="dof")
+    noise_share: float = key("part of the redundancy of the circle that is noise", of="share")
+    chi2: float = key("v'Pv about the circle")
+    chi2_dof: int = key("n - 3")
+    p: float | None = key("of the stated covariance, two-sided; null: it was estimated")
+    compared: bool = key("whether it takes part in Bartlett's test", of="is_compared")
+    differs: bool = key("whether it disagrees with the stated covariance")
+
+
+class HomogeneityRecord(Saved):
+    """Whether the sections have one variance of noise."""
+
+    statistic: float | None = key("of Bartlett's test; null: fewer than two sections take part")
+    dof: int | None = key("its degrees of freedom")
+    p: float | None = key("probability of a larger statistic")
+    sections: list[SectionTestRecord] = key("from the bottom up")
+
+
+def homogeneity_record(job, wall):
+    """`HomogeneityRecord` of a wall; None where its sections have no noise of their own."""
+    found = None if wall is None else homogeneity_of(job, wall)
+    if found is None:
+        return None
+    sections = [filled_from(SectionTestRecord, one) for one in found.sections]
+    return filled_from(HomogeneityRecord, found, sections=sections)
+
+
+# ---- decisions against the search for blunders
+
+
+class OverrulingRecord(Saved):
+    """A point or a reading that was decided by hand."""
+
+    what: str = key("its name: a point, or table and row of a reading")
+    kind: str = key('"point" or "reading"')
+    decision: str = key('"keep" or "leave_out"')
+    reason: str = key("as given")
+    by: str = key('who decided; "": not given')
+    date: str = key('when; "": not given')
+    searched: str | None = key(
+        'what the search alone does with it: "" it uses it, "removed" a reading, "no_solution", or'
+        " the reason of a rejected point; null: not computed"
+    )
+    off_m: float | None = key("from the wall as the search alone has it, outwards; null: a reading")
+    w: float | None = key("its normalised residual there; null: none was computed")
+    moved_m3: float | None = key(
+        "volume of the top row less that without this decision; null: not computed"
+    )
+    is_outrageous: bool = key("kept, and so far off that it is told as a warning")
+    row: int | None = key("of the file")
+
+
+class OverrulingsRecord(Saved):
+    """All decisions, and what they change together."""
+
+    each: list[OverrulingRecord] = key("in the order of the file")
+    moved_m3: float | None = key(
+        "volume of the top row less that of the search alone; null: not computed, or that has no"
+        " sound solution"
+    )
+    others: list[str] = key("points and readings without decision that changed sides")
+
+
+def overrulings_of(result):
+    """`OverrulingsRecord` of a result; None where nothing was decided."""
+    found = result.overrulings
+    if found is None:
+        return None
+    return filled_from(
+        OverrulingsRecord,
+        found,
+        each=[
+            _saved(
+                one.decision,
+                searched=one.searched,
+                off_m=one.off_m,
+                w=one.w,
+                moved_m3=one.moved_m3,
+                is_outrageous=one.is_outrageous,
+            )
+            for one in found.each
+        ],
+    )
+
+
+def overrulings_of_adjustment(job):
+    """The same of a survey that was only adjusted: its readings, without what that changed."""
+    decided = [one for one in getattr(job, "overrulings", ()) if one.table is not None]
+    if not decided:
+        return None
+    nothing = dict.fromkeys(("searched", "off_m", "w", "moved_m3"))
+    each = [_saved(one, is_outrageous=False, **nothing) for one in decided]
+    return OverrulingsRecord(each=each, moved_m3=None, others=[])
+
+
+def _saved(decision, **found):
+    return OverrulingRecord(
+        what=decision.what,
+        kind="point" if decision.table is None else "reading",
+        decision=decision.decision,
+        reason=decision.reason,
+        by=decision.by,
+        date=decision.date,
+        row=decision.row,
+        **found,
+    )

@@ -1,7 +1,7 @@
 """The versions of the record, and what is added to an older one so that it is of the last."""
 
+from tankcal.record.columns import columns_of
 from tankcal.record.covariance_factor import in_blocks
-from tankcal.record.plain_data import columns_of
 from tankcal.record.saved_formats import SavedFormat
 
 VERSION = 2

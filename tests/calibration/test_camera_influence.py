@@ -28,7 +28,7 @@ from tankcal.geometry.rotations import rotation_of_angles, rotation_vector
 from tankcal.job.model import Job, Material
 from tankcal.record.adjustment import adjustment_of
 from tankcal.record.camera_influence import as_json
-from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import to_plain
 from tankcal.survey.measurements import (
     AdjustmentSettings,
     CameraSetup,

@@ -23,7 +23,7 @@ from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict, smallest, what_helps
 from tankcal.planning.wall.filling_changes import changes_of_runs
 from tankcal.planning.wall.prediction import foresee_table
-from tankcal.record.wall_plan import WALL_PLAN
+from tankcal.record.plan import WALL_PLAN
 from tankcal.report.planning import empty_job
 from tankcal.report.planning.wall_rows import rows_of_runs
 from tankcal.tank.liquid.run_effect import averaged

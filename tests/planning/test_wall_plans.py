@@ -39,7 +39,7 @@ from tankcal.planning.wall.model import PlannedHits, PlannedStrap, even_radius_m
 from tankcal.planning.wall.nominal_readings import with_nominal_readings
 from tankcal.planning.wall.prediction import foresee_table
 from tankcal.planning.wall.reading import changed, tables_of
-from tankcal.record.wall_plan import WALL_PLAN, plain_of_wall
+from tankcal.record.plan import WALL_PLAN, plain_of_wall
 from tankcal.report.planning import empty_job, figures, workbook
 from tankcal.report.planning.empty_job import form_of_wall
 from tankcal.report.planning.wall_paper import WallPaper, wall_outlook, wall_sheets

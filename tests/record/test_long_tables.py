@@ -24,8 +24,7 @@ from tankcal.record import (
     record_of_adjustment,
     save,
 )
-from tankcal.record.columns import ArrayColumns, ArrayRows, Texts, column_of, values_of
-from tankcal.record.plain_data import whole
+from tankcal.record.columns import ArrayColumns, ArrayRows, Texts, column_of, values_of, whole
 from tankcal.record.recomputation import compare_records
 from tankcal.report import outputs
 from tankcal.report.attachments import sha256

@@ -14,8 +14,7 @@ from tankcal.cli import main
 from tankcal.errors import CellError, InputError
 from tankcal.record import FORMAT, VERSION, load, migrated, version_of
 from tankcal.record.making import Record
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import MOST_TOLD, checked, from_plain
+from tankcal.record.schema import MOST_TOLD, checked, from_plain, to_plain
 from tankcal.record.versions import RECORD
 from tankcal.report import outputs
 

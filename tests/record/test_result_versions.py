@@ -12,9 +12,8 @@ from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict
 from tankcal.record.camera_product import as_json
 from tankcal.record.camera_versions import CAMERA
-from tankcal.record.plain_data import to_plain
 from tankcal.record.plan import PLAN, plain_of
-from tankcal.record.schema import checked, from_plain
+from tankcal.record.schema import checked, from_plain, to_plain
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera.paper import load
 from tankcal.report.planning import empty_job

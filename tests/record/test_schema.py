@@ -19,7 +19,6 @@ from tankcal.errors import InputError
 from tankcal.messages import Message, message
 from tankcal.record import load, migrated
 from tankcal.record.making import Record
-from tankcal.record.plain_data import to_plain
 from tankcal.record.schema import (
     MOST_TOLD,
     Finite,
@@ -28,6 +27,7 @@ from tankcal.record.schema import (
     from_plain,
     json_schema,
     key,
+    to_plain,
 )
 
 STALE = "make schemas writes schemas and docs anew"

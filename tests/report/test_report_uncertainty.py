@@ -22,8 +22,8 @@ from tankcal.job.contract.uncertainty import INPUTS
 from tankcal.pipeline import plot_style
 from tankcal.record import record_of, save
 from tankcal.record.covariance_factor import blocks_of
-from tankcal.record.plain_data import to_plain
-from tankcal.record.statements import budgets_of
+from tankcal.record.schema import to_plain
+from tankcal.record.table import budgets_of
 from tankcal.report import figures
 from tankcal.report.paper import Paper
 from tankcal.report.pdf import pdf

@@ -10,8 +10,8 @@ from scipy import stats
 
 from tankcal.errors import HeightError
 from tankcal.job.rule_files import shipped_names, shipped_rule
-from tankcal.record.plain_data import to_plain
-from tankcal.record.statements import rule_of
+from tankcal.record.schema import to_plain
+from tankcal.record.table import rule_of
 from tankcal.tank.capacity import Capacity
 from tankcal.tank.deliveries import worst_deliveries
 from tankcal.tank.rules import TANKS, Printed, StatedVolume, conformity_probability, judge

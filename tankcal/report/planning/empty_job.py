@@ -12,8 +12,7 @@ from tankcal.messages import message
 from tankcal.planning.measurements import targets_of
 from tankcal.planning.model import TAPED
 from tankcal.planning.wall.reading import datum_of, tables_of
-from tankcal.record.plan import PLAN
-from tankcal.record.wall_plan import WALL_PLAN
+from tankcal.record.plan import PLAN, WALL_PLAN
 from tankcal.text.decoding import read_json
 from tankcal.text.languages import DEFAULT
 

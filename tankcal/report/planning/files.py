@@ -1,8 +1,7 @@
 """Files of a prediction for programs: plan.json, and CSV files with units in their headings."""
 
 from tankcal.record import save
-from tankcal.record.plan import plain_of
-from tankcal.record.wall_plan import plain_of_wall
+from tankcal.record.plan import plain_of, plain_of_wall
 from tankcal.report.planning.rows import place_of_change
 from tankcal.text.spreadsheets import write_guarded
 

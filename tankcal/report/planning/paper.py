@@ -5,7 +5,7 @@ import numpy as np
 import tankcal
 from tankcal.messages import as_plain
 from tankcal.planning.changes import IMAGES, OF_COURSE, ROW
-from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import to_plain
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper, words_with_part
 from tankcal.report.planning.rows import find_by_name

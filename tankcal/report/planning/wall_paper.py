@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.planning.changes import cost_of
 from tankcal.planning.wall.changes import NUMBERED
-from tankcal.record.wall_plan import survey_of
+from tankcal.record.plan import survey_of
 from tankcal.report import blocks
 from tankcal.report.numbers import symbol
 from tankcal.report.plain import Column

@@ -4,7 +4,7 @@ from math import inf
 
 from tankcal.report import blocks, numbers
 from tankcal.report.tables import Column, Table
-from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, k_of_rows, stated_rows
+from tankcal.report.uncertainty.stated import MARK, flag_simulated, k_of_rows, stated_rows
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 
 # Inputs that are estimated from the survey.
@@ -125,7 +125,7 @@ def draws(paper):
 
 def verdict(paper, mark):
     """Return a sentence on the number of rows in which the GUM interval is validated."""
-    simulated = by_monte_carlo(paper.record["capacity"])
+    simulated = flag_simulated(paper.record["capacity"])
     if not any(simulated):
         return paper.word("texts.validated_all")
     if all(simulated):

@@ -5,11 +5,9 @@ from dataclasses import dataclass, replace
 
 from tankcal.report.tables import (
     clouds,
-    great_circles,
     hits,
     lines,
     liquid,
-    radii,
     ship,
     strapping,
     tangents,
@@ -60,7 +58,7 @@ TABLES_SHEETS = {
     "strapping": TablesSheet("strapping", _strapping_tables),
     "great_circles": TablesSheet(
         "great_circles",
-        (replace(great_circles.CIRCLES, name="great_circles"), great_circles.TAPES_OF_SPHERE),
+        (replace(strapping.CIRCLES, name="great_circles"), strapping.TAPES_OF_SPHERE),
     ),
     "lines": TablesSheet("lines", (lines.LEVELS, lines.PLUMMETS, lines.LINES, lines.OFFSETS)),
     "hits": TablesSheet(
@@ -86,7 +84,7 @@ TABLES_SHEETS = {
         lambda record: (liquid.STEPS, liquid.DIPS, liquid.volumes_table(record)),
         omits_empty=True,
     ),
-    "radii": TablesSheet("radii", (radii.RADII,)),
+    "radii": TablesSheet("radii", (tank.RADII,)),
 }
 
 

@@ -1,8 +1,8 @@
 """Sheets of budgets, stated volumes, deliveries, Monte Carlo, and decision rule."""
 
 from tankcal.report.uncertainty import budget, monte_carlo, rule
-from tankcal.report.uncertainty.deliveries import WORST_DELIVERIES, worst_rows
 from tankcal.report.uncertainty.method import stated_table
+from tankcal.report.uncertainty.stated import WORST_DELIVERIES, worst_delivery_rows
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.sections import (
     HEAD_ROW,
@@ -84,7 +84,7 @@ def _totals(book, sheet, last, values):
 def deliveries_sheet(book, record):
     """Write the stated volumes and deliveries, and the worst deliveries."""
     sections = [cell_table(book, stated_table(record), title=book.word("headings.stated"))]
-    worst = worst_rows(book.paper)
+    worst = worst_delivery_rows(book.paper)
     if worst:
         title = book.word("headings.worst_deliveries")
         sections.append(cell_table(book, WORST_DELIVERIES, worst, title=title))
