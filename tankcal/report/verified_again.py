@@ -335,14 +335,16 @@ def saved_folder(verification, folder, callbacks, manifest):
     """
     from tankcal.record.camera_versions import CAMERA
     from tankcal.record.plan import PLAN
-    from tankcal.report.saved_rooms import room_of
+    from tankcal.report.saved_documents import find_document
 
-    room, path = room_of(folder)
-    if room is not None:
-        room.load(path)
+    document, path = find_document(folder)
+    if document is not None:
+        document.load(path)
         _take(verification, path)
         if callbacks is not None:
-            make_papers_again(verification, folder, manifest, _rebuild_of(room, path, callbacks[0]))
+            make_papers_again(
+                verification, folder, manifest, _rebuild_of(document, path, callbacks[0])
+            )
         verification.note(_not_computed(path.name))
         return True
     for name in (CAMERA.file, PLAN.file):
@@ -359,9 +361,9 @@ def saved_folder(verification, folder, callbacks, manifest):
     return manifest is not None
 
 
-def _rebuild_of(room, path, step):
+def _rebuild_of(document, path, step):
     def rebuild(place, language, letterhead):
-        room.rebuild(path, place, language, step, letterhead)
+        document.rebuild(path, place, language, step, letterhead)
 
     return rebuild
 

@@ -3,13 +3,10 @@
 All values come from history.json; no number is computed here.
 """
 
-from functools import partial
 from typing import ClassVar
 
 from tankcal.messages import message
-from tankcal.record import manifest, save
 from tankcal.record.history import HISTORY
-from tankcal.record.schema import to_plain
 from tankcal.report.history.tables import (
     CERTIFICATES,
     CHANGES,
@@ -19,18 +16,14 @@ from tankcal.report.history.tables import (
     VOLUMES,
 )
 from tankcal.report.plain import words_with_part
-from tankcal.report.saved_folder import SavedFolder, write_pages
+from tankcal.report.saved_document import SavedDocument
 from tankcal.report.saved_paper import SavedPaper, bearable
 from tankcal.text.languages import DEFAULT
 from tankcal.text.words import load_words
 
-__all__ = [
-    *("FILES", "HistoryPaper", "history_file", "rebuild", "refuse_foreign"),
-    "write_history",
-]
+__all__ = [*("DOCUMENT", "FILES", "HistoryPaper", "rebuild", "refuse_foreign"), "write_history"]
 
 FILE, WORKBOOK = "history.json", "history.xlsx"
-PDF, PAGE = "history.pdf", "history.html"
 TABLES = {
     "certificates.csv": CERTIFICATES,
     "volumes.csv": VOLUMES,
@@ -39,70 +32,6 @@ TABLES = {
     "radius_changes.csv": RADIUS_CHANGES,
     "inspections.csv": CHECKS,
 }
-FILES = (FILE, *TABLES, WORKBOOK, PDF, PAGE, manifest.FILE)
-_FOLDER = SavedFolder(
-    HISTORY,
-    FILES,
-    unreadable=lambda error: message(
-        "history_unreadable", "cannot be read as a history: {error}", error=error
-    ),
-    without_content=lambda what: message(
-        "no_history", "does not have the content of a history ({what})", what=what
-    ),
-)
-refuse_foreign, history_file, load = _FOLDER.refuse_foreign, _FOLDER.file_of, _FOLDER.load
-
-
-def write_history(history, folder, language=None, progress=None, letterhead=None):
-    """Write history.json, CSV files, workbook, PDF and web page, all or nothing.
-
-    Parameters
-    ----------
-    history : HistoryFile or dict
-        Result of `recalibration.history.history_of`, or the same as plain data.
-    folder : path
-        Created if missing. An earlier history in the folder is replaced.
-    language : str, optional
-        Language of papers and workbook, one of languages.LANGUAGES; None: English.
-    progress : callable, optional
-        progress(text), called at the beginning of each step.
-    letterhead : report.letterhead.Letterhead, optional
-        Letterhead of the author.
-
-    Returns
-    -------
-    list of Path
-
-    Raises
-    ------
-    InputError
-        For a folder with other files, or for data that are not a history.
-    """
-    plain = history if isinstance(history, dict) else to_plain(history)
-    paper = HistoryPaper(plain, language, letterhead)
-    return _FOLDER.write(folder, partial(_write, paper), language, progress)
-
-
-def rebuild(source, folder, language=None, progress=None, letterhead=None):
-    """Write the files from a history.json; other arguments as in `write_history`."""
-    return _FOLDER.rebuild(
-        source, lambda plain: write_history(plain, folder, language, progress, letterhead)
-    )
-
-
-def _write(paper, folder, progress):
-    from tankcal.report.history import workbook
-    from tankcal.report.history.pages import pages
-    from tankcal.report.outputs.csv_files import write_table
-
-    progress(message("history_tables", "writing the tables of the history"))
-    save(paper.saved, folder / FILE)
-    for name, table in TABLES.items():
-        if rows := table.rows(paper.found):
-            write_table(table, folder / name, rows)
-    workbook.write(paper, folder / WORKBOOK)
-    progress(message("history_papers", "setting the papers of the history"))
-    write_pages(pages, paper, folder, PDF, PAGE)
 
 
 class HistoryPaper(SavedPaper):
@@ -146,3 +75,57 @@ class HistoryPaper(SavedPaper):
     def newest(self):
         """The newest certificate."""
         return self.found["certificates"][-1]
+
+
+def _load_renderers():
+    from tankcal.report.history.pages import pages
+    from tankcal.report.history.workbook import write
+
+    return pages, write
+
+
+DOCUMENT = SavedDocument(
+    HISTORY,
+    HistoryPaper,
+    _load_renderers,
+    steps=(
+        message("history_tables", "writing the tables of the history"),
+        message("history_papers", "setting the papers of the history"),
+    ),
+    unreadable=lambda error: message(
+        "history_unreadable", "cannot be read as a history: {error}", error=error
+    ),
+    without_content=lambda what: message(
+        "no_history", "does not have the content of a history ({what})", what=what
+    ),
+    tables=TABLES,
+)
+FILES, refuse_foreign, rebuild = DOCUMENT.files, DOCUMENT.refuse_foreign, DOCUMENT.rebuild
+
+
+def write_history(history, folder, language=None, progress=None, letterhead=None):
+    """Write history.json, CSV files, workbook, PDF and web page, all or nothing.
+
+    Parameters
+    ----------
+    history : HistoryFile or dict
+        Result of `recalibration.history.history_of`, or the same as plain data.
+    folder : path
+        Created if missing. An earlier history in the folder is replaced.
+    language : str, optional
+        Language of papers and workbook, one of languages.LANGUAGES; None: English.
+    progress : callable, optional
+        progress(text), called at the beginning of each step.
+    letterhead : report.letterhead.Letterhead, optional
+        Letterhead of the author.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        For a folder with other files, or for data that are not a history.
+    """
+    return DOCUMENT.write(history, folder, language, progress, letterhead)
