@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.inspection.epochs import Epoch
-from tankcal.inspection.settlement_limits import SettlementLimits, Strength
+from tankcal.inspection.rules import SettlementLimits, Strength
 
 A_MM = (
     *(113.8, 109.5, 100.9, 97.1, 96.2, 87.1, 81.1, 82.4),

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from levelled_tanks import LIMITS, epoch_of, even_azimuths
 
-from tankcal.inspection.out_of_plane import between_neighbours, explained_share, fit_plane
-from tankcal.inspection.settlement import assess, figures_of
-from tankcal.inspection.settlement_limits import SettlementLimits, Strength
-from tankcal.inspection.verdict import judged
+from tankcal.inspection.out_of_plane import explained_share, find_neighbours, fit_plane
+from tankcal.inspection.rules import SettlementLimits, Strength
+from tankcal.inspection.settlement import assess, settlement_figures
+from tankcal.inspection.verdict import make_check
 
 POINTS = (16, 20, 24)
 RADIUS_M, HEIGHT_M, E_PA = 15.0, 12.0, 206e9
@@ -68,7 +68,7 @@ def _tank(rng, family, count, noise):
     t = even_azimuths(count)
     true = FAMILIES[family](rng, t) + rng.uniform(5, 40) * np.cos(t - rng.uniform(0, 7))
     plane = fit_plane(t, true)
-    S = np.abs(between_neighbours(t, RADIUS_M).operator @ plane.residual_m).max()
+    S = np.abs(find_neighbours(t, RADIUS_M).operator @ plane.residual_m).max()
     r2 = explained_share(true, plane.residual_m)[0]
     s = S * np.exp(rng.uniform(*np.log(noise)))
     arc, limit = 2 * np.pi * RADIUS_M / count, S * rng.uniform(0.6, 1.6)
@@ -78,8 +78,8 @@ def _tank(rng, family, count, noise):
         curvature_factor=FACTOR, least_r2=1 - (1 - r2) * rng.uniform(0.6, 1.6)
     )
     epoch = epoch_of(true + rng.normal(0, s, count), s_mm=s)
-    checks = {one.code: judged(one) for one in figures_of(assess(epoch, np.inf, strength, limits),
-                                                          limits)}  # fmt: skip
+    figures = settlement_figures(assess(epoch, np.inf, strength, limits), limits)
+    checks = {figure.code: make_check(figure) for figure in figures}
     return [
         Levelled(family, code, truth, checks[code])
         for code, truth in (("settlement_all", S), ("settlement_cosine", r2))

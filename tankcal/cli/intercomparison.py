@@ -197,22 +197,21 @@ def _make(options):
 
 
 def _template(options):
-    from tankcal.intercomparison.answers import template_files
+    from tankcal.intercomparison.answers import make_forms
     from tankcal.intercomparison.package import write_files
     from tankcal.report.folders import replaced
 
     speak(options.language)
     _refuse_existing(options.out)
     manifest = _package(options.package)
-    files = template_files(manifest, say_in_language)
+    files = make_forms(manifest, say_in_language)
     with replaced(options.out) as folder:
         write_files(folder, files)
     print_paths(options.out, sorted(files))
 
 
 def _answer(options):
-    from tankcal.intercomparison.answers import answer_files
-    from tankcal.intercomparison.own_answers import answer_package
+    from tankcal.intercomparison.answers import answer_files, answer_package
     from tankcal.intercomparison.package import write_files
     from tankcal.report.folders import replaced
 
@@ -233,7 +232,7 @@ def _answer(options):
 def _score(options):
     prepare_for_small_work()
     speak(options.language)
-    from tankcal.intercomparison.judging import score_folders
+    from tankcal.intercomparison.scoring import score_folders
     from tankcal.record.schema import to_plain
 
     if options.out is not None:

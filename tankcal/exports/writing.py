@@ -10,7 +10,7 @@ from tankcal.exports.profiles import LEVEL_UNITS_M, LINE_ENDS, MARKED
 from tankcal.job.tables import Log
 from tankcal.linter import lint
 from tankcal.linter.grids import read_grids
-from tankcal.linter.layout import tables_of
+from tankcal.linter.layout import find_tables
 from tankcal.messages import message
 from tankcal.tank.dips import dip_label
 
@@ -141,7 +141,7 @@ def read_back(data, body, profile, is_even=False, rounded=0):
         path.write_text("\n".join([_headings(profile), *_as_read(rows, profile)]) + "\n", "utf-8")
         grids = read_grids(path, log)
         log.stop_if_problems()
-        tables = [table for grid in grids for table in tables_of(grid, log)]
+        tables = [table for grid in grids for table in find_tables(grid, log)]
         report = lint(path, even_steps=is_even)
     entries = max((table.entries for table in tables), key=len, default=())
     _refuse_other_rows(entries, body, profile)

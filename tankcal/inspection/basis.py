@@ -6,7 +6,7 @@ from pathlib import Path
 
 import tankcal.record
 from tankcal.errors import InputError, Problem
-from tankcal.inspection.settlement_limits import Strength
+from tankcal.inspection.rules import Strength
 from tankcal.inspection.shape import Sizes
 from tankcal.job import load
 from tankcal.messages import message
@@ -92,7 +92,7 @@ class Basis:
         return Sizes(nominal, sum(self.courses_m), self.courses_m, diameter_m)
 
 
-def basis_of(source, progress, part_progress=None):
+def read_basis(source, progress, part_progress=None):
     """Read the `Basis` from a job, a record.json or a folder of results.
 
     Parameters

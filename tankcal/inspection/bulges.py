@@ -46,8 +46,8 @@ def find_bulge(r, z, sd, height_per_radius=None):
     """Find the largest bulge or dent of a profile.
 
     The line of the bottom is the line of least absolute deviations through the readings on the
-    bottom (`on_the_bottom`). A bulge over less than half of the profile does not move this line. A
-    bulge extends between two crossings of the profile with this line.
+    bottom (`select_bottom_readings`). A bulge over less than half of the profile does not move this
+    line. A bulge extends between two crossings of the profile with this line.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def find_bulge(r, z, sd, height_per_radius=None):
     """
     if len(r) < LEAST_READINGS:
         return None
-    flat = on_the_bottom(r, z, sd)
+    flat = select_bottom_readings(r, z, sd)
     deviation = z - _line_of_least_deviations(r, z, flat)
     deviation[np.abs(deviation) < 1e-9] = 0.0  # rounding of the solver
     # Runs of readings on one side of the line; each change of sign starts a run.
@@ -96,7 +96,7 @@ def find_bulge(r, z, sd, height_per_radius=None):
     return max(bulges, key=lambda bulge: abs(bulge.height_m) / bulge.half_length_m, default=None)
 
 
-def on_the_bottom(r, z, sd):
+def select_bottom_readings(r, z, sd):
     """Select the readings of a profile that are on the bottom, not on a bulge.
 
     Of all lines through two readings, the line with the least median deviation is used. The
@@ -122,7 +122,8 @@ def on_the_bottom(r, z, sd):
 
     Examples
     --------
-    >>> on_the_bottom(np.arange(6.0), np.array([0, 0.01, 0.02, 0.03, 0.09, 0.09]), None).tolist()
+    >>> z = np.array([0, 0.01, 0.02, 0.03, 0.09, 0.09])
+    >>> select_bottom_readings(np.arange(6.0), z, None).tolist()
     [True, True, True, True, False, False]
     """
     trial = np.unique(np.linspace(0, len(r) - 1, min(len(r), MOST_ENDS)).round().astype(int))
@@ -137,7 +138,7 @@ def on_the_bottom(r, z, sd):
     return deviations[best] <= np.maximum(ON_BOTTOM * scale, 1e-9)
 
 
-def beside_a_bulge(r, z, weights, squares, least_radius):
+def select_beside_bulge(r, z, weights, squares, least_radius):
     """Select the readings of a bent profile that are outside of its bulge or dent.
 
     A bulge is a run of readings inside of the bend that deviates from two straight lines. Each run
@@ -167,7 +168,7 @@ def beside_a_bulge(r, z, weights, squares, least_radius):
     --------
     >>> r = np.arange(16.0)
     >>> z = np.maximum(r - 12, 0) * -0.05 + np.where((r > 5) & (r < 9), 0.04, 0.0)
-    >>> np.flatnonzero(~beside_a_bulge(r, z, np.ones(16), 0.002, 10.0)).tolist()
+    >>> np.flatnonzero(~select_beside_bulge(r, z, np.ones(16), 0.002, 10.0)).tolist()
     [6, 7, 8]
     """
     count = len(r)

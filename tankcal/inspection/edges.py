@@ -15,11 +15,10 @@ import scipy
 
 from tankcal.adjust import ALPHA
 from tankcal.gum.coverage import coverage_factor
-from tankcal.inspection.bulges import beside_a_bulge, find_bulge
-from tankcal.inspection.figures import PROBABILITY, Figure
+from tankcal.inspection.bulges import find_bulge, select_beside_bulge
 from tankcal.inspection.levelling import LEAST_READINGS
-from tankcal.inspection.settlement_limits import largest_drop_mm
-from tankcal.inspection.verdict import gravity
+from tankcal.inspection.rules import largest_drop_mm
+from tankcal.inspection.verdict import PROBABILITY, Figure, severity
 from tankcal.messages import message
 from tankcal.record.inspection import EdgeProfile, InspectionLimit
 
@@ -101,7 +100,7 @@ def find_break(r, z, sd, shell_radius_m):
 
     The point is searched for within `widest_edge` of the shell. The fit uses the readings within
     three times this distance. Readings on a bulge are rejected, because the flank of a bulge is no
-    break (`bulges.beside_a_bulge`). If the residuals exceed the standard deviations, the
+    break (`bulges.select_beside_bulge`). If the residuals exceed the standard deviations, the
     covariance is scaled by the residuals.
 
     Parameters
@@ -125,7 +124,7 @@ def find_break(r, z, sd, shell_radius_m):
     best = _best_bend(r, z, weights, shell_radius_m - widest)
     # A profile may have several bulges; each round rejects the most significant bulge.
     for _ in range(MOST_BULGES):
-        beside = best and beside_a_bulge(r, z, weights, best[0], shell_radius_m - widest)
+        beside = best and select_beside_bulge(r, z, weights, best[0], shell_radius_m - widest)
         if beside is None:
             break
         r, z, weights = r[beside], z[beside], weights[beside]
@@ -291,7 +290,7 @@ def _edge_figure(lines, profiles, breaks, edge):
     if not with_break:
         return Figure(value=None, U=None, k=None, dof=0.0, limit=None, remark="no_break", **place)
     limited = [i for i in with_break if profiles[i].limit_mm is not None]
-    worst = max(limited or with_break, key=lambda i: _gravity(profiles[i]))
+    worst = max(limited or with_break, key=lambda i: _profile_severity(profiles[i]))
     profile, bend = profiles[worst], breaks[worst]
     limit = None
     if profile.limit_mm is not None:
@@ -313,9 +312,9 @@ def _edge_figure(lines, profiles, breaks, edge):
     )
 
 
-def _gravity(profile):
-    """Sort key of a profile with a break-over point, see `verdict.gravity`."""
-    return gravity(profile.drop_mm, profile.U_mm, profile.limit_mm)
+def _profile_severity(profile):
+    """Sort key of a profile with a break-over point, see `verdict.severity`."""
+    return severity(profile.drop_mm, profile.U_mm, profile.limit_mm)
 
 
 def _bulge_figure(lines, breaks, bulge):
@@ -331,7 +330,7 @@ def _bulge_figure(lines, breaks, bulge):
     if not bulges:
         return None
     normal = float(coverage_factor(PROBABILITY, np.inf))
-    line, largest = max(bulges, key=lambda two: _gravity_of_bulge(two[1], normal, ratio))
+    line, largest = max(bulges, key=lambda two: _bulge_severity(two[1], normal, ratio))
     k = normal if np.isfinite(largest.u_m) else None
     limit = None
     if ratio is not None:
@@ -352,8 +351,8 @@ def _bulge_figure(lines, breaks, bulge):
     )
 
 
-def _gravity_of_bulge(bulge, k, ratio):
-    """Sort key of a bulge, see `verdict.gravity`; `ratio` is the limit, mm per m half length."""
+def _bulge_severity(bulge, k, ratio):
+    """Sort key of a bulge, see `verdict.severity`; `ratio` is the limit, mm per m half length."""
     limit = None if ratio is None else ratio * bulge.half_length_m
     U = 1000 * k * bulge.u_m if np.isfinite(bulge.u_m) else None
-    return gravity(1000 * bulge.height_m, U, limit)
+    return severity(1000 * bulge.height_m, U, limit)

@@ -7,7 +7,7 @@ from datetime import date
 import numpy as np
 import scipy
 
-from tankcal.inspection.out_of_plane import arcs_after
+from tankcal.inspection.out_of_plane import arcs_to_next
 from tankcal.messages import list_some, message
 
 LEAST_POINTS = 8  # least number of points of an epoch
@@ -89,13 +89,13 @@ def is_like_a_date(name):
     return re.fullmatch(r"[0-9]+(-[0-9]+){1,2}", name) is not None and not is_date(name)
 
 
-def in_order(epochs):
+def sort_epochs(epochs):
     """Epochs sorted by date if all names are dates such as 2024, 2024-05 or 2024-05-31."""
     dated = all(is_date(epoch.name) for epoch in epochs)
     return sorted(epochs, key=lambda epoch: epoch.name) if dated else epochs
 
 
-def differences(levelling, log):
+def find_differences(levelling, log):
     """Differences of each later epoch to the first, and of the last epoch to the previous one."""
     pairs = [(epoch, levelling.epochs[0]) for epoch in levelling.epochs[1:]]
     if len(pairs) > 1:
@@ -112,7 +112,7 @@ def _difference(later, earlier, file, log):
     unmatched = [*dict.fromkeys(point for point in (*later.points, *earlier.points)
                       if point not in earlier_place or point not in later.points)]  # fmt: skip
     z = later.z_m[common] - earlier.z_m[earlier_rows]
-    gaps = np.degrees(arcs_after(later.azimuth_rad[common])) if common else np.array([360.0])
+    gaps = np.degrees(arcs_to_next(later.azimuth_rad[common])) if common else np.array([360.0])
     names = {"later": later.name, "earlier": earlier.name}
     if len(common) < LEAST_POINTS or gaps.max() > WIDEST_GAP_DEG:
         text = message("levels_no_difference", "{count} points are in both {later!r} and"
@@ -135,7 +135,7 @@ def _difference(later, earlier, file, log):
     return Epoch(later.name, earlier.name, points, later.azimuth_rad[common], z, u)
 
 
-def warn_of_points(epoch, file, diameter_m, limits, log):
+def warn_about_points(epoch, file, diameter_m, limits, log):
     """Warn of too few points for the tank, of an odd number of points, and of wide gaps.
 
     Parameters
@@ -163,7 +163,7 @@ def warn_of_points(epoch, file, diameter_m, limits, log):
                        " expected, so that diameters close", epoch=epoch.name,
                        count=count)  # fmt: skip
         log.warning(file, text)
-    arcs = arcs_after(epoch.azimuth_rad) * diameter_m / 2
+    arcs = arcs_to_next(epoch.azimuth_rad) * diameter_m / 2
     if limits.largest_arc_m is not None and arcs.max() > limits.largest_arc_m + 1e-6:
         after = [epoch.points[i] for i in np.flatnonzero(arcs > limits.largest_arc_m + 1e-6)]
         text = message("levels_wide_gaps", "epoch {epoch!r} has points up to {arc:.3g} m apart,"

@@ -114,7 +114,7 @@ def simulate_errors(azimuth_rad, z_m, u_m):
     return Errors(*(np.concatenate([half, -half])[:, places] * u_m for half in halves))
 
 
-def estimate(statistic, z_m, reading, errors):
+def estimate_statistic(statistic, z_m, reading, errors):
     """Estimate a statistic of the true elevations by extrapolation, with its uncertainty.
 
     Parameters

@@ -6,16 +6,22 @@ from pathlib import Path
 import numpy as np
 
 from tankcal.errors import Problem
-from tankcal.inspection.basis import RECORD, basis_of
-from tankcal.inspection.bottom import Bottom, inspect_bottom
-from tankcal.inspection.figures import Figure
-from tankcal.inspection.known_welds import known_welds
-from tankcal.inspection.largest_gaps import undetermined
+from tankcal.inspection.basis import RECORD, read_basis
+from tankcal.inspection.edges import assess_edges
 from tankcal.inspection.levelling import read_edge_profiles, read_settlement
-from tankcal.inspection.rules import DEFAULT, find_rule, limit_of
-from tankcal.inspection.shape import LEAST_READ, inspect_shape, not_surveyed
-from tankcal.inspection.verdict import judged
-from tankcal.inspection.welds_of_clouds import gaps_of_result
+from tankcal.inspection.rules import (
+    DEFAULT,
+    bulge_limits,
+    edge_limits,
+    find_rule,
+    limit_of,
+    settlement_limits,
+)
+from tankcal.inspection.settlement import assess_settlement
+from tankcal.inspection.shape import LEAST_READ, inspect_shape, unsurveyed_figures
+from tankcal.inspection.verdict import Figure, make_check
+from tankcal.inspection.weld_gaps import find_gaps, undetermined_gaps
+from tankcal.inspection.welds import list_welds
 from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import Log
 from tankcal.messages import message
@@ -87,7 +93,7 @@ def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
     files = _levelling_paths(asked)
     _check_levellings(files, log)  # report their problems before a long computation of the survey
     log.stop_if_problems()
-    basis = basis_of(asked.source, progress, part_progress)
+    basis = read_basis(asked.source, progress, part_progress)
     rule = rule or _rule_of_job(basis, log)
     if basis.is_older and files == (None, None):
         log.problem(basis.file, _older_message())
@@ -98,7 +104,7 @@ def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
     bottom = inspect_bottom(*files, strength, rule.sections, log)
     log.stop_if_problems()
     welds = _welds(basis, rule, part_progress, progress)
-    inspection = inspection_of(basis, rule, bottom, welds, nominal=asked.nominal)
+    inspection = assemble_inspection(basis, rule, bottom, welds, nominal=asked.nominal)
     older = [_older_warning(basis)] if basis.is_older else []
     return replace(
         inspection, warnings=[*inspection.warnings, *warnings_of([*log.warnings, *older])]
@@ -135,16 +141,16 @@ def _rule_of_job(basis, log):
 
 
 def _welds(basis, rule, part_progress, progress):
-    """`GapsFound` at the welds, from the clouds of a job or without any determined gap."""
+    """`WeldGaps` at the welds, from the clouds of a job or without any determined gap."""
     if basis.survey is not None:
         gap_limits = {code: limit_of(rule, code) for code in ("peaking", "banding")}
         limits = {code: entry.value for code, entry in gap_limits.items() if entry is not None}
-        return gaps_of_result(basis.survey, limits, Reading(None, part_progress), progress)
+        return find_gaps(basis.survey, limits, Reading(None, part_progress), progress)
     given_rad = [entry.get("welds_rad") or () for entry in basis.job["courses"]]
-    return undetermined(known_welds(basis.courses_m, given_rad), "gap_no_cloud")
+    return undetermined_gaps(list_welds(basis.courses_m, given_rad), "gap_no_cloud")
 
 
-def inspection_of(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
+def assemble_inspection(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
     """Build the `InspectionFile` from the results of all parts.
 
     Parameters
@@ -153,9 +159,9 @@ def inspection_of(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
         Job or record, with the shape of the wall.
     rule : rules.Rule or None
         Rule with the limits; None for figures without limits.
-    bottom : bottom.Bottom, optional
+    bottom : Bottom, optional
         Results of the levellings.
-    welds : largest_gaps.GapsFound, optional
+    welds : weld_gaps.WeldGaps, optional
         Gaps at the welds.
     nominal : str
         One of NOMINALS.
@@ -168,13 +174,17 @@ def inspection_of(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
     if nominal == "mean":
         sizes = replace(sizes, nominal_radius_m=None)
     if basis.shape is None:
-        figures, generatrices, levels = not_surveyed(rule, sizes, "wall_not_surveyed"), None, []
+        figures, generatrices, levels = (
+            unsurveyed_figures(rule, sizes, "wall_not_surveyed"),
+            None,
+            [],
+        )
     else:
         figures, generatrices, levels = inspect_shape(basis.shape, sizes, rule)
         problems += _shape_warnings(basis, sizes, levels)
     if welds is not None:
         figures += [_gap_figure(item, limit_of(rule, item.code)) for item in welds.figures]
-    checks = [judged(item) for item in (*figures, *bottom.figures)]  # in the order of CHECKS
+    checks = [make_check(item) for item in (*figures, *bottom.figures)]  # in the order of CHECKS
     return InspectionFile(
         notice=basis.job["certificate"].get("notice") or "",
         tank=_tank_record(basis, sizes, levels),
@@ -191,7 +201,7 @@ def inspection_of(basis, rule, bottom=None, welds=None, *, nominal="drawing"):
 
 
 def _gap_figure(gap, limit):
-    """`Figure` of a `largest_gaps.GapFigure`."""
+    """`Figure` of a `weld_gaps.GapFigure`."""
     return Figure(
         code=gap.code,
         unit="mm",
@@ -304,3 +314,81 @@ def _older_warning(basis):
         "inspected; the rest needs its job, or the record of a new run",
     )
     return Problem(basis.file, text)
+
+
+# ---- settlement of the foot, edge and bulges of the bottom
+
+
+@dataclass(frozen=True)
+class Bottom:
+    """Results of the levellings of a tank.
+
+    Attributes
+    ----------
+    settlements : tuple of record.inspection.Settlement
+        Each epoch, then the differences between epochs.
+    edges : tuple of record.inspection.EdgeProfile
+    figures : tuple of verdict.Figure
+        Figures of each epoch in the order of the checks; edge and bulge last.
+    """
+
+    settlements: tuple = ()
+    edges: tuple = ()
+    figures: tuple = ()
+
+    @property
+    def as_built(self):
+        """Whether differences to an earlier epoch remove the form of the tank as built."""
+        return any(settlement.since is not None for settlement in self.settlements)
+
+
+def inspect_bottom(settlement, edges, strength, sections, log) -> Bottom:
+    """Read settlement.csv and edge_profiles.csv, and compute their figures.
+
+    Parameters
+    ----------
+    settlement, edges : path or None
+        The files; None if not levelled.
+    strength : rules.Strength
+        Diameter, height and steel of the tank. A levelled tank without a diameter is a problem.
+    sections : dict
+        {section: {key: value}} of the rule. Without the section "settlement", "edge" or "bulge",
+        its figures have no limits.
+    log : Log
+        Receives the problems and warnings of both files.
+
+    Returns
+    -------
+    Bottom
+        Empty if the files have problems.
+
+    Examples
+    --------
+    >>> from tankcal.inspection.rules import Strength
+    >>> from tankcal.job.tables import Log
+    >>> tank = Strength(13.0, 9.5, yield_pa=250e6, e_pa=206e9)
+    >>> bottom = inspect_bottom("examples/inspection/settlement.csv", None, tank, {}, Log())
+    >>> [settlement.epoch for settlement in bottom.settlements], bottom.as_built
+    (['2019-03-11', '2026-05-04', '2026-05-04'], True)
+    """
+    problem_count = len(log.problems)
+    levelling = None if settlement is None else read_settlement(settlement, log)
+    lines = None if edges is None else read_edge_profiles(edges, log)
+    is_levelled = not (settlement is None and edges is None)
+    if is_levelled and strength.diameter_m is None:
+        text = message("bottom_no_diameter", "missing; settlement and edges are held against the"
+                       " size of the tank, expected its diameter")  # fmt: skip
+        log.problem(Path(settlement or edges).name, text, None, "nominal_diameter_m")
+    if len(log.problems) > problem_count:
+        return Bottom()
+    settlements, figures, profiles = [], [], []
+    if levelling is not None:
+        limits = settlement_limits(sections.get("settlement"))
+        settlements, figures = assess_settlement(levelling, strength, limits, log)
+    if lines is not None:
+        limits = edge_limits(sections.get("edge")), bulge_limits(sections.get("bulge"))
+        profiles, edge_figures = assess_edges(
+            lines, strength.diameter_m / 2, *limits, file=Path(edges).name, log=log
+        )
+        figures = [*figures, *edge_figures]
+    return Bottom(tuple(settlements), tuple(profiles), tuple(figures))

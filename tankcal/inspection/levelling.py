@@ -19,10 +19,10 @@ from tankcal.inspection.epochs import (
     WIDEST_GAP_DEG,
     Epoch,
     Levelling,
-    in_order,
     is_like_a_date,
+    sort_epochs,
 )
-from tankcal.inspection.out_of_plane import arcs_after
+from tankcal.inspection.out_of_plane import arcs_to_next
 from tankcal.job.checking import missing_beside, tiny_sd
 from tankcal.job.contract.shorthand import number, positive
 from tankcal.job.entries import read_columns
@@ -102,7 +102,7 @@ def read_settlement(path, log):
     given = values.of("s_mm")[0] is not None
     pooled, dof = _pooled_sd(values, groups)
     if given:
-        _warn_of_repeats(values, groups, log)
+        _warn_about_repeats(values, groups, log)
     sd_m = values.numbers("s_mm") / 1000 if given else np.full(len(epochs), pooled)
     epoch_list = [_epoch(name, values, groups, places, sd_m) for name in dict.fromkeys(epochs)]
     for epoch in epoch_list:
@@ -114,7 +114,7 @@ def read_settlement(path, log):
                        " uncertainty is known, so nothing can be said to pass")  # fmt: skip
         log.warning(values.file, text)
     dof = np.inf if given else float(dof)
-    return Levelling(values.file, tuple(in_order(epoch_list)), given, dof, radius_m)
+    return Levelling(values.file, tuple(sort_epochs(epoch_list)), given, dof, radius_m)
 
 
 def _epoch(name, values, groups, places, sd_m):
@@ -315,7 +315,7 @@ def _mean(values, rows, sd_m):
     return np.average(values.numbers("elevation_m")[rows], weights=weights)
 
 
-def _warn_of_repeats(values, groups, log):
+def _warn_about_repeats(values, groups, log):
     """Warn if repeats differ by more than s_mm allows (chi-squared test, 0.1 %)."""
     z, sd = values.numbers("elevation_m"), values.numbers("s_mm") / 1000
     dof = sum(len(rows) - 1 for rows in groups.values())
@@ -345,7 +345,7 @@ def _check_epoch(epoch, file, log):
                        most=MOST_POINTS)  # fmt: skip
         log.problem(file, text)
         return
-    gaps = np.degrees(arcs_after(epoch.azimuth_rad))
+    gaps = np.degrees(arcs_to_next(epoch.azimuth_rad))
     for i in np.flatnonzero(gaps < SAME_AZIMUTH_DEG):
         text = message("levels_same_azimuth", "points {point!r} and {other!r} of epoch {epoch!r}"
                        " are both at {azimuth:.2f} degrees; expected two places, or one name",

@@ -168,7 +168,7 @@ class Neighbours:
         return curvature_per_m * self.before_m * self.after_m / 2
 
 
-def between_neighbours(azimuth_rad, radius_m, places=None):
+def find_neighbours(azimuth_rad, radius_m, places=None):
     """Compute the linear map from U to S for all points, or for selected points.
 
     Parameters
@@ -186,12 +186,12 @@ def between_neighbours(azimuth_rad, radius_m, places=None):
 
     Examples
     --------
-    >>> neighbours = between_neighbours(np.radians([0.0, 90.0, 180.0, 270.0]), 2 / np.pi)
+    >>> neighbours = find_neighbours(np.radians([0.0, 90.0, 180.0, 270.0]), 2 / np.pi)
     >>> neighbours.operator[1].tolist(), neighbours.arc_m.round(9).tolist()
     ([-0.5, 1.0, -0.5, 0.0], [1.0, 1.0, 1.0, 1.0])
     """
     places = np.arange(len(azimuth_rad)) if places is None else np.asarray(places)
-    after = radius_m * arcs_after(np.asarray(azimuth_rad)[places])
+    after = radius_m * arcs_to_next(np.asarray(azimuth_rad)[places])
     before = np.roll(after, 1)
     rows, arc_sum = np.arange(len(places)), before + after
     operator = np.zeros((len(places), len(azimuth_rad)))
@@ -201,12 +201,12 @@ def between_neighbours(azimuth_rad, radius_m, places=None):
     return Neighbours(places, operator, before, after)
 
 
-def arcs_after(azimuth_rad):
+def arcs_to_next(azimuth_rad):
     """Angles (n,) from each of n ascending azimuths to the next azimuth, rad.
 
     Examples
     --------
-    >>> np.degrees(arcs_after(np.radians([10.0, 100.0, 350.0]))).round(6).tolist()
+    >>> np.degrees(arcs_to_next(np.radians([10.0, 100.0, 350.0]))).round(6).tolist()
     [90.0, 250.0, 20.0]
     """
     return np.diff(azimuth_rad, append=azimuth_rad[0] + 2 * np.pi)
@@ -283,7 +283,7 @@ class Curvature:
     gradient: np.ndarray
 
 
-def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
+def find_largest_curvature(azimuth_rad, z_m, radius_m, highest):
     """Find the largest |d2U/ds2| of harmonics 2 to `highest`, fitted together with the plane.
 
     (1/R)^2 max |sum k^2 (a_k cos k t + b_k sin k t)|, k from 2
@@ -305,7 +305,7 @@ def largest_curvature_of(azimuth_rad, z_m, radius_m, highest):
     Examples
     --------
     >>> t = np.radians(np.arange(0.0, 360.0, 30.0))
-    >>> curvature = largest_curvature_of(t, 0.001 * np.cos(2 * t), 2.0, 3)
+    >>> curvature = find_largest_curvature(t, 0.001 * np.cos(2 * t), 2.0, 3)
     >>> round(curvature.per_m, 9)
     0.001
     """
@@ -343,7 +343,7 @@ def curvature_rows(azimuth_rad, radius_m, highest, start_rad):
     radius_m : float
         Radius of the shell, m.
     highest : int
-        Highest harmonic, as in `largest_curvature_of`.
+        Highest harmonic, as in `find_largest_curvature`.
     start_rad : float
         A point of the grid, such as the azimuth of the largest curvature.
 

@@ -12,21 +12,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
-from tankcal.inspection.epochs import Epoch, differences, is_within_noise, warn_of_points
-from tankcal.inspection.extrapolation import Estimate, Statistic, estimate, simulate_errors
-from tankcal.inspection.figures import PROBABILITY, Figure
+from tankcal.inspection.epochs import Epoch, find_differences, is_within_noise, warn_about_points
+from tankcal.inspection.extrapolation import (
+    Estimate,
+    Statistic,
+    estimate_statistic,
+    simulate_errors,
+)
 from tankcal.inspection.out_of_plane import (
     Curvature,
     Neighbours,
     Plane,
-    between_neighbours,
     curvature_rows,
     explained_share,
+    find_largest_curvature,
+    find_neighbours,
     fit_plane,
-    largest_curvature_of,
     spaced_subset,
 )
-from tankcal.inspection.settlement_limits import largest_curvature
+from tankcal.inspection.rules import compute_curvature_limit
+from tankcal.inspection.verdict import PROBABILITY, Figure
 from tankcal.messages import message
 from tankcal.record.inspection import Settlement, SettlementPoint
 
@@ -58,7 +63,7 @@ class Largest:
 
 
 @dataclass(frozen=True)
-class Assessed:
+class SettlementResult:
     """Computed settlement of one epoch, or between two epochs, in m.
 
     Attributes
@@ -151,11 +156,11 @@ def assess_settlement(levelling, strength, limits, log):
         log.problem(levelling.file, text, None, "x_m")
         return [], []
     for epoch in levelling.epochs:
-        warn_of_points(epoch, levelling.file, strength.diameter_m, limits, log)
-    epochs = [*levelling.epochs, *differences(levelling, log)]
+        warn_about_points(epoch, levelling.file, strength.diameter_m, limits, log)
+    epochs = [*levelling.epochs, *find_differences(levelling, log)]
     assessed = [assess(item, levelling.dof, strength, limits) for item in epochs]
-    figures = [figure for item in assessed for figure in figures_of(item, limits)]
-    return [settlement_of(item, strength, levelling.sd_known) for item in assessed], figures
+    figures = [figure for item in assessed for figure in settlement_figures(item, limits)]
+    return [make_settlement(item, strength, levelling.sd_known) for item in assessed], figures
 
 
 def assess(epoch, dof, strength, limits):
@@ -174,7 +179,7 @@ def assess(epoch, dof, strength, limits):
 
     Returns
     -------
-    Assessed
+    SettlementResult
     """
     azimuth, z, radius_m = epoch.azimuth_rad, epoch.z_m, strength.diameter_m / 2
     variance = np.full(len(z), np.nan) if not dof else epoch.u_m**2
@@ -187,8 +192,8 @@ def assess(epoch, dof, strength, limits):
         arc_m=limits.subset_arc_m,
         least=limits.least_points,
     )
-    every, subset = (between_neighbours(azimuth, radius_m, points) for points in (None, chosen))
-    curvature_limit = largest_curvature(limits, strength)
+    every, subset = (find_neighbours(azimuth, radius_m, points) for points in (None, chosen))
+    curvature_limit = compute_curvature_limit(limits, strength)
     S, u_S = _out_of_plane(every, plane, variance)
     every_limit, subset_limit = (
         None if curvature_limit is None else points.limits_m(curvature_limit)
@@ -197,13 +202,13 @@ def assess(epoch, dof, strength, limits):
     by_arc = None if limits.de_beer is None else every.arc_m / limits.de_beer
     # Harmonics up to h have 2 h + 1 unknowns, which must not exceed the number of points.
     highest = min(limits.highest_harmonic or len(z) // 4, (len(z) - 1) // 2)
-    curvature = largest_curvature_of(azimuth, z, radius_m, highest)
+    curvature = find_largest_curvature(azimuth, z, radius_m, highest)
     curvature_map = curvature_rows(azimuth, radius_m, highest, curvature.azimuth_rad)
     errors = simulate_errors(azimuth, z, epoch.u_m) if dof else None
 
     def true_value(statistic, reading):
         """Estimate of the true statistic, or None without uncertainties."""
-        return None if errors is None else estimate(statistic, z, reading, errors)
+        return None if errors is None else estimate_statistic(statistic, z, reading, errors)
 
     def largest_of(neighbours, limits_m):
         """`Largest` of the points of `neighbours`."""
@@ -211,7 +216,7 @@ def assess(epoch, dof, strength, limits):
 
     largest = largest_of(every, every_limit)
     is_whole = len(subset.places) == len(every.places)  # avoids a second simulation
-    return Assessed(
+    return SettlementResult(
         epoch=epoch,
         dof=dof,
         k=float(coverage_factor(PROBABILITY, dof)) if dof else np.nan,
@@ -286,8 +291,8 @@ def _largest(neighbours, plane, variance, limits_m, true_value):
 # ---- figures and saved settlements
 
 
-def figures_of(assessed, limits):
-    """Figures of an `Assessed`, in the order of the report."""
+def settlement_figures(assessed, limits):
+    """Figures of an `SettlementResult`, in the order of the report."""
     every, subset = assessed.all_points, assessed.subset
     figures = [_r2_figure(assessed, limits)]
     for code, largest, used in (
@@ -369,12 +374,12 @@ def _r2_figure(assessed, limits):
     )
 
 
-def settlement_of(assessed, strength, sd_known):
+def make_settlement(assessed, strength, sd_known):
     """Build the `Settlement` of the record.
 
     Parameters
     ----------
-    assessed : Assessed
+    assessed : SettlementResult
         Computed settlement.
     strength : Strength
         Diameter of the tank, m.

@@ -1,6 +1,7 @@
 """Plumbness and roundness of a wall, from its shape in a record.
 
-The place with the largest `verdict.gravity` decides a check: a tank passes only if all places pass.
+The place with the largest `verdict.severity` decides a check: a tank passes only if all its places
+pass.
 """
 
 from dataclasses import dataclass
@@ -8,9 +9,8 @@ from math import atan2, degrees, hypot
 
 import numpy as np
 
-from tankcal.inspection.figures import PROBABILITY, Figure
 from tankcal.inspection.rules import limit_of
-from tankcal.inspection.verdict import gravity
+from tankcal.inspection.verdict import PROBABILITY, Figure, severity
 from tankcal.record.inspection import Generatrices, InspectedLevel
 from tankcal.uncertainty import coverage_factor
 
@@ -58,6 +58,15 @@ class Spread:
         """Values and expanded uncertainties times a factor."""
         return Spread(factor * self.value, factor * self.U, self.k, self.dof)
 
+    def at(self, place):
+        """Value, U, k and degrees of freedom at a place, as arguments of a `Figure`."""
+        return {
+            "value": float(self.value[place]),
+            "U": float(self.U[place]),
+            "k": float(self.k[place]),
+            "dof": float(self.dof[place]),
+        }
+
 
 def spread_of(value, u, dof):
     """Build a `Spread`.
@@ -98,7 +107,7 @@ def deciding_place(value, U, limit):
     >>> [deciding_place(values, U, limit) for limit in (6.0, 9.0, None)]
     [1, 2, 1]
     """
-    return max(range(len(value)), key=lambda i: gravity(value[i], U[i], limit))
+    return max(range(len(value)), key=lambda i: severity(value[i], U[i], limit))
 
 
 def inspect_shape(shape, sizes, rule):
@@ -133,7 +142,7 @@ def inspect_shape(shape, sizes, rule):
     return figures, _generatrices(shape), levels
 
 
-def not_surveyed(rule, sizes, remark):
+def unsurveyed_figures(rule, sizes, remark):
     """Figures of the checks of a wall that was not surveyed, without values."""
     return [_undetermined(code, _limit(rule, code, sizes), remark) for code in WALL_CHECKS]
 
@@ -169,7 +178,7 @@ def _axis(axis, sizes, rule):
     return Figure(
         code="plumbness_axis",
         unit="mm",
-        **_values_at(offset, 0),
+        **offset.at(0),
         limit=limit,
         azimuth_deg=azimuth_deg,
         used=2,
@@ -197,7 +206,7 @@ def _courses(shape, sizes, rule):
         return _undetermined("plumbness_course", None, "one_level_a_course")
     used = sum(item.used for item in figures)
     worst = max(
-        figures, key=lambda item: gravity(item.value, item.U, item.limit and item.limit.value)
+        figures, key=lambda item: severity(item.value, item.U, item.limit and item.limit.value)
     )
     return Figure(**(vars(worst) | {"used": used}))
 
@@ -216,7 +225,7 @@ def _plumb_figure(code, plumb, height_m, limit, course=None):
     return Figure(
         code=code,
         unit="mm",
-        **_values_at(departures, place),
+        **departures.at(place),
         limit=limit,
         course=course,
         azimuth_deg=azimuth_deg[place] % 360,
@@ -232,16 +241,6 @@ def _lean_remark(value_mm, height_m, levels):
     values = {"low_m": levels["low_m"], "high_m": levels["high_m"], "mm_per_m": per_m,
               "one_in": one_in, "over_m": height_m}  # fmt: skip
     return {"remark": "plumb_between", "remark_values": values}
-
-
-def _values_at(spread, place):
-    """Value, U, k and degrees of freedom at a place."""
-    return {
-        "value": float(spread.value[place]),
-        "U": float(spread.U[place]),
-        "k": float(spread.k[place]),
-        "dof": float(spread.dof[place]),
-    }
 
 
 def _generatrices(shape):
@@ -314,7 +313,7 @@ def _roundness(code, shape, sizes, rule):
     return Figure(
         code=code,
         unit="mm",
-        **_values_at(whole, place),
+        **whole.at(place),
         limit=limit,
         course=level["course"],
         height_m=level["height_m"],

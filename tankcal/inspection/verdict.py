@@ -1,4 +1,4 @@
-"""Decision on a figure of an inspection: guard bands and probability of conformity.
+"""Figure of an inspection, and the decision on it by guard bands and probability of conformity.
 
 The limit L of |value| and the expanded uncertainty U determine the verdict:
 
@@ -15,9 +15,64 @@ Sources: ILAC-G8:09/2019 4.2.3, guard bands w = U; JCGM 106:2012 7.3, 8.3.2.
 """
 
 import math
+from dataclasses import dataclass, field
 
-from tankcal.record.inspection import InspectionCheck
+from tankcal.record.inspection import InspectionCheck, InspectionLimit
 from tankcal.tank.rules import conformity_probability
+
+PROBABILITY = 0.95  # coverage probability of U
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure:
+    """A measured value with at most one limit, in the terms of `InspectionCheck`.
+
+    Attributes
+    ----------
+    code : str
+        One of tankcal.record.inspection.CHECKS.
+    unit : str
+        "mm", "1/m" or "" (a ratio).
+    value : float or None
+        Value with its sign; None if not determined.
+    U : float or None
+        Expanded uncertainty for PROBABILITY; None if no standard deviation is known.
+    k : float or None
+        Coverage factor of U.
+    dof : float
+        Degrees of freedom of U; may be inf.
+    limit : InspectionLimit or None
+        None if the rule has no limit, or if the limit requires data that are not given.
+    at_least : bool
+        Whether the limit is a lower limit of the value; if not, an upper limit of its magnitude.
+    course, height_m, azimuth_deg, epoch : optional
+        Place of the value, and its epoch or difference of two epochs.
+    used : int
+        Number of places that the largest value was selected from.
+    reading, U_reading : float or None
+        Largest single reading and its expanded uncertainty if the value estimates the largest true
+        value; None if the value is a reading.
+    remark, remark_values
+        Code of a remark on the value, and the numbers of the remark.
+    """
+
+    code: str
+    unit: str
+    value: float | None
+    U: float | None
+    k: float | None
+    dof: float
+    limit: InspectionLimit | None
+    at_least: bool = False
+    course: int | None = None
+    height_m: float | None = None
+    azimuth_deg: float | None = None
+    epoch: str | None = None
+    used: int = 0
+    reading: float | None = None
+    U_reading: float | None = None
+    remark: str | None = None
+    remark_values: dict = field(default_factory=dict)
 
 
 def verdict_of(value, U, limit, *, at_least=False, reading=None, U_reading=None):
@@ -67,7 +122,7 @@ def _margin(value, limit, at_least):
     return value - limit if at_least else limit - abs(value)
 
 
-def gravity(value, U, limit):
+def severity(value, U, limit):
     """Sort key of a place; the place with the largest key decides a check of many places.
 
     Places that fail have the largest keys, then places beyond the limit, then places within the
@@ -88,7 +143,7 @@ def gravity(value, U, limit):
     Examples
     --------
     >>> places = [(6.5, 1.0), (9.0, 4.0), (5.0, 1.2), (4.0, 2.5)]
-    >>> sorted(places, key=lambda place: gravity(*place, 5.2), reverse=True)
+    >>> sorted(places, key=lambda place: severity(*place, 5.2), reverse=True)
     [(6.5, 1.0), (9.0, 4.0), (4.0, 2.5), (5.0, 1.2)]
     """
     size, U = abs(value), U or 0.0
@@ -129,10 +184,9 @@ def probability_of(value, u, limit, dof=math.inf, *, at_least=False):
     return float(conformity_probability(value, u, low, high, dof))
 
 
-def judged(figure):
-    """`InspectionCheck` of a `figures.Figure`, with its verdict and probability of conformity."""
+def make_check(figure):
+    """`InspectionCheck` of a `Figure`, with its verdict and probability of conformity."""
     limit = None if figure.limit is None else figure.limit.value
-    direction = {"at_least": figure.at_least}
     u = figure.U / figure.k if figure.U is not None and figure.k else None
     return InspectionCheck(
         code=figure.code,
@@ -146,14 +200,14 @@ def judged(figure):
         epoch=figure.epoch,
         used=figure.used,
         limit=figure.limit,
-        probability=probability_of(figure.value, u, limit, figure.dof, **direction),
+        probability=probability_of(figure.value, u, limit, figure.dof, at_least=figure.at_least),
         verdict=verdict_of(
             figure.value,
             figure.U,
             limit,
+            at_least=figure.at_least,
             reading=figure.reading,
             U_reading=figure.U_reading,
-            **direction,
         ),
         reading=figure.reading,
         U_reading=figure.U_reading,

@@ -1,14 +1,17 @@
-"""Answers of a comparison: write empty forms, and read the answers of any program."""
+"""Answers of a comparison: empty forms, answers of any program, and answers of tankcal."""
 
 import csv
+import datetime
 import io
 import json
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import norm
 
+from tankcal.errors import InputError, Problem, TankcalError
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import read_columns, read_section, unknown_section
 from tankcal.job.fields import Field
@@ -17,6 +20,7 @@ from tankcal.job.tables import SEPARATORS, nearest, read_bytes
 from tankcal.messages import list_some, message
 from tankcal.record.intercomparison import ANSWERS, Answer, AnswersFile, Participant
 from tankcal.text.decoding import find_encoding
+from tankcal.version import find_version
 
 PARTICIPANT = "participant.toml"
 ROWS = (
@@ -89,7 +93,7 @@ class Answers:
     warnings: tuple
 
 
-def file_of(tank, method):
+def answer_file(tank, method):
     """Name of the table of answers for a survey."""
     return f"{tank}_{method}.csv"
 
@@ -97,22 +101,24 @@ def file_of(tank, method):
 # ---- writing
 
 
-def template_files(manifest, said=str):
+def make_forms(manifest, translate=str):
     """Empty forms for all surveys of a package, {name: bytes}.
 
-    `said(message)` returns the text of a comment in the language of the participant.
+    `translate(message)` returns the text of a comment in the language of the participant.
     """
-    lines = [*(f"# {said(item)}" for item in ABOUT), "", "[participant]"]
+    lines = [*(f"# {translate(item)}" for item in ABOUT), "", "[participant]"]
     for item in KEYS:
         value = manifest["truth_sha256"] if item.name == "package" else ""
         value = "2026-01-31" if item.kind == "date" else _quoted(value)
-        lines.append(f"{'' if item.required else '# '}{item.name} = {value}  # {said(item.note)}")
+        lines.append(
+            f"{'' if item.required else '# '}{item.name} = {value}  # {translate(item.note)}"
+        )
     lines += ["", "# [csv]", '# separator = ";"', '# decimal = ","', ""]
     files = {PARTICIPANT: "\n".join(lines).encode()}
     heights = {item["tank"]: item["heights_m"] for item in manifest["tanks"]}
     for job in manifest["jobs"]:
         rows = [[f"{height:g}", "", "", ""] for height in heights[job["tank"]]]
-        files[file_of(job["tank"], job["method"])] = _table(rows)
+        files[answer_file(job["tank"], job["method"])] = _table(rows)
     return files
 
 
@@ -129,7 +135,7 @@ def answer_files(saved):
     for item in saved.answers:
         columns = zip(item.height_m, item.volume_m3, item.U_m3, item.k, strict=True)
         rows = [[f"{height:g}", *map(_cell, values)] for height, *values in columns]
-        files[file_of(item.tank, item.method)] = _table(rows)
+        files[answer_file(item.tank, item.method)] = _table(rows)
     return files
 
 
@@ -155,14 +161,14 @@ def _quoted(text):
 # ---- reading
 
 
-def read_answers(folder, asked, log):
+def read_answers(folder, requested, log):
     """Read the `Answers` of a folder.
 
     Parameters
     ----------
     folder : path
         Folder with participant.toml and tables, or with answers.json.
-    asked : dict
+    requested : dict
         Requested heights and methods of the truth or the manifest, {tank: (heights, set of
         methods)}.
     log : Log
@@ -180,9 +186,9 @@ def read_answers(folder, asked, log):
         return None
     warnings = _WarningStart(log)
     if (folder / ANSWERS.file).is_file():
-        saved = _read_json(folder / ANSWERS.file, asked, log, warnings)
+        saved = _read_json(folder / ANSWERS.file, requested, log, warnings)
     else:
-        saved = _read_tables(folder, asked, log, warnings)
+        saved = _read_tables(folder, requested, log, warnings)
     if saved is not None and not saved.answers and len(log.problems) == problem_count:
         log.problem(folder.name, message("ic_no_answers", "no volume in any table; expected the "
                     "answers of one survey at least"))  # fmt: skip
@@ -198,12 +204,12 @@ class _WarningStart:
         self.first = len(log.warnings)
 
 
-def _read_tables(folder, asked, log, warnings):
+def _read_tables(folder, requested, log, warnings):
     """AnswersFile of participant.toml and CSV tables, or None without a participant."""
     participant, marks = _participant(folder / PARTICIPANT, log)
     known = {
-        file_of(tank, method): (tank, method)
-        for tank, (_, methods) in asked.items()
+        answer_file(tank, method): (tank, method)
+        for tank, (_, methods) in requested.items()
         for method in methods
     }
     answers = []
@@ -216,7 +222,7 @@ def _read_tables(folder, asked, log, warnings):
                            such=list_some(sorted(known), 3))  # fmt: skip
             log.problem(path.name, text)
             continue
-        answer = _read_table(path, *known[path.name], asked, marks, log)
+        answer = _read_table(path, *known[path.name], requested, marks, log)
         if answer is not None:
             answers.append(answer)
     return AnswersFile(participant, answers) if participant else None
@@ -244,14 +250,14 @@ def _participant(path, log):
     return Participant(**values | {"date": None if day is None else str(day)}), marks
 
 
-def _read_table(path, tank, method, asked, marks, log):
+def _read_table(path, tank, method, requested, marks, log):
     """Read the Answer of a table; None if the table is empty or invalid."""
     problem_count, data = len(log.problems), read_bytes(path, log)
     if data is None:
         return None
     marks = marks or _likely_marks(data)
     table = read_csv(path.name, data, *marks, log, settings_file=PARTICIPANT)
-    if table is None or _has_too_many(path.name, len(table.rows), asked[tank][0], log):
+    if table is None or _has_too_many(path.name, len(table.rows), requested[tank][0], log):
         return None
     values = read_columns(None, table, log, ROWS)
     if "volume_m3" not in table.headings:
@@ -261,7 +267,7 @@ def _read_table(path, tank, method, asked, marks, log):
         return None
     height, volume, U, k, coverage = (values.numbers(item.name) for item in ROWS)
     k = _factors(path.name, values.rows, U, k, coverage, log)
-    _check_heights(path.name, values.rows, height, asked[tank][0], log)
+    _check_heights(path.name, values.rows, height, requested[tank][0], log)
     given = np.isfinite(volume)
     for row, is_given, spread in zip(values.rows, given, U, strict=True):
         if not is_given and np.isfinite(spread):
@@ -269,7 +275,7 @@ def _read_table(path, tank, method, asked, marks, log):
             log.problem(path.name, text, row, "U_m3")
     if len(log.problems) > problem_count:
         return None
-    _warn_of_missing(path.name, height[given], asked[tank][0], log)
+    _warn_about_missing(path.name, height[given], requested[tank][0], log)
     if not given.any():
         return None
     if np.any(np.isfinite(U) & ~np.isfinite(k)):
@@ -297,24 +303,24 @@ def _factors(name, rows, U, k, coverage, log):
     return np.where(np.isfinite(U), factors, np.nan)
 
 
-def _has_too_many(name, count, asked, log):
+def _has_too_many(name, count, requested, log):
     """Whether a table has too many rows for a message about each; if so, report it to `log`."""
-    if count <= MOST_TIMES * len(asked):
+    if count <= MOST_TIMES * len(requested):
         return False
     text = message("ic_too_many_rows", "{count} rows; expected {asked} at most, one for each "
-                   "height that is asked", count=count, asked=len(asked))  # fmt: skip
+                   "height that is asked", count=count, asked=len(requested))  # fmt: skip
     log.problem(name, text)
     return True
 
 
-def _check_heights(name, rows, height, asked, log):
+def _check_heights(name, rows, height, requested, log):
     """Report heights that were not requested or that occur twice."""
-    requested, seen = np.asarray(asked), {}
+    requested_m, seen = np.asarray(requested), {}
     for row, value in zip(rows, height, strict=True):
-        nearest = int(np.argmin(np.abs(requested - value)))
-        if abs(requested[nearest] - value) > SAME_M:
+        nearest = int(np.argmin(np.abs(requested_m - value)))
+        if abs(requested_m[nearest] - value) > SAME_M:
             text = message("ic_not_asked", "{height:g} m was not asked; the nearest height that was"
-                           " is {near:g} m", height=value, near=requested[nearest])  # fmt: skip
+                           " is {near:g} m", height=value, near=requested_m[nearest])  # fmt: skip
             log.problem(name, text, row, "height_m")
         elif nearest in seen:
             text = message("ic_height_twice", "{height:g} m stands in row {first}, too; expected "
@@ -324,13 +330,13 @@ def _check_heights(name, rows, height, asked, log):
             seen[nearest] = row
 
 
-def _warn_of_missing(name, height, asked, log):
+def _warn_about_missing(name, height, requested, log):
     """Warn of requested heights without a volume."""
-    missing = [item for item in asked if not np.any(np.abs(height - item) <= SAME_M)]
+    missing = [item for item in requested if not np.any(np.abs(height - item) <= SAME_M)]
     if missing:
         text = message(
             "ic_missing_heights", "{missing} of {asked} heights without a volume ({heights})",
-            missing=len(missing), asked=len(asked),
+            missing=len(missing), asked=len(requested),
             heights=list_some(
                 [message("ic_height", "{height:g} m", height=item) for item in missing], MOST_NAMED
             ),
@@ -341,7 +347,7 @@ def _warn_of_missing(name, height, asked, log):
 # ---- answers.json
 
 
-def _read_json(path, asked, log, warnings):
+def _read_json(path, requested, log, warnings):
     """AnswersFile of answers.json, or None if it has problems."""
     from tankcal.intercomparison.package import load_saved
 
@@ -353,18 +359,20 @@ def _read_json(path, asked, log, warnings):
         name = f"{path.name}, {entry['tank']} {entry['method']}"
         lengths = {len(entry[key]) for key in ("height_m", "volume_m3", "U_m3", "k")}
         place = entry["tank"], entry["method"]
-        if entry["tank"] not in asked or entry["method"] not in asked[entry["tank"]][1]:
+        if entry["tank"] not in requested or entry["method"] not in requested[entry["tank"]][1]:
             log.problem(name, message("ic_unknown_survey", "no such survey in the package"))
         elif place in seen:
             log.problem(name, message("ic_survey_twice", "answered twice; expected once"))
         elif len(lengths) > 1:
             log.problem(name, message("ic_uneven", "lists of different lengths; expected a value "
                         "(or null) for each height"))  # fmt: skip
-        elif not _has_too_many(name, len(entry["height_m"]), asked[entry["tank"]][0], log):
+        elif not _has_too_many(name, len(entry["height_m"]), requested[entry["tank"]][0], log):
             U, k = (_checked_positive(name, key, entry[key], log) for key in ("U_m3", "k"))
             height = np.array(entry["height_m"], float)
-            _check_heights(name, range(1, len(height) + 1), height, asked[entry["tank"]][0], log)
-            _warn_of_missing(name, height, asked[entry["tank"]][0], log)
+            _check_heights(
+                name, range(1, len(height) + 1), height, requested[entry["tank"]][0], log
+            )
+            _warn_about_missing(name, height, requested[entry["tank"]][0], log)
             if len(height):
                 answers.append(Answer(*place, entry["height_m"], entry["volume_m3"], U, k))
         seen.add(place)
@@ -380,3 +388,74 @@ def _checked_positive(name, key, values, log):
         log.problem(name, message("ic_not_positive", "a value of 0 or below; expected above 0, or "
                     "null"), None, key)  # fmt: skip
     return numbers.tolist()
+
+
+# ---- answers of tankcal
+
+
+def answer_package(folder, manifest, progress=None, run=None):
+    """Compute every survey of a package.
+
+    Parameters
+    ----------
+    folder : path
+        Folder of the package.
+    manifest : dict
+        Checked manifest of the package.
+    progress : callable, optional
+        Function progress(text, done, total).
+    run : callable, optional
+        Function run(folder of a job) that returns an object with a method `at(height)`; by default
+        tankcal.
+
+    Returns
+    -------
+    AnswersFile
+        Answers to all surveys with a valid solution.
+    tuple of Problem
+        Problems of the other surveys.
+    """
+    progress = progress or (lambda *_: None)
+    run = run or _run
+    heights = {item["tank"]: item["heights_m"] for item in manifest["tanks"]}
+    answers, problems = [], []
+    step = message("ic_answering", "computing the surveys")
+    for done, job in enumerate(manifest["jobs"]):
+        progress(step, done, len(manifest["jobs"]))
+        requested = heights[job["tank"]]
+        try:
+            table = run(Path(folder) / job["folder"])
+            volumes = [table.at(height) for height in requested]
+        except InputError as error:
+            problems += [_problem_of_job(job, item) for item in error.problems]
+            continue
+        except TankcalError as error:
+            problems += [Problem(job["folder"], text) for text in error.texts]
+            continue
+        U = [item.U_m3 if item.U_m3 > 0 else math.nan for item in volumes]
+        k = [math.nan if item.k is None else item.k for item in volumes]
+        values = [item.value_m3 for item in volumes]
+        answers.append(Answer(job["tank"], job["method"], list(requested), values, U, k))
+    progress(step, len(manifest["jobs"]), len(manifest["jobs"]))
+    participant = Participant(
+        name="tankcal",
+        software="tankcal",
+        version=find_version(),
+        date=datetime.date.today().isoformat(),
+        contact=None,
+        remarks=None,
+        package=manifest["truth_sha256"],
+    )
+    return AnswersFile(participant, answers), tuple(problems)
+
+
+def _run(folder):
+    """Capacity table of a job by tankcal."""
+    import tankcal
+
+    return tankcal.run(tankcal.load(folder))
+
+
+def _problem_of_job(job, problem):
+    """Problem with the folder of its job before the file name."""
+    return replace(problem, file=f"{job['folder']}/{problem.file}")

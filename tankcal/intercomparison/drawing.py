@@ -119,7 +119,7 @@ def _waves(rng, height, family):
     return waves
 
 
-def _brick(rng, radius, joints):
+def _draw_bricks(rng, radius, joints):
     """Vertical welds in brick pattern, and horizontal welds."""
     plates = max(3, round(FULL_TURN * radius / rng.uniform(6, 10)))
     peak, flank = rng.choice([-1, 1]) * rng.uniform(2e-3, 10e-3), rng.uniform(0.1, 0.3)
@@ -139,7 +139,7 @@ def _brick(rng, radius, joints):
     return defects
 
 
-def _coil(rng, radius, joints):
+def _draw_coil_seams(rng, radius, joints):
     """One to three seams over the full height."""
     defects = []
     for _ in range(int(rng.integers(1, 4))):
@@ -149,7 +149,7 @@ def _coil(rng, radius, joints):
     return defects
 
 
-def _dented(rng, radius, joints):
+def _draw_dents(rng, radius, joints):
     """Three to seven dents or bumps, and two to five flat places."""
     defects = []
     for _ in range(int(rng.integers(3, 8))):
@@ -165,7 +165,7 @@ def _dented(rng, radius, joints):
     return defects
 
 
-def _buckled(rng, radius, joints):
+def _draw_buckles(rng, radius, joints):
     """One or two buckles, and horizontal welds."""
     defects = []
     for _ in range(int(rng.integers(1, 3))):
@@ -186,11 +186,11 @@ def _no_defects(rng, radius, joints):
 
 
 _DEFECTS_BY_FAMILY = {
-    "brick": _brick,
-    "coil": _coil,
-    "dented": _dented,
+    "brick": _draw_bricks,
+    "coil": _draw_coil_seams,
+    "dented": _draw_dents,
     "leaning": _no_defects,
-    "buckled": _buckled,
+    "buckled": _draw_buckles,
     "round": _no_defects,
 }
 

@@ -8,17 +8,20 @@ therefore also depend on 256 random bits that only the truth contains.
 """
 
 import hashlib
+import io
 import json
 import secrets
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 
 import numpy as np
 
 from tankcal.intercomparison.drawing import FAMILIES, draw_tank
 from tankcal.intercomparison.observers import METHODS
-from tankcal.intercomparison.site import Chance, ask
-from tankcal.intercomparison.writing import job_files
+from tankcal.intercomparison.observers.cloud import LAS_STEP_M
+from tankcal.intercomparison.site import Chance, request_table
+from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.messages import message
 from tankcal.record.intercomparison import (
     ANSWERS,
@@ -32,16 +35,33 @@ from tankcal.record.intercomparison import (
     TruthFile,
 )
 from tankcal.record.schema import to_plain
+from tankcal.text.shipped import shipped_folder
+from tankcal.text.spreadsheets import write_guarded
 from tankcal.version import find_version
 
 LICENCE = "CC0-1.0"  # SPDX identifier
 COVERAGE = 0.95  # coverage probability of the requested U
 DENSITIES_KG_M3 = (0.0, 850.0)  # density of the liquid, alternating between tanks
 SCHEMA = "answers.schema.json"  # file name of the JSON schema of answers
+SEALED = (
+    "The true volumes are **sealed**: nobody but the organiser has them until all answers are in."
+)
+OPEN = (
+    "The true volumes lie beside this package (`truth.json`): it is **for practice**, and for a"
+    " look at the formats."
+)
+HEAD = """# Every key and column
+
+What stands in the files of this package. A name ends with its unit: `_m` metres, `_mm`
+millimetres, `_deg` degrees, `_c` degrees Celsius, `_m3` cubic metres, `_ppm` parts per million;
+`s_` is a standard deviation, `u_` a standard uncertainty. CSV files have a row of headings, commas
+and decimal points. Scans are LAS 1.2, point format 0, metres in steps of {step} m, in the scanner's
+own frame: the scanner is at its origin, and it stands a little out of level.
+"""
 
 
 @dataclass(frozen=True)
-class Made:
+class Package:
     """Files of a package, {path: bytes}, and the bytes of its truth file."""
 
     files: dict
@@ -96,7 +116,7 @@ def make_package(count, seed, methods, *, secret="", nonce=None, is_open=False, 
     progress(step, total, total)
     nonce = secrets.token_hex(32) if nonce is None else nonce
     sealed = TruthFile(find_version(), nonce, secret, seed, list(methods), truth)
-    truth_bytes = as_bytes(to_plain(sealed))
+    truth_bytes = json_bytes(to_plain(sealed))
     files |= _documentation(used, is_open)
     manifest = PackageFile(
         tankcal=find_version(),
@@ -108,8 +128,8 @@ def make_package(count, seed, methods, *, secret="", nonce=None, is_open=False, 
         jobs=jobs,
         files=[FileHash(name, digest(files[name])) for name in sorted(files)],
     )
-    files[PACKAGE.file] = as_bytes(to_plain(manifest))
-    return Made(files, truth_bytes)
+    files[PACKAGE.file] = json_bytes(to_plain(manifest))
+    return Package(files, truth_bytes)
 
 
 def _draw_case(number, seed, secret):
@@ -117,7 +137,7 @@ def _draw_case(number, seed, secret):
     family = FAMILIES[number % len(FAMILIES)]
     name = f"T{number + 1:02d}"
     tank = draw_tank(_stream(seed, secret, number, 0), name, family)
-    requested = ask(tank, DENSITIES_KG_M3[number % len(DENSITIES_KG_M3)])
+    requested = request_table(tank, DENSITIES_KG_M3[number % len(DENSITIES_KG_M3)])
     volumes = tank.volumes_m3(requested.dips_m, requested.density_kg_m3)
     error = tank.volume_error_m3(requested.dips_m, requested.density_kg_m3)
     true = TrueTank(name, family, list(requested.dips_m), volumes.tolist(), error, tank.plain())
@@ -141,22 +161,7 @@ def _note_names(parts, used):
             used.setdefault(f"{name}.toml", {}).update(dict.fromkeys(entry))
 
 
-def _documentation(used, is_open):
-    """Documentation of a package: README, columns, schema of the answers, licence."""
-    from tankcal.intercomparison.reading_matter import columns_text, readme_text
-    from tankcal.text.shipped import shipped_folder
-
-    texts = {
-        "README.md": readme_text(is_open),
-        "COLUMNS.md": columns_text(used),
-        "LICENSE.txt": (shipped_folder("report_templates") / "intercomparison" / "licence.txt")
-        .read_text(encoding="utf-8"),
-        SCHEMA: json.dumps(ANSWERS.schema(), ensure_ascii=False, indent=1) + "\n",
-    }  # fmt: skip
-    return {name: text.encode() for name, text in texts.items()}
-
-
-def as_bytes(plain):
+def json_bytes(plain):
     """Bytes of a JSON file with plain data."""
     return (json.dumps(plain, ensure_ascii=False, indent=1, allow_nan=False) + "\n").encode()
 
@@ -172,6 +177,98 @@ def write_files(folder, files):
         path = Path(folder) / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
+
+
+# ---- documentation in a package
+
+
+def _documentation(used, is_open):
+    """Documentation of a package: README, columns, schema of the answers, licence."""
+    folder = shipped_folder("report_templates") / "intercomparison"
+    readme = (folder / "readme.md").read_text(encoding="utf-8")
+    readme = readme.replace("{state}", OPEN if is_open else SEALED).replace(
+        "{version}", find_version()
+    )
+    texts = {
+        "README.md": readme,
+        "COLUMNS.md": _columns_text(used),
+        "LICENSE.txt": (folder / "licence.txt").read_text(encoding="utf-8"),
+        SCHEMA: json.dumps(ANSWERS.schema(), ensure_ascii=False, indent=1) + "\n",
+    }
+    return {name: text.encode() for name, text in texts.items()}
+
+
+def _columns_text(used):
+    """Text of COLUMNS.md: notes of the job contract on all names that a package uses.
+
+    The names are given as {file: names}.
+    """
+    parts = [HEAD.format(step=LAS_STEP_M)]
+    for file in sorted(used):
+        rows = [f"| `{name}` | {_note(file, name)} |" for name in used[file]]
+        head = "key" if file.endswith(".toml") else "column"
+        parts.append(f"## {file}\n\n| {head} | what it is |\n| --- | --- |\n" + "\n".join(rows))
+    return "\n\n".join(parts) + "\n"
+
+
+def _note(file, name):
+    """Note on a key or column in the contract of a job."""
+    owner = file.rpartition(".")[0]
+    if file == "job.toml":
+        section, _, name = name.rpartition(".")
+        fields = KEYS[section]
+    else:
+        fields = COLUMNS.get(owner) or REGISTER_KEYS[owner]
+    return next((field.note for field in fields if field.name == name), "")
+
+
+# ---- files of a job
+
+
+def job_files(parts):
+    """Files of a job's folder, {path: bytes}, from its `Parts`."""
+    files = {"job.toml": toml_text(_sections(parts.settings)).encode()}
+    for name, rows in parts.tables.items():
+        if len(rows) > 1:
+            files[f"{name}.csv"] = csv_text(rows).encode()
+    for name, entries in parts.registers.items():
+        named = {f"{name}.{json.dumps(key)}": entry for key, entry in entries.items()}
+        files[f"{name}.toml"] = toml_text(named).encode()
+    return files | parts.files
+
+
+def csv_text(rows):
+    """Text of a CSV file with these rows."""
+    stream = io.StringIO()
+    write_guarded(stream, rows, ",")
+    return stream.getvalue()
+
+
+def toml_text(sections):
+    """Text of a TOML file with {section: {key: value}}."""
+    parts = []
+    for section, entries in sections.items():
+        lines = [f"{key} = {_value(value)}" for key, value in entries.items()]
+        parts.append("\n".join([f"[{section}]", *lines]) + "\n")
+    return "\n".join(parts)
+
+
+def _sections(settings):
+    """Convert {"section.key": value} to {section: {key: value}}."""
+    sections = {}
+    for path, value in settings.items():
+        section, _, key = path.rpartition(".")
+        sections.setdefault(section, {})[key] = value
+    return sections
+
+
+def _value(value):
+    """Value as TOML; strings, numbers and flags have the form of JSON."""
+    if isinstance(value, date):
+        return value.isoformat()
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 # ---- reading

@@ -15,10 +15,20 @@ the standard deviation of a share of rows follows from a ratio of sums over tabl
 For the top rows of tables, the exact binomial bounds (Clopper and Pearson) are computed.
 """
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 from scipy.stats import beta
 
+from tankcal.errors import InputError
+from tankcal.intercomparison.answers import PARTICIPANT, read_answers
+from tankcal.intercomparison.package import load_package, load_truth
+from tankcal.job.tables import Log
+from tankcal.messages import message
 from tankcal.record.intercomparison import (
+    ANSWERS,
+    PACKAGE,
     MethodScore,
     ScoredRows,
     ScoredTable,
@@ -27,6 +37,85 @@ from tankcal.record.intercomparison import (
 )
 from tankcal.record.texts import warnings_of
 from tankcal.version import find_version
+
+
+def score_folders(folders, truth, package=None):
+    """Score folders of answers.
+
+    Parameters
+    ----------
+    folders : sequence of path
+        Folders of answers, one for each participant.
+    truth : path
+        The file truth.json, or its folder.
+    package : path, optional
+        The package; its manifest must also state the SHA-256 of this truth.
+
+    Returns
+    -------
+    ScoresFile
+
+    Raises
+    ------
+    InputError
+        If the folders, the truth or the package have problems, or if answers or manifest refer to
+        another truth. The error lists all problems.
+    """
+    log, committed = Log(), []
+    coverage = 0.95
+    if package is not None:
+        manifest = load_package(package, log)
+        if manifest is not None:
+            committed.append((PACKAGE.file, manifest["truth_sha256"]))
+            coverage = manifest["coverage_probability"]
+    truth_and_hash = load_truth(truth, committed, log)
+    if truth_and_hash is None:
+        log.stop_if_problems()
+    truth_data, truth_sha256 = truth_and_hash
+    requested = {
+        item["tank"]: (item["heights_m"], set(truth_data["methods"]))
+        for item in truth_data["tanks"]
+    }
+    problems, participants = list(log.problems), []
+    for folder in folders:
+        folder_log = Log()
+        answers = read_answers(folder, requested, folder_log)
+        if answers is not None and answers.saved.participant.package != truth_sha256:
+            folder_log.problem(
+                _identifying_file(folder),
+                _other_package(answers.saved.participant.package, truth_sha256),
+            )
+        problems += [_with_folder(folder, item, folders) for item in folder_log.problems]
+        if answers is not None:
+            warnings = [_with_folder(folder, item, folders) for item in answers.warnings]
+            participants.append(replace(answers, warnings=tuple(warnings)))
+    if problems:
+        raise InputError(problems)
+    return score(participants, truth_data, truth_sha256, coverage)
+
+
+def _other_package(promised, own):
+    """Message that answers refer to another package."""
+    return message(
+        "ic_other_package",
+        "the answers are to the package with truth_sha256 {promised}, the truth has {own}: it was "
+        "changed, or belongs to another package",
+        promised=promised,
+        own=own,
+    )
+
+
+def _identifying_file(folder):
+    """Name of the file of a folder that identifies the participant."""
+    return ANSWERS.file if (Path(folder) / ANSWERS.file).is_file() else PARTICIPANT
+
+
+def _with_folder(folder, problem, folders):
+    """Problem with the folder before its file name if several folders are scored."""
+    if len(folders) < 2:
+        return problem
+    return replace(problem, file=f"{Path(folder).resolve().name}/{problem.file}")
+
 
 EVERY = "*"  # replaces the method in scores of all methods
 SAME_M = 1e-6  # largest difference of heights that are treated as equal
@@ -97,11 +186,11 @@ def score_table(participant, answer, true):
     -------
     ScoredTable
     """
-    requested, assigned = np.array(true["heights_m"]), np.array(true["volume_m3"])
+    requested_m, assigned = np.array(true["heights_m"]), np.array(true["volume_m3"])
     order = np.argsort(answer.height_m)
     height = np.array(answer.height_m, float)[order]
     # Index of the requested height of each row.
-    at = np.argmin(np.abs(requested[:, None] - height), axis=0)
+    at = np.argmin(np.abs(requested_m[:, None] - height), axis=0)
     volume, U, k = (
         np.array([np.nan if value is None else value for value in values], float)[order]
         for values in (answer.volume_m3, answer.U_m3, answer.k)
@@ -111,13 +200,15 @@ def score_table(participant, answer, true):
     E_n = error / np.hypot(U, reference)
     zeta = error / np.hypot(U / k, reference)
     is_judged = np.isfinite(E_n)
-    has_top = at[-1] == len(requested) - 1
+    has_top = at[-1] == len(requested_m) - 1
     return ScoredTable(
         participant=participant,
         tank=answer.tank,
         method=answer.method,
-        rows=ScoredRows(*(value.tolist() for value in (requested[at], exact, error, U, E_n, zeta))),
-        missing=len(requested) - len(height),
+        rows=ScoredRows(
+            *(value.tolist() for value in (requested_m[at], exact, error, U, E_n, zeta))
+        ),
+        missing=len(requested_m) - len(height),
         top_error_ppm=float(1e6 * error[-1] / full) if has_top else None,
         top_E_n=float(E_n[-1]) if has_top and is_judged[-1] else None,
         rms_ppm=float(1e6 * _rms(error) / full),

@@ -97,9 +97,9 @@ class Site:
     inputs: list
 
     @property
-    def grown(self):
+    def expansion_factor(self):
         """Factor of all lengths by thermal expansion, relative to the reference temperature."""
-        return self.tank.grown(self.shell_c)
+        return self.tank.expansion_factor(self.shell_c)
 
     def places(self, azimuth, z, off_m=0.0, outside=None):
         """True points (n, 3) of the expanded wall in the coordinate system of the survey, m.
@@ -118,12 +118,12 @@ class Site:
         if np.any(off_m):
             ray = np.column_stack([np.sin(azimuth), np.cos(azimuth), np.zeros(len(cool))])
             # The distance itself does not expand, so it is divided by the factor applied below.
-            cool = cool + np.asarray(off_m)[..., None] * ray / self.grown
-        return self.frame_m + self.grown * cool
+            cool = cool + np.asarray(off_m)[..., None] * ray / self.expansion_factor
+        return self.frame_m + self.expansion_factor * cool
 
     def level(self, z):
         """Observed heights above the dip plate, for heights z at the reference temperature, m."""
-        return self.grown * np.asarray(z) - self.zero_m
+        return self.expansion_factor * np.asarray(z) - self.zero_m
 
     def add_input(self, name, u, unit, note):
         """Add a row to uncertainty.csv."""
@@ -153,7 +153,7 @@ def observe_site(tank, chance, asked, *, outside, frame_m=(0.0, 0.0, 0.0)):
     shell_c = float(np.round(chance.rng.uniform(12.0, 32.0), 1))
     read_c = round(shell_c + float(chance.normal(U_SHELL_K)), 1)
     frame = np.asarray(frame_m, float)
-    f = tank.grown(shell_c)
+    f = tank.expansion_factor(shell_c)
     zero = f * tank.plate_z_m + float(chance.normal(U_ZERO_M))
     parts = Parts(_settings(tank, asked, outside, read_c, frame, zero))
     site = Site(tank, chance, outside, shell_c, frame, zero, parts, [])
@@ -226,7 +226,7 @@ def _bottom(site):
         places += list(zip(r * np.sin(turn), r * np.cos(turn), strict=True))
     x, y = np.array(places).T
     z = tank.floor.height_m(x, y, tank.radius_m)
-    observed = site.frame_m + site.grown * np.column_stack([x, y, z])
+    observed = site.frame_m + site.expansion_factor * np.column_stack([x, y, z])
     observed[:, 2] += chance.normal(FLOOR_SD_M, len(observed))
     return rows + [[*np.round(point, 5).tolist(), 1000 * FLOOR_SD_M] for point in observed]
 
@@ -244,7 +244,7 @@ def _fittings(site):
 
 
 @dataclass(frozen=True)
-class Asked:
+class TableRequest:
     """Requested heights and conditions of a capacity table.
 
     Attributes
@@ -262,8 +262,8 @@ class Asked:
     reference_temperature_c: float = REFERENCE_C
 
 
-def ask(tank, density_kg_m3):
-    """`Asked` of a tank: every half metre, and pairs for deliveries of 1 cm, 10 cm and 2 m.
+def request_table(tank, density_kg_m3):
+    """`TableRequest` of a tank: every half metre, and pairs for deliveries of 1 cm, 10 cm and 2 m.
 
     The deliveries of 1 cm and 10 cm are in the middle of every course and across every weld between
     courses, where a table computed by sections changes its slope.
@@ -278,4 +278,4 @@ def ask(tank, density_kg_m3):
         low = np.round(place, 2)
         dips |= {low, low + 0.01, low + 0.1}
     rounded = sorted({round(float(dip), 2) for dip in dips if first - 1e-9 <= dip <= top + 1e-9})
-    return Asked(tuple(rounded), density_kg_m3)
+    return TableRequest(tuple(rounded), density_kg_m3)

@@ -196,7 +196,7 @@ class Tank:
 
     # ---- temperature
 
-    def grown(self, celsius):
+    def expansion_factor(self, celsius):
         """Factor of all lengths at a temperature of the shell, relative to REFERENCE_C."""
         return 1 + self.expansion_per_k * (celsius - REFERENCE_C)
 
@@ -224,7 +224,7 @@ class Tank:
         dips, density, celsius = np.broadcast_arrays(
             *(np.atleast_1d(np.asarray(item, float)) for item in (dips_m, density_kg_m3, celsius))
         )
-        f = self.grown(celsius)
+        f = self.expansion_factor(celsius)
         levels = dips / f + self.plate_z_m  # at the reference temperature
         low, high = self.lowest_level_m, self.height_m
         if np.any(levels < low - 1e-9) or np.any(levels > high + 1e-9):

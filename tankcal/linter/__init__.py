@@ -1,10 +1,14 @@
 """Linter for capacity tables in CSV files, Excel workbooks, PDFs, or records of tankcal.
 
-grids, headings, numbers, layout   from a file to pairs of height and volume
+grids                              cells of a file
+headings, units, numbers           texts of headings and cells
+layout, blocks, wide, compound_heights   from cells to pairs of height and volume
 heights                            order, steps, missing, doubled and swapped rows
-volumes, examination               rounding, falls, rows that disagree with their neighbours
-screening, hypotheses, suggestions   detection, explanation and likely intended values
-linting, totals, parts             units, total, last row; proportional parts
+volumes                            rounding, falls, likely intended values
+examination, hypotheses            rows that disagree with their neighbours, and explanations
+totals                             units, total, last row
+linting                            all checks of a file; proportional parts
+rows                               rows of a table in SI units, for other packages
 """
 
 from tankcal.linter.linting import Finding, Report, lint

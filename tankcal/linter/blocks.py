@@ -8,18 +8,18 @@ from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 
 from tankcal.errors import InputError, Problem
+from tankcal.linter.compound_heights import join_heights, parts_heading
 from tankcal.linter.headings import (
     Uncertainty,
-    announces_parts,
     heading_of,
     is_coverage_factor,
+    is_heading_of_parts,
     is_unit,
     uncertainty_of,
 )
 from tankcal.linter.numbers import has_digit, has_letter, is_blank
-from tankcal.linter.split_heights import parts_heading, with_joined_heights
 from tankcal.linter.units import INCH_M, Unit, countries_in
-from tankcal.linter.wide import WideHeading, refused_columns, title_unit, wide_heading
+from tankcal.linter.wide import WideHeading, find_unnamed_columns, title_unit, wide_heading
 from tankcal.messages import message
 
 _LINES_OF_HEADING = 3  # largest number of heading lines above the steps of a wide table
@@ -82,7 +82,7 @@ class Block:
         return pairs, None if self.wide is None else self.wide.texts
 
 
-def blocks_of(grid):
+def find_blocks(grid):
     """Return the `Block`s of a grid; a text without headings is one block of columns 1 and 2."""
     rows = list(grid.rows)
     blocks, start, is_parts, end = [], None, False, 0
@@ -96,26 +96,26 @@ def blocks_of(grid):
         if wide is None and not any(has_letter(cell) for cell in cells):
             index, end = index + 1, index + 1
             continue
-        if any(announces_parts(cell) for cell in cells):
+        if any(is_heading_of_parts(cell) for cell in cells):
             is_parts, start = True, index
         if wide is not None:
             first = index + 1
             pairs = (Pair(0, wide.first, wide.height, wide.volume),)
             heading = (rows[index][0], cells)
         else:
-            joined, used = _with_units(rows, index)
+            joined, used = _read_heading_lines(rows, index)
             pairs, first = _pairs(joined), index + used
             pairs = () if _is_over_wide(rows, index, above) else pairs
-            pairs = tuple(_with_title(pair, above) for pair in pairs)
+            pairs = tuple(_add_title_unit(pair, above) for pair in pairs)
             heading = (rows[index][0], joined)
         if not pairs:
             index += 1
             continue
-        pairs = _as_first_page(pairs, wide, first_pages)
+        pairs = _copy_units_of_first_page(pairs, wide, first_pages)
         blocks.append((first, pairs, heading, is_parts, index if start is None else start, wide))
         is_parts, start, index, end = False, None, first, first
     if not blocks:
-        return _without_heading(grid.name, rows) if grid.is_text else ()
+        return _block_without_heading(grid.name, rows) if grid.is_text else ()
     ends = [heading_start for *_, heading_start, _ in blocks[1:]] + [len(rows)]
     return tuple(
         _block(grid, pairs, tuple(rows[first:end]), parts, heading, wide)
@@ -125,23 +125,23 @@ def blocks_of(grid):
 
 def _block(grid, pairs, rows, is_parts, heading, wide):
     """Return a `Block` with combined heights; report unnamed columns of numbers."""
-    width = len(trimmed(heading[1]))
+    width = len(trim_cells(heading[1]))
     if wide is not None:
         return Block(pairs, width, rows, is_parts, heading, wide)
     problems = []
     for places in dict.fromkeys((pair.height, pair.parts) for pair in pairs):
         first = next(pair for pair in pairs if pair.height == places[0])
         columns = ((first.height, first.height_heading), *first.parts)
-        rows, problem = with_joined_heights(grid.name, rows, *zip(*columns, strict=True))
+        rows, problem = join_heights(grid.name, rows, *zip(*columns, strict=True))
         problems += [] if problem is None else [problem]
     if not is_parts:
         body = [row for row in rows if any(has_digit(cell) for cell in row[1])]
-        problem = refused_columns(grid.name, body, pairs, *heading)
+        problem = find_unnamed_columns(grid.name, body, pairs, *heading)
         problems += [] if problem is None else [problem]
     return Block(pairs, width, rows, is_parts, heading, None, tuple(problems))
 
 
-def _as_first_page(pairs, wide, first_pages):
+def _copy_units_of_first_page(pairs, wide, first_pages):
     """Return the pairs with units that only a title above the first page states.
 
     first_pages {texts of a heading: its pairs} is extended.
@@ -168,7 +168,7 @@ def _is_over_wide(rows, index, above):
     return False
 
 
-def _with_title(pair, above):
+def _add_title_unit(pair, above):
     """Return a pair with the unit of volumes of a title, if its heading states none."""
     named = pair.volume_heading.named
     if named.choices:
@@ -181,18 +181,18 @@ def _with_title(pair, above):
     return replace(pair, volume_heading=replace(pair.volume_heading, named=named))
 
 
-def _with_units(rows, index):
+def _read_heading_lines(rows, index):
     """Return (heading cells, rows used), including a row of units above or below it."""
     cells = rows[index][1]
     if index + 1 >= len(rows):
         return cells, 1
     below = rows[index + 1][1]
     if _is_row_of_units(below) and any(heading_of(cell).role for cell in cells):
-        return _joined(cells, below), 2
+        return _join_names_and_units(cells, below), 2
     has_names = any(heading_of(cell).role for cell in below) and not _is_row_of_units(below)
     has_units = any(heading_of(cell).named.is_named for cell in below)
     if _is_row_of_units(cells) and has_names and not has_units:
-        return _joined(below, cells), 2
+        return _join_names_and_units(below, cells), 2
     return cells, 1
 
 
@@ -206,7 +206,7 @@ def _is_row_of_units(cells):
     return all(has_letter(cell) and not heading_of(cell).role for cell in others)
 
 
-def _joined(names, units):
+def _join_names_and_units(names, units):
     """Combine cells of names and cells of units into heading cells."""
     joined = []
     for name, unit in zip_longest(names, units):
@@ -236,10 +236,11 @@ def _pairs(cells):
     pairs += _pairs_of_run(heights, volumes)
     if not pairs and heights:  # volumes stand to the left of their heights
         pairs = _pairs_of_run(heights, before)
-    return tuple(_with_uncertainty(pairs, cells))
+    return tuple(_add_uncertainties(pairs, cells))
 
 
 def _pairs_of_run(heights, volumes):
+    """Pairs of a run of columns of heights, then of volumes."""
     if not volumes:
         return []
     dips = [height for height in heights if height[1].role == "height"] or heights
@@ -249,7 +250,7 @@ def _pairs_of_run(heights, volumes):
     return [Pair(place, k, heading, volume, parts=tuple(parts)) for k, volume in volumes]
 
 
-def _with_uncertainty(pairs, cells):
+def _add_uncertainties(pairs, cells):
     """Return pairs with the columns of uncertainties and coverage factors next to their volumes."""
     starts = [min(pair.height, pair.volume) for pair in pairs if pair.height] + [len(cells)]
     for pair in pairs:
@@ -271,7 +272,7 @@ def _with_uncertainty(pairs, cells):
         yield replace(pair, beside=beside, uncertainty=announced[known[0]])
 
 
-def trimmed(cells):
+def trim_cells(cells):
     """Return the cells without trailing blank cells."""
     cells = list(cells)
     while cells and is_blank(cells[-1]):
@@ -280,14 +281,16 @@ def trimmed(cells):
 
 
 def _column(number):
+    """Heading of a column without heading."""
     return message("lint_column", "column {number}", number=str(number))
 
 
-def _without_heading(name, rows):
+def _block_without_heading(name, rows):
+    """Block of columns 1 and 2 of a text without headings, or () if it has no numbers."""
     body = [row for row in rows if all(has_digit(cell) for cell in row[1][:2]) and row[1][1:]]
     if not body or len(body) < 0.5 * len(rows):
         return ()
-    _refuse_half_a_heading(name, rows)
+    _refuse_partial_heading(name, rows)
     counts = [sum(has_digit(cell) for cell in cells) for _, cells in body]
     if sum(count > 2 for count in counts) > 0.5 * len(counts):
         text = message(
@@ -299,11 +302,11 @@ def _without_heading(name, rows):
         raise InputError(Problem(name, text, body[0][0]))
     nothing = heading_of(None)
     pair = Pair(0, 1, *(replace(nothing, text=_column(k)) for k in (1, 2)))
-    width = max(len(trimmed(cells)) for _, cells in body)
+    width = max(len(trim_cells(cells)) for _, cells in body)
     return (Block((pair,), width, tuple(body)),)
 
 
-def _refuse_half_a_heading(name, rows):
+def _refuse_partial_heading(name, rows):
     """Raise InputError for a heading with heights but no volumes, or the reverse."""
     for row, cells in rows:
         texts = [cell for cell in cells if has_letter(cell)]

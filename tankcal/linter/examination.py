@@ -17,12 +17,12 @@ from tankcal.linter.hypotheses import explain
 
 DEGREE, WINDOW = 3, 13
 FEWEST_ROWS = 6  # fewest rows of a screened stretch
-LEAST_SPARED = 1e-6  # smallest 1 - leverage; below it, other rows do not predict the row
+LEAST_REMAINDER = 1e-6  # smallest 1 - leverage; below it, other rows do not predict the row
 ROUGHNESS_ROWS, ROUGHNESS_FACTOR = 25, 6.0
 
 
 @dataclass
-class Rows:
+class ScreenedRows:
     """The rows under examination; findings modify them.
 
     Attributes
@@ -45,7 +45,7 @@ class Rows:
 
     height: np.ndarray
     volume: np.ndarray
-    is_sound: np.ndarray
+    is_valid: np.ndarray
     is_settled: np.ndarray
     joints: list
     weight: np.ndarray
@@ -53,12 +53,12 @@ class Rows:
 
     def window(self, row, width):
         """Return at most `width` rows of the same stretch around a row, including the row."""
-        sound = np.flatnonzero(self.is_sound)
-        stretch = np.searchsorted(self.joints, sound, side="right")
-        place = int(np.searchsorted(sound, row))
+        valid = np.flatnonzero(self.is_valid)
+        stretch = np.searchsorted(self.joints, valid, side="right")
+        place = int(np.searchsorted(valid, row))
         low, high = np.searchsorted(stretch, [stretch[place], stretch[place] + 1])
         start = int(np.clip(place - width // 2, low, max(low, high - width)))
-        return sound[start : min(start + width, high)]
+        return valid[start : min(start + width, high)]
 
 
 def leave_one_out(rows):
@@ -67,8 +67,8 @@ def leave_one_out(rows):
     The limit is infinite for rows that are not screened.
     """
     difference, allowed = np.zeros(len(rows.height)), np.full(len(rows.height), np.inf)
-    sound = np.flatnonzero(rows.is_sound)
-    stretch = np.searchsorted(rows.joints, sound, side="right")
+    valid = np.flatnonzero(rows.is_valid)
+    stretch = np.searchsorted(rows.joints, valid, side="right")
     low = np.searchsorted(stretch, stretch, side="left")
     high = np.searchsorted(stretch, stretch, side="right")
     screened = np.flatnonzero(high - low >= FEWEST_ROWS)
@@ -79,8 +79,8 @@ def leave_one_out(rows):
     )
     place = start[:, None] + np.arange(WINDOW)
     is_in = place < high[screened][:, None]
-    others = sound[np.minimum(place, len(sound) - 1)]
-    row = sound[screened]
+    others = valid[np.minimum(place, len(valid) - 1)]
+    row = valid[screened]
     apart = (rows.height[others] - rows.height[row][:, None]) * is_in
     # Heights scaled to 1 keep the powers of the cubic well conditioned.
     apart /= np.abs(apart).max(axis=1)[:, None]
@@ -92,10 +92,10 @@ def leave_one_out(rows):
     # Row of the hat matrix: prediction with the row. Division by 1 - leverage removes the row.
     hat = np.einsum("nk,njk->nj", q[number, screened - start], q)
     leverage = hat[number, screened - start]
-    spared = np.maximum(1 - leverage, LEAST_SPARED)
-    difference[row] = -np.einsum("nj,nj->n", hat, values) / spared
-    weights = (np.abs(hat).sum(axis=1) - leverage) / spared  # sum |w| of the prediction
-    is_predicted = 1 - leverage > LEAST_SPARED
+    remainder = np.maximum(1 - leverage, LEAST_REMAINDER)
+    difference[row] = -np.einsum("nj,nj->n", hat, values) / remainder
+    weights = (np.abs(hat).sum(axis=1) - leverage) / remainder  # sum |w| of the prediction
+    is_predicted = 1 - leverage > LEAST_REMAINDER
     allowed[row] = np.where(is_predicted, rows.noise * (1 + weights) * (1 + 1e-9), np.inf)
     return difference, allowed
 
@@ -117,7 +117,7 @@ def most_suspicious(rows):
     return int(screened[candidates[np.argmax(excess)]])
 
 
-MOST_STORIES = 150
+MOST_ROUNDS = 150
 _SECOND_LOOK = 10  # rows examined again about a rejected joint
 _SAME_SIZE = 0.02
 _FEWEST_FOR_SLOPES = 4  # rows
@@ -177,7 +177,7 @@ def examine(height, volume, rounding):
     count = len(height)
     noise = 0.5 + 8e-16 * float(np.abs(volume).max())
     steepest = _slopes_around(np.abs(np.diff(volume) / np.diff(height)))
-    rows = Rows(
+    rows = ScreenedRows(
         np.asarray(height, dtype=float),
         np.array(volume, dtype=float),
         np.ones(count, dtype=bool),
@@ -186,32 +186,32 @@ def examine(height, volume, rounding):
         noise / (noise + steepest * rounding),
         noise,
     )
-    faults, doubtful, seen, moved = _excess_of_last(rows, rounding), [], set(), set()
-    for _ in range(MOST_STORIES):
+    faults, doubtful, doubted, moved = _check_last_row(rows, rounding), [], set(), set()
+    for _ in range(MOST_ROUNDS):
         row = most_suspicious(rows)
         if row is None:
             if not doubtful:
                 break
             _reopen(rows, doubtful.pop())
             continue
-        best = _beyond_joint(rows, explain(rows, row), moved)
+        best = _test_other_joint(rows, explain(rows, row), moved)
         if best.kind == "joint" and best.rows[0] not in rows.joints:
             rows.joints = sorted([*rows.joints, best.rows[0]])
-            if best.excess > 1 and best.rows[0] not in seen:
+            if best.excess > 1 and best.rows[0] not in doubted:
                 doubtful.append(best.rows[0])
-                seen.add(best.rows[0])
+                doubted.add(best.rows[0])
         elif best.is_null:
             rows.is_settled[row] = True
         else:
-            faults += _mend(rows, best)
+            faults += _apply(rows, best)
     else:
         row = -1
-    mended = np.where(rows.is_sound, rows.volume, np.nan)
-    faults = tuple(sorted(_merged(faults, count), key=lambda fault: fault.first))
-    return Examination(faults, tuple(rows.joints), mended, row != -1)
+    corrected = np.where(rows.is_valid, rows.volume, np.nan)
+    faults = tuple(sorted(_merge_shifts(faults, count), key=lambda fault: fault.first))
+    return Examination(faults, tuple(rows.joints), corrected, row != -1)
 
 
-def _excess_of_last(rows, rounding):
+def _check_last_row(rows, rounding):
     """Return a list with the Fault of the last row, if its interval implies twice the area."""
     height, volume = rows.height, rows.volume
     if len(height) < FEWEST_ROWS:
@@ -225,7 +225,7 @@ def _excess_of_last(rows, rounding):
         return []
     last = len(height) - 1
     expected = volume[-2] + areas[-1] * (height[-1] - height[-2])
-    rows.is_sound[-1] = False
+    rows.is_valid[-1] = False
     return [Fault("row", last, last, float(volume[-1] - expected))]
 
 
@@ -249,7 +249,7 @@ def _reopen(rows, joint):
     rows.is_settled[max(joint - _SECOND_LOOK, 0) : joint + _SECOND_LOOK] = False
 
 
-def _beyond_joint(rows, best, moved):
+def _test_other_joint(rows, best, moved):
     """Return the best hypothesis; a wrong row beside a joint may be a joint elsewhere.
 
     moved: joints already tested.
@@ -267,7 +267,7 @@ def _beyond_joint(rows, best, moved):
     return best
 
 
-def _mend(rows, best):
+def _apply(rows, best):
     """Return the faults of an alternative; correct its rows, or exclude them from now on."""
     first, last = best.rows[0], best.rows[-1]
     if best.kind == "swap":
@@ -275,18 +275,18 @@ def _mend(rows, best):
         return [Fault("swap", first, last, 0.0)]
     if best.kind in ("row", "pair"):
         wrong = dict(zip(best.rows if best.kind == "pair" else (first,), best.sizes, strict=True))
-        rows.is_sound[list(wrong)] = False
+        rows.is_valid[list(wrong)] = False
         return [
             Fault("row", row, row, size)
             for row, size in wrong.items()
-            if not _is_below_nothing(rows.volume[row], size)
+            if not _is_below_zero(rows.volume[row], size)
         ]
     end = len(rows.height) if last is None else last + 1
     rows.volume[first:end] -= best.sizes[0]
     return [Fault(best.kind, first, end - 1, best.sizes[0])]
 
 
-def _is_below_nothing(volume, size):
+def _is_below_zero(volume, size):
     """Whether an expected volume is so far below zero that the row is right, as near the bottom.
 
     The tank may be empty above its bottom, or tilted; zero is then nearer to the row.
@@ -295,7 +295,7 @@ def _is_below_nothing(volume, size):
     return volume >= 0 and expected < 0 and -expected > 0.5 * size
 
 
-def _merged(faults, count):
+def _merge_shifts(faults, count):
     """Merge opposite shifts into a block, and a block of one row into a wrong row."""
     shifts = sorted((f for f in faults if f.kind == "shift"), key=lambda fault: fault.first)
     others = [f for f in faults if f.kind != "shift"]
@@ -314,4 +314,5 @@ def _merged(faults, count):
 
 
 def _tolerance(size):
+    """Largest difference of two sizes that are treated as equal."""
     return _SAME_SIZE * abs(size) + 3

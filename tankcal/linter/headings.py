@@ -181,14 +181,16 @@ def parts_of_inch(text):
     return int(match[1]) if match[1] else 8 if match[2] else 16
 
 
-def announces_parts(cell):
+def is_heading_of_parts(cell):
     """Whether a cell is a heading of proportional parts."""
     return isinstance(cell, str) and _PARTS.search(plain_text(cell)) is not None
 
 
 def _words(text):
+    """Words of a heading."""
     return [token for token in without_prepositions(tokens_of(text)) if token[0].isalpha()]
 
 
 def _any(pattern, words):
+    """Whether a word matches a pattern."""
     return any(pattern.fullmatch(word) for word in words)

@@ -1,7 +1,4 @@
-"""Checks of the heights of a table.
-
-Readable, constant steps, missing, doubled or misplaced rows.
-"""
+"""Checks of the heights of a table: readable, equal steps, missing, doubled or misplaced rows."""
 
 from bisect import bisect_left
 from dataclasses import dataclass
@@ -13,7 +10,7 @@ from tankcal.messages import message
 FEWEST_ROWS = 3
 _EXACT = 1e-6  # tolerance of exact heights, relative to a step
 _SHORTEST_ZONE = 3  # fewest equal steps of a zone
-_MOST_STRAY = 100  # largest number of rows out of order that are reported separately
+_MOST_MISPLACED = 100  # largest number of rows out of order that are reported separately
 
 
 @dataclass(frozen=True)
@@ -41,7 +38,7 @@ class Series:
     rounding: np.ndarray
 
 
-def series_of(table, log, even_steps=True):
+def check_heights(table, log, even_steps=True):
     """Return the `Series` of a table; None after reporting to `log` that it has too few rows.
 
     even_steps False: the rows are breakpoints, so that uneven steps do not show missing rows.
@@ -77,9 +74,9 @@ def series_of(table, log, even_steps=True):
             message("lint_no_rise", "the heights do not rise; expected rising heights, row by row"),
         )
         return None
-    teller = _Teller(table, entries, height, direction, log)
-    height, keep = _in_order(teller, step, tolerance)
-    order = _rising(height, np.flatnonzero(keep), tolerance)
+    reporter = _HeightReporter(table, entries, height, direction, log)
+    height, keep = _correct_order(reporter, step, tolerance)
+    order = _sort_rows(height, np.flatnonzero(keep), tolerance)
     entries, height = [entries[k] for k in order], height[order]
     if len(entries) < FEWEST_ROWS:
         log.problem(
@@ -92,14 +89,15 @@ def series_of(table, log, even_steps=True):
             ),
         )
         return None
-    teller = _Teller(table, entries, height, direction, log)
+    reporter = _HeightReporter(table, entries, height, direction, log)
     if even_steps:
-        height = _even_steps(teller, step, tolerance)
+        height = _even_steps(reporter, step, tolerance)
     rounding = _rounding(entries, height, tolerance)
     return Series(tuple(entries), height, direction, step, rounding)
 
 
 def _is_readable(table, entry, log):
+    """Whether an entry has a height; an unreadable height is reported."""
     reading = entry.height
     if reading.value is None and reading.complaint:
         log.problem(table.name, reading.complaint, entry.row, entry.height_column)
@@ -129,7 +127,7 @@ def _usual_step(height, entries):
     return usual, _EXACT * usual
 
 
-class _Teller:
+class _HeightReporter:
     """Reports problems of heights, with the heights and rows of the file."""
 
     def __init__(self, table, entries, height, direction, log):
@@ -137,55 +135,58 @@ class _Teller:
         self.height, self.direction = height, direction
 
     def shown(self, height):
+        """Text of a height, with the sign of the file."""
         return f"{self.direction * height:.9g}"
 
     def row(self, k):
+        """Row number in the file."""
         return self.entries[k].row
 
     def problem(self, k, text):
+        """Report a problem of a height."""
         entry = self.entries[k]
         self.log.problem(self.table.name, text, entry.row, entry.height_column)
 
 
-def _in_order(teller, step, tolerance):
+def _correct_order(reporter, step, tolerance):
     """Return (heights, mask of kept rows); rows that break the order are reported and corrected."""
-    height = teller.height.copy()
+    height = reporter.height.copy()
     keep = np.ones(len(height), dtype=bool)
     chain = _longest_rise(height)
-    stray = sorted(set(range(len(height))) - set(chain))
-    if len(stray) > _MOST_STRAY:
-        keep[stray] = False
+    misplaced = sorted(set(range(len(height))) - set(chain))
+    if len(misplaced) > _MOST_MISPLACED:
+        keep[misplaced] = False
         expected = message(
             "lint_many_astray",
             "{count} of {all} heights are out of order; expected heights that rise row by row",
-            count=len(stray),
+            count=len(misplaced),
             all=len(height),
         )
-        teller.problem(stray[0], expected)
+        reporter.problem(misplaced[0], expected)
         return height, keep
-    expected = {k: _place(k, chain, stray, height, step, tolerance) for k in stray}
+    expected = {k: _expected_height(k, chain, height, step, tolerance) for k in misplaced}
     done = set()
-    for k in stray:
+    for k in misplaced:
         if k in done:
             continue
-        partner = _partner(k, stray, expected, height, tolerance)
-        twin = _twin(height[k], chain, teller.height, tolerance)
-        shown = teller.shown(height[k])
+        partner = _find_partner(k, misplaced, expected, height, tolerance)
+        twin = _find_twin(height[k], chain, reporter.height, tolerance)
+        shown = reporter.shown(height[k])
         if partner is not None:
             done.add(partner)
-            teller.problem(k, _swapped(teller, height, k, k, partner))
+            reporter.problem(k, _swap_message(reporter, height, k, k, partner))
         elif twin is not None and expected[k] is None:
             keep[k] = False
-            _tell_twin(teller, k, twin)
+            _report_twin(reporter, k, twin)
         elif expected[k] is not None:
-            teller.problem(k, _rather(shown, teller.shown(expected[k])))
+            reporter.problem(k, _expectation(shown, reporter.shown(expected[k])))
             height[k] = expected[k]
         else:
-            _tell_astray(teller, k, height)
+            _report_misplaced(reporter, k, height)
     return height, keep
 
 
-def _rising(height, rows, tolerance):
+def _sort_rows(height, rows, tolerance):
     """Return the rows sorted by height; of rows corrected to equal heights, keep the first."""
     order = sorted(rows, key=lambda k: height[k])
     return [
@@ -212,7 +213,7 @@ def _longest_rise(height):
     return chain[::-1]
 
 
-def _place(k, chain, stray, height, step, tolerance):
+def _expected_height(k, chain, height, step, tolerance):
     """Height that a misplaced row should have at its position; None if no row is missing there."""
     place = bisect_left(chain, k)
     left = chain[place - 1] if place else None
@@ -227,16 +228,16 @@ def _place(k, chain, stray, height, step, tolerance):
     return None
 
 
-def _twin(value, chain, height, tolerance):
+def _find_twin(value, chain, height, tolerance):
     """Return the row in order with a given height, or None."""
     place = bisect_left(chain, value - tolerance, key=lambda c: height[c])
     is_twin = place < len(chain) and abs(height[chain[place]] - value) <= tolerance
     return chain[place] if is_twin else None
 
 
-def _partner(k, stray, expected, height, tolerance):
+def _find_partner(k, misplaced, expected, height, tolerance):
     """Return the misplaced row with which this row is swapped, or None."""
-    for candidate in stray:
+    for candidate in misplaced:
         if candidate > k and expected[k] is not None and expected[candidate] is not None:
             here = abs(expected[k] - height[candidate]) <= tolerance
             is_expected = abs(expected[candidate] - height[k]) <= tolerance
@@ -245,16 +246,19 @@ def _partner(k, stray, expected, height, tolerance):
     return None
 
 
-def _tell_twin(teller, k, twin):
-    first, second = teller.entries[twin].volume, teller.entries[k].volume
+def _report_twin(reporter, k, twin):
+    """Report a row whose height is also in another row."""
+    first, second = reporter.entries[twin].volume, reporter.entries[k].volume
     text = message(
         "lint_height_twice",
         "height {height} is also in row {row}",
-        height=teller.shown(teller.height[k]),
-        row=teller.row(twin),
+        height=reporter.shown(reporter.height[k]),
+        row=reporter.row(twin),
     )
     if first.value == second.value:
-        teller.problem(k, message("lint_row_twice", "{found}: the row is given twice", found=text))
+        reporter.problem(
+            k, message("lint_row_twice", "{found}: the row is given twice", found=text)
+        )
         return
     expected = message(
         "lint_two_volumes",
@@ -263,26 +267,29 @@ def _tell_twin(teller, k, twin):
         there=first.text,
         here=second.text or message("lint_none", "none"),
     )
-    teller.problem(k, expected)
+    reporter.problem(k, expected)
 
 
-def _rather(text, expected):
+def _expectation(text, expected):
+    """Message with the expected height."""
     return message(
         "lint_rather", "found {found}; expected {expected}", found=text, expected=expected
     )
 
 
-def _swapped(teller, height, k, first_row, second_row):
+def _swap_message(reporter, height, k, first_row, second_row):
+    """Message about two swapped rows."""
     return message(
         "lint_rows_swapped",
         "found {found}; rows {row} and {other_row} are swapped",
-        found=teller.shown(height[k]),
-        row=teller.row(first_row),
-        other_row=teller.row(second_row),
+        found=reporter.shown(height[k]),
+        row=reporter.row(first_row),
+        other_row=reporter.row(second_row),
     )
 
 
-def _tell_astray(teller, k, height):
+def _report_misplaced(reporter, k, height):
+    """Report a row out of order: swapped with a neighbour, or without an explanation."""
     neighbours = [n for n in (k - 1, k + 1) if 0 <= n < len(height)]
     for n in neighbours:
         swapped = height.copy()
@@ -290,19 +297,19 @@ def _tell_astray(teller, k, height):
         around = swapped[max(min(k, n) - 1, 0) : max(k, n) + 2]
         if np.all(np.diff(around) > 0):
             low, high = sorted((k, n))
-            teller.problem(low, _swapped(teller, height, low, low, high))
+            reporter.problem(low, _swap_message(reporter, height, low, low, high))
             return
     expected = message(
         "lint_astray",
         "found {found}; expected heights that rise row by row",
-        found=teller.shown(height[k]),
+        found=reporter.shown(height[k]),
     )
-    teller.problem(k, expected)
+    reporter.problem(k, expected)
 
 
-def _even_steps(teller, step, tolerance):
+def _even_steps(reporter, step, tolerance):
     """Return heights with single odd ones corrected; missing rows are reported."""
-    height = teller.height.copy()
+    height = reporter.height.copy()
     for k in range(1, len(height) - 1):
         low, high = height[k] - height[k - 1], height[k + 1] - height[k]
         is_odd = abs(low - step) > tolerance and abs(high - step) > tolerance
@@ -310,18 +317,20 @@ def _even_steps(teller, step, tolerance):
         after = k + 2 >= len(height) or abs(height[k + 2] - height[k + 1] - step) <= tolerance
         if is_odd and before and after and abs(low + high - 2 * step) <= 2 * tolerance:
             expected = height[k - 1] + step
-            teller.problem(k, _rather(teller.shown(height[k]), teller.shown(expected)))
+            reporter.problem(k, _expectation(reporter.shown(height[k]), reporter.shown(expected)))
             height[k] = expected
-    _tell_gaps(teller, height, tolerance)
+    _report_gaps(reporter, height, tolerance)
     return height
 
 
-def _tell_gaps(teller, height, tolerance):
+def _report_gaps(reporter, height, tolerance):
+    """Report steps that are larger than the steps around: missing rows or an odd step."""
     steps = np.diff(height)
     zone = _zone_steps(steps, tolerance)
     last = len(steps) - 1
     for k in np.flatnonzero(np.isnan(zone)):
-        around = [zone[n] for n in (_near(zone, k, -1), _near(zone, k, 1)) if n is not None]
+        nearest = _nearest_zone(zone, k, -1), _nearest_zone(zone, k, 1)
+        around = [zone[n] for n in nearest if n is not None]
         if not around:
             continue
         is_same = abs(around[0] - around[-1]) <= tolerance
@@ -336,8 +345,8 @@ def _tell_gaps(teller, height, tolerance):
         order = message(
             "lint_follows",
             "{after} follows {before}",
-            after=teller.shown(height[k + 1]),
-            before=teller.shown(height[k]),
+            after=reporter.shown(height[k + 1]),
+            before=reporter.shown(height[k]),
         )
         if fits or k == last:
             count = max(missing, 1)
@@ -347,7 +356,7 @@ def _tell_gaps(teller, height, tolerance):
             expected = message(
                 "lint_next",
                 "{next} next: {rows}",
-                next=teller.shown(height[k] + largest),
+                next=reporter.shown(height[k] + largest),
                 rows=rows,
             )
         else:
@@ -357,7 +366,7 @@ def _tell_gaps(teller, height, tolerance):
         text = message(
             "lint_gap", "found that {found}; expected {expected}", found=order, expected=expected
         )
-        teller.problem(k + 1, text)
+        reporter.problem(k + 1, text)
 
 
 def _rounding(entries, height, tolerance):
@@ -389,7 +398,8 @@ def _zone_steps(steps, tolerance):
     return zone
 
 
-def _near(zone, k, direction):
+def _nearest_zone(zone, k, direction):
+    """Index of the nearest step of a zone in a direction (-1 or 1), or None."""
     while 0 <= k < len(zone):
         if not np.isnan(zone[k]):
             return k

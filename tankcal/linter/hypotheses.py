@@ -54,10 +54,11 @@ class Hypothesis:
 
     @property
     def is_null(self):
+        """Whether no volume is wrong by this hypothesis."""
         return self.kind in ("smooth", "joint")
 
     @property
-    def is_telling(self):
+    def is_significant(self):
         """Whether it is a null hypothesis, or its size exceeds the effect of two rounded digits."""
         return not self.sizes or max(abs(size) for size in self.sizes) >= LEAST_SIZE
 
@@ -76,6 +77,7 @@ class Curve:
 
     @property
     def parameters(self):
+        """Number of parameters."""
         return self.basis.shape[1]
 
     @cached_property
@@ -90,14 +92,17 @@ class Curve:
 
     @cached_property
     def residuals(self):
+        """Weighted residuals (n,)."""
         return self.residual_maker @ (self.values * self.weight)
 
     @cached_property
     def rss(self):
+        """Sum of squares of the weighted residuals."""
         return float(self.residuals @ self.residuals)
 
     @cached_property
     def excess(self):
+        """Largest residual over its limit by rounding; 0 if the curve fits any values."""
         if len(self.values) <= self.parameters:
             return 0.0
         return _excess(self.residuals, self.residual_maker, self.noise)
@@ -111,6 +116,7 @@ class Curve:
 
 
 def _excess(residuals, maker, noise):
+    """Largest residual over its limit by rounding."""
     allowed = noise * np.abs(maker).sum(axis=1)
     return float((np.abs(residuals) / np.maximum(allowed, 1e-9 * noise)).max())
 
@@ -126,6 +132,7 @@ def explain(rows, row):
 
 
 def _explain(rows, row, width):
+    """Select a `Hypothesis` about a row from a window of `width` rows."""
     members = rows.window(row, width)
     x = rows.height[members] - rows.height[row]
     scale = np.abs(x).max() if len(x) > 1 else 1.0
@@ -138,18 +145,18 @@ def _explain(rows, row, width):
         if len(x) - curve.parameters >= 4:
             hypotheses += _blocks(curve, members, _ends(rows, members))
             hypotheses += _swaps(curve, members)
-    return _believed(hypotheses, curves, members, rows.noise)
+    return _select_hypothesis(hypotheses, curves, members, rows.noise)
 
 
 def _bases(rows, members, x):
     """Polynomials of degree 1 to 5, and the series of a lying cylinder at the ends of the table."""
     bases = [x[:, None] ** np.arange(degree + 1) for degree in range(1, 6) if len(x) >= degree + 3]
-    sound = np.flatnonzero(rows.is_sound)
+    valid = np.flatnonzero(rows.is_valid)
     # The volume of a lying cylinder grows with the power 1.5 of the height above its end.
     powers = np.array([0, 1.5, 2, 2.5, 3, 3.5])
     for is_end, away in (
-        (members[0] == sound[0], x - x[0]),
-        (members[-1] == sound[-1], x[-1] - x),
+        (members[0] == valid[0], x - x[0]),
+        (members[-1] == valid[-1], x[-1] - x),
     ):
         if is_end and len(x) >= 9:
             bases += [(away[:, None] / away.max()) ** powers[:count] for count in (4, 6)]
@@ -188,10 +195,10 @@ def _blocks(curve, members, ends):
     parameters = curve.parameters
     hypotheses = []
     for k in np.argsort(rss)[:12]:
-        left = residuals - size[k] * moved[:, k]
+        remaining = residuals - size[k] * moved[:, k]
         # residual maker of the basis with the block
         maker_left = maker - np.outer(moved[:, k], moved[:, k]) / norm[k]
-        excess = _excess(left, maker_left, curve.noise) if parameters <= PLAIN else np.inf
+        excess = _excess(remaining, maker_left, curve.noise) if parameters <= PLAIN else np.inf
         low, high = int(members[first[k]]), int(members[end[k] - 1])
         is_open = end[k] == count
         if end[k] - first[k] == 1 and (ends[1] or not is_open):
@@ -212,11 +219,12 @@ def _swaps(curve, members):
     for first in range(len(members) - 1):
         values = curve.values.copy()
         values[[first, first + 1]] = values[[first + 1, first]]
-        left = maker @ (values * curve.weight)
+        remaining = maker @ (values * curve.weight)
         parameters = curve.parameters
-        excess = _excess(left, maker, curve.noise) if parameters <= PLAIN else np.inf
+        excess = _excess(remaining, maker, curve.noise) if parameters <= PLAIN else np.inf
         where = (int(members[first]), int(members[first + 1]))
-        hypotheses.append(Hypothesis("swap", parameters + 1, float(left @ left), excess, where))
+        rss = float(remaining @ remaining)
+        hypotheses.append(Hypothesis("swap", parameters + 1, rss, excess, where))
     return hypotheses
 
 
@@ -287,13 +295,18 @@ def _pairs(curve, members):
     return [Hypothesis("pair", parameters, max(float(rss[k]), 0.0), np.inf, where, sizes)]
 
 
-def _believed(hypotheses, curves, members, noise):
+def _select_hypothesis(hypotheses, curves, members, noise):
+    """Select the simplest hypothesis within rounding, or else the hypothesis of least cost.
+
+    Null hypotheses are preferred to alternatives, and these to two wrong rows.
+    """
     count = len(members)
 
     def cost(hypothesis):
+        """Twice the negative log likelihood, with a penalty for each parameter."""
         return count * np.log(hypothesis.rss / count + noise**2 / 3) + PRICE * hypothesis.parameters
 
-    hypotheses = [hypothesis for hypothesis in hypotheses if hypothesis.is_telling]
+    hypotheses = [hypothesis for hypothesis in hypotheses if hypothesis.is_significant]
     possible = [s for s in hypotheses if s.excess <= 1 + 1e-6]
     if possible:
         return min(possible, key=lambda s: (s.parameters, not s.is_null, s.rss))

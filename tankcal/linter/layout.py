@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from tankcal.errors import InputError, Problem
-from tankcal.linter.blocks import blocks_of, trimmed
-from tankcal.linter.feet import feet_reader, fraction_reader
+from tankcal.linter.blocks import find_blocks, trim_cells
+from tankcal.linter.compound_heights import feet_reader, fraction_reader
 from tankcal.linter.headings import Uncertainty
 from tankcal.linter.numbers import Reading, has_digit, read_number, style_of
 from tankcal.linter.units import INCH_M, plain_text
@@ -80,21 +80,21 @@ class Table:
     complaints: tuple[Problem, ...] = ()
 
 
-def tables_of(grid, log):
+def find_tables(grid, log):
     """Return the `Table`s of a grid; blocks with equal headings are pages of one table."""
     pages = {}
-    for block in blocks_of(grid):
+    for block in find_blocks(grid):
         pages.setdefault((block.kind, block.is_parts), []).append(block)
     tables = []
     for blocks in pages.values():
-        for volumes in _kinds(blocks[0].pairs):
+        for volumes in _pairs_by_kind(blocks[0].pairs):
             table = _table(grid, blocks, volumes, log)
             if table.entries:
                 tables.append(table)
     return tuple(tables)
 
 
-def _kinds(pairs):
+def _pairs_by_kind(pairs):
     """Indices of the pairs of each kind: equal units and equal position after a height."""
     kinds = {}
     for number, pair in enumerate(pairs):
@@ -105,11 +105,12 @@ def _kinds(pairs):
 
 
 def _table(grid, blocks, numbers, log):
-    cells = [_cells(grid, block, [block.pairs[k] for k in numbers], log) for block in blocks]
+    """Read a `Table` from pairs of one kind on all pages, in the order with fewer reversals."""
+    cells = [_read_cells(grid, block, [block.pairs[k] for k in numbers], log) for block in blocks]
     by_column = [item for page in cells for column in page for item in column]
     orders = [by_column]
     if len(numbers) > 1 or blocks[0].wide is not None:
-        orders.append([item for page in cells for row in _by_row(page) for item in row])
+        orders.append([item for page in cells for row in _rows_of_page(page) for item in row])
     style = style_of([[item[3] for item in by_column], [item[4] for item in by_column]])
     first = blocks[0].pairs[numbers[0]]
     heights, rows = [item[3] for item in by_column], [item[0] for item in by_column]
@@ -173,6 +174,7 @@ def _complaints_of_heights(pair, in_fractions, entries):
 
 
 def _complaints_of_volumes(pair, entries):
+    """Yield (text, column) of headings of volumes that cannot be used."""
     heading = pair.volume_heading
     if heading.named.complaint:
         yield heading.named.complaint, heading.text
@@ -209,22 +211,22 @@ def _example(readings, are_whole, factor):
     return texts[-1] if factor > 1 else texts[are_whole.index(False)]
 
 
-def _cells(grid, block, pairs, log):
+def _read_cells(grid, block, pairs, log):
     """For each pair of columns, the list of (row, two names, height, volume, related cells)."""
     if block.wide is not None:
         rows = [row for row in block.rows if not _is_total(row[1], block.pairs[0])]
         return wide_cells(grid.name, block.wide, rows, log)
-    names = _names(block.pairs)
+    names = _column_names(block.pairs)
     columns = [[] for _ in pairs]
     _refuse_split_rows(grid, block)
     for row, cells in block.rows:
-        is_split = grid.is_text and len(trimmed(cells)) > block.width
+        is_split = grid.is_text and len(trim_cells(cells)) > block.width
         if is_split:
             expected = message(
                 "lint_split_row",
                 "{count} cells, expected {width} as in the heading (a decimal comma, or a "
                 "thousands mark?)",
-                count=len(trimmed(cells)),
+                count=len(trim_cells(cells)),
                 width=block.width,
             )
             log.problem(grid.name, expected, row)
@@ -254,21 +256,21 @@ def _is_total(cells, pair):
 
 def _refuse_split_rows(grid, block):
     """Raise InputError if the numbers themselves are split into several cells, row after row."""
-    split = [(row, cells) for row, cells in block.rows if len(trimmed(cells)) > block.width]
+    split = [(row, cells) for row, cells in block.rows if len(trim_cells(cells)) > block.width]
     if grid.is_text and len(split) > max(_FEW_SPLIT_ROWS, 0.2 * len(block.rows)):
         row, cells = split[0]
         expected = message(
             "lint_split_rows",
             "{count} cells, expected {width} as in the heading, as in {more} more "
             "rows: write ; between the cells when decimals have a comma",
-            count=len(trimmed(cells)),
+            count=len(trim_cells(cells)),
             width=block.width,
             more=len(split) - 1,
         )
         raise InputError(Problem(grid.name, expected, row))
 
 
-def _names(pairs):
+def _column_names(pairs):
     """{position: heading}, with the number of the column if a heading appears twice."""
     named = {p.height: p.height_heading.text for p in pairs}
     named |= {p.volume: p.volume_heading.text for p in pairs}
@@ -283,12 +285,14 @@ def _names(pairs):
     }
 
 
-def _by_row(page):
+def _rows_of_page(page):
+    """Pairs of a page row by row, from its columns."""
     longest = max((len(column) for column in page), default=0)
     return [[column[k] for column in page if k < len(column)] for k in range(longest)]
 
 
 def _entry(cells, style, read_height):
+    """Read an `Entry`."""
     row, height_name, volume_name, height, volume, beside = cells
     volume = volume if isinstance(volume, Reading) else read_number(volume, style)
     height = read_height(height) if read_height else read_number(height, style)

@@ -9,81 +9,18 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.job.tables import Log, nearest
 from tankcal.linter.grids import read_grids
-from tankcal.linter.heights import Series, series_of
-from tankcal.linter.layout import Table, tables_of
-from tankcal.linter.totals import NO_UNITS, NOTHING_NOMINAL, Nominal, Units, check_totals, units_of
-from tankcal.linter.volumes import Volumes, volumes_of
+from tankcal.linter.heights import Series, check_heights
+from tankcal.linter.layout import Table, find_tables
+from tankcal.linter.totals import NO_NOMINAL, NO_UNITS, Nominal, Units, check_totals, choose_units
+from tankcal.linter.volumes import Volumes, check_volumes
 from tankcal.messages import message
 from tankcal.text.display import table_html
 
-# Proportional parts beside a table: proportional to each other, and to the rise of the table.
-
-MOST_PARTS = 15  # largest number of rows: 9 for a centimetre, 7 or 15 for an inch
-_AS_THE_TABLE = 0.02
-
-
-def check_parts(table, main, log):
-    """Report parts that are not proportional, or disagree with the rise of the main table.
-
-    Parameters
-    ----------
-    table : Table
-        Table of parts: marks 1, 2, ... and their volumes.
-    main : (float, float)
-        Smallest and largest area of the steps of the main table, m2.
-    log : Log
-
-    Notes
-    -----
-    Part j is j * p, rounded. Some p must lie between (v_j - q/2) / j and (v_j + q/2) / j for all j.
-    """
-    entries = [e for e in table.entries if e.height.value and e.volume.value is not None]
-    if len(entries) < 2:
-        return
-    marks = np.array([entry.height.value for entry in entries])
-    values = np.array([entry.volume.value for entry in entries])
-    half = 0.5 * 10.0 ** -max(entry.volume.decimals for entry in entries) * (1 + 1e-9)
-    low, high = (values - half) / marks, (values + half) / marks
-    if low.max() > high.min():
-        spared = [np.delete(low, k).max() <= np.delete(high, k).min() for k in range(len(entries))]
-        part = float(np.median(values / marks))
-        worst = (
-            int(np.argmax(spared)) if any(spared) else int(np.argmax(abs(values - marks * part)))
-        )
-        entry = entries[worst]
-        rest = np.delete(values, worst).sum() / np.delete(marks, worst).sum()
-        expected = rest * marks[worst]
-        about = f"{expected:.{entry.volume.decimals}f}"
-        text = message(
-            "lint_odd_part",
-            "found {found}; expected about {about}, in proportion to the others",
-            found=entry.volume.text,
-            about=about,
-        )
-        log.problem(table.name, text, entry.row, entry.volume_column)
-        return
-    _check_size(table, entries, float(low.max()), float(high.min()), main, log)
-
-
-def _check_size(table, entries, low, high, main, log):
-    if main is None or table.height_unit_m is None or table.volume_unit_m3 is None:
-        return
-    unit = table.volume_unit_m3 / table.height_unit_m
-    least, most = main
-    if high * unit < least * (1 - _AS_THE_TABLE) or low * unit > most * (1 + _AS_THE_TABLE):
-        text = message(
-            "lint_parts_size",
-            "proportional parts of {part:.6g} for each mark; expected {least:.6g} to "
-            "{most:.6g}, as the table rises",
-            part=0.5 * (low + high),
-            least=least / unit,
-            most=most / unit,
-        )
-        log.problem(table.name, text, entries[0].row, entries[0].volume_column)
-
-
+# Largest number of rows of proportional parts: 9 for a centimetre, 7 or 15 for an inch.
+MOST_PARTS = 15
+_SAME_AREA = 0.02  # largest relative deviation of parts from the rise of the table
 _PART_OF_LARGEST = 0.5  # smallest share of the rows of the largest table of a capacity table
-_ROWS_OF_SLOPE = 10
+_ROWS_OF_SLOPE = 10  # rows over which the area of the cross section is averaged
 
 
 @dataclass(frozen=True)
@@ -158,7 +95,7 @@ class Report:
 
 def lint(
     path: str | PathLike,
-    nominal: Nominal = NOTHING_NOMINAL,
+    nominal: Nominal = NO_NOMINAL,
     sheet: str | None = None,
     even_steps: bool = True,
 ) -> Report:
@@ -172,10 +109,10 @@ def lint(
     nominal : Nominal, optional
         Nominal tank to compare total and last row with.
     sheet : str, optional
-        Name of the sheet; None: the one with the longest table.
+        Name of the sheet; None: the sheet with the longest table.
     even_steps : bool, optional
-        False: the rows stand where they are needed (breakpoints), not at even steps; then none is
-        missing and no height is odd.
+        False: the rows are breakpoints without even steps, so that no row is missing and no height
+        is odd.
 
     Returns
     -------
@@ -184,7 +121,7 @@ def lint(
     Raises
     ------
     InputError
-        For a file that cannot be read or holds no table.
+        If the file cannot be read or contains no table.
 
     Examples
     --------
@@ -200,7 +137,7 @@ def lint(
     >>> print(report.findings[0].problem.expected)
     found 18 after 19; expected volumes that do not fall
     """
-    return checked(path, nominal, sheet, even_steps=even_steps).report
+    return check_file(path, nominal, sheet, even_steps=even_steps).report
 
 
 @dataclass(frozen=True)
@@ -214,22 +151,22 @@ class CheckedTable:
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedFile:
     """Report of a file, and its capacity tables, the longest ones."""
 
     report: Report
     tables: tuple[CheckedTable, ...]
 
 
-def checked(
+def check_file(
     path,
-    nominal=NOTHING_NOMINAL,
+    nominal=NO_NOMINAL,
     sheet=None,
     declared=NO_UNITS,
     choose=None,
     even_steps=True,
 ):
-    """Return the `Checked` tables of a file, examined as in `lint`.
+    """Return the `CheckedFile` tables of a file, examined as in `lint`.
 
     Parameters
     ----------
@@ -248,8 +185,8 @@ def checked(
     path, log = Path(path), Log()
     grids = read_grids(path, log)
     log.stop_if_problems()
-    tables = _tables(path.name, grids, sheet, log, choose)
-    tables = [_declared(table, declared) for table in tables]
+    tables = _select_tables(path.name, grids, sheet, log, choose)
+    tables = [_with_declared_units(table, declared) for table in tables]
     longest = max(len(table.entries) for table in tables)
     complaints = [
         problem
@@ -263,17 +200,19 @@ def checked(
     for table in tables:
         if len(table.entries) >= _PART_OF_LARGEST * longest:
             has_several = sum(other_table.name == table.name for other_table in tables) > 1
-            checked_table, summary, areas = _check(table, nominal, log, even_steps, has_several)
+            checked_table, summary, areas = _check_table(
+                table, nominal, log, even_steps, has_several
+            )
             summaries.append(summary)
             checked_tables.append(checked_table)
     for table in tables:
         if len(table.entries) <= MOST_PARTS < longest:
-            check_parts(table, areas, log)
+            _check_parts(table, areas, log)
     report = Report(_findings(log), tuple(line for line in summaries if line))
-    return Checked(report, tuple(checked_tables))
+    return CheckedFile(report, tuple(checked_tables))
 
 
-def _declared(table, declared):
+def _with_declared_units(table, declared):
     """Return the table with declared units where its headings state none."""
     choices = table.volume_choices
     is_choice = not choices or declared.volume_m3 in choices
@@ -286,7 +225,7 @@ def _declared(table, declared):
     )
 
 
-def _tables(file, grids, sheet, log, choose=None):
+def _select_tables(file, grids, sheet, log, choose=None):
     """Return the tables of the selected sheet; raise InputError if there is none."""
     if sheet is not None:
         names = [grid.sheet for grid in grids if grid.sheet]
@@ -303,7 +242,7 @@ def _tables(file, grids, sheet, log, choose=None):
     sheets_read = []
     for grid in grids:
         sheet_log = Log()
-        tables = tables_of(grid, sheet_log)
+        tables = find_tables(grid, sheet_log)
         size = max((len(table.entries) for table in tables), default=0)
         sheets_read.append((size, tables, sheet_log))
     size, tables, sheet_log = max(
@@ -326,10 +265,10 @@ def _tables(file, grids, sheet, log, choose=None):
     return tables
 
 
-def _check(table, nominal, log, even_steps, has_several):
+def _check_table(table, nominal, log, even_steps, has_several):
     """Return (CheckedTable, summary, (least, largest) area in m2) of one table; report its faults.
 
-    has_several: whether the summary names the column of volumes, as the file has several.
+    With `has_several` tables, the summary also has the column of volumes.
     """
     if not table.has_heading:
         log.warning(
@@ -338,11 +277,11 @@ def _check(table, nominal, log, even_steps, has_several):
                 "lint_no_heading", "no heading: taken as heights in column 1, volumes in column 2"
             ),
         )
-    series = series_of(table, log, even_steps)
-    volumes = volumes_of(table, series, log) if series else None
+    series = check_heights(table, log, even_steps)
+    volumes = check_volumes(table, series, log) if series else None
     if volumes is None:
         return CheckedTable(table, series, None, None), "", None
-    units = units_of(table, volumes, log)
+    units = choose_units(table, volumes, log)
     check_totals(table, volumes, units, series.step, nominal, log)
     low, high = sorted(abs(float(h)) * units.height_m for h in volumes.height[[0, -1]])
     summary = message(
@@ -355,10 +294,10 @@ def _check(table, nominal, log, even_steps, has_several):
         step=series.step * units.height_m,
         total=volumes.volume[-1] * units.volume_m3,
     )
-    return CheckedTable(table, series, volumes, units), summary, _areas(volumes, units)
+    return CheckedTable(table, series, volumes, units), summary, _area_range(volumes, units)
 
 
-def _areas(volumes, units):
+def _area_range(volumes, units):
     """Least and largest mean area of the cross section over ten rows, m2."""
     apart = min(_ROWS_OF_SLOPE, len(volumes.height) - 1)
     rise = volumes.volume[apart:] - volumes.volume[:-apart]
@@ -368,6 +307,70 @@ def _areas(volumes, units):
 
 
 def _findings(log):
+    """Findings in the order of the file, from the problems and warnings of a log."""
     findings = [Finding("error", problem) for problem in log.problems]
     findings += [Finding("warning", problem) for problem in log.warnings]
     return tuple(sorted(dict.fromkeys(findings), key=lambda finding: finding.problem.row or 0))
+
+
+# ---- proportional parts beside a table
+
+
+def _check_parts(table, main, log):
+    """Report parts that are not proportional, or disagree with the rise of the main table.
+
+    Parameters
+    ----------
+    table : Table
+        Table of parts: marks 1, 2, ... and their volumes.
+    main : (float, float)
+        Smallest and largest area of the steps of the main table, m2.
+    log : Log
+
+    Notes
+    -----
+    Part j is j * p, rounded. Some p must lie between (v_j - q/2) / j and (v_j + q/2) / j for all j.
+    """
+    entries = [e for e in table.entries if e.height.value and e.volume.value is not None]
+    if len(entries) < 2:
+        return
+    marks = np.array([entry.height.value for entry in entries])
+    values = np.array([entry.volume.value for entry in entries])
+    half = 0.5 * 10.0 ** -max(entry.volume.decimals for entry in entries) * (1 + 1e-9)
+    low, high = (values - half) / marks, (values + half) / marks
+    if low.max() > high.min():
+        # The wrong row is the row without which the others agree, or the row farthest from them.
+        is_odd = [np.delete(low, k).max() <= np.delete(high, k).min() for k in range(len(entries))]
+        part = float(np.median(values / marks))
+        worst = int(np.argmax(is_odd if any(is_odd) else abs(values - marks * part)))
+        entry = entries[worst]
+        rest = np.delete(values, worst).sum() / np.delete(marks, worst).sum()
+        expected = rest * marks[worst]
+        about = f"{expected:.{entry.volume.decimals}f}"
+        text = message(
+            "lint_odd_part",
+            "found {found}; expected about {about}, in proportion to the others",
+            found=entry.volume.text,
+            about=about,
+        )
+        log.problem(table.name, text, entry.row, entry.volume_column)
+        return
+    _check_size_of_parts(table, entries, float(low.max()), float(high.min()), main, log)
+
+
+def _check_size_of_parts(table, entries, low, high, main, log):
+    """Report parts that disagree with the rise of the main table."""
+    if main is None or table.height_unit_m is None or table.volume_unit_m3 is None:
+        return
+    unit = table.volume_unit_m3 / table.height_unit_m
+    least, most = main
+    if high * unit < least * (1 - _SAME_AREA) or low * unit > most * (1 + _SAME_AREA):
+        text = message(
+            "lint_parts_size",
+            "proportional parts of {part:.6g} for each mark; expected {least:.6g} to "
+            "{most:.6g}, as the table rises",
+            part=0.5 * (low + high),
+            least=least / unit,
+            most=most / unit,
+        )
+        log.problem(table.name, text, entries[0].row, entries[0].volume_column)

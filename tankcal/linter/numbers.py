@@ -93,11 +93,13 @@ def read_number(cell, style):
 
 
 def _no_number(text):
+    """Message that a cell is no number."""
     return message("lint_no_number", "found {found}; expected a number", found=shown(text))
 
 
 @lru_cache(maxsize=50_000)  # cached because style_of reads most cells several times
 def _read_text(text, style, is_typed=True):
+    """Read a number in a text."""
     plain, marks = text, False
     if style.thousands and style.thousands in text:
         groups = re.fullmatch(

@@ -21,12 +21,12 @@ _CODE = (
 )
 
 
-def pages_of(path, log):
+def read_pages(path, log):
     """Return the text of each page in its layout.
 
     None after reporting to `log` why there is none.
     """
-    kind, answer = _asked_child(path)
+    kind, answer = _ask_child(path)
     if kind == PAGES and any(page.strip() for page in answer):
         return tuple(answer)
     log.problem(path.name, _refusal(kind, answer))
@@ -34,6 +34,7 @@ def pages_of(path, log):
 
 
 def _refusal(kind, answer):
+    """Message that a PDF has no readable text."""
     if kind == PAGES:
         return message(
             "lint_scanned_pdf",
@@ -59,7 +60,7 @@ def _refusal(kind, answer):
     return message("lint_damaged_pdf", "not a PDF that can be read, or damaged")
 
 
-def _asked_child(path):
+def _ask_child(path):
     """Return the answer of a child process: (kind, pages or message)."""
     request = {"path": str(path.resolve()), "sys_path": sys.path}
     try:
@@ -92,6 +93,7 @@ def main(request):
 
 
 def _answer(path):
+    """Answer of the child process: kind, and the text of the pages or None."""
     import pypdf
 
     reader = pypdf.PdfReader(path)

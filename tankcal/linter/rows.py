@@ -6,8 +6,8 @@ from math import gcd, isfinite
 import numpy as np
 
 from tankcal.job.tables import nearest
-from tankcal.linter.linting import checked
-from tankcal.linter.totals import NO_UNITS, NOTHING_NOMINAL, likely_units
+from tankcal.linter.linting import check_file
+from tankcal.linter.totals import NO_NOMINAL, NO_UNITS, likely_units
 from tankcal.messages import message
 
 _SAME_UNIT = 1e-6
@@ -90,12 +90,12 @@ def read_rows(path, log, sheet=None, declared=NO_UNITS, volume_column=None):
         If the file cannot be read or contains no table.
     """
     choose = None if sheet is not None else _sheet_with_uncertainties
-    result = checked(path, NOTHING_NOMINAL, sheet, declared, choose)
+    result = check_file(path, NO_NOMINAL, sheet, declared, choose)
     tables = [table for table in result.tables if table.volumes is not None]
     if result.report.errors or not tables:
         return None, result.report
     problems_before = len(log.problems)
-    selected = _the_table(tables, volume_column, log)
+    selected = _select_table(tables, volume_column, log)
     if selected is None or not (
         _has_clear_units(selected, declared, log) and _has_clear_marks(selected, log)
     ):
@@ -132,17 +132,17 @@ def _top(table):
     return last.height.value * height_unit, last.volume.value * volume_unit
 
 
-def _the_table(tables, volume_column, log):
+def _select_table(tables, volume_column, log):
     """Return the selected table; None after reporting that there is none, or more than one."""
     names = [str(table.table.entries[0].volume_column) for table in tables]
     if volume_column is not None:
-        named = [
+        matching = [
             candidate
             for candidate, name in zip(tables, names, strict=True)
             if name.strip().casefold() == volume_column.strip().casefold()
         ]
-        if len(named) == 1:
-            return named[0]
+        if len(matching) == 1:
+            return matching[0]
         expected = message(
             "former_no_column",
             "no column of volumes {column!r}{hint}; the table has {names}",
@@ -168,13 +168,14 @@ def _the_table(tables, volume_column, log):
 
 def _agree(first, second):
     """Whether two tables contain equal values, such as one in m3 and one in litres."""
-    h, v = _in_si(first)
-    h2, v2 = _in_si(second)
+    h, v = _rows_in_si(first)
+    h2, v2 = _rows_in_si(second)
     between = np.interp(h2, h, v)
     return bool(np.all(abs(between - v2) <= _SAME_TOP * max(v[-1], v2[-1])))
 
 
-def _in_si(checked_table):
+def _rows_in_si(checked_table):
+    """Heights and volumes of a table in m and m3."""
     return (
         checked_table.volumes.height * checked_table.units.height_m,
         checked_table.volumes.volume * checked_table.units.volume_m3,
@@ -223,16 +224,16 @@ def _agrees_with_headings(checked_table, declared, log):
         return False
     units = (("m", checked_table.table.height_unit_m, declared.height_m),
             ("m3", checked_table.table.volume_unit_m3, declared.volume_m3))  # fmt: skip
-    for unit, named, declared_size in units:
+    for unit, matching, declared_size in units:
         if (
             declared_size is not None
-            and named is not None
-            and abs(named / declared_size - 1) > _SAME_UNIT
+            and matching is not None
+            and abs(matching / declared_size - 1) > _SAME_UNIT
         ):
             expected = message(
                 "lint_other_unit",
                 "the heading says units of {said:g} {unit}; declared {declared:g} {unit}",
-                said=named,
+                said=matching,
                 declared=declared_size,
                 unit=unit,
             )
@@ -259,6 +260,7 @@ def _has_clear_marks(checked_table, log):
 
 
 def _rows(checked_table, log):
+    """Build the `TableRows` of a table."""
     table, series, units = checked_table.table, checked_table.series, checked_table.units
     place = {float(height): k for k, height in enumerate(series.height)}
     at = [place[float(height)] for height in checked_table.volumes.height]

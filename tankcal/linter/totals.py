@@ -28,7 +28,7 @@ class Nominal:
     height_m: float | None = None
 
 
-NOTHING_NOMINAL = Nominal()
+NO_NOMINAL = Nominal()
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Units:
 NO_UNITS = Units(None, None)
 
 
-def units_of(table, volumes, log):
+def choose_units(table, volumes, log):
     """Return the `Units` from the headings, or those that give a tank of usual proportions."""
-    pairs = _possible(table)
+    pairs = _possible_units(table)
     if table.volume_choices:  # volumes do not distinguish gallons
         pairs = [pair for pair in pairs if pair.volume_m3 == table.volume_choices[0]]
         note = message(
@@ -53,7 +53,7 @@ def units_of(table, volumes, log):
             "give volumes 20 % larger; expected US gal or imp gal in the heading",
         )
         log.warning(table.name, note)
-    units = min(pairs, key=lambda pair: _oddity(volumes, pair))
+    units = min(pairs, key=lambda pair: _implausibility(volumes, pair))
     if len(pairs) > 1:
         text = message(
             "lint_no_units",
@@ -67,10 +67,11 @@ def units_of(table, volumes, log):
 
 def likely_units(table, volumes):
     """Return the `Units` permitted by the headings that give a tank of usual proportions."""
-    return [units for units in _possible(table) if _is_usual(volumes, units)]
+    return [units for units in _possible_units(table) if _is_usual(volumes, units)]
 
 
-def _possible(table):
+def _possible_units(table):
+    """Units that the headings permit."""
     heights, sizes = _USUAL_HEIGHT_UNITS_M, _USUAL_VOLUME_UNITS_M3
     if table.height_unit_m is not None:
         heights = [table.height_unit_m]
@@ -81,13 +82,15 @@ def _possible(table):
     return [Units(*pair) for pair in product(heights, sizes)]
 
 
-def _oddity(volumes, units):
+def _implausibility(volumes, units):
+    """Measure of how unusual the proportions of a tank are; 0 for a usual tank."""
     height_m, ratio = _proportions(volumes, units)
     too_small, too_high = log10(_LOWEST_M / height_m), log10(height_m / _HIGHEST_M)
     return abs(log10(ratio)) + max(too_small, too_high, 0.0)
 
 
 def _is_usual(volumes, units):
+    """Whether the units give a tank of usual proportions."""
     height_m, ratio = _proportions(volumes, units)
     return _LOWEST_M <= height_m <= _HIGHEST_M and _SLIMMEST < ratio < _FLATTEST
 
@@ -129,6 +132,7 @@ def check_totals(table, volumes, units, step, nominal, log):
 
 
 def _check_proportions(table, height_m, total_m3, log):
+    """Warn about unusual proportions of the tank."""
     ratio = _slenderness(height_m, total_m3)
     if not _SLIMMEST < ratio < _FLATTEST:
         text = message(
@@ -143,6 +147,7 @@ def _check_proportions(table, height_m, total_m3, log):
 
 
 def _check_total(table, total_m3, expected_m3, close, log):
+    """Report a total that differs from the nominal volume."""
     ratio = total_m3 / expected_m3
     if abs(ratio - 1) <= close:
         return
@@ -156,11 +161,12 @@ def _check_total(table, total_m3, expected_m3, close, log):
         nominal=expected_m3,
         hint=hint,
     )
-    tell = log.warning if abs(ratio - 1) <= _FAR else log.problem
-    tell(table.name, text)
+    report = log.warning if abs(ratio - 1) <= _FAR else log.problem
+    report(table.name, text)
 
 
 def _hint_of_factor(power):
+    """Text that a power of ten is the likely cause of a difference."""
     factor = 10 ** abs(power)
     if power > 0:
         return message(
@@ -176,6 +182,7 @@ def _hint_of_factor(power):
 
 
 def _check_top(table, volumes, units, step, nominal_m, log):
+    """Report a last row that differs from the nominal height."""
     low, high = sorted(abs(float(h)) * units.height_m for h in volumes.height[[0, -1]])
     top_m = high if not table.is_ullage else high - low
     gap = nominal_m - top_m
@@ -193,5 +200,5 @@ def _check_top(table, volumes, units, step, nominal_m, log):
         hint=hint,
     )
     is_small = abs(gap) <= max(5 * step * units.height_m, _CLOSE_DIAMETER * nominal_m)
-    tell = log.warning if is_small else log.problem
-    tell(table.name, text)
+    report = log.warning if is_small else log.problem
+    report(table.name, text)

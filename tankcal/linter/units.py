@@ -432,6 +432,7 @@ _ROLE_WORD = re.compile(
 
 
 def _is_usual_factor(value):
+    """Whether a number is a usual factor of a unit."""
     return value > 0 and (value in _PLAIN_FACTORS or abs(log10(value) - round(log10(value))) < 1e-9)
 
 
@@ -452,6 +453,7 @@ def _countries(tokens, names):
 
 
 def _unusable(unit, kind, dimension):
+    """Message about a unit that cannot be used."""
     expected = "m, dm, cm, mm, in, ft"
     if dimension == VOLUME:
         expected = "m3, L, hL, bbl, US gal, imp gal, ft3"
@@ -466,6 +468,7 @@ def _unusable(unit, kind, dimension):
 
 
 def _unclear_factor(number):
+    """Message about a number that may be a factor."""
     return message(
         "lint_unclear_factor",
         "found the number {number} in the heading, perhaps a factor; expected a factor with its "

@@ -10,92 +10,6 @@ from tankcal.linter.heights import FEWEST_ROWS
 from tankcal.linter.numbers import BLANK
 from tankcal.messages import message
 
-# Likely intended number: slips of the pen that lead from the expected value to the wrong one.
-
-
-def suggestion(text, expected, tolerance, decimals):
-    """Return (number as text, kind of slip) for a wrong number, or None.
-
-    Parameters
-    ----------
-    text : str
-        As written, with a decimal point and without thousands separators.
-    expected : float
-        Value from the neighbouring rows.
-    tolerance : float
-        Tolerance of the expected value.
-    decimals : int
-        Number of decimals of the other rows.
-
-    Notes ----- The nearest one-digit slip takes precedence. Then follow two digits swapped, a
-    decimal mark moved, a digit missing, a digit too many.
-    """
-    for slip, candidates in (
-        (message("slip_one_digit", "one digit"), _one_digit(text)),
-        (message("slip_transposed", "two digits changed places"), _transposed(text)),
-        (message("slip_decimal_mark", "the decimal mark"), _moved_mark(text, decimals)),
-        (message("slip_digit_missing", "a digit is missing"), _inserted(text)),
-        (message("slip_digit_too_many", "a digit too many"), _removed(text)),
-    ):
-        good = [
-            (abs(float(candidate) - expected), candidate)
-            for candidate in candidates
-            if candidate != text
-            and _is_written_so(candidate, decimals)
-            and abs(float(candidate) - expected) <= tolerance
-        ]
-        if good:
-            return min(good)[1], slip
-    return None
-
-
-def _is_written_so(text, decimals):
-    """Whether a number looks natural: no needless leading zero, no more decimals than usual."""
-    whole, _, part = text.partition(".")
-    return not (whole[:1] == "0" and len(whole) > 1) and len(part) <= decimals
-
-
-def _one_digit(text):
-    return [
-        text[:k] + digit + text[k + 1 :]
-        for k, char in enumerate(text)
-        if char.isdigit()
-        for digit in "0123456789"
-    ]
-
-
-def _transposed(text):
-    places = [k for k, char in enumerate(text) if char.isdigit()]
-    numbers = []
-    for a, b in pairwise(places):
-        chars = list(text)
-        chars[a], chars[b] = chars[b], chars[a]
-        numbers.append("".join(chars))
-    return numbers
-
-
-def _moved_mark(text, decimals):
-    value = float(text)
-    return [f"{value * 10.0**power:.{decimals}f}" for power in (-6, -3, -2, -1, 1, 2, 3, 6)]
-
-
-def _inserted(text):
-    return [
-        text[:k] + digit + text[k:]
-        for k in range(len(text) + 1)
-        if k or text[:1].isdigit()
-        for digit in "0123456789"
-    ]
-
-
-def _removed(text):
-    return [
-        text[:k] + text[k + 1 :]
-        for k, char in enumerate(text)
-        if char.isdigit() and sum(c.isdigit() for c in text) > 1
-    ]
-
-
 _USUAL = 0.98  # share of the rows with at most the usual number of decimals
 _FINEST = 1e-9  # smallest rounding relative to the total
 _MOST_WRITTEN = 6  # largest number of decimals that people write
@@ -123,13 +37,13 @@ class Volumes:
     joints: tuple[float, ...]
 
 
-def volumes_of(table, series, log):
+def check_volumes(table, series, log):
     """Return the `Volumes` of a series after reporting their problems to `log`; None if too few."""
-    left_out = _left_out(table, series.entries, log)
+    blank_rows = _find_long_blanks(table, series.entries, log)
     good = [
         k
         for k, entry in enumerate(series.entries)
-        if k not in left_out and _is_readable(table, entry, log)
+        if k not in blank_rows and _is_readable(table, entry, log)
     ]
     if len(good) < FEWEST_ROWS:
         if not log.problems:  # only long blanks; an unreadable cell is a problem
@@ -149,10 +63,10 @@ def volumes_of(table, series, log):
     quantum = max(10.0**-decimals, _FINEST * float(np.abs(volume).max()), 1e-300)
     rounding = series.rounding[good] / series.step
     examined = examine(height / series.step, volume / quantum, rounding)
-    teller = _Teller(table, entries, volume, quantum, decimals, examined.joints, log)
+    reporter = _VolumeReporter(table, entries, volume, quantum, decimals, examined.joints, log)
     for fault in examined.faults:
-        teller.tell(fault)
-    _check_falls(teller, examined.volume * quantum)
+        reporter.report(fault)
+    _check_falls(reporter, examined.volume * quantum)
     if not examined.complete:
         log.warning(
             table.name,
@@ -162,9 +76,9 @@ def volumes_of(table, series, log):
     return Volumes(height, volume, decimals, joints)
 
 
-def _left_out(table, entries, log):
+def _find_long_blanks(table, entries, log):
     """Rows of long, intended blanks, such as a critical zone of a roof that is not for use."""
-    left_out = set()
+    blank_rows = set()
     for is_blank, run in groupby(
         range(len(entries)), lambda k: entries[k].volume.complaint == BLANK
     ):
@@ -177,11 +91,12 @@ def _left_out(table, entries, log):
                 last_row=last.row,
             )
             log.warning(table.name, text, first.row, first.volume_column)
-            left_out.update(rows)
-    return left_out
+            blank_rows.update(rows)
+    return blank_rows
 
 
 def _is_readable(table, entry, log):
+    """Whether an entry has a volume; unreadable and negative volumes are reported."""
     reading = entry.volume
     if reading.value is None:
         if reading.complaint:
@@ -242,11 +157,11 @@ def _check_rounding(table, entries, log):
     if keeps_zeros and len(short) <= max(1, len(entries) // 100):
         for entry in short:
             is_last = entry is entries[-1]
-            tell = log.problem if is_last else log.warning
+            report = log.problem if is_last else log.warning
             text = _other_decimals(entry, usual)
             if is_last:
                 text = message("lint_cut", "{text}: is the last row cut?", text=text)
-            tell(table.name, text, entry.row, entry.volume_column)
+            report(table.name, text, entry.row, entry.volume_column)
     for entry in entries:
         if entry.volume.decimals > usual:
             text = _other_decimals(entry, usual)
@@ -255,6 +170,7 @@ def _check_rounding(table, entries, log):
 
 
 def _other_decimals(entry, usual):
+    """Message about an unusual number of decimals."""
     return message(
         "lint_decimals",
         "found {found}; expected {usual} decimals as in the other rows",
@@ -263,21 +179,21 @@ def _other_decimals(entry, usual):
     )
 
 
-def _check_falls(teller, mended):
+def _check_falls(reporter, corrected):
     """Report falling volumes that no other fault explains."""
-    sound = np.flatnonzero(np.isfinite(mended))
-    for before, row in pairwise(sound):
-        if mended[row] < mended[before] - 0.5 * teller.quantum:
+    valid_rows = np.flatnonzero(np.isfinite(corrected))
+    for before, row in pairwise(valid_rows):
+        if corrected[row] < corrected[before] - 0.5 * reporter.quantum:
             text = message(
                 "lint_falls",
                 "found {found} after {before}; expected volumes that do not fall",
-                found=teller.text(row),
-                before=teller.text(before),
+                found=reporter.text(row),
+                before=reporter.text(before),
             )
-            teller.problem(row, text)
+            reporter.problem(row, text)
 
 
-class _Teller:
+class _VolumeReporter:
     """Reports faults of volumes with the texts and rows of the file."""
 
     def __init__(self, table, entries, volume, quantum, decimals, joints, log):
@@ -285,17 +201,21 @@ class _Teller:
         self.quantum, self.decimals, self.joints = quantum, decimals, joints
 
     def text(self, k):
+        """Text of a volume in the file."""
         return self.entries[k].volume.text
 
     def number(self, value):
+        """Text of a volume with the usual decimals."""
         return f"{value:.{min(self.decimals, _MOST_WRITTEN)}f}"
 
     def problem(self, k, text, is_error=True):
+        """Report an error or a warning about a volume."""
         entry = self.entries[k]
-        tell = self.log.problem if is_error else self.log.warning
-        tell(self.table.name, text, entry.row, entry.volume_column)
+        report = self.log.problem if is_error else self.log.warning
+        report(self.table.name, text, entry.row, entry.volume_column)
 
-    def tell(self, fault):
+    def report(self, fault):
+        """Report a fault of an examination."""
         first, last = (self.entries[k].row for k in (fault.first, fault.last))
         if fault.kind == "swap":
             self.problem(
@@ -309,14 +229,15 @@ class _Teller:
                 ),
             )
         elif fault.kind == "row":
-            self._tell_row(fault)
+            self._report_row(fault)
         else:
-            self._tell_shift(fault, first, last)
+            self._report_shift(fault, first, last)
 
-    def _tell_row(self, fault):
+    def _report_row(self, fault):
+        """Report a wrong volume, with the likely intended number."""
         expected = self.volume[fault.first] - fault.size * self.quantum
         tolerance = max(3.0, 0.02 * abs(fault.size)) * self.quantum
-        slip = suggestion(self.text(fault.first), expected, tolerance, self.decimals)
+        slip = suggest_number(self.text(fault.first), expected, tolerance, self.decimals)
         hint = (
             ""
             if not slip
@@ -334,7 +255,8 @@ class _Teller:
         )
         self.problem(fault.first, text, not is_fitting)
 
-    def _tell_shift(self, fault, first, last):
+    def _report_shift(self, fault, first, last):
+        """Report volumes with a common error."""
         is_open = fault.kind == "shift"
         rows = message("lint_rows", "rows {row} to {last_row}", row=first, last_row=last)
         if is_open:
@@ -362,10 +284,105 @@ class _Teller:
 
 
 def _amount(number, size):
+    """Text of an error of volumes."""
     if size > 0:
         return message("lint_too_large", "{number} too large", number=number)
     return message("lint_too_small", "{number} too small", number=number)
 
 
 def _or_fitting(is_fitting):
+    """Text that a fitting is possible, or ""."""
     return message("lint_fitting", ", or the edge of a fitting") if is_fitting else ""
+
+
+# ---- likely intended numbers
+
+
+def suggest_number(text, expected, tolerance, decimals):
+    """Return the likely intended number as text and the kind of slip, or None.
+
+    Parameters
+    ----------
+    text : str
+        As written, with a decimal point and without thousands separators.
+    expected : float
+        Value from the neighbouring rows.
+    tolerance : float
+        Tolerance of the expected value.
+    decimals : int
+        Number of decimals of the other rows.
+
+    Notes
+    -----
+    The nearest number with one wrong digit takes precedence. Then follow two digits swapped, a
+    decimal mark moved, a digit missing, a digit too many.
+    """
+    for slip, candidates in (
+        (message("slip_one_digit", "one digit"), _change_digit(text)),
+        (message("slip_transposed", "two digits changed places"), _swap_digits(text)),
+        (message("slip_decimal_mark", "the decimal mark"), _move_mark(text, decimals)),
+        (message("slip_digit_missing", "a digit is missing"), _insert_digit(text)),
+        (message("slip_digit_too_many", "a digit too many"), _remove_digit(text)),
+    ):
+        good = [
+            (abs(float(candidate) - expected), candidate)
+            for candidate in candidates
+            if candidate != text
+            and _is_natural(candidate, decimals)
+            and abs(float(candidate) - expected) <= tolerance
+        ]
+        if good:
+            return min(good)[1], slip
+    return None
+
+
+def _is_natural(text, decimals):
+    """Whether a number looks natural: no needless leading zero, no more decimals than usual."""
+    whole, _, part = text.partition(".")
+    return not (whole[:1] == "0" and len(whole) > 1) and len(part) <= decimals
+
+
+def _change_digit(text):
+    """Numbers with one digit changed."""
+    return [
+        text[:k] + digit + text[k + 1 :]
+        for k, char in enumerate(text)
+        if char.isdigit()
+        for digit in "0123456789"
+    ]
+
+
+def _swap_digits(text):
+    """Numbers with two neighbouring digits swapped."""
+    places = [k for k, char in enumerate(text) if char.isdigit()]
+    numbers = []
+    for a, b in pairwise(places):
+        chars = list(text)
+        chars[a], chars[b] = chars[b], chars[a]
+        numbers.append("".join(chars))
+    return numbers
+
+
+def _move_mark(text, decimals):
+    """Numbers with the decimal mark moved."""
+    value = float(text)
+    return [f"{value * 10.0**power:.{decimals}f}" for power in (-6, -3, -2, -1, 1, 2, 3, 6)]
+
+
+def _insert_digit(text):
+    """Numbers with one digit more."""
+    return [
+        text[:k] + digit + text[k:]
+        for k in range(len(text) + 1)
+        if k or text[:1].isdigit()
+        for digit in "0123456789"
+    ]
+
+
+def _remove_digit(text):
+    """Numbers with one digit less."""
+    return [
+        text[:k] + text[k + 1 :]
+        for k, char in enumerate(text)
+        if char.isdigit() and sum(c.isdigit() for c in text) > 1
+    ]

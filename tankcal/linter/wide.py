@@ -163,28 +163,28 @@ def _has_rows(rows, index, count):
     )
 
 
-def _units(cells, above, of_labels):
+def _units(cells, above, label_unit):
     """(unit of the rows, unit of the labels) in the heading, m; None if not stated.
 
     A first cell such as cm / mm states both.
     """
-    own_units = []
+    row_units = []
     for line in (cells, *above[::-1]):
         text = line[0] if line and _is_short(line[0]) else ""
         tokens = without_prepositions(tokens_of(text))
-        own_units += [
+        row_units += [
             size for size in (size_of(token, LENGTH) for token in tokens) if size is not None
         ]
-        if own_units:
+        if row_units:
             break
-    label_units = [of_labels] if of_labels is not None else own_units[1:]
+    label_units = [label_unit] if label_unit is not None else row_units[1:]
     if not label_units:
         texts = [cell for line in above for cell in line[1:] if isinstance(cell, str)]
         tokens = [token for text in texts for token in without_prepositions(tokens_of(text))]
         label_units = [
             size for size in (size_of(token, LENGTH) for token in tokens) if size is not None
         ]
-    return (own_units[0] if own_units else None), (label_units[0] if label_units else None)
+    return (row_units[0] if row_units else None), (label_units[0] if label_units else None)
 
 
 def wide_cells(name, wide, rows, log):
@@ -262,13 +262,13 @@ def _ratio(wide, bases):
     by_column = (len(bases) * base_step) / label_step
     if wide.row_m is not None and wide.label_m is not None:
         ratio = wide.label_m / wide.row_m
-        fits = (abs(ratio / one - 1) <= _SAME for one in (row_by_row, by_column))
+        fits = (abs(ratio / expected - 1) <= _SAME for expected in (row_by_row, by_column))
         return ratio if any(fits) else None
     known = (ratio for ratio in _RATIOS if abs(ratio / row_by_row - 1) <= _SAME)
     return next(known, None)
 
 
-def refused_columns(name, block_rows, pairs, heading_row, heading_cells):
+def find_unnamed_columns(name, block_rows, pairs, heading_row, heading_cells):
     """Return the Problem of several columns of numbers without a heading.
 
     None if there are none.

@@ -13,7 +13,7 @@ from tankcal.job.contract import columns_of
 from tankcal.job.sheets import KEY, SECTION, VALUE, is_read
 from tankcal.job.tables import REGISTERS, SETTINGS_SHEET, TABLES
 from tankcal.text.numerals import NUMBER
-from tankcal.workbench.decimals import Unwritten
+from tankcal.workbench.decimals import AmbiguousNumber
 from tankcal.workbench.keys import Entry, field_of
 from tankcal.workbench.tables import EditedTable, Row
 
@@ -49,7 +49,7 @@ class SheetOrigin:
     def render(self, table):
         """Table and number of each row in the sheet, None for a new blank row.
 
-        `written_book` writes the table into the workbook.
+        `write_book` writes the table into the workbook.
         """
         written = [not (row.line is None and row.is_blank) for row in table.rows]
         places = iter(self._places(sum(written)))
@@ -93,7 +93,7 @@ class BookKeys:
         Last row of the sheet.
     rows : tuple of (Entry, int or None, bool)
         Each entry, the number of its row (None for a new entry), and whether it was changed.
-    unwritten : dict
+    ambiguous : dict
         Ambiguous values that are not written, {(owner, key): text}.
     """
 
@@ -103,7 +103,7 @@ class BookKeys:
     columns: tuple[int, int, int]
     last_row: int
     rows: tuple[tuple, ...]
-    unwritten: dict = field(default_factory=dict)
+    ambiguous: dict = field(default_factory=dict)
 
     decimal = "."
 
@@ -111,15 +111,15 @@ class BookKeys:
     def entries(self):
         """Entries of the sheet in its order."""
         return [
-            replace(entry, text=self.unwritten.get((entry.owner, entry.key)) or entry.text)
+            replace(entry, text=self.ambiguous.get((entry.owner, entry.key)) or entry.text)
             for entry, _, _ in self.rows
         ]
 
     def set_value(self, owner, key, text):
         """New state with the value of a key."""
-        unwritten = {place: item for place, item in self.unwritten.items() if place != (owner, key)}
-        if isinstance(text, Unwritten):
-            unwritten[owner, key] = text
+        ambiguous = {place: item for place, item in self.ambiguous.items() if place != (owner, key)}
+        if isinstance(text, AmbiguousNumber):
+            ambiguous[owner, key] = text
             text = ""
         existing = [(item.owner, item.key) for item, _, _ in self.rows]
         new_entry = Entry(owner, key, str(text))
@@ -129,7 +129,7 @@ class BookKeys:
             rows = (*self.rows[:place], row, *self.rows[place + 1 :])
         else:
             rows = (*self.rows, (new_entry, None, True))
-        return replace(self, rows=rows, unwritten=unwritten)
+        return replace(self, rows=rows, ambiguous=ambiguous)
 
     def write(self, book):
         """Write the changed values into the sheet of an openpyxl workbook."""
@@ -163,7 +163,7 @@ def cell_value(key_field, text):
     >>> cell_value(Field("x_m", "number", ""), "6.50"), cell_value(None, "=1+1")
     (6.5, '=1+1')
     """
-    if not text or isinstance(text, Unwritten):
+    if not text or isinstance(text, AmbiguousNumber):
         return None
     kind = key_field.kind if key_field is not None else "text"
     if kind in ("number", "numbers") and NUMBER.fullmatch(text):
@@ -223,7 +223,7 @@ def new_sheet_table(name, headings, kind):
     return EditedTable(name, sheet_named(name), tuple(headings), (), ".", origin)
 
 
-def written_book(data, tables, keys):
+def write_book(data, tables, keys):
     """Bytes of a workbook after writing the changed tables and keys into it."""
     from openpyxl import load_workbook
 

@@ -1,4 +1,4 @@
-"""Computation of a saved job, with progress and Stop."""
+"""Computation of a saved job with progress and Stop, and errors of a notebook."""
 
 import threading
 import time
@@ -6,6 +6,16 @@ import time
 from tankcal.errors import TankcalError
 from tankcal.messages import message
 from tankcal.text.time_left import how_far
+
+
+class Refusal(TankcalError):
+    """An error that a notebook shows as its message, without a traceback."""
+
+    exit_status = 2
+
+    def _render_traceback_(self):
+        """Lines that IPython shows in place of a traceback."""
+        return [f"tankcal: {line}" for line in str(self).splitlines()]
 
 
 class Stopped(TankcalError):
@@ -19,9 +29,9 @@ class Run:
     ----------
     source, out : Path
         The job and the folder of the results.
-    tell : callable, optional
-        Function tell(text, share) that receives the progress of a step: a Message, and a share
-        from 0 to 1 or None.
+    on_progress : callable, optional
+        Function on_progress(text, share) that receives the progress of a step: a Message, and a
+        share from 0 to 1 or None.
     papers : bool, optional
         Whether to write reports; if not, only record and CSV files are written.
     on_result : callable, optional
@@ -37,9 +47,9 @@ class Run:
         Error that ended the computation.
     """
 
-    def __init__(self, source, out, tell=None, papers=True, on_result=None):
+    def __init__(self, source, out, on_progress=None, papers=True, on_result=None):
         self.source, self.out, self.papers = source, out, papers
-        self._tell = tell or (lambda text, share: None)
+        self._on_progress = on_progress or (lambda text, share: None)
         self._on_result = on_result or (lambda result: None)
         self._is_stopped = threading.Event()
         self._now, self._began = None, (0.0, 0)
@@ -96,4 +106,4 @@ class Run:
             began, first = self._began
             left = how_far(done, total, done - first, time.monotonic() - began)
             text = message("step_and_part", "{step} {part}", step=text, part=left)
-        self._tell(text, share)
+        self._on_progress(text, share)

@@ -10,11 +10,11 @@ from tankcal.text.numerals import NUMBER
 LISTS = ("numbers", "ranges", "rows")  # kinds with several numbers in a cell, with decimal points
 
 
-class Unwritten(str):
-    """An ambiguous number: it is shown and reported, but not written to the file."""
+class AmbiguousNumber(str):
+    """An ambiguous number, which is shown and reported, but not written to the file."""
 
 
-def shown_text(field: Field | None, text: str, in_file: str, in_language: str) -> str:
+def text_for_display(field: Field | None, text: str, in_file: str, in_language: str) -> str:
     """Convert the text of a cell in the file to the text in the grid.
 
     Parameters
@@ -32,10 +32,10 @@ def shown_text(field: Field | None, text: str, in_file: str, in_language: str) -
 
     Examples
     --------
-    >>> shown_text(Field("z_m", "number", ""), "10.950", ".", ",")
+    >>> text_for_display(Field("z_m", "number", ""), "10.950", ".", ",")
     '10,950'
     """
-    if isinstance(text, Unwritten) or field is None or not text:
+    if isinstance(text, AmbiguousNumber) or field is None or not text:
         return str(text)
     if field.kind in LISTS:
         return text.replace(".", in_language)
@@ -45,7 +45,7 @@ def shown_text(field: Field | None, text: str, in_file: str, in_language: str) -
     return text.replace(in_file, in_language) if is_number else text
 
 
-def entered_text(field: Field | None, text: str, in_file: str, in_language: str) -> str:
+def text_for_file(field: Field | None, text: str, in_file: str, in_language: str) -> str:
     """Convert an entered text to the text in the file.
 
     Parameters
@@ -60,15 +60,15 @@ def entered_text(field: Field | None, text: str, in_file: str, in_language: str)
     Returns
     -------
     str
-        An `Unwritten` if the text is ambiguous.
+        An `AmbiguousNumber` if the text is ambiguous.
 
     Examples
     --------
     >>> column = Field("z_m", "number", "")
-    >>> entered_text(column, " 10,950 ", ".", ",")
+    >>> text_for_file(column, " 10,950 ", ".", ",")
     '10.950'
-    >>> type(entered_text(column, "1.234", ".", ",")).__name__
-    'Unwritten'
+    >>> type(text_for_file(column, "1.234", ".", ",")).__name__
+    'AmbiguousNumber'
     """
     text = " ".join(text.replace("\N{NO-BREAK SPACE}", " ").split())
     if field is None:
@@ -80,7 +80,7 @@ def entered_text(field: Field | None, text: str, in_file: str, in_language: str)
     if in_file == in_language:
         return text
     if in_file in text and NUMBER.fullmatch(text.replace(in_file, ".").split(";")[0].strip()):
-        return Unwritten(text)
+        return AmbiguousNumber(text)
     plain = text.replace(in_language, in_file)
     if field.kind in LISTS:
         return plain

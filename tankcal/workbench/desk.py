@@ -17,31 +17,22 @@ from tankcal.job.contract import SURVEYS, TABLES_OF_KIND
 from tankcal.job.tables import REGISTERS, TABLES
 from tankcal.report.folders import default_folder
 from tankcal.text.languages import DEFAULT, nearest_language
-from tankcal.workbench.computing import Run
-from tankcal.workbench.decimals import entered_text
+from tankcal.workbench.computing import Refusal, Run
+from tankcal.workbench.decimals import text_for_file
+from tankcal.workbench.display import Reader
 from tankcal.workbench.draft import Draft
 from tankcal.workbench.findings import BAD, DOUBTFUL
 from tankcal.workbench.keys import SETTINGS, field_of
 from tankcal.workbench.plain import list_page, table_page, text_page
-from tankcal.workbench.shown import Reader
 
 # Environment variables of interactive sessions.
-OF_PERSONS = ("JPY_SESSION_NAME", "VOILA_REQUEST_URL", "VSCODE_PID")
+SESSION_VARIABLES = ("JPY_SESSION_NAME", "VOILA_REQUEST_URL", "VSCODE_PID")
 WIDGETS = ("ipywidgets", "anywidget")  # packages required for grids and buttons
-
-
-class Refusal(TankcalError):
-    """An error that a notebook shows as its message, without a traceback."""
-
-    exit_status = 2
-
-    def _render_traceback_(self):
-        return [f"tankcal: {line}" for line in str(self).splitlines()]
 
 
 def is_attended():
     """Whether the session is interactive (JupyterLab, Voilà, VS Code)."""
-    return any(os.environ.get(name) for name in OF_PERSONS)
+    return any(os.environ.get(name) for name in SESSION_VARIABLES)
 
 
 def open_job(job=".", *, out=None, language=None, live=None):
@@ -105,7 +96,7 @@ class Desk:
         Last computation.
     is_stale : bool
         Whether the job was edited or overruled since the last computation.
-    said : str
+    status : str
         Message about the last action, shown in the head.
     """
 
@@ -113,8 +104,8 @@ class Desk:
         self.draft, self.out, self.reader = draft, out, reader
         self.is_live = is_live and all(map(find_spec, WIDGETS))
         self.last_run, self.is_stale = None, False
-        self.every_key, self.said, self.waiting = {}, "", None
-        self._listeners, self._checked = [], None
+        self.every_key, self.status, self.pending_check = {}, "", None
+        self._listeners, self._check = [], None
 
     # ---- content
 
@@ -129,7 +120,7 @@ class Desk:
         return tuple(name for name in REGISTERS if name in self.draft.keys)
 
     @property
-    def further(self):
+    def addable(self):
         """Names of the tables that can be added to the job."""
         kind = self.draft.kind or "vertical"
         of_surveys = [name for names in SURVEYS.values() for name in names]
@@ -162,9 +153,9 @@ class Desk:
     @property
     def outcome(self):
         """`Check` of the edited job."""
-        if self._checked is None:
-            self._checked = self.draft.check()
-        return self._checked
+        if self._check is None:
+            self._check = self.draft.check()
+        return self._check
 
     @property
     def problems(self):
@@ -175,17 +166,17 @@ class Desk:
         """Register a function act() that is called after each change."""
         self._listeners.append(act)
 
-    def changed(self):
+    def notify_edit(self):
         """Discard the check after an edit, and notify the listeners."""
-        self.edited()
-        self.tell()
+        self.mark_edited()
+        self.notify()
 
-    def edited(self):
+    def mark_edited(self):
         """Discard the check after an edit, and mark the results as outdated."""
-        self._checked, self.said = None, ""
+        self._check, self.status = None, ""
         self.is_stale = self.last_run is not None
 
-    def tell(self):
+    def notify(self):
         """Notify the listeners."""
         for act in tuple(self._listeners):
             act()
@@ -207,11 +198,11 @@ class Desk:
             Entered text.
         """
         if isinstance(row, str):
-            typed = entered_text(field_of(name, row, column), text, ".", self.reader.mark)
+            typed = text_for_file(field_of(name, row, column), text, ".", self.reader.mark)
             self.draft.set_value(name, row, column, typed)
         else:
             self.reader.enter(self.draft, name, [(row, column, text)])
-        self.changed()
+        self.notify_edit()
 
     def save(self):
         """Write the edited files of the job, all or none of them, and return their paths."""
@@ -222,8 +213,8 @@ class Desk:
         except OSError as error:
             reason = self.reader.say(reason_of(error))
             raise Refusal(self.reader.word("not_saved", reason=reason)) from None
-        self._checked = None
-        self.tell()
+        self._check = None
+        self.notify()
         return written
 
     def refusal(self, error):
@@ -232,12 +223,12 @@ class Desk:
 
     # ---- computing
 
-    def begin(self, tell=None, papers=True, on_result=None):
+    def prepare_run(self, on_progress=None, papers=True, on_result=None):
         """Save the job, and return a `Run` that is not yet started.
 
         Parameters
         ----------
-        tell, papers, on_result
+        on_progress, papers, on_result
             As in `Run`.
 
         Returns
@@ -249,14 +240,14 @@ class Desk:
         Refusal
             If the job cannot be computed or saved.
         """
-        if not self.outcome.is_sound:
+        if not self.outcome.is_valid:
             raise Refusal("\n".join(self.reader.line(problem) for problem in self.outcome.problems))
         try:
             self.draft.refuse_changed_elsewhere()  # so that the shown job is computed
         except InputError as error:
             raise self.refusal(error) from None
         self.save()
-        return Run(self.draft.source, self.out, tell, papers, on_result)
+        return Run(self.draft.source, self.out, on_progress, papers, on_result)
 
     def run(self, papers=True):
         """Save the job, compute it and write the results as `tankcal run`; return the result.
@@ -266,7 +257,7 @@ class Desk:
         Refusal
             If the job cannot be computed, with all problems.
         """
-        run = self.begin(papers=papers)
+        run = self.prepare_run(papers=papers)
         try:
             run.wait()
         except TankcalError as error:
@@ -307,7 +298,7 @@ class Desk:
         columns = ("point", "decision", "reason", "date")
         given = {"point": point, "decision": decision, "reason": reason}
         given["date"] = datetime.date.today().isoformat()
-        with draft.as_one_edit():
+        with draft.group_edits():
             if name not in draft.tables:
                 draft.add_table(name, columns)
             for column in columns:
@@ -319,12 +310,12 @@ class Desk:
             if row == len(points):
                 draft.insert_rows(name, row)
             draft.set_cells(name, [(row, *entry) for entry in given.items()])
-        self.changed()
+        self.notify_edit()
 
     @property
     def more(self):
         """Selection of a table to add to the job."""
-        return Further(self)
+        return AddableTables(self)
 
     def _repr_mimebundle_(self, include=None, exclude=None):
         return bundle(self, "head_panel", text_page(self.head_text()))
@@ -340,7 +331,7 @@ class Desk:
         return "\n".join(lines)
 
 
-def bundle(desk, panel, page, *given):
+def bundle(desk, panel, page, *arguments):
     """MIME bundle for a notebook: the HTML page, and a panel of widgets if the desk is live.
 
     Parameters
@@ -351,14 +342,14 @@ def bundle(desk, panel, page, *given):
         Name of a function of `panels`.
     page : str
         HTML.
-    *given
+    *arguments
         Further arguments of the function.
     """
     shown = {"text/html": page, "text/plain": panel}
     if desk.is_live:
         from tankcal.workbench import panels
 
-        widget = getattr(panels, panel)(desk, *given)
+        widget = getattr(panels, panel)(desk, *arguments)
         shown |= widget._repr_mimebundle_()
     return shown
 
@@ -419,7 +410,7 @@ class Findings:
         return bundle(self._desk, "findings_panel", self.page)
 
 
-class Further:
+class AddableTables:
     """Tables that can be added to a job."""
 
     def __init__(self, desk):
@@ -427,7 +418,7 @@ class Further:
 
     def _repr_mimebundle_(self, include=None, exclude=None):
         reader = self._desk.reader
-        titles = ", ".join(f"{reader.title(name)} ({name})" for name in self._desk.further)
+        titles = ", ".join(f"{reader.title(name)} ({name})" for name in self._desk.addable)
         return bundle(self._desk, "further_panel", text_page(reader.word("further", titles=titles)))
 
 
@@ -438,7 +429,7 @@ class Results:
         self._desk = desk
 
     def _repr_mimebundle_(self, include=None, exclude=None):
-        from tankcal.workbench.result_views import results_page
+        from tankcal.workbench.plain import results_page
 
         desk = self._desk
         return bundle(desk, "results_panel", "" if desk.is_live else results_page(desk))

@@ -28,23 +28,23 @@ from tankcal.job.tables import (
 )
 from tankcal.messages import message
 from tankcal.text.decoding import WESTERN, decode_text, find_encoding, is_western
-from tankcal.workbench.book import new_sheet_table, read_book, written_book
-from tankcal.workbench.findings import Check, found_in
-from tankcal.workbench.keys import NOT_HERE, SETTINGS, EditedKeys
+from tankcal.workbench.book import new_sheet_table, read_book, write_book
+from tankcal.workbench.findings import Check, mark_cells
+from tankcal.workbench.keys import READ_ONLY_SECTIONS, SETTINGS, EditedKeys
 from tankcal.workbench.tables import new_csv_table, read_csv_table
 
-NOT_TOLD_APART = message(
+AMBIGUOUS = message(
     "entry_not_told_apart",
     "which of two numbers is meant cannot be told from the decimal mark; expected the mark of the "
     "language. The entry is not written",
 )
-OFF = message("entry_switches_off", "begins with #: the row is not read")
+READ_AS_COMMENT = message("entry_switches_off", "begins with #: the row is not read")
 FORMULAS = message(
     "workbook_has_formulas",
     "has formulas in the sheets of the job; edit it in Excel or LibreOffice, for their values "
     "would be lost here",
 )
-KEPT_EDITS = 200  # number of edits that Undo can revert
+MOST_UNDO = 200  # number of edits that Undo can revert
 
 
 def source_of(path):
@@ -89,15 +89,15 @@ class Draft:
         self.is_book = source.is_file()
         self.locked = None
         self.unreadable = []
-        self._disk = {}  # {file: its bytes, None for a missing file}
-        self._first = {}  # {name of a table or of keys: its state on the disk}
-        self._before, self._marks = [], (",", ".")
+        self._saved_bytes = {}  # {file: its bytes, None for a missing file}
+        self._saved = {}  # {name of a table or of keys: its state on the disk}
+        self._undo_states, self._marks = [], (",", ".")
         self.tables, self.keys = {}, {}
         if self.is_book:
             self._read_book()
         else:
             self._read_folder()
-        self._first = {**self.tables, **self.keys}
+        self._saved = {**self.tables, **self.keys}
 
     @classmethod
     def open(cls, path):
@@ -110,7 +110,7 @@ class Draft:
         """Bytes of a file, None if it is missing or unreadable, which the check reports."""
         path = self.source if self.is_book else self.source / name
         data = read_beside(path.parent, path.name, Log()) if path.exists() else None
-        self._disk[name] = data
+        self._saved_bytes[name] = data
         return data
 
     def _read_folder(self):
@@ -136,7 +136,7 @@ class Draft:
             file = f"{name}.csv"
             if (self.source / file).is_file():
                 data = self._content(file)
-                text = None if data is None else _edited_text(file, data)
+                text = None if data is None else _decode_with_mark(file, data)
                 if text is not None:
                     self.tables[name] = read_csv_table(name, file, text, *marks)
 
@@ -195,8 +195,8 @@ class Draft:
     def is_changed(self):
         """Whether a file differs from the file on the disk."""
         now = {**self.tables, **self.keys}
-        return any(state is not self._first.get(name) for name, state in now.items()) or any(
-            name not in now for name in self._first
+        return any(state is not self._saved.get(name) for name, state in now.items()) or any(
+            name not in now for name in self._saved
         )
 
     # ---- edits
@@ -209,23 +209,23 @@ class Draft:
             for row, heading, text in changes
             if 0 <= row < len(table.rows) and heading in table.headings
         ]
-        self._keep()
+        self._store_undo()
         self.tables[name] = table.set_cells(places)
 
     def insert_rows(self, name, place, count=1):
         """Insert blank rows before row `place`."""
-        self._keep()
+        self._store_undo()
         self.tables[name] = self.tables[name].insert_rows(place, count)
 
     def remove_rows(self, name, places):
         """Remove rows."""
-        self._keep()
+        self._store_undo()
         self.tables[name] = self.tables[name].remove_rows(places)
 
     def add_column(self, name, heading):
         """Add a blank column at the right, unless it exists."""
         if heading not in self.tables[name].headings:
-            self._keep()
+            self._store_undo()
             self.tables[name] = self.tables[name].add_column(heading)
 
     def add_table(self, name, headings=None):
@@ -234,11 +234,11 @@ class Draft:
             field.name for field in COLUMNS[name] if field.suits(self.kind) and field.required
         ]
         required = headings or required or [field.name for field in columns_of(name, self.kind)]
-        self._keep()
+        self._store_undo()
         if self.is_book:
             self.tables[name] = new_sheet_table(name, required, self.kind)
             return
-        self._disk.setdefault(f"{name}.csv", None)
+        self._saved_bytes.setdefault(f"{name}.csv", None)
         self.tables[name] = new_csv_table(name, f"{name}.csv", required, *self._marks)
 
     def set_value(self, name, owner, key, text):
@@ -261,80 +261,82 @@ class Draft:
         from tomlkit.exceptions import TOMLKitError
 
         keys = self.keys[name]
-        if owner in NOT_HERE:
-            self._refuse(keys, owner, key)
+        if owner in READ_ONLY_SECTIONS:
+            self._refuse_edit(keys, owner, key)
         try:
             state = keys.set_value(owner, key, text)
         except (TOMLKitError, ValueError, LookupError, TypeError, AttributeError):
-            self._refuse(keys, owner, key)
-        self._keep()
+            self._refuse_edit(keys, owner, key)
+        self._store_undo()
         self.keys[name] = state
 
     @staticmethod
-    def _refuse(keys, owner, key):
+    def _refuse_edit(keys, owner, key):
         """Raise InputError for a key that cannot be edited here."""
         expected = message("key_not_edited_here", "cannot be edited here; edit the file itself")
         raise InputError(Problem(keys.file, expected, None, f"{owner}.{key}"))
 
-    def _keep(self):
+    def _store_undo(self):
         """Store the state for Undo before an edit; InputError if the job is locked."""
         if self.locked is not None:
             raise InputError(Problem(self.source.name, self.locked))
-        self._before.append((dict(self.tables), dict(self.keys)))
-        del self._before[:-KEPT_EDITS]
+        self._undo_states.append((dict(self.tables), dict(self.keys)))
+        del self._undo_states[:-MOST_UNDO]
 
     @contextmanager
-    def as_one_edit(self):
+    def group_edits(self):
         """Context in which all edits are a single edit for Undo, and are discarded on an error."""
-        state, before = (dict(self.tables), dict(self.keys)), [*self._before]
+        state, before = (dict(self.tables), dict(self.keys)), [*self._undo_states]
         try:
             yield
         except BaseException:
-            (self.tables, self.keys), self._before = state, before
+            (self.tables, self.keys), self._undo_states = state, before
             raise
-        if self._before and (not before or self._before[-1] is not before[-1]):
-            self._before = [*before, state][-KEPT_EDITS:]
+        if self._undo_states and (not before or self._undo_states[-1] is not before[-1]):
+            self._undo_states = [*before, state][-MOST_UNDO:]
 
     def undo(self):
         """Revert the last edit, and return whether there was an edit."""
-        if not self._before:
+        if not self._undo_states:
             return False
-        self.tables, self.keys = self._before.pop()
+        self.tables, self.keys = self._undo_states.pop()
         return True
 
     # ---- files
 
-    def edited(self):
+    def edited_files(self):
         """Files that differ from the disk, {file: bytes}, and row numbers, {table: numbers}."""
         rendered = {name: table.render() for name, table in self.tables.items()}
         numbers = {name: row_numbers for name, (_, row_numbers) in rendered.items()}
         now = {**self.tables, **self.keys}
-        changed = [name for name, state in now.items() if state is not self._first.get(name)]
+        changed = [name for name, state in now.items() if state is not self._saved.get(name)]
         if self.is_book:
             if not changed:
                 return {}, numbers
             file = self.source.name
             tables = [self.tables[name] for name in changed if name in self.tables]
             keys = [self.keys[name] for name in changed if name in self.keys]
-            return {file: written_book(self._original, tables, keys)}, numbers
+            return {file: write_book(self._original, tables, keys)}, numbers
         files = {now[name].file: now[name].render()[0] for name in changed}
-        return {name: data for name, data in files.items() if data != self._disk[name]}, numbers
+        return {
+            name: data for name, data in files.items() if data != self._saved_bytes[name]
+        }, numbers
 
     @property
     def _original(self):
         """Bytes of the workbook on the disk."""
-        return self._disk[self.source.name]
+        return self._saved_bytes[self.source.name]
 
     def check(self):
         """Check the job in its edited state, and return a `Check` with all problems by cell."""
-        files, numbers = self.edited()
+        files, numbers = self.edited_files()
         problems, warnings, job = (), (), None
         try:
             job = load_edited(self.source, files)
             warnings = job.warnings
         except InputError as error:
             problems = error.problems
-        ambiguous = [*self._not_written()]
+        ambiguous = [*self._ambiguous_values()]
         # Of a value that is not written, only its own problem is reported.
         places = {(problem.file, problem.row, problem.column) for problem in ambiguous}
         problems = [
@@ -343,23 +345,23 @@ class Draft:
             if (problem.file, problem.row, problem.column) not in places
             and (problem.file, None, problem.column) not in places
         ]
-        off = self._switched_off(numbers)
-        return found_in(self, numbers, Check((*ambiguous, *problems), (*warnings, *off), job))
+        off = self._commented_rows(numbers)
+        return mark_cells(self, numbers, Check((*ambiguous, *problems), (*warnings, *off), job))
 
-    def _not_written(self):
+    def _ambiguous_values(self):
         """Yield a problem for each ambiguous value."""
         for table in self.tables.values():
-            numbers = table.render()[1] if table.unwritten else ()
-            for row, column in table.unwritten:
-                yield Problem(table.file, NOT_TOLD_APART, numbers[row], table.headings[column])
+            numbers = table.render()[1] if table.ambiguous else ()
+            for row, column in table.ambiguous:
+                yield Problem(table.file, AMBIGUOUS, numbers[row], table.headings[column])
         for keys in self.keys.values():
-            for owner, key in keys.unwritten:
-                yield Problem(keys.file, NOT_TOLD_APART, None, f"{owner}.{key}")
+            for owner, key in keys.ambiguous:
+                yield Problem(keys.file, AMBIGUOUS, None, f"{owner}.{key}")
 
-    def _switched_off(self, numbers):
+    def _commented_rows(self, numbers):
         """Warnings of rows that an edit made a comment."""
         return [
-            Problem(table.file, OFF, numbers[name][place], table.headings[0])
+            Problem(table.file, READ_AS_COMMENT, numbers[name][place], table.headings[0])
             for name, table in self.tables.items()
             for place, row in enumerate(table.rows)
             if row.changed and row.cells and row.cells[0].startswith("#")
@@ -379,18 +381,20 @@ class Draft:
             If a value is ambiguous, or if another program has changed an edited file (any file, if
             no file was edited).
         """
-        ambiguous = [*self._not_written()]
+        ambiguous = [*self._ambiguous_values()]
         if ambiguous:
             raise InputError(ambiguous)
-        files, _ = self.edited()
+        files, _ = self.edited_files()
         folder, paths = self._folder, self._paths(files)
-        self.refuse_changed_elsewhere(files or self._disk)
-        _replace_all({paths[name]: data for name, data in files.items()}, self._disk, paths)
-        self._disk.update(files)
+        self.refuse_changed_elsewhere(files or self._saved_bytes)
+        _replace_files(
+            {paths[name]: data for name, data in files.items()}, self._saved_bytes, paths
+        )
+        self._saved_bytes.update(files)
         if self.is_book and files:
             self._read_book()
-            self._before.clear()
-        self._first = {**self.tables, **self.keys}
+            self._undo_states.clear()
+        self._saved = {**self.tables, **self.keys}
         return [folder / name for name in files]
 
     @property
@@ -410,15 +414,15 @@ class Draft:
             "Open the notebook again",
         )
         changed = []
-        for name, path in self._paths(self._disk if names is None else names).items():
+        for name, path in self._paths(self._saved_bytes if names is None else names).items():
             data = read_bytes(path, Log()) if path.is_file() else None
-            if _digest(data) != _digest(self._disk[name]):
+            if _digest(data) != _digest(self._saved_bytes[name]):
                 changed.append(Problem(name, expected))
         if changed:
             raise InputError(changed)
 
 
-def _edited_text(file, data):
+def _decode_with_mark(file, data):
     """Text of a CSV file with its byte order mark, or None if it cannot be decoded.
 
     Edited files are written in UTF-8. A file in Windows-1252 gets a byte order mark, by which Excel
@@ -434,7 +438,7 @@ def _digest(data):
     return None if data is None else hashlib.sha256(data).hexdigest()
 
 
-def _replace_all(contents, before, paths):
+def _replace_files(contents, before, paths):
     """Replace files by {path: bytes}, all or none of them.
 
     The new files are first written next to the files that they replace.

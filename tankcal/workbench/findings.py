@@ -37,12 +37,12 @@ class Check:
     marks: dict = field(default_factory=dict)
 
     @property
-    def is_sound(self):
+    def is_valid(self):
         """Whether the job has no problem and can be computed."""
         return not self.problems
 
 
-def found_in(draft, numbers, check):
+def mark_cells(draft, numbers, check):
     """Assign the problems and warnings of a check to cells.
 
     Parameters

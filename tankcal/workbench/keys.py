@@ -12,10 +12,10 @@ from tankcal.job.contract import KEYS, REGISTER_KEYS
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
 from tankcal.job.fields import Field
 from tankcal.text.numerals import NUMBER
-from tankcal.workbench.decimals import Unwritten
+from tankcal.workbench.decimals import AmbiguousNumber
 
 SETTINGS = "job"  # name of the settings
-NOT_HERE = ("csv",)  # sections that are not edited here, because they define the format of files
+READ_ONLY_SECTIONS = ("csv",)  # define the format of files
 
 
 @dataclass(frozen=True)
@@ -37,14 +37,14 @@ class EditedKeys:
         "job" or the name of a list, and the name of the file, such as "job.toml".
     text : str
         Text of the file.
-    unwritten : dict
+    ambiguous : dict
         Ambiguous values that are not written, {(owner, key): text}.
     """
 
     name: str
     file: str
     text: str
-    unwritten: dict = field(default_factory=dict)
+    ambiguous: dict = field(default_factory=dict)
 
     decimal = "."
 
@@ -52,12 +52,12 @@ class EditedKeys:
     def entries(self):
         """Entries of the file in its order, including values that are not written."""
         entries = [
-            Entry(owner, key, self.unwritten.get((owner, key)) or _text_of(value))
+            Entry(owner, key, self.ambiguous.get((owner, key)) or _text_of(value))
             for owner, given in self._owners(tomllib.loads(self.text))
             for key, value in given.items()
         ]
         known = {(entry.owner, entry.key) for entry in entries}
-        new = [Entry(*place, text) for place, text in self.unwritten.items() if place not in known]
+        new = [Entry(*place, text) for place, text in self.ambiguous.items() if place not in known]
         return entries + new
 
     def _owners(self, content):
@@ -79,26 +79,23 @@ class EditedKeys:
         """New state with the value of a key; a blank value of an existing key becomes ""."""
         import tomlkit
 
-        unwritten = {place: item for place, item in self.unwritten.items() if place != (owner, key)}
-        if isinstance(text, Unwritten):
-            unwritten[owner, key] = text
+        ambiguous = {place: item for place, item in self.ambiguous.items() if place != (owner, key)}
+        if isinstance(text, AmbiguousNumber):
+            ambiguous[owner, key] = text
             text = ""
         document = tomlkit.parse(self.text)
         place, last = self._table_of(document, owner, key, bool(text))
         if place is not None and (text or last in place):
             new_value = toml_value(field_of(self.name, owner, key), text, place.get(last))
-            if (
-                last not in place
-                or place[last] != new_value
-                or type(place[last]) is not type(new_value)
-            ):
+            old_value = place.get(last)
+            if old_value != new_value or type(old_value) is not type(new_value):
                 place[last] = new_value  # preserves its comment
-        return replace(self, text=tomlkit.dumps(document), unwritten=unwritten)
+        return replace(self, text=tomlkit.dumps(document), ambiguous=ambiguous)
 
-    def _table_of(self, document, owner, key, is_made):
+    def _table_of(self, document, owner, key, is_added):
         """Table of the document that contains a key, or None, and the key in this table.
 
-        With `is_made`, missing tables are added.
+        With `is_added`, missing tables are added.
         """
         import tomlkit
 
@@ -109,7 +106,7 @@ class EditedKeys:
         place = document
         for depth, part in enumerate(path):
             if part not in place:
-                if not is_made:
+                if not is_added:
                     return None, key
                 is_super = self.name != SETTINGS and depth == 0
                 if depth < len(path) - 1 or is_super:
@@ -144,13 +141,9 @@ def field_of(name, owner, key):
         family = FAMILIES.get(name, {}).get(key.partition(".")[0])
         if "." in key and family is not None:
             return family
-        long_names = {
-            short: name_in_contract for name_in_contract, short in SHORT_KEYS[name].items()
-        }
+        long_names = {short: long for long, short in SHORT_KEYS[name].items()}
         key = long_names.get(key, key)
-    return next(
-        (name_in_contract for name_in_contract in fields if name_in_contract.name == key), None
-    )
+    return next((field for field in fields if field.name == key), None)
 
 
 def _text_of(value):
@@ -174,7 +167,7 @@ def toml_value(key_field: Field | None, text: str, before=None):
 
     Parameters
     ----------
-    of : Field or None
+    key_field : Field or None
         Field of the key; None for an unknown key.
     text : str
         Entered text.

@@ -11,7 +11,7 @@ from tankcal.text.decoding import read_json
 from tankcal.workbench.desk import open_job
 
 FOLDER_NAME = "tankcal.ipynb"  # file name of the notebook of a job folder
-OURS = "tankcal"  # key of the metadata with the hash of the written cells
+METADATA_KEY = "tankcal"  # key of the metadata with the hash of the written cells
 
 
 def notebook_path(source):
@@ -38,35 +38,37 @@ def make_notebook(source, path, language=None):
     desk = open_job(source, language=language, live=False)
     reader = desk.reader
     words = reader.words["workbench"]["notebook"]
-    job = _counted_from(source.resolve(), path.resolve().parent)
+    job = _relative_path(source.resolve(), path.resolve().parent)
     name = source.resolve().name
-    tank = _plain(desk.draft.value("tank", "id") or name)
+    tank = _escape_markdown(desk.draft.value("tank", "id") or name)
     name = name.replace("`", "'")  # a backquote would end the code in Markdown
     cells = [
-        _text(f"# {words['title'].format(tank=tank)}\n\n{words['about'].format(job=name)}"),
-        _code(
+        _markdown_cell(
+            f"# {words['title'].format(tank=tank)}\n\n{words['about'].format(job=name)}"
+        ),
+        _code_cell(
             f"# {words['parameters']}\nJOB = {job!r}\nOUT = None\n"
             f"LANGUAGE = {reader.language!r}\nLIVE = None",
             "parameters",
         ),
-        _code(
+        _code_cell(
             "from tankcal.workbench import open_job\n\n"
             "desk = open_job(JOB, out=OUT, language=LANGUAGE, live=LIVE)\ndesk"
         ),
-        *_part(words["settings"], reader.note("job"), "desk.settings"),
+        *_section(words["settings"], reader.note("job"), "desk.settings"),
     ]
     for name in (*desk.names, *desk.lists):
-        cells += _part(reader.title(name), reader.note(name), f"desk.{name}")
-    cells += _part(words["further"], "", "desk.more")
-    cells += _part(words["problems"], "", "desk.problems")
-    cells += _part(words["results"], "", "desk.results")
+        cells += _section(reader.title(name), reader.note(name), f"desk.{name}")
+    cells += _section(words["further"], "", "desk.more")
+    cells += _section(words["problems"], "", "desk.problems")
+    cells += _section(words["results"], "", "desk.results")
     for number, cell in enumerate(cells, 1):
         cell["id"] = f"tankcal-{number}"
     kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
     metadata = {
         "kernelspec": kernel,
         "language_info": {"name": "python"},
-        OURS: {"version": tankcal.__version__, "sha256": _digest(cells)},
+        METADATA_KEY: {"version": tankcal.__version__, "sha256": _digest(cells)},
     }
     return {"cells": cells, "metadata": metadata, "nbformat": 4, "nbformat_minor": 5}
 
@@ -99,7 +101,7 @@ def write_notebook(source, path, language=None):
     notebook = make_notebook(source, path, language)
     if path.exists():
         existing = _read(path)
-        if _digest(existing["cells"]) != existing["metadata"].get(OURS, {}).get("sha256"):
+        if _digest(existing["cells"]) != existing["metadata"].get(METADATA_KEY, {}).get("sha256"):
             return False
         if _digest(existing["cells"]) == _digest(notebook["cells"]):
             return True
@@ -127,7 +129,7 @@ def _read(path):
     raise InputError(Problem(path.name, expected))
 
 
-def _counted_from(source, folder):
+def _relative_path(source, folder):
     """Path of a job, relative to a folder if the job is in the folder, else absolute."""
     if source == folder:
         return "."
@@ -142,22 +144,22 @@ def _digest(cells):
     return hashlib.sha256(json.dumps(sources).encode()).hexdigest()
 
 
-def _plain(text):
+def _escape_markdown(text):
     """Escape a text for Markdown, without backslashes, which may begin a formula."""
     return re.sub(r"[#$&*<>\[\\\]_`|~]", lambda mark: f"&#{ord(mark[0])};", " ".join(text.split()))
 
 
-def _part(title, note, code):
+def _section(title, note, code):
     """Cells of a section: title with note, and code."""
-    return [_text(f"## {title}\n\n{note}".rstrip()), _code(code)]
+    return [_markdown_cell(f"## {title}\n\n{note}".rstrip()), _code_cell(code)]
 
 
-def _text(source):
+def _markdown_cell(source):
     """Markdown cell."""
     return {"cell_type": "markdown", "id": "", "metadata": {}, "source": source}
 
 
-def _code(source, *tags):
+def _code_cell(source, *tags):
     """Code cell."""
     return {
         "cell_type": "code",

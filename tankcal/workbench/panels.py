@@ -6,23 +6,24 @@ from html import escape
 import ipywidgets as widgets
 
 from tankcal.errors import InputError, TankcalError, reason_of
-from tankcal.workbench.desk import Refusal
+from tankcal.record import record_of
+from tankcal.workbench.computing import Refusal
 from tankcal.workbench.grid import Grid
-from tankcal.workbench.result_views import live_results, warnings_page
+from tankcal.workbench.plain import warnings_page
 
 PAUSE_S = 0.3  # pause after an edit before the job is checked
 
 
-def later(desk):
+def check_later(desk):
     """Check the job after a pause without edits, and notify the listeners."""
     try:
         loop = asyncio.get_running_loop()
     except RuntimeError:  # without an event loop there is no pause
-        desk.tell()
+        desk.notify()
         return
-    if desk.waiting is not None:
-        desk.waiting.cancel()
-    desk.waiting = loop.call_later(PAUSE_S, desk.tell)
+    if desk.pending_check is not None:
+        desk.pending_check.cancel()
+    desk.pending_check = loop.call_later(PAUSE_S, desk.notify)
 
 
 def _button(text, act, style="", icon=""):
@@ -32,11 +33,6 @@ def _button(text, act, style="", icon=""):
     )
     button.on_click(lambda _: act())
     return button
-
-
-def _page(html=""):
-    """HTML widget."""
-    return widgets.HTML(html)
 
 
 # ---- tables
@@ -58,24 +54,20 @@ class TableGrid:
             name=name, label=shown.title, words=words, takes_rows=shown.takes_rows,
             **self._content(shown),
         )  # fmt: skip
-        self.grid.on_msg(self._heard)
+        self.grid.on_msg(self._handle_message)
         desk.listen(self.refresh)
 
     def _content(self, shown):
         """Traits of the grid for a ShownTable."""
         return {
-            "columns": [vars(one) for one in shown.columns],
+            "columns": [vars(column) for column in shown.columns],
             "rows": shown.rows,
-            "marks": self._marks(shown),
+            # Marks as lists [row, column, level, text].
+            "marks": [[*place, *mark] for place, mark in shown.marks.items()],
             "addable": list(shown.addable),
             "every_key": self.desk.every_key.get(self.name, False),
             "locked": self.desk.draft.locked is not None,
         }
-
-    @staticmethod
-    def _marks(shown):
-        """Marks as lists [row, column, level, text]."""
-        return [[*place, *mark] for place, mark in shown.marks.items()]
 
     def refresh(self):
         """Update the grid; if only cells have changed, only these cells are sent."""
@@ -84,8 +76,8 @@ class TableGrid:
             return  # removed by Undo; the check reports a missing table
         shown = desk.show(self.name)
         content = self._content(shown)
-        same = len(shown.rows) == len(grid.rows) and content["columns"] == grid.columns
-        if same:
+        is_same_form = len(shown.rows) == len(grid.rows) and content["columns"] == grid.columns
+        if is_same_form:
             cells = [
                 (row, place, text)
                 for row, (new, old) in enumerate(zip(shown.rows, grid.rows, strict=True))
@@ -101,7 +93,7 @@ class TableGrid:
             for key, value in content.items():
                 setattr(grid, key, value)
 
-    def _heard(self, _widget, content, _buffers):
+    def _handle_message(self, _widget, content, _buffers):
         """Handle a message of the grid, whose kind is the name of a method below."""
         desk = self.desk
         try:
@@ -109,19 +101,19 @@ class TableGrid:
                 **{k: v for k, v in content.items() if k != "kind"}
             )
         except InputError as error:  # a locked workbook, or a key that cannot be edited here
-            say(desk, "\n".join(desk.reader.say(text) for text in error.texts))
+            show_status(desk, "\n".join(desk.reader.say(text) for text in error.texts))
             self.refresh()
             return
         if content["kind"] == "every":
             self.refresh()
             return
-        desk.edited()
-        later(desk)
+        desk.mark_edited()
+        check_later(desk)
 
     def _enter(self, changes):
         """Enter texts in cells."""
         desk = self.desk
-        with desk.draft.as_one_edit():
+        with desk.draft.group_edits():
             desk.reader.enter(desk.draft, self.name, changes, desk.every_key.get(self.name, False))
 
     def _paste(self, row, column, cells):
@@ -133,7 +125,7 @@ class TableGrid:
             for right, text in enumerate(line)
             if column + right < len(shown)
         ]
-        with draft.as_one_edit():
+        with draft.group_edits():
             if self.name in draft.tables:
                 count = len(draft.tables[self.name].rows)
                 if row + len(cells) > count:
@@ -164,10 +156,10 @@ class TableGrid:
         self.desk.draft.undo()
 
 
-def say(desk, text):
+def show_status(desk, text):
     """Show a message in the head of the desk."""
-    desk.said = text
-    desk.tell()
+    desk.status = text
+    desk.notify()
 
 
 # ---- head, problems, further tables
@@ -175,27 +167,29 @@ def say(desk, text):
 
 def head_panel(desk):
     """Path and state of the job, with Save and Undo."""
-    word, page = desk.reader.word, _page()
+    word, page = desk.reader.word, widgets.HTML()
 
     def save():
+        """Save the job, and show the names of the files or the reason of the refusal."""
         try:
             written = desk.save()
         except Refusal as error:
-            say(desk, str(error))
+            show_status(desk, str(error))
             return
         names = ", ".join(path.name for path in written)
-        say(desk, word("saved", files=names) if written else word("nothing_to_save"))
+        show_status(desk, word("saved", files=names) if written else word("nothing_to_save"))
 
     def undo():
+        """Revert the last edit."""
         if desk.draft.undo():
-            desk.changed()
+            desk.notify_edit()
 
     save_button = _button(word("save"), save, "primary", "save")
     save_button.add_class("tankcal-save")
 
     def refresh():
         state = word("unsaved") if desk.draft.is_changed else word("as_on_disk")
-        lines = [*desk.head_text().splitlines(), state, *desk.said.splitlines()]
+        lines = [*desk.head_text().splitlines(), state, *desk.status.splitlines()]
         page.value = "".join(f"<div>{escape(line)}</div>" for line in lines)
 
     page.add_class("tankcal-head")
@@ -208,7 +202,7 @@ def head_panel(desk):
 
 def findings_panel(desk):
     """Problems and warnings, updated after each edit."""
-    page = _page()
+    page = widgets.HTML()
     page.add_class("tankcal-findings")
 
     def refresh():
@@ -222,7 +216,7 @@ def findings_panel(desk):
 def further_panel(desk):
     """Selection of a table to add, and the grids of added tables."""
     reader = desk.reader
-    names = {f"{reader.title(name)} ({name})": name for name in desk.further}
+    names = {f"{reader.title(name)} ({name})": name for name in desk.addable}
     choice = widgets.Dropdown(options={"": None, **names}, layout={"width": "24em"})
     grids = widgets.VBox([])
 
@@ -234,11 +228,13 @@ def further_panel(desk):
             if name not in desk.draft.tables:
                 desk.draft.add_table(name)
         except InputError as error:
-            say(desk, "\n".join(reader.say(text) for text in error.texts))
+            show_status(desk, "\n".join(reader.say(text) for text in error.texts))
             return
-        heading = _page(f"<h3>{escape(reader.title(name))}</h3><p>{escape(reader.note(name))}</p>")
+        heading = widgets.HTML(
+            f"<h3>{escape(reader.title(name))}</h3><p>{escape(reader.note(name))}</p>"
+        )
         grids.children = (*grids.children, heading, TableGrid(desk, name).grid)
-        desk.changed()
+        desk.notify_edit()
 
     button = _button(reader.word("add_table"), add)
     return widgets.VBox([widgets.HBox([choice, button]), grids])
@@ -248,7 +244,7 @@ def further_panel(desk):
 
 
 def results_panel(desk):
-    """Run, Stop, progress with the time left, and the results."""
+    """Run, Stop, progress with the remaining time, and the results."""
     return ResultsPanel(desk).box
 
 
@@ -264,7 +260,7 @@ class ResultsPanel:
         self.stopper.disabled = True
         self.papers = widgets.Checkbox(value=True, description=word("with_papers"), indent=False)
         self.bar = widgets.FloatProgress(min=0, max=1, layout={"width": "16em"})
-        self.step, self.state, self.view = _page(), _page(), widgets.VBox([])
+        self.step, self.state, self.view = widgets.HTML(), widgets.HTML(), widgets.VBox([])
         self.step.add_class("tankcal-step")
         self.state.add_class("tankcal-state")
         self.view.add_class("tankcal-view")
@@ -275,7 +271,7 @@ class ResultsPanel:
     def refresh(self):
         """Show a message if the results are older than the job."""
         if self.desk.is_stale and self.run is None:
-            self._state(self.desk.reader.word("stale"), "#6b4e00")
+            self._show_state(self.desk.reader.word("stale"), "#6b4e00")
 
     def start(self):
         """Save the job and start the computation."""
@@ -284,15 +280,18 @@ class ResultsPanel:
         loop = asyncio.get_running_loop()
 
         def on_loop(act):
-            return lambda *given: loop.call_soon_threadsafe(act, *given)
+            """Function that calls act on the event loop, from any thread."""
+            return lambda *arguments: loop.call_soon_threadsafe(act, *arguments)
 
         try:
-            self.run = self.desk.begin(on_loop(self._tell), self.papers.value, on_loop(self._show))
+            self.run = self.desk.prepare_run(
+                on_loop(self._show_progress), self.papers.value, on_loop(self._show_result)
+            )
         except Refusal as error:
-            self._state(str(error))
+            self._show_state(str(error))
             return
         self.button.disabled, self.stopper.disabled = True, False
-        self._state("", "")
+        self._show_state("", "")
         thread = self.run.start()
         self.waiting = loop.create_task(self._finish(thread))
 
@@ -302,16 +301,21 @@ class ResultsPanel:
             self.run.stop()
             self.step.value = escape(self.desk.reader.word("stopping"))
 
-    def _tell(self, text, share):
+    def _show_progress(self, text, share):
         """Show the progress of a step."""
         self.step.value = escape(self.desk.reader.say(text))
         if share is not None:
             self.bar.value = share
 
-    def _show(self, result):
+    def _show_result(self, result):
         """Show the results while the reports are still being written."""
         self.desk.keep_run(self.run)
-        self.view.children = (live_results(self.desk),)
+        from tankcal.workbench.views import results_view
+
+        desk = self.desk
+        record = record_of(result)
+        view = results_view(result, record, desk.reader.language, desk.overrule)
+        self.view.children = (view,)
 
     async def _finish(self, thread):
         """Wait for the end of the computation, and show its files or its error."""
@@ -322,19 +326,19 @@ class ResultsPanel:
         word = self.desk.reader.word
         if run.error is None:
             names = ", ".join(path.name for path in run.files)
-            self._state(
+            self._show_state(
                 word("written", folder=str(self.desk.out.resolve()), files=names), "#1b5e20"
             )
             self.state.value += warnings_page(self.desk)
         elif isinstance(run.error, TankcalError):
-            self._state("\n".join(self.desk.reader.say(text) for text in run.error.texts))
+            self._show_state("\n".join(self.desk.reader.say(text) for text in run.error.texts))
         elif isinstance(run.error, OSError):
             reason = self.desk.reader.say(reason_of(run.error))
-            self._state(word("not_written", reason=reason))
+            self._show_state(word("not_written", reason=reason))
         else:
-            self._state(f"{type(run.error).__name__}: {run.error}")
+            self._show_state(f"{type(run.error).__name__}: {run.error}")
 
-    def _state(self, text, colour="#8c1d18"):
+    def _show_state(self, text, colour="#8c1d18"):
         """Show a message below the buttons; red by default."""
         lines = "".join(f"<div>{escape(line)}</div>" for line in text.splitlines())
         self.state.value = f'<div style="color: {colour}">{lines}</div>' if lines else ""

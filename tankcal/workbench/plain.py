@@ -1,6 +1,8 @@
-"""Tables and lists as plain HTML, with the texts and colours of the widgets."""
+"""Tables, lists and results as plain HTML, with the texts and colours of the widgets."""
 
 from html import escape
+
+from tankcal.workbench.findings import DOUBTFUL
 
 MOST_ROWS = 400  # largest number of rows of a page; the middle of a longer table is omitted
 STYLE = """<style>
@@ -85,3 +87,29 @@ def list_page(lines, nothing):
 def text_page(text):
     """HTML of a text with a paragraph for each line."""
     return "".join(f"<p>{escape(line)}</p>" for line in text.splitlines())
+
+
+# ---- results of the last computation
+
+
+def warnings_page(desk):
+    """HTML of warnings of the last computation that the check did not give, or ""."""
+    result = desk.last_run.result
+    known = {warning.text for warning in result.job.warnings}
+    warnings = [warning for warning in result.warnings if warning.text not in known]
+    if not warnings:
+        return ""
+    return list_page([(DOUBTFUL, desk.reader.line(warning)) for warning in warnings], "")
+
+
+def results_page(desk):
+    """HTML of the last computation, without buttons, below the list of written files."""
+    from tankcal.record import record_of
+    from tankcal.report.paper import Paper
+    from tankcal.workbench.views.page import SavedView
+
+    paper = Paper(record_of(desk.last_run.result), language=desk.reader.language)
+    names = ", ".join(path.name for path in desk.last_run.files)
+    written = desk.reader.word("written", folder=str(desk.out.resolve()), files=names)
+    above = f"<p>{escape(written)}</p>{warnings_page(desk)}"
+    return f"{above}{SavedView(paper)._repr_html_()}"

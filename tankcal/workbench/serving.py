@@ -19,7 +19,7 @@ POLICY = (
 )
 # Voilà refuses the request of a closed page to end its kernel, so that idle kernels must be ended.
 # A running computation reports its progress and is not idle.
-LEFT_S, LOOK_S = 600, 60  # idle time after which a kernel is ended, and interval of the check
+IDLE_S, CHECK_S = 600, 60  # idle time after which a kernel is ended, and interval of the check
 
 
 def has_lab():
@@ -36,7 +36,7 @@ def open_lab(notebook, is_browser=True):
     """Show a notebook in JupyterLab, on this machine only, until JupyterLab is stopped."""
     from jupyterlab.labapp import LabApp
 
-    _let_kernels_start_quickly()
+    _speed_up_kernels()
     arguments = [str(notebook), f"--ServerApp.ip={HERE}", "--ServerApp.answer_yes=True"]
     LabApp.launch_instance(arguments if is_browser else [*arguments, "--no-browser"])
 
@@ -60,7 +60,7 @@ def serve_app(notebook, port, address=HERE, is_browser=True, token=""):
     from traitlets.config import Config
     from voila.app import Voila
 
-    _let_kernels_start_quickly()
+    _speed_up_kernels()
     arguments = [
         str(notebook),
         f"--Voila.ip={address}",
@@ -70,7 +70,7 @@ def serve_app(notebook, port, address=HERE, is_browser=True, token=""):
         "--strip_sources=True",
     ]
     headers = {"Content-Security-Policy": POLICY}
-    idle_settings = {"cull_idle_timeout": LEFT_S, "cull_interval": LOOK_S, "cull_connected": False}
+    idle_settings = {"cull_idle_timeout": IDLE_S, "cull_interval": CHECK_S, "cull_connected": False}
     # A local address requires no token. A web page whose host name resolves to this machine (DNS
     # rebinding) must not reach the kernel, so that other host names are refused.
     tornado = {"headers": headers, "allow_remote_access": not is_local(address)}
@@ -112,7 +112,7 @@ def free_port(address, wanted=None):
         raise InputError(Problem("--port" if wanted else "--address", expected)) from error
 
 
-def _let_kernels_start_quickly():
+def _speed_up_kernels():
     """Set environment variables for kernels; several BLAS threads are slow for small matrices."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("PYDEVD_DISABLE_FILE_VALIDATION", "1")

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from tankcal.job.folder import is_row, separator_of_text
 from tankcal.text.spreadsheets import guard_formula, unguard_formula
-from tankcal.workbench.decimals import Unwritten
+from tankcal.workbench.decimals import AmbiguousNumber
 
 _ENDING = re.compile("\r\n|\r|\n")
 MARK_OF_ORDER = "\N{ZERO WIDTH NO-BREAK SPACE}"  # byte order mark
@@ -102,13 +102,13 @@ class EditedTable:
         return replace(self, headings=(*self.headings, heading), rows=rows)
 
     @property
-    def unwritten(self):
+    def ambiguous(self):
         """Places [(row, column)] of the ambiguous values, which are not written."""
         return [
             (place, column)
             for place, row in enumerate(self.rows)
             for column in row.changed
-            if isinstance(row.cells[column], Unwritten)
+            if isinstance(row.cells[column], AmbiguousNumber)
         ]
 
     def render(self):
@@ -213,7 +213,7 @@ class CsvLines:
 
     def _quoted(self, text):
         """Text of a cell in the file, with quotation marks if required; "" if ambiguous."""
-        if isinstance(text, Unwritten):
+        if isinstance(text, AmbiguousNumber):
             return ""
         text = guard_formula(_ENDING.sub(" ", text).strip())
         if self.separator not in text and '"' not in text:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tankcal.inspection.boards import BOARD_M, bead_height, board_gap, gaps_of_profile
+from tankcal.inspection.boards import BOARD_M, bead_height, board_gap, profile_gaps
 
 CELL_M = 0.0125
 CELLS_M = CELL_M * np.arange(-42, 43)
@@ -41,7 +41,7 @@ def test_shift_and_lean_drop_out():  # property: exact, of formula and of cells
     e, sd = 0.008 * np.exp(-np.abs(CELLS_M) / 0.1), np.full(len(CELLS_M), 2e-4)
     moved = e + 0.013 - 0.02 * CELLS_M
     assert_allclose(board_gap(CELLS_M, moved), board_gap(CELLS_M, e), atol=1e-15)
-    one, other = (gaps_of_profile(CELLS_M, each, sd) for each in (e, moved))
+    one, other = (profile_gaps(CELLS_M, each, sd) for each in (e, moved))
     assert_allclose(one.gap_m, other.gap_m, atol=1e-15)
     assert_allclose(one.noise_m2, other.noise_m2)
 
@@ -57,7 +57,7 @@ def test_another_centre_drops_out_to_first_order():  # closed form: a (1 - cos(b
 # Truth: the means of the cells by closed form, the gap by that of the page.
 @pytest.mark.parametrize("wide_m", [0.1, 0.15, 0.3])
 def test_what_cells_miss_of_a_cusp_is_told(wide_m):
-    found = gaps_of_profile(CELLS_M, _means_of_cusp(wide_m, 0.008), np.full(len(CELLS_M), 1e-7))
+    found = profile_gaps(CELLS_M, _means_of_cusp(wide_m, 0.008), np.full(len(CELLS_M), 1e-7))
     truth = 0.008 * (1 - np.exp(-BOARD_M / 2 / wide_m))
     missed = truth - found.gap_m[MIDDLE]
     assert 0 < missed < 3e-4
@@ -70,10 +70,8 @@ def test_noise_of_a_gap():  # truth: the spread of 4000 simulated profiles
     e, sd = _means_of_cusp(0.15, 0.008), rng.uniform(1e-4, 4e-4, len(CELLS_M))
     noisy = e + sd * rng.normal(size=(4000, len(e)))
     for has_bead in (False, True):
-        gaps = np.array(
-            [gaps_of_profile(CELLS_M, one, sd, has_bead=has_bead).gap_m for one in noisy]
-        )
-        told = gaps_of_profile(CELLS_M, e, sd, has_bead=has_bead)
+        gaps = np.array([profile_gaps(CELLS_M, one, sd, has_bead=has_bead).gap_m for one in noisy])
+        told = profile_gaps(CELLS_M, e, sd, has_bead=has_bead)
         inner = slice(MIDDLE - 12, MIDDLE + 13)
         assert_allclose(gaps[:, inner].mean(axis=0), told.gap_m[inner], atol=4 * 5e-4 / 63)
         assert_allclose(gaps[:, inner].var(axis=0), told.noise_m2[inner], rtol=0.12)
@@ -86,9 +84,9 @@ def test_bead_is_no_peak(wide_m, short_m):
     truth = 0.008 * (1 - np.exp(-BOARD_M / 2 / wide_m))
     bead = 0.0025 * (np.abs(CELLS_M) < 0.01)
     sd = np.full(len(e), 1e-5)
-    bare, seen = (gaps_of_profile(CELLS_M, one, sd) for one in (e, e + bead))
+    bare, seen = (profile_gaps(CELLS_M, one, sd) for one in (e, e + bead))
     assert bead_height(CELLS_M, bare.gap_m) < 0.001 < bead_height(CELLS_M, seen.gap_m)
-    found = gaps_of_profile(CELLS_M, e + bead, sd, has_bead=True)
+    found = profile_gaps(CELLS_M, e + bead, sd, has_bead=True)
     short = truth - found.gap_m[MIDDLE]
     assert 0 <= short < short_m
     assert short < 1.96 * np.sqrt((found.noise_m2 + found.missed_m2)[MIDDLE])
@@ -96,7 +94,7 @@ def test_bead_is_no_peak(wide_m, short_m):
 
 def _without(hidden):
     e = np.where(hidden, np.nan, 0.008 * np.exp(-np.abs(CELLS_M) / 0.1))
-    return gaps_of_profile(CELLS_M, e, np.full(len(e), 2e-4))
+    return profile_gaps(CELLS_M, e, np.full(len(e), 2e-4))
 
 
 def test_profile_that_bears_no_board():  # property

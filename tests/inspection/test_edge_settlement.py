@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from tankcal.inspection.bulges import find_bulge
 from tankcal.inspection.edges import assess_edges, bent_line, find_break
 from tankcal.inspection.levelling import RadialLine
-from tankcal.inspection.settlement_limits import BulgeLimits, EdgeLimits, largest_drop_mm
+from tankcal.inspection.rules import BulgeLimits, EdgeLimits, largest_drop_mm
 from tankcal.job.tables import Log
 
 pytestmark = pytest.mark.slow  # seconds of fits

@@ -6,15 +6,15 @@ from levelled_tanks import LIMITS, epoch_of, even_azimuths
 from numpy.testing import assert_allclose
 from settled_tanks import CLASSES, FAMILIES, levelled_class, shares
 
-from tankcal.inspection.extrapolation import Statistic, estimate, simulate_errors
-from tankcal.inspection.out_of_plane import between_neighbours, fit_plane
-from tankcal.inspection.settlement import assess, figures_of
-from tankcal.inspection.settlement_limits import Strength
-from tankcal.inspection.verdict import gravity, verdict_of
+from tankcal.inspection.extrapolation import Statistic, estimate_statistic, simulate_errors
+from tankcal.inspection.out_of_plane import find_neighbours, fit_plane
+from tankcal.inspection.rules import Strength
+from tankcal.inspection.settlement import assess, settlement_figures
+from tankcal.inspection.verdict import severity, verdict_of
 
 N = 16
 T = even_azimuths(N)
-ROWS = between_neighbours(T, 1.0).operator @ fit_plane(T, np.zeros(N)).residual_operator
+ROWS = find_neighbours(T, 1.0).operator @ fit_plane(T, np.zeros(N)).residual_operator
 
 
 S = Statistic(ROWS, lambda values: np.max(np.abs(values), axis=-1))
@@ -26,7 +26,7 @@ S = Statistic(ROWS, lambda values: np.max(np.abs(values), axis=-1))
 def estimates(z, u_m=1e-3):
     """`Estimate` of the largest S of elevations."""
     errors = simulate_errors(T, z, np.full(N, u_m))
-    return estimate(S, z, float(S.reduce(S.operator @ z)), errors)
+    return estimate_statistic(S, z, float(S.reduce(S.operator @ z)), errors)
 
 
 def test_a_sum_of_squares_is_extrapolated_exactly():
@@ -35,7 +35,7 @@ def test_a_sum_of_squares_is_extrapolated_exactly():
     residual = fit_plane(T, z).residual_operator
     squares = Statistic(residual, lambda values: np.sum(values**2, axis=-1))
     reading = float(np.sum((residual @ z) ** 2))
-    found = estimate(squares, z, reading, simulate_errors(T, z, np.full(N, 1e-3)))
+    found = estimate_statistic(squares, z, reading, simulate_errors(T, z, np.full(N, 1e-3)))
     assert_allclose(found.value, reading - (N - 3) * 1e-6, rtol=0.01)
 
 
@@ -46,7 +46,7 @@ def test_level_tanks_keep_a_known_part_of_the_largest_error():
     draws = rng.normal(0, 1e-3, (400, N))
     readings = S.reduce(draws @ S.operator.T)
     values = [
-        estimate(S, z, one, simulate_errors(T, z, np.full(N, 1e-3))).value
+        estimate_statistic(S, z, one, simulate_errors(T, z, np.full(N, 1e-3))).value
         for z, one in zip(draws[:60], readings, strict=False)
     ]
     left = 3 - 3 * np.sqrt(2) + np.sqrt(3)
@@ -78,7 +78,7 @@ def test_turning_the_tank_changes_no_estimate():
     found = []
     for shift in (0, 5):
         epoch = epoch_of(1000 * np.roll(z, shift))
-        figures = figures_of(assess(epoch, np.inf, strength, LIMITS), LIMITS)
+        figures = settlement_figures(assess(epoch, np.inf, strength, LIMITS), LIMITS)
         found.append([(one.value, one.U) for one in figures])
     assert_allclose(found[0], found[1], rtol=1e-6)
 
@@ -98,7 +98,7 @@ def test_a_pass_needs_the_largest_reading_within_its_own_u():
 
 
 def test_a_place_that_fails_decides_before_a_larger_uncertain_one():
-    assert gravity(6.5, 1.0, 5.2) > gravity(9.0, 4.0, 5.2) > gravity(5.0, 4.0, 5.2)
+    assert severity(6.5, 1.0, 5.2) > severity(9.0, 4.0, 5.2) > severity(5.0, 4.0, 5.2)
 
 
 # ---- families of settlement that are no prior of the package

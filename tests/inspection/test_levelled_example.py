@@ -8,11 +8,10 @@ import tomllib
 import numpy as np
 import pytest
 
-from tankcal.inspection.bottom import Bottom, inspect_bottom
 from tankcal.inspection.edges import assess_edges
+from tankcal.inspection.inspecting import Bottom, inspect_bottom
 from tankcal.inspection.levelling import read_edge_profiles, read_settlement
-from tankcal.inspection.settlement import assess_settlement
-from tankcal.inspection.settlement_limits import (
+from tankcal.inspection.rules import (
     BULGE,
     EDGE,
     SETTLEMENT,
@@ -21,6 +20,7 @@ from tankcal.inspection.settlement_limits import (
     edge_limits,
     settlement_limits,
 )
+from tankcal.inspection.settlement import assess_settlement
 from tankcal.job.entries import read_section
 from tankcal.job.folder import read_toml
 from tankcal.job.tables import Log

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 
 from tankcal.inspection.edges import assess_edges
 from tankcal.inspection.levelling import read_edge_profiles, read_settlement
+from tankcal.inspection.rules import BulgeLimits, EdgeLimits
 from tankcal.inspection.settlement import assess_settlement
-from tankcal.inspection.settlement_limits import BulgeLimits, EdgeLimits
 from tankcal.job.tables import Log
 
 POINTS = {f"P{i + 1}": (22.5 * i, 12 + z / 1000) for i, z in enumerate(A_MM)}

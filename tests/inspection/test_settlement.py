@@ -8,20 +8,27 @@ from numpy.testing import assert_allclose
 
 from tankcal.inspection.epochs import Levelling, is_within_noise
 from tankcal.inspection.out_of_plane import (
-    between_neighbours,
     explained_share,
+    find_largest_curvature,
+    find_neighbours,
     fit_plane,
-    largest_curvature_of,
     spaced_subset,
 )
-from tankcal.inspection.settlement import assess, assess_settlement, figures_of, settlement_of
-from tankcal.inspection.settlement_limits import SettlementLimits, Strength, largest_curvature
-from tankcal.inspection.verdict import judged
+from tankcal.inspection.rules import SettlementLimits, Strength, compute_curvature_limit
+from tankcal.inspection.settlement import (
+    assess,
+    assess_settlement,
+    make_settlement,
+    settlement_figures,
+)
+from tankcal.inspection.verdict import make_check
 from tankcal.job.tables import Log
 
 
 def figures(epoch, strength, limits=LIMITS, dof=np.inf):
-    return {one.code: one for one in figures_of(assess(epoch, dof, strength, limits), limits)}
+    return {
+        one.code: one for one in settlement_figures(assess(epoch, dof, strength, limits), limits)
+    }
 
 
 # ---- published: example A of 16 points, every printed digit
@@ -30,7 +37,7 @@ def figures(epoch, strength, limits=LIMITS, dof=np.inf):
 @pytest.fixture(scope="module")
 def example_a():
     assessed = assess(epoch_of(A_MM), np.inf, TANK_A, LIMITS)
-    return settlement_of(assessed, TANK_A, True)
+    return make_settlement(assessed, TANK_A, True)
 
 
 def test_cosine_of_example_a(example_a):
@@ -63,7 +70,7 @@ def test_largest_of_example_a_with_its_uncertainty():
     assert 4.0 < one.value < one.reading  # a second point, of 4.26 mm, competes
     assert (one.azimuth_deg, one.used) == (90.0, 16)  # point 5
     assert one.reading < one.limit.value < one.reading + one.U_reading  # the guard band
-    assert judged(one).verdict == "guard_band"
+    assert make_check(one).verdict == "guard_band"
     assert round(found["settlement_de_beer"].limit.value, 2) == 9.29
 
 
@@ -77,7 +84,7 @@ def test_subset_of_example_a(example_a):
 
 @pytest.mark.parametrize(("highest", "printed"), [(4, 3.8e-4), (7, 8.1e-4)])
 def test_curvature_of_example_a(highest, printed):
-    found = largest_curvature_of(even_azimuths(16), np.array(A_MM) / 1000, 21.3 / 2, highest)
+    found = find_largest_curvature(even_azimuths(16), np.array(A_MM) / 1000, 21.3 / 2, highest)
     assert float(f"{found.per_m:.1e}") == printed
 
 
@@ -91,8 +98,8 @@ def test_harmonics_of_example_a(example_a):
 
 def limits_of_b(count, strength):
     """Limit of S with so many points round a tank, in the length unit of `strength`."""
-    neighbours = between_neighbours(even_azimuths(count), strength.diameter_m / 2)
-    return neighbours.limits_m(largest_curvature(LIMITS, strength))
+    neighbours = find_neighbours(even_azimuths(count), strength.diameter_m / 2)
+    return neighbours.limits_m(compute_curvature_limit(LIMITS, strength))
 
 
 @pytest.mark.parametrize(
@@ -120,7 +127,7 @@ def test_readings_of_a_dense_levelling_are_beyond_the_limit(figure):
     """
     t = np.radians(np.arange(0, 360, 0.01))
     planted = sum(k * k * waves(t, {k: PLANTED[k]}) for k in (2, 3, 4)) / 1000 / 30**2
-    truth, limit = np.abs(planted).max(), largest_curvature(LIMITS, WIDE)
+    truth, limit = np.abs(planted).max(), compute_curvature_limit(LIMITS, WIDE)
     assert 0.3 < truth / limit < 0.7
     rng = np.random.default_rng(653)
     beyond, failed = {}, 0
@@ -136,7 +143,7 @@ def test_readings_of_a_dense_levelling_are_beyond_the_limit(figure):
                 beyond[count][code] += abs(readings[code].value) > readings[code].limit.value
             if number < 10:
                 found = figures(epoch_of(z, s_mm=1.5), WIDE)
-                failed += sum(judged(found[code]).verdict == "failed" for code in beyond[count])
+                failed += sum(make_check(found[code]).verdict == "failed" for code in beyond[count])
     figure(
         "settlement of half the limit, s = 1.5 mm, D 60 m: readings beyond it in % by all, subset,"
         " curvature",
@@ -156,7 +163,7 @@ def test_without_errors_every_spacing_says_the_same():
         z = waves(even_azimuths(count), {2: (60.0, 0.0)})
         found = figures(epoch_of(z), WIDE)
         step = 2 * np.pi / count
-        one, limit = found["settlement_all"], largest_curvature(LIMITS, WIDE)
+        one, limit = found["settlement_all"], compute_curvature_limit(LIMITS, WIDE)
         assert_allclose(abs(one.reading), 60 * (1 - np.cos(2 * step)), rtol=1e-9)
         assert_allclose(abs(one.reading) / one.limit.value, 4 * 0.06 / 30**2 / limit, rtol=0.06)
         assert_allclose(found["settlement_curvature"].reading, 4 * 0.06 / 30**2, rtol=1e-6)
@@ -173,7 +180,7 @@ def uneven(count, seed, share=0.3):
 def test_a_curve_between_uneven_neighbours():
     """Closed form: s^2/2 has curvature 1, so that S is minus half the product of both arcs."""
     azimuth = np.array([0.1, 0.3, 0.8, 2.0, 3.0, 4.0, 4.5, 5.5])
-    found = between_neighbours(azimuth, 10.0)
+    found = find_neighbours(azimuth, 10.0)
     arcs = 10 * azimuth
     S = found.operator @ (arcs**2 / 2)
     inner = slice(1, -1)
@@ -188,7 +195,7 @@ def test_curvature_of_uneven_points_is_the_planted_one():
     azimuth = uneven(24, 4)
     grid = np.radians(np.arange(0, 360, 0.01))
     planted = sum(k * k * waves(grid, {k: PLANTED[k]}) for k in (2, 3, 4)) / 1000 / 30**2
-    found = largest_curvature_of(azimuth, waves(azimuth, PLANTED) / 1000, 30.0, 6)
+    found = find_largest_curvature(azimuth, waves(azimuth, PLANTED) / 1000, 30.0, 6)
     assert_allclose(found.per_m, np.abs(planted).max(), rtol=1e-6)
     assert_allclose(found.azimuth_rad, grid[np.argmax(np.abs(planted))], atol=2e-4)
 
@@ -210,11 +217,11 @@ def test_half_the_points_at_uneven_places():
     azimuth = uneven(24, 8)
     epoch = epoch_of(np.random.default_rng(3).normal(0, 4, 24), azimuth)
     assessed = assess(epoch, np.inf, WIDE, LIMITS)
-    saved = settlement_of(assessed, WIDE, True)
+    saved = make_settlement(assessed, WIDE, True)
     at = assessed.largest.place
     half = np.sort([*range(at % 2, 24, 2)])
-    others = between_neighbours(azimuth[half], 30.0)
-    limits = others.limits_m(largest_curvature(LIMITS, WIDE))
+    others = find_neighbours(azimuth[half], 30.0)
+    limits = others.limits_m(compute_curvature_limit(LIMITS, WIDE))
     assert_allclose(saved.limit_half_mm, 1000 * limits[np.flatnonzero(half == at)[0]])
 
 
@@ -244,7 +251,7 @@ def test_few_points_are_their_own_subset():
 
 def test_sd_of_out_of_plane_settlement():
     """Published: sqrt(1.5) without the fit, 1.2244 with it (N = 16)."""
-    neighbours = between_neighbours(even_azimuths(16), 1.0)
+    neighbours = find_neighbours(even_azimuths(16), 1.0)
     plane = fit_plane(even_azimuths(16), np.zeros(16))
     assert_allclose(np.linalg.norm(neighbours.operator, axis=1), np.sqrt(1.5))
     rows = neighbours.operator @ plane.residual_operator
@@ -275,7 +282,7 @@ def test_uncertainty_of_curvature_tilt_and_r2_by_simulation():
         z = (true + rng.normal(0, 1, 16)) / 1000
         plane = fit_plane(azimuth, z)
         r2 = explained_share(z, plane.residual_m)[0]
-        found.append((largest_curvature_of(azimuth, z, 30.0, 4).per_m, plane.b_m, r2))
+        found.append((find_largest_curvature(azimuth, z, 30.0, 4).per_m, plane.b_m, r2))
     of_b = np.sqrt(assessed.plane.b_gradient() ** 2 @ np.full(16, 1e-6))
     expected = [assessed.u_curvature_per_m, of_b, assessed.u_r2]
     assert_allclose(expected, np.std(found, axis=0), rtol=0.05)
@@ -293,9 +300,9 @@ def test_gradients():
         lambda z: np.array([fit_plane(azimuth, z).b_m]), z, fit_plane(azimuth, z).b_gradient()[None]
     )
     assert_derivative(
-        lambda z: np.array([largest_curvature_of(azimuth, z, 2.0, 3).per_m]),
+        lambda z: np.array([find_largest_curvature(azimuth, z, 2.0, 3).per_m]),
         z,
-        largest_curvature_of(azimuth, z, 2.0, 3).gradient[None],
+        find_largest_curvature(azimuth, z, 2.0, 3).gradient[None],
         step=1e-4,
     )
 
@@ -345,7 +352,9 @@ def test_without_strength_there_are_figures_without_limit():
     assert found["settlement_all"].remark == "no_strength"
     assert found["settlement_curvature"].limit is None
     assert round(found["settlement_de_beer"].limit.value, 2) == 9.29
-    saved = settlement_of(assess(epoch_of(A_MM), 0, Strength(21.3), LIMITS), Strength(21.3), False)
+    saved = make_settlement(
+        assess(epoch_of(A_MM), 0, Strength(21.3), LIMITS), Strength(21.3), False
+    )
     assert (saved.limit_mm, saved.limit_half_mm, saved.subset_limit_mm) == (None,) * 3
     assert saved.points[4].limit_mm is None
 

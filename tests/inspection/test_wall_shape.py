@@ -10,7 +10,7 @@ from inspected_walls import cylinder, true_level, true_plumb
 
 from tankcal.inspection.rules import limit_of, shipped_names, shipped_rule
 from tankcal.inspection.shape import Sizes, inspect_shape, spread_of
-from tankcal.inspection.verdict import judged, verdict_of
+from tankcal.inspection.verdict import make_check, verdict_of
 from tankcal.pipeline.wall import find_wall
 from tankcal.pipeline.wall_shape import LOW_M, wall_shape_of
 from tankcal.record.schema import to_plain
@@ -35,7 +35,7 @@ def checks_of(job, wall, rule):
     courses = tuple(one.height_m for one in job.courses)
     sizes = Sizes(wall.radius_m, sum(courses), courses, 2 * wall.radius_m)
     figures, _, _ = inspect_shape(to_plain(shape_record(job, found)), sizes, shipped_rule(rule))
-    return {one.code: judged(one) for one in figures}
+    return {one.code: make_check(one) for one in figures}
 
 
 @pytest.mark.slow

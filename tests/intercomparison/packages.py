@@ -3,7 +3,7 @@
 import json
 from functools import cache
 
-from tankcal.intercomparison.answers import answer_files, template_files
+from tankcal.intercomparison.answers import answer_files, make_forms
 from tankcal.intercomparison.package import make_package, write_files
 from tankcal.record.intercomparison import Answer, AnswersFile, Participant
 
@@ -46,5 +46,5 @@ def write_answers(folder, saved):
 
 def write_template(folder, manifest):
     """A folder of empty forms."""
-    write_files(folder, template_files(manifest))
+    write_files(folder, make_forms(manifest))
     return folder

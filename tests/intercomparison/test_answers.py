@@ -9,7 +9,7 @@ from packages import answers_of, write_answers, write_template, written_package
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.intercomparison.answers import read_answers
-from tankcal.intercomparison.judging import score_folders
+from tankcal.intercomparison.scoring import score_folders
 from tankcal.job.tables import Log
 from tankcal.record.intercomparison import ANSWERS, SCORES
 from tankcal.record.schema import to_plain

@@ -11,8 +11,8 @@ from tankcal.camera.model import PARAMETERS, Form, distort_image_points
 from tankcal.intercomparison.drawing import draw_tank
 from tankcal.intercomparison.observers import METHODS, tape
 from tankcal.intercomparison.observers.cloud import observe_cloud
-from tankcal.intercomparison.observers.photographs import looking, photograph
-from tankcal.intercomparison.site import Chance, ask, observe_site
+from tankcal.intercomparison.observers.photographs import camera_rotation, photograph
+from tankcal.intercomparison.site import Chance, observe_site, request_table
 
 U_READ_M = 2e-5  # files have hundredths of a millimetre
 
@@ -25,7 +25,7 @@ def tank():
 def perfect(tank, method, seed=1):
     """The parts of a job of a crew without errors."""
     chance = Chance(np.random.default_rng(seed), size=0.0)
-    return METHODS[method](tank, chance, ask(tank, 0.0))
+    return METHODS[method](tank, chance, request_table(tank, 0.0))
 
 
 def columns(parts, table, *names):
@@ -37,7 +37,7 @@ def columns(parts, table, *names):
 def cool(parts, tank, xyz, origin=(0.0, 0.0)):
     """Places in the frame of a job as places of the tank when it is cool."""
     foot = np.array([*origin, parts.settings["datum.bottom_z_m"]])
-    return (xyz - foot) / tank.grown(parts.settings["survey.shell_temperature_c"])
+    return (xyz - foot) / tank.expansion_factor(parts.settings["survey.shell_temperature_c"])
 
 
 def on_wall(parts, tank, xyz, origin=(0.0, 0.0)):
@@ -80,7 +80,7 @@ def test_a_tape_reads_the_mean_width_of_the_hull(tank):
     shell_c = parts.settings["survey.shell_temperature_c"]
     reading, pull = columns(parts, "circumferences", "reading_m", "tension_n")
     tape_unit = (1 + 1.15e-5 * (shell_c - 20)) * (1 + (pull[0] - 50) / 5.15e5)
-    expected = tank.grown(shell_c) * tape.girth_m(tank, z) + np.pi * 2e-4
+    expected = tank.expansion_factor(shell_c) * tape.girth_m(tank, z) + np.pi * 2e-4
     assert_allclose(reading[0] * tape_unit, expected, atol=U_READ_M)
 
 
@@ -88,7 +88,7 @@ def test_offsets_end_on_the_wall(tank):
     """The line of each offset is upright: where all of its offsets begin is one place."""
     parts = perfect(tank, "reference-line")
     rows = parts.tables["offsets"][1:]
-    f = tank.grown(parts.settings["survey.shell_temperature_c"])
+    f = tank.expansion_factor(parts.settings["survey.shell_temperature_c"])
     zero = parts.settings["datum.dip_plate_z_m"]
     angles = {row[0]: np.radians(row[1]) for row in parts.tables["lines"][1:]}
     for name, at in list(angles.items())[::5]:
@@ -114,7 +114,7 @@ def las_points(data):
 def test_scans_lie_on_wall_bottom_and_columns(tank):
     """Pose by the targets of both files, here by the SVD of their coordinates."""
     chance = Chance(np.random.default_rng(1), size=0.0)
-    parts = observe_cloud(tank, chance, ask(tank, 0.0), points=6000)
+    parts = observe_cloud(tank, chance, request_table(tank, 0.0), points=6000)
     station = np.array([0.1, 0.15, 1.5])
     names = [row[1] for row in parts.tables["directions"][1:]]
     read = [columns(parts, *pair)[0] for pair in (
@@ -145,7 +145,7 @@ def test_laspy_reads_the_scans(tank):
     """Other program."""
     laspy = pytest.importorskip("laspy")
     chance = Chance(np.random.default_rng(1), size=0.0)
-    data = observe_cloud(tank, chance, ask(tank, 0.0), points=2000).files["scans/a.las"]
+    data = observe_cloud(tank, chance, request_table(tank, 0.0), points=2000).files["scans/a.las"]
     read = laspy.read(io.BytesIO(data))
     assert_allclose(read.xyz, las_points(data), atol=1e-9)
     assert_allclose([read.header.mins, read.header.maxs], [read.xyz.min(0), read.xyz.max(0)])
@@ -175,11 +175,13 @@ def test_batches_are_the_mass_in_the_tank(tank):
 def test_photographs_are_those_of_the_camera(tank):
     """Second method: the package's own camera in the convention that the job names."""
     chance = Chance(np.random.default_rng(1), size=0.0)
-    site = observe_site(tank, chance, ask(tank, 0.0), outside=True, frame_m=(100.0, 200.0, 50.0))
+    site = observe_site(
+        tank, chance, request_table(tank, 0.0), outside=True, frame_m=(100.0, 200.0, 50.0)
+    )
     azimuth = np.linspace(0, 2 * np.pi, 60)
     places = site.places(azimuth, np.full(60, 2.0))
     centre = np.array([100.0 + tank.radius_m + 9.0, 203.0, 52.0])
-    rotation = looking(centre, site.frame_m + [0, 0, 3.0], 0.4)
+    rotation = camera_rotation(centre, site.frame_m + [0, 0, 3.0], 0.4)
     interior = {
         "c": 20.1,
         "x0": 0.02,
@@ -205,8 +207,8 @@ def test_what_is_declared_holds_the_errors():
     tank = draw_tank(np.random.default_rng(8), "T1", "round")
     rng, zeros, heights = np.random.default_rng(1), [], []
     for _ in range(300):
-        site = observe_site(tank, Chance(rng), ask(tank, 0.0), outside=False)
-        zeros.append(site.zero_m - site.grown * tank.plate_z_m)
+        site = observe_site(tank, Chance(rng), request_table(tank, 0.0), outside=False)
+        zeros.append(site.zero_m - site.expansion_factor * tank.plate_z_m)
         heights += [row[1] for row in site.parts.tables["courses"][1:]]
     along = np.hypot(1, np.hypot(*tank.lean))
     off = np.reshape(heights, (300, -1)) - along * np.array(tank.courses_m)
@@ -219,11 +221,10 @@ def test_what_is_declared_holds_the_errors():
 def test_tankcal_finds_the_tank(method, tmp_path, figure):
     """A perfect crew: what is left is the wall that no reading shows, well within U."""
     import tankcal
-    from tankcal.intercomparison.package import write_files
-    from tankcal.intercomparison.writing import job_files
+    from tankcal.intercomparison.package import job_files, write_files
 
     tank = draw_tank(np.random.default_rng(1), "T1", "coil")
-    asked = ask(tank, 850.0)
+    asked = request_table(tank, 850.0)
     parts = METHODS[method](tank, Chance(np.random.default_rng(2), size=0.0), asked)
     write_files(tmp_path, job_files(parts))
     result = tankcal.run(tankcal.load(tmp_path))

@@ -17,9 +17,9 @@ from packages import (
 
 from tankcal.cli.intercomparison import METHODS as NAMED
 from tankcal.errors import InputError
-from tankcal.intercomparison.judging import score_folders
 from tankcal.intercomparison.observers import METHODS as ALL
 from tankcal.intercomparison.package import load_package, make_package
+from tankcal.intercomparison.scoring import score_folders
 from tankcal.intercomparison.tank import tank_of
 from tankcal.job import load
 from tankcal.job.tables import Log

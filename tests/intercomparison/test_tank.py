@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from tankcal.intercomparison.defects import Band, Buckle, Course, Dent, Flat, Oval, Seam
 from tankcal.intercomparison.drawing import FAMILIES, draw_tank
-from tankcal.intercomparison.site import ask
+from tankcal.intercomparison.site import request_table
 from tankcal.intercomparison.tank import GRAVITY, Fitting, Floor, Tank, Wave, tank_of
 
 LEVEL = Floor()
@@ -65,7 +65,7 @@ def test_things_and_zero():
 def test_a_warm_tank_holds_the_cube():
     """Property: similar bodies, but for the dip plate, which is at the foot here."""
     tank = make_tank(EVERYTHING)
-    f = tank.grown(40.0)
+    f = tank.expansion_factor(40.0)
     assert_allclose(tank.volumes_m3(3.0 * f, celsius=40.0), f**3 * tank.volumes_m3(3.0), rtol=1e-12)
 
 
@@ -137,7 +137,7 @@ def test_volume_of_a_mesh(family):
 def test_more_nodes_change_nothing(family):
     """Property: converged to a part of 1e8, for every family."""
     tank = draw_tank(np.random.default_rng(5), "T1", family)
-    asked = ask(tank, 850.0)
+    asked = request_table(tank, 850.0)
     some = asked.dips_m[::9]
     assert tank.volume_error_m3(some, 850.0) < 1e-8 * tank.volumes_m3(some[-1])[0]
 
@@ -159,7 +159,7 @@ def test_rays_end_on_the_wall():
 def test_what_is_asked():
     """Heights rise, are covered by liquid, and have the pairs of deliveries."""
     tank = draw_tank(np.random.default_rng(5), "T1", "coil")
-    dips = np.array(ask(tank, 0.0).dips_m)
+    dips = np.array(request_table(tank, 0.0).dips_m)
     assert np.all(np.diff(dips) > 0.005)
     assert dips[0] + tank.plate_z_m >= tank.lowest_level_m
     assert dips[-1] + tank.plate_z_m < tank.height_m

@@ -16,15 +16,15 @@ from linted_tables import DECIMALS, SHAPES, STEPS, WIDE, courses, lying, rows_of
 from tankcal.errors import InputError, TankcalError
 from tankcal.linter import Nominal, lint
 from tankcal.linter.examination import (
-    Rows,
-    _is_below_nothing,
+    ScreenedRows,
+    _is_below_zero,
     examine,
     leave_one_out,
     most_suspicious,
 )
 from tankcal.linter.headings import heading_of
 from tankcal.linter.numbers import Style, read_number, style_of
-from tankcal.linter.volumes import suggestion
+from tankcal.linter.volumes import suggest_number
 from tankcal.recalibration.reading import read_former
 from tankcal.tank.dips import dip_label, table_heights
 
@@ -151,7 +151,7 @@ def test_rounding_alone_is_never_suspicious(coefficients, seed, gaps):
 def examined(heights, volumes):
     count = len(heights)
     flags = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
-    return Rows(heights, volumes, *flags, [], np.ones(count), 0.5 + 1e-9)
+    return ScreenedRows(heights, volumes, *flags, [], np.ones(count), 0.5 + 1e-9)
 
 
 # spoilt tables: the study
@@ -654,7 +654,7 @@ def test_a_leaning_tank_dipped_near_its_low_end_is_sound(tank, tmp_path):
 def test_a_little_less_than_nothing_excuses_no_row():
     """300 where about -1 is expected is wrong; 1 where -83 is expected is not; 0 never is."""
     cases = (300.0, 301.0), (1.0, 84.0), (0.0, 5.0), (100.0, 60.0)
-    assert [_is_below_nothing(*one) for one in cases] == [False, True, True, False]
+    assert [_is_below_zero(*one) for one in cases] == [False, True, True, False]
 
 
 def test_ullage_and_tables_from_the_top_down(tmp_path):
@@ -760,8 +760,8 @@ def test_the_style_is_the_one_in_which_the_columns_rise():
     ],
 )
 def test_suggestions(text, expected, found_text, slip):
-    assert suggestion(text, expected, 0.003, 3) == (found_text, slip)
-    assert suggestion(text, expected + 7777, 0.003, 3) is None
+    assert suggest_number(text, expected, 0.003, 3) == (found_text, slip)
+    assert suggest_number(text, expected + 7777, 0.003, 3) is None
 
 
 # the whole table

@@ -24,18 +24,18 @@ from tankcal.report import blocks
 from tankcal.report.inspection import (
     FILES,
     InspectionPaper,
-    figures,
     rebuild,
     tables,
+    wall,
     workbook,
     write_inspection,
 )
 from tankcal.report.inspection import paper as papers
-from tankcal.report.inspection.bottom import edges, points, settlement
+from tankcal.report.inspection.bottom import edges, points, settlement_blocks
 from tankcal.report.inspection.pages import (
     checks,
     counts,
-    ending_together,
+    keep_end_together,
     limits,
     pages,
     reading,
@@ -78,7 +78,7 @@ def test_the_table_of_checks_has_the_numbers_of_the_example():
 def test_an_epoch_says_plane_limits_and_verdicts():
     """The published numbers of the example, to the printed digit."""
     paper = InspectionPaper(plain())
-    blocks = settlement(paper, paper.found["settlements"][1])
+    blocks = settlement_blocks(paper, paper.found["settlements"][1])
     said = " ".join(texts_of(blocks)).replace(SPACE, " ")
     for number in (
         *("17.48 mm", "327.7 °", "1.64 mm/m", "a = 100.21 mm", "14.78 mm", f"{MINUS}9.33 mm"),
@@ -142,15 +142,15 @@ def test_shown_levels_are_the_low_one_the_worst_and_the_highest():
                  "azimuth_deg": [0.0, 120.0, 240.0], "U_mm": [1.0, 1.0, 1.0]}
         for n in range(20)
     ]  # fmt: skip
-    heights = [one["height_m"] for one in figures.shown_levels(found)]
-    assert len(heights) == figures.MOST_LEVELS
+    heights = [one["height_m"] for one in wall.select_levels(found)]
+    assert len(heights) == wall.MOST_LEVELS
     assert {0.3, 7.3, 19.3} <= set(heights)
 
 
 def test_the_largest_gaps_come_first_and_open_ones_never():
     found = plain()
     found["gaps"][0]["gap_mm"] = None
-    sizes = [abs(one["gap_mm"]) for one in tables.largest_gaps(found, "peaking")]
+    sizes = [abs(one["gap_mm"]) for one in tables.select_largest_gaps(found, "peaking")]
     known = [o["gap_mm"] for o in found["gaps"][1:] if o["kind"] == "peaking"]
     assert sizes == sorted(map(abs, known), reverse=True)[: tables.MOST_GAPS]
 
@@ -180,13 +180,13 @@ def test_how_many_checks_came_out_how():
 
 def test_a_largest_reading_is_shown_beside_its_estimate():
     paper = InspectionPaper(plain())
-    said = settlement(paper, paper.found["settlements"][1])
+    said = settlement_blocks(paper, paper.found["settlements"][1])
     rows = {row[0]: row for row in table_of(said, "2026: verdicts")}
     assert rows["Settlement: S, all points"][2:4] == [f"+5.31{SPACE}mm", f"+4.81{SPACE}mm"]
     old = plain()
     for one in old["checks"]:
         one |= {"reading": None, "U_reading": None}
-    said = settlement(InspectionPaper(old), old["settlements"][1])
+    said = settlement_blocks(InspectionPaper(old), old["settlements"][1])
     assert table_of(said, "2026: verdicts")[1][2] == f"+4.81{SPACE}mm"
 
 
@@ -364,7 +364,7 @@ def test_no_page_is_nearly_empty_whatever_comes_before(tmp_path, ending):
     end = [block for part in ENDINGS[ending] for block in part(paper)]
     for above in range(10, 50, 2):
         lines = [blocks.paragraph(f"line {n}") for n in range(above)]
-        made += [blocks.document(title="T", footer=""), *ending_together([*lines, *end])]
+        made += [blocks.document(title="T", footer=""), *keep_end_together([*lines, *end])]
     path = tmp_path / "made.pdf"
     path.write_bytes(pdf([block.data for block in made]))
     shown = pages_of(path)

@@ -13,9 +13,9 @@ from tankcal.job.tables import REGISTERS, TABLES
 from tankcal.text.languages import LANGUAGES
 from tankcal.workbench import Refusal, desk, open_job
 from tankcal.workbench.computing import Run, Stopped
-from tankcal.workbench.decimals import Unwritten, entered_text, shown_text
+from tankcal.workbench.decimals import AmbiguousNumber, text_for_display, text_for_file
 from tankcal.workbench.desk import Desk
-from tankcal.workbench.result_views import warnings_page
+from tankcal.workbench.plain import warnings_page
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NUMBER = Field("x_m", "number", "")
@@ -42,23 +42,23 @@ def folder(tmp_path):
     ],
 )  # fmt: skip
 def test_numbers_are_typed_with_the_mark_of_the_language(field, typed, in_file, mark, entered):
-    found = entered_text(field, typed, in_file, mark)
+    found = text_for_file(field, typed, in_file, mark)
     assert found == entered
-    assert not isinstance(found, Unwritten)
+    assert not isinstance(found, AmbiguousNumber)
 
 
 @pytest.mark.parametrize("typed", ["1.234", "14.5", "1.5"])
 def test_the_other_mark_is_never_taken_in_silence(typed):
-    assert isinstance(entered_text(NUMBER, typed, ".", ","), Unwritten)
-    assert isinstance(entered_text(NUMBER, typed.replace(".", ","), ",", "."), Unwritten)
+    assert isinstance(text_for_file(NUMBER, typed, ".", ","), AmbiguousNumber)
+    assert isinstance(text_for_file(NUMBER, typed.replace(".", ","), ",", "."), AmbiguousNumber)
 
 
 @pytest.mark.parametrize("text", ["1.5", "-3", "1e-5", "abc", "", "1.2.3"])
 @pytest.mark.parametrize(("in_file", "mark"), [(".", ","), (",", "."), (".", "."), (",", ",")])
 def test_what_is_shown_can_be_typed_again(text, in_file, mark):
     in_cell = text.replace(".", in_file)
-    shown = shown_text(NUMBER, in_cell, in_file, mark)
-    assert entered_text(NUMBER, shown, in_file, mark) == in_cell
+    shown = text_for_display(NUMBER, in_cell, in_file, mark)
+    assert text_for_file(NUMBER, shown, in_file, mark) == in_cell
 
 
 # ---- what is shown
@@ -140,13 +140,13 @@ def test_no_job_is_refused_without_a_traceback(tmp_path):
 
 
 def test_tables_of_the_kind_may_be_added(folder):
-    assert {"welds", "deadwood", "circumferences"} <= set(open_job(folder, live=False).further)
+    assert {"welds", "deadwood", "circumferences"} <= set(open_job(folder, live=False).addable)
     sphere = open_job(EXAMPLES / "sphere-straps", live=False)
-    assert "welds" not in sphere.further
+    assert "welds" not in sphere.addable
 
 
 def test_who_looks_on_is_found_out(monkeypatch):
-    for name in desk.OF_PERSONS:
+    for name in desk.SESSION_VARIABLES:
         monkeypatch.delenv(name, raising=False)
     assert not desk.is_attended()
     monkeypatch.setenv("JPY_SESSION_NAME", "tankcal.ipynb")
@@ -167,10 +167,10 @@ def live_grid(folder, name, language="en"):
 
 def test_a_grid_hands_over_what_is_typed(folder):
     _, table = live_grid(folder, "points")
-    table._heard(None, {"kind": "enter", "changes": [[2, "x_m", "abc"]]}, [])
+    table._handle_message(None, {"kind": "enter", "changes": [[2, "x_m", "abc"]]}, [])
     assert [mark[:3] for mark in table.grid.marks] == [[2, 1, "bad"]]
     assert table.grid.rows[2][1] == "abc"
-    table._heard(None, {"kind": "undo"}, [])
+    table._handle_message(None, {"kind": "undo"}, [])
     assert table.grid.marks == []
     assert table.grid.rows[2][1] != "abc"
 
@@ -179,7 +179,7 @@ def test_a_block_is_pasted_and_makes_rows(folder):
     made, table = live_grid(folder, "points", "pt-BR")
     count = len(table.grid.rows)
     block = [["N1", "6,5", "0,1", "0,9"], ["N2", "6,5", "0,2", "9.1"]]
-    table._heard(None, {"kind": "paste", "row": count, "column": 0, "cells": block}, [])
+    table._handle_message(None, {"kind": "paste", "row": count, "column": 0, "cells": block}, [])
     assert len(table.grid.rows) == count + 2
     assert made.draft.tables["points"].rows[count].cells[:3] == ("N1", "6.5", "0.1")
     (row, column, level), _text = table.grid.marks[0][:3], table.grid.marks[0][3]
@@ -188,16 +188,16 @@ def test_a_block_is_pasted_and_makes_rows(folder):
 
 def test_rows_and_columns_of_a_grid(folder):
     _, table = live_grid(folder, "courses")
-    table._heard(None, {"kind": "insert", "row": 1, "count": 1}, [])
+    table._handle_message(None, {"kind": "insert", "row": 1, "count": 1}, [])
     assert table.grid.rows[1][0] == ""
-    table._heard(None, {"kind": "remove", "rows": [1]}, [])
+    table._handle_message(None, {"kind": "remove", "rows": [1]}, [])
     assert len(table.grid.rows) == 5
     name = table.grid.addable[0]
-    table._heard(None, {"kind": "column", "name": name}, [])
+    table._handle_message(None, {"kind": "column", "name": name}, [])
     assert table.grid.columns[-1]["name"] == name
     _, table = live_grid(folder, "job")
     count = len(table.grid.rows)
-    table._heard(None, {"kind": "every", "value": True}, [])
+    table._handle_message(None, {"kind": "every", "value": True}, [])
     assert len(table.grid.rows) > count
 
 
@@ -210,8 +210,8 @@ def test_a_grid_of_a_locked_workbook_says_so(tmp_path):
     book.save(path)
     made, table = live_grid(path, "points")
     assert table.grid.locked
-    table._heard(None, {"kind": "enter", "changes": [[0, "x_m", "1"]]}, [])
-    assert "formulas" in made.said
+    table._handle_message(None, {"kind": "enter", "changes": [[0, "x_m", "1"]]}, [])
+    assert "formulas" in made.status
 
 
 # ---- computing
@@ -299,7 +299,7 @@ def test_warnings_of_a_run_stand_with_its_results(folder, tmp_path):
 
 
 def insert_rows_of_two(draft, *names):
-    with draft.as_one_edit():
+    with draft.group_edits():
         for name in names:
             draft.insert_rows(name, 0)
 
@@ -347,7 +347,7 @@ def test_a_run_can_be_stopped(folder, tmp_path):
         if len(heard) == 3:
             run.stop()
 
-    run._tell = tell
+    run._on_progress = tell
     with pytest.raises(Stopped):
         run.wait()
     assert len(heard) == 3

@@ -12,7 +12,7 @@ from openpyxl import load_workbook
 import tankcal
 from tankcal.errors import InputError
 from tankcal.workbench import draft as drafts
-from tankcal.workbench.decimals import Unwritten
+from tankcal.workbench.decimals import AmbiguousNumber
 from tankcal.workbench.draft import Draft
 from tankcal.workbench.findings import BAD, DOUBTFUL
 
@@ -38,7 +38,7 @@ def contents(folder):
 def test_opening_an_example_changes_nothing(name):
     draft = Draft.open(EXAMPLES / name)
     assert not draft.is_changed
-    assert draft.edited()[0] == {}
+    assert draft.edited_files()[0] == {}
     for state in (*draft.tables.values(), *draft.keys.values()):
         assert state.render()[0] == (EXAMPLES / name / state.file).read_bytes()
 
@@ -52,7 +52,7 @@ def test_a_bad_cell_is_marked_with_its_reason(folder):
     assert mark.level == BAD
     assert "'abc'" in mark.problem.expected
     draft.undo()
-    assert draft.check().is_sound
+    assert draft.check().is_valid
 
 
 def test_a_problem_follows_its_row(folder):
@@ -111,7 +111,7 @@ def test_separator_and_decimal_of_the_job_stay(tmp_path):
     for path in folder.glob("*.csv"):
         path.write_text(path.read_text().replace(",", ";").replace(".", ","))
     draft = Draft.open(folder)
-    assert draft.check().is_sound
+    assert draft.check().is_valid
     draft.set_cells("courses", [(0, "height_m", "1,95")])
     draft.save()
     assert ";1,95;" in (folder / "courses.csv").read_text()
@@ -185,7 +185,7 @@ def test_a_table_is_added(folder):
     draft.insert_rows("deadwood", 0)
     row = {"name": "coil", "bottom_m": "0.5", "top_m": "1.0", "volume_m3": "-0.2"}
     draft.set_cells("deadwood", [(0, name, text) for name, text in row.items()])
-    assert draft.check().is_sound
+    assert draft.check().is_valid
     draft.save()
     (found,) = tankcal.load(folder).deadwood
     assert (found.name, found.volume_m3) == ("coil", -0.2)
@@ -201,8 +201,8 @@ def test_a_row_that_becomes_a_comment_is_told(folder):
 
 def test_an_entry_that_may_be_two_numbers_stops_everything(folder):
     draft = Draft.open(folder)
-    draft.set_cells("points", [(0, "x_m", Unwritten("1.234"))])
-    draft.set_value("job", "tank", "nominal_height_m", Unwritten("9.500"))
+    draft.set_cells("points", [(0, "x_m", AmbiguousNumber("1.234"))])
+    draft.set_value("job", "tank", "nominal_height_m", AmbiguousNumber("9.500"))
     check = draft.check()
     assert {(one.file, one.column) for one in check.problems} == {
         ("points.csv", "x_m"), ("job.toml", "tank.nominal_height_m"),
@@ -249,7 +249,7 @@ def test_no_job_is_told_in_one_line(tmp_path, name):
 
 def test_a_workbook_is_the_same_job(book, folder):
     draft, other = Draft.open(book), Draft.open(folder)
-    assert draft.edited()[0] == {}
+    assert draft.edited_files()[0] == {}
     assert set(draft.tables) == set(other.tables)
     cells = [row.cells for row in draft.tables["courses"].rows]
     assert [cells[0][1], len(cells)] == ["1.9", 5]
@@ -292,7 +292,7 @@ def test_rows_of_a_workbook_come_and_go(book):
     named = dict(zip(draft.tables["points"].headings, first, strict=True)) | {"point": "NEW"}
     named["z_m"] = "9.1"
     draft.set_cells("points", [(3, name, text) for name, text in named.items()])
-    assert draft.check().is_sound
+    assert draft.check().is_valid
     draft.save()
     names = tankcal.load(book).points.names
     assert len(names) == count - 1

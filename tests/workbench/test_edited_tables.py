@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log
-from tankcal.workbench.decimals import Unwritten
+from tankcal.workbench.decimals import AmbiguousNumber
 from tankcal.workbench.tables import new_csv_table, read_csv_table
 
 TEXT = (
@@ -24,8 +24,8 @@ def table(text=TEXT, separator=","):
     return read_csv_table("points", "points.csv", text, separator, ".")
 
 
-def text_of(edited):
-    return edited.render()[0].decode("utf-8")
+def text_of(edited_table):
+    return edited_table.render()[0].decode("utf-8")
 
 
 def test_unedited_file_is_byte_for_byte_the_same():
@@ -51,8 +51,8 @@ def test_same_value_again_changes_nothing():
 
 
 def test_rows_come_and_go_in_their_place():
-    edited = table().insert_rows(1, 2).set_cells([(1, 0, "N"), (1, 1, "9")])
-    data, numbers = edited.render()
+    edited_table = table().insert_rows(1, 2).set_cells([(1, 0, "N"), (1, 1, "9")])
+    data, numbers = edited_table.render()
     lines = data.decode("utf-8").split("\r\n")
     assert lines[3] == "N,9,"
     assert numbers == [3, 4, None, 7, 8]  # the blank one is not written
@@ -60,13 +60,13 @@ def test_rows_come_and_go_in_their_place():
 
 
 def test_rows_after_a_last_line_without_end():
-    edited = table().insert_rows(3).set_cells([(3, 0, "D")])
-    assert text_of(edited) == TEXT + "\r\nD,,\r\n"
+    edited_table = table().insert_rows(3).set_cells([(3, 0, "D")])
+    assert text_of(edited_table) == TEXT + "\r\nD,,\r\n"
 
 
 def test_a_column_is_added_at_the_right():
-    edited = table().add_column("section").set_cells([(0, 3, "1")])
-    lines = text_of(edited).split("\r\n")
+    edited_table = table().add_column("section").set_cells([(0, 3, "1")])
+    lines = text_of(edited_table).split("\r\n")
     assert lines[1:3] == ["point, x_m ,note,section", 'A,1.50,"a, ""b""",1']
     assert lines[-1] == "C,3.0,last,"
 
@@ -90,9 +90,9 @@ def test_a_new_file_has_its_headings():
 
 
 def test_what_is_not_told_apart_is_not_written():
-    edited = table().set_cells([(0, 1, Unwritten("1.234"))])
-    assert edited.unwritten == [(0, 1)]
-    assert 'A,,"a' in text_of(edited)
+    edited_table = table().set_cells([(0, 1, AmbiguousNumber("1.234"))])
+    assert edited_table.ambiguous == [(0, 1)]
+    assert 'A,,"a' in text_of(edited_table)
 
 
 @pytest.mark.parametrize("text", ["", "\n\n", "# only a comment\n", "\ufeff", "a", "a\n", '"a\n"b'])

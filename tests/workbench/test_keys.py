@@ -7,7 +7,7 @@ import pytest
 import tomlkit
 
 from tankcal.job.fields import Field
-from tankcal.workbench.decimals import Unwritten
+from tankcal.workbench.decimals import AmbiguousNumber
 from tankcal.workbench.keys import EditedKeys, Entry, toml_value
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -97,11 +97,11 @@ def test_marks_of_a_camera_are_a_section_within_it():
 
 
 def test_what_is_not_told_apart_is_not_written():
-    made = settings().set_value("tank", "nominal_height_m", Unwritten("9.500"))
+    made = settings().set_value("tank", "nominal_height_m", AmbiguousNumber("9.500"))
     assert tomllib.loads(made.text)["tank"]["nominal_height_m"] == ""
     assert Entry("tank", "nominal_height_m", "9.500") in made.entries
     mended = made.set_value("tank", "nominal_height_m", "9.6")
-    assert mended.unwritten == {}
+    assert mended.ambiguous == {}
     assert tomllib.loads(mended.text)["tank"]["nominal_height_m"] == 9.6
 
 

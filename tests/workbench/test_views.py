@@ -19,9 +19,9 @@ from tankcal.report.tables.capacity import capacity_rows, capacity_table
 from tankcal.text.languages import LANGUAGES
 from tankcal.workbench.views import page as pages
 from tankcal.workbench.views import results_view
-from tankcal.workbench.views.calculating import Calculator, typed_number
+from tankcal.workbench.views.calculator import Calculator, parse_number
 from tankcal.workbench.views.page import SavedView, wall_page
-from tankcal.workbench.views.what_if import sentences, suppose, table_html
+from tankcal.workbench.views.what_if import budget_sentences, change_budget, table_html
 
 TURN = np.radians(7.5)
 DENT = ("dent", 6.46 * np.sin(TURN), 6.46 * np.cos(TURN), 5.225)
@@ -129,7 +129,7 @@ def test_the_same_dip_twice_is_no_delivery(result, english):
 
 
 def test_a_decimal_comma_is_understood(result, record):
-    assert typed_number("4,25") == typed_number(" 4.25 ") == 4.25
+    assert parse_number("4,25") == parse_number(" 4.25 ") == 4.25
     answer = Calculator(result, Paper(record, language="pt-BR")).volume_at("4,5")
     assert re.match(r"V = \d+,\d{3}", answer.text)
 
@@ -145,18 +145,18 @@ def test_the_critical_zone_is_refused(result, english):
 
 
 def test_the_budget_as_it_is(result, paper):
-    supposed = suppose(result, paper, 9.5)
+    supposed = change_budget(result, paper, 9.5)
     assert supposed.then.U_m3 == pytest.approx(result.budget().U_m3, rel=1e-12)
-    assert len(sentences(paper, supposed)) == 1
+    assert len(budget_sentences(paper, supposed)) == 1
     assert len(supposed.names) == len(result.budget().lines)
 
 
 def test_half_of_a_line(result, paper):
-    supposed = suppose(result, paper, 9.5, factors={0: 0.5})
+    supposed = change_budget(result, paper, 9.5, factors={0: 0.5})
     assert supposed.then.U_m3 == pytest.approx(
         result.budget().U_m3 * result.budget().lines[0].halved, rel=1e-12
     )
-    said = sentences(paper, supposed)
+    said = budget_sentences(paper, supposed)
     change = 100 * (supposed.then.U_m3 / supposed.now.U_m3 - 1)
     assert paper.number(abs(change), decimals=1) in said[1]
     html = table_html(paper, supposed)
@@ -165,7 +165,7 @@ def test_half_of_a_line(result, paper):
 
 
 def test_a_delivery_has_its_own_budget(result, english):
-    supposed = suppose(result, english, 9.0, 2.0)
+    supposed = change_budget(result, english, 9.0, 2.0)
     assert supposed.now.volume_m3 == pytest.approx(result.delivery(2.0, 9.0).value_m3)
 
 
@@ -318,13 +318,13 @@ def test_picture_and_list_look_at_the_same_point(widgets, result, english):
 
 
 def test_sliders_of_the_budget(widgets, result, paper):
-    from tankcal.workbench.views.supposing import BudgetPanel
+    from tankcal.workbench.views.budget_panel import BudgetPanel
 
     panel = BudgetPanel(result, paper)
     before = panel.totals.value
     panel.factors[0].value = 0.5
     assert panel.totals.value != before
-    panel.put_back()
+    panel.reset_factors()
     assert panel.totals.value == before
     panel.dip.value = 4.5
     assert panel.totals.value != before

@@ -46,7 +46,7 @@ def observe_cloud(tank, chance, asked, points=200_000):
     targets = _targets(rng, site)
     rows = [["scan", "target", "x_m", "y_m", "z_m", "s_mm"]]
     parts, clouds = site.parts, {}
-    reach = 1.02 * tank.radius_m * site.grown
+    reach = 1.02 * tank.radius_m * site.expansion_factor
     low = -0.3
     for name, place in zip("AB", _stands(rng, tank), strict=True):
         rotation = _rotation(rng)
@@ -137,7 +137,7 @@ def _rotation(rng):
 
 def _scan(chance, site, place, rotation, count, bias, noise):
     """Unit rays (n, 3) in the scanner's coordinates and noisy ranges (n,) of the returns, m."""
-    rng, tank, f = chance.rng, site.tank, site.grown
+    rng, tank, f = chance.rng, site.tank, site.expansion_factor
     lines = int(np.sqrt(count * (HIGHEST_RAD - LOWEST_RAD) / FULL_TURN))
     columns = count // lines
     rise, turn = np.meshgrid(

@@ -40,7 +40,10 @@ def observe_lines(tank, chance, asked):
     kappa, read_sd = chance.normal(COLLIMATION_RAD), chance.declared(1000 * READ_M)
     rows = [["line", "course", "level_m", "offset_mm", "s_mm", "face", "reference"]]
     reference = PARTS[0] * tank.courses_m[0]
-    feet = tank.places_m(azimuth, np.full(count, reference), outside=True)[:, :2] * site.grown
+    feet = (
+        tank.places_m(azimuth, np.full(count, reference), outside=True)[:, :2]
+        * site.expansion_factor
+    )
     outwards = np.column_stack([np.sin(azimuth), np.cos(azimuth)])
     lines = feet + stands[:, None] * outwards  # places at the temperature of the shell
     for course, (low, height) in enumerate(zip(tank.joints_m[:-1], tank.courses_m, strict=True)):
@@ -72,7 +75,7 @@ def observe_lines(tank, chance, asked):
     ]
     parts.tables["offsets"] = rows
     parts.registers["instruments"]["ZL-1"] = {"kind": "plummet", "certificate": "simulated"}
-    parts.settings["shell.shape_sd_mm"] = chance.declared(1000 * _form_m(tank), 1)
+    parts.settings["shell.shape_sd_mm"] = chance.declared(1000 * _shape_sd_of_course_m(tank), 1)
     return finish(site)
 
 
@@ -90,7 +93,7 @@ def offsets_m(site, lines, inwards_from, z):
     z : float
         Height at the reference temperature.
     """
-    tank, f = site.tank, site.grown
+    tank, f = site.tank, site.expansion_factor
     offsets = np.full(len(lines), 0.2)
     for _ in range(MOST_STEPS):
         places = (lines - offsets[:, None] * inwards_from) / f
@@ -101,7 +104,7 @@ def offsets_m(site, lines, inwards_from, z):
     return offsets
 
 
-def _form_m(tank):
+def _shape_sd_of_course_m(tank):
     """Standard deviation of the radius round the middle of the first course, m."""
     azimuth = FULL_TURN * np.arange(2048) / 2048
     return float(np.std(tank.radii_m(azimuth, tank.courses_m[0] / 2)))

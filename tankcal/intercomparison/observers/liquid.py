@@ -52,7 +52,7 @@ def observe_liquid(tank, chance, asked):
     rows, clock = [HEADINGS], datetime.datetime(2026, 5, 4, 7, 0)
     for run, step in enumerate(STEPS_M, 1):
         rows.append([str(run), "M-1", 0.0, "", "", "", "", "", clock.isoformat("T", "minutes")])
-        clock = _fill(site, rows, clock, str(run), dips_of(tank, step), water, factor, zero)
+        clock = _fill(site, rows, clock, str(run), list_dips(tank, step), water, factor, zero)
         clock += datetime.timedelta(days=2)
     site.parts.tables["liquid"] = rows
     site.parts.registers["meters"] = {
@@ -102,7 +102,7 @@ def _fill(site, rows, clock, run, dips, water, factor, zero):
     for dip in dips:
         meter_c, warm = warm + rng.normal(0.3, 0.2), warm + rng.normal(0.02, 0.02)
         shell_c = warm + rng.normal(0.4, 0.1)
-        mass = held_kg(tank, dip, water.at(warm), shell_c)
+        mass = liquid_mass_kg(tank, dip, water.at(warm), shell_c)
         indicated = (mass - previous_mass) / water.at(meter_c) / (factor * (1 + run_error))
         reading = indicated + chance.normal(np.hypot(REPEATS * indicated, FIXED_M3))
         previous_mass = mass
@@ -119,7 +119,7 @@ def _fill(site, rows, clock, run, dips, water, factor, zero):
     return clock
 
 
-def dips_of(tank, step_m):
+def list_dips(tank, step_m):
     """Dips of a run, m; the lowest dip covers the bottom."""
     first = max(tank.lowest_level_m - tank.plate_z_m + 0.05, 0.3)
     first = np.ceil(20 * first) / 20
@@ -127,6 +127,6 @@ def dips_of(tank, step_m):
     return np.round(np.arange(first, top, step_m), 3)
 
 
-def held_kg(tank, dip, density, shell_c):
+def liquid_mass_kg(tank, dip, density, shell_c):
     """Mass of liquid below a dip, kg, in the tank expanded by temperature and liquid head."""
     return float(density * tank.volumes_m3(dip, density, celsius=shell_c)[0])

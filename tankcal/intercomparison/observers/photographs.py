@@ -106,10 +106,10 @@ def _stations(rng, site):
         centre = site.frame_m + [distance * np.sin(azimuth), distance * np.cos(azimuth), height]
         aim = site.frame_m + [*(0.2 * rng.normal(size=2)), 0.5 * tank.height_m]
         roll = 0.03 * rng.normal() + (0.0 if k % 3 else 1.0) * np.pi / 2
-        yield centre, looking(centre, aim, roll)
+        yield centre, camera_rotation(centre, aim, roll)
 
 
-def looking(centre, aim, roll):
+def camera_rotation(centre, aim, roll):
     """Rotation (3, 3) of a camera aimed at a point, with rows x right, y up and z backwards.
 
     Parameters
@@ -138,7 +138,7 @@ def photograph(places, site, centre, rotation, interior):
     site : Site
         Tank during the survey.
     centre, rotation : ndarray, shapes (3,) and (3, 3)
-        Exterior orientation, as in `looking`.
+        Exterior orientation, as in `camera_rotation`.
     interior : dict
         Interior orientation c, x0, y0, K1, K2, P1 and P2, mm.
 

@@ -89,7 +89,7 @@ def read_wall(chance, site, station, aims, tool, zero=0.0):
     zero : float
         Azimuth of the zero of the horizontal circle, rad.
     """
-    tank, f = site.tank, site.grown
+    tank, f = site.tank, site.expansion_factor
     vectors = np.asarray(aims, float) - station
     rays = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     origin = (np.asarray(station, float) - site.frame_m) / f

@@ -45,7 +45,7 @@ def observe_tape(tank, chance, asked):
     """
     site = observe_site(tank, chance, asked, outside=True)
     strap(site, range(len(tank.courses_m)))
-    form = _shape_m(tank)
+    form = _shape_sd_m(tank)
     site.parts.settings["shell.shape_sd_mm"] = chance.declared(1000 * form, 1)
     return finish(site)
 
@@ -69,7 +69,7 @@ def strap(site, courses, repeats=REPEATS):
     for course in courses:
         for part in LEVELS:
             z = tank.joints_m[course] + part * tank.courses_m[course]
-            true = site.grown * girth_m(tank, z) + np.pi * THICK_M
+            true = site.expansion_factor * girth_m(tank, z) + np.pi * THICK_M
             for _ in range(repeats):
                 pull = float(np.round(chance.rng.uniform(45, 60)))
                 # True length of a nominal metre: scale, temperature and tension of the tape.
@@ -95,7 +95,7 @@ def strap(site, courses, repeats=REPEATS):
     }
 
 
-def _shape_m(tank):
+def _shape_sd_m(tank):
     """Standard deviation of the radius round the wall, root mean square over the courses, m."""
     azimuth = FULL_TURN * np.arange(2048) / 2048
     middles = (tank.joints_m[:-1] + tank.joints_m[1:]) / 2

@@ -1,6 +1,6 @@
-"""What `tankcal inspect` leaves behind: the inspection as data, on paper and as a workbook.
+"""Files of `tankcal inspect`: the inspection as data, PDF and workbook.
 
-Nothing here computes a number: all of it is made from inspection.json. No part of it belongs to a
+All files are written from inspection.json; no number is computed here. No file belongs to a
 capacity certificate.
 """
 
@@ -41,22 +41,22 @@ DOCUMENT = SavedDocument(
 FILES, refuse_foreign, rebuild = DOCUMENT.files, DOCUMENT.refuse_foreign, DOCUMENT.rebuild
 
 
-def write_inspection(found, out, language=None, progress=None, letterhead=None):
-    """Write inspection.json, the workbook and the PDF, all or nothing.
+def write_inspection(inspection, out, language=None, progress=None, letterhead=None):
+    """Write inspection.json, the workbook and the PDF, all or none of them.
 
     Parameters
     ----------
-    found : record.inspection.InspectionFile or dict
-        Of an inspection, or the same as plain data.
+    inspection : record.inspection.InspectionFile or dict
+        The inspection, or its plain data.
     out : path
-        Folder, made when missing; an earlier inspection there is replaced, and a folder that holds
-        anything else is refused.
+        Folder of the files. An earlier inspection is replaced; a folder with other files is
+        refused.
     language : str, optional
-        Of the papers, one of languages.LANGUAGES; None: English.
+        Language of the documents, one of languages.LANGUAGES; None: English.
     progress : callable, optional
-        Called with a line of text as each step begins.
+        Function that receives a line of text at the start of each step.
     letterhead : report.letterhead.Letterhead, optional
-        Of who inspects.
+        Letterhead of the inspecting organisation.
 
     Returns
     -------
@@ -65,6 +65,6 @@ def write_inspection(found, out, language=None, progress=None, letterhead=None):
     Raises
     ------
     InputError
-        For a folder that is not tankcal's to replace, and what is no inspection.
+        If the folder has other files, or if the data are no inspection.
     """
-    return DOCUMENT.write(found, out, language, progress, letterhead)
+    return DOCUMENT.write(inspection, out, language, progress, letterhead)

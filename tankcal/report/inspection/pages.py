@@ -1,4 +1,4 @@
-"""What an inspection says, block by block: result, checks, limits, wall, welds, bottom."""
+"""Blocks of an inspection: result, subject, checks, limits, wall, welds and bottom."""
 
 from tankcal.report import blocks
 from tankcal.report.comparison.pages import FILE_COLUMNS
@@ -10,15 +10,15 @@ from tankcal.report.saved_paper import bearable, shortened
 from tankcal.text.digits import NOTHING
 
 SHOWN = ("table", "columns_table", "figure")
-SHORT = 12  # rows of a table that page.typ keeps on one page
+SHORT = 12  # largest number of rows of a table that page.typ keeps on one page
 
-# Verdicts, the gravest first.
+# Verdicts, the most severe first.
 ORDER = ("failed", "guard_band_beyond", "guard_band", "not_determined", "no_limit", "passed")
 
 
 def pages(paper, folder=None):
-    """The blocks of an InspectionPaper; `folder`: of the files that the PDF holds inside."""
-    return ending_together(
+    """List the blocks of an InspectionPaper; `folder` has the files attached to the PDF."""
+    return keep_end_together(
         [
             *paper.head(folder),
             *result(paper),
@@ -37,60 +37,67 @@ def pages(paper, folder=None):
     )
 
 
-def ending_together(made):
-    """The blocks, the last table on one page with the table or figure before it.
+def keep_end_together(page_blocks):
+    """Keep the last table on one page with the table or figure before it.
 
-    Alone, its few rows would leave the last page nearly empty, and so would the last of them. A
-    long table goes on from page to page.
+    A few rows alone would leave the last page nearly empty. Long tables are not kept together.
     """
-    shown = [i for i, block in enumerate(made) if block.data["kind"] in SHOWN]
+    shown = [i for i, block in enumerate(page_blocks) if block.data["kind"] in SHOWN]
     if len(shown) < 2:
-        return made
+        return page_blocks
     first, last = shown[-2:]
-    if SHORT < len(made[last].data.get("rows", ())) <= 2 * SHORT:
-        made = [*made[:last], blocks.whole(made[last]), *made[last + 1 :]]
-    before = made[first].data
-    if len(before.get("rows", ())) > SHORT * before.get("across", 1):
-        return made
-    return [*made[:first], *map(blocks.with_next, made[first:last]), *made[last:]]
+    page_blocks = list(page_blocks)
+    if SHORT < len(page_blocks[last].data.get("rows", ())) <= 2 * SHORT:
+        page_blocks[last] = blocks.whole(page_blocks[last])
+    before = page_blocks[first].data
+    if len(before.get("rows", ())) <= SHORT * before.get("across", 1):
+        page_blocks[first:last] = map(blocks.with_next, page_blocks[first:last])
+    return page_blocks
 
 
 def result(paper):
-    """How many checks came out how, in the frame; there is no verdict of all together."""
-    rule = paper.found["rule"]
-    note = paper.word("texts.no_rule")
-    if rule:
-        note = paper.word("texts.by_rule", rule=bearable(rule["name"]), verified=_read(paper, rule))
+    """Frame with the number of checks of each verdict; there is no verdict of all checks."""
     return [
-        blocks.result(paper.word("labels.result"), counts(paper), note),
+        blocks.result(paper.word("labels.result"), counts(paper), rule_text(paper)),
         paper.paragraph("not_of_certificate"),
     ]
 
 
+def rule_text(paper):
+    """Sentence with the rule, and whether it was read in the standard itself."""
+    rule = paper.found["rule"]
+    if not rule:
+        return paper.word("texts.no_rule")
+    verified = paper.word(f"verified.{rule['verified']}")
+    return paper.word("texts.by_rule", rule=bearable(rule["name"]), verified=verified)
+
+
 def counts(paper):
-    """How many checks have each verdict: "1 beyond the limit, 8 within it"."""
-    said = [verdict_of(one) for one in paper.found["checks"]]
-    found = [
-        paper.word(f"counted.{code}_{'one' if said.count(code) == 1 else 'many'}",
-                   count=said.count(code))
+    """Text with the number of checks of each verdict: "1 beyond the limit, 8 within it"."""
+    verdicts = [verdict_of(check) for check in paper.found["checks"]]
+    counted = [
+        paper.word(f"counted.{code}_{'one' if verdicts.count(code) == 1 else 'many'}",
+                   count=verdicts.count(code))
         for code in ORDER
-        if code in said
+        if code in verdicts
     ]  # fmt: skip
-    return "; ".join(found) or paper.word("texts.no_checks")
+    return "; ".join(counted) or paper.word("texts.no_checks")
 
 
 def subject(paper):
-    """The tank, its survey, and the rule with whether it was read."""
+    """Blocks on the tank, its survey and the rule."""
     tank, rule = paper.found["tank"], paper.found["rule"]
+    files = [{"file": shortened(tank["file"]), "sha256": tank["sha256"]}]
     return [
         paper.heading("subject"),
         paper.facts([*_tank(paper, tank), *_survey(paper, tank)]),
-        *([paper.table("files", _files(tank), FILE_COLUMNS)] if tank["sha256"] else []),
+        *([paper.table("files", files, FILE_COLUMNS)] if tank["sha256"] else []),
         *([paper.facts(_rule(paper, rule))] if rule else []),
     ]
 
 
 def _tank(paper, tank):
+    """Facts about the tank."""
     diameter = paper.number(tank["nominal_diameter_m"], "m", decimals=3)
     if diameter is not None:
         source = paper.words["nominal_sources"].get(tank["nominal_source"], tank["nominal_source"])
@@ -104,12 +111,12 @@ def _tank(paper, tank):
 
 
 def _survey(paper, tank):
+    """Facts about the survey."""
     source = paper.words["sources_of_inspections"].get(tank["source"], tank["source"])
-    methods = [paper.words["methods"].get(one, bearable(one)) for one in tank["methods"]]
+    methods = [paper.words["methods"].get(method, bearable(method)) for method in tank["methods"]]
     side = tank["survey_side"]
-    day = iso if (iso := paper.date()) else None
     return [
-        ("survey_date", paper.day(day) or paper.word("texts.not_known")),
+        ("survey_date", paper.day(paper.date() or None) or paper.word("texts.not_known")),
         ("methods", ", ".join(methods)),
         ("surface", side and paper.words["surfaces"].get(side, side)),
         ("state", side and paper.words["states"].get(tank["state"], tank["state"])),
@@ -117,81 +124,79 @@ def _survey(paper, tank):
     ]
 
 
-def _files(tank):
-    return [{"file": shortened(tank["file"]), "sha256": tank["sha256"]}]
-
-
 def _rule(paper, rule):
+    """Facts about the rule."""
     return [
         ("rule", bearable(rule["name"])),
         ("rule_file", shortened(rule["file"])),
         ("rule_source", bearable(rule["source"])),
-        ("rule_verified", _read(paper, rule)),
+        ("rule_verified", paper.word(f"verified.{rule['verified']}")),
         ("rule_remark", bearable(rule["remark"])),
     ]
-
-
-def _read(paper, one):
-    return paper.word(f"verified.{one['verified']}")
 
 
 # ---- the checks
 
 
 def checks(paper):
-    """Every check with its figure, U, limit, verdict and probability; what to read beside it."""
-    found = paper.found["checks"]
-    if not found:
+    """Blocks with the table of checks, the decision rule, and remarks on checks."""
+    entries = paper.found["checks"]
+    if not entries:
         return []
-    said = remarks(paper)
-    unread = any(one["limit"] is not None and not one["limit"]["verified"] for one in found)
+    sentences = remarks(paper)
+    unread = any(check["limit"] is not None and not check["limit"]["verified"] for check in entries)
     return [
         paper.heading("checks"),
         paper.show(CHECKS, CHECKS.rows(paper.found)),
         *([paper.paragraph("unverified", mark=UNVERIFIED)] if unread else []),
         blocks.paragraph(_decision(paper)),
-        *([paper.heading("remarks", 2), blocks.listing(said)] if said else []),
+        *([paper.heading("remarks", 2), blocks.listing(sentences)] if sentences else []),
     ]
 
 
 def remarks(paper):
-    """What is to be read beside checks: a sentence each, the same of several checks once."""
-    places = {}
-    for one in paper.found["checks"]:
-        if one["remark"] is not None:
-            said = (paper.check_name(one["code"]), paper.remark(one))
-            places.setdefault(said, []).append(paper.place(one))
-    return [f"{name}{_where(found)}: {said}" for (name, said), found in places.items()]
+    """Sentences with the remarks on checks; equal remarks on several checks are joined."""
+    places_by_remark = {}
+    for check in paper.found["checks"]:
+        if check["remark"] is not None:
+            remark = (paper.check_name(check["code"]), paper.remark(check))
+            places_by_remark.setdefault(remark, []).append(paper.place(check))
+    return [
+        f"{name}{_place_in_brackets(places)}: {remark}"
+        for (name, remark), places in places_by_remark.items()
+    ]
 
 
-def _where(places):
-    """The one place of a remark, in brackets; "" of several, or where there is none."""
+def _place_in_brackets(places):
+    """The place of a remark in brackets; "" for several places or no place."""
     return f" ({places[0]})" if len(places) == 1 and places != [NOTHING] else ""
 
 
 def _decision(paper):
-    """The decision rule of this file, and its coverage factors."""
-    factors = sorted({round(one["k"], 2) for one in paper.found["checks"] if one["k"]})
-    k = "; ".join(paper.number(one, decimals=2) for one in factors)
+    """Sentence with the decision rule of this file and its coverage factors."""
+    factors = sorted({round(check["k"], 2) for check in paper.found["checks"] if check["k"]})
+    k = "; ".join(paper.number(factor, decimals=2) for factor in factors)
     decision = paper.found["decision"]
     rule = "" if decision == "guarded" else f"_{decision}"
     return paper.word(f"texts.decision{'' if k else '_without_k'}{rule}", k=k)
 
 
 def limits(paper):
-    """Where each limit stands, and whether it was read there."""
+    """Blocks with the clause of each limit, and whether the limit was read there."""
     rows = limit_rows(paper)
     return [paper.heading("limits"), paper.show(LIMITS, rows)] if rows else []
 
 
 def reading(paper):
-    """What to know before relying on it; warnings."""
-    found = paper.found
-    said = [paper.word("texts.as_built" if found["as_built"] else "texts.as_built_unknown")]
-    if found["rule"] and not found["rule"]["verified"]:
-        said.append(paper.word("texts.rule_not_read"))
-    if found["generatrices"] is not None or found["levels"]:
-        said.append(paper.word("texts.surface_of_radii"))
-    said += paper.words["standing_limits"].values()
-    said += [paper.warning(one) for one in found["warnings"]]
-    return [paper.heading("reading"), blocks.listing(said)]
+    """Blocks with the limitations of an inspection, and its warnings."""
+    inspection = paper.found
+    sentences = [
+        paper.word("texts.as_built" if inspection["as_built"] else "texts.as_built_unknown")
+    ]
+    if inspection["rule"] and not inspection["rule"]["verified"]:
+        sentences.append(paper.word("texts.rule_not_read"))
+    if inspection["generatrices"] is not None or inspection["levels"]:
+        sentences.append(paper.word("texts.surface_of_radii"))
+    sentences += paper.words["standing_limits"].values()
+    sentences += [paper.warning(warning) for warning in inspection["warnings"]]
+    return [paper.heading("reading"), blocks.listing(sentences)]

@@ -1,55 +1,57 @@
-"""The tables of an inspection, declared once for paper and workbook; their rows."""
+"""Tables of an inspection for report and workbook, and their rows."""
 
 from tankcal.report.inspection.paper import epoch_name, unit_of
 from tankcal.report.saved_paper import bearable
 from tankcal.report.tables import Column, Table
 from tankcal.text.digits import NOTHING
 
-MM = "image mm"  # a value that is in millimetres already
-MOST_GAPS = 12  # of each kind that a page shows: the largest
+MM = "image mm"  # unit of a value in millimetres
+MOST_GAPS = 12  # largest number of gaps of each kind in the report
 _SHOWN = {"sheet": True, "width": 11}
 
 
 def _mm(key, decimals=1, **more):
+    """Column of values in millimetres."""
     return Column(key, MM, decimals=decimals, **_SHOWN, **more)
 
 
 def _azimuth(**more):
+    """Column of azimuths."""
     return Column("azimuth_deg", "deg", decimals=1, **_SHOWN, **more)
 
 
-def _said(key, say, **more):
-    """A column of texts; a check without one has a dash."""
-    return Column(key, text=lambda paper, row: say(paper, row) or NOTHING, **more)
+def _text_column(key, text_of, **more):
+    """Column of texts, with a dash for a check without text."""
+    return Column(key, text=lambda paper, row: text_of(paper, row) or NOTHING, **more)
 
 
 def _format(row):
-    """The number format of a check's figures in the workbook, in the unit of the file."""
+    """Number format of a check's figures in the workbook, in the unit of the file."""
     return "0.00E+00" if row["unit"] == "1/m" else unit_of(row)[2]
 
 
 CHECKS = Table(
     "checks",
     (
-        _said("check", lambda paper, row: paper.check_name(row["code"])),
-        _said("place", lambda paper, row: paper.place(row)),
-        _said("value", lambda paper, row: paper.value(row), align="right"),
-        _said("U", lambda paper, row: paper.in_unit(row, row["U"]), align="right"),
-        _said("limit", lambda paper, row: paper.limit(row), align="right"),
-        _said("verdict", lambda paper, row: paper.verdict(row)),
-        _said("probability", lambda paper, row: paper.probability(row), align="right"),
+        _text_column("check", lambda paper, row: paper.check_name(row["code"])),
+        _text_column("place", lambda paper, row: paper.place(row)),
+        _text_column("value", lambda paper, row: paper.value(row), align="right"),
+        _text_column("U", lambda paper, row: paper.in_unit(row, row["U"]), align="right"),
+        _text_column("limit", lambda paper, row: paper.limit(row), align="right"),
+        _text_column("verdict", lambda paper, row: paper.verdict(row)),
+        _text_column("probability", lambda paper, row: paper.probability(row), align="right"),
     ),
-    rows=lambda found: found["checks"],
+    rows=lambda inspection: inspection["checks"],
 )
 
-READING = _said("reading", lambda paper, row: paper.reading(row), align="right")
+READING = _text_column("reading", lambda paper, row: paper.reading(row), align="right")
 
 LIMITS = Table(
     "limits",
     (
-        _said("check", lambda paper, row: row["check"]),
-        _said("limit", lambda paper, row: row["limit"], align="right"),
-        _said("clause", lambda paper, row: bearable(row["clause"])),
+        _text_column("check", lambda paper, row: row["check"]),
+        _text_column("limit", lambda paper, row: row["limit"], align="right"),
+        _text_column("clause", lambda paper, row: bearable(row["clause"])),
         Column("verified", words="read"),
     ),
 )
@@ -138,7 +140,7 @@ GAPS = Table(
         _mm("gap_mm", heading="gap"),
         _mm("U_mm", heading="U"),
     ),
-    rows=lambda found: gap_rows(found),
+    rows=lambda inspection: gap_rows(inspection),
 )
 
 POINTS = Table(
@@ -185,7 +187,7 @@ EDGES = Table(
         _mm("U_mm", heading="U"),
         _mm("limit_mm", heading="limit"),
     ),
-    rows=lambda found: found["edges"],
+    rows=lambda inspection: inspection["edges"],
 )
 
 READINGS = Table(
@@ -202,110 +204,112 @@ READINGS = Table(
 
 
 def limit_rows(paper):
-    """Each limit once, with the checks that it is of, its clause, and whether it was read."""
-    found = {}
-    for one in paper.found["checks"]:
-        bound = one["limit"]
-        if bound is not None:
-            key = (one["code"], paper.limit(one), bound["clause"], bound["verified"])
-            found.setdefault(key, one)
+    """Each limit once, with its check, its clause, and whether it was read there."""
+    limits = dict.fromkeys(
+        (check["code"], paper.limit(check), check["limit"]["clause"], check["limit"]["verified"])
+        for check in paper.found["checks"]
+        if check["limit"] is not None
+    )
     return [
-        {"check": paper.check_name(code), "limit": limit, "clause": clause, "verified": verified}
-        for code, limit, clause, verified in found
+        {"check": paper.check_name(code), "limit": text, "clause": clause, "verified": verified}
+        for code, text, clause, verified in limits
     ]
 
 
 def sheet_rows(paper):
-    """The checks with their numbers as numbers, in the unit of the file."""
-    return [_sheet_row(paper, one) for one in paper.found["checks"]]
+    """Checks with numbers as numbers, in the unit of the file."""
+    return [_sheet_row(paper, check) for check in paper.found["checks"]]
 
 
-def _sheet_row(paper, one):
-    bound = one["limit"] or {"value": None, "clause": None, "verified": None}
-    return one | {
-        "check": paper.check_name(one["code"]),
-        "verdict": paper.verdict(one),
-        "limit": bound["value"],
-        "clause": bound["clause"],
-        "verified": bound["verified"],
-        "unit": one["unit"] or None,
+def _sheet_row(paper, check):
+    """Row of a check in the workbook."""
+    limit = check["limit"] or {"value": None, "clause": None, "verified": None}
+    return check | {
+        "check": paper.check_name(check["code"]),
+        "verdict": paper.verdict(check),
+        "limit": limit["value"],
+        "clause": limit["clause"],
+        "verified": limit["verified"],
+        "unit": check["unit"] or None,
     }
 
 
-def gap_rows(found):
-    """The gaps; a horizontal weld without one has no azimuth, for its boards go all round."""
+def gap_rows(inspection):
+    """Gaps at the welds; a horizontal weld without a determined gap has no azimuth."""
     return [
-        one | {"azimuth_deg": None} if one["kind"] == "banding" and one["gap_mm"] is None else one
-        for one in found["gaps"]
+        gap | {"azimuth_deg": None} if gap["kind"] == "banding" and gap["gap_mm"] is None else gap
+        for gap in inspection["gaps"]
     ]
 
 
-def checks_of(found, *codes):
-    """The checks of these codes, in their order."""
-    return [one for one in found["checks"] if one["code"] in codes]
+def select_checks(inspection, *codes):
+    """Select the checks with these codes, in their order."""
+    return [check for check in inspection["checks"] if check["code"] in codes]
 
 
-def limit_mm(found, *codes):
-    """The limit of the first check of these codes that has one in mm; None: there is none."""
+def limit_mm(inspection, *codes):
+    """Limit of the first check with these codes that has a limit in mm, or None."""
     limits = [
-        one["limit"]["value"]
-        for one in checks_of(found, *codes)
-        if one["limit"] is not None and one["unit"] == "mm"
+        check["limit"]["value"]
+        for check in select_checks(inspection, *codes)
+        if check["limit"] is not None and check["unit"] == "mm"
     ]
     return limits[0] if limits else None
 
 
-def is_low(found, level):
-    """Whether a level is the one above the bottom weld, which has a limit of its own."""
+def is_low(inspection, level):
+    """Whether a level is directly above the bottom weld; such a level has another limit."""
     heights = [
-        one["height_m"] for one in checks_of(found, "roundness_low") if one["height_m"] is not None
+        item["height_m"]
+        for item in select_checks(inspection, "roundness_low")
+        if item["height_m"] is not None
     ]
     if not heights:
-        return level is found["levels"][0]
-    nearest = min(found["levels"], key=lambda one: abs(one["height_m"] - heights[0]))
+        return level is inspection["levels"][0]
+    nearest = min(inspection["levels"], key=lambda item: abs(item["height_m"] - heights[0]))
     return level["height_m"] == nearest["height_m"]
 
 
-def limit_of_level(found, level):
-    """The limit of the radius of a level, mm; None: there is none."""
-    return limit_mm(found, "roundness_low" if is_low(found, level) else "roundness_high")
+def limit_of_level(inspection, level):
+    """Limit of the radius of a level, mm, or None."""
+    return limit_mm(inspection, "roundness_low" if is_low(inspection, level) else "roundness_high")
 
 
 def worst_place(departures):
-    """Place of the largest departure, either way."""
+    """Index of the largest deviation in magnitude."""
     return max(range(len(departures)), key=lambda place: abs(departures[place]))
 
 
-def level_rows(found):
-    """The levels, from the bottom up, with the range of their departures."""
+def level_rows(inspection):
+    """Levels from the bottom up, with the range of their deviations."""
     return [
-        one
+        level
         | {
-            "least": min(one["departure_mm"]),
-            "most": max(one["departure_mm"]),
-            "U": one["U_mm"][worst_place(one["departure_mm"])],
-            "limit": limit_of_level(found, one),
+            "least": min(level["departure_mm"]),
+            "most": max(level["departure_mm"]),
+            "U": level["U_mm"][worst_place(level["departure_mm"])],
+            "limit": limit_of_level(inspection, level),
         }
-        for one in found["levels"]
-        if one["departure_mm"]
+        for level in inspection["levels"]
+        if level["departure_mm"]
     ]
 
 
-def place_rows(found):
-    """Every place of every level."""
+def place_rows(inspection):
+    """All places of all levels."""
     return [
-        {"height_m": one["height_m"], "course": one["course"], "azimuth_deg": azimuth,
+        {"height_m": level["height_m"], "course": level["course"], "azimuth_deg": azimuth,
          "departure": departure, "U": U}
-        for one in found["levels"]
+        for level in inspection["levels"]
         for azimuth, departure, U in zip(
-            one["azimuth_deg"], one["departure_mm"], one["U_mm"], strict=True
+            level["azimuth_deg"], level["departure_mm"], level["U_mm"], strict=True
         )
     ]  # fmt: skip
 
 
-def generatrix_rows(found):
-    """Every place of the generatrices, from the lowest height."""
-    wall = found["generatrices"]
+def generatrix_rows(inspection):
+    """All places of the generatrices, from the lowest height."""
+    wall = inspection["generatrices"]
     if wall is None:
         return []
     return [
@@ -319,54 +323,59 @@ def generatrix_rows(found):
     ]  # fmt: skip
 
 
-def course_rows(found):
-    """What each course departs by, from the bottom up: selected, not computed."""
-    walls, levels, gaps = generatrix_rows(found), place_rows(found), found["gaps"]
-    numbers = {one["course"] for one in (*walls, *levels, *gaps)}
+def course_rows(inspection):
+    """Largest deviations of each course from the bottom up; selected, not computed."""
+    walls, levels, gaps = generatrix_rows(inspection), place_rows(inspection), inspection["gaps"]
+    numbers = {row["course"] for row in (*walls, *levels, *gaps)}
     return [_course_row(number, walls, levels, gaps) for number in sorted(numbers)]
 
 
 def _course_row(number, walls, levels, gaps):
-    wall, level, gaps = ([o for o in of if o["course"] == number] for of in (walls, levels, gaps))
+    """Largest deviations and gaps of a course."""
+    wall, level, gaps = (
+        [item for item in rows if item["course"] == number] for rows in (walls, levels, gaps)
+    )
     row = {"course": number}
     if wall:
-        row["plumb_least"] = min(one["plumb"] for one in wall)
-        row["plumb_most"] = max(one["plumb"] for one in wall)
-        row["plumb_U"] = max(one["U"] for one in wall)
+        row["plumb_least"] = min(item["plumb"] for item in wall)
+        row["plumb_most"] = max(item["plumb"] for item in wall)
+        row["plumb_U"] = max(item["U"] for item in wall)
     if level:
-        worst = max(level, key=lambda one: abs(one["departure"]))
+        worst = max(level, key=lambda item: abs(item["departure"]))
         row |= {"round_worst": worst["departure"], "round_U": worst["U"]}
     for kind in ("peaking", "banding"):
-        known = [one["gap_mm"] for one in gaps if one["kind"] == kind]
-        known = [one for one in known if one is not None]
+        known = [item["gap_mm"] for item in gaps if item["kind"] == kind]
+        known = [item for item in known if item is not None]
         row |= {kind: max(known, key=abs)} if known else {}
     return row
 
 
-def largest_gaps(found, kind, most=MOST_GAPS):
-    """The largest gaps of a kind that are determined, the largest first."""
-    known = [one for one in found["gaps"] if one["kind"] == kind and one["gap_mm"] is not None]
-    return sorted(known, key=lambda one: -abs(one["gap_mm"]))[:most]
+def select_largest_gaps(inspection, kind, most=MOST_GAPS):
+    """Select the largest determined gaps of a kind, the largest first."""
+    known = [gap for gap in inspection["gaps"] if gap["kind"] == kind and gap["gap_mm"] is not None]
+    return sorted(known, key=lambda gap: -abs(gap["gap_mm"]))[:most]
 
 
-def point_rows(found):
-    """Every point of every settlement."""
+def point_rows(inspection):
+    """All points of all epochs and differences."""
     return [
-        {"epoch": epoch_name(one)} | point
-        for one in found["settlements"]
-        for point in one["points"]
+        {"epoch": epoch_name(settlement)} | point
+        for settlement in inspection["settlements"]
+        for point in settlement["points"]
     ]
 
 
-def plane_rows(found):
-    """The plane of every settlement."""
-    return [one | {"epoch": epoch_name(one)} for one in found["settlements"]]
-
-
-def reading_rows(found):
-    """Every reading of the profiles of the bottom's edge."""
+def plane_rows(inspection):
+    """Planes of all epochs and differences."""
     return [
-        {"azimuth_deg": one["azimuth_deg"], "radius_m": radius, "z": z}
-        for one in found["edges"]
-        for radius, z in zip(one["radius_m"], one["z_mm"], strict=True)
+        settlement | {"epoch": epoch_name(settlement)} for settlement in inspection["settlements"]
+    ]
+
+
+def reading_rows(inspection):
+    """All readings of the profiles of the edge."""
+    return [
+        {"azimuth_deg": profile["azimuth_deg"], "radius_m": radius, "z": z}
+        for profile in inspection["edges"]
+        for radius, z in zip(profile["radius_m"], profile["z_mm"], strict=True)
     ]

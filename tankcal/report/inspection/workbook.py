@@ -1,6 +1,6 @@
-"""Workbook of an inspection: all checks, places, welds and points, with numbers as numbers."""
+"""Workbook of an inspection: checks, places, welds and points, with numbers as numbers."""
 
-from tankcal.report.inspection.pages import counts, remarks
+from tankcal.report.inspection.pages import counts, remarks, rule_text
 from tankcal.report.inspection.tables import (
     COURSES,
     EDGES,
@@ -70,13 +70,9 @@ def sheets(book):
 
 def _checks_sheet(book, paper):
     """Return the result and its scope, all checks with their limits, remarks and warnings."""
-    inspection, rule = paper.found, paper.found["rule"]
-    by_rule = paper.word("texts.no_rule")
-    if rule:
-        verified = paper.word(f"verified.{rule['verified']}")
-        by_rule = paper.word("texts.by_rule", rule=bearable(rule["name"]), verified=verified)
-    as_built = "as_built" if inspection["as_built"] else "as_built_unknown"
-    scope = [by_rule, paper.word("texts.not_of_certificate"), paper.word(f"texts.{as_built}")]
+    inspection = paper.found
+    as_built = paper.word("texts.as_built" if inspection["as_built"] else "texts.as_built_unknown")
+    scope = [rule_text(paper), paper.word("texts.not_of_certificate"), as_built]
     sections = [
         (Sentences([counts(paper)], look=FIRST_LINE), Sentences(scope)),
         cell_table(book, SHEET_OF_CHECKS, sheet_rows(paper)),

@@ -1,6 +1,6 @@
-"""What `tankcal intercomparison score` leaves behind: scores as data, as a page and as a workbook.
+"""Files of `tankcal intercomparison score`: scores as data, web page and workbook.
 
-Nothing here computes a number: all of it is made from scores.json.
+All files are written from scores.json; no number is computed here.
 """
 
 from pathlib import Path
@@ -17,24 +17,23 @@ FILES = (FILE, WORKBOOK, PAGE)
 
 
 def refuse_foreign(folder):
-    """Raise InputError when a folder exists and holds anything but scores."""
+    """Raise InputError if a folder exists and has other files than scores."""
     folders.refuse_foreign(folder, FILES)
 
 
-def write_scores(found, out, language=None, progress=None):
-    """Write scores.json, the workbook and the page, all or nothing.
+def write_scores(scores, out, language=None, progress=None):
+    """Write scores.json, the workbook and the page, all or none of them.
 
     Parameters
     ----------
-    found : record.intercomparison.ScoresFile or dict
-        Scores, or the same as plain data.
+    scores : record.intercomparison.ScoresFile or dict
+        Scores, or their plain data.
     out : path
-        Folder, made when missing; earlier scores there are replaced, and a folder that holds
-        anything else is refused.
+        Folder of the files. Earlier scores are replaced; a folder with other files is refused.
     language : str, optional
-        Of the page and the workbook, one of languages.LANGUAGES; None: English.
+        Language of page and workbook, one of languages.LANGUAGES; None: English.
     progress : callable, optional
-        Called with a line of text as each step begins.
+        Function that receives a line of text at the start of each step.
 
     Returns
     -------
@@ -43,20 +42,41 @@ def write_scores(found, out, language=None, progress=None):
     Raises
     ------
     InputError
-        For a folder that is not tankcal's to replace, and what is no file of scores.
+        If the folder has other files, or if the data are no scores.
     """
-    from tankcal.report.scores import workbook
     from tankcal.report.scores.pages import pages
     from tankcal.report.web import page
 
     refuse_foreign(out)
     progress = progress or (lambda text: None)
-    plain = found if isinstance(found, dict) else to_plain(found)
+    plain = scores if isinstance(scores, dict) else to_plain(scores)
     paper = ScoresPaper(plain, language)
     with folders.replaced(out) as temporary:
         progress(message("ic_papers", "writing scores, page and workbook"))
         save(paper.saved, temporary / FILE)
-        workbook.write(paper, temporary / WORKBOOK)
+        _write_workbook(paper, temporary / WORKBOOK)
         blocks = [block.data for block in pages(paper)]
         (temporary / PAGE).write_text(page(blocks), encoding="utf-8")
     return [Path(out) / name for name in FILES]
+
+
+def _write_workbook(paper, path):
+    """Write the workbook of a ScoresPaper; equal scores give equal bytes."""
+    from tankcal.report.scores.tables import METHODS_SHEET, PARTICIPANTS, ROWS, TABLES
+    from tankcal.report.workbook.book import workbook_head
+    from tankcal.report.workbook.sections import SheetContent, cell_table, write_workbook
+
+    def sheets(book):
+        for code, table in (
+            ("scored_methods", METHODS_SHEET),
+            ("scored_tables", TABLES),
+            ("scored_rows", ROWS),
+            ("scored_participants", PARTICIPANTS),
+        ):
+            yield SheetContent(code, [cell_table(book, table)], tab="result", is_filtered=True)
+
+    scores = paper.found
+    head = workbook_head(
+        scores["tankcal"], source=paper.subject(), date=paper.date(), notice=scores["notice"]
+    )
+    write_workbook(paper, path, "scores", head, sheets)

@@ -1,14 +1,23 @@
-"""What the page of scores says, block by block."""
+"""Blocks of the page of scores, with figures of errors along the height and Youden's plot."""
 
+from math import ceil
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from tankcal.pipeline.plot_style import FAINT, GREY, WIDTH, set_margins
 from tankcal.report import blocks
-from tankcal.report.scores import figures
+from tankcal.report.camera.drawings import COLOURS, line_style, styled
+from tankcal.report.scores.paper import EVERY
 from tankcal.report.scores.tables import ERRORS, FORMS, PARTICIPANTS, TABLES
 
+MOST_PANELS, ACROSS, PANEL_IN = 9, 3, 1.75  # largest number of panels, columns, height
+MARKS = "osD^v<>PX*"  # of the methods in Youden's plot
 FORMULAS = ("E_n", "zeta", "share", "form", "deliveries", "ranking")
 
 
 def pages(paper):
-    """The blocks of a ScoresPaper."""
+    """List the blocks of a ScoresPaper."""
     return [
         *paper.head(),
         *_subject(paper),
@@ -21,54 +30,164 @@ def pages(paper):
 
 
 def _subject(paper):
-    found = paper.found
-    tanks = {one["tank"] for one in found["tables"]}
-    methods = figures.methods_of(found)
+    """Blocks on the tanks, methods and participants."""
+    scores = paper.found
+    tanks = {table["tank"] for table in scores["tables"]}
+    methods = answered_methods(scores)
     return [
         paper.heading("subject"),
         paper.paragraph(
-            "subject", tanks=len(tanks), methods=len(methods), tables=len(found["tables"])
+            "subject", tanks=len(tanks), methods=len(methods), tables=len(scores["tables"])
         ),
-        paper.paragraph("commitment", digest=found["truth_sha256"]),
-        paper.show(PARTICIPANTS, PARTICIPANTS.rows(found)),
+        paper.paragraph("commitment", digest=scores["truth_sha256"]),
+        paper.show(PARTICIPANTS, PARTICIPANTS.rows(scores)),
     ]
 
 
 def _scores(paper):
-    found = paper.found
-    coverage = paper.percent(found["coverage_probability"])
+    """Blocks with the scores of participants and methods."""
+    scores = paper.found
+    coverage = paper.percent(scores["coverage_probability"])
     return [
         paper.heading("scores"),
-        paper.show(ERRORS, ERRORS.rows(found), coverage=coverage),
-        paper.show(FORMS, FORMS.rows(found)),
+        paper.show(ERRORS, ERRORS.rows(scores), coverage=coverage),
+        paper.show(FORMS, FORMS.rows(scores)),
     ]
 
 
 def _reading(paper):
-    said = [paper.word(f"reading.{one}") for one in FORMULAS]
-    return [paper.heading("reading"), blocks.listing(said)]
+    """Blocks with the definitions of the scores."""
+    sentences = [paper.word(f"reading.{name}") for name in FORMULAS]
+    return [paper.heading("reading"), blocks.listing(sentences)]
 
 
 def _figures(paper):
-    found = paper.found
-    made = [paper.heading("figures")]
-    for method in figures.methods_of(found):
+    """Blocks with a figure of errors for each method, and Youden's plot."""
+    scores = paper.found
+    page_blocks = [paper.heading("figures")]
+    for method in answered_methods(scores):
         name = paper.method(method)
-        made.append(paper.figure(figures.errors(paper, method), "scored_lines", method=name))
-    pair = figures.tanks_of_youden(found)
+        page_blocks.append(paper.figure(draw_errors(paper, method), "scored_lines", method=name))
+    pair = select_two_tanks(scores)
     if pair:
         first, second = pair
-        made.append(
-            paper.figure(figures.youden(paper, *pair), "youden", width=0.75, first=first,
+        page_blocks.append(
+            paper.figure(draw_youden(paper, *pair), "youden", width=0.75, first=first,
                          second=second)
         )  # fmt: skip
-    return made
+    return page_blocks
 
 
 def _tables(paper):
+    """Blocks with the scores of each table."""
     return [paper.heading("tables"), paper.show(TABLES, TABLES.rows(paper.found))]
 
 
 def _warnings(paper):
-    said = [paper.warning(one) for one in paper.found["warnings"]]
-    return [paper.heading("warnings"), blocks.listing(said)] if said else []
+    """Blocks with the warnings about answers."""
+    sentences = [paper.warning(warning) for warning in paper.found["warnings"]]
+    return [paper.heading("warnings"), blocks.listing(sentences)] if sentences else []
+
+
+# ---- figures
+
+
+def answered_methods(scores):
+    """Methods with answers, in the order of the scores."""
+    return list(dict.fromkeys(row["method"] for row in scores["methods"] if row["method"] != EVERY))
+
+
+@styled
+def draw_errors(paper, method):
+    """Draw errors, ppm of the capacity, along the height: a panel for each tank."""
+    scores = paper.found
+    tables = [table for table in scores["tables"] if table["method"] == method]
+    tanks = list(dict.fromkeys(table["tank"] for table in tables))[:MOST_PANELS]
+    down = ceil(len(tanks) / ACROSS)
+    across = min(len(tanks), ACROSS)
+    figure = Figure(figsize=(WIDTH, PANEL_IN * down + 0.75))
+    grid = figure.subplots(down, across, squeeze=False)
+    for place, ax in enumerate(grid.ravel()):
+        if place >= len(tanks):
+            ax.axis("off")
+            continue
+        for table in tables:
+            if table["tank"] == tanks[place]:
+                _draw_line(ax, paper, table)
+        ax.axhline(0, color=GREY, linewidth=0.6)
+        ax.set_title(tanks[place], loc="left")
+        if place % across == 0:
+            ax.set_ylabel(paper.word("axes.error_ppm"))
+        if place >= len(tanks) - across:
+            ax.set_xlabel(paper.word("axes.height_scored"))
+    set_margins(figure, 0.65, 0.1, 0.75, 0.25, wspace=0.3, hspace=0.45)
+    _draw_legend(figure, grid[0, 0])
+    return figure
+
+
+def _draw_line(ax, paper, table):
+    """Draw the errors of a participant, with U as a band."""
+    rows, style = table["rows"], line_style(table["participant"])
+    full = rows["true_m3"][-1] / 1e6
+    height, error = np.array(rows["height_m"]), np.array(rows["error_m3"]) / full
+    U = np.array([np.nan if x is None else x for x in rows["U_m3"]], float) / full
+    ax.fill_between(height, error - U, error + U, color=style["color"], alpha=0.15, linewidth=0)
+    ax.plot(height, error, linewidth=1.0, label=paper.participant(table), **style)
+
+
+@styled
+def draw_youden(paper, first, second):
+    """Draw errors at the top of two tanks; common errors of both lie on the diagonal."""
+    scores = paper.found
+    tops = {
+        (row["participant"], row["method"], row["tank"]): row["top_error_ppm"]
+        for row in scores["tables"]
+        if row["top_error_ppm"] is not None
+    }
+    figure = Figure(figsize=(4.6, 3.6))
+    ax = figure.subplots()
+    methods, sizes = answered_methods(scores), [1.0]
+    for who in range(len(scores["participants"])):
+        for number, method in enumerate(methods):
+            pair = [tops.get((who, method, tank)) for tank in (first, second)]
+            if None in pair:
+                continue
+            sizes += map(abs, pair)
+            label = paper.method(method)
+            if len(scores["participants"]) > 1:
+                label = f"{paper.participant({'participant': who})}, {label}"
+            ax.plot(*pair, MARKS[number % len(MARKS)], color=COLOURS[who % len(COLOURS)],
+                    markersize=5, label=label, linestyle="")  # fmt: skip
+    reach = 1.15 * max(sizes)
+    ax.plot([-reach, reach], [-reach, reach], color=FAINT, linewidth=0.6)
+    ax.axhline(0, color=GREY, linewidth=0.6)
+    ax.axvline(0, color=GREY, linewidth=0.6)
+    ax.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
+    ax.set_xlabel(paper.word("axes.error_of", tank=first))
+    ax.set_ylabel(paper.word("axes.error_of", tank=second))
+    set_margins(figure, 0.65, 1.7, 0.55, 0.1)
+    ax.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize=7)
+    return figure
+
+
+def select_two_tanks(scores):
+    """Select the two tanks with the most common answers; None without common answers.
+
+    Of equal pairs, the first is selected.
+    """
+    answered = {}
+    for row in scores["tables"]:
+        if row["top_error_ppm"] is not None:
+            answered.setdefault(row["tank"], set()).add((row["participant"], row["method"]))
+    names = sorted(answered)
+    pairs = [(len(answered[a] & answered[b]), -i, -j, a, b) for i, a in enumerate(names)
+             for j, b in enumerate(names) if i < j]  # fmt: skip
+    best = max(pairs, default=None)
+    return best[3:] if best and best[0] > 0 else None
+
+
+def _draw_legend(figure, ax):
+    """Draw a legend below all panels if there are several lines."""
+    lines, labels = ax.get_legend_handles_labels()
+    if len(labels) > 1:
+        figure.legend(lines, labels, loc="lower center", ncols=min(3, len(labels)), fontsize=7)

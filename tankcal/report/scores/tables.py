@@ -1,4 +1,4 @@
-"""The tables of scores, declared once for page and workbook."""
+"""Tables of scores for page and workbook."""
 
 from tankcal.report.saved_paper import bearable
 from tankcal.report.tables import Column, Table
@@ -8,29 +8,34 @@ _SHEET = {"sheet": True, "width": 11}
 
 
 def _ppm(key, **more):
+    """Column of relative values, ppm."""
     return Column(key, "ppm", decimals=0, **_SHEET, **more)
 
 
 def _percent(key):
+    """Column of relative values, percent."""
     return Column(key, "percent", decimals=3, **_SHEET)
 
 
-def _who(**more):
+def _participant(**more):
+    """Column of the participant."""
     return Column("participant", text=lambda paper, row: paper.participant(row), sheet=True,
                   width=26, **more)  # fmt: skip
 
 
 def _method():
+    """Column of the method."""
     return Column("method", heading="method_scored", sheet=True, width=20,
                   text=lambda paper, row: paper.method(row["method"]))  # fmt: skip
 
 
-def _said(key, say):
-    """A column of the page alone, in words."""
-    return Column(key, text=lambda paper, row: say(paper, row) or NOTHING, align="right")
+def _text_column(key, text_of):
+    """Column of texts, which only the page has."""
+    return Column(key, text=lambda paper, row: text_of(paper, row) or NOTHING, align="right")
 
 
 def _tops(paper, row):
+    """Number of top rows with |E_n| <= 1, and the bounds of its share; None without an E_n."""
     if not row["tops_judged"]:
         return None
     low, high = (fixed(row[key], 2, paper.marks) for key in ("tops_low", "tops_high"))
@@ -45,30 +50,34 @@ PARTICIPANTS = Table(
                width=20, heading=f"participant_{key}")
         for key in ("name", "software", "version", "date", "contact", "remarks")
     ),
-    rows=lambda found: found["participants"],
+    rows=lambda scores: scores["participants"],
 )  # fmt: skip
 
 ERRORS = Table(
     "scored_errors",
     (
-        _who(),
+        _participant(),
         _method(),
-        _said("tables_of", lambda paper, row: f"{row['tables']}/{row['asked']}"),
-        _said("bias", lambda paper, row: paper.with_sd(row["bias_ppm"], row["u_bias_ppm"], 0)),
+        _text_column("tables_of", lambda paper, row: f"{row['tables']}/{row['asked']}"),
+        _text_column(
+            "bias", lambda paper, row: paper.with_sd(row["bias_ppm"], row["u_bias_ppm"], 0)
+        ),
         _ppm("rms_top_ppm"),
         _ppm("rms_ppm"),
         _ppm("mean_U_ppm"),
-        _said("share", lambda paper, row: paper.with_sd(row["share_within"], row["u_share"], 2)),
-        _said("tops", _tops),
+        _text_column(
+            "share", lambda paper, row: paper.with_sd(row["share_within"], row["u_share"], 2)
+        ),
+        _text_column("tops", _tops),
         Column("rms_zeta", decimals=2, **_SHEET),
     ),
-    rows=lambda found: found["methods"],
+    rows=lambda scores: scores["methods"],
 )
 
 FORMS = Table(
     "scored_forms",
     (
-        _who(),
+        _participant(),
         _method(),
         _ppm("form_ppm"),
         _percent("delivery_1cm_percent"),
@@ -76,20 +85,20 @@ FORMS = Table(
         _ppm("delivery_2m_ppm"),
         Column("falling_rows", decimals=0, **_SHEET),
     ),
-    rows=lambda found: found["methods"],
+    rows=lambda scores: scores["methods"],
 )
 
 TABLES = Table(
     "scored_tables",
     (
-        _who(),
+        _participant(),
         Column("tank", heading="tank_scored", sheet=True, width=8),
         _method(),
         Column("missing", decimals=0, **_SHEET),
         _ppm("top_error_ppm"),
         Column("top_E_n", decimals=2, **_SHEET),
         _ppm("rms_ppm"),
-        _said("rows_within", lambda paper, row: f"{row['within']}/{row['judged']}"),
+        _text_column("rows_within", lambda paper, row: f"{row['within']}/{row['judged']}"),
         _ppm("mean_U_ppm"),
         Column("rms_zeta", decimals=2, **_SHEET),
         Column("zero_m3", "m3", decimals=4, **_SHEET),
@@ -97,13 +106,13 @@ TABLES = Table(
         _ppm("form_ppm"),
         _ppm("worst_2m_ppm"),
     ),
-    rows=lambda found: [{**one, **one["form"]} for one in found["tables"]],
+    rows=lambda scores: [{**table, **table["form"]} for table in scores["tables"]],
 )
 
 METHODS_SHEET = Table(
     "scored_methods",
     (
-        _who(),
+        _participant(),
         _method(),
         *(Column(key, decimals=0, **_SHEET) for key in ("tables", "asked")),
         *(_ppm(key) for key in ("bias_ppm", "u_bias_ppm", "rms_top_ppm", "rms_ppm", "mean_U_ppm")),
@@ -113,23 +122,23 @@ METHODS_SHEET = Table(
         Column("rms_zeta", decimals=2, **_SHEET),
         *FORMS.columns[2:],
     ),
-    rows=lambda found: found["methods"],
+    rows=lambda scores: scores["methods"],
 )
 
 ROWS = Table(
     "scored_rows",
     (
-        _who(),
+        _participant(),
         Column("tank", heading="tank_scored", sheet=True, width=8),
         _method(),
         Column("height_m", "m", height=True, heading="height_scored", **_SHEET),
         *(Column(key, "m3", decimals=4, **_SHEET) for key in ("true_m3", "error_m3", "U_m3")),
         *(Column(key, decimals=3, **_SHEET) for key in ("E_n", "zeta")),
     ),
-    rows=lambda found: [
-        {**{key: one[key] for key in ("participant", "tank", "method")},
-         **{key: values[i] for key, values in one["rows"].items()}}
-        for one in found["tables"]
-        for i in range(len(one["rows"]["height_m"]))
+    rows=lambda scores: [
+        {**{key: table[key] for key in ("participant", "tank", "method")},
+         **{key: values[i] for key, values in table["rows"].items()}}
+        for table in scores["tables"]
+        for i in range(len(table["rows"]["height_m"]))
     ],
 )  # fmt: skip

@@ -58,7 +58,7 @@ def _page(paper, blocks):
     return page([block.data for block in (first, *blocks)], has_contents=False)
 
 
-def framed(html, title, height=HEIGHT):
+def frame_html(html, title, height=HEIGHT):
     """HTML of a frame that contains a page."""
     style = f"box-sizing:border-box;width:100%;height:{height};border:1px solid #c3cad2"
     return (
@@ -79,4 +79,4 @@ class SavedView:
         return whole_page(self._paper)
 
     def _repr_html_(self):
-        return framed(self.html, self._paper.word("views.results"))
+        return frame_html(self.html, self._paper.word("views.results"))

@@ -5,10 +5,10 @@ from importlib.util import find_spec
 
 import ipywidgets as widgets
 
-from tankcal.workbench.views.calculating import Calculator
-from tankcal.workbench.views.page import framed, table_page, wall_page
+from tankcal.workbench.views.budget_panel import BudgetPanel
+from tankcal.workbench.views.calculator import Calculator
+from tankcal.workbench.views.page import frame_html, table_page, wall_page
 from tankcal.workbench.views.points import PointsPanel
-from tankcal.workbench.views.supposing import BudgetPanel
 
 WIDE = {"width": "100%"}  # layout
 # Style that prevents truncated titles of tabs.
@@ -33,7 +33,7 @@ def live_view(result, paper, on_overrule):
 def frame_of(html, title):
     """Widget with a page; without anywidget, it does not report the selected point."""
     if find_spec("anywidget") is None:
-        return widgets.HTML(framed(html, title), layout=WIDE)
+        return widgets.HTML(frame_html(html, title), layout=WIDE)
     from tankcal.workbench.views.frame import Frame
 
     return Frame(page=html, title=title)

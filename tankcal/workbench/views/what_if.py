@@ -16,7 +16,7 @@ from tankcal.text.digits import UNKNOWN_DECIMALS, decimals_of, fixed
 
 
 @dataclass(frozen=True)
-class Supposed:
+class ChangedBudget:
     """Budgets without and with changed standard uncertainties.
 
     Attributes
@@ -38,7 +38,7 @@ class Supposed:
     is_simulated: bool = False
 
 
-def suppose(result, paper, high_m, low_m=None, factors=None):
+def change_budget(result, paper, high_m, low_m=None, factors=None):
     """Compute the budget of a dip, or of a delivery between two dips, with factors of u.
 
     Parameters
@@ -54,7 +54,7 @@ def suppose(result, paper, high_m, low_m=None, factors=None):
 
     Returns
     -------
-    Supposed
+    ChangedBudget
 
     Raises
     ------
@@ -66,12 +66,12 @@ def suppose(result, paper, high_m, low_m=None, factors=None):
     then = result.budget(high_m, low_m, factors=all_factors)
     names = tuple(paper.input_name(line) for line in to_plain(budget_lines(now.lines)))
     stated = result.at(high_m) if low_m is None else result.delivery(low_m, high_m)
-    return Supposed(now, then, names, all_factors, stated.interval == "monte_carlo")
+    return ChangedBudget(now, then, names, all_factors, stated.interval == "monte_carlo")
 
 
-def sentences(paper, supposed):
+def budget_sentences(paper, changed):
     """Sentences with volume, U, k and degrees of freedom, without and with the factors."""
-    now, then = supposed.now, supposed.then
+    now, then = changed.now, changed.then
     lines = [
         paper.word(
             "views.budget_now",
@@ -79,7 +79,7 @@ def sentences(paper, supposed):
             **_totals(paper, now),
         )
     ]
-    if any(factor != 1.0 for factor in supposed.factors):
+    if any(factor != 1.0 for factor in changed.factors):
         change = 100 * (then.U_m3 / now.U_m3 - 1) if now.U_m3 > 0 else 0.0
         lines.append(
             paper.word(
@@ -88,7 +88,7 @@ def sentences(paper, supposed):
                 change=f"{'+' if change > 0 else ''}{fixed(change, 1, paper.marks)}",
             )
         )
-    if supposed.is_simulated:
+    if changed.is_simulated:
         lines.append(paper.word("views.budget_simulated"))
     return lines
 
@@ -103,14 +103,14 @@ def _totals(paper, budget):
     }
 
 
-def table_html(paper, supposed):
+def table_html(paper, changed):
     """HTML table of the lines of the budget with the factors."""
-    U = supposed.now.U_m3
+    U = changed.now.U_m3
     table = budget_table(decimals_of(U) + 1 if U > 0 else UNKNOWN_DECIMALS)
     table = table.only("input", "u", "unit", "how", "dof", "contribution_m3", "share")
     factor = Column("factor", decimals=2, heading="factor_of_u")
     input_, *others = table.columns
-    lines = to_plain(budget_lines(supposed.then.lines))
-    rows = [line | {"factor": value} for line, value in zip(lines, supposed.factors, strict=True)]
+    lines = to_plain(budget_lines(changed.then.lines))
+    rows = [line | {"factor": value} for line, value in zip(lines, changed.factors, strict=True)]
     shown = replace(table, columns=(input_, factor, *others))
     return block_html(paper.show(shown, rows, on="budget_what_if").data)

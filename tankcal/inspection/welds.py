@@ -1,9 +1,9 @@
-"""Fine cells of the wall beside welds, each with a histogram of distances for each scan.
+"""Welds of a shell, and fine cells of the wall beside them.
 
 The coarse cells of the wall (`tankcal.clouds.wall`) determine the wall and its hidden parts. Fine
-cells divide the coarse cells, and count distances from the coarse mean of the same scan. Only
-cells beside welds are kept, so that the memory depends on the number of welds and scans, not on the
-number of points.
+cells divide the coarse cells, each with a histogram of distances for each scan, counted from the
+coarse mean of this scan. Only cells beside welds are kept, so that the memory depends on the number
+of welds and scans, not on the number of points.
 """
 
 from dataclasses import dataclass
@@ -12,6 +12,79 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.geometry.outlines import FULL_TURN
+
+PEAKING, BANDING = "peaking", "banding"
+APART_M = 0.3  # distance beyond which a detected weld differs from a given weld
+LOOSE_M = 0.12  # largest error of the place of a weld that was detected in coarse cells
+
+
+@dataclass(frozen=True)
+class KnownWeld:
+    """Place of a weld for the gaps of boards.
+
+    Attributes
+    ----------
+    kind : str
+        "peaking" for a vertical weld, "banding" for a horizontal weld.
+    course : int
+        Course, counted from 0 at the bottom; for a horizontal weld, the course below it.
+    low_m, high_m : float
+        Heights of the ends of a vertical weld above the bottom of the shell, m; for a horizontal
+        weld, both are its height.
+    azimuth_rad : float
+        Azimuth, clockwise from +y, rad; 0 for a horizontal weld.
+    loose_m : float
+        Largest error of the place, m; 0 for a given weld.
+    """
+
+    kind: str
+    course: int
+    low_m: float
+    high_m: float
+    azimuth_rad: float = 0.0
+    loose_m: float = 0.0
+
+
+def list_welds(course_heights_m, given_rad=(), detected=(), radius_m=np.inf):
+    """List the welds of a shell: vertical welds, then horizontal welds, from the bottom up.
+
+    Parameters
+    ----------
+    course_heights_m : sequence of float
+        Heights of the courses between joints, from the bottom up, m.
+    given_rad : sequence of sequence of float or None, optional
+        Given azimuths of the vertical welds of each course, rad; None if unknown.
+    detected : sequence of tankcal.clouds.wall.features.Weld, optional
+        Welds detected in a cloud. A weld near a given weld of its course is ignored.
+    radius_m : float, optional
+        Radius of the shell, m.
+
+    Returns
+    -------
+    tuple of KnownWeld
+
+    Examples
+    --------
+    >>> [(weld.kind, weld.course, weld.high_m) for weld in list_welds([2.0, 1.5], [[0.5], None])]
+    [('peaking', 0, 2.0), ('banding', 0, 2.0)]
+    """
+    joints = np.concatenate([[0.0], np.cumsum(course_heights_m)]).tolist()
+    welds = []
+    for course, (low, high) in enumerate(pairwise(joints)):
+        given = list((given_rad[course] or ()) if course < len(given_rad) else ())
+        welds += [KnownWeld(PEAKING, course, low, high, float(weld)) for weld in given]
+        for weld in detected:
+            if weld.course == course and _is_apart(weld.azimuth_rad, given, radius_m):
+                at = float(weld.azimuth_rad)
+                welds.append(KnownWeld(PEAKING, course, low, high, at, LOOSE_M))
+    rounds = [KnownWeld(BANDING, course, at, at) for course, at in enumerate(joints[1:-1])]
+    return (*welds, *rounds)
+
+
+def _is_apart(azimuth, given, radius_m):
+    """Whether an azimuth differs from all given azimuths by more than APART_M along the shell."""
+    return all(abs(wrap_angle(azimuth - known)) * radius_m > APART_M for known in given)
+
 
 # Size of a cell: least and largest width across the weld, and length along the weld.
 ACROSS_M, WIDEST_M, ALONG_M = 0.0125, 0.05, 0.15
@@ -90,7 +163,7 @@ class WeldCells:
         return merged
 
 
-def weld_cells_of(points, surface, grids):
+def fill_weld_cells(points, surface, grids):
     """`WeldCells` of an iterator of (scan, points); used by the passes over the clouds."""
     cells = WeldCells(surface, grids)
     for scan, xyz in points:
@@ -98,7 +171,7 @@ def weld_cells_of(points, surface, grids):
     return cells
 
 
-def located(grid, counts):
+def locate_wall(grid, counts):
     """Distances of the wall in fine cells and their standard deviations.
 
     The distance is the mean of the points within 2.5 standard deviations of the mode of a cell.
@@ -127,7 +200,7 @@ def located(grid, counts):
     return distance, sd
 
 
-def width_by_density(wall):
+def choose_cell_width(wall):
     """Width of a fine cell with enough points, m, at most WIDEST_M."""
     width = FULL_TURN * wall.surface.radius_m / wall.grid.columns
     area = width * float(np.median(np.diff(wall.grid.edges_m)))
@@ -137,7 +210,7 @@ def width_by_density(wall):
     return float(np.clip(needed, ACROSS_M, WIDEST_M))
 
 
-def grid_of_uprights(wall, strips, across_m):
+def build_upright_grid(wall, strips, across_m):
     """Build the `FineGrid` beside vertical welds, with rows of about 0.15 m within a course.
 
     Parameters
@@ -162,13 +235,13 @@ def grid_of_uprights(wall, strips, across_m):
     kept = np.zeros((len(groups), columns * division), dtype=bool)
     middle = (np.arange(columns * division) + 0.5) * width
     for weld, reach in strips:
-        near = np.abs(turned(middle - weld.azimuth_rad)) * wall.surface.radius_m <= reach
+        near = np.abs(wrap_angle(middle - weld.azimuth_rad)) * wall.surface.radius_m <= reach
         kept |= (course == weld.course)[:, None] & near
     base = np.stack([_medians(wall.radius_m[:, group]) for group in groups], axis=1)
     return _fine_grid(wall, edges, columns * division, kept, np.repeat(base, division, axis=2))
 
 
-def grid_of_rounds(wall, strips, across_m):
+def build_round_grid(wall, strips, across_m):
     """Build the `FineGrid` beside horizontal welds, with columns of about 0.15 m.
 
     Parameters
@@ -202,7 +275,7 @@ def grid_of_rounds(wall, strips, across_m):
     return _fine_grid(wall, edges, columns, kept, np.stack(base, axis=2)[:, parent])
 
 
-def turned(angle):
+def wrap_angle(angle):
     """Equivalent angle from -pi to pi, rad."""
     return (angle + np.pi) % FULL_TURN - np.pi
 

@@ -24,10 +24,13 @@ from scanned_tanks import scanned_parts
 
 import tankcal
 from tankcal.clouds.wall import Passes, find_cloud_wall
-from tankcal.inspection.known_welds import known_welds
-from tankcal.inspection.largest_gaps import undetermined
-from tankcal.inspection.weld_cells import grid_of_rounds, grid_of_uprights, weld_cells_of
-from tankcal.inspection.welds_of_clouds import gaps_of_cloud, gaps_of_result
+from tankcal.inspection.weld_gaps import find_gaps, find_gaps_in_cloud, undetermined_gaps
+from tankcal.inspection.welds import (
+    build_round_grid,
+    build_upright_grid,
+    fill_weld_cells,
+    list_welds,
+)
 
 LIMITS = {"peaking": 12.7, "banding": 25.4}
 SMALL = {"radius_m": 1.5, "courses": 2, "course_m": 1.2}
@@ -53,12 +56,12 @@ def _given(shell):
 
 
 def _welds(shell, given=None):
-    return known_welds([shell.course_m] * shell.courses, given or _given(shell))
+    return list_welds([shell.course_m] * shell.courses, given or _given(shell))
 
 
 def _gaps(shell, scans, welds=None, limits=LIMITS, **options):
     wall, passes = wall_and_passes(shell, scans)
-    return gaps_of_cloud(passes, wall, welds or _welds(shell), limits, **options)
+    return find_gaps_in_cloud(passes, wall, welds or _welds(shell), limits, **options)
 
 
 def _upright(found):
@@ -79,7 +82,7 @@ def scanned(shell):
 @pytest.fixture(scope="module")
 def found(shell, scanned):
     wall, passes = scanned
-    return gaps_of_cloud(passes, wall, _welds(shell), LIMITS)
+    return find_gaps_in_cloud(passes, wall, _welds(shell), LIMITS)
 
 
 @pytest.mark.slow
@@ -130,7 +133,7 @@ def test_profiles_are_kept_of_the_largest(found):  # property; a profile has its
 @pytest.mark.slow
 def test_turns_in_memory_give_the_same(shell, scanned, found):  # second method: weld by weld
     wall, passes = scanned
-    again = gaps_of_cloud(passes, wall, _welds(shell), LIMITS, memory_bytes=1)
+    again = find_gaps_in_cloud(passes, wall, _welds(shell), LIMITS, memory_bytes=1)
     assert again == found
 
 
@@ -138,10 +141,10 @@ def test_turns_in_memory_give_the_same(shell, scanned, found):  # second method:
 def test_points_in_parts_give_the_same(shell, scanned):  # property: whole numbers that add
     wall, _ = scanned
     strips = [(one, 0.5) for one in _welds(shell)]
-    grids = grid_of_uprights(wall, strips[:5], 0.02), grid_of_rounds(wall, strips[5:], 0.02)
+    grids = build_upright_grid(wall, strips[:5], 0.02), build_round_grid(wall, strips[5:], 0.02)
     cloud = _cloud(shell)[:50_000]
-    whole = weld_cells_of([(0, cloud)], wall.surface, grids)
-    parts = [weld_cells_of([(0, one)], wall.surface, grids) for one in np.array_split(cloud, 3)]
+    whole = fill_weld_cells([(0, cloud)], wall.surface, grids)
+    parts = [fill_weld_cells([(0, one)], wall.surface, grids) for one in np.array_split(cloud, 3)]
     both = parts[2].merged(parts[0]).merged(parts[1])
     for one, other in zip(whole.counts, both.counts, strict=True):
         assert one.sum() > 10_000
@@ -234,8 +237,8 @@ def test_clutter_of_rays_makes_no_peak(clutter):  # truth: the radius of the sce
     ]
     scans[1] = scans[1] * 1.0003 + np.array([0.003, -0.002, 0.0])
     wall = find_cloud_wall(passes_of(scans), radius_m=3.0, joints_m=scene.joints_m)
-    welds = known_welds([2.0, 2.0], [[one[0] for one in at]] * 2)
-    found = gaps_of_cloud(Passes(passes_of(scans)), wall, welds, LIMITS)
+    welds = list_welds([2.0, 2.0], [[one[0] for one in at]] * 2)
+    found = find_gaps_in_cloud(Passes(passes_of(scans)), wall, welds, LIMITS)
     off = []
     for weld, gap in zip(welds, found.gaps, strict=True):
         if weld.kind == "peaking" and gap.gap_mm is not None:
@@ -270,7 +273,7 @@ def test_job_with_files_of_a_scanner(tmp_path, seed):
     parts.tables["welds"] = [["course", "azimuth_deg"], *rows]
     result = tankcal.run(tankcal.load(write_folder(tmp_path / "job", parts)), simulated=False)
     told = []
-    found = gaps_of_result(result, LIMITS, progress=told.append)
+    found = find_gaps(result, LIMITS, progress=told.append)
     assert any("5 welds" in str(one) for one in told)
     for at, gap in zip((1.0, 4.0, 1.0, 4.0), _upright(found), strict=True):
         truth = 1000 * largest_of_formula(lambda s, at=at: form(at + s / 3.0, 1.0))
@@ -285,9 +288,9 @@ def test_job_with_files_of_a_scanner(tmp_path, seed):
 def test_weld_that_the_cloud_shows():  # truth: azimuth and gap of the form
     shell = PeakedShell(peaks=PEAKS[:2], **SMALL)
     wall, passes = wall_and_passes(shell, [_cloud(shell)])
-    welds = known_welds([1.2, 1.2], (), wall.welds, shell.radius_m)
+    welds = list_welds([1.2, 1.2], (), wall.welds, shell.radius_m)
     found = sorted(
-        _upright(gaps_of_cloud(passes, wall, welds, LIMITS)), key=lambda one: one.azimuth_deg
+        _upright(find_gaps_in_cloud(passes, wall, welds, LIMITS)), key=lambda one: one.azimuth_deg
     )
     for peak, gap in zip(PEAKS[:2], found, strict=True):
         off = np.radians(gap.azimuth_deg) - peak.azimuth_rad
@@ -297,7 +300,7 @@ def test_weld_that_the_cloud_shows():  # truth: azimuth and gap of the form
 
 def test_found_weld_is_that_which_was_given():  # property
     seen = [SimpleNamespace(course=0, azimuth_rad=at) for at in (0.52, 3.0)]
-    welds = known_welds([2.0, 2.0], [[0.5], None], seen, 6.5)
+    welds = list_welds([2.0, 2.0], [[0.5], None], seen, 6.5)
     assert [(one.course, one.azimuth_rad, one.loose_m > 0) for one in welds] == [
         (0, 0.5, False),
         (0, 3.0, True),
@@ -319,7 +322,7 @@ def test_sparse_cloud_determines_nothing():  # 250 points in each square metre
 @pytest.mark.slow
 def test_gap_that_is_too_uncertain(shell, scanned, found):  # u over a quarter of the limit
     wall, passes = scanned
-    again = gaps_of_cloud(passes, wall, _welds(shell), {"peaking": 0.4})
+    again = find_gaps_in_cloud(passes, wall, _welds(shell), {"peaking": 0.4})
     peaking, banding = again.figures
     assert (peaking.value_mm, peaking.remark) == (None, "gap_too_uncertain")
     assert peaking.remark_values["u_mm"] > peaking.remark_values["most_mm"] == 0.1
@@ -355,14 +358,14 @@ def test_weld_of_which_a_part_is_hidden(hidden_m, is_told):  # property: half is
 def test_survey_without_a_cloud_determines_nothing(tmp_path):  # property
     write_job(tmp_path / "job")
     result = SimpleNamespace(job=tankcal.load(tmp_path / "job"), clouded=None)
-    found = gaps_of_result(result, LIMITS)
+    found = find_gaps(result, LIMITS)
     assert [one.kind for one in found.gaps] == ["banding"] * 4
     assert [one.remark for one in found.figures] == ["gap_no_weld", "gap_no_cloud"]
     assert all(one.gap_mm is None for one in found.gaps)
 
 
 def test_welds_of_which_nothing_is_told():  # property
-    found = undetermined(known_welds([2.0, 2.0], [[0.5], [1.5]]), "gap_no_cloud")
+    found = undetermined_gaps(list_welds([2.0, 2.0], [[0.5], [1.5]]), "gap_no_cloud")
     assert [(one.kind, one.course, one.gap_mm) for one in found.gaps] == [
         ("peaking", 1, None),
         ("peaking", 2, None),

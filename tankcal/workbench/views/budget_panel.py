@@ -7,8 +7,8 @@ import ipywidgets as widgets
 from tankcal.errors import HeightError
 from tankcal.text.digits import fixed
 from tankcal.text.words import say
-from tankcal.workbench.views.calculating import typed_number
-from tankcal.workbench.views.what_if import sentences, suppose, table_html
+from tankcal.workbench.views.calculator import parse_number
+from tankcal.workbench.views.what_if import budget_sentences, change_budget, table_html
 
 LARGEST, STEP = 3.0, 0.05  # largest factor, and step of its slider
 STYLE = """<style>.tankcal-budget th, .tankcal-budget td { padding: 0 8px; line-height: 1.6;
@@ -36,10 +36,10 @@ class BudgetPanel:
         self.low = widgets.Text(
             description=word("views.low_dip"), style=wide, layout={"width": "22rem"}
         )
-        initial = suppose(result, paper, float(heights[-1]))
+        initial = change_budget(result, paper, float(heights[-1]))
         self.factors = [self._slider(name) for name in initial.names]
         self.reset = widgets.Button(description=word("views.reset"), layout={"width": "auto"})
-        self.reset.on_click(lambda _: self.put_back())
+        self.reset.on_click(lambda _: self.reset_factors())
         self.totals, self.table = widgets.HTML(), widgets.HTML()
         self.table.add_class("tankcal-budget")
         for item in (self.dip, self.low, *self.factors):
@@ -102,7 +102,7 @@ class BudgetPanel:
         button.on_click(halve)
         return button
 
-    def put_back(self):
+    def reset_factors(self):
         """Reset all factors to 1."""
         for slider in self.factors:
             slider.value = 1.0
@@ -112,22 +112,22 @@ class BudgetPanel:
         low, text = None, self.low.value.strip()
         try:
             if text:
-                low = typed_number(text)
+                low = parse_number(text)
                 if low is None:
-                    raise _Typed(self.paper.word("web.no_number", text=text[:40]))
+                    raise _InvalidEntry(self.paper.word("web.no_number", text=text[:40]))
                 if low >= self.dip.value:
-                    raise _Typed(self.paper.word("views.not_below"))
+                    raise _InvalidEntry(self.paper.word("views.not_below"))
             factors = {i: slider.value for i, slider in enumerate(self.factors)}
-            supposed = suppose(self.result, self.paper, self.dip.value, low, factors)
-        except _Typed as error:
+            changed = change_budget(self.result, self.paper, self.dip.value, low, factors)
+        except _InvalidEntry as error:
             self._refuse(str(error))
             return
         except HeightError as error:
             self._refuse(say(self.paper.words, error.args[0]))
             return
-        text_html = "<br>".join(map(escape, sentences(self.paper, supposed)))
+        text_html = "<br>".join(map(escape, budget_sentences(self.paper, changed)))
         self.totals.value = f'<div role="status">{text_html}</div>'
-        self.table.value = STYLE + table_html(self.paper, supposed)
+        self.table.value = STYLE + table_html(self.paper, changed)
 
     def _refuse(self, text):
         """Show a message in place of the budget."""
@@ -135,5 +135,5 @@ class BudgetPanel:
         self.table.value = ""
 
 
-class _Typed(Exception):
+class _InvalidEntry(Exception):
     """The entered text is no valid dip."""

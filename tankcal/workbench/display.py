@@ -6,9 +6,9 @@ from tankcal.errors import SHEET
 from tankcal.job.contract import KEYS, REGISTER_KEYS, SECTIONS
 from tankcal.job.starter.texts import Texts, parted, texts_in
 from tankcal.text.words import marks_of, say
-from tankcal.workbench.decimals import entered_text, shown_text
+from tankcal.workbench.decimals import text_for_display, text_for_file
 from tankcal.workbench.findings import BAD
-from tankcal.workbench.keys import NOT_HERE, SETTINGS, field_of
+from tankcal.workbench.keys import READ_ONLY_SECTIONS, SETTINGS, field_of
 
 # Names of the columns in which keys are shown.
 OWNER, KEY, VALUE, UNIT, EXPECTED = "owner", "key", "value", "unit", "expected"
@@ -125,7 +125,7 @@ class Reader:
         kinds = [fields.get(heading) for heading in table.headings]
         rows = [
             [
-                shown_text(field, text, table.decimal, self.mark)
+                text_for_display(field, text, table.decimal, self.mark)
                 for field, text in zip(kinds, row.cells, strict=True)
             ]
             for row in table.rows
@@ -172,7 +172,7 @@ class Reader:
         rows = []
         for owner, key in places:
             field = field_of(name, owner, key)
-            shown = shown_text(field, texts.get((owner, key), ""), ".", self.mark)
+            shown = text_for_display(field, texts.get((owner, key), ""), ".", self.mark)
             rows.append([owner, key, shown, *self._unit_and_note(name, owner, key, field)])
         index = {place: number for number, place in enumerate(places)}
         value = 2
@@ -199,7 +199,7 @@ class Reader:
 
     def _unit_and_note(self, name, owner, key, field):
         """Unit of a key, and its description with the expected values."""
-        if owner in NOT_HERE:
+        if owner in READ_ONLY_SECTIONS:
             return "", self.word("in_file")
         if field is None:
             return "", self.word("own_field")
@@ -209,23 +209,28 @@ class Reader:
         note = self.texts.notes[group].get(place, field.note)
         return parted(field.name)[1], f"{note} · {self._expectation(field)}"
 
-    def _marks(self, check, name, placed):
-        """Marks {(row, column): (level, text)}; several marks of a cell share the worst level."""
+    def _marks(self, check, name, find_place):
+        """Marks {(row, column): (level, text)}; several marks of a cell share the worst level.
+
+        `find_place` converts a place of the check to a place of the grid. The name of the column
+        is added to a problem whose cell is not shown.
+        """
         texts = {}
         for place, marks in check.marks.get(name, {}).items():
+            place_in_grid = find_place(place)
             is_bad = any(mark.level == BAD for mark in marks)
             text = "\n".join(
-                f"{place_of_key(mark)}{self.say(mark.problem.expected)}"
-                if placed(place) == (None, None)
+                f"{mark.problem.column}: {self.say(mark.problem.expected)}"
+                if mark.problem.column and place_in_grid == (None, None)
                 else self.say(mark.problem.expected)
                 for mark in marks
             )
             level = BAD if is_bad else marks[0].level
-            known = texts.get(placed(place))
+            known = texts.get(place_in_grid)
             if known is not None:
                 level = BAD if BAD in (level, known[0]) else level
                 text = f"{known[1]}\n{text}"
-            texts[placed(place)] = level, text
+            texts[place_in_grid] = level, text
         return texts
 
     # ---- entry
@@ -250,13 +255,13 @@ class Reader:
                 if column == VALUE and 0 <= row < len(places):
                     owner, key = places[row]
                     field = field_of(name, owner, key)
-                    draft.set_value(name, owner, key, entered_text(field, text, ".", self.mark))
+                    draft.set_value(name, owner, key, text_for_file(field, text, ".", self.mark))
             return
         fields, decimal = draft.fields(name), draft.tables[name].decimal
         draft.set_cells(
             name,
             [
-                (row, column, entered_text(fields.get(column), text, decimal, self.mark))
+                (row, column, text_for_file(fields.get(column), text, decimal, self.mark))
                 for row, column, text in changes
             ],
         )
@@ -264,11 +269,6 @@ class Reader:
     def line(self, problem):
         """Text of a problem or a warning in a single line."""
         return self.say(problem.text)
-
-
-def place_of_key(mark):
-    """Prefix "x_m: " with the column of a problem whose cell is not shown, or ""."""
-    return f"{mark.problem.column}: " if mark.problem.column else ""
 
 
 def key_places(draft, name, every_key=False):
@@ -282,7 +282,9 @@ def key_places(draft, name, every_key=False):
         owners = dict.fromkeys(owner for owner, _ in given)
         fields = {owner: REGISTER_KEYS[name] for owner in owners}
     else:
-        fields = {section: KEYS[section] for section in SECTIONS if section not in NOT_HERE}
+        fields = {
+            section: KEYS[section] for section in SECTIONS if section not in READ_ONLY_SECTIONS
+        }
     kind = draft.kind if name == SETTINGS else None
     places = []
     for owner, owner_fields in fields.items():

@@ -38,7 +38,7 @@ class Answer:
     is_refused: bool = False
 
 
-def typed_number(text):
+def parse_number(text):
     """Number in an entered text, with decimal point or comma, or None."""
     plain = text.strip().replace(",", ".")
     return float(plain) if len(plain) < MOST_LETTERS and _NUMBER.fullmatch(plain) else None
@@ -72,7 +72,7 @@ class Calculator:
 
     def dip_of(self, text):
         """Answer with the dip of a volume, entered in the unit of the table."""
-        volume = typed_number(text)
+        volume = parse_number(text)
         if volume is None:
             return self._refused(
                 "views.no_volume" if text.strip() else "views.type_volume",
@@ -112,7 +112,7 @@ class Calculator:
 
     def _dip(self, text):
         """Dip in the range of the table, or an `Answer` that refuses the entered text."""
-        heights, dip = self.result.table.height_m, typed_number(text)
+        heights, dip = self.result.table.height_m, parse_number(text)
         if not text.strip():
             return self._refused("web.type_dip")
         if dip is None:

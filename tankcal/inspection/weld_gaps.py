@@ -1,14 +1,153 @@
-"""Largest gap of each weld and of all welds, with the expanded uncertainty of a maximum."""
+"""Peaking and banding: the largest gap of each weld and of all welds, from the points of scans.
+
+The expanded uncertainty of the largest gap accounts for all gaps that may be the largest.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.inspection.boards import REACH_M, UNCERTAIN
-from tankcal.inspection.known_welds import BANDING, PEAKING
-from tankcal.inspection.weld_boards import TOGETHER, noise_factor
+from tankcal.geometry.outlines import FULL_TURN
+from tankcal.inspection.boards import (
+    REACH_M,
+    TOGETHER,
+    UNCERTAIN,
+    board_reach,
+    lay_boards,
+    noise_factor,
+)
+from tankcal.inspection.welds import (
+    ALONG_M,
+    BANDING,
+    BINS,
+    COUNT_BYTES,
+    PEAKING,
+    build_round_grid,
+    build_upright_grid,
+    choose_cell_width,
+    fill_weld_cells,
+    list_welds,
+    locate_wall,
+)
+from tankcal.messages import message
+from tankcal.pipeline.cloud_cluster import open_passes
+from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
 from tankcal.record.inspection import WeldGap
 from tankcal.uncertainty import coverage_factor
+
+MEMORY_BYTES = 512 << 20  # memory of the histograms; more welds require several passes
+
+
+def find_gaps(result, limits_mm, reading=None, progress=None):
+    """Determine the gaps at the welds of a computed job from its clouds.
+
+    Without clouds, no gap is determined, with the remark "gap_no_cloud".
+
+    Parameters
+    ----------
+    result : tankcal.pipeline.result.Result
+        Result for an upright tank. The files of its clouds are read again.
+    limits_mm : dict
+        Limits of the rule, {"peaking": mm, "banding": mm}. A missing key is an unknown limit.
+    reading : tankcal.pipeline.cloud_passes.Reading, optional
+        Number of workers; by default the files are read in this process.
+    progress : callable, optional
+        Function that receives a message for each step.
+
+    Returns
+    -------
+    WeldGaps
+
+    Raises
+    ------
+    InputError
+        If the file of a cloud cannot be read.
+    """
+    job, clouded = result.job, result.clouded
+    heights = [course.height_m for course in job.courses]
+    given = [course.welds_rad for course in job.courses]
+    if clouded is None:
+        return undetermined_gaps(list_welds(heights, given), "gap_no_cloud")
+    wall, reading = clouded.cells, reading or Reading()
+    welds = list_welds(heights, given, wall.welds, wall.surface.radius_m)
+    telling = Telling(progress, reading.part_progress)
+    placing = Placing.of(job.clouds, clouded.registration)
+    with open_passes(placing, reading, telling) as passes:
+        telling.step(
+            message("cloud_weld_pass", "laying boards over {count} welds", count=len(welds))
+        )
+        return find_gaps_in_cloud(passes, wall, welds, limits_mm)
+
+
+def find_gaps_in_cloud(passes, wall, welds, limits_mm, *, memory_bytes=MEMORY_BYTES):
+    """Determine the gaps at the welds of an upright tank from the points of its scans.
+
+    Parameters
+    ----------
+    passes : object
+        Object with a method `gather(taken_of, *sizes)` that processes all points, such as
+        `tankcal.clouds.wall.Passes`, `JobPasses` or `ClusterPasses`.
+    wall : tankcal.clouds.wall.CloudWall
+        Coarse cells of the same points.
+    welds : sequence of KnownWeld
+        Welds of `list_welds`, with heights above the lowest joint of the wall.
+    limits_mm : dict
+        Limits, {"peaking": mm, "banding": mm}. A gap whose u exceeds a quarter of its limit is not
+        determined. With a missing key, a gap is determined for any u.
+    memory_bytes : int, optional
+        Memory of the fine cells. If the welds require more, they are processed in several passes.
+
+    Returns
+    -------
+    WeldGaps
+        Gaps in the order of the welds, with profiles of the three largest gaps of each kind. The k
+        of U accounts for all gaps that may be the largest (two-sided, 95 % for all together).
+    """
+    across_m = choose_cell_width(wall)
+    boards = []
+    for batch in _batches(welds, wall, across_m, memory_bytes):
+        boards += _board_batch(passes, wall, batch, across_m)
+    gaps, figures = [None] * len(welds), []
+    for kind in (PEAKING, BANDING):
+        places = [i for i, weld in enumerate(welds) if weld.kind == kind]
+        batch, figure = select_largest_gaps(kind, [boards[i] for i in places], limits_mm.get(kind))
+        for i, gap in zip(places, batch, strict=True):
+            gaps[i] = gap
+        figures.append(figure)
+    return WeldGaps(tuple(gaps), tuple(figures))
+
+
+def _batches(welds, wall, across_m, memory_bytes):
+    """Yield lists of welds whose cells fit into `memory_bytes`."""
+    cell_bytes, around_m = len(wall.sides) * BINS * COUNT_BYTES, FULL_TURN * wall.surface.radius_m
+    batch, used_bytes = [], 0
+    for weld in welds:
+        rows = 2 * board_reach(weld, across_m) / across_m
+        tall = weld.high_m - weld.low_m
+        along = (around_m if weld.kind == BANDING else tall) / ALONG_M + 1
+        required_bytes = cell_bytes * rows * along
+        if batch and used_bytes + required_bytes > memory_bytes:
+            yield batch
+            batch, used_bytes = [], 0
+        batch.append(weld)
+        used_bytes += required_bytes
+    if batch:
+        yield batch
+
+
+def _board_batch(passes, wall, welds, across_m):
+    """`Boards` of welds, from one pass over the points."""
+    grids = {}
+    for kind, grid_of in ((PEAKING, build_upright_grid), (BANDING, build_round_grid)):
+        if strips := [(weld, board_reach(weld, across_m)) for weld in welds if weld.kind == kind]:
+            grids[kind] = grid_of(wall, strips, across_m)
+    cells = passes.gather(fill_weld_cells, wall.surface, tuple(grids.values()))
+    fields = {
+        kind: (grid, *locate_wall(grid, counts))
+        for (kind, grid), counts in zip(grids.items(), cells.counts, strict=True)
+    }
+    return [lay_boards(wall, weld, across_m, *fields[weld.kind]) for weld in welds]
+
 
 # Least share of determined boards: for a determined weld, and for all welds without a remark.
 LEAST_SEEN, WELL_SEEN = 0.5, 0.9
@@ -57,14 +196,14 @@ class GapFigure:
 
 
 @dataclass(frozen=True)
-class GapsFound:
+class WeldGaps:
     """Gaps at the welds: a `WeldGap` for each weld, and a `GapFigure` for each kind of weld."""
 
     gaps: tuple
     figures: tuple
 
 
-def largest_gaps(kind, boards, limit_mm):
+def select_largest_gaps(kind, boards, limit_mm):
     """Determine the largest gap of each weld of a kind, and of all these welds.
 
     Parameters
@@ -114,7 +253,7 @@ def _figure(kind, gap, worst, known, welds, noise_scale):
     """`GapFigure` of the largest gap; `known` has (Boards, _Largest) of each determined weld."""
     # Gaps that may exceed the largest gap within 2 u of both are candidates for the true maximum.
     rivals = sum(_rivals(*pair, noise_scale, abs(worst.gap_m) - 2 * worst.u_m) for pair in known)
-    k = factor_of_largest(rivals)
+    k = maximum_coverage_factor(rivals)
     seen = float(np.mean([gap_of_weld.seen for _, gap_of_weld in known]))
     remark = "gap_partly_seen" if seen < WELL_SEEN else None
     return GapFigure(
@@ -131,21 +270,21 @@ def _figure(kind, gap, worst, known, welds, noise_scale):
     )
 
 
-def undetermined(welds, remark):
-    """`GapsFound` without any determined gap, as for a survey by points or strapping."""
+def undetermined_gaps(welds, remark):
+    """`WeldGaps` without any determined gap, as for a survey by points or strapping."""
     figures = []
     for kind in (PEAKING, BANDING):
         count = sum(weld.kind == kind for weld in welds)
         figures.append(_no_figure(kind, count, remark if count else "gap_no_weld"))
-    return GapsFound(tuple(_no_gap(weld) for weld in welds), tuple(figures))
+    return WeldGaps(tuple(_no_gap(weld) for weld in welds), tuple(figures))
 
 
-def factor_of_largest(rivals):
+def maximum_coverage_factor(rivals):
     """Coverage factor k of the largest of independent gaps.
 
     With a probability of 95 %, the error of none of the `rivals` gaps exceeds k u.
 
-    >>> round(factor_of_largest(1), 3), round(factor_of_largest(20), 3)
+    >>> round(maximum_coverage_factor(1), 3), round(maximum_coverage_factor(20), 3)
     (1.96, 3.016)
     """
     return float(coverage_factor(PROBABILITY ** (1 / rivals), np.inf))
@@ -220,7 +359,7 @@ def _weld_gap(boards, largest, noise_scale, with_profile):
         height_m=along if is_upright else weld.low_m,
         azimuth_deg=float(np.degrees(azimuth) % 360),
         gap_mm=IN_MM * largest.gap_m,
-        U_mm=IN_MM * factor_of_largest(rivals) * largest.u_m,
+        U_mm=IN_MM * maximum_coverage_factor(rivals) * largest.u_m,
         along_mm=np.round(IN_MM * boards.s_m[known], 1).tolist(),
         profile_mm=np.round(IN_MM * profile[known], 2).tolist(),
     )
