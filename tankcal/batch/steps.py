@@ -247,7 +247,7 @@ def _export(task, clock):
     record = _record(task)
     language = _language(task, record)
     export = export_record(record, find_profile(task.job.options.profile), language=language)
-    with folders.replaced(_place(task, "export")) as temporary:
+    with folders.replace_folder(_place(task, "export")) as temporary:
         return write_export(export, temporary / default_name(export), language)
 
 

@@ -113,7 +113,7 @@ class SavedDocument:
         plain = result if isinstance(result, dict) else to_plain(result)
         paper = self.paper_of(plain, language, letterhead)
         self.refuse_foreign(folder)
-        with folders.replaced(folder, language) as temporary:
+        with folders.replace_folder(folder, language) as temporary:
             self._write_files(paper, temporary, progress or (lambda text: None))
         return [path for path in (Path(folder) / name for name in self.files) if path.exists()]
 

@@ -312,7 +312,7 @@ def _compare_covariance(verification, path, adjustment):
         )
 
 
-def saved_folder(verification, folder, callbacks, manifest):
+def verify_saved_folder(verification, folder, callbacks, manifest):
     """Verify a folder with a saved file other than a record; return whether it is such a folder.
 
     The papers of comparisons, inspections and histories are written again from their file. For

@@ -62,7 +62,7 @@ def write(result, directory, progress=None, language=None):
 
     kind = CameraPaper(result, language).result["kind"]
     progress = progress or (lambda text, done, total: None)
-    with folders.replaced(directory, language) as temporary:
+    with folders.replace_folder(directory, language) as temporary:
         text = json.dumps(result, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
         (temporary / RECORD).write_text(text + "\n", encoding="utf-8")
         for name, rows in _of_kind(result).tables(result).items():

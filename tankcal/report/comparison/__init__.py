@@ -65,9 +65,9 @@ class ComparisonPaper(SavedPaper):
         texts = self._texts_of_rule(rule)
         clauses = texts.get("clauses", {})
         of_rule = {key: text for key, text in texts.items() if key != "clauses"}
-        self.found = self.saved | {"rule": rule and rule | of_rule}
+        self.record = self.saved | {"rule": rule and rule | of_rule}
         for key in ("legal", "ages"):
-            self.found[key] = [
+            self.record[key] = [
                 entry | {"clause": clauses.get(entry["clause"], entry["clause"])}
                 for entry in self.saved[key]
             ]
@@ -83,13 +83,13 @@ class ComparisonPaper(SavedPaper):
 
     def subject(self):
         """Return the tank, or the file of the former table if the tank is unknown."""
-        tank = self.found["tank"]
-        subject = f"{self.word('page.tank')} {tank}" if tank else self.found["former"]["name"]
+        tank = self.record["tank"]
+        subject = f"{self.word('page.tank')} {tank}" if tank else self.record["former"]["name"]
         return bearable(subject)
 
     def date(self):
         """Return the ISO date of the new table; "" if it is unknown or no date."""
-        return iso_day(self.found["new"]["date"])
+        return iso_day(self.record["new"]["date"])
 
     # ---- values
 

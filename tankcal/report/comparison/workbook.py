@@ -63,7 +63,7 @@ READ_VALUES = Table(  # values estimated from the tables
 
 def write(paper, path):
     """Write the workbook of a ComparisonPaper; equal comparisons give equal bytes."""
-    comparison, new = paper.found, paper.found["new"]
+    comparison, new = paper.record, paper.record["new"]
     head = workbook_head(
         comparison["tankcal"],
         tank=comparison["tank"] or comparison["former"]["name"],
@@ -76,7 +76,7 @@ def write(paper, path):
 
 def sheets(book):
     """Yield the content of each sheet, in order."""
-    paper, comparison = book.paper, book.paper.found
+    paper, comparison = book.paper, book.paper.record
     yield _verdict_sheet(book, paper)
     yield SheetContent("rows", [cell_table(book, ROWS)], tab="result", is_filtered=True)
     waterfall = cell_table(book, waterfall_table(comparison), comparison["waterfall"])
@@ -87,8 +87,8 @@ def sheets(book):
 
 def _verdict_sheet(book, paper):
     """Return verdict, its reasons, both tables, the limits of the rule and estimated values."""
-    code = paper.found["verdict"] or "none"
-    reasons = [f"– {paper.reason(reason)}" for reason in paper.found["reasons"]]
+    code = paper.record["verdict"] or "none"
+    reasons = [f"– {paper.reason(reason)}" for reason in paper.record["reasons"]]
     verdict = (
         Sentences([paper.word(f"verdicts.{code}")], look=FIRST_LINE),
         Sentences([paper.word(f"texts.verdict_{code}"), *reasons]),
@@ -121,7 +121,7 @@ def _limit_rows(paper):
             "unit": unit_symbol(limit["unit"]),
             "decimals": DECIMALS_OF_LIMITS[limit["unit"]],
         }
-        for limit in paper.found["legal"]
+        for limit in paper.record["legal"]
     ]
     periods = [
         age
@@ -132,6 +132,6 @@ def _limit_rows(paper):
             "unit": paper.word("texts.unit_years"),
             "decimals": 1,
         }
-        for age in paper.found["ages"]
+        for age in paper.record["ages"]
     ]
     return [*limits, *periods]

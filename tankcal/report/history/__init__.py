@@ -58,12 +58,12 @@ class HistoryPaper(SavedPaper):
         self.words["checks"] = words["inspection"]["checks"]
         self.words["check_verdicts"] = words["inspection"]["verdicts"]
         self.words["steps"] = words["comparison"]["steps"]
-        self.saved = self.found = HISTORY.migrated(history, HISTORY.file)
+        self.saved = self.record = HISTORY.migrated(history, HISTORY.file)
         self.letterhead = letterhead.data() if letterhead else None
 
     def subject(self):
         """Return the tank, or the file of the newest table if the tank is unknown."""
-        tank = self.found["tank"]
+        tank = self.record["tank"]
         name = f"{self.word('page.tank')} {tank}" if tank else self.newest["file"]
         return bearable(name)
 
@@ -74,7 +74,7 @@ class HistoryPaper(SavedPaper):
     @property
     def newest(self):
         """The newest certificate."""
-        return self.found["certificates"][-1]
+        return self.record["certificates"][-1]
 
 
 def _load_renderers():

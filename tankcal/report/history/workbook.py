@@ -31,7 +31,7 @@ SHEETS = {
 
 def write(paper, path):
     """Write the workbook of a HistoryPaper; equal histories give equal bytes."""
-    history, newest = paper.found, paper.newest
+    history, newest = paper.record, paper.newest
     head = workbook_head(
         history["tankcal"],
         tank=history["tank"] or newest["file"],
@@ -44,7 +44,7 @@ def write(paper, path):
 
 def sheets(book):
     """Yield the content of each sheet, in order; no sheet for a table without rows."""
-    paper, history = book.paper, book.paper.found
+    paper, history = book.paper, book.paper.record
     for code, table in SHEETS.items():
         if table.rows(history):
             yield SheetContent(code, [cell_table(book, table)], tab="result", is_filtered=True)

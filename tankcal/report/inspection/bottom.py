@@ -26,7 +26,7 @@ SETTLEMENT = ("settlement_cosine", "settlement_all", "settlement_subset", "settl
 
 def settlements(paper):
     """Blocks on each epoch, then on the differences, after a figure with all epochs."""
-    items = paper.found["settlements"]
+    items = paper.record["settlements"]
     if not items:
         return []
     has_several = len(items) > 1
@@ -41,7 +41,7 @@ def settlements(paper):
 
 def _has_estimates(paper):
     """Whether a figure estimates a true value, with the reading beside it."""
-    return any(check["reading"] is not None for check in paper.found["checks"])
+    return any(check["reading"] is not None for check in paper.record["checks"])
 
 
 def settlement_blocks(paper, item):
@@ -99,7 +99,7 @@ def _verdicts(paper, item):
     name = epoch_name(item)
     checks = [
         entry
-        for entry in paper.found["checks"]
+        for entry in paper.record["checks"]
         if entry["code"] in SETTLEMENT and entry["epoch"] == name
     ]
     if not checks:
@@ -114,7 +114,7 @@ def _verdicts(paper, item):
 
 def points(paper):
     """Blocks with the points of all epochs and differences; the last section, with long tables."""
-    items = paper.found["settlements"]
+    items = paper.record["settlements"]
     if not items:
         return []
     tables = [
@@ -133,7 +133,7 @@ def _across(points):
 
 def edges(paper):
     """Blocks with the profiles of the edge, and the table of their drops."""
-    profiles = paper.found["edges"]
+    profiles = paper.record["edges"]
     if not profiles:
         return []
     return [
@@ -210,7 +210,7 @@ def _draw_curvatures(paper, ax, azimuth, values, points):
 @styled
 def draw_epochs(paper):
     """Draw the residuals U_i of all epochs and differences against the azimuth."""
-    shown = paper.found["settlements"][:MOST_EPOCHS]
+    shown = paper.record["settlements"][:MOST_EPOCHS]
     figure = Figure(figsize=(WIDTH, HIGH))
     ax = figure.subplots()
     for number, item in enumerate(shown):
@@ -231,7 +231,7 @@ def draw_epochs(paper):
 @styled
 def draw_edges(paper):
     """Draw profiles of the edge, the deepest first: readings, break-over point and limit."""
-    shown = _edges_by_depth(paper.found)
+    shown = _edges_by_depth(paper.record)
     across = min(3, len(shown))
     down = ceil(len(shown) / across)
     figure = Figure(figsize=(WIDTH, 1.75 * down + 0.45))

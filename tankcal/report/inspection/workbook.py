@@ -44,7 +44,7 @@ SHEETS = {
 
 def write(paper, path):
     """Write the workbook of an InspectionPaper; equal inspections give equal bytes."""
-    inspection, tank = paper.found, paper.found["tank"]
+    inspection, tank = paper.record, paper.record["tank"]
     head = workbook_head(
         inspection["tankcal"],
         tank=bearable(tank["id"]),
@@ -61,7 +61,7 @@ def sheets(book):
         tables = [
             cell_table(book, table, rows)
             for table, rows_of in declared
-            if (rows := rows_of(book.paper.found))
+            if (rows := rows_of(book.paper.record))
         ]
         if tables:
             is_single = len(tables) == 1
@@ -70,7 +70,7 @@ def sheets(book):
 
 def _checks_sheet(book, paper):
     """Return the result and its scope, all checks with their limits, remarks and warnings."""
-    inspection = paper.found
+    inspection = paper.record
     as_built = paper.word("texts.as_built" if inspection["as_built"] else "texts.as_built_unknown")
     scope = [rule_text(paper), paper.word("texts.not_of_certificate"), as_built]
     sections = [

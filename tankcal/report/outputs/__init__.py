@@ -180,7 +180,7 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
     """Write all files; prepare(folder) writes the record into a folder and returns it."""
     refuse_foreign(directory)
     progress = progress or (lambda text, done, total: None)
-    with folders.replaced(directory, language) as temporary:
+    with folders.replace_folder(directory, language) as temporary:
         progress(message("writing_record", "writing the record and the tables"), 0, 1)
         with without_collection():
             record = prepare(temporary)

@@ -51,7 +51,7 @@ def write_scores(scores, out, language=None, progress=None):
     progress = progress or (lambda text: None)
     plain = scores if isinstance(scores, dict) else to_plain(scores)
     paper = ScoresPaper(plain, language)
-    with folders.replaced(out) as temporary:
+    with folders.replace_folder(out) as temporary:
         progress(message("ic_papers", "writing scores, page and workbook"))
         save(paper.saved, temporary / FILE)
         _write_workbook(paper, temporary / WORKBOOK)
@@ -75,7 +75,7 @@ def _write_workbook(paper, path):
         ):
             yield SheetContent(code, [cell_table(book, table)], tab="result", is_filtered=True)
 
-    scores = paper.found
+    scores = paper.record
     head = workbook_head(
         scores["tankcal"], source=paper.subject(), date=paper.date(), notice=scores["notice"]
     )

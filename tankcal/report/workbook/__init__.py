@@ -6,20 +6,20 @@ The package computes no results. The cells contain values of the record, possibl
 
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
-from tankcal.report.workbook.capacity import capacity_sheet
+from tankcal.report.workbook.capacity import (
+    capacity_sheet,
+    densities_sheet,
+    millimetres_sheet,
+    proportional_parts_sheet,
+)
 from tankcal.report.workbook.certificate import certificate_sheet
 from tankcal.report.workbook.charts import charts_sheets
 from tankcal.report.workbook.papers import (
     corrections_sheet,
+    inside_sheet,
     provenance_sheet,
     ship_sheet,
     tables_sheets,
-)
-from tankcal.report.workbook.parts import (
-    densities_sheet,
-    inside_sheet,
-    millimetres_sheet,
-    proportional_parts_sheet,
 )
 from tankcal.report.workbook.survey import (
     adjustment_sheet,

@@ -1,8 +1,10 @@
-"""Sheets of the working papers: courses, surveys, corrections, ship, and provenance."""
+"""Sheets of the working papers: courses, surveys, ship, corrections, tank, and provenance."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from tankcal.report.numbers import unit
+from tankcal.report.paper import DECIMALS_OF_PARTS
 from tankcal.report.tables import (
     clouds,
     hits,
@@ -14,8 +16,17 @@ from tankcal.report.tables import (
     tank,
 )
 from tankcal.report.workbook.look import Column, number_format
-from tankcal.report.workbook.sections import CellTable, SheetContent, cell_table, write_sheet
+from tankcal.report.workbook.sections import (
+    HEAD_ROW,
+    CellTable,
+    SheetContent,
+    cell_table,
+    write_sheet,
+)
+from tankcal.report.workbook.tables import columns_of
 from tankcal.text.digits import decimals_of
+
+_INSIDE_WIDTHS = (50, 16, 16, 16, 16)  # widths of the columns of the sheet inside, letters
 
 
 @dataclass(frozen=True)
@@ -157,3 +168,50 @@ def provenance_sheet(book, record):
         for title, name, table in declared
     ]
     write_sheet(book, SheetContent("provenance", sections, landscape=False, tab="origin"))
+
+
+# ---- the tank
+
+
+def inside_sheet(book, record):
+    """Write the dimensions of a solid, and bottom, deadwood, top and roof."""
+    paper, corrections = book.paper, book.words["corrections"]
+    sheet = book.sheet("inside")
+    book.widths(sheet, *_INSIDE_WIDTHS)
+    row = HEAD_ROW
+    if record["solid"]:
+        row = _described(book, sheet, row, book.words["headings"]["dimensions"], record["solid"])
+    for code in ("deadwood", "bottom", "top", "roof"):
+        texts, declared = paper.choices(code), record.get(code)
+        if not (texts or declared):
+            continue
+        title = corrections[code]
+        if declared and code != "deadwood":
+            row = _described(book, sheet, row, title, declared) - 1
+        else:
+            book.heading(sheet, row, title, len(_INSIDE_WIDTHS))
+            row += 1
+        for text in texts:
+            book.paragraph(sheet, row, text, _INSIDE_WIDTHS)
+            row += 1
+        if declared and code == "deadwood":
+            row = book.table(sheet, row + 1, "deadwood", columns_of(book, tank.DEADWOOD)) + 1
+        row += 1
+
+
+def _described(book, sheet, row, title, lines):
+    """Write a heading and a line for each {code, value, unit}; return the next row."""
+    words = book.words
+    book.heading(sheet, row, title, len(_INSIDE_WIDTHS))
+    for line in lines:
+        row += 1
+        value = line["value"]
+        book.put(sheet, row, 0, words["labels"].get(line["code"], line["code"]))
+        if line["unit"] is None:
+            book.put(sheet, row, 1, words["parts"].get(value, value))
+            continue
+        shown, decimals = unit(line["unit"]), DECIMALS_OF_PARTS.get(line["unit"], 0)
+        look = {"num_format": number_format(decimals)}
+        book.put(sheet, row, 1, shown.factor * value, **look)
+        book.put(sheet, row, 2, shown.symbol, indent=1)
+    return row + 2
