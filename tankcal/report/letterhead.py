@@ -101,7 +101,7 @@ def _parsed(path, data, log):
             expected = message(
                 "unknown_section_of_letterhead",
                 "unknown section; expected [laboratory] or [colours]{hint}",
-                hint=_hint(section),
+                hint=nearest(section, _SECTIONS),
             )
             log.problem(path.name, expected, rows.get(section), f"[{section}]")
     sections = {
@@ -121,10 +121,6 @@ def _parsed(path, data, log):
     if mark is None and laboratory["accreditation_place"]:
         mark = PLACE
     return Letterhead(laboratory["name"], laboratory["address"] or (), logo, colours, mark)
-
-
-def _hint(section):
-    return nearest(section, _SECTIONS)
 
 
 def _colour(file, field, values, given, log):

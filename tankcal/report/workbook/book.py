@@ -229,14 +229,13 @@ class Book(Writer):
             else repeat(column.digits, len(column.cells))
             for column in columns
         )
-        looks = cache(lambda shown: tuple(map(self._number_look, shown)))
+        looks = cache(
+            lambda shown: tuple(self.format(num_format=number_format(places)) for places in shown)
+        )
         cells = zip(*(column.cells for column in columns), strict=True)
         rows = zip(cells, map(looks, zip(*digits, strict=True)), strict=True)
         sheet.write_number_rows(1, (NumberRow(*row) for row in rows))
         return sheet
-
-    def _number_look(self, digits):
-        return self.format(num_format=number_format(digits))
 
     def _page(self, code, landscape, tab):
         """Add a protected sheet with page set-up, header and footer."""

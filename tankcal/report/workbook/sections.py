@@ -25,8 +25,18 @@ FIRST_LINE = {"bold": True, "font_size": 12}  # look of the result in the first 
 _DPI, _PT_PER_INCH, _MARGIN_PT = 110, 72.0, 8.0  # of figures: resolution, unit, margin of the row
 
 
+class Part:
+    """Part of a section; a subclass has `title` and `write(book, sheet, row, widths)`."""
+
+    title = ""
+
+    def is_empty(self):
+        """Whether the part, with its title, is omitted."""
+        return False
+
+
 @dataclass(frozen=True)
-class Facts:
+class Facts(Part):
     """Labels with their values, a row each.
 
     Attributes
@@ -62,12 +72,11 @@ class Facts:
         return row
 
     def is_empty(self):
-        """Whether nothing is to be written."""
         return not self.lines
 
 
 @dataclass(frozen=True)
-class Sentences:
+class Sentences(Part):
     """Paragraphs across all columns, a row each.
 
     Attributes
@@ -95,12 +104,11 @@ class Sentences:
         return row
 
     def is_empty(self):
-        """Whether nothing is to be written."""
         return not self.texts
 
 
 @dataclass(frozen=True)
-class CellTable:
+class CellTable(Part):
     """Table of columns with their cells.
 
     Attributes
@@ -148,12 +156,11 @@ class CellTable:
         return last + 1
 
     def is_empty(self):
-        """Whether nothing is to be written."""
         return self.is_optional and not self.columns[0].cells
 
 
 @dataclass(frozen=True)
-class Picture:
+class Picture(Part):
     """Figure of matplotlib in one high row, which page breaks cannot divide.
 
     Attributes
@@ -182,13 +189,9 @@ class Picture:
         sheet.insert_image(row, 0, f"{self.name}.png", options)
         return row + 1
 
-    def is_empty(self):
-        """Whether nothing is to be written."""
-        return False
-
 
 @dataclass(frozen=True)
-class DrawnPart:
+class DrawnPart(Part):
     """Part that a function writes.
 
     Attributes
@@ -205,10 +208,6 @@ class DrawnPart:
     def write(self, book, sheet, row, widths):
         """Write the part from a row and return the next row."""
         return self.draw(book, sheet, row)
-
-    def is_empty(self):
-        """Whether nothing is to be written."""
-        return False
 
 
 def cell_table(book, table, rows=None, *, name=None, **more):

@@ -37,17 +37,14 @@ def budget_sheet(book, record):
     for number, stated in enumerate(record.get("budgets", []), 2):
         starts.append(row)
         columns = _budget_columns(book, stated["lines"], stated["u_m3"])
-        book.heading(sheet, row, _title(book, paper, stated), len(columns))
+        high, low = paper.height(stated["high_m"]), paper.height(stated["low_m"])
+        kind = "volume" if low is None else "delivery"
+        title = book.word(f"headings.budget_{kind}", high=high, low=low)
+        book.heading(sheet, row, title, len(columns))
         row = _budget_table(book, sheet, row + 1, f"budget_{number}", columns, widths)
         row = _totals(book, sheet, row, stated)
     book.keep_together(sheet, starts, row, widths)
     sheet.freeze_panes(HEAD_ROW + 1, 1)  # not repeated in print, since each budget has headings
-
-
-def _title(book, paper, stated):
-    high, low = paper.height(stated["high_m"]), paper.height(stated["low_m"])
-    return book.word(f"headings.budget_{'volume' if low is None else 'delivery'}", high=high,
-                     low=low)  # fmt: skip
 
 
 def _budget_columns(book, lines, u_m3):
