@@ -8,7 +8,6 @@ from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
 from tankcal.job.checks.extent import (
     has_clouds,
-    has_great_circles,
     has_hits,
     has_radii,
     has_survey,
@@ -20,7 +19,6 @@ from tankcal.job.checks.extent import (
 from tankcal.job.checks.lines import has_lines
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
-from tankcal.job.contract.great_circles import BESIDE as BESIDE_CIRCLES
 from tankcal.job.contract.strapping import COLUMNS as OF_TAPES
 from tankcal.job.contract.strapping import IN_PLACE
 from tankcal.job.covariance import OF_RADII, read_covariance
@@ -36,7 +34,6 @@ from tankcal.job.tables import (
     RADII_TABLES,
     REGISTERS,
     RING_TABLES,
-    SPHERE_TABLES,
     STRAPPING_TABLES,
     SURVEY_TABLES,
     TABLES,
@@ -45,6 +42,7 @@ from tankcal.job.tables import (
     missing_sheet,
 )
 from tankcal.messages import message
+from tankcal.methods.base import methods, methods_for
 
 
 def job_of(raw, log, is_whole=True):
@@ -85,7 +83,12 @@ def job_of(raw, log, is_whole=True):
         return replace(frame, overrulings=overrulings)
     job = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
     surveys = _make_surveys(raw, values, tables, registers, attached)
-    return replace(job, overrulings=overrulings, **surveys)
+    by_method = {
+        method.name: method.read(tables, registers)
+        for method in methods()
+        if method.is_given(tables)
+    }
+    return replace(job, overrulings=overrulings, surveys=by_method, **surveys)
 
 
 def _make_surveys(raw, values, tables, registers, attached):
@@ -123,10 +126,6 @@ def _make_surveys(raw, values, tables, registers, attached):
 
         radii, change = make_radii(values, tables, attached.radii_covariance_m2)
         surveys |= {"radii": radii, "change": change}
-    if has_great_circles(tables):
-        from tankcal.job.great_circles import make_great_circles
-
-        surveys["great_circles"] = make_great_circles(tables, registers)
     return surveys
 
 
@@ -145,8 +144,8 @@ def _read_tables(raw, registers, is_whole, log):
         allowed += STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + RADII_TABLES
     if kind == "horizontal":
         allowed += (*RING_TABLES, *OF_TAPES)
-    if kind == "sphere":
-        allowed += SPHERE_TABLES + BESIDE_CIRCLES
+    for method in methods_for(kind):
+        allowed += method.tables + method.shared_tables
     if kind in OF_CLOUDS:
         allowed += CLOUD_TABLES
     tables = {"clouds": _cloud_table(raw, registers, kind, log)}

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from tankcal.errors import SHEET, InputError, Problem, reason_of, sheet_named
 from tankcal.messages import message
+from tankcal.methods.base import methods
 
 TANK_TABLES = (
     *("points", "courses", "welds", "bottom", "deadwood"),
@@ -28,7 +29,6 @@ STRAPPING_TABLES = (
     *("circumferences", "obstructions", "thickness", "tape_checks"),
     *("lines", "offsets"),
 )
-SPHERE_TABLES = ("great_circles",)
 HITS_TABLES = ("wall_hits", "control_readings")
 TANGENT_TABLES = ("tangents",)
 CLOUD_TABLES = ("scan_targets",)
@@ -37,8 +37,9 @@ RADII_TABLES = ("radii",)
 RING_TABLES = ("rings",)
 OVERRULING_TABLES = ("overrulings",)
 TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
-TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES + SPHERE_TABLES + SURVEY_TABLES
-TABLES += OVERRULING_TABLES
+TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES
+TABLES += tuple(table for method in methods() for table in method.tables)
+TABLES += SURVEY_TABLES + OVERRULING_TABLES
 REGISTERS = {  # name of an entry in each list
     "cameras": "camera",
     "instruments": "instrument",

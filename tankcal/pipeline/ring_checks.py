@@ -33,7 +33,7 @@ def check_rings(job, wall):
     """`Problem`s of a `RingedWall`."""
     straps = wall.straps
     return (
-        *check_tapes(job, straps),
+        *check_tapes(job, straps, job.strapping),
         *check_repeats(straps, LIMITS),
         *_check_pairs(job, straps),
         *_check_other_rings(job, straps),

@@ -13,6 +13,7 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
+from tankcal.methods.base import given_methods
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.nominal_size import refuse_other_size
 from tankcal.pipeline.overruled_points import refuse_kept_readings, with_decided_readings
@@ -195,10 +196,8 @@ def _survey(job, progress, dof, amplitudes):
         return find_nominal_wall(job, progress)
     if job.tank.kind == "vertical":
         return find_wall(job, progress, dof, amplitudes)
-    if job.great_circles is not None:
-        from tankcal.pipeline.strapped_sphere import find_strapped_sphere
-
-        return find_strapped_sphere(job, progress)
+    for method in given_methods(job):
+        return method.find(job, progress)
     if job.mesh is not None:
         from tankcal.pipeline.ship import check_pipe
         from tankcal.tank.meshes import parse_mesh

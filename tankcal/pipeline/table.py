@@ -9,6 +9,7 @@ import numpy as np
 
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.messages import message
+from tankcal.methods.base import method_of
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.nominal_size import check_size
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
@@ -198,17 +199,15 @@ def _check_sights(job, survey, sighting):
 
 def _check_survey(job, survey, top_m):
     """Warnings about a survey, by its kind."""
-    kind = None if survey is None else survey.surveyed_as
+    method, kind = method_of(survey), None if survey is None else survey.surveyed_as
+    if method is not None:
+        return method.warnings(job, survey)
     if kind == "wall":
         return _check_wall_of_points(job, survey)
     if kind == "strapped":
         from tankcal.pipeline.strapping_checks import check_strapped
 
         return (*check_strapped(job, survey), *_check_reference_lines(job, survey))
-    if kind == "circles":
-        from tankcal.pipeline.great_circle_checks import check_circles
-
-        return check_circles(job, survey)
     if kind == "rings":
         from tankcal.pipeline.ring_checks import check_rings
 

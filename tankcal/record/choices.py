@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.adjust import CRITICAL
+from tankcal.methods.base import given_methods
 from tankcal.record.liquid import geometry_beside
 from tankcal.record.schema import Saved, key
 from tankcal.record.table import zero_of
@@ -33,6 +34,7 @@ def choices_of(result):
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job, result),
         "temperature": _temperature_choice(job),
+        **_choices_of_methods(result),
         **_sphere_choices(job),
         "height_expansion": "yes" if job.table.height_expansion else "no",
         "head": _head_choice(job),
@@ -150,14 +152,19 @@ def _ring_choices(result):
     }
 
 
+def _choices_of_methods(result):
+    """Assumptions of the methods of `tankcal.methods` that the job contains."""
+    choices = {}
+    for method in given_methods(result.job):
+        choices |= method.choices(result)
+    return choices
+
+
 def _sphere_choices(job):
-    """How a sphere was taken that great circles describe, and the pressure that it is for."""
-    found = {}
-    if job.great_circles is not None:
-        found |= {"survey": "great_circles", "between_sections": "ellipsoid"}
+    """Pressure of the table of a sphere, bar."""
     if job.sphere is not None and job.switches.head and job.table.pressure_pa:
-        found["pressure"] = job.table.pressure_pa / 1e5
-    return found
+        return {"pressure": job.table.pressure_pa / 1e5}
+    return {}
 
 
 def _liquid_choices(result):

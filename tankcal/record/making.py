@@ -16,12 +16,12 @@ from tankcal.job.model.settings import (
     TableSpec,
     Tank,
 )
+from tankcal.methods.base import find_method, methods
 from tankcal.pipeline.corrections import Correction
 from tankcal.record import statements, survey, table, tank_parts, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.choices import Choice, adjustment_choices, choices_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
-from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
 from tankcal.record.hits import HitsRecord, hits_of
 from tankcal.record.homogeneity import HomogeneityRecord, homogeneity_record
 from tankcal.record.lines import LinesRecord, lines_of
@@ -69,6 +69,12 @@ class JobAsRead(Saved):
         default=None,
         optional=True,
     )
+
+
+def saved_parts_of_methods():
+    """Keys of the methods in a record: {name: (dataclass, description)}."""
+    parts = {method.name: (method.saved_type(), method.saved_note) for method in methods()}
+    return {name: part for name, part in parts.items() if part[0] is not None}
 
 
 class Record(Saved, kw_only=True):
@@ -119,8 +125,8 @@ class Record(Saved, kw_only=True):
     ship: ShipRecord | None = key(
         "corrections for trim and list; left out where there are none", default=None, optional=True
     )
-    great_circles: GreatCirclesRecord | None = key(
-        "strapped sphere; left out where there is none", default=None, optional=True
+    surveys: dict = key(
+        "saved part of each method", default_factory=dict, parts=saved_parts_of_methods
     )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
     wall_shape: WallShapeRecord | None = key(
@@ -155,6 +161,12 @@ class Record(Saved, kw_only=True):
         optional=True,
     )
 
+    def __getattr__(self, name):
+        # The saved part of a method is an attribute, as every other key of the record is.
+        if name not in saved_parts_of_methods():
+            raise AttributeError(f"'Record' object has no attribute {name!r}")
+        return self.surveys.get(name)
+
 
 _HEAD = ("format", "tankcal", "versions", "files", "job")
 _OF_A_SURVEY = ("points", "choices", "warnings", "adjustment")
@@ -180,7 +192,7 @@ def record_of(result):
             liquid=liquid_of(result),
             radii=radii_of(result),
             ship=ship_of(result),
-            great_circles=great_circles_of(result),
+            surveys=surveys_of(result),
             courses=survey.courses_of(result),
             wall_shape=shape_record(job, result.wall),
             capacity=table.capacity_of(result),
@@ -204,6 +216,12 @@ def record_of(result):
             monte_carlo=statements.monte_carlo_of(result),
         )
     )
+
+
+def surveys_of(result):
+    """Saved part of each method whose survey a result contains, by the name of the method."""
+    saved = [name for name in saved_parts_of_methods() if name in result.surveys]
+    return {name: find_method(name).save(result) for name in saved}
 
 
 def record_of_adjustment(job, adjustment):

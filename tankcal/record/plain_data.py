@@ -57,7 +57,7 @@ def whole(record):
 
 def _object(value):
     keys = [one for one in keys_of(type(value)) if one.name]
-    found = {one.key: getattr(value, one.name) for one in keys}
+    found = {one.key: one.value_in(value) for one in keys}
     told = [one for one in keys if one.type is Message]
     plain = {
         one.key: to_plain(found[one.key])

@@ -46,7 +46,7 @@ class Saved:
         dataclass(frozen=True, kw_only=kw_only)(cls)
 
 
-def key(doc, *, of=None, times=None, named=None, optional=False, **options):
+def key(doc, *, of=None, times=None, named=None, optional=False, parts=None, **options):
     """A field that is a key of what is saved.
 
     doc    what it holds, in one line
@@ -54,8 +54,11 @@ def key(doc, *, of=None, times=None, named=None, optional=False, **options):
     times  factor that it is multiplied by: of another unit
     named  the key, where that is no name of Python ("from")
     optional  whether the key is left out where the value is None
+    parts  of a field that is a dict: function that returns {key: (type, doc)}. The entries of the
+           dict are written in place of the field, each left out where it is missing
     """
     about = {"doc": doc, "of": of, "times": times, "named": named, "optional": optional}
+    about["parts"] = parts
     return field(metadata=about, **options)
 
 
@@ -87,6 +90,12 @@ class Key:
     type: Any
     doc: str = ""
     required: bool = True
+    is_part: bool = False  # an entry of the dict that is the field
+
+    def value_in(self, instance):
+        """Value of the key in an instance of the dataclass; None for a missing entry."""
+        value = getattr(instance, self.name)
+        return value.get(self.key) if self.is_part else value
 
 
 @cache
@@ -95,6 +104,12 @@ def keys_of(cls):
     hints, said = get_type_hints(cls, include_extras=True), _said_of_attributes(cls)
     found = []
     for one in fields(cls):
+        if one.metadata.get("parts"):
+            found += [
+                Key(name, one.name, kind | None, doc, required=False, is_part=True)
+                for name, (kind, doc) in one.metadata["parts"]().items()
+            ]
+            continue
         optional = one.metadata.get("optional", False)
         doc = one.metadata.get("doc") or said.get(one.name, "")
         named = one.metadata.get("named") or one.name
@@ -416,6 +431,8 @@ def _object(cls, data):
             text = Message(value)
             text.code, text.values = data[f"{one.key}_code"], data[f"{one.key}_values"]
             values[one.name] = text
+        elif one.is_part:
+            values.setdefault(one.name, {})[one.key] = _made(one.type, value)
         else:
             values[one.name] = _made(one.type, value)
     for one in fields(cls):  # an optional key that is not there

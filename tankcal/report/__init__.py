@@ -26,7 +26,6 @@ _NOT_IN_ALL = (  # keys that some kinds of record, or records of earlier version
     "liquid",
     "radii",
     "ship",
-    "great_circles",
     "overrulings",
 )
 _PARTS = (  # name of each PDF and the part of the notebook that it contains
@@ -95,7 +94,10 @@ def missing(record):
 
     The keys include those that a record of an earlier version lacks.
     """
-    known = dict.fromkeys(_NOT_IN_ALL) | record
+    from tankcal.methods.base import methods
+
+    of_methods = (method.name for method in methods())
+    known = dict.fromkeys((*_NOT_IN_ALL, *of_methods)) | record
     return [part for part, value in known.items() if not value]
 
 

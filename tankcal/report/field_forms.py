@@ -3,6 +3,7 @@
 from tankcal.job.contract import columns_of, tables_of_survey
 from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS
 from tankcal.job.starter.texts import parted, texts_in
+from tankcal.methods.base import methods
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
 
@@ -20,7 +21,7 @@ FORMS = (  # input tables of each form, read together, and the number of rows on
     (("wall_hits",), 30),
     (("control_readings",), 24),
     (("circumferences",), 15),
-    (("great_circles",), 15),
+    *(form for method in methods() for form in method.field_forms),
     (("obstructions",), 9),
     (("thickness",), 8),
     (("tape_checks",), 4),

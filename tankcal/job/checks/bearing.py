@@ -3,7 +3,6 @@
 from tankcal.job.checking import has_rows, loads_sphere
 from tankcal.job.checks.extent import (
     has_clouds,
-    has_great_circles,
     has_hits,
     has_radii_alone,
     has_wall_points,
@@ -17,6 +16,7 @@ from tankcal.job.contract.bottom import SHAPED, bottom_form
 from tankcal.job.contract.lying import RINGS_WITHOUT_TUBE, ROUND_TUBE
 from tankcal.job.contract.ship import is_ship
 from tankcal.messages import message
+from tankcal.methods.base import methods_for
 
 GIVEN = ("dish", "knuckle")
 SIZES_OF_END = ("depth_m", "dish_radius_m", "knuckle_radius_m", "standard")
@@ -336,10 +336,9 @@ def _of_sphere(values, tables):
         ),
     }
     reasons = {name: why for name, why in rules.items() if isinstance(why, str)}
-    if has_great_circles(tables):
-        reasons["diameter"] = message(
-            "from_circles", "its uncertainty comes from the great circles"
-        )
+    for method in methods_for("sphere"):
+        if method.is_given(tables):
+            reasons |= method.useless_inputs(tables)
     is_subtracted = (values["survey"]["side"] == "outside") and values["corrections"][
         "plate"
     ] is not False

@@ -8,6 +8,7 @@ from tankcal.job.checking import has_rows, zero_z
 from tankcal.job.contract.bottom import OF_CLOUD, rise_of_bottom
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.contract.top import depth_of_top
+from tankcal.methods.base import methods_for
 
 
 def has_survey(tables):
@@ -43,11 +44,6 @@ def has_clouds(tables):
 def is_metered(tables):
     """Return True if metered liquid was filled or drawn off between dips."""
     return has_rows(tables.get("liquid"))
-
-
-def has_great_circles(tables):
-    """Return True if great circles of a sphere were taped."""
-    return has_rows(tables.get("great_circles"))
 
 
 def has_radii(tables):
@@ -132,9 +128,9 @@ def extent_of(values, tables, kind):
         return _of_horizontal(values["horizontal"], values, wall_of(tables) is not None)
     if kind == "sphere":
         diameter = values["sphere"]["diameter_m"] or values["tank"]["nominal_diameter_m"]
-        if diameter is None and has_great_circles(tables):
-            readings = tables["great_circles"].numbers("reading_m")
-            diameter = np.nanmedian(readings) / np.pi if np.any(readings > 0) else None
+        for method in methods_for(kind):
+            if diameter is None and method.is_given(tables):
+                diameter = method.estimate_diameter_m(tables)
         area = None if diameter is None else np.pi / 4 * diameter**2
         return _lying(diameter, 0.0, area, values, has_wall_points(tables))
     return Extent()

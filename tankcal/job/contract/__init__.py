@@ -10,7 +10,6 @@ from tankcal.job.contract import (
     correlations,
     courses,
     deadwood,
-    great_circles,
     hits,
     lines,
     liquid,
@@ -36,6 +35,7 @@ from tankcal.job.contract.observations import SURVEYS as ADJUSTED_SURVEYS
 from tankcal.job.contract.parts import KEYS as PART_KEYS
 from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_OF_SURVEY
 from tankcal.job.contract.uncertainty import INPUTS
+from tankcal.methods.base import methods
 from tankcal.text.form_words import NOTES
 
 SECTIONS = (
@@ -49,7 +49,9 @@ SECTIONS = (
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
-COLUMNS |= great_circles.COLUMNS | clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
+for _method in methods():
+    COLUMNS |= _method.columns()
+COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
 COLUMNS |= rings.COLUMNS | SURVEY_COLUMNS | overrulings.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
@@ -68,8 +70,11 @@ SURVEYS = ADJUSTED_SURVEYS | {
 
 SURVEYS_OF_KIND = {  # surveys whose tables for a kind of tank differ from SURVEYS
     "horizontal": {"strapping": (*strapping.COLUMNS, *rings.COLUMNS)},
-    "sphere": {"strapping": (*great_circles.COLUMNS, *great_circles.BESIDE)},
 }
+for _method in methods():
+    for _kind in _method.kinds if _method.starter else ():
+        _surveys = SURVEYS if _kind == "vertical" else SURVEYS_OF_KIND.setdefault(_kind, {})
+        _surveys[_method.starter] = (*_method.tables, *_method.shared_tables)
 
 
 def tables_of_survey(kind, survey):

@@ -1,7 +1,8 @@
 """Tables of total station hits on the bare wall, and of control targets read between them."""
 
-from tankcal.job.contract.observations import USE, angle_fields
+from tankcal.job.contract.observations import angle_fields
 from tankcal.job.fields import Field
+from tankcal.job.shared_columns import USE
 
 
 def _time(required=False):

@@ -3,15 +3,10 @@
 from dataclasses import dataclass
 
 from tankcal.job.fields import Field
+from tankcal.job.shared_columns import USE
 
 ANGLE_UNITS = ("deg", "gon", "dms")
 FULL_CIRCLE = {"deg": 360, "gon": 400, "dms": 360}
-USE = Field(
-    "use",
-    "choice",
-    "check: only compared with the adjusted values; blank: adjust",
-    choices=("adjust", "check"),
-)
 
 
 def _name(name, note, required=True):

@@ -1,5 +1,7 @@
 """Examples shown in grey in an input workbook; they are never read."""
 
+from tankcal.methods.base import methods
+
 EXAMPLES_OF_KEYS = {
     "tank.id": "T-17",
     "tank.nominal_diameter_m": 13.0,
@@ -153,16 +155,6 @@ EXAMPLES_OF_TABLES = {
             "level_m": 1.52,
             "from_a_m": 1.52,
             "reading_m": 40.8931,
-            "s_mm": 0.5,
-        },
-    ],
-    "great_circles": [
-        {"circle": "equator", "kind": "equator", "reading_m": 62.8512, "s_mm": 0.5},
-        {
-            "circle": "M0",
-            "kind": "meridian",
-            "azimuth_deg": 0,
-            "reading_m": 62.8431,
             "s_mm": 0.5,
         },
     ],
@@ -326,3 +318,5 @@ EXAMPLES_OF_TABLES = {
         }
     ],
 }
+for _method in methods():
+    EXAMPLES_OF_TABLES |= _method.examples()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.job.fields import MAX_TEXT
+from tankcal.methods.base import methods
 from tankcal.text.digits import shortest
 from tankcal.text.form_words import word_of
 from tankcal.text.languages import DEFAULT
@@ -72,7 +73,6 @@ TABLE_NOTES = {
     "thickness": "one row for each reading of a gauge of plates; may stay empty",
     "tape_checks": "one row for each comparison of the working tape with its master; may stay"
     " empty",
-    "great_circles": "one row for each reading of the tape round the sphere: equator and meridians",
     "targets": "one row for each target of the wall; may stay empty: the wall is then searched",
     "photos": "one row for each photo; orientations may stay blank, they are found",
     "image_points": "one row for each image of a point; a repeated row is a repeated reading",
@@ -98,6 +98,8 @@ TABLE_NOTES = {
     "control_readings": "one row for each reading of a control target: at the start, every half"
     " hour and at the end; may stay empty",
 }
+for _method in methods():
+    TABLE_NOTES |= _method.table_notes()
 REGISTER_NOTES = {
     "cameras": "one section for each camera; put its name, as in photos.csv, in place of NAME",
     "instruments": "one section for each instrument; put its name in place of NAME; may stay empty",

@@ -97,3 +97,13 @@ def _headed(table, record):
         course={"heading": "ring", "sheet": "ring", "csv": "ring"},
         level_m={"heading": "from_a_m", "sheet": "strap_from_a_m", "csv": "from_a_m"},
     )
+
+
+def certificates_of_tapes(tapes):
+    """Return {tape or master tape: certificate or None} of saved tapes."""
+    certificates = {}
+    for tape in tapes:
+        certificates[tape["tape"]] = tape["certificate"]
+        if tape["master"]:
+            certificates[tape["master"]] = tape["master_certificate"]
+    return certificates

@@ -13,10 +13,10 @@ from tankcal.report.workbook.papers import (
     clouds_sheet,
     corrections_sheet,
     courses_sheet,
-    great_circles_sheet,
     hits_sheet,
     lines_sheet,
     liquid_sheet,
+    method_sheets,
     provenance_sheet,
     radii_sheet,
     ship_sheet,
@@ -50,7 +50,6 @@ _HIDDEN = (
 )
 _SHEETS_OF_SURVEYS = {  # sheets of each survey method, by the key of the record
     "strapping": strapping_sheet,
-    "great_circles": great_circles_sheet,
     "lines": lines_sheet,
     "hits": hits_sheet,
     "tangents": tangents_sheet,
@@ -109,6 +108,7 @@ def _sheets_of_tank(book, record):
     for key, sheet_of in _SHEETS_OF_SURVEYS.items():
         if record.get(key):
             sheet_of(book, record)
+    method_sheets(book, record)
     corrections_sheet(book, record)
     inside_sheet(book, record)
     budget_sheet(book, record)

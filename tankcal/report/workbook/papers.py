@@ -1,8 +1,8 @@
 """Sheets of the working papers: courses, surveys, corrections, and provenance."""
 
+from tankcal.methods.base import methods
 from tankcal.report.tables import (
     clouds,
-    great_circles,
     hits,
     lines,
     liquid,
@@ -49,15 +49,16 @@ def strapping_sheet(book, record):
     write_tables(book, sheet, _HEAD_ROW, tables)
 
 
-def great_circles_sheet(book, record):
-    """Write the tape readings of a sphere with their corrections, and the tapes."""
-    sheet = book.sheet("great_circles", book.word("texts.circles_subtitle"), landscape=True)
-    tables = [
-        (book.word("headings.great_circles"), "great_circles",
-         columns_of(book, great_circles.CIRCLES)),
-        (book.word("headings.tapes"), "tapes", columns_of(book, great_circles.TAPES_OF_SPHERE)),
-    ]  # fmt: skip
-    write_tables(book, sheet, _HEAD_ROW, tables)
+def method_sheets(book, record):
+    """Write the sheets of the methods of `tankcal.methods` that the record contains."""
+    for method in methods():
+        for name, subtitle, tables in method.sheets(record) if record.get(method.name) else ():
+            sheet = book.sheet(name, book.word(f"texts.{subtitle}"), landscape=True)
+            cells = [
+                (book.word(f"headings.{heading}"), heading, columns_of(book, table))
+                for heading, table in tables
+            ]
+            write_tables(book, sheet, _HEAD_ROW, cells)
 
 
 def lines_sheet(book, record):

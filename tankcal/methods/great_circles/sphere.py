@@ -6,7 +6,7 @@ seams, legs) is a random field of assumed size. It changes the mean of each circ
 volumes below a dip more. This field is not estimated; it contributes to the uncertainty only.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,8 @@ from tankcal.geometry.great_ellipses import (
 )
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
+from tankcal.methods.great_circles.columns import KINDS
+from tankcal.pipeline.nominal_size import single_radius
 from tankcal.pipeline.wall_readings import (
     WallReading,
     factors_of_readings,
@@ -28,7 +30,6 @@ from tankcal.pipeline.wall_readings import (
     readings_of_straps,
 )
 from tankcal.pipeline.wall_straps import AreaTerm
-from tankcal.survey.great_circles import KINDS
 from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
 from tankcal.tank.ellipsoids import Ellipsoid
 from tankcal.tank.factors import Factor
@@ -73,7 +74,7 @@ class StrappedSphere:
     prior: FormPrior
     fit: FittedEllipsoid
     tapes: tuple
-    surveyed_as = "circles"
+    surveyed_as = "great_circles"
 
     def solid(self, plate_m=0.0, scale=1.0):
         """`Ellipsoid` inside the plates, with lengths multiplied by `scale`."""
@@ -121,7 +122,19 @@ class StrappedSphere:
     def _parts(self):
         return _parts(self.places, self.variances_m2)
 
-    def part_of_volumes(self, plate_m):
+    def arguments_of_part(self, plate_m, scale):
+        """Arguments of `SolidPart` for the ellipsoid inside the plates; volumes are scaled."""
+        form, read_with = self._part_of_volumes(plate_m)
+        factors = tuple(
+            replace(factor, columns=scale**3 * factor.columns) for factor in form.factors
+        )
+        return {
+            "surveyed": ("diameter",),
+            "form": replace(form, factors=factors),
+            "read_with": {name: scale**3 * column for name, column in read_with.items()},
+        }
+
+    def _part_of_volumes(self, plate_m):
         """`SurveyedForm` of the ellipsoid inside the plates, and derivatives of its volumes.
 
         The derivatives are {input: (nodes,)} by the inputs on which the readings depend.
@@ -182,7 +195,7 @@ class StrappedSphere:
 
 def find_strapped_sphere(job, progress):
     """`StrappedSphere` of a job with great circles."""
-    circles = job.great_circles
+    circles = job.surveys["great_circles"]
     progress(
         message(
             "strapping_sphere",
@@ -215,6 +228,12 @@ def find_strapped_sphere(job, progress):
         fit=fit,
         tapes=tapes_used(circles.strapping),
     )
+
+
+def inside_radii(job, sphere):
+    """`InsideRadii` of a `StrappedSphere`: half its mean diameter inside the plates."""
+    plate = job.sphere.thickness_m
+    return single_radius(sphere.solid(plate).diameter_m / 2, plate)
 
 
 def _normals(azimuth):

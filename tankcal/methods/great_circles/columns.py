@@ -1,10 +1,9 @@
 """Columns of great_circles.csv: equator and meridians of a sphere by tape."""
 
-from tankcal.job.contract.observations import USE
-from tankcal.job.contract.strapping import readings_by_tape
 from tankcal.job.fields import Field
-from tankcal.survey.great_circles import KINDS
+from tankcal.job.shared_columns import NOTE, USE, readings_by_tape
 
+KINDS = ("equator", "meridian")
 GREAT_CIRCLES = (
     Field(
         "circle",
@@ -22,7 +21,9 @@ GREAT_CIRCLES = (
     ),
     *readings_by_tape("reading of the tape round the outside of the sphere, metres"),
     USE,
-    Field("note", "text", "remark for the reader"),
+    NOTE,
 )
-COLUMNS = {"great_circles": GREAT_CIRCLES}
-BESIDE = ("obstructions", "tape_checks")  # tables of strapping that a sphere also uses
+EXAMPLES = (
+    {"circle": "equator", "kind": "equator", "reading_m": 62.8512, "s_mm": 0.5},
+    {"circle": "M0", "kind": "meridian", "azimuth_deg": 0, "reading_m": 62.8431, "s_mm": 0.5},
+)

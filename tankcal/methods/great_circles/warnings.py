@@ -10,14 +10,15 @@ from tankcal.messages import message
 from tankcal.pipeline import tape_checks
 from tankcal.pipeline.nominal_size import allowed_departure_m
 from tankcal.pipeline.strapping_checks import FAR_LIMITS, check_repeats, limit_of_repeats
-from tankcal.pipeline.survey_limits import limits_of
+from tankcal.pipeline.survey_limits import limits_of_method
 
 FILE = "great_circles.csv"
 
 
 def check_circles(job, sphere):
     """Return the warnings of a `StrappedSphere`."""
-    of_straps = (*tape_checks.check_tapes(job, sphere), *check_repeats(sphere))
+    strapping = job.surveys["great_circles"].strapping
+    of_straps = (*tape_checks.check_tapes(job, sphere, strapping), *check_repeats(sphere))
     return (
         *(_assign_to_circles(problem) for problem in of_straps),
         *_check_equator(sphere),
@@ -61,7 +62,7 @@ def _check_meridians(sphere):
     azimuth = sphere.azimuth_rad[sphere.adjusted]
     # A meridian is a plane through the axis: azimuths that differ by pi are the same plane.
     planes = np.unique(np.round(azimuth[~np.isnan(azimuth)] % np.pi, 6))
-    limits = limits_of("great_circles")
+    limits = limits_of_method("tankcal.methods.great_circles")
     if len(planes) == 0:
         return
     if len(planes) < limits["least_meridians"]:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from tankcal.job.checking import tell
-from tankcal.job.checks.extent import has_great_circles, has_wall_points, is_metered
+from tankcal.job.checks.extent import has_wall_points, is_metered
 from tankcal.job.checks.strapping import (
     MOST_STRAPS,
     check_girths,
@@ -19,10 +19,14 @@ from tankcal.messages import message
 MOST_APART = 0.05  # largest relative difference of great circles of one sphere
 
 
-def check_great_circles(values, tables, registers, raw, log):
-    """Check circles, obstructions and tape comparisons; parameters as for `check_all`."""
+def check_great_circles(values, tables, registers, raw, log, *, is_given):
+    """Check circles, obstructions and tape comparisons; parameters as for `Method.check`.
+
+    is_given : bool
+        Whether the job has rows of great circles.
+    """
     table = tables["great_circles"]
-    if not has_great_circles(tables):
+    if not is_given:
         tell_without_effect(tables, log)
         if values is not None:
             _refuse_settings(values, raw, log)

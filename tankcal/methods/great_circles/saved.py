@@ -2,8 +2,11 @@
 
 import numpy as np
 
+from tankcal.geometry.great_ellipses import horizontal_axes
 from tankcal.record.schema import Saved, key
 from tankcal.record.strapping import TapeUsed, tapes_of
+
+_STEPS = ("certificate", "temperature", "tension", "tape_thickness", "rise", "sag")
 
 
 class CircleReading(Saved):
@@ -42,17 +45,13 @@ class GreatCirclesRecord(Saved):
     form_m: float = key("standard deviation assumed of its radius beyond the ellipsoid")
 
 
-def great_circles_of(result):
-    """`GreatCirclesRecord` of a result; None where no sphere was strapped."""
-    sphere = result.circles
-    if sphere is None:
-        return None
-    from tankcal.geometry.great_ellipses import horizontal_axes
-
+def save_great_circles(result):
+    """`GreatCirclesRecord` of a result."""
+    sphere = result.surveys["great_circles"]
     a, b, azimuth = horizontal_axes(sphere.fit.unknowns)
     return GreatCirclesRecord(
         readings=_readings(sphere),
-        tapes=tapes_of(sphere.tapes, result.job.great_circles.strapping),
+        tapes=tapes_of(sphere.tapes, result.job.surveys["great_circles"].strapping),
         axis_a_m=a,
         axis_b_m=b,
         axis_c_m=float(sphere.fit.unknowns[3]),
@@ -69,23 +68,32 @@ def _readings(sphere):
     azimuths = np.degrees(sphere.azimuth_rad)
     return [
         CircleReading(
-            circle=one.strap.name,
-            kind=one.strap.course,
+            circle=reading.strap.name,
+            kind=reading.strap.course,
             azimuth_deg=azimuth,
-            tape=one.strap.tape,
-            reading_m=one.strap.reading_m,
-            **{f"{step}_m": one.steps_m[step] for step in _STEPS},
-            circumference_m=one.circumference_m,
-            sd_m=one.sd_m,
-            difference_m=one.circumference_m - length,
-            w=own,
-            used=not one.strap.check,
-            row=one.strap.row,
+            tape=reading.strap.tape,
+            reading_m=reading.strap.reading_m,
+            **{f"{step}_m": reading.steps_m[step] for step in _STEPS},
+            circumference_m=reading.circumference_m,
+            sd_m=reading.sd_m,
+            difference_m=reading.circumference_m - length,
+            w=w_of_reading,
+            used=not reading.strap.check,
+            row=reading.strap.row,
         )
-        for one, azimuth, length, own in zip(
+        for reading, azimuth, length, w_of_reading in zip(
             sphere.reduced, azimuths, sphere.length_m, w, strict=True
         )
     ]
 
 
-_STEPS = ("certificate", "temperature", "tension", "tape_thickness", "rise", "sag")
+def sizes_inside(result):
+    """Semi-axes inside of a strapped sphere, as surveyed: {name: (value, unit)}."""
+    job = result.job
+    plate = job.sphere.thickness_m if job.switches.plate else 0.0
+    inside = result.surveys["great_circles"].solid(plate)
+    return {
+        "semi_axis_a": (inside.a_m, "m"),
+        "semi_axis_b": (inside.b_m, "m"),
+        "semi_axis_c": (inside.c_m, "m"),
+    }

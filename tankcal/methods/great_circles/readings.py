@@ -1,11 +1,38 @@
 """From the checked great_circles.csv to `GreatCircles`, in SI."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tankcal.job.checks.strapping import tapes_of, tapes_read
 from tankcal.job.strapping import tools_of
-from tankcal.survey.great_circles import GreatCircles
 from tankcal.survey.strapping import Strap, Strapping
+
+
+@dataclass(frozen=True)
+class GreatCircles:
+    """Strapping of a sphere.
+
+    Attributes
+    ----------
+    strapping : Strapping
+        Readings and tapes. The name of a `Strap` is a circle, its course the kind of circle.
+    azimuth_rad : dict
+        {circle: azimuth of the plane of a meridian, clockwise from +y, rad; nan: equator}.
+    """
+
+    strapping: Strapping
+    azimuth_rad: dict
+
+    def azimuths(self, straps):
+        """Azimuths (n,) of the circles of the straps, rad; nan: the equator."""
+        return np.array([self.azimuth_rad[strap.name] for strap in straps], dtype=float)
+
+
+def estimate_diameter_m(table):
+    """Outside diameter of the sphere from the median of all readings, m; None without readings."""
+    readings = table.numbers("reading_m")
+    return np.nanmedian(readings) / np.pi if np.any(readings > 0) else None
 
 
 def make_great_circles(tables, registers):
