@@ -11,7 +11,6 @@ from tankcal.job.checks.extent import (
     has_hits,
     has_radii,
     has_survey,
-    has_tangents,
     is_metered,
     is_sighted,
     is_strapped,
@@ -37,7 +36,6 @@ from tankcal.job.tables import (
     STRAPPING_TABLES,
     SURVEY_TABLES,
     TABLES,
-    TANGENT_TABLES,
     TANK_TABLES,
     missing_sheet,
 )
@@ -83,11 +81,12 @@ def job_of(raw, log, is_whole=True):
         return replace(frame, overrulings=overrulings)
     job = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
     surveys = _make_surveys(raw, values, tables, registers, attached)
-    by_method = {
-        method.name: method.read(tables, registers)
-        for method in methods()
-        if method.is_given(tables)
-    }
+    by_method = {}
+    for method in methods():
+        if method.is_given(tables):
+            readings = method.read(tables, registers)
+            attributes = by_method if method.attribute is None else surveys
+            attributes[method.attribute or method.name] = readings
     return replace(job, overrulings=overrulings, surveys=by_method, **surveys)
 
 
@@ -109,10 +108,6 @@ def _make_surveys(raw, values, tables, registers, attached):
         from tankcal.job.hits import make_hits
 
         surveys["hits"] = make_hits(tables, registers)
-    if has_tangents(tables):
-        from tankcal.job.tangents import make_tangents
-
-        surveys["tangents"] = make_tangents(tables, registers)
     if has_clouds(tables):
         from tankcal.job.clouds import make_clouds
 
@@ -141,7 +136,7 @@ def _read_tables(raw, registers, is_whole, log):
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
     if kind == "vertical":
-        allowed += STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + RADII_TABLES
+        allowed += STRAPPING_TABLES + HITS_TABLES + RADII_TABLES
     if kind == "horizontal":
         allowed += (*RING_TABLES, *OF_TAPES)
     for method in methods_for(kind):
@@ -223,7 +218,8 @@ def _tell_sights_missing(raw, tables, log):
     has_readings = has_survey(tables) or is_strapped(tables)  # otherwise reported as missing points
     if has_targets or not has_readings or not has_rows(tables["setups"]):
         return
-    sights = [name for name in ("wall_hits", "tangents") if name in raw.tables]
+    of_methods = (method.tables[0] for method in methods() if method.is_sighted)
+    sights = [name for name in ("wall_hits", *of_methods) if name in raw.tables]
     for name in sights:
         if raw.tables[name] is not None:
             log.problem(raw.tables[name].file, _IN_PLACE_OF_POINTS[name])
@@ -246,7 +242,7 @@ def _tell_clouds_missing(raw, tables, log):
 
 _IN_PLACE_OF_POINTS = {
     "wall_hits": message("no_rows_of_hits", "no rows; expected a sight to the wall in each"),
-    "tangents": message("no_rows_of_tangents", "no rows; expected a sight to a limb in each"),
+    **{method.tables[0]: method.no_rows() for method in methods() if method.no_rows()},
     "liquid": message(
         "no_rows_of_liquid",
         "no rows; expected the start of each run, and a row for each batch and the dip after it",

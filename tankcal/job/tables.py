@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tankcal.errors import SHEET, InputError, Problem, reason_of, sheet_named
 from tankcal.messages import message
-from tankcal.methods.base import methods
+from tankcal.methods.base import methods, methods_for
 
 TANK_TABLES = (
     *("points", "courses", "welds", "bottom", "deadwood"),
@@ -30,16 +30,16 @@ STRAPPING_TABLES = (
     *("lines", "offsets"),
 )
 HITS_TABLES = ("wall_hits", "control_readings")
-TANGENT_TABLES = ("tangents",)
 CLOUD_TABLES = ("scan_targets",)
 LIQUID_TABLES = ("liquid",)
 RADII_TABLES = ("radii",)
 RING_TABLES = ("rings",)
 OVERRULING_TABLES = ("overrulings",)
-TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
-TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES
-TABLES += tuple(table for method in methods() for table in method.tables)
-TABLES += SURVEY_TABLES + OVERRULING_TABLES
+# The input files of a record are in this order: first the methods for upright tanks.
+_UPRIGHT = tuple(table for method in methods_for("vertical") for table in method.tables)
+_OTHERS = tuple(table for method in methods() for table in method.tables if table not in _UPRIGHT)
+TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + _UPRIGHT + CLOUD_TABLES
+TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES + _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
 REGISTERS = {  # name of an entry in each list
     "cameras": "camera",
     "instruments": "instrument",

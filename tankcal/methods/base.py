@@ -14,7 +14,10 @@ from functools import cache
 from importlib import import_module
 
 GROUP = "tankcal.methods"  # entry points of methods in other distributions
-_BUILT_IN = ("tankcal.methods.great_circles:GreatCirclesMethod",)
+_BUILT_IN = (
+    "tankcal.methods.tangents:TangentsMethod",
+    "tankcal.methods.great_circles:GreatCirclesMethod",
+)
 
 
 class Method:
@@ -26,6 +29,9 @@ class Method:
         Key of the readings in `Job.surveys`, of the survey in `Result.surveys`, of the saved part
         in the record, and of the sheet in the workbook. A survey that the method finds has this
         name as its attribute `surveyed_as`.
+    attribute : str or None
+        Attribute of `Job` with the readings, for methods whose attribute is in the documented
+        interface; None: the readings are in `Job.surveys`.
     kinds : tuple of str
         Kinds of tank that the method can measure: "vertical", "horizontal", "sphere", "mesh".
     tables : tuple of str
@@ -34,10 +40,21 @@ class Method:
         Tables of other methods that the method also reads.
     starter : str or None
         Value of `tankcal new --survey` that starts a job with these tables.
+    starts : tuple of (str, str)
+        Initial values of settings in such a job: ("survey.side", "outside").
+    needs_station_heights : bool
+        Whether the field sheets have a form for the heights of the stations.
     tables_with_sds : tuple of str
         Tables whose column s_mm or s_arcsec is checked for values below those of any reading.
+    is_sighted : bool
+        Whether the readings are sights that become points of an upright wall. `find` then returns
+        a job with these points, and the sights.
+    is_smooth : bool
+        Whether the readings show the wall smoother than it is.
+    names_levels : bool
+        Whether a section is named by its course and the sighted level.
     has_named_points : bool
-        Whether overrulings.csv can name the readings as points of the wall.
+        Whether overrulings.csv can name a sight by its set-up and row, as a point of the wall.
     compares_size : bool
         Whether `warnings` compares the size of the whole tank with the drawing.
     field_forms : tuple of (tuple of str, int)
@@ -49,12 +66,18 @@ class Method:
     """
 
     name = ""
+    attribute = None
     kinds = ()
     tables = ()
     shared_tables = ()
     starter = None
+    starts = ()
+    needs_station_heights = False
     tables_with_sds = ()
-    has_named_points = True
+    is_sighted = False
+    is_smooth = False
+    names_levels = False
+    has_named_points = False
     compares_size = False
     field_forms = ()
     csv_files = ()
@@ -85,6 +108,9 @@ class Method:
         table = tables.get(self.tables[0])
         return table is not None and bool(table.rows or table.skipped)
 
+    def no_rows(self):
+        """Message about a table of readings without rows, in place of points; None: no message."""
+
     def check(self, values, tables, registers, raw, log):
         """Report problems of the tables and settings to `log`; called with or without readings.
 
@@ -114,22 +140,31 @@ class Method:
         """Readings in SI from tables and registers without problems, for `Job.surveys`."""
         raise NotImplementedError
 
+    def readings_of(self, job):
+        """Readings of this method in a `Job`; None without readings."""
+        if self.attribute is not None:
+            return getattr(job, self.attribute)
+        return job.surveys.get(self.name)
+
     # ---- pipeline
 
-    def find(self, job, progress):
+    def find(self, job, progress, network):
         """Survey of the tank from the readings of a job.
 
         Parameters
         ----------
         job : Job
-            Job whose `surveys` contain the readings of this method.
+            Job with readings of this method.
         progress : callable
             Called with a message as a step begins.
+        network : pipeline.surveying.Network
+            Adjusted network of the job, and known amplitudes of the wall.
 
         Returns
         -------
-        object
-            Survey with the attribute `surveyed_as`, which becomes an entry of `Result.surveys`.
+        pipeline.surveying.Surveyed
+            Its `survey` has the attribute `surveyed_as` and becomes an entry of `Result.surveys`;
+            its `sights` become `Result.sights`.
         """
         raise NotImplementedError
 
@@ -160,8 +195,21 @@ class Method:
         """
         raise NotImplementedError
 
-    def warnings(self, job, survey):
-        """`Problem`s of a survey: undetermined quantities, outliers, disagreement."""
+    def warnings(self, job, survey, sights=None):
+        """`Problem`s of a survey: undetermined quantities, outliers, disagreement.
+
+        Parameters
+        ----------
+        job : Job
+        survey : object
+            Survey that `find` returned; of a method with sights, the wall fitted to their points.
+        sights : object, optional
+            Sights that `find` returned.
+
+        Returns
+        -------
+        iterable of Problem
+        """
         return ()
 
     # ---- record
@@ -171,7 +219,7 @@ class Method:
         return
 
     def save(self, result):
-        """Saved part of a `Result` whose surveys contain this method."""
+        """Saved part of a `Result` whose surveys or sights contain this method."""
         raise NotImplementedError
 
     def choices(self, result):
@@ -235,7 +283,12 @@ def method_of(survey):
 
 def given_methods(job):
     """Methods whose readings a `Job` contains."""
-    return tuple(method for method in methods() if method.name in job.surveys)
+    return tuple(method for method in methods() if method.readings_of(job) is not None)
+
+
+def is_sighted(job):
+    """Whether the points of the wall of a `Job` are sights of a method."""
+    return any(method.is_sighted for method in given_methods(job))
 
 
 def _load(path):

@@ -10,7 +10,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.job.plausibility import IMPOSSIBLE_MISS, INSIDE, PLATES_TO_INSIDE, unit_guess
 from tankcal.messages import list_some, message
-from tankcal.methods.base import method_of
+from tankcal.methods.base import given_methods, method_of
 from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.wall_straps import mean_radii
 
@@ -197,10 +197,8 @@ def check_size(job, survey):
 
 def _has_own_line(job, survey):
     """Whether another check compares the whole tank of this survey with the drawing."""
-    is_sighted = job.hits is not None or job.tangents is not None
-    method = method_of(survey)
-    compares_size = method is not None and method.compares_size
-    return is_sighted or compares_size or survey.surveyed_as in ("strapped", "rings")
+    by_method = any(method.compares_size for method in given_methods(job))
+    return by_method or job.hits is not None or survey.surveyed_as in ("strapped", "rings")
 
 
 def _unlike_drawing(job, radius_m, miss_m):

@@ -1,7 +1,7 @@
 """Result of a job: the capacity table, the data behind it, and functions that read it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -59,12 +59,9 @@ class Result:
         and with declared radii also the survey that checks them. The properties `wall`, `scan`,
         `strapped`, `nominal`, `radii` and `rings` are entries of it. The survey of a method of
         `tankcal.methods` has the name of the method, such as "great_circles".
-    sighting : sighting.Sighting or None
-        Reflectorless hits of the wall as points, with their set-ups.
-    touching : tangents.Touching or None
-        Tangents as points of the wall, with their set-ups.
-    clouded : cloud_wall.Clouded or None
-        Point clouds as points of the wall: scans, cells and obstructions.
+    sights : dict
+        {method: its sights as points of the wall}; the properties `sighting`, `touching` and
+        `clouded` are entries of it.
     liquid : liquid.LiquidResult or None
         Calibration by metered liquid, in addition to the geometry.
     ship : ship.ShipTables or None
@@ -121,9 +118,7 @@ class Result:
     rule: RuleVerdict | None
     warnings: tuple[Problem, ...]
     adjustment: "Adjustment | None" = None
-    sighting: "Sighting | None" = None
-    touching: "Touching | None" = None
-    clouded: "Clouded | None" = None
+    sights: dict[str, object] = field(default_factory=dict)
     liquid: "LiquidResult | None" = None
     ship: "ShipTables | None" = None
     overrulings: Overrulings | None = None
@@ -157,6 +152,21 @@ class Result:
     def rings(self) -> "RingedWall | None":
         """Rings of a horizontal cylinder measured by strapping."""
         return self.surveys.get("rings")
+
+    @property
+    def sighting(self) -> "Sighting | None":
+        """Reflectorless hits of the wall as points, with their set-ups."""
+        return self.sights.get("hits")
+
+    @property
+    def touching(self) -> "Touching | None":
+        """Tangents as points of the wall, with their set-ups."""
+        return self.sights.get("tangents")
+
+    @property
+    def clouded(self) -> "Clouded | None":
+        """Point clouds as points of the wall: scans, cells and obstructions."""
+        return self.sights.get("clouds")
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]

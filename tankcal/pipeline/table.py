@@ -9,7 +9,7 @@ import numpy as np
 
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.messages import message
-from tankcal.methods.base import method_of
+from tankcal.methods.base import given_methods, method_of
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.nominal_size import check_size
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
@@ -188,10 +188,9 @@ def _check_sights(job, survey, sighting):
         from tankcal.pipeline.hit_checks import check_hits
 
         return check_hits(job, survey, sighting)
-    if job.tangents is not None:
-        from tankcal.pipeline.tangent_checks import check_tangents
-
-        return check_tangents(job, survey, sighting)
+    for method in given_methods(job):
+        if method.is_sighted:
+            return method.warnings(job, survey, sighting)
     from tankcal.pipeline.cloud_checks import check_clouds
 
     return check_clouds(job, survey, sighting)

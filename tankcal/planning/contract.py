@@ -1,8 +1,8 @@
 """Keys of plan.toml, and columns of its tables that a job does not have."""
 
 from tankcal.job.contract import columns_of
-from tankcal.job.contract.observations import ANGLE_UNITS
 from tankcal.job.fields import Field
+from tankcal.job.shared_columns import ANGLE_UNITS
 from tankcal.messages import message
 from tankcal.planning.fields import count, number, numbers_list
 from tankcal.planning.wall import contract as wall

@@ -108,8 +108,8 @@ def _measured_by(job, result):
         found = {"survey": "wall_hits", "covariance": "hits"}
     elif job.clouds is not None:
         found = {"survey": "clouds", "covariance": "clouds"}
-    elif job.tangents is not None:
-        found = {"survey": "tangents", "covariance": "tangents"}
+    for method in given_methods(job):
+        found = method.choices(result)
     if result.straps is not None:
         found["straps"] = "beside_points"
     if job.lines is not None:

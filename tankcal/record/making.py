@@ -37,7 +37,6 @@ from tankcal.record.radii import RadiiRecord, radii_of
 from tankcal.record.schema import Saved, filled_from, key
 from tankcal.record.ship import ShipRecord, ship_of
 from tankcal.record.strapping import StrappingRecord, strapping_of
-from tankcal.record.tangents import TangentsRecord, tangents_of
 from tankcal.record.versions import FORMAT
 from tankcal.record.wall_shape import WallShapeRecord, shape_record
 from tankcal.tank.deliveries import WorstDeliveries
@@ -113,8 +112,8 @@ class Record(Saved, kw_only=True):
     hits: HitsRecord | None = key(
         "bare wall hits; left out where there are none", default=None, optional=True
     )
-    tangents: TangentsRecord | None = key(
-        "tangents from outside; left out where there are none", default=None, optional=True
+    surveys: dict = key(
+        "saved part of each method", default_factory=dict, parts=saved_parts_of_methods
     )
     liquid: LiquidRecord | None = key(
         "metered runs; left out where there are none", default=None, optional=True
@@ -124,9 +123,6 @@ class Record(Saved, kw_only=True):
     )
     ship: ShipRecord | None = key(
         "corrections for trim and list; left out where there are none", default=None, optional=True
-    )
-    surveys: dict = key(
-        "saved part of each method", default_factory=dict, parts=saved_parts_of_methods
     )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
     wall_shape: WallShapeRecord | None = key(
@@ -188,7 +184,6 @@ def record_of(result):
             lines=lines_of(result),
             hits=hits_of(result),
             clouds=clouds_of(result),
-            tangents=tangents_of(result),
             liquid=liquid_of(result),
             radii=radii_of(result),
             ship=ship_of(result),
@@ -219,8 +214,9 @@ def record_of(result):
 
 
 def surveys_of(result):
-    """Saved part of each method whose survey a result contains, by the name of the method."""
-    saved = [name for name in saved_parts_of_methods() if name in result.surveys]
+    """Saved part of each method whose survey or sights a result contains, by its name."""
+    found = {**result.surveys, **result.sights}
+    saved = [name for name in saved_parts_of_methods() if name in found]
     return {name: find_method(name).save(result) for name in saved}
 
 

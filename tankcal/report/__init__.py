@@ -21,7 +21,6 @@ _NOT_IN_ALL = (  # keys that some kinds of record, or records of earlier version
     "strapping",
     "lines",
     "hits",
-    "tangents",
     "clouds",
     "liquid",
     "radii",

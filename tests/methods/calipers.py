@@ -29,9 +29,12 @@ class CalipersMethod(Method):
         table = tables["calipers"]
         return table.numbers("diameter_m"), table.numbers("s_mm") / 1000
 
-    def find(self, job, progress):
+    def find(self, job, progress, network):
+        from tankcal.pipeline.surveying import Surveyed
+
         diameters, sds = job.surveys["calipers"]
-        return MeasuredSphere(float(diameters.mean()), float((sds**2).sum() ** 0.5 / len(sds)))
+        sd_of_mean = float((sds**2).sum() ** 0.5 / len(sds))
+        return Surveyed(job, MeasuredSphere(float(diameters.mean()), sd_of_mean))
 
     def solid_part(self, survey, plate_m, scale):
         import numpy as np
@@ -43,7 +46,7 @@ class CalipersMethod(Method):
         arguments = {"surveyed": ("diameter",), "factors": (factor,)}
         return Sphere(survey.diameter_m * scale), arguments, ("offset",)
 
-    def warnings(self, job, survey):
+    def warnings(self, job, survey, sights=None):
         from tankcal.errors import Problem
         from tankcal.messages import message
 

@@ -29,7 +29,6 @@ from tankcal.job.checks.rings import check_rings
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
-from tankcal.job.checks.tangents import check_tangents
 from tankcal.job.checks.tiny_sds import check_tiny_sds
 from tankcal.job.contract.bottom import check_bottom
 from tankcal.job.contract.correlations import check_correlations
@@ -75,7 +74,6 @@ def check_all(values, tables, registers, raw, is_whole, log):
             check_strapping(values, tables, registers, raw, log)
             check_lines(values, tables, registers, raw, log)
             check_hits(values, tables, registers, raw, log)
-            check_tangents(values, tables, registers, raw, log)
         if kind_of(raw) == "horizontal":
             check_rings(values, tables, registers, raw, log)
         for method in methods_for(kind_of(raw)):

@@ -8,7 +8,7 @@ from tankcal.job.checking import has_rows, zero_z
 from tankcal.job.contract.bottom import OF_CLOUD, rise_of_bottom
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.contract.top import depth_of_top
-from tankcal.methods.base import methods_for
+from tankcal.methods.base import methods, methods_for
 
 
 def has_survey(tables):
@@ -29,11 +29,6 @@ def tells_by_tape(tables):
 def has_hits(tables):
     """Return True if a total station measured the bare wall."""
     return has_rows(tables["wall_hits"])
-
-
-def has_tangents(tables):
-    """Return True if the limbs of the tank were sighted from a traverse around it."""
-    return has_rows(tables["tangents"])
 
 
 def has_clouds(tables):
@@ -68,7 +63,13 @@ def is_metered_alone(tables):
 
 def is_sighted(tables):
     """Return True if sights without targets, or scans, determine the wall."""
-    return has_hits(tables) or has_tangents(tables) or has_clouds(tables)
+    return has_hits(tables) or has_clouds(tables) or any(sights_given(tables))
+
+
+def sights_given(tables):
+    """Return the names of the tables of sighting methods that have rows."""
+    sighted = [method for method in methods() if method.is_sighted]
+    return [method.tables[0] for method in sighted if method.is_given(tables)]
 
 
 def may_be_hit_from_both_sides(tables):

@@ -22,7 +22,6 @@ from tankcal.job.contract import (
     stadia,
     stated,
     strapping,
-    tangents,
     top,
     uncertainty,
     welds,
@@ -35,7 +34,7 @@ from tankcal.job.contract.observations import SURVEYS as ADJUSTED_SURVEYS
 from tankcal.job.contract.parts import KEYS as PART_KEYS
 from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_OF_SURVEY
 from tankcal.job.contract.uncertainty import INPUTS
-from tankcal.methods.base import methods
+from tankcal.methods.base import methods, methods_for
 from tankcal.text.form_words import NOTES
 
 SECTIONS = (
@@ -48,7 +47,10 @@ SECTIONS = (
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
-COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
+COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS
+for _method in methods_for("vertical"):
+    COLUMNS |= _method.columns()
+COLUMNS |= stadia.COLUMNS
 for _method in methods():
     COLUMNS |= _method.columns()
 COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
@@ -62,7 +64,7 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "reference-line": (*lines.COLUMNS, *strapping.COLUMNS),
     "wall-hits": (*hits.COLUMNS, *hits.BESIDE),
     "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
-    "tangents": (*tangents.COLUMNS, *tangents.BESIDE),
+    "tangents": (),  # of its method
     "cloud": (*clouds.COLUMNS, *clouds.BESIDE),
     "liquid": tuple(liquid.COLUMNS),
     "radii": tuple(radii.COLUMNS),
@@ -75,6 +77,7 @@ for _method in methods():
     for _kind in _method.kinds if _method.starter else ():
         _surveys = SURVEYS if _kind == "vertical" else SURVEYS_OF_KIND.setdefault(_kind, {})
         _surveys[_method.starter] = (*_method.tables, *_method.shared_tables)
+        REGISTERS_OF_SURVEY.setdefault(_method.starter, ("instruments",))
 
 
 def tables_of_survey(kind, survey):

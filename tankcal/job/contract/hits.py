@@ -1,8 +1,7 @@
 """Tables of total station hits on the bare wall, and of control targets read between them."""
 
-from tankcal.job.contract.observations import angle_fields
 from tankcal.job.fields import Field
-from tankcal.job.shared_columns import USE
+from tankcal.job.shared_columns import USE, angle_fields
 
 
 def _time(required=False):

@@ -168,7 +168,8 @@ def names_of_points(tables):
             if tables[name].skipped:
                 return None
             names += tables[name].of("point")
-    for name in ("wall_hits", "tangents"):
+    of_methods = (method.tables[0] for method in methods() if method.has_named_points)
+    for name in ("wall_hits", *of_methods):
         if has_rows(tables[name]):
             if tables[name].skipped:
                 return None

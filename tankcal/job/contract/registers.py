@@ -276,7 +276,6 @@ REGISTERS_OF_SURVEY = {
     "strapping": ("instruments",),
     "reference-line": ("instruments",),
     "wall-hits": ("instruments",),
-    "tangents": ("instruments",),
     "triangulation": ("instruments",),
     "cloud": ("clouds", "instruments"),
     "liquid": ("meters",),

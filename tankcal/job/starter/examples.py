@@ -229,17 +229,6 @@ EXAMPLES_OF_TABLES = {
         }
     ],
     "stadia": [{"setup": "S1-1", "to": "S2", "bar": "bar 1", "angle_deg": 10.3942, "s_arcsec": 1}],
-    "tangents": [
-        {
-            "setup": "S1-1",
-            "course": "1",
-            "level_m": 0.45,
-            "side": "left",
-            "direction_deg": 73.2157,
-            "zenith_deg": 94.0216,
-            "s_arcsec": 5,
-        }
-    ],
     "targets": [
         {"point": "P101", "section": "1", "generatrix": "A", "z_m": 0.95, "offset_mm": 0.2}
     ],

@@ -12,7 +12,6 @@ class GreatCirclesMethod(Method):
     shared_tables = ("obstructions", "tape_checks")
     starter = "strapping"
     tables_with_sds = ("great_circles",)
-    has_named_points = False
     compares_size = True
     field_forms = ((("great_circles",), 15),)
     csv_files = ("great_circles.csv",)
@@ -57,10 +56,11 @@ class GreatCirclesMethod(Method):
 
     # ---- pipeline
 
-    def find(self, job, progress):
+    def find(self, job, progress, network):
         from tankcal.methods.great_circles.sphere import find_strapped_sphere
+        from tankcal.pipeline.surveying import Surveyed
 
-        return find_strapped_sphere(job, progress)
+        return Surveyed(job, find_strapped_sphere(job, progress))
 
     def inside_radii(self, job, survey):
         from tankcal.methods.great_circles.sphere import inside_radii
@@ -70,7 +70,7 @@ class GreatCirclesMethod(Method):
     def solid_part(self, survey, plate_m, scale):
         return survey.solid(plate_m, scale), survey.arguments_of_part(plate_m, scale), ("offset",)
 
-    def warnings(self, job, survey):
+    def warnings(self, job, survey, sights=None):
         from tankcal.methods.great_circles.warnings import check_circles
 
         return check_circles(job, survey)

@@ -7,13 +7,13 @@ import numpy as np
 from tankcal.job.checks.hits import FEWEST_HITS, MOST_HITS, too_many_hits
 from tankcal.job.checks.lines import MOST_OFFSETS, too_many_offsets
 from tankcal.job.checks.strapping import MOST_STRAPS, too_many_straps
-from tankcal.job.checks.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
 from tankcal.messages import message
 from tankcal.planning.fields import check_form, no_such_name, too_many_sections
 from tankcal.planning.given import PLAN_FILE
 from tankcal.planning.obstacles import check_obstacles
 from tankcal.planning.wall.filling import check_runs
 from tankcal.planning.wall.model import USUAL_AT, even_radius_m, evenness_of_limbs
+from tankcal.survey.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
 
 CLEAR_M, MOST_SECTIONS = 0.5, 50
 LIMBS = ("left", "right")

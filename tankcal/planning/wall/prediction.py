@@ -204,7 +204,7 @@ def foresee_table(job, amplitudes):
         return _tabled(surveyed, surveyed.survey)  # no readings that could estimate amplitudes
     field = surveyed.survey.field
     expected = expect_amplitudes(field)
-    if surveyed.touching is not None:  # tangents estimate only the excess of the hull
+    if "tangents" in surveyed.sights:  # they estimate only the excess of the hull
         surveyed = find_survey(job, lambda text: None, expected)
         field = surveyed.survey.field
     return _tabled(surveyed, replace(surveyed.survey, field=replace(field, amplitudes=expected)))
@@ -214,7 +214,7 @@ def _tabled(surveyed, wall):
     """Return the `WallTable` of a `Surveyed` with a wall of the predicted precision."""
     measured = measure_by_liquid(surveyed.job, wall)
     table = compute_table(surveyed.job, wall, body=measured and measured.body)
-    return WallTable(surveyed.job, wall, table, surveyed.sighting or surveyed.touching, measured)
+    return WallTable(surveyed.job, wall, table, surveyed.sighting, measured)
 
 
 def courses_of(tabled):

@@ -28,3 +28,9 @@ def counts_of(sights):
         Column(sights, decimals=0, heading="hits_used", sheet="hits_used"),
         Column("rejected", decimals=0, heading="hits_rejected", sheet="hits_rejected"),
     )
+
+
+def certificates_of_setups(setups):
+    """Return {instrument: certificate} of saved set-ups."""
+    named = [setup for setup in setups if setup["instrument"]]
+    return {setup["instrument"]: setup["certificate"] for setup in named}

@@ -4,6 +4,9 @@ The package computes no results. The cells contain values of the record, possibl
 (mm for m, litres per centimetre for m2). The stored results of formulas are values of the record.
 """
 
+from functools import partial
+
+from tankcal.methods.base import methods
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
 from tankcal.report.workbook.capacity import capacity_sheet
@@ -21,7 +24,6 @@ from tankcal.report.workbook.papers import (
     radii_sheet,
     ship_sheet,
     strapping_sheet,
-    tangents_sheet,
 )
 from tankcal.report.workbook.parts import (
     densities_sheet,
@@ -52,7 +54,7 @@ _SHEETS_OF_SURVEYS = {  # sheets of each survey method, by the key of the record
     "strapping": strapping_sheet,
     "lines": lines_sheet,
     "hits": hits_sheet,
-    "tangents": tangents_sheet,
+    **{method.name: partial(method_sheets, method) for method in methods()},
     "clouds": clouds_sheet,
     "liquid": liquid_sheet,
     "radii": radii_sheet,
@@ -108,7 +110,6 @@ def _sheets_of_tank(book, record):
     for key, sheet_of in _SHEETS_OF_SURVEYS.items():
         if record.get(key):
             sheet_of(book, record)
-    method_sheets(book, record)
     corrections_sheet(book, record)
     inside_sheet(book, record)
     budget_sheet(book, record)

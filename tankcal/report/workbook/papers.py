@@ -1,6 +1,5 @@
 """Sheets of the working papers: courses, surveys, corrections, and provenance."""
 
-from tankcal.methods.base import methods
 from tankcal.report.tables import (
     clouds,
     hits,
@@ -9,7 +8,6 @@ from tankcal.report.tables import (
     radii,
     ship,
     strapping,
-    tangents,
     tank,
 )
 from tankcal.report.workbook.look import Column, number_format
@@ -49,16 +47,15 @@ def strapping_sheet(book, record):
     write_tables(book, sheet, _HEAD_ROW, tables)
 
 
-def method_sheets(book, record):
-    """Write the sheets of the methods of `tankcal.methods` that the record contains."""
-    for method in methods():
-        for name, subtitle, tables in method.sheets(record) if record.get(method.name) else ():
-            sheet = book.sheet(name, book.word(f"texts.{subtitle}"), landscape=True)
-            cells = [
-                (book.word(f"headings.{heading}"), heading, columns_of(book, table))
-                for heading, table in tables
-            ]
-            write_tables(book, sheet, _HEAD_ROW, cells)
+def method_sheets(method, book, record):
+    """Write the sheets of a method of `tankcal.methods`."""
+    for name, subtitle, tables in method.sheets(record):
+        sheet = book.sheet(name, book.word(f"texts.{subtitle}"), landscape=True)
+        cells = [
+            (book.word(f"headings.{heading}"), heading, columns_of(book, table))
+            for heading, table in tables
+        ]
+        write_tables(book, sheet, _HEAD_ROW, cells)
 
 
 def lines_sheet(book, record):
@@ -92,16 +89,6 @@ def hits_sheet(book, record):
     tables = [
         (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
         for table in chosen
-    ]
-    write_tables(book, sheet, _HEAD_ROW, tables)
-
-
-def tangents_sheet(book, record):
-    """Write the set-ups of tangents, the levels with perimeter and area, and all sights."""
-    sheet = book.sheet("tangents", book.word("texts.tangents_subtitle"), landscape=True)
-    tables = [
-        (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
-        for table in (tangents.SETUPS, tangents.LEVELS, tangents.READINGS)
     ]
     write_tables(book, sheet, _HEAD_ROW, tables)
 

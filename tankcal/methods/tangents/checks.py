@@ -3,31 +3,18 @@
 import numpy as np
 
 from tankcal.job.checking import has_rows, tell
-from tankcal.job.checks.extent import has_survey, has_tangents
+from tankcal.job.checks.extent import has_survey
 from tankcal.job.checks.strapping import check_levels, refuse_others
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
 from tankcal.job.checks.survey.readings import check_angle, warn_copies
 from tankcal.messages import message
-
-MOST_TANGENTS = 2500  # largest number of tangents with a full covariance matrix
-FEWEST_SETUPS = 3  # smallest number of set-ups of a level, with two sights each
-
-
-def too_many_tangents(count):
-    """Message about more tangents than can be used."""
-    return message(
-        "too_many_tangents",
-        "{count} tangents; expected at most {most}, for the covariance of each with each is kept,"
-        " four times as much for twice the tangents: take every second one",
-        count=count,
-        most=MOST_TANGENTS,
-    )
+from tankcal.survey.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
 
 
 def check_tangents(values, tables, registers, raw, log):
-    """Check sights to both limbs from a network of set-ups outside; as for `check_all`."""
+    """Check sights to both limbs from a network of set-ups outside; as for `Method.check`."""
     table = tables["tangents"]
-    if not has_tangents(tables):
+    if not has_rows(table):
         return
     if len(table.rows) > MOST_TANGENTS:
         log.problem(table.file, too_many_tangents(len(table.rows)))

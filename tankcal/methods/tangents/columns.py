@@ -1,8 +1,7 @@
 """Table of tangents: sights to the limbs of a tank from set-ups of a traverse round it."""
 
-from tankcal.job.contract.observations import angle_fields
 from tankcal.job.fields import Field
-from tankcal.job.shared_columns import USE
+from tankcal.job.shared_columns import USE, angle_fields
 
 TANGENTS = (
     Field("setup", "name", "set-up of setups.csv", required=True),
@@ -44,8 +43,14 @@ TANGENTS = (
     ),
     USE,
 )
-BESIDE = (  # tables of the traverse and of circumferences by tape
-    *("setups", "control", "directions", "zenith_angles", "slope_distances"),
-    *("stadia", "circumferences", "obstructions"),
+EXAMPLES = (
+    {
+        "setup": "S1-1",
+        "course": "1",
+        "level_m": 0.45,
+        "side": "left",
+        "direction_deg": 73.2157,
+        "zenith_deg": 94.0216,
+        "s_arcsec": 5,
+    },
 )
-COLUMNS = {"tangents": TANGENTS}

@@ -1,7 +1,10 @@
-"""The part of the record that says what tangents showed: set-ups, levels, every sight."""
+"""Saved part of tangents: set-ups, levels, every sight."""
 
 import numpy as np
 
+from tankcal.geometry.support import fit_support
+from tankcal.pipeline.moved_setups import critical_of_setup
+from tankcal.pipeline.tangent_checks import judge_tangents, least_tangents
 from tankcal.record.hits import departure_from_sections
 from tankcal.record.schema import Finite, Saved, key
 
@@ -71,12 +74,8 @@ class TangentsRecord(Saved):
     excess_own_sd_m: float = key("standard deviation of one tangent beside it")
 
 
-def tangents_of(result):
-    """`TangentsRecord` of a result; None where the limbs were not sighted."""
-    if result.touching is None:
-        return None
-    from tankcal.pipeline.tangent_checks import judge_tangents
-
+def save_tangents(result):
+    """`TangentsRecord` of a result."""
     tests = judge_tangents(result.job, result.wall, result.touching)
     hull = result.touching.hull
     return TangentsRecord(
@@ -90,8 +89,6 @@ def tangents_of(result):
 
 
 def _setups(result, tests):
-    from tankcal.pipeline.moved_setups import critical_of_setup
-
     tangents, poses = result.job.tangents, result.touching.poses
     setup, found, first = np.array(tangents.setup), [], {}
     for place, (name, _) in enumerate(poses.keys):
@@ -142,8 +139,6 @@ def _readings(result, tests):
 
 
 def _levels(result, tests):
-    from tankcal.pipeline.tangent_checks import least_tangents
-
     job, least = result.job, least_tangents(result.job)
     counted = np.flatnonzero(~job.tangents.check)
     name_of = np.array(result.touching.points.section)
@@ -174,8 +169,6 @@ def _levels(result, tests):
 
 def _curve(touching, mine):
     """Highest wave, and `SupportCurve` of some tangents; None: they do not determine it."""
-    from tankcal.geometry.support import fit_support
-
     order = int(np.clip(len(mine) // PER_WAVE - 1, 1, MOST_WAVES))
     f, support = touching.normal_rad[mine], touching.support_m[mine]
     for highest in range(order, 0, -1):

@@ -15,12 +15,8 @@ from tankcal.geometry.girth import support_of, tangent_excess
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
+from tankcal.methods.tangents.misread import refuse_limbs, refuse_misread, refuse_misread_zeniths
 from tankcal.pipeline.hit_wall import take_points
-from tankcal.pipeline.misread_tangents import (
-    refuse_limbs,
-    refuse_misread,
-    refuse_misread_zeniths,
-)
 from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.wall import find_wall
 from tankcal.pipeline.wall_straps import rings_of
