@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from tankcal.fieldbooks.sorting import is_meant
-from tankcal.job.contract.hits import CONTROL_READINGS, WALL_HITS
+from tankcal.job.contract import COLUMNS
 from tankcal.job.contract.observations import (
     CONTROL,
     DIRECTIONS,
@@ -17,8 +17,8 @@ from tankcal.messages import message
 
 CONTRACT = {
     "setups": SETUPS,
-    "wall_hits": WALL_HITS,
-    "control_readings": CONTROL_READINGS,
+    "wall_hits": COLUMNS["wall_hits"],
+    "control_readings": COLUMNS["control_readings"],
     "directions": DIRECTIONS,
     "zenith_angles": ZENITH_ANGLES,
     "slope_distances": SLOPE_DISTANCES,

@@ -8,7 +8,6 @@ from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
 from tankcal.job.checks.extent import (
     has_clouds,
-    has_hits,
     has_radii,
     has_survey,
     is_metered,
@@ -27,7 +26,6 @@ from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
     CLOUD_TABLES,
     COVARIANCE_FILE,
-    HITS_TABLES,
     LIQUID_TABLES,
     RADII_COVARIANCE_FILE,
     RADII_TABLES,
@@ -104,10 +102,6 @@ def _make_surveys(raw, values, tables, registers, attached):
         from tankcal.job.lines import make_lines
 
         surveys["lines"] = make_lines(tables, registers)
-    if has_hits(tables):
-        from tankcal.job.hits import make_hits
-
-        surveys["hits"] = make_hits(tables, registers)
     if has_clouds(tables):
         from tankcal.job.clouds import make_clouds
 
@@ -136,7 +130,7 @@ def _read_tables(raw, registers, is_whole, log):
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
     if kind == "vertical":
-        allowed += STRAPPING_TABLES + HITS_TABLES + RADII_TABLES
+        allowed += STRAPPING_TABLES + RADII_TABLES
     if kind == "horizontal":
         allowed += (*RING_TABLES, *OF_TAPES)
     for method in methods_for(kind):
@@ -219,7 +213,7 @@ def _tell_sights_missing(raw, tables, log):
     if has_targets or not has_readings or not has_rows(tables["setups"]):
         return
     of_methods = (method.tables[0] for method in methods() if method.is_sighted)
-    sights = [name for name in ("wall_hits", *of_methods) if name in raw.tables]
+    sights = [name for name in of_methods if name in raw.tables]
     for name in sights:
         if raw.tables[name] is not None:
             log.problem(raw.tables[name].file, _IN_PLACE_OF_POINTS[name])
@@ -241,7 +235,6 @@ def _tell_clouds_missing(raw, tables, log):
 
 
 _IN_PLACE_OF_POINTS = {
-    "wall_hits": message("no_rows_of_hits", "no rows; expected a sight to the wall in each"),
     **{method.tables[0]: method.no_rows() for method in methods() if method.no_rows()},
     "liquid": message(
         "no_rows_of_liquid",

@@ -8,6 +8,7 @@ from tankcal.job.fields import Field
 
 ANGLE_UNITS = ("deg", "gon", "dms")
 FULL_CIRCLE = {"deg": 360, "gon": 400, "dms": 360}
+SURFACES = ("paint", "rust", "tape")  # surfaces with separate biases of ranging
 USE = Field(
     "use",
     "choice",

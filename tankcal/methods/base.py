@@ -15,6 +15,7 @@ from importlib import import_module
 
 GROUP = "tankcal.methods"  # entry points of methods in other distributions
 _BUILT_IN = (
+    "tankcal.methods.hits:HitsMethod",
     "tankcal.methods.tangents:TangentsMethod",
     "tankcal.methods.great_circles:GreatCirclesMethod",
 )
@@ -51,6 +52,9 @@ class Method:
         a job with these points, and the sights.
     is_smooth : bool
         Whether the readings show the wall smoother than it is.
+    has_own_offset : bool
+        Whether the instruments have offsets of their own, so that the declared input "offset" of
+        all radii has no effect.
     names_levels : bool
         Whether a section is named by its course and the sighted level.
     has_named_points : bool
@@ -76,6 +80,7 @@ class Method:
     tables_with_sds = ()
     is_sighted = False
     is_smooth = False
+    has_own_offset = False
     names_levels = False
     has_named_points = False
     compares_size = False
@@ -127,6 +132,10 @@ class Method:
         log : Log
             Receives problems and warnings.
         """
+
+    def may_see_both_sides(self, tables):
+        """Whether the readings of a job may be on both sides of the wall."""
+        return False
 
     def useless_inputs(self, tables):
         """Inputs of uncertainty that these readings replace: {input: Message of the reason}."""

@@ -198,7 +198,7 @@ def check_size(job, survey):
 def _has_own_line(job, survey):
     """Whether another check compares the whole tank of this survey with the drawing."""
     by_method = any(method.compares_size for method in given_methods(job))
-    return by_method or job.hits is not None or survey.surveyed_as in ("strapped", "rings")
+    return by_method or survey.surveyed_as in ("strapped", "rings")
 
 
 def _unlike_drawing(job, radius_m, miss_m):

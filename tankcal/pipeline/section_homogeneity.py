@@ -100,7 +100,7 @@ def homogeneity_of(job, wall):
         None if points share unknowns of instruments (hits, clouds, tangents) or were averaged in
         cells, because sections then have no separate noise.
     """
-    shares_unknowns = job.hits or job.clouds or is_sighted(job) or job.points.unbound
+    shares_unknowns = job.clouds or is_sighted(job) or job.points.unbound
     if shares_unknowns or wall.points_read != len(wall.accepted):
         return None
     noise = wall.section_noise

@@ -106,7 +106,7 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     """
     adjustment, sights = None, {}
     sighted = [method for method in given_methods(job) if method.is_sighted]
-    is_sighted = bool(sighted) or job.hits is not None or job.clouds is not None
+    is_sighted = bool(sighted) or job.clouds is not None
     if job.measurements is not None:
         adjustment = _adjusted(job, progress)
     if not is_sighted and adjustment is not None:
@@ -116,13 +116,7 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
         job = replace(job, points=s_transform(points))
     network = Network(adjustment, amplitudes)
     try:
-        if job.hits is not None:
-            from tankcal.pipeline.hit_wall import find_hit_wall
-
-            job, sights["hits"], survey = find_hit_wall(
-                job, adjustment, progress, network.dof, amplitudes=amplitudes
-            )
-        elif sighted:
+        if sighted:
             found = sighted[0].find(job, progress, network)
             job, survey, sights = found.job, found.survey, found.sights
         elif job.clouds is not None:

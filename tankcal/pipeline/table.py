@@ -184,10 +184,6 @@ def _check_sights(job, survey, sighting):
     """Warnings about the sights or clouds of a wall."""
     if sighting is None:
         return ()
-    if job.hits is not None:
-        from tankcal.pipeline.hit_checks import check_hits
-
-        return check_hits(job, survey, sighting)
     for method in given_methods(job):
         if method.is_sighted:
             return method.warnings(job, survey, sighting)

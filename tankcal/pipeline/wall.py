@@ -87,7 +87,7 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None, *, sizes=None):
         )
         decided = decisions_of(job)
         shell = _shell(job, joints_of(job), radial_sds(job.points), decided)
-        if job.hits is not None or is_sighted(job):
+        if is_sighted(job):
             shell = _clear_of_welds(job, shell, decided)
         most = WIDE_BAND * job.tank.nominal_diameter_m / 2
         refuse_kept(job, shell.residual_m, most, shell.reason)
@@ -203,8 +203,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         straps=straps,
         read=read,
         by_inputs=by_inputs,
-        # Hits and clouds have instrument offsets of their own.
-        without_inputs=("offset",) if job.hits or job.clouds else (),
+        without_inputs=("offset",) if _has_own_offsets(job) else (),
         origins_m=np.array([sample.centre_m for sample in samples]),
         told=told,
     )
@@ -217,6 +216,11 @@ def is_smoothed(job):
     see.
     """
     return _is_smooth(job) or has_loose_poses(job)
+
+
+def _has_own_offsets(job):
+    """Whether the instruments of the wall have offsets of their own, as of hits and clouds."""
+    return bool(job.clouds) or any(method.has_own_offset for method in given_methods(job))
 
 
 def _is_smooth(job):
@@ -346,7 +350,7 @@ def _shell(job, heights, sds, decided):
             decided=decided,
         )
     except SolutionError as error:
-        if job.hits is not None or is_sighted(job):
+        if is_sighted(job):
             text = error.args[0]
             if not isinstance(text, Message):  # a message of the solver about its unknowns
                 text = message("no_upright_shell", "the sights show no upright shell")

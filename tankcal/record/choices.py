@@ -104,9 +104,7 @@ def _shell_choices(job, result):
 def _measured_by(job, result):
     """How the points came about, and what is known of them."""
     found = {"covariance": _covariance_choice(job) if result.adjustment is None else "adjusted"}
-    if job.hits is not None:
-        found = {"survey": "wall_hits", "covariance": "hits"}
-    elif job.clouds is not None:
+    if job.clouds is not None:
         found = {"survey": "clouds", "covariance": "clouds"}
     for method in given_methods(job):
         found = method.choices(result)

@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.record.cloud_inside import InsideSeen, inside_of
 from tankcal.record.cloud_map import CloudMap, map_of
-from tankcal.record.hits import SharedByHits, shared_of
+from tankcal.record.ranging import SharedByHits, shared_of
 from tankcal.record.schema import Finite, Saved, key
 
 ARCSEC = np.pi / 180 / 3600

@@ -22,7 +22,6 @@ from tankcal.record import statements, survey, table, tank_parts, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.choices import Choice, adjustment_choices, choices_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
-from tankcal.record.hits import HitsRecord, hits_of
 from tankcal.record.homogeneity import HomogeneityRecord, homogeneity_record
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
@@ -109,9 +108,6 @@ class Record(Saved, kw_only=True):
     clouds: CloudsRecord | None = key(
         "clouds of the wall; left out where there are none", default=None, optional=True
     )
-    hits: HitsRecord | None = key(
-        "bare wall hits; left out where there are none", default=None, optional=True
-    )
     surveys: dict = key(
         "saved part of each method", default_factory=dict, parts=saved_parts_of_methods
     )
@@ -182,7 +178,6 @@ def record_of(result):
             homogeneity=homogeneity_record(job, result.wall),
             strapping=strapping_of(result),
             lines=lines_of(result),
-            hits=hits_of(result),
             clouds=clouds_of(result),
             liquid=liquid_of(result),
             radii=radii_of(result),

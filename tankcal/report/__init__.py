@@ -20,7 +20,6 @@ _NOT_IN_ALL = (  # keys that some kinds of record, or records of earlier version
     "homogeneity",
     "strapping",
     "lines",
-    "hits",
     "clouds",
     "liquid",
     "radii",

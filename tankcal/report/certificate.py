@@ -15,7 +15,6 @@ from tankcal.report.tables.facts import (
     SURVEY_DATE,
     tank_facts,
 )
-from tankcal.report.tables.sights import certificates_of_setups
 from tankcal.report.tables.strapping import certificates_of_tapes
 
 TO_WRITE_ON = ""  # value that the page style prints as a blank line
@@ -118,8 +117,6 @@ def instruments_of(record):
     for entry in lines["plummets"] if lines else ():
         if entry["plummet"]:  # None: the job does not describe the plummet
             used[entry["plummet"]] = entry["certificate"]
-    if record.get("hits"):
-        used |= certificates_of_setups(record["hits"]["setups"])
     for method in methods():
         if record.get(method.name):
             used |= method.certificates(record[method.name])

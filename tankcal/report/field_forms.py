@@ -18,8 +18,6 @@ FORMS = (  # input tables of each form, read together, and the number of rows on
     (("stadia",), 6),
     (("directions", "zenith_angles", "slope_distances"), 30),
     *(form for method in methods() for form in method.field_forms),
-    (("wall_hits",), 30),
-    (("control_readings",), 24),
     (("circumferences",), 15),
     (("obstructions",), 9),
     (("thickness",), 8),
@@ -27,9 +25,8 @@ FORMS = (  # input tables of each form, read together, and the number of rows on
     (("liquid",), 26),
 )
 ROWS_BESIDE = {("tangents", "directions"): 20}  # rows if another form is on the same page
-HEIGHTS_OF = (  # surveys with heights of the stations above the bottom
-    "wall-hits", *(method.starter for method in methods() if method.needs_station_heights),
-)  # fmt: skip
+# Surveys with heights of the stations above the bottom.
+HEIGHTS_OF = tuple(method.starter for method in methods() if method.needs_station_heights)
 ROWS_OF_HEIGHTS = 4  # rows of the form for the heights of stations
 IN_THE_OFFICE = (  # columns that are not filled in on site
     *("use", "s_mm", "s_arcsec", "note", "s_dip_mm", "s_volume_l"),

@@ -20,7 +20,6 @@ from tankcal.job.checks.extent import (
     wall_of,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
-from tankcal.job.checks.hits import check_hits
 from tankcal.job.checks.lines import check_lines
 from tankcal.job.checks.liquid import check_liquid
 from tankcal.job.checks.plausible import check_metering, check_plausible
@@ -73,7 +72,6 @@ def check_all(values, tables, registers, raw, is_whole, log):
             check_radii(values, tables, raw, log)
             check_strapping(values, tables, registers, raw, log)
             check_lines(values, tables, registers, raw, log)
-            check_hits(values, tables, registers, raw, log)
         if kind_of(raw) == "horizontal":
             check_rings(values, tables, registers, raw, log)
         for method in methods_for(kind_of(raw)):

@@ -26,11 +26,6 @@ def tells_by_tape(tables):
     return is_strapped(tables) and any(use != "check" for use in tables["circumferences"].of("use"))
 
 
-def has_hits(tables):
-    """Return True if a total station measured the bare wall."""
-    return has_rows(tables["wall_hits"])
-
-
 def has_clouds(tables):
     """Return True if the wall was scanned."""
     return has_rows(tables.get("clouds"))
@@ -63,7 +58,7 @@ def is_metered_alone(tables):
 
 def is_sighted(tables):
     """Return True if sights without targets, or scans, determine the wall."""
-    return has_hits(tables) or has_clouds(tables) or any(sights_given(tables))
+    return has_clouds(tables) or any(sights_given(tables))
 
 
 def sights_given(tables):
@@ -72,9 +67,10 @@ def sights_given(tables):
     return [method.tables[0] for method in sighted if method.is_given(tables)]
 
 
-def may_be_hit_from_both_sides(tables):
-    """Return True if hits from several set-ups may be on both sides of the wall."""
-    return has_hits(tables) and len(set(tables["wall_hits"].of("setup"))) > 1
+def may_be_seen_from_both_sides(tables):
+    """Return True if the sights of a method may be on both sides of the wall."""
+    given = [method for method in methods() if method.is_given(tables)]
+    return any(method.may_see_both_sides(tables) for method in given)
 
 
 def has_wall_points(tables):

@@ -12,7 +12,7 @@ from tankcal.methods.base import methods
 
 LEAST = {"s_mm": 0.02, "s_arcsec": 0.02}  # smallest sd of a scale or circle
 SURE = {"s_mm": 0.002, "s_arcsec": 0.002}  # smaller values are in metres or degrees
-READ = ("circumferences", "offsets", "wall_hits")
+READ = ("circumferences", "offsets")
 
 
 def check_tiny_sds(tables, registers, raw, log):

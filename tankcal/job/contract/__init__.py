@@ -10,7 +10,6 @@ from tankcal.job.contract import (
     correlations,
     courses,
     deadwood,
-    hits,
     lines,
     liquid,
     overrulings,
@@ -47,7 +46,7 @@ SECTIONS = (
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
-COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS
+COLUMNS |= strapping.COLUMNS | lines.COLUMNS
 for _method in methods_for("vertical"):
     COLUMNS |= _method.columns()
 COLUMNS |= stadia.COLUMNS
@@ -62,7 +61,7 @@ KEYS = {section: _KEYS[section] for section in SECTIONS}
 SURVEYS = ADJUSTED_SURVEYS | {
     "strapping": tuple(strapping.COLUMNS),
     "reference-line": (*lines.COLUMNS, *strapping.COLUMNS),
-    "wall-hits": (*hits.COLUMNS, *hits.BESIDE),
+    "wall-hits": (),  # of its method
     "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
     "tangents": (),  # of its method
     "cloud": (*clouds.COLUMNS, *clouds.BESIDE),

@@ -1,9 +1,9 @@
 """Keys of clouds.toml, with a section for each scanner file, and the table of scan targets."""
 
-from tankcal.job.contract.hits import SURFACES
 from tankcal.job.contract.kinds import WITH_POINTS
 from tankcal.job.contract.shorthand import FREE, choice, number, positive
 from tankcal.job.fields import Field
+from tankcal.job.shared_columns import SURFACES
 
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "us_ft": 1200 / 3937, "in": 0.0254}
 OF_FILE = "file"  # in place of a pose: the pose stored in the file

@@ -169,7 +169,7 @@ def names_of_points(tables):
                 return None
             names += tables[name].of("point")
     of_methods = (method.tables[0] for method in methods() if method.has_named_points)
-    for name in ("wall_hits", *of_methods):
+    for name in of_methods:
         if has_rows(tables[name]):
             if tables[name].skipped:
                 return None

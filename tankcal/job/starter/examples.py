@@ -200,34 +200,6 @@ EXAMPLES_OF_TABLES = {
             "face": 1,
         },
     ],
-    "wall_hits": [
-        {
-            "setup": "S1-1",
-            "course": "1",
-            "direction_deg": 12.3456,
-            "zenith_deg": 91.2345,
-            "distance_m": 6.5123,
-            "surface": "paint",
-        },
-        {
-            "setup": "S1-1",
-            "course": "1",
-            "direction_deg": 27.3401,
-            "zenith_deg": 91.2338,
-            "distance_m": 6.5098,
-            "surface": "paint",
-        },
-    ],
-    "control_readings": [
-        {
-            "setup": "S1-1",
-            "target": "K1",
-            "direction_deg": 10.0012,
-            "zenith_deg": 85.4321,
-            "distance_m": 6.4321,
-            "time": "2026-01-05T14:30",
-        }
-    ],
     "stadia": [{"setup": "S1-1", "to": "S2", "bar": "bar 1", "angle_deg": 10.3942, "s_arcsec": 1}],
     "targets": [
         {"point": "P101", "section": "1", "generatrix": "A", "z_m": 0.95, "offset_mm": 0.2}

@@ -25,7 +25,7 @@ METERED = "liquid"  # survey for every kind of tank
 DECLARED = "radii"  # radii of a former table, a record or a declaration
 # Surveys for vertical tanks; for other kinds see SURVEYS_OF_KIND.
 OF_SHELLS = (
-    *STRAPPED, "wall-hits", *(method.starter for method in methods_for("vertical")), DECLARED,
+    *STRAPPED, *(method.starter for method in methods_for("vertical")), DECLARED,
 )  # fmt: skip
 OF_GREAT_CIRCLES = (("sphere", "ovality_mm"), ("sphere", "form_mm"))
 # Marks of CSV files from spreadsheets in these languages.

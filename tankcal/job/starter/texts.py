@@ -93,9 +93,6 @@ TABLE_NOTES = {
     "scan_targets": "one row for each target in each scan; may stay empty",
     "liquid": "one row for the start of each run, and one for each batch with the dip after it",
     "radii": "one row for each course, with its radius as a former table or a record has it",
-    "wall_hits": "one row for each sight to the bare wall, without a target",
-    "control_readings": "one row for each reading of a control target: at the start, every half"
-    " hour and at the end; may stay empty",
 }
 for _method in methods():
     TABLE_NOTES |= _method.table_notes()

@@ -5,7 +5,7 @@ import numpy as np
 from tankcal.geometry.support import fit_support
 from tankcal.pipeline.moved_setups import critical_of_setup
 from tankcal.pipeline.tangent_checks import judge_tangents, least_tangents
-from tankcal.record.hits import departure_from_sections
+from tankcal.record.ranging import departure_from_sections
 from tankcal.record.schema import Finite, Saved, key
 
 MOST_WAVES, PER_WAVE = 6, 4  # highest order of a level's curve; tangents for each of its orders

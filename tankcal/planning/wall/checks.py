@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from tankcal.job.checks.hits import FEWEST_HITS, MOST_HITS, too_many_hits
 from tankcal.job.checks.lines import MOST_OFFSETS, too_many_offsets
 from tankcal.job.checks.strapping import MOST_STRAPS, too_many_straps
 from tankcal.messages import message
@@ -14,6 +13,7 @@ from tankcal.planning.obstacles import check_obstacles
 from tankcal.planning.wall.filling import check_runs
 from tankcal.planning.wall.model import USUAL_AT, even_radius_m, evenness_of_limbs
 from tankcal.survey.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
+from tankcal.survey.wall_hits import FEWEST_HITS, MOST_HITS, too_many_hits
 
 CLEAR_M, MOST_SECTIONS = 0.5, 50
 LIMBS = ("left", "right")

@@ -1,6 +1,6 @@
 """Sections of plan.toml for bare walls: strapping, reference lines, hits, tangents, liquid."""
 
-from tankcal.job.contract.hits import RANGING
+from tankcal.job.contract.ranging import RANGING
 from tankcal.job.fields import Field
 from tankcal.messages import message
 from tankcal.planning.fields import count, number, numbers_list

@@ -1,6 +1,6 @@
-"""Columns common to the tables of wall hits and of tangents."""
+"""Columns common to the tables of wall hits, tangents and clouds."""
 
-from tankcal.report.tables.table import Column
+from tankcal.report.tables.table import Column, Table
 
 SETUP = Column("setup", heading="hit_setup", sheet="hit_setup", width=10)
 INSTRUMENT = Column("instrument", heading="hit_instrument", sheet="hit_instrument", width=14)
@@ -20,6 +20,23 @@ ROW = Column("row", decimals=0, heading="hit_row", sheet="hit_row", width=8)
 DEPARTURE = Column(
     "departure_m", "mm", decimals=2, heading="line_departure", sheet="line_departure_mm"
 )
+SHARED = Table(
+    "hit_shared",
+    (
+        INSTRUMENT,
+        Column("certificate", heading="tape_certificate", sheet="tape_certificate", width=14),
+        Column("what", words="inputs", heading="hit_shared_what", sheet="hit_shared_what",
+               width=22),
+        Column("unit", heading="hit_shared_unit", sheet="hit_shared_unit", width=7),
+        Column("u_before", decimals=2, heading="hit_u_before", sheet="hit_u_before"),
+        Column("value", decimals=2, heading="hit_value", sheet="hit_value"),
+        Column("u_after", decimals=2, heading="hit_u_after", sheet="hit_u_after"),
+        Column("correlation", decimals=2, heading="hit_correlation", sheet="hit_correlation"),
+    ),
+    rows=lambda record: [
+        {**error, "certificate": error["certificate"] or None} for error in record["hits"]["shared"]
+    ],
+)  # fmt: skip
 
 
 def counts_of(sights):

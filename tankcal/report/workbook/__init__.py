@@ -16,7 +16,6 @@ from tankcal.report.workbook.papers import (
     clouds_sheet,
     corrections_sheet,
     courses_sheet,
-    hits_sheet,
     lines_sheet,
     liquid_sheet,
     method_sheets,
@@ -53,7 +52,6 @@ _HIDDEN = (
 _SHEETS_OF_SURVEYS = {  # sheets of each survey method, by the key of the record
     "strapping": strapping_sheet,
     "lines": lines_sheet,
-    "hits": hits_sheet,
     **{method.name: partial(method_sheets, method) for method in methods()},
     "clouds": clouds_sheet,
     "liquid": liquid_sheet,

@@ -2,7 +2,6 @@
 
 from tankcal.report.tables import (
     clouds,
-    hits,
     lines,
     liquid,
     radii,
@@ -66,29 +65,6 @@ def lines_sheet(book, record):
         (book.word("headings.plummets"), "plummets", columns_of(book, lines.PLUMMETS)),
         (book.word("headings.lines"), "lines", columns_of(book, lines.LINES)),
         (book.word("headings.offsets"), "offsets", columns_of(book, lines.OFFSETS)),
-    ]
-    write_tables(book, sheet, _HEAD_ROW, tables)
-
-
-def hits_sheet(book, record):
-    """Write set-ups, common errors, rings, control targets and incidence of wall hits."""
-    sheet = book.sheet("hits", book.word("texts.hits_subtitle"), landscape=True)
-    chosen = [
-        table
-        for table in (
-            hits.SETUPS,
-            hits.SHARED,
-            hits.RINGS,
-            hits.CONTROL,
-            hits.DRIFTS,
-            hits.COMPARED,
-            hits.INCIDENCE,
-        )
-        if table.rows(record)
-    ]
-    tables = [
-        (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
-        for table in chosen
     ]
     write_tables(book, sheet, _HEAD_ROW, tables)
 

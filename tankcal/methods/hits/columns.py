@@ -1,7 +1,7 @@
 """Tables of total station hits on the bare wall, and of control targets read between them."""
 
 from tankcal.job.fields import Field
-from tankcal.job.shared_columns import USE, angle_fields
+from tankcal.job.shared_columns import SURFACES, USE, angle_fields
 
 
 def _time(required=False):
@@ -14,7 +14,6 @@ def _distance(note, required=False):
     return Field("distance_m", "number", note, required=required, low=0, high=1e4, above_low=True)
 
 
-SURFACES = ("paint", "rust", "tape")
 _SETUP = Field("setup", "name", "set-up of setups.csv", required=True)
 _DIRECTION = angle_fields("direction", "direction as read, clockwise", (-1, 1))
 _ZENITH = angle_fields("zenith", "zenith angle, from the zenith downwards", (0, 0.5))
@@ -65,34 +64,34 @@ CONTROL_READINGS = (
     _distance("slope distance as read, metres"),
     _time(required=True),
 )
-BESIDE = (  # tables that connect set-ups or determine an offset
-    *("setups", "control", "directions", "zenith_angles", "slope_distances"),
-    *("circumferences", "obstructions"),
-)
 COLUMNS = {"wall_hits": WALL_HITS, "control_readings": CONTROL_READINGS}
-RANGING = (  # keys of instruments.toml for ranging on the wall
-    Field(
-        "s_mm",
-        "number",
-        "standard deviation of a distance to the bare wall, millimetres",
-        low=0,
-        high=1e3,
-        above_low=True,
-    ),
-    Field(
-        "s_arcsec",
-        "number",
-        "standard deviation of a direction or a zenith angle to the bare wall, seconds of arc",
-        low=0,
-        high=1e4,
-        above_low=True,
-    ),
-    Field(
-        "u_incidence_mm",
-        "number",
-        "standard uncertainty of the ranging bias at 60 degrees of incidence, relative to"
-        " perpendicular incidence, millimetres; blank: 1",
-        low=0,
-        high=100,
-    ),
-)
+EXAMPLES = {
+    "wall_hits": [
+        {
+            "setup": "S1-1",
+            "course": "1",
+            "direction_deg": 12.3456,
+            "zenith_deg": 91.2345,
+            "distance_m": 6.5123,
+            "surface": "paint",
+        },
+        {
+            "setup": "S1-1",
+            "course": "1",
+            "direction_deg": 27.3401,
+            "zenith_deg": 91.2338,
+            "distance_m": 6.5098,
+            "surface": "paint",
+        },
+    ],
+    "control_readings": [
+        {
+            "setup": "S1-1",
+            "target": "K1",
+            "direction_deg": 10.0012,
+            "zenith_deg": 85.4321,
+            "distance_m": 6.4321,
+            "time": "2026-01-05T14:30",
+        }
+    ],
+}

@@ -6,6 +6,7 @@ from tankcal.errors import Problem
 from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.shell import course_of
 from tankcal.messages import list_some, message
+from tankcal.methods.hits.lost_setups import check_lost_setups
 from tankcal.pipeline.cause_correlations import noise_of_wall
 from tankcal.pipeline.level_checks import (
     check_nominal,
@@ -14,19 +15,18 @@ from tankcal.pipeline.level_checks import (
     girth_m,
     levels_with_few,
 )
-from tankcal.pipeline.lost_setups import check_lost_setups
 from tankcal.pipeline.moved_setups import (
     critical_of_ranging,
     moved_or_ranged,
     worst_setup,
 )
+from tankcal.pipeline.ranging_checks import causes_unlike_certificates
 from tankcal.pipeline.survey_limits import limit_at, limits_of, repeat_factor
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
 from tankcal.survey.sighting import NETWORK, WALL
 
 RULES, CONTROL = "wall_hits", "control_readings.csv"
-UNLIKE_SDS = 3.0  # largest deviation of an offset or scale from its certificate, in sds
 OVER_JOINT_M = 0.02  # largest distance of a hit beyond the joints of its course
 SUSPECT = 3.0  # test quantity of the worst set-up from which it is tested against all others
 WAVE_M = 3e-3  # standard deviation of each long wave of the wall in the test of a set-up
@@ -286,73 +286,3 @@ def _length_in_words(by_mm):
     if by_mm < 0:
         return message("mm_too_short", "{by_mm:.1f} mm too short", by_mm=-by_mm)
     return message("mm_too_long", "{by_mm:.1f} mm too long", by_mm=by_mm)
-
-
-def causes_unlike_certificates(wall, estimates, file="instruments.toml", *, taken_off_m):
-    """Warn of offsets and scales that differ from their certificates, according to the wall.
-
-    The wall controls them only with straps, or with hits from both sides.
-
-    Parameters
-    ----------
-    wall : Wall
-    estimates : sequence of ToldCause
-    file : str
-        File of the certificates.
-    taken_off_m : dict
-        {instrument: offset already corrected in its readings, m}.
-
-    Yields
-    ------
-    Problem
-    """
-    if not estimates or (wall.straps is None and not wall.by_inputs):
-        return
-    for cause in estimates:
-        if not np.isfinite(cause.u_before) and cause.what == "instrument_offset":
-            yield from _strange_offset(cause, taken_off_m.get(cause.name, 0.0), file)
-        if not np.isfinite(cause.u_before) or abs(cause.value) <= UNLIKE_SDS * cause.u_before:
-            continue
-        ratio = abs(cause.value) / cause.u_before
-        if cause.what == "instrument_offset":
-            key, text = (
-                "u_offset_mm",
-                message(
-                    "offset_unlike_certificate",
-                    "the wall makes the offset of {name} {value_mm:+.2f} mm, {ratio:.1f} times its"
-                    " u_offset_mm: is that of another reflector, or a strap or a plate wrong?",
-                    name=cause.name,
-                    value_mm=1000 * cause.value,
-                    ratio=ratio,
-                ),
-            )
-        else:
-            key, text = (
-                "u_scale_ppm",
-                message(
-                    "scale_unlike_certificate",
-                    "the wall makes the scale of {name} {value_ppm:+.0f} ppm, {ratio:.1f} times its"
-                    " u_scale_ppm",
-                    name=cause.name,
-                    value_ppm=1e6 * cause.value,
-                    ratio=ratio,
-                ),
-            )
-        yield Problem(file, text, None, f"{cause.name}.{key}")
-
-
-def _strange_offset(cause, taken_off_m, file):
-    """Warn of an offset without certificate that is larger than usual for instruments."""
-    most = limits_of(RULES)["most_offset_mm"] / 1000
-    value = cause.value + taken_off_m
-    if abs(value) > most + UNLIKE_SDS * cause.u_after:
-        text = message(
-            "offset_strange",
-            "straps and wall make the offset of {name} {value_mm:+.2f} mm; on a bare wall it is"
-            " seldom more than {most_mm:g} mm: was the constant of a reflector set, is a strap"
-            " misread, or are circumferences those of the inside?",
-            name=cause.name,
-            value_mm=1000 * value,
-            most_mm=1000 * most,
-        )
-        yield Problem(file, text, None, f"{cause.name}.u_offset_mm")

@@ -1,10 +1,10 @@
 """Tables of wall hits: set-ups, common errors, rings, control targets, incidence."""
 
+from tankcal.report.tables import sights
 from tankcal.report.tables.sights import (
     CHECKS,
     COURSE,
     DEPARTURE,
-    INSTRUMENT,
     LEAST,
     LEVEL,
     PLACE,
@@ -28,23 +28,7 @@ SETUPS = Table(
     rows=lambda record: record["hits"]["setups"],
 )  # fmt: skip
 
-SHARED = Table(
-    "hit_shared",
-    (
-        INSTRUMENT,
-        Column("certificate", heading="tape_certificate", sheet="tape_certificate", width=14),
-        Column("what", words="inputs", heading="hit_shared_what", sheet="hit_shared_what",
-               width=22),
-        Column("unit", heading="hit_shared_unit", sheet="hit_shared_unit", width=7),
-        Column("u_before", decimals=2, heading="hit_u_before", sheet="hit_u_before"),
-        Column("value", decimals=2, heading="hit_value", sheet="hit_value"),
-        Column("u_after", decimals=2, heading="hit_u_after", sheet="hit_u_after"),
-        Column("correlation", decimals=2, heading="hit_correlation", sheet="hit_correlation"),
-    ),
-    rows=lambda record: [
-        {**error, "certificate": error["certificate"] or None} for error in record["hits"]["shared"]
-    ],
-)  # fmt: skip
+SHARED = sights.SHARED  # also the basis of a table of clouds
 
 RINGS = Table(
     "hit_rings",

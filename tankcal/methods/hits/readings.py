@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.job.checks.hits import instruments_used, ranging_of
+from tankcal.job.checks.ranging import instruments_used, ranging_of
+from tankcal.job.contract.ranging import USUAL_INCIDENCE_MM
 from tankcal.job.contract.registers import FREE
 from tankcal.job.measuring import ARCSEC, angle_in_rad, setups_of
 from tankcal.survey.wall_hits import ControlReading, RangingInstrument, WallHits
 
-USUAL_INCIDENCE_MM = 1.0  # default standard uncertainty of the bias at 60 degrees incidence, mm
 AXES = "xyz"
 
 

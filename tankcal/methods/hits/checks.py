@@ -3,35 +3,23 @@
 import numpy as np
 
 from tankcal.job.checking import has_rows, refuse_repeated, tell_missing
-from tankcal.job.checks.extent import has_hits, has_survey, tells_by_tape
-from tankcal.job.checks.strapping import refuse_others, tapes_of
+from tankcal.job.checks.extent import has_survey, tells_by_tape
+from tankcal.job.checks.ranging import instruments_used, ranging_of
+from tankcal.job.checks.strapping import refuse_others
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
 from tankcal.job.checks.survey.instruments import check_correction
 from tankcal.job.checks.survey.readings import check_angle, warn_copies
 from tankcal.job.contract.registers import FREE
 from tankcal.messages import message
+from tankcal.survey.wall_hits import FEWEST_HITS, MOST_HITS, too_many_hits
 
-RANGE_NOTHING = ("plummet", "stadia", "level")  # kinds of instruments without a distance
-MOST_HITS = 2500  # largest number of hits with a full covariance matrix
-FEWEST_HITS = 5  # smallest number of hits of a section of the wall
 RANGES = ("slope_distances", "distances")  # tables by which a network determines an offset
 
 
-def too_many_hits(count):
-    """Message about more hits than can be used."""
-    return message(
-        "too_many_hits",
-        "{count} hits; expected at most {most}, for the covariance of each with each is kept, four"
-        " times as much for twice the hits: take every second one or hand them in as points.csv",
-        count=count,
-        most=MOST_HITS,
-    )
-
-
 def check_hits(values, tables, registers, raw, log):
-    """Check hits, their set-ups and the accuracy of the instruments; as for `check_all`."""
+    """Check hits, their set-ups and the accuracy of the instruments; as for `Method.check`."""
     hits, control = tables["wall_hits"], tables["control_readings"]
-    if not has_hits(tables):
+    if not has_rows(hits):
         if has_rows(control):
             expected = message("no_hits", "without effect: the job has no wall hits")
             log.warning(control.file, expected)
@@ -85,23 +73,6 @@ def _check_readings(files, table, *, is_needed):
     for angle in ("direction", "zenith"):
         check_angle(files, table, angle, is_needed=is_needed)
     warn_copies(files, table, are_sights=True)
-
-
-def ranging_of(registers):
-    """{name: {key: value}} of the instruments that measure distances, except tapes."""
-    instruments, tapes = registers["instruments"], tapes_of(registers)
-    return {
-        name: given
-        for name, given in instruments.items()
-        if name not in tapes and (given["kind"] or "").strip().lower() not in RANGE_NOTHING
-    }
-
-
-def instruments_used(setups, ranging):
-    """{set-up: name of its instrument}; a blank means the only instrument, None if several."""
-    only = next(iter(ranging)) if len(ranging) == 1 else None
-    pairs = zip(setups.of("setup"), setups.of("instrument"), strict=True)
-    return {setup: name or only for setup, name in pairs}
 
 
 def _check_instruments(files, hits):

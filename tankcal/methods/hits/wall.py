@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.geometry.shell import course_of
-from tankcal.job.checks.hits import offset_unknown
 from tankcal.messages import message
+from tankcal.methods.hits.checks import offset_unknown
+from tankcal.methods.hits.misread import refuse_other_units
+from tankcal.methods.hits.misread_lines import refuse_misread_heights, refuse_misread_lines
 from tankcal.pipeline.cause_correlations import told_causes
-from tankcal.pipeline.misread_hits import refuse_other_units
-from tankcal.pipeline.misread_lines import refuse_misread_heights, refuse_misread_lines
 from tankcal.pipeline.point_covariance import s_transform
-from tankcal.pipeline.wall import find_wall, joints_of
+from tankcal.pipeline.sighted_points import take_points, through_wall
+from tankcal.pipeline.wall import find_wall
 from tankcal.sections import coordinates_of
 from tankcal.survey import wall_points
 from tankcal.survey.poses import covariance_with_points, poses_of, settled
@@ -128,32 +128,6 @@ def _targets_beside(job, poses, adjustment):
     return Beside(points, covariance_with_points(job.hits, poses, adjustment, points.names))
 
 
-def take_points(points, chosen):
-    """Return selected points (k,), with their covariance and their causes."""
-    if np.array_equal(chosen, np.arange(len(points.names))):  # the covariance may be large
-        return points
-    index = coordinates_of(chosen)
-
-    def select(values):
-        return tuple(values[i] for i in chosen)
-
-    def select_columns(causes):
-        return tuple(replace(cause, column_m=cause.column_m[index]) for cause in causes)
-
-    return replace(
-        points,
-        names=select(points.names),
-        xyz_m=points.xyz_m[chosen],
-        covariance_m2=points.covariance_m2[np.ix_(index, index)],
-        section=select(points.section),
-        generatrix=select(points.generatrix),
-        rows=select(points.rows),
-        causes=select_columns(points.causes),
-        unbound=select_columns(points.unbound),
-        by_inputs={name: column[index] for name, column in points.by_inputs.items()},
-    )
-
-
 def _refuse_side(job, sighting):
     """Raise InputError if all set-ups lie on the other side of the wall than declared."""
     if not np.any(sighting.is_inside == (job.survey.side == "inside")):
@@ -197,42 +171,6 @@ def _move_to_one_side(job, sighting):
         return sighting
     points = through_wall(job, sighting.points, sighting.normal, is_moved)
     return replace(sighting, points=points)
-
-
-def through_wall(job, points, normal, is_moved):
-    """Move points of a vertical wall to its other side.
-
-    Parameters
-    ----------
-    job : Job
-    points : Points
-    normal : ndarray, shape (n, 3)
-        Normals of the wall, outwards.
-    is_moved : ndarray of bool, shape (n,)
-        Points that are not on the side of the survey.
-
-    Returns
-    -------
-    Points
-        With the derivatives by plate thickness and paint.
-    """
-    joints = job.datum.bottom_z_m + joints_of(job)
-    course = course_of(points.xyz_m[:, 2], joints)
-    outwards = 1.0 if job.survey.side == "outside" else -1.0
-    normal = (outwards * is_moved)[:, None] * normal
-    switches = {"plate_thickness": job.switches.plate, "paint": job.switches.paint}
-    sizes = {
-        "plate_thickness": np.array([part.thickness_m for part in job.courses])[course],
-        "paint": np.array([part.paint_m for part in job.courses])[course],
-    }
-    size = sum(switches[name] * thickness for name, thickness in sizes.items())
-    xyz = points.xyz_m + size[:, None] * normal
-    derivatives = {
-        name: normal.ravel()
-        for name, thickness in sizes.items()
-        if switches[name] and thickness.any()
-    }
-    return replace(points, xyz_m=xyz, by_inputs=derivatives)
 
 
 def _refuse_unknown_offset(job, sighting):
