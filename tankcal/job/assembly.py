@@ -26,7 +26,6 @@ from tankcal.job.model import (
     Material,
     Mesh,
     Points,
-    Ring,
     Roof,
     Ship,
     Sphere,
@@ -218,7 +217,6 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         roof=_roof(values["roof"]),
         top=_top(values["top"]),
         horizontal=_horizontal(values["horizontal"], has_points) if kind == "horizontal" else None,
-        rings=_rings(tables) if kind == "horizontal" else (),
         sphere=_sphere(values["sphere"]) if kind == "sphere" else None,
         circumference_m=values["checks"]["circumference_m"],
         diameter_is=values["checks"]["diameter_is"],
@@ -345,31 +343,14 @@ def _courses(tables):
         Course(
             name,
             height_m,
-            *_plate(thickness_mm / 1000, (paint_mm or 0.0) / 1000, gauge_means.get(name)),
+            *plate_and_paint(thickness_mm / 1000, (paint_mm or 0.0) / 1000, gauge_means.get(name)),
             tuple(sorted(azimuths[name])) if name in azimuths else None,
         )
         for name, height_m, thickness_mm, paint_mm in zip(*columns, strict=True)
     )
 
 
-def _rings(tables):
-    table = tables["rings"]
-    if table is None:
-        return ()
-    gauge_means = gauged(tables["thickness"])
-    columns = map(table.of, ("ring", "length_m", "thickness_mm", "paint_mm", "lap"))
-    return tuple(
-        Ring(
-            name,
-            length_m,
-            *_plate((thickness_mm or 0.0) / 1000, (paint_mm or 0.0) / 1000, gauge_means.get(name)),
-            lap,
-        )
-        for name, length_m, thickness_mm, paint_mm, lap in zip(*columns, strict=True)
-    )
-
-
-def _plate(thickness_m, paint_m, gauge_mean):
+def plate_and_paint(thickness_m, paint_m, gauge_mean):
     """Thickness of plate and paint, m; gauge readings, averaged by `gauged`, take precedence."""
     if gauge_mean is None:
         return thickness_m, paint_m

@@ -17,7 +17,6 @@ from tankcal.job.checks.extent import (
 from tankcal.job.checks.lines import has_lines
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
-from tankcal.job.contract.strapping import COLUMNS as OF_TAPES
 from tankcal.job.contract.strapping import IN_PLACE
 from tankcal.job.covariance import OF_RADII, read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
@@ -30,7 +29,6 @@ from tankcal.job.tables import (
     RADII_COVARIANCE_FILE,
     RADII_TABLES,
     REGISTERS,
-    RING_TABLES,
     STRAPPING_TABLES,
     SURVEY_TABLES,
     TABLES,
@@ -131,8 +129,6 @@ def _read_tables(raw, registers, is_whole, log):
         allowed += SURVEY_TABLES
     if kind == "vertical":
         allowed += STRAPPING_TABLES + RADII_TABLES
-    if kind == "horizontal":
-        allowed += (*RING_TABLES, *OF_TAPES)
     for method in methods_for(kind):
         allowed += method.tables + method.shared_tables
     if kind in OF_CLOUDS:

@@ -32,13 +32,12 @@ STRAPPING_TABLES = (
 CLOUD_TABLES = ("scan_targets",)
 LIQUID_TABLES = ("liquid",)
 RADII_TABLES = ("radii",)
-RING_TABLES = ("rings",)
 OVERRULING_TABLES = ("overrulings",)
 # The input files of a record are in this order: first the methods for upright tanks.
 _UPRIGHT = tuple(table for method in methods_for("vertical") for table in method.tables)
 _OTHERS = tuple(table for method in methods() for table in method.tables if table not in _UPRIGHT)
 TABLES = TANK_TABLES + STRAPPING_TABLES + _UPRIGHT + CLOUD_TABLES
-TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES + _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
+TABLES += LIQUID_TABLES + RADII_TABLES + _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
 REGISTERS = {  # name of an entry in each list
     "cameras": "camera",
     "instruments": "instrument",

@@ -17,6 +17,7 @@ GROUP = "tankcal.methods"  # entry points of methods in other distributions
 _BUILT_IN = (
     "tankcal.methods.hits:HitsMethod",
     "tankcal.methods.tangents:TangentsMethod",
+    "tankcal.methods.rings:RingsMethod",
     "tankcal.methods.great_circles:GreatCirclesMethod",
 )
 
@@ -93,6 +94,10 @@ class Method:
     def columns(self):
         """Columns of the tables: {table: tuple of `job.fields.Field`}."""
         return {}
+
+    def starter_tables(self):
+        """Tables of a starter job, in their order."""
+        return (*self.tables, *self.shared_tables)
 
     def table_notes(self):
         """English notes above the tables in a starter: {table: note}."""
@@ -180,6 +185,9 @@ class Method:
     def inside_radii(self, job, survey):
         """`InsideRadii` of a survey, to be compared with the drawing; None: no size is known."""
         return
+
+    def part(self, job, survey, switches):
+        """`tank.body.SolidPart` of a tank of one solid; None: made from `solid_part`."""
 
     def solid_part(self, survey, plate_m, scale):
         """Inside of a tank of one solid, with the arguments of its `SolidPart`.

@@ -101,14 +101,12 @@ def inside_radii(job, survey):
     InsideRadii or None
     """
     kind = None if survey is None else survey.surveyed_as
-    if kind in ("wall", "strapped", "radii", "rings"):
-        parts = job.rings if kind == "rings" else job.courses
+    if kind in ("wall", "strapped", "radii"):
+        parts = job.courses
         plates = np.array([part.thickness_m + part.paint_m for part in parts])
         names = tuple(getattr(part, "name", str(i)) for i, part in enumerate(parts, 1))
         if kind == "radii":
             radius = survey.radius_m
-        elif kind == "rings":
-            radius = survey.straps.radius_m - plates
         else:
             radius = mean_radii(survey.field) - plates * (job.survey.side == "outside")
         sd = _sds_of_courses(survey, len(parts)) if kind == "wall" else np.zeros(len(parts))
@@ -198,7 +196,7 @@ def check_size(job, survey):
 def _has_own_line(job, survey):
     """Whether another check compares the whole tank of this survey with the drawing."""
     by_method = any(method.compares_size for method in given_methods(job))
-    return by_method or survey.surveyed_as in ("strapped", "rings")
+    return by_method or survey.surveyed_as == "strapped"
 
 
 def _unlike_drawing(job, radius_m, miss_m):

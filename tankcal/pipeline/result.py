@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from tankcal.pipeline.nominal_wall import NominalWall
     from tankcal.pipeline.radii_wall import RadiiWall
     from tankcal.pipeline.read_wall import ReadWall
-    from tankcal.pipeline.ringed_wall import RingedWall
     from tankcal.pipeline.scan import Scan
     from tankcal.pipeline.ship import ShipTables
     from tankcal.pipeline.strapped_wall import StrappedWall
@@ -149,7 +148,7 @@ class Result:
         return self.surveys.get("radii")
 
     @property
-    def rings(self) -> "RingedWall | None":
+    def rings(self):
         """Rings of a horizontal cylinder measured by strapping."""
         return self.surveys.get("rings")
 

@@ -188,10 +188,8 @@ def adjust_decided(job, progress):
 
 def _survey(job, progress, network):
     """Survey of the tank: wall of courses, mesh or scan; None for declared sizes alone."""
-    if job.rings:
-        from tankcal.pipeline.ringed_wall import find_ringed_wall
-
-        return find_ringed_wall(job, progress, network.amplitudes)
+    for method in given_methods(job):
+        return method.find(job, progress, network).survey
     if job.strapping is not None and job.points is None:
         from tankcal.pipeline.strapped_wall import find_strapped_wall
 
@@ -206,8 +204,6 @@ def _survey(job, progress, network):
         return find_nominal_wall(job, progress)
     if job.tank.kind == "vertical":
         return find_wall(job, progress, network.dof, network.amplitudes)
-    for method in given_methods(job):
-        return method.find(job, progress, network).survey
     if job.mesh is not None:
         from tankcal.pipeline.ship import check_pipe
         from tankcal.tank.meshes import parse_mesh

@@ -203,10 +203,6 @@ def _check_survey(job, survey, top_m):
         from tankcal.pipeline.strapping_checks import check_strapped
 
         return (*check_strapped(job, survey), *_check_reference_lines(job, survey))
-    if kind == "rings":
-        from tankcal.pipeline.ring_checks import check_rings
-
-        return check_rings(job, survey)
     if kind == "scan":
         return check_scan(job, survey, top_m)
     return () if survey is None else check_mesh(job, top_m)

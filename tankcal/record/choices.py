@@ -30,11 +30,11 @@ def choices_of(result):
         **(_strapped_choices(job) if result.strapped is not None else {}),
         **_liquid_choices(result),
         **_radii_choices(result),
-        **_ring_choices(result),
+        **_choices_of_methods(result, ("vertical", "horizontal")),
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job, result),
         "temperature": _temperature_choice(job),
-        **_choices_of_methods(result),
+        **_choices_of_methods(result, ("sphere",)),
         **_sphere_choices(job),
         "height_expansion": "yes" if job.table.height_expansion else "no",
         "head": _head_choice(job),
@@ -137,23 +137,13 @@ def _area_term_choice(shape_sd_m):
     return "none" if shape_sd_m == 0 else 1000 * shape_sd_m
 
 
-def _ring_choices(result):
-    """What was assumed about rings that a tape was put round."""
-    if result.rings is None:
-        return {}
-    shape_mm = 1000 * result.rings.shape_sd_m
-    return {
-        "survey": "strapping_rings",
-        "area_term": shape_mm or "none",
-        "between_sections": "rings",
-        "form": "learned",
-    }
+def _choices_of_methods(result, kinds):
+    """Assumptions of the methods of a job, if its tank is of these kinds.
 
-
-def _choices_of_methods(result):
-    """Assumptions of the methods of `tankcal.methods` that the job contains."""
+    A record of a sphere has them at another place than the records of other tanks.
+    """
     choices = {}
-    for method in given_methods(result.job):
+    for method in given_methods(result.job) if result.job.tank.kind in kinds else ():
         choices |= method.choices(result)
     return choices
 

@@ -11,7 +11,6 @@ FILE = "field-sheets.pdf"
 # Surveys recorded by hand.
 BY_PEN = (*(survey for survey in OF_SHELLS if survey != DECLARED), METERED)
 FORMS = (  # input tables of each form, read together, and the number of rows on a sheet
-    (("rings",), 12),
     (("lines",), 12),
     (("offsets",), 30),
     (("setups",), 9),

@@ -16,7 +16,7 @@ from test_coverage_of_rings import SHARES, base_job  # noqa: F401  (a fixture)
 from test_coverage_of_strapped_spheres import FOLDER
 
 from tankcal.methods.great_circles.sphere import find_strapped_sphere
-from tankcal.pipeline.ringed_wall import find_ringed_wall
+from tankcal.methods.rings.wall import find_ringed_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.capacity import Capacity
 

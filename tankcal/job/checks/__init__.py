@@ -9,11 +9,11 @@ from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.clouds import check_clouds
 from tankcal.job.checks.extent import (
     Extent,
+    estimate_diameter_m,
     extent_of,
     has_radii,
     has_survey,
     has_wall_points,
-    height_of_rings,
     is_metered,
     is_sighted,
     is_strapped,
@@ -24,7 +24,6 @@ from tankcal.job.checks.lines import check_lines
 from tankcal.job.checks.liquid import check_liquid
 from tankcal.job.checks.plausible import check_metering, check_plausible
 from tankcal.job.checks.radii import check_radii
-from tankcal.job.checks.rings import check_rings
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
@@ -72,8 +71,6 @@ def check_all(values, tables, registers, raw, is_whole, log):
             check_radii(values, tables, raw, log)
             check_strapping(values, tables, registers, raw, log)
             check_lines(values, tables, registers, raw, log)
-        if kind_of(raw) == "horizontal":
-            check_rings(values, tables, registers, raw, log)
         for method in methods_for(kind_of(raw)):
             method.check(values, tables, registers, raw, log)
         check_tiny_sds(tables, registers, raw, log)
@@ -132,7 +129,7 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
     elif has_rows(points):
         check_scan(points, values, kind, raw, log)
     if kind == "horizontal":
-        check_horizontal(values, wall_of(tables), raw, log, height_of_rings(tables))
+        check_horizontal(values, wall_of(tables), raw, log, estimate_diameter_m(kind, tables))
     if kind == "sphere":
         check_sphere(
             values,

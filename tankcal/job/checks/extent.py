@@ -82,19 +82,15 @@ def wall_of(tables):
     """Origin of the wall of a lying tank: "points", "straps", or None for its dimensions."""
     if has_wall_points(tables):
         return "points"
-    return "straps" if is_strapped(tables) or has_rows(tables.get("rings")) else None
+    is_measured = any(method.is_given(tables) for method in methods_for("horizontal"))
+    return "straps" if is_strapped(tables) or is_measured else None
 
 
-def height_of_rings(tables):
-    """Approximate inside diameter of strapped rings, m; None if unknown."""
-    if not is_strapped(tables) or not has_rows(tables.get("rings")):
-        return None
-    readings = [value for value in tables["circumferences"].of("reading_m") if value is not None]
-    plates = [value for value in tables["rings"].of("thickness_mm") if value is not None]
-    if not readings:
-        return None
-    # Subtract two plates from the outside diameter, mm to m.
-    return float(np.median(readings) / np.pi - 2e-3 * (np.median(plates) if plates else 0.0))
+def estimate_diameter_m(kind, tables):
+    """Approximate diameter of a tank of one solid from its readings, m; None if unknown."""
+    given = (method for method in methods_for(kind) if method.is_given(tables))
+    diameters = (method.estimate_diameter_m(tables) for method in given)
+    return next((diameter for diameter in diameters if diameter is not None), None)
 
 
 @dataclass(frozen=True)
@@ -125,9 +121,8 @@ def extent_of(values, tables, kind):
         return _of_horizontal(values["horizontal"], values, wall_of(tables) is not None)
     if kind == "sphere":
         diameter = values["sphere"]["diameter_m"] or values["tank"]["nominal_diameter_m"]
-        for method in methods_for(kind):
-            if diameter is None and method.is_given(tables):
-                diameter = method.estimate_diameter_m(tables)
+        if diameter is None:
+            diameter = estimate_diameter_m(kind, tables)
         area = None if diameter is None else np.pi / 4 * diameter**2
         return _lying(diameter, 0.0, area, values, has_wall_points(tables))
     return Extent()

@@ -15,7 +15,6 @@ from tankcal.job.contract import (
     overrulings,
     points,
     radii,
-    rings,
     roof,
     ship,
     stadia,
@@ -53,7 +52,7 @@ COLUMNS |= stadia.COLUMNS
 for _method in methods():
     COLUMNS |= _method.columns()
 COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
-COLUMNS |= rings.COLUMNS | SURVEY_COLUMNS | overrulings.COLUMNS
+COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
@@ -70,12 +69,11 @@ SURVEYS = ADJUSTED_SURVEYS | {
 }
 
 SURVEYS_OF_KIND = {  # surveys whose tables for a kind of tank differ from SURVEYS
-    "horizontal": {"strapping": (*strapping.COLUMNS, *rings.COLUMNS)},
 }
 for _method in methods():
     for _kind in _method.kinds if _method.starter else ():
         _surveys = SURVEYS if _kind == "vertical" else SURVEYS_OF_KIND.setdefault(_kind, {})
-        _surveys[_method.starter] = (*_method.tables, *_method.shared_tables)
+        _surveys[_method.starter] = _method.starter_tables()
         REGISTERS_OF_SURVEY.setdefault(_method.starter, ("instruments",))
 
 

@@ -27,7 +27,6 @@ _WALL_WITHOUT_NAMES = (
     "offsets",
     "liquid",
     "radii",
-    "rings",
     "scan_targets",
 )
 MOST = 200  # largest number of decisions; more would replace the outlier test

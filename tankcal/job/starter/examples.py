@@ -107,10 +107,6 @@ EXAMPLES_OF_TABLES = {
         {"course": "1", "height_m": 1.9, "thickness_mm": 8.0, "paint_mm": 0.3},
         {"course": "2", "height_m": 1.9, "thickness_mm": 6.3, "paint_mm": 0.3},
     ],
-    "rings": [
-        {"ring": "1", "length_m": 1.9, "thickness_mm": 8.0, "paint_mm": 0.3, "lap": "outer"},
-        {"ring": "2", "length_m": 1.9, "thickness_mm": 8.0, "paint_mm": 0.3, "lap": "inner"},
-    ],
     "welds": [{"course": "1", "azimuth_deg": 34.5}],
     "bottom": [{"x_m": 1.5, "y_m": -2.0, "z_m": 0.048, "s_mm": 2.0}],
     "deadwood": [

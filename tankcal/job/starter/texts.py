@@ -55,7 +55,6 @@ SECTION_NOTES = {
 TABLE_NOTES = {
     "points": "one row for each surveyed point of the wall",
     "courses": "one row for each course (ring of plates), from the bottom up",
-    "rings": "one row for each ring (of plates) of the cylinder, from end A to end B",
     "welds": "one row for each vertical weld of a course whose azimuth is known; may stay empty",
     "bottom": "one row for each surveyed point of the bottom (x_m, y_m, z_m), or for each level"
     " measured with liquid (level_m, volume_m3); leave it empty for other bottoms",

@@ -1,7 +1,6 @@
 """Tank of one solid: horizontal cylinder, sphere or mesh, from its sizes or its points."""
 
 from dataclasses import replace
-from functools import partial
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
@@ -13,7 +12,6 @@ from tankcal.pipeline.tanks.common import (
     is_warmed,
     thermal_scale,
 )
-from tankcal.pipeline.tanks.rings import ringed_part
 from tankcal.tank.body import Body, SolidPart
 from tankcal.tank.ellipsoids import Membrane, PressedSphere, Pressure
 from tankcal.tank.meshes import mesh_part
@@ -25,8 +23,12 @@ POISSON = 0.3  # default Poisson's ratio, of steel
 
 def solid_body(job, survey, switches, heel=(0.0, 0.0)):
     """`Body` of a solid; `heel` contains the tangents of trim and list of a ship's tank."""
-    part_of = ringed_part if job.rings else partial(_part, heel=heel)
-    parts, zero = [part_of(job, survey, switches)], solid_zero(job)
+    method, part = method_of(survey), None
+    if method is not None:
+        part = method.part(job, survey, switches)
+    if part is None:
+        part = _part(job, survey, switches, heel)
+    parts, zero = [part], solid_zero(job)
     if switches.deadwood and job.deadwood:
         parts.append(deadwood_part(job.deadwood, zero))
     return Body(

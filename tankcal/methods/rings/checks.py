@@ -1,8 +1,10 @@
-"""Checks of the rings of a lying cylinder together with their circumferences."""
+"""Checks of the rings of a horizontal cylinder, alone and with their circumferences."""
+
+from itertools import pairwise
 
 import numpy as np
 
-from tankcal.job.checking import has_rows
+from tankcal.job.checking import has_rows, refuse_repeated
 from tankcal.job.checks.extent import has_wall_points, is_metered, is_strapped
 from tankcal.job.checks.strapping import (
     END_M,
@@ -15,13 +17,17 @@ from tankcal.job.checks.strapping import (
     tell_without_effect,
     too_many_straps,
 )
-from tankcal.job.contract.rings import check_rings_alone
+from tankcal.job.contract.courses import SMALLEST_THICKNESS_MM, thin_plate
 from tankcal.job.plausibility import IMPOSSIBLE_MISS
 from tankcal.messages import message
 
+MOST_RINGS = 100
+# Largest difference of the sum of the rings from the length of the cylinder: metres, or relative.
+MISS_M, MISS_RELATIVE = 0.020, 0.002
+
 
 def check_rings(values, tables, registers, raw, log):
-    """Check rings, circumferences and other measurements; parameters as for `check_all`."""
+    """Check rings, circumferences and other measurements; parameters as for `Method.check`."""
     rings, straps = tables["rings"], tables["circumferences"]
     if not is_strapped(tables) and not has_rows(rings):
         tell_without_effect(tables, log)
@@ -33,7 +39,7 @@ def check_rings(values, tables, registers, raw, log):
         log.problem(straps.file, too_many_straps(len(straps.rows)))
         return
     gauged_rings = tables["thickness"].of("ring") if has_rows(tables["thickness"]) else ()
-    check_rings_alone(rings, set(gauged_rings), values, log)
+    _check_rings_alone(rings, set(gauged_rings), values, log)
     known = tuple(rings.of("ring"))
     refuse_others(straps, "ring", known, log)
     if has_rows(tables["thickness"]):
@@ -119,3 +125,69 @@ def _check_places(rings, straps, log):
                 high=high,
             )
             log.problem(straps.file, expected, row, "from_a_m")
+
+
+def _check_rings_alone(rings, gauged, values, log):
+    """Check names, plates, lengths and laps of the rings.
+
+    Parameters
+    ----------
+    rings : ColumnValues
+        Rows of rings.csv.
+    gauged : set of str
+        Names of the rings with readings of a thickness gauge.
+    values : dict or None
+        Values of job.toml.
+    log
+        Log of the problems.
+    """
+    refuse_repeated(rings, "ring", log)
+    if len(rings.rows) > MOST_RINGS:
+        expected = message(
+            "too_many_rings",
+            "{count} rings; expected at most {most}",
+            count=len(rings.rows),
+            most=MOST_RINGS,
+        )
+        log.problem(rings.file, expected)
+    plates = zip(rings.rows, rings.of("ring"), rings.of("thickness_mm"), strict=True)
+    for row, name, thickness in plates:
+        if log.has(rings.file, row, "thickness_mm"):
+            continue
+        if thickness is None and name not in gauged:
+            expected = message(
+                "ring_without_plate",
+                "blank; expected the plate's thickness: the tape was outside, and the table"
+                " thickness has no reading of this ring",
+            )
+            log.problem(rings.file, expected, row, "thickness_mm")
+        elif thickness is not None and 0 < thickness < SMALLEST_THICKNESS_MM:
+            log.problem(rings.file, thin_plate(thickness), row, "thickness_mm")
+    if values is not None:
+        _check_sum(rings, values["horizontal"]["length_m"], log)
+    laps = rings.of("lap")
+    if None not in laps and any(lap == next_lap for lap, next_lap in pairwise(laps)):
+        expected = message(
+            "laps_not_in_turn",
+            "adjacent rings are both inner, or both outer; lap-jointed rings alternate",
+        )
+        log.warning(rings.file, expected, None, "lap")
+
+
+def _check_sum(rings, whole_m, log):
+    """Check that the rings add up to the length of the cylinder, m."""
+    lengths = rings.of("length_m")
+    if whole_m is None or None in lengths or rings.skipped:
+        return
+    miss, allowed = sum(lengths) - whole_m, max(MISS_M, MISS_RELATIVE * whole_m)
+    if abs(miss) > allowed * (1 + 1e-9):
+        expected = message(
+            "rings_do_not_add_up",
+            "the rings add up to {sum:.4g} m, expected horizontal.length_m = {length:g} m within"
+            " {allowed:.0f} mm; they differ by {miss:.0f} mm",
+            sum=sum(lengths),
+            length=whole_m,
+            allowed=1000 * allowed,
+            miss=1000 * miss,
+        )
+        log.problem(rings.file, expected, None, "length_m")

@@ -17,6 +17,7 @@ from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES, mode_sh
 from tankcal.geometry.field.estimate import LEVELS, gauss_heights
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.messages import message
+from tankcal.pipeline.nominal_size import InsideRadii
 from tankcal.pipeline.strapped_wall import TapedWall, adjust_readings
 from tankcal.pipeline.tanks.common import factor_of_unseen
 from tankcal.pipeline.wall_readings import names_of, readings_of_straps
@@ -223,4 +224,12 @@ def find_ringed_wall(job, progress, amplitudes=None):
         plate_sd_m=gauged_plates(job),
         tapes=tapes_used(straps),
         shape_sd_m=straps.shape_sd_m,
+    )
+
+
+def inside_radii(job, wall):
+    """`InsideRadii` of a `RingedWall`."""
+    plates = np.array([ring.thickness_m + ring.paint_m for ring in job.rings])
+    return InsideRadii(
+        tuple(names_of(job.rings)), wall.straps.radius_m - plates, plates, np.zeros(len(plates))
     )

@@ -8,7 +8,7 @@ SURVEYED = ("ring_radii", "dip_radius", "ring_waves")
 
 
 def ringed_part(job, wall, switches):
-    """`SolidPart` of a `ringed_wall.RingedWall`."""
+    """`SolidPart` of a `wall.RingedWall`."""
     scale, lying = thermal_scale(job, switches), job.horizontal
     ends_m = lying.thickness_m * switches.plate
     insets = [
