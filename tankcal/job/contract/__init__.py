@@ -32,7 +32,7 @@ from tankcal.job.contract.observations import SURVEYS as ADJUSTED_SURVEYS
 from tankcal.job.contract.parts import KEYS as PART_KEYS
 from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_OF_SURVEY
 from tankcal.job.contract.uncertainty import INPUTS
-from tankcal.methods.base import methods, methods_for
+from tankcal.methods.base import methods
 from tankcal.text.form_words import NOTES
 
 SECTIONS = (
@@ -45,10 +45,7 @@ SECTIONS = (
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
-COLUMNS |= strapping.COLUMNS | lines.COLUMNS
-for _method in methods_for("vertical"):
-    COLUMNS |= _method.columns()
-COLUMNS |= stadia.COLUMNS
+COLUMNS |= strapping.COLUMNS | lines.COLUMNS | stadia.COLUMNS
 for _method in methods():
     COLUMNS |= _method.columns()
 COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
@@ -60,16 +57,15 @@ KEYS = {section: _KEYS[section] for section in SECTIONS}
 SURVEYS = ADJUSTED_SURVEYS | {
     "strapping": tuple(strapping.COLUMNS),
     "reference-line": (*lines.COLUMNS, *strapping.COLUMNS),
-    "wall-hits": (),  # of its method
+    "wall-hits": (),  # filled in below, as for each survey of a method
     "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
-    "tangents": (),  # of its method
+    "tangents": (),
     "cloud": (*clouds.COLUMNS, *clouds.BESIDE),
     "liquid": tuple(liquid.COLUMNS),
     "radii": tuple(radii.COLUMNS),
 }
 
-SURVEYS_OF_KIND = {  # surveys whose tables for a kind of tank differ from SURVEYS
-}
+SURVEYS_OF_KIND = {}  # surveys whose tables for a kind of tank differ from SURVEYS
 for _method in methods():
     for _kind in _method.kinds if _method.starter else ():
         _surveys = SURVEYS if _kind == "vertical" else SURVEYS_OF_KIND.setdefault(_kind, {})
