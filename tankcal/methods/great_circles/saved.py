@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tankcal.geometry.great_ellipses import horizontal_axes
 from tankcal.record.schema import Saved, key
 from tankcal.record.strapping import TapeUsed, tapes_of
 
@@ -47,6 +46,8 @@ class GreatCirclesRecord(Saved):
 
 def save_great_circles(result):
     """`GreatCirclesRecord` of a result."""
+    from tankcal.geometry.great_ellipses import horizontal_axes
+
     sphere = result.surveys["great_circles"]
     a, b, azimuth = horizontal_axes(sphere.fit.unknowns)
     return GreatCirclesRecord(

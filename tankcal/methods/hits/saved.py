@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tankcal.methods.hits.warnings import least_hits
 from tankcal.record.ranging import SharedByHits, departure_from_sections, shared_of
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.survey.control_drift import HOUR_S, drifts_of, repeats_of
@@ -142,6 +141,8 @@ def _setups(result):
 
 
 def _rings(result):
+    from tankcal.methods.hits.warnings import least_hits
+
     job, wall = result.job, result.wall
     least, count = least_hits(job), np.count_nonzero(~job.hits.check)
     heights = np.array([section.group.height_m for section in wall.sections])

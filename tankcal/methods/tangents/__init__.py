@@ -47,9 +47,10 @@ class TangentsMethod(Method):
         return message("no_rows_of_tangents", "no rows; expected a sight to a limb in each")
 
     def check(self, values, tables, registers, raw, log):
-        from tankcal.methods.tangents.checks import check_tangents
+        if self.is_given(tables):
+            from tankcal.methods.tangents.checks import check_tangents
 
-        check_tangents(values, tables, registers, raw, log)
+            check_tangents(values, tables, registers, raw, log)
 
     def read(self, tables, registers):
         from tankcal.methods.tangents.readings import make_tangents

@@ -14,8 +14,6 @@ from tankcal.survey.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tange
 def check_tangents(values, tables, registers, raw, log):
     """Check sights to both limbs from a network of set-ups outside; as for `Method.check`."""
     table = tables["tangents"]
-    if not has_rows(table):
-        return
     if len(table.rows) > MOST_TANGENTS:
         log.problem(table.file, too_many_tangents(len(table.rows)))
         return

@@ -2,9 +2,6 @@
 
 import numpy as np
 
-from tankcal.geometry.support import fit_support
-from tankcal.pipeline.moved_setups import critical_of_setup
-from tankcal.pipeline.tangent_checks import judge_tangents, least_tangents
 from tankcal.record.ranging import departure_from_sections
 from tankcal.record.schema import Finite, Saved, key
 
@@ -76,6 +73,8 @@ class TangentsRecord(Saved):
 
 def save_tangents(result):
     """`TangentsRecord` of a result."""
+    from tankcal.pipeline.tangent_checks import judge_tangents
+
     tests = judge_tangents(result.job, result.wall, result.touching)
     hull = result.touching.hull
     return TangentsRecord(
@@ -89,6 +88,8 @@ def save_tangents(result):
 
 
 def _setups(result, tests):
+    from tankcal.pipeline.moved_setups import critical_of_setup
+
     tangents, poses = result.job.tangents, result.touching.poses
     setup, found, first = np.array(tangents.setup), [], {}
     for place, (name, _) in enumerate(poses.keys):
@@ -139,6 +140,8 @@ def _readings(result, tests):
 
 
 def _levels(result, tests):
+    from tankcal.pipeline.tangent_checks import least_tangents
+
     job, least = result.job, least_tangents(result.job)
     counted = np.flatnonzero(~job.tangents.check)
     name_of = np.array(result.touching.points.section)
@@ -169,6 +172,8 @@ def _levels(result, tests):
 
 def _curve(touching, mine):
     """Highest wave, and `SupportCurve` of some tangents; None: they do not determine it."""
+    from tankcal.geometry.support import fit_support
+
     order = int(np.clip(len(mine) // PER_WAVE - 1, 1, MOST_WAVES))
     f, support = touching.normal_rad[mine], touching.support_m[mine]
     for highest in range(order, 0, -1):
