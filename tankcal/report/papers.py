@@ -16,13 +16,10 @@ _NOT_IN_ALL = (  # keys that some kinds of record, or records of earlier version
     "homogeneity",
     "strapping",
     "lines",
-    "hits",
-    "tangents",
     "clouds",
     "liquid",
     "radii",
     "ship",
-    "great_circles",
     "overrulings",
 )
 _PARTS = (  # name of each PDF and the part of the notebook that it contains
@@ -88,7 +85,10 @@ def build(record_path, directory, progress=None, language=None, letterhead=None,
 
 def parts_without_content(record):
     """Return the keys of a record without content, also of keys that it lacks (list of str)."""
-    known = dict.fromkeys(_NOT_IN_ALL) | record
+    from tankcal.methods.base import methods
+
+    of_methods = (method.name for method in methods())
+    known = dict.fromkeys((*_NOT_IN_ALL, *of_methods)) | record
     return [part for part, value in known.items() if not value]
 
 

@@ -1,18 +1,17 @@
 """Sheets of the working papers: courses, surveys, ship, corrections, tank, and provenance."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
+from tankcal.methods.base import methods
 from tankcal.report.numbers import unit
 from tankcal.report.paper import DECIMALS_OF_PARTS
 from tankcal.report.tables import (
     clouds,
-    hits,
     lines,
     liquid,
     ship,
     strapping,
-    tangents,
     tank,
 )
 from tankcal.report.workbook.look import Column, number_format
@@ -67,25 +66,7 @@ def _strapping_tables(record):
 TABLES_SHEETS = {
     "courses": TablesSheet("courses", _course_tables),
     "strapping": TablesSheet("strapping", _strapping_tables),
-    "great_circles": TablesSheet(
-        "great_circles",
-        (replace(strapping.CIRCLES, name="great_circles"), strapping.TAPES_OF_SPHERE),
-    ),
     "lines": TablesSheet("lines", (lines.LEVELS, lines.PLUMMETS, lines.LINES, lines.OFFSETS)),
-    "hits": TablesSheet(
-        "hits",
-        (
-            hits.SETUPS,
-            hits.SHARED,
-            hits.RINGS,
-            hits.CONTROL,
-            hits.DRIFTS,
-            hits.COMPARED,
-            hits.INCIDENCE,
-        ),
-        omits_empty=True,
-    ),
-    "tangents": TablesSheet("tangents", (tangents.SETUPS, tangents.LEVELS, tangents.READINGS)),
     "clouds": TablesSheet("clouds", clouds.TABLES, omits_empty=True),
     "liquid": TablesSheet(
         "liquid", (liquid.METERS, liquid.RUNS, liquid.SIZES, liquid.CAUSES), omits_empty=True
@@ -99,18 +80,38 @@ TABLES_SHEETS = {
 }
 
 
+_BEFORE_METHODS = "lines"  # the sheets of the methods follow this sheet
+
+
 def tables_sheets(book, record):
-    """Write the sheets of TABLES_SHEETS whose content the record has."""
+    """Write the sheets of TABLES_SHEETS and of the methods whose content the record has."""
     for code, declared in TABLES_SHEETS.items():
-        if not record.get(declared.key):
-            continue
-        tables = declared.tables(record) if callable(declared.tables) else declared.tables
+        if record.get(declared.key):
+            _tables_sheet(book, record, code, declared)
+        if code == _BEFORE_METHODS:
+            for method in methods():
+                if record.get(method.name):
+                    _method_sheets(book, record, method)
+
+
+def _method_sheets(book, record, method):
+    """Write the sheets of a method of `tankcal.methods`."""
+    for code, subtitle, tables in method.sheets(record):
         sections = [
-            cell_table(book, table, title=book.word(f"headings.{table.name}"))
-            for table in tables
-            if not declared.omits_empty or table.rows(record)
+            cell_table(book, table, name=name, title=book.word(f"headings.{name}"))
+            for name, table in tables
         ]
-        write_sheet(book, SheetContent(code, sections, book.word(f"texts.{code}_subtitle")))
+        write_sheet(book, SheetContent(code, sections, book.word(f"texts.{subtitle}")))
+
+
+def _tables_sheet(book, record, code, declared):
+    tables = declared.tables(record) if callable(declared.tables) else declared.tables
+    sections = [
+        cell_table(book, table, title=book.word(f"headings.{table.name}"))
+        for table in tables
+        if not declared.omits_empty or table.rows(record)
+    ]
+    write_sheet(book, SheetContent(code, sections, book.word(f"texts.{code}_subtitle")))
 
 
 def ship_sheet(book, record):
