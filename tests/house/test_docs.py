@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from line_references import PAGE, definition_line, references
 from page_sessions import FENCE
 
 ROOT = Path(__file__).parents[2]
@@ -145,3 +146,10 @@ def test_output_of_a_command_is_shown_by_a_session_alone():
         for line in re.findall(r"^    +(\S.*\d.*)$", text, flags=re.M):
             stale += [f"{page.name}: {line}" for one in printed if one.search(line)][:1]
     assert stale == []
+
+
+def test_line_references_are_those_of_the_definitions():
+    """`python tests/line_references.py` writes them anew."""
+    found = references(PAGE.read_text(encoding="utf-8"))
+    assert len(found) >= 12
+    assert found == [(path, definition_line(path, name), name) for path, _, name in found]
