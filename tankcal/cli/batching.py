@@ -16,7 +16,7 @@ from tankcal.cli.showing import (
     say,
     speak,
 )
-from tankcal.cli.stopping import stopped_status
+from tankcal.cli.stopping import signal_status
 from tankcal.errors import TankcalError, problem_from
 from tankcal.messages import message
 
@@ -136,7 +136,7 @@ def _batch(options):
                 command=_command(),
             )
         )
-        return stopped_status(stop)
+        return signal_status(stop)
     except TankcalError:
         progress.show.end()
         raise

@@ -70,10 +70,14 @@ def add(commands):
 
 
 def _inspect(options):
-    from tankcal.cli.asked_language import asked_language, asked_of_record
+    from tankcal.cli.input_language import read_job_language, read_record_language
 
     prepare_for_small_work()
-    speak(options.language or asked_of_record(options.source) or asked_language(options.source))
+    speak(
+        options.language
+        or read_record_language(options.source)
+        or read_job_language(options.source)
+    )
     from tankcal.inspection.inspecting import Asked, inspect_files
     from tankcal.record.inspection import plain_of_inspection
 

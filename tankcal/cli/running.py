@@ -7,7 +7,6 @@ import tankcal
 from tankcal.cli.arguments import parse_cluster
 from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.reporting import add_letterhead, letterhead_of
-from tankcal.cli.set_aside import lines_set_aside
 from tankcal.cli.showing import (
     Progress,
     marks,
@@ -27,6 +26,8 @@ from tankcal.text.digits import (
     format_significant,
     format_with_u,
 )
+
+MOST_NAMES = 5  # of rejected observations of a kind
 
 
 def add(commands):
@@ -135,7 +136,7 @@ def _tell(out, paths, warnings, result, adjustment):
         say(_summary(adjustment))
     if result is not None:
         say(_capacity(result))
-    for line in lines_set_aside(result, adjustment):
+    for line in describe_rejected(result, adjustment):
         say(line)
     print_paths(out, paths)
     print_doubts(doubts)
@@ -311,8 +312,8 @@ def _summary(adjustment):
         "adjusted",
         "adjustment: {fit}, {set_aside}, {points}{mean}",
         fit=_fit_of(adjustment),
-        set_aside=_set_aside(removed),
-        points=_points(len(adjustment.names)),
+        set_aside=_count_rejected(removed),
+        points=_count_points(len(adjustment.names)),
         mean=mean,
     )
 
@@ -336,7 +337,7 @@ def _fit_of(adjustment):
     )
 
 
-def _set_aside(count):
+def _count_rejected(count):
     if count == 0:
         return message("none_set_aside", "no observations rejected")
     if count == 1:
@@ -344,7 +345,82 @@ def _set_aside(count):
     return message("some_set_aside", "{count} observations rejected", count=count)
 
 
-def _points(count):
+def _count_points(count):
     if count == 1:
         return message("one_point", "1 point")
     return message("some_points", "{count} points", count=count)
+
+
+def describe_rejected(result, adjustment):
+    """Yield a line (Message) with the first names for each kind of rejected observations.
+
+    Parameters
+    ----------
+    result : Result or None
+        None: only the survey was adjusted.
+    adjustment : NetworkAdjustment or None
+    """
+    kinds = []
+    if result is not None:
+        kinds = [
+            (message("set_aside_points", "points rejected"), _rejected_points(result)),
+            (message("set_aside_straps", "circumferences rejected"), _rejected_straps(result)),
+            (message("set_aside_offsets", "offsets rejected"), _rejected_offsets(result)),
+        ]
+    readings = message("set_aside_readings", "readings rejected")
+    for kind, all_names in (*kinds, (readings, _rejected_readings(adjustment))):
+        names = list(dict.fromkeys(all_names))
+        if len(names) > MOST_NAMES:
+            yield message(
+                "set_aside_and_more",
+                "  {what}: {names} and {more} more (see the working papers)",
+                what=kind,
+                names=names[:MOST_NAMES],
+                more=len(names) - MOST_NAMES,
+            )
+        elif names:
+            yield message("set_aside_named", "  {what}: {names}", what=kind, names=names)
+
+
+def _rejected_points(result):
+    """Yield the names of the rejected points of the wall."""
+    if result.accepted is not None:
+        kept = {int(i) for i in result.accepted}
+        yield from (name for i, name in enumerate(result.job.points.names) if i not in kept)
+
+
+def _rejected_straps(result):
+    """Yield the names and rows of the rejected circumferences."""
+    straps = result.straps
+    for i in () if straps is None else straps.adjusted[~straps.accepted]:
+        strap = straps.reduced[i].strap
+        yield message("named_in_row", "{name} (row {row})", name=strap.name, row=str(strap.row))
+
+
+def _rejected_offsets(result):
+    """Yield the lines, levels and rows of the rejected offsets."""
+    read, lines = result.read, result.job.lines
+    if read is None or lines is None:
+        return
+    for i in read.places[read.are("offsets")][~read.tests_of("offsets")[2]]:
+        offset = lines.offsets[i]
+        yield message(
+            "named_at_level",
+            "line {line} at {level_m:g} m (row {row})",
+            line=offset.line,
+            level_m=offset.level_m,
+            row=str(offset.row),
+        )
+
+
+def _rejected_readings(adjustment):
+    """Yield the ends, file and row of the rejected readings, largest test statistic first."""
+    removed = () if adjustment is None else adjustment.removed
+    for reading in sorted(removed, key=lambda reading: -abs(reading.w)):
+        yield message(
+            "named_in_file",
+            "{ends} ({file}, row {row})",
+            ends="-".join(map(str, reading.ids)),
+            file=reading.file,
+            row="-" if reading.row is None else str(reading.row),
+        )

@@ -11,7 +11,7 @@ from pathlib import Path
 from tankcal.errors import InputError
 from tankcal.messages import Message, message, printable, printable_lines
 from tankcal.text.languages import DEFAULT, nearest_language
-from tankcal.text.time_left import how_far
+from tankcal.text.time_left import describe_progress
 
 RECORD = "record.json"
 OBJECTS_AT_ONCE = (
@@ -29,7 +29,7 @@ def speak(language=None):
         setting = next((os.environ[name] for name in _LOCALE if os.environ.get(name)), "")
         language = nearest_language(setting) or DEFAULT
     if language != DEFAULT:
-        from tankcal.text.word_files import load_words
+        from tankcal.text.words import load_words
 
         _spoken.update(load_words(language))
 
@@ -88,9 +88,9 @@ def complain(text):
 
 def read_job(source, show, **options):
     """Return the checked Job of a folder or workbook; set its language."""
-    from tankcal.cli.asked_language import asked_language
+    from tankcal.cli.input_language import read_job_language
 
-    language = asked_language(source)
+    language = read_job_language(source)
     if language is not None:
         speak(language)
     show.step(message("reading_job", "reading {file}", file=str(source)))
@@ -156,7 +156,9 @@ class Progress:
             self._line, self.began = line, (time.monotonic(), done)
         if self.live and total:
             began, first = self.began
-            so_far = say_in_language(how_far(done, total, done - first, time.monotonic() - began))
+            so_far = say_in_language(
+                describe_progress(done, total, done - first, time.monotonic() - began)
+            )
             width = shutil.get_terminal_size().columns - 1
             if self._line and len(self._line) + 1 + len(so_far) > width:
                 print(file=sys.stderr)  # a wrapped line cannot be overwritten

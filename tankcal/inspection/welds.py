@@ -155,7 +155,7 @@ class WeldCells:
             for grid, counts in zip(self.grids, self.counts, strict=True):
                 _count(grid, counts[scan], scan, u, turn, distance)
 
-    def merged(self, other):
+    def merge(self, other):
         """New `WeldCells` with the sums of both histograms."""
         merged = WeldCells(self.surface, self.grids)
         for sums, first, second in zip(merged.counts, self.counts, other.counts, strict=True):

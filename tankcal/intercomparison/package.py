@@ -36,8 +36,8 @@ from tankcal.record.intercomparison import (
     plain_of,
     version,
 )
+from tankcal.text.delimited import write_guarded
 from tankcal.text.shipped import shipped_folder
-from tankcal.text.spreadsheets import write_guarded
 
 LICENCE = "CC0-1.0"  # SPDX identifier
 COVERAGE = 0.95  # coverage probability of the requested U

@@ -271,7 +271,7 @@ def _refuse_scans_apart(job, cells, registration):
     the registration is wrong or a scan shows another surface, and the table could belong to either
     wall.
     """
-    if cells.are_apart:
+    if cells.are_separate:
         overlaps = [
             overlap for overlap in overlaps_of(job, cells, registration) if overlap.is_apart
         ]

@@ -8,7 +8,7 @@ JUDGED_S, MILLION = (
 )  # seconds before the remaining time is estimated; limit for counts in millions
 
 
-def how_far(done, total, fresh, seconds):
+def describe_progress(done, total, fresh, seconds):
     """Return the progress and the remaining time of a long step; for millions also the rate.
 
     Parameters

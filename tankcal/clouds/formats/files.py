@@ -147,7 +147,7 @@ def count_mismatch(file, declared, found):
     )
 
 
-def cut_short(file, what, needed, there):
+def describe_cut(file, what, needed, there):
     """Create the message for a part of the file that ends beyond the end of the file."""
     return message(
         "cloud_file_short",

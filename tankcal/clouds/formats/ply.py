@@ -7,7 +7,7 @@ import numpy as np
 
 from tankcal.clouds.contents import WHOLE, ScanHeader
 from tankcal.clouds.formats.files import Piece, count_mismatch, no_points, ranges_of
-from tankcal.clouds.formats.lines import Layout, Lines, parse_rows, shown, skip_lines
+from tankcal.clouds.formats.lines import Layout, Lines, parse_rows, printable_start, skip_lines
 from tankcal.messages import message
 
 TYPES = {
@@ -131,16 +131,16 @@ def _parse_header(file, text):
                 elements.append(_Element(name, int(count), (), ()))
                 continue
             case ["property", kind, name] if kind in TYPES and elements:
-                elements[-1] = _with_property(elements[-1], name, TYPES[kind])
+                elements[-1] = _add_property(elements[-1], name, TYPES[kind])
                 continue
             case ["property", "list", size, kind, name] if elements and {size, kind} <= {*TYPES}:
-                elements[-1] = _with_property(elements[-1], name, "")
+                elements[-1] = _add_property(elements[-1], name, "")
                 continue
         raise file.refusal(
             message(
                 "cloud_file_ply_row",
                 "found {found!r} in the header; expected a format, an element or a property of PLY",
-                found=shown(line),
+                found=printable_start(line),
             ),
             row=row,
         )
@@ -151,7 +151,7 @@ def _parse_header(file, text):
     return order, tuple(elements)
 
 
-def _with_property(element, name, kind):
+def _add_property(element, name, kind):
     return _Element(element.name, element.count, (*element.names, name), (*element.types, kind))
 
 

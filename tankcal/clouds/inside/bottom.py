@@ -16,15 +16,15 @@ from tankcal.clouds.inside.floor_cells import (
     OVER_M,
     STACK_M,
     FloorCells,
-    floor_cells_of,
     floor_grid,
+    sum_floor_cells,
 )
 from tankcal.clouds.wall.growing import (
     FEWEST,
     WALL,
+    estimate_spread,
+    find_off_trend,
     grow_wall,
-    off_trend,
-    spread_between,
 )
 from tankcal.clouds.wall.passes import Passes
 from tankcal.clouds.wall.screens import FILE
@@ -169,14 +169,14 @@ def find_cloud_bottom(passes, cloud_wall, sides=None, *, below_m=None, above_m=N
     grid = floor_grid(cloud_wall.surface, joints[0], joints[-1], **sizes)
     inside = [side != "outside" for side in sides or cloud_wall.sides]
     passes = Passes(passes) if callable(passes) else passes
-    return bottom_of_cells(passes.gather(floor_cells_of, grid, inside))
+    return find_bottom_in_cells(passes.gather(sum_floor_cells, grid, inside))
 
 
-def bottom_of_cells(cells):
+def find_bottom_in_cells(cells):
     """Find the bottom in the sums of `FloorCells`; return a `CloudBottom`."""
     # The largest surface that connects from cell to cell is the candidate for the bottom.
     grid, counts = cells.grid, cells.counts()
-    in_plan, rim = _plan(grid)
+    in_plan, rim = _find_plan(grid)
     width = np.full(grid.across, grid.cell_m)
     grown = grow_wall(counts, column_m=width, row_m=grid.cell_m, bin_m=BIN_M)
     bin_number = np.arange(grid.bins)
@@ -186,12 +186,12 @@ def bottom_of_cells(cells):
     # Cells that deviate from the trend of their neighbours show objects on the bottom. The slope
     # within a cell is removed first.
     is_bottom = (grown.why == WALL) & (count >= FEWEST)
-    is_bottom &= ~off_trend(_reduce_to_centres(x, y, z, is_bottom, grid), spread, is_bottom)
+    is_bottom &= ~find_off_trend(_reduce_to_centres(x, y, z, is_bottom, grid), spread, is_bottom)
     seen_share = float(np.mean(is_bottom[in_plan]))
     _check_bottom(z, is_bottom, rim, seen_share, grid)
     even = np.where(is_bottom, _reduce_to_centres(x, y, z, is_bottom, grid), np.nan)
     scatter = max(_scatter(even), LEAST_SD_M)
-    level = level_everywhere(z, is_bottom)
+    level = extend_level(z, is_bottom)
     mirror, low, share, mirrored = _find_mirror_images(counts, level, grid)
     mirror |= cells.under.reshape(mirror.shape) >= FEWEST
     return CloudBottom(
@@ -221,7 +221,7 @@ def _find_roof(cells, in_plan):
     return RoofSeen(share, float(low), float(high))
 
 
-def _plan(grid):
+def _find_plan(grid):
     """Return cells whose centre lies in the shell, and the ring of these cells at its foot."""
     middle = (np.arange(grid.across) + 0.5 - grid.across / 2) * grid.cell_m
     distance = np.hypot(middle[:, None], middle[None, :])
@@ -246,10 +246,10 @@ def _scatter(values):
     """Standard deviation of a cell from second differences, the larger of both directions."""
     differences = [values[1:-1] - (values[:-2] + values[2:]) / 2]
     differences.append(values[:, 1:-1] - (values[:, :-2] + values[:, 2:]) / 2)
-    return max(spread_between(values_of_direction) for values_of_direction in differences)
+    return max(estimate_spread(values_of_direction) for values_of_direction in differences)
 
 
-def level_everywhere(z, is_bottom):
+def extend_level(z, is_bottom):
     """Height of the bottom in each cell (across, across), from the nearest cell that shows it."""
     nearest = scipy.ndimage.distance_transform_edt(~is_bottom, return_indices=True)[1]
     return np.where(is_bottom, z, np.nan)[tuple(nearest)]

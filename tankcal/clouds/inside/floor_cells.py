@@ -84,13 +84,8 @@ class FloorGrid:
         axis = s.centre_m[:2] + np.array(s.slope) * (self.bottom_m - s.centre_m[2])
         return axis - self.across * self.cell_m / 2
 
-    @property
-    def bytes_needed(self):
-        """Memory of the sums, bytes."""
-        return self.across**2 * (3 * 8 * self.bins + 4 * self.levels)
 
-
-def reach_of_floor(radius_m):
+def floor_reach(radius_m):
     """Depth below the shell in which the bottom is searched, m, for a radius in m."""
     return max(LEAST_REACH_M, REACH * radius_m)
 
@@ -114,7 +109,7 @@ def floor_grid(surface, bottom_m, top_m, *, below_m=None, above_m=None, cell_m=N
     -------
     FloorGrid
     """
-    reach = reach_of_floor(surface.radius_m)
+    reach = floor_reach(surface.radius_m)
     return FloorGrid(
         surface,
         float(bottom_m),
@@ -186,14 +181,14 @@ class FloorCells:
         for start in range(0, len(xyz_m), PIECE):
             self._add(np.asarray(xyz_m[start : start + PIECE], dtype=float), scan)
 
-    def merged(self, other):
+    def merge(self, other):
         """Return the sums of both sets of points, in the same grid."""
         both = FloorCells(self.grid, self.scans)
         for name in self.NAMES:
             np.add(getattr(self, name), getattr(other, name), out=getattr(both, name))
         return both
 
-    __add__ = merged
+    __add__ = merge
 
     def counts(self):
         """Number of points in each bin (across, across, bins); the first axis is along x."""
@@ -286,7 +281,7 @@ class FloorCells:
         np.add.at(self.roof, level[over].astype(np.int64), 1)
 
 
-def floor_cells_of(points, grid, from_inside):
+def sum_floor_cells(points, grid, from_inside):
     """Sum an iterator of (scan, points) in `FloorCells`.
 
     Only the scans for which `from_inside` (sequence of bool) is true are included.

@@ -134,14 +134,14 @@ class WallCells:
         for name, (indices, values) in packed.items():
             getattr(self, name).reshape(-1)[indices] += values
 
-    def merged(self, other):
+    def merge(self, other):
         """Return the sums of both sets of points, of the same surface, grid and number of scans."""
         both = WallCells(self.surface, self.grid, self.scans)
         for name in SUMMED:
             np.add(getattr(self, name), getattr(other, name), out=getattr(both, name))
         return both
 
-    __add__ = merged
+    __add__ = merge
 
     def counts(self, scan):
         """Number of points of one scan in each bin, shape (rows, columns, bins)."""

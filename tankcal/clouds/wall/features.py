@@ -10,7 +10,7 @@ import scipy
 
 from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.clouds.wall.cells import FAR_BINS, FAR_M
-from tankcal.clouds.wall.growing import EMPTY, WALL, spread_between
+from tankcal.clouds.wall.growing import EMPTY, WALL, estimate_spread
 from tankcal.geometry.outlines import FULL_TURN
 
 # Rows on each side of a step; least step, m, and as a multiple of the scatter
@@ -119,7 +119,7 @@ def find_joints(radius_m, middle_m, joints_m):
     if rows < 2 * JOINT_ROWS + 1:
         return ()
     between = _medians(steps)  # steps within a column are independent of the form along the row
-    scatter = max(spread_between(between[1:-1] - (between[:-2] + between[2:]) / 2), 1e-5)
+    scatter = max(estimate_spread(between[1:-1] - (between[:-2] + between[2:]) / 2), 1e-5)
     height, inner = np.diff(middle_m), joints_m[1:-1]
     joints = []
     for i in np.argsort(-np.nan_to_num(np.abs(between)), kind="stable"):

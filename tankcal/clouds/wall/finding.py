@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.clouds.wall.cells import CellGrid
-from tankcal.clouds.wall.deciding import wall_of_cells
+from tankcal.clouds.wall.deciding import decide_wall
 from tankcal.clouds.wall.passes import Passes
 from tankcal.clouds.wall.start import find_surface
 from tankcal.geometry.outlines import FULL_TURN
@@ -119,7 +119,7 @@ def find_cloud_wall(
         )
     )
     cells = passes.cells(surface, grid, scans)
-    return wall_of_cells(cells, joints, tuple(sides or ["one"] * scans))
+    return decide_wall(cells, joints, tuple(sides or ["one"] * scans))
 
 
 def _viewing_directions(sample, sides):

@@ -112,7 +112,7 @@ def grow_wall(counts, *, column_m, row_m, bin_m, joined_rows=()):
     )
 
 
-def off_trend(values, sds, wall):
+def find_off_trend(values, sds, wall):
     """Cells of a wall that deviate from the trend of their neighbours.
 
     A trend is the mean of two opposite neighbours, or the straight line through two neighbours on
@@ -141,7 +141,7 @@ def off_trend(values, sds, wall):
             deviation = np.fmin(deviation, np.abs(values - trend))
         if axis == 0:
             second_difference = values - trends[0]
-    scatter = spread_between(second_difference)
+    scatter = estimate_spread(second_difference)
     limit = np.maximum(TREND * np.hypot(scatter, np.nan_to_num(sds)), LEAST_TREND_M)
     return wall & ~(deviation <= limit)
 
@@ -149,7 +149,7 @@ def off_trend(values, sds, wall):
 _LINES = tuple((sign * k, sign * 2 * k, 2) for sign in (-1, 1) for k in (1, 2))
 
 
-def spread_between(second_differences):
+def estimate_spread(second_differences):
     """Standard deviation of a value, from the median of absolute second differences.
 
     A second difference is the deviation from the mean of two neighbours; its variance is 1.5 s2.
