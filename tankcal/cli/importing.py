@@ -6,7 +6,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, positive, refuse_argument
+from tankcal.cli.arguments import add_language, parse_positive, refuse_argument
 from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import (
     complain,
@@ -87,7 +87,7 @@ def add(commands):
         parser.add_argument(
             f"--targets-{name}",
             metavar=name.upper(),
-            type=positive,
+            type=parse_positive,
             help=f"standard deviation of {what} to targets that tie set-ups",
         )
     for name, what in (("begin", "first"), ("end", "last")):

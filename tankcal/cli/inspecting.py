@@ -1,6 +1,6 @@
 """`tankcal inspect`: plumb, roundness, welds and settlement of a tank from its survey."""
 
-from tankcal.cli.arguments import add_language, yield_mpa
+from tankcal.cli.arguments import add_language, parse_yield
 from tankcal.cli.machine import add_json, print_saved
 from tankcal.cli.showing import (
     Progress,
@@ -54,7 +54,7 @@ def add(commands):
     inspect.add_argument(
         "--yield-mpa",
         metavar="MPA",
-        type=yield_mpa,
+        type=parse_yield,
         help="yield strength of the steel, for the limits of settlement (default: value of the "
         "job)",
     )

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, parse_count, parse_list, share
+from tankcal.cli.arguments import add_language, parse_count, parse_several, parse_share
 from tankcal.cli.plan_items import describe_change, describe_items
 from tankcal.cli.showing import (
     Progress,
@@ -56,14 +56,14 @@ def add(commands):
     plan.add_argument(
         "--simulate",
         metavar="N",
-        type=parse_list,
+        type=parse_several,
         help="simulate the readings of N surveys, compute each survey, and compare the scatter "
         "with the prediction",
     )
     plan.add_argument(
         "--blunders",
         metavar="SHARE",
-        type=share,
+        type=parse_share,
         default=0.0,
         help="share of the simulated readings with a blunder of 20 standard deviations, such as "
         "0.01 (default: none)",

@@ -1,6 +1,5 @@
 """`tankcal run` and `tankcal demo`: computation of a job and output of its results."""
 
-from functools import partial
 from pathlib import Path
 
 import tankcal
@@ -97,29 +96,84 @@ def _add_run(commands):
 
 
 def _run(options):
-    source = Path(options.job)
     from tankcal.report.folders import default_folder
 
-    out = Path(options.out) if options.out else default_folder(source)
-    compute = partial(_adjust if options.only == "adjustment" else _compute, options.cluster)
-    tell = _tell_machine if options.machine else _tell
-    quiet = options.quiet or options.machine
-    papers = letterhead_of(options), not options.no_papers
-    compute(source, out, quiet, options.strict, papers, tell)
+    source = Path(options.job)
+    _compute(
+        source,
+        Path(options.out) if options.out else default_folder(source),
+        quiet=options.quiet or options.machine,
+        only=options.only,
+        strict=options.strict,
+        cluster=options.cluster,
+        papers=(letterhead_of(options), not options.no_papers),
+        tell=_tell_machine if options.machine else _tell,
+    )
 
 
 def _demo(options):
     from tankcal.text.shipped import shipped_folder
 
-    _compute(None, shipped_folder("examples") / "silva-1995", Path(options.out), options.quiet)
+    job = shipped_folder("examples") / "silva-1995"
+    _compute(job, Path(options.out), quiet=options.quiet, tell=_tell)
 
 
-def _print_doubts_of_job(job, show, tell):
-    """Print implausible inputs before the computation, which they may slow down."""
+def _compute(
+    source, out, *, quiet, tell, only=None, strict=False, cluster=None, papers=(None, True)
+):
+    """Compute a job, or adjust its survey only; write the results and print a summary.
+
+    Parameters
+    ----------
+    source, out : Path
+        The job, and the folder of its results.
+    quiet : bool
+        Whether to print no progress.
+    tell : callable
+        Prints the results: `_tell` or `_tell_machine`.
+    only : str, optional
+        "adjustment": stop after the adjustment of the survey.
+    strict : bool, optional
+        Whether to refuse a doubtful adjustment.
+    cluster : str or int, optional
+        Workers for point clouds, as in `tankcal.run`.
+    papers : tuple, optional
+        Letterhead or None, and whether to write the reports.
+    """
+    prepare_for_small_work()
+    show = Progress(quiet)
+    job = read_job(source, show, only=only)
+    from tankcal.report import outputs
+
+    outputs.refuse_foreign(out)
     doubts = _doubts_among(job.warnings)
-    if doubts and tell is _tell:
+    if doubts and tell is _tell:  # before the computation, which they may slow down
         show.end()
         print_doubts(doubts)
+    result = None
+    if only == "adjustment":
+        adjustment = tankcal.adjust_job(job, show.step)
+    else:
+        result = tankcal.run(job, show.step, part_progress=show.part, cluster=cluster)
+        adjustment = result.adjustment
+    if strict:
+        _refuse_failed(adjustment)
+    if result is None:
+        paths = outputs.write_adjustment(job, adjustment, out, show.part, *papers)
+        warnings = dict.fromkeys((*job.warnings, *adjustment.warnings, *_idle_cluster(cluster)))
+    else:
+        paths = outputs.write(result, out, show.part, *papers)
+        warnings = (*result.warnings, *_idle_cluster(cluster, result.job.clouds))
+    show.end()
+    tell(out, paths, warnings, result, adjustment)
+
+
+def _idle_cluster(cluster, clouds=None):
+    """Return a warning for requested workers if there are no clouds to read."""
+    if cluster in (None, "auto", 0) or clouds is not None:
+        return ()
+    text = message("cluster_idle", "without effect: the job has no point cloud")
+    return (Problem("--cluster", text),)
 
 
 def _doubts_among(warnings):
@@ -179,32 +233,6 @@ def _fit(adjustment):
     }
 
 
-def _compute(cluster, source, out, quiet, strict=False, papers=(), tell=_tell):
-    prepare_for_small_work()
-    show = Progress(quiet)
-    job = read_job(source, show)
-    from tankcal.report import outputs
-
-    outputs.refuse_foreign(out)
-    _print_doubts_of_job(job, show, tell)
-    result = tankcal.run(job, show.step, part_progress=show.part, cluster=cluster)
-    adjustment = result.adjustment
-    if strict:
-        _refuse_failed(adjustment)
-    paths = outputs.write(result, out, show.part, *papers)
-    show.end()
-    warnings = (*result.warnings, *_idle_cluster(cluster, result.job.clouds))
-    tell(out, paths, warnings, result, adjustment)
-
-
-def _idle_cluster(cluster, clouds):
-    """Return a warning for requested workers if there are no clouds to read."""
-    if cluster in (None, "auto", 0) or clouds is not None:
-        return ()
-    text = message("cluster_idle", "without effect: the job has no point cloud")
-    return (Problem("--cluster", text),)
-
-
 def _capacity(result):
     """Return one line with the capacity, rounded to the digits of U, and the number of points."""
     top_m = result.table.height_m[-1]
@@ -254,23 +282,6 @@ def _volume_unit(name):
 
     shown = message("cubic_metres", "m3") if name == "m3" else name
     return shown, float(1 / VOLUME_UNITS_M3[name]), TABLE_DECIMALS[name]
-
-
-def _adjust(cluster, source, out, quiet, strict, papers, tell=_tell):
-    prepare_for_small_work()
-    show = Progress(quiet)
-    job = read_job(source, show, only="adjustment")
-    from tankcal.report import outputs
-
-    outputs.refuse_foreign(out)
-    _print_doubts_of_job(job, show, tell)
-    adjustment = tankcal.adjust_job(job, show.step)
-    if strict:
-        _refuse_failed(adjustment)
-    paths = outputs.write_adjustment(job, adjustment, out, show.part, *papers)
-    show.end()
-    warnings = (*job.warnings, *adjustment.warnings, *_idle_cluster(cluster, None))
-    tell(out, paths, dict.fromkeys(warnings), None, adjustment)
 
 
 def _refuse_failed(adjustment):

@@ -14,9 +14,8 @@ from tankcal.text.languages import DEFAULT, nearest_language
 from tankcal.text.time_left import describe_progress
 
 RECORD = "record.json"
-OBJECTS_AT_ONCE = (
-    10_000  # allocations between garbage collections: objects of modules are permanent
-)
+# Allocations between garbage collections; many, because objects of modules are permanent
+OBJECTS_AT_ONCE = 10_000
 _LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # in order of priority
 TO_THE_END = "\x1b[K"  # control sequence: clear the rest of the line
 _spoken = {}  # words of the current language; empty: the English of the messages

@@ -330,7 +330,7 @@ def _course_of(wall, u):
 
 def _rows_of_courses(wall):
     """Indices of the coarse rows of each course."""
-    course = _course_of(wall, (wall.grid.edges_m[:-1] + wall.grid.edges_m[1:]) / 2)
+    course = _course_of(wall, wall.grid.middles_m)
     return [np.flatnonzero(course == index) for index in np.unique(course)]
 
 

@@ -40,7 +40,7 @@ def map_of(cells, low_m=0.0, most=MOST_CELLS):
         is shown.
     """
     grid = cells.grid
-    middle = (grid.edges_m[:-1] + grid.edges_m[1:]) / 2
+    middle = grid.middles_m
     course = np.searchsorted(np.array(cells.joints_m)[1:-1], middle, side="right")
     departure = _departures(cells, course)
     shown = np.isfinite(departure)

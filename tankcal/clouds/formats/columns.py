@@ -235,7 +235,7 @@ def _read_heading(line, at, is_comment):
 
 def _check_layout(file, rows, heading, first):
     """Return the `Layout` of rows of numbers, checked against the heading."""
-    layout = _find_separator(file, rows, heading, first)
+    layout = _guess_layout(file, rows, heading, first)
     count = len(layout.cells(rows[0]))
     if heading is not None and count != heading.names:
         if not heading.is_comment:
@@ -266,18 +266,16 @@ def _are_row_numbers(cells):
     return numbers == [*range(numbers[0], numbers[0] + len(numbers))]
 
 
-def _find_separator(file, rows, heading, first):
+def _guess_layout(file, rows, heading, first):
+    """Return the `Layout` of rows, from the marks that occur in them."""
     columns = heading.columns if heading else (0, 1, 2)
     text = b"\n".join(rows)
     has_comma, has_point = b"," in text, b"." in text
-    if b";" in text:
+    has_tabs = heading is not None and heading.is_of_tabs and b"\t" in rows[0]
+    if b";" in text or has_tabs:
         if has_comma and has_point:
             raise _comma_error(file, first)
-        return Layout(";", "," if has_comma else ".", columns)
-    if heading is not None and heading.is_of_tabs and b"\t" in rows[0]:
-        if has_comma and has_point:
-            raise _comma_error(file, first)
-        return Layout("tab", "," if has_comma else ".", columns)
+        return Layout(";" if b";" in text else "tab", "," if has_comma else ".", columns)
     if not has_comma:
         return Layout("blank", ".", columns)
     cells = [cell for row in rows for cell in row.split()]

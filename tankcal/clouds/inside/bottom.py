@@ -176,13 +176,12 @@ def find_bottom_in_cells(cells):
     """Find the bottom in the sums of `FloorCells`; return a `CloudBottom`."""
     # The largest surface that connects from cell to cell is the candidate for the bottom.
     grid, counts = cells.grid, cells.counts()
-    in_plan, rim = _find_plan(grid)
+    radius_m = grid.surface.radius_m
+    in_plan = grid.distance_m < radius_m - grid.cell_m / 2
+    rim = in_plan & (grid.distance_m > radius_m - EDGE_CELLS * grid.cell_m)
     width = np.full(grid.across, grid.cell_m)
     grown = grow_wall(counts, column_m=width, row_m=grid.cell_m, bin_m=BIN_M)
-    bin_number = np.arange(grid.bins)
-    within = (bin_number >= grown.low[..., None]) & (bin_number <= grown.high[..., None])
-    within &= (grown.why == WALL)[..., None]
-    x, y, z, spread, count = cells.means(within)
+    x, y, z, spread, count = cells.means(grown.wall_bins(grid.bins))
     # Cells that deviate from the trend of their neighbours show objects on the bottom. The slope
     # within a cell is removed first.
     is_bottom = (grown.why == WALL) & (count >= FEWEST)
@@ -219,14 +218,6 @@ def _find_roof(cells, in_plan):
     level = np.searchsorted(np.cumsum(cells.roof), np.array([0.05, 0.95]) * cells.roof.sum())
     low, high = cells.grid.top_m - OVER_M + (level + 0.5) * STACK_M
     return RoofSeen(share, float(low), float(high))
-
-
-def _find_plan(grid):
-    """Return cells whose centre lies in the shell, and the ring of these cells at its foot."""
-    middle = (np.arange(grid.across) + 0.5 - grid.across / 2) * grid.cell_m
-    distance = np.hypot(middle[:, None], middle[None, :])
-    in_plan = distance < grid.surface.radius_m - grid.cell_m / 2
-    return in_plan, in_plan & (distance > grid.surface.radius_m - EDGE_CELLS * grid.cell_m)
 
 
 def _reduce_to_centres(x, y, z, known, grid):

@@ -58,6 +58,12 @@ class FloorGrid:
         return 2 * int(np.ceil(self.surface.radius_m / self.cell_m)) + 2
 
     @property
+    def distance_m(self):
+        """Distance (across, across) of the centre of each cell from the axis, m."""
+        middle = (np.arange(self.across) + 0.5 - self.across / 2) * self.cell_m
+        return np.hypot(middle[:, None], middle[None, :])
+
+    @property
     def bins(self):
         """Number of bins of height near the bottom."""
         return int(np.ceil((self.below_m + self.above_m) / BIN_M - 1e-9))
@@ -139,10 +145,8 @@ class FloorCells:
         The counts of `over` in all cells together, by height.
     under : ndarray of uint32, shape (across**2,)
         Counts below the lowest bin.
-    delivered, inside : int
-        Number of points received; number of points inside the shell, SKIN_M from its mean radius.
-    wall_below : int
-        Number of points on the surface of the wall, but below the shell.
+    tally : ndarray of int64, shape (2,)
+        The numbers of points `inside` and `wall_below`.
     """
 
     NAMES = ("sums", "places", "stack", "by_scan", "over", "roof", "under", "tally")
@@ -157,27 +161,21 @@ class FloorCells:
         self.over = np.zeros(cells, dtype=np.uint32)
         self.roof = np.zeros(grid.roof_levels, dtype=np.int64)
         self.under = np.zeros(cells, dtype=np.uint32)
-        self.tally = np.zeros(3, dtype=np.int64)
+        self.tally = np.zeros(2, dtype=np.int64)
         self._corner = grid.corner_m
-
-    @property
-    def delivered(self):
-        """Number of points received."""
-        return int(self.tally[0])
 
     @property
     def inside(self):
         """Number of points inside the shell, SKIN_M from its mean radius."""
-        return int(self.tally[1])
+        return int(self.tally[0])
 
     @property
     def wall_below(self):
         """Number of points on the surface of the wall, but below the shell."""
-        return int(self.tally[2])
+        return int(self.tally[1])
 
     def add(self, xyz_m, scan=0):
         """Add points (n, 3) of one scan."""
-        self.tally[0] += len(xyz_m)
         for start in range(0, len(xyz_m), PIECE):
             self._add(np.asarray(xyz_m[start : start + PIECE], dtype=float), scan)
 
@@ -245,9 +243,9 @@ class FloorCells:
         grid = self.grid
         distance = grid.surface.places(xyz_m)[2]
         at_wall = np.abs(distance) <= SKIN_M
-        self.tally[2] += np.count_nonzero(at_wall & (xyz_m[:, 2] < grid.bottom_m - FOOT_M))
+        self.tally[1] += np.count_nonzero(at_wall & (xyz_m[:, 2] < grid.bottom_m - FOOT_M))
         is_inside = distance < -SKIN_M
-        self.tally[1] += np.count_nonzero(is_inside)
+        self.tally[0] += np.count_nonzero(is_inside)
         x, y, z = xyz_m[is_inside].T
         x, y = (x - self._corner[0]) / grid.cell_m, (y - self._corner[1]) / grid.cell_m
         column, row = x.astype(np.int64), y.astype(np.int64)

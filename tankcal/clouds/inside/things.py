@@ -189,9 +189,7 @@ def _label_objects(bottom, level):
     # Only cells clear of bottom, roof and wall can belong to an object.
     edge = grid.low_m + np.arange(grid.levels) * STACK_M
     is_free = (edge > (level + CLEAR_M)[..., None]) & (edge < grid.top_m - ROOF_M - STACK_M)
-    middle = (np.arange(grid.across) + 0.5 - grid.across / 2) * grid.cell_m
-    distance = np.hypot(middle[:, None], middle[None, :])
-    is_free &= (distance < grid.surface.radius_m - WALL_M)[..., None]
+    is_free &= (grid.distance_m < grid.surface.radius_m - WALL_M)[..., None]
     occupied = is_free & (bottom.cells.stack.reshape(shape) >= LEAST_POINTS)
     tall = occupied.sum(axis=2) > STANDING * is_free.sum(axis=2).max(initial=1)
     # A column includes the cells around it, which may show its edges.

@@ -51,6 +51,11 @@ class CellGrid:
         return len(self.edges_m) - 1
 
     @property
+    def middles_m(self):
+        """Coordinate u of the centres of the rows, m."""
+        return (self.edges_m[:-1] + self.edges_m[1:]) / 2
+
+    @property
     def unit_m(self):
         """Unit of the sums of distances, m."""
         return 2 * self.band_m / self.bins / FINE

@@ -131,7 +131,7 @@ def decide_wall(cells, joints_m, sides):
         side_scans = [i for i, item in enumerate(sides) if item == side]
         grown_of[side] = wall_values.decide(side_scans, joints_m, column_m)
     is_seen = np.any(wall_values.is_wall, axis=0)
-    course = np.searchsorted(joints_m[1:-1], _row_centres(cells.grid), side="right")
+    course = np.searchsorted(joints_m[1:-1], cells.grid.middles_m, side="right")
     courses = np.arange(len(joints_m) - 1)
     count = np.where(wall_values.is_wall, wall_values.count, 0)
     best = _weighted_mean(wall_values.radius, wall_values.sd, count)[0]
@@ -150,7 +150,7 @@ def decide_wall(cells, joints_m, sides):
         why={side: grown.why for side, grown in grown_of.items()},
         scatter_m=wall_values.scatter,
         masked_share=np.array([1 - is_seen[course == item].mean() for item in courses]),
-        joints=find_joints(best, _row_centres(cells.grid), joints_m) if is_one_side else (),
+        joints=find_joints(best, cells.grid.middles_m, joints_m) if is_one_side else (),
         welds=find_welds(best, course, column_m) if is_one_side else (),
         obstructions=find_obstructions(is_seen, list(grown_of.values()), cells, column_m),
         delivered=cells.delivered,
@@ -176,10 +176,11 @@ class _ScanValues:
         """Decide the scans of one side and fill in their means; return `Grown`."""
         cells, grid = self.cells, self.cells.grid
         total = sum(cells.counts(i) for i in side_scans)
+        row_m = float(np.median(np.diff(grid.edges_m)))
         grown = grow_wall(
             total,
             column_m=column_m,
-            row_m=float(np.median(np.diff(grid.edges_m))),
+            row_m=row_m,
             bin_m=grid.bin_m,
             joined_rows=np.searchsorted(grid.edges_m, joints_m[1:-1] - 1e-9),
         )
@@ -197,14 +198,13 @@ class _ScanValues:
             self.radius[side_scans], self.sd[side_scans], self.count[side_scans]
         )
         grown.why[find_off_trend(values, sds, grown.why == WALL)] = OFF_TREND
+        course = np.searchsorted(joints_m[1:-1], grid.middles_m, side="right")
+        width_m = float(np.median(column_m))
         for i in side_scans:
             self.is_wall[i] = (grown.why == WALL) & (self.count[i] >= 3)
             self.radius[i][~self.is_wall[i]] = np.nan
-            course = np.searchsorted(joints_m[1:-1], _row_centres(grid), side="right")
-            width, row_m = float(np.median(column_m)), float(np.median(np.diff(grid.edges_m)))
-            self.scatter[i] = _scatter_of_cells(self.radius[i], course, row_m, width)
-            least = max(LEAST_SD_M, self.scatter[i])
-            self.sd[i] = np.maximum(self.sd[i], least)
+            self.scatter[i] = _scatter_of_cells(self.radius[i], course, row_m, width_m)
+            self.sd[i] = np.maximum(self.sd[i], max(LEAST_SD_M, self.scatter[i]))
         return grown
 
     def _decide_alone(self, side_scans, joints_m, column_m, grown, second):
@@ -335,13 +335,9 @@ def _mean_distances(counts, low, high, grid):
         return (part @ number / part.sum(axis=2) + 0.5) * grid.bin_m - grid.band_m
 
 
-def _row_centres(grid):
-    return (grid.edges_m[:-1] + grid.edges_m[1:]) / 2
-
-
 def _column_widths(cells):
     """Width of a cell in each row (rows,), m."""
-    return FULL_TURN * cells.surface.width_m(_row_centres(cells.grid)) / cells.grid.columns
+    return FULL_TURN * cells.surface.width_m(cells.grid.middles_m) / cells.grid.columns
 
 
 def _average_distances(cells, scan, grown):
@@ -356,8 +352,7 @@ def _average_distances(cells, scan, grown):
     """
     grid = cells.grid
     number = np.arange(grid.bins)
-    within = (number >= grown.low[..., None]) & (number <= grown.high[..., None])
-    within &= (grown.why == WALL)[..., None]
+    within = grown.wall_bins(grid.bins)
     counts = np.where(within, cells.counts(scan), 0)
     count = counts.sum(axis=2)
     # The sum of whole units is exact; half a unit compensates their truncation.

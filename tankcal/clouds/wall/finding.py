@@ -21,10 +21,8 @@ SAMPLE = 500_000  # points of the sample
 ROW_M, COLUMN_M, FEWEST_COLUMNS = 0.05, 0.15, 360
 MEMORY_BYTES = 256 << 20  # memory of the sums of all scans, bytes
 POINTS_OF_CELL = 40  # desired number of points in a cell, for points spread evenly over the wall
-LEAST_COLUMNS, WIDEST_M = (
-    90,
-    0.3,
-)  # least number of columns, largest width of a cell, for few points
+# Least number of columns, and largest width of a cell, m, for few points
+LEAST_COLUMNS, WIDEST_M = 90, 0.3
 # Largest height of a row, m, and as a share of a course, because a course bulges between joints
 COARSEST_M, TALLEST = 0.2, 0.1
 

@@ -57,6 +57,12 @@ class Grown:
     surfaces: tuple
     two_modes: np.ndarray
 
+    def wall_bins(self, bins):
+        """Whether each bin (rows, columns, bins) belongs to the mean distance of the wall."""
+        number = np.arange(bins)
+        within = (number >= self.low[..., None]) & (number <= self.high[..., None])
+        return within & (self.why == WALL)[..., None]
+
 
 def grow_wall(counts, *, column_m, row_m, bin_m, joined_rows=()):
     """Find the wall in the histograms of cells.
