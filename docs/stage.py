@@ -44,8 +44,7 @@ DOORS = {  # rooms of the reference, in the order in which a job goes through th
             "field.components",
             "field.amplitudes",
             "field.estimate",
-            "buckles",
-            "seams",
+            "patches",
             "rotations",
         )
     ),

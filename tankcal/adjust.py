@@ -235,7 +235,89 @@ def adjust(model, unknowns, observations, covariance, *, max_iterations=50, tole
 
 
 @dataclass(frozen=True)
-class Snooped:
+class Damping:
+    """Levenberg-Marquardt damping of `gauss_newton`: the weight of a term that shortens steps.
+
+    Attributes
+    ----------
+    start : float
+        Damping of the first step. With 0, the search ends at the first rejected step.
+    relax : float
+        Divisor after an accepted step. A rejected step multiplies the damping by 10.
+    least, most : float
+        Smallest damping, and the damping above which the search ends.
+    """
+
+    start: float = 1e-3
+    relax: float = 10.0
+    least: float = 1e-9
+    most: float = np.inf
+
+
+UNDAMPED = Damping(start=0.0, least=0.0)
+
+
+def gauss_newton(step_at, state, *, move, is_small, most_steps, is_better=None, damping=UNDAMPED):
+    """Improve a state by Gauss-Newton steps until a step is small, or no step is accepted.
+
+    This function controls the steps of small nonlinear fits without covariance, such as start
+    values. The caller linearises the problem and solves for each step.
+
+    Parameters
+    ----------
+    step_at : callable
+        step_at(state, damping) -> step. Undamped searches may ignore the damping.
+    state : object
+        Start values, in any form accepted by `step_at` and `move`.
+    move : callable
+        move(state, step) -> state after the step.
+    is_small : callable
+        is_small(step) -> bool: an accepted step that ends the search.
+    most_steps : int
+        Largest number of steps, including rejected steps.
+    is_better : callable, optional
+        is_better(candidate, state) -> bool: whether a step is accepted. None accepts every step.
+    damping : Damping, optional
+
+    Returns
+    -------
+    object
+        The last accepted state.
+
+    Examples
+    --------
+    Position on a line whose distance to a point at height 3 is 5:
+
+    >>> x = gauss_newton(
+    ...     lambda x, damping: (5.0 - np.hypot(x, 3.0)) * np.hypot(x, 3.0) / x,
+    ...     1.0,
+    ...     move=lambda x, step: x + step,
+    ...     is_small=lambda step: abs(step) < 1e-9,
+    ...     most_steps=20,
+    ... )
+    >>> round(float(x), 9)
+    4.0
+    """
+    weight = damping.start
+    for _ in range(most_steps):
+        step = step_at(state, weight)
+        candidate = move(state, step)
+        if is_better is None or is_better(candidate, state):
+            state = candidate
+            if is_small(step):
+                break
+            # Close to the minimum, a weakly damped step converges fastest.
+            weight = max(weight / damping.relax, damping.least)
+        else:
+            # A strongly damped step is short and follows the gradient, so it reduces the cost.
+            weight *= 10
+            if not 0 < weight <= damping.most:
+                break
+    return state
+
+
+@dataclass(frozen=True)
+class SnoopingResult:
     """Result of data snooping among k candidates.
 
     Attributes
@@ -288,7 +370,7 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
 
     Returns
     -------
-    Snooped
+    SnoopingResult
 
     Raises
     ------
@@ -350,7 +432,7 @@ def snoop(adjustment, tests, readjust, *, at_once, returns, choose=None, keep=Fa
             )
             return_counts[readmitted] += 1
         if not (rejected.any() or readmitted.any()):
-            return Snooped(adjustment, statistic, needed, round_number)
+            return SnoopingResult(adjustment, statistic, needed, round_number)
         try:
             adjustment, only_worst = readjust(adjustment, rejected, readmitted), False
         except SolutionError:

@@ -24,7 +24,7 @@ CONTROL = tuple(f"P{i}" for i in range(1, 48, 6))
 
 
 def compare_sets():
-    return stability_json.as_json(compare(sets(HOSTILE), "spr", grid=SMALL))
+    return stability_json.plain_stability(compare(sets(HOSTILE), "spr", grid=SMALL))
 
 
 def photographed_tank(folder):
@@ -40,20 +40,20 @@ def photographed_tank(folder):
 
 
 def analyse_parameters(job):
-    return parameters_json.as_json(analyse_job(job)[0])
+    return parameters_json.plain_parameters(analyse_job(job)[0])
 
 
 def analyse_influence(job):
     own = job.measurements.cameras[0]
     other = replace(own, camera=replace(own.camera, name="=cmd", sd=np.full(13, np.nan)))
-    return influence_json.as_json(influence(job, (other,), ("fixed", "weighted")))
+    return influence_json.plain_influence(influence(job, (other,), ("fixed", "weighted")))
 
 
 def check_differences():
     rng = np.random.default_rng(3)
     names = [f"<i>{number}</i>" for number in range(25)]
     differences = rng.normal([0.2, 0.0, 0.0], 0.15, (25, 3))
-    return product_json.as_json(
+    return product_json.plain_product(
         check_product(differences, names=names, limits=shipped_limits(), expected_sd_m=(0.1,) * 3)
     )
 

@@ -13,7 +13,8 @@ import numpy as np
 from generated_strapping import strapped_job
 from generated_walls import FULL_TURN
 
-from tankcal.survey.reference_line import ARCSEC, Line, Offset, Plummet, ReferenceLines
+from tankcal.survey.reference_line import Line, Offset, Plummet, ReferenceLines
+from tankcal.units import ARCSEC
 
 COLLIMATION = 6 * ARCSEC
 PARTS = {1: (0.5,), 2: (0.25, 0.75)}

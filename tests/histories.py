@@ -7,7 +7,8 @@ import numpy as np
 from tables_of_s1 import RADII, new_s1, rings_m3
 
 from tankcal.recalibration.history import DatedTable, history_of
-from tankcal.record.history import CheckInHistory, InspectionInHistory, plain_of_history
+from tankcal.record.history import CheckInHistory, InspectionInHistory
+from tankcal.record.schema import to_plain
 
 COMMON_U = 0.0002  # relative standard uncertainty of a table, common to its rows
 HOSTILE = '=HYPERLINK("http://x.example","y") <script>alert(1)</script>'
@@ -55,13 +56,13 @@ def inspections():
 
 def plain():
     """A history of five tables and three inspections."""
-    return plain_of_history(history_of(drawn_tables(5), inspections()))
+    return to_plain(history_of(drawn_tables(5), inspections()))
 
 
 def single():
     """One table, without U."""
     one = dated_table(3)
-    return plain_of_history(history_of([replace(one, table=replace(one.table, U_m3=None))]))
+    return to_plain(history_of([replace(one, table=replace(one.table, U_m3=None))]))
 
 
 def hostile():

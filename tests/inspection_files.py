@@ -24,8 +24,8 @@ from tankcal.record.inspection import (
     Settlement,
     SettlementPoint,
     WeldGap,
-    plain_of_inspection,
 )
+from tankcal.record.schema import to_plain
 from tankcal.record.texts import WarningRecord
 
 HOSTILE = '=HYPERLINK("http://x.example","y") <script>alert(1)</script>'
@@ -308,7 +308,7 @@ def inspection():
 
 @cache
 def _plain():
-    return plain_of_inspection(inspection())
+    return to_plain(inspection())
 
 
 def plain():
@@ -327,7 +327,7 @@ def few():
         "methods": ["straps", "lines"], "nominal_source": "mean", "state": "unloaded",
     }  # fmt: skip
     one = settlement(Z_MM, None, "survey")
-    found["settlements"] = [plain_of_inspection(one)]
+    found["settlements"] = [to_plain(one)]
     found["gaps"] = [
         one | {"gap_mm": None, "U_mm": None, "along_mm": [], "profile_mm": []}
         for one in found["gaps"][:6]
@@ -341,7 +341,7 @@ def few():
           for kind in ("peaking", "banding")),
         *checks_of(one),
     ]  # fmt: skip
-    found["checks"] = kept + [plain_of_inspection(one) for one in more]
+    found["checks"] = kept + [to_plain(one) for one in more]
     for one in found["checks"]:
         one["limit"]["verified"] = True
     return found
@@ -384,7 +384,7 @@ def hostile():
     found["checks"][2] |= {"remark": "unheard_of", "remark_values": {"x": HOSTILE, "y": 2.5}}
     text = f"{TYPESET} {HOSTILE}"
     warning = WarningRecord(file=long, row=None, column=None, text=text, code=None, values={})
-    return found | {"warnings": [plain_of_inspection(warning)]}
+    return found | {"warnings": [to_plain(warning)]}
 
 
 KINDS = {"plain": plain, "few": few, "unjudged": unjudged, "hostile": hostile}

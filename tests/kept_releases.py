@@ -18,10 +18,11 @@ from tankcal.planning import load_plan, predict
 from tankcal.recalibration.history_inputs import history_of_files
 from tankcal.recalibration.inputs import Asked, compare_files
 from tankcal.record import record_of, record_of_adjustment, save
-from tankcal.record.comparison import COMPARISON, plain_of_comparison
-from tankcal.record.history import HISTORY, plain_of_history
-from tankcal.record.inspection import INSPECTION, plain_of_inspection
-from tankcal.record.wall_plan import WALL_PLAN, plain_of_wall
+from tankcal.record.comparison import COMPARISON
+from tankcal.record.history import HISTORY
+from tankcal.record.inspection import INSPECTION
+from tankcal.record.plan import WALL_PLAN, plain_of_wall
+from tankcal.record.schema import to_plain
 
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = Path(__file__).with_name("releases")
@@ -98,9 +99,9 @@ def _keep_saved(place):
             (Path(folder) / name).mkdir()
             tables.append(unpack(place / name / "record.json.xz", Path(folder) / name))
         found = [
-            (COMPARISON.file, plain_of_comparison(compare_files(Asked(*tables)))),
-            (HISTORY.file, plain_of_history(history_of_files([folder]))),
-            (INSPECTION.file, plain_of_inspection(inspect_files(_inspected()))),
+            (COMPARISON.file, to_plain(compare_files(Asked(*tables)))),
+            (HISTORY.file, to_plain(history_of_files([folder]))),
+            (INSPECTION.file, to_plain(inspect_files(_inspected()))),
         ]
     plan = predict(load_plan(ROOT / "examples" / "plan-tangents"))
     for file, saved in (*found, (WALL_PLAN.file, plain_of_wall(plan))):

@@ -25,10 +25,9 @@ from tankcal.record.intercomparison import (
     TruthFile,
 )
 from tankcal.record.making import Record
-from tankcal.record.plan import PLAN, PlanFile
+from tankcal.record.plan import PLAN, WALL_PLAN, PlanFile, WallPlanFile
 from tankcal.record.schema import json_schema
 from tankcal.record.versions import RECORD
-from tankcal.record.wall_plan import WALL_PLAN, WallPlanFile
 
 SAVED = (
     (RECORD, None, Record),

@@ -215,26 +215,26 @@ def _report(task, clock):
 
 def _compare(task, clock):
     from tankcal.recalibration.inputs import Asked, compare_files
-    from tankcal.record.comparison import plain_of_comparison
+    from tankcal.record.schema import to_plain
     from tankcal.report.comparison import write_comparison
 
     record, options = _record(task), task.job.options
     comparison = compare_files(Asked(find_former(task.job), record, rule=options.compare_by))
     return write_comparison(
-        plain_of_comparison(comparison), _place(task, "compare"), _language(task, record), None,
+        to_plain(comparison), _place(task, "compare"), _language(task, record), None,
         _letterhead(options),
     )  # fmt: skip
 
 
 def _inspect(task, clock):
     from tankcal.inspection.inspecting import Asked, inspect_files
-    from tankcal.record.inspection import plain_of_inspection
+    from tankcal.record.schema import to_plain
     from tankcal.report.inspection import write_inspection
 
     options = task.job.options
     source, rule, levelled = find_inspection_source(task.job, _place(task, "run"))
     inspection = inspect_files(Asked(source, rule=options.inspect_by or rule, **levelled))
-    plain = plain_of_inspection(inspection)
+    plain = to_plain(inspection)
     language = options.language or read_language(source)
     return write_inspection(plain, _place(task, "inspect"), language, None, _letterhead(options))
 

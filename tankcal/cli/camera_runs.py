@@ -26,7 +26,7 @@ def parameters(options):
     from tankcal.calibration.interiors import count_sets
     from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
     from tankcal.calibration.parameters.judgement import Choices
-    from tankcal.record.camera_parameters import as_json
+    from tankcal.record.camera_parameters import plain_parameters
 
     show = _start(options)
     choices = Choices(
@@ -44,7 +44,9 @@ def parameters(options):
             job, choices, **selection, dropping=not options.no_trials, progress=show.part
         )
     paths = [] if job is not None else [options.source]
-    _show_results([as_json(analysis) for analysis in analyses], options, show, paths, job, record)
+    _show_results(
+        [plain_parameters(analysis) for analysis in analyses], options, show, paths, job, record
+    )
 
 
 def compare(options):
@@ -54,7 +56,7 @@ def compare(options):
     from tankcal.calibration.stability.grids import parse_grid
     from tankcal.calibration.stability.terrains import parse_terrain
     from tankcal.job.calibrations import choose, read_cameras, with_pixels
-    from tankcal.record.camera_stability import as_json, summary
+    from tankcal.record.camera_stability import plain_stability, summary
 
     show = _start(options)
     warnings = []
@@ -73,7 +75,7 @@ def compare(options):
     )
     warn(warnings)
     _show_results(
-        [as_json(comparison)], options, show, [options.cameras], printed=summary(comparison)
+        [plain_stability(comparison)], options, show, [options.cameras], printed=summary(comparison)
     )
 
 
@@ -82,7 +84,7 @@ def influence(options):
     prepare_for_small_work()
     from tankcal.calibration.influence.runs import influence as compute_influence
     from tankcal.job.calibrations import read_cameras
-    from tankcal.record.camera_influence import as_json
+    from tankcal.record.camera_influence import plain_influence
 
     show = _start(options)
     warnings = []
@@ -97,7 +99,7 @@ def influence(options):
         file=Path(options.cameras).name,
     )
     warn(warnings)
-    _show_results([as_json(effects)], options, show, [options.cameras], job)
+    _show_results([plain_influence(effects)], options, show, [options.cameras], job)
 
 
 def check(options):
@@ -106,7 +108,7 @@ def check(options):
     from tankcal.calibration.product import limits
     from tankcal.calibration.product.check import check_product
     from tankcal.calibration.product.differences import collect_differences, read_differences
-    from tankcal.record.camera_product import as_json
+    from tankcal.record.camera_product import plain_product
 
     show = _start(options)
     table = limits.read_limits(options.limits) if options.limits else limits.shipped_limits()
@@ -126,7 +128,7 @@ def check(options):
     )
     paths = [] if job is not None else [options.source]
     paths += [options.limits] if options.limits else []
-    _show_results([as_json(checked)], options, show, paths, job, record)
+    _show_results([plain_product(checked)], options, show, paths, job, record)
 
 
 def convert(options):

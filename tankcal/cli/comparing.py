@@ -64,7 +64,7 @@ def _compare(options):
     prepare_for_small_work()
     speak_of_record(options.language, options.new, options.old)
     from tankcal.recalibration.inputs import Asked, compare_files
-    from tankcal.record.comparison import plain_of_comparison
+    from tankcal.record.schema import to_plain
 
     if options.out is not None:
         from tankcal.report.comparison import refuse_foreign, write_comparison
@@ -77,7 +77,7 @@ def _compare(options):
         options.old, options.new, former=options.former, new_former=options.new_former,
         courses=options.courses, rule=options.rule,
     )  # fmt: skip
-    comparison = plain_of_comparison(compare_files(asked))
+    comparison = to_plain(compare_files(asked))
     written = ()
     if options.out is not None:
         written = write_comparison(comparison, options.out, language_of_run(), show.step)

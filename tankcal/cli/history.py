@@ -69,14 +69,14 @@ def _history(options):
     prepare_for_small_work()
     speak_of_record(options.language, *options.sources)
     from tankcal.recalibration.history_inputs import history_of_files
-    from tankcal.record.history import plain_of_history
+    from tankcal.record.schema import to_plain
 
     if options.out is not None:
         from tankcal.report.history import refuse_foreign, write_history
 
         refuse_foreign(options.out)
     show = Progress(options.quiet or options.machine)
-    history = plain_of_history(
+    history = to_plain(
         history_of_files(
             options.sources,
             tanks=options.tank,

@@ -35,7 +35,7 @@ def read_job_language(path):
 
 def read_plan_language(path):
     """Return the language of a plan for `load_plan`, or None."""
-    from tankcal.planning.given import PLAN_FILE
+    from tankcal.planning.entries import PLAN_FILE
 
     path = Path(path)
     try:

@@ -79,7 +79,7 @@ def _inspect(options):
         or read_job_language(options.source)
     )
     from tankcal.inspection.inspecting import Asked, inspect_files
-    from tankcal.record.inspection import plain_of_inspection
+    from tankcal.record.schema import to_plain
 
     if options.out is not None:
         from tankcal.report.inspection import refuse_foreign, write_inspection
@@ -95,7 +95,7 @@ def _inspect(options):
         edges=options.edges,
         yield_pa=None if options.yield_mpa is None else 1e6 * options.yield_mpa,
     )
-    inspection = plain_of_inspection(inspect_files(asked, show.step, show.part))
+    inspection = to_plain(inspect_files(asked, show.step, show.part))
     written = ()
     if options.out is not None:
         written = write_inspection(inspection, options.out, language_of_run(), show.step)

@@ -233,7 +233,7 @@ def _score(options):
     prepare_for_small_work()
     speak(options.language)
     from tankcal.intercomparison.scoring import score_folders
-    from tankcal.record.intercomparison import plain_of
+    from tankcal.record.schema import to_plain
 
     if options.out is not None:
         from tankcal.report.scores import refuse_foreign, write_scores
@@ -242,7 +242,7 @@ def _score(options):
     show = Progress(options.quiet or options.machine)
     show.step(message("ic_scoring", "scoring answers (folders: {count})",
                       count=len(options.names)))  # fmt: skip
-    scores = plain_of(score_folders(options.names, options.truth, options.package))
+    scores = to_plain(score_folders(options.names, options.truth, options.package))
     written = ()
     if options.out is not None:
         written = write_scores(scores, options.out, language_of_run(), show.step)

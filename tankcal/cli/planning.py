@@ -209,15 +209,15 @@ def _simulate(prediction, options, show):
 
 def _network_summary(prediction):
     """Yield the items of the plan and the predicted quality of its points."""
-    from tankcal.planning.bases import by_ends
+    from tankcal.planning.bases import group_by_ends
 
     plan = prediction.plan
-    solution = prediction.predicted.adjusted.solution
+    solution = prediction.network.adjusted.solution
     counts = {
         "photographs": len(plan.photos),
         "setups": len(plan.setups),
         "ties": len(plan.ties),
-        "bases": len(by_ends(plan.bases)),
+        "bases": len(group_by_ends(plan.bases)),
         "control": len(plan.known),
         "targets": len(plan.targets.names),
     }
@@ -258,7 +258,7 @@ def _verdict(prediction):
     """Yield the top of the table, the worst delivery, and the limit."""
     plan = prediction.plan
     yield _top(prediction.table)
-    for delivery in prediction.tabled.stated.worst[:1]:
+    for delivery in prediction.result.stated.worst[:1]:
         worst = delivery.relative
         yield message(
             "plan_worst",
@@ -339,7 +339,7 @@ def _design(path):
     values = {
         "before": _percent(path.start_u),
         "after": _percent(path.relative_u),
-        "tried": path.tried,
+        "tried": path.evaluations,
     }
     if path.start_cost or path.cost:
         yield message(
@@ -383,7 +383,7 @@ def _percent(share):
 
 def _wall_summary(prediction):
     """Yield the items of the plan and the predicted u of the course radii."""
-    from tankcal.record.wall_plan import survey_of
+    from tankcal.record.plan import survey_of
 
     plan = prediction.plan
     has = survey_of(plan)

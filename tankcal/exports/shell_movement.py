@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.tank.hydrostatics import STANDARD_GRAVITY
+from tankcal.units import STANDARD_GRAVITY
 
 POISSON = 0.3  # Poisson's ratio of the shell
 _SAMPLES = 150  # number of levels at which the line is compared with the curve

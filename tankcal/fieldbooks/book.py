@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 
 from tankcal.messages import message
 from tankcal.text.numerals import NUMBER
+from tankcal.units import FOOT_M, US_SURVEY_FOOT_M
 
 FULL_TURN, HALF_TURN = 360.0, 180.0
 FARTHEST_M, HIGHEST_M, MOST_M = 1e4, 50.0, 1e8
-METRES = {"m": 1.0, "mm": 1e-3, "ft": 0.3048, "usft": 1200 / 3937}
+METRES = {"m": 1.0, "mm": 1e-3, "ft": FOOT_M, "usft": US_SURVEY_FOOT_M}
 DEGREES = {"deg": 1.0, "gon": 0.9, "mil": 360 / 6400}
 MAX_NUMBER = 40  # characters
 NO_YEAR = 1904  # year of times without year in the file (a leap year)

@@ -5,9 +5,9 @@ from tankcal.fieldbooks.detection import NAMES
 from tankcal.fieldbooks.faces import LARGE_DEG, LARGE_M
 from tankcal.job.checks.hits import MOST_HITS
 from tankcal.messages import list_some, message
+from tankcal.units import ARCSEC_PER_DEG
 
 SHOWN = 8
-ARCSEC = 3600.0
 APPLIED_BY_INSTRUMENT = ("gsi", "sdr")  # formats with distances that include the prism constant
 
 
@@ -124,10 +124,10 @@ def _describe_faces(setup, report):
             "{c_spread:.1f}), index error {i_arcsec:+.1f} arcsec (largest deviation "
             "{i_spread:.1f}), distances of the two faces within {apart_mm:.1f} mm",
             setup=setup,
-            c_arcsec=ARCSEC * report.collimation[0],
-            c_spread=ARCSEC * report.collimation[1],
-            i_arcsec=ARCSEC * report.index[0],
-            i_spread=ARCSEC * report.index[1],
+            c_arcsec=ARCSEC_PER_DEG * report.collimation[0],
+            c_spread=ARCSEC_PER_DEG * report.collimation[1],
+            i_arcsec=ARCSEC_PER_DEG * report.index[0],
+            i_spread=ARCSEC_PER_DEG * report.index[1],
             apart_mm=1000 * report.apart_m,
         )
     if sum(report.single) and (report.collimation or report.index):
@@ -191,8 +191,8 @@ def collect_warnings(chosen, names, setups, reports):
                     "the limit of {limit:.0f} (is the instrument adjusted?); readings on one face "
                     "are corrected by the mean error only",
                     setup=name,
-                    size=ARCSEC * max(abs(what[0]), what[1]),
-                    limit=ARCSEC * LARGE_DEG,
+                    size=ARCSEC_PER_DEG * max(abs(what[0]), what[1]),
+                    limit=ARCSEC_PER_DEG * LARGE_DEG,
                 )
                 problems.append(Problem(file, text))
                 break

@@ -86,20 +86,20 @@ def find_form(local, course, zeta, candidates, axis, relative, slope_sd, least_m
     xyz, courses, relative = local[index], course[index], relative[index]
     uneven = unevenness(xyz, courses, zeta[index], axis)
     thin = _sample_points(xyz, courses, axis)
-    part = xyz[thin], courses[thin], Uneven(uneven.columns[thin], uneven.sd_m)
+    part = xyz[thin], courses[thin], UnevenRadii(uneven.columns[thin], uneven.sd_m)
 
-    def fitted(accepted, previous_fit):
+    def fit_accepted(accepted, previous_fit):
         return _fit_form(*part, axis, relative[thin], slope_sd, accepted, previous_fit)
 
     def refit(previous_fit, goes, comes):
-        return fitted(previous_fit.accepted & ~goes | comes, previous_fit)
+        return fit_accepted(previous_fit.accepted & ~goes | comes, previous_fit)
 
     def tests(fit, stays=stays[thin]):
         is_far = (np.abs(fit.residual) > least_m) & ~stays
         return fit.accepted, np.where(is_far, np.abs(fit.w), 0.0), CRITICAL
 
     # The first fit accepts all points; `snoop` then alternates rejections and fits.
-    fit = fitted(np.ones(len(thin), dtype=bool), None)
+    fit = fit_accepted(np.ones(len(thin), dtype=bool), None)
     if least_m is not None:
         fit = snoop(fit, tests, refit, at_once=0.9, returns=1).adjustment
     # The sample determined the form; now predict and test the remaining points once.
@@ -223,7 +223,7 @@ def _scale_factor(fit, group):
 
 
 @dataclass(frozen=True)
-class Uneven:
+class UnevenRadii:
     """Model of the departure of the mean radius from the radius of the course.
 
     columns  (n, c) derivative of the radii by each departure
@@ -235,7 +235,7 @@ class Uneven:
 
 
 def unevenness(xyz, course, zeta, axis):
-    """Return an `Uneven`: tapers of the courses, and radii of rings in courses of three or more.
+    """Return `UnevenRadii`: tapers of the courses, and radii of rings in courses of three or more.
 
     Only points in the lower and in the upper part of a course, all round it, determine a taper.
     With fewer points, objects in front of the wall (treads of a stair, the rim of a nozzle) would
@@ -253,7 +253,7 @@ def unevenness(xyz, course, zeta, axis):
 
     Returns
     -------
-    Uneven
+    UnevenRadii
     """
     offset, _ = distances_from_axis(xyz, axis)
     azimuth = np.arctan2(offset[:, 0], offset[:, 1])
@@ -270,7 +270,7 @@ def unevenness(xyz, course, zeta, axis):
         if len(rings) > 2:
             columns += [_indicator_column(len(xyz), ring, 1.0) for ring in rings]
             sds += len(rings) * [RING_M]
-    return Uneven(np.hstack(columns), np.array(sds))
+    return UnevenRadii(np.hstack(columns), np.array(sds))
 
 
 def _indicator_column(count, members, value):
@@ -331,11 +331,11 @@ def _covers_turn(azimuth):
 
 
 def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
-    """Return the arguments of `adjust` for radii = R of the course + `Uneven` + form.
+    """Return the arguments of `adjust` for radii = R of the course + `UnevenRadii` + form.
 
     The form depends on azimuth and height. It is equal at all heights except for a part that grows
-    linearly with height. The modes of the form, the slope and the terms of `Uneven` are unknowns
-    with a prior (an observation of zero). Without `form`, the shell is round.
+    linearly with height. The modes of the form, the slope and the terms of `UnevenRadii` are
+    unknowns with a prior (an observation of zero). Without `form`, the shell is round.
 
     The azimuths of the form refer to the start axis, so that the form is linear. About an axis that
     moves in the adjustment, high modes of a deep form would make Gauss-Newton oscillate. Distances
@@ -355,7 +355,7 @@ def shell_problem(xyz, course, axis, sd, form, slope_sd, uneven=None):
         Amplitude of the form, m.
     slope_sd : float
         Prior standard deviation of the slopes.
-    uneven : Uneven, optional
+    uneven : UnevenRadii, optional
 
     Returns
     -------

@@ -5,7 +5,7 @@ import numpy as np
 from tankcal.geometry.field.components import COMPONENTS, Heights, mode_shares, weld_columns
 from tankcal.geometry.field.sites import spans_of
 from tankcal.geometry.girth import draw_waves, modes_of, nodes_of
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 NOTHING = 1e-12  # relative to the largest eigenvalue: smaller eigenvalues are rounding errors
 

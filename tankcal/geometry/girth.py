@@ -27,7 +27,7 @@ from tankcal.geometry.field.components import (
     azimuth_correlations,
     mode_shares,
 )
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 SHORTEST_WAVE_M = 0.2  # shortest wavelength along the arc: plates do not bend more sharply
 DRAWS, NODES_OF_WAVE = 64, 8  # number of random walls; nodes of an outline in its shortest wave

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.special import elliprd, elliprg
 
 from tankcal.adjust import adjust
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 UNKNOWNS = ("mean", "cos", "sin", "pole")  # m, A, B, c
 

@@ -23,8 +23,8 @@ from tankcal.geometry.form import (
 )
 from tankcal.messages import message
 from tankcal.quadrature import panels, polar_products
+from tankcal.units import FULL_TURN
 
-FULL_TURN = 2 * np.pi
 PANELS = 4 * HARMONICS  # panels around the turn: r^2 has twice the harmonics; four nodes a panel
 
 

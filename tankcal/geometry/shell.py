@@ -13,7 +13,6 @@ import numpy as np
 
 from tankcal.adjust import adjust
 from tankcal.errors import SolutionError
-from tankcal.geometry.buckles import find_buckles
 from tankcal.geometry.clutter import (
     LEAST_NOISE_M,
     distances_from_axis,
@@ -21,11 +20,10 @@ from tankcal.geometry.clutter import (
     find_rings,
     shell_problem,
 )
-from tankcal.geometry.columns import NONE, find_columns
 from tankcal.geometry.field.blunders import find_blunders
 from tankcal.geometry.field.sites import Sites, spans_of
 from tankcal.geometry.field.uprights import find_uprights
-from tankcal.geometry.seams import find_seams
+from tankcal.geometry.patches import NO_COLUMN, find_buckles, find_columns, find_seams
 from tankcal.messages import message
 
 # Half width of the band about the wall, relative to the nominal radius: at the start and the end.
@@ -196,7 +194,7 @@ def find_shell(
     if not tilt_known:
         upright = np.array([*axis[:2], 0.0, 0.0])
         found = find_form(*band, upright, relative, 1e-9, least_departure, kept)
-    in_band, axis, column = wall, found.axis, np.full(len(xyz_m), NONE)
+    in_band, axis, column = wall, found.axis, np.full(len(xyz_m), NO_COLUMN)
     w, residual, wall, sizes = found.w, found.residual.copy(), found.wall, None
     if snooping:
         seams = _mark_seams(local, course, candidates, in_band, found, nominal_radius_m)
@@ -213,7 +211,7 @@ def find_shell(
         # The columns are judged by departures from the smooth form, not by the flexible field.
         raw = np.where(wall, found.residual, residual)
         column = _number_columns(local, in_band, axis, raw, wall, found.noise, nominal_radius_m)
-        reason[column != NONE] = UNDECIDED
+        reason[column != NO_COLUMN] = UNDECIDED
         sizes = tested.sizes_m2
     reason[(reason == "") & ~wall] = "snooping"
     if wall.sum() < LEAST_PART * candidates.sum():
@@ -269,7 +267,7 @@ def _test_by_field(
 
     Returns
     -------
-    tested : Tested
+    tested : ReadingTests
         Results for the points of the band.
     stands : ndarray of bool
         Points of the band in columns that are unlikely for a wall.
@@ -302,7 +300,7 @@ def _mark_buckles(local, in_band, axis, departure_m, wall, nominal_radius_m):
 
 def _number_columns(local, in_band, axis, departure_m, wall, noise, nominal_radius_m):
     """Number (n,) the columns of rejected points that may be wall or a fitting; otherwise -1."""
-    tested, numbers = np.flatnonzero(in_band), np.full(len(local), NONE)
+    tested, numbers = np.flatnonzero(in_band), np.full(len(local), NO_COLUMN)
     place = next(_unroll(local[tested], axis, nominal_radius_m))
     turn, rejected = 2 * np.pi * nominal_radius_m, ~wall[tested]
     numbers[tested] = find_columns(place, departure_m[tested], rejected, noise, turn)

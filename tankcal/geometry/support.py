@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from tankcal.pipeline.surveyed_wall import Wall
 from tankcal.pipeline.surveying import find_survey, placed
 from tankcal.pipeline.wall import warnings_of
 from tankcal.record.making import JobAsRead
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import filled_from
+from tankcal.record.schema import fill_from, to_plain
 from tankcal.record.texts import warnings_of as records_of
 from tankcal.record.wall_shape import shape_record
 
@@ -151,7 +150,7 @@ def _basis_of_job(path, progress, part_progress):
         source="job",
         file=job.source,
         folder=path if path.is_dir() else path.parent,
-        job=to_plain(filled_from(JobAsRead, job, inspection=job.inspection)),
+        job=to_plain(fill_from(JobAsRead, job, inspection=job.inspection)),
         shape=to_plain(shape_record(job, wall)),
         methods=_methods({name: getattr(job, name) for name in METHODS}, is_wall),
         warnings=to_plain(records_of(dict.fromkeys(placed(job, warnings)))),

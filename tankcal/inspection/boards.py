@@ -19,8 +19,8 @@ from functools import lru_cache
 import numpy as np
 
 from tankcal.adjust import SD_OVER_MEDIAN
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.inspection.welds import BANDING, PEAKING
+from tankcal.units import FULL_TURN
 
 BOARD_M = 0.914  # length of the board, 36 in
 REACH_M = 0.150  # distance from the weld within which the largest gap is searched for

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.inspection.boards import (
     REACH_M,
     TOGETHER,
@@ -34,6 +33,7 @@ from tankcal.pipeline.cloud_cluster import open_passes
 from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
 from tankcal.record.inspection import WeldGap
 from tankcal.uncertainty import coverage_factor
+from tankcal.units import FULL_TURN, MM_PER_M
 
 MEMORY_BYTES = 512 << 20  # memory of the histograms; more welds require several passes
 
@@ -153,7 +153,6 @@ def _board_batch(passes, wall, welds, across_m):
 LEAST_SEEN, WELL_SEEN = 0.5, 0.9
 KEPT = 3  # number of profiles saved for each kind of weld, at the largest gaps
 PROBABILITY = 0.95  # coverage probability of U
-IN_MM = 1000.0  # millimetres per metre
 
 
 @dataclass(frozen=True)
@@ -226,7 +225,7 @@ def select_largest_gaps(kind, boards, limit_mm):
         return [], _no_figure(kind, 0, "gap_no_weld")
     # Neighbouring cells may share noise, so the variance of the noise is scaled.
     noise_scale = noise_factor(boards) ** 2
-    most_m = np.inf if limit_mm is None else UNCERTAIN * limit_mm / IN_MM
+    most_m = np.inf if limit_mm is None else UNCERTAIN * limit_mm / MM_PER_M
     largest = [_largest(item, noise_scale, most_m) for item in boards]
     determined = [item.seen >= LEAST_SEEN for item in largest]
     sizes = [
@@ -243,7 +242,7 @@ def select_largest_gaps(kind, boards, limit_mm):
         if not most_m < least_m < np.inf:
             return gaps, _no_figure(kind, len(boards), "gap_too_sparse")
         figure = _no_figure(kind, len(boards), "gap_too_uncertain")
-        figure.remark_values.update(u_mm=IN_MM * least_m, most_mm=IN_MM * most_m)
+        figure.remark_values.update(u_mm=MM_PER_M * least_m, most_mm=MM_PER_M * most_m)
         return gaps, figure
     known = [(boards[i], largest[i]) for i in np.flatnonzero(determined)]
     return gaps, _figure(kind, gaps[order[0]], largest[order[0]], known, len(boards), noise_scale)
@@ -259,7 +258,7 @@ def _figure(kind, gap, worst, known, welds, noise_scale):
     return GapFigure(
         code=kind,
         value_mm=gap.gap_mm,
-        U_mm=IN_MM * k * worst.u_m,
+        U_mm=MM_PER_M * k * worst.u_m,
         k=k,
         course=gap.course,
         height_m=gap.height_m,
@@ -358,10 +357,10 @@ def _weld_gap(boards, largest, noise_scale, with_profile):
         course=weld.course + 1,
         height_m=along if is_upright else weld.low_m,
         azimuth_deg=float(np.degrees(azimuth) % 360),
-        gap_mm=IN_MM * largest.gap_m,
-        U_mm=IN_MM * maximum_coverage_factor(rivals) * largest.u_m,
-        along_mm=np.round(IN_MM * boards.s_m[known], 1).tolist(),
-        profile_mm=np.round(IN_MM * profile[known], 2).tolist(),
+        gap_mm=MM_PER_M * largest.gap_m,
+        U_mm=MM_PER_M * maximum_coverage_factor(rivals) * largest.u_m,
+        along_mm=np.round(MM_PER_M * boards.s_m[known], 1).tolist(),
+        profile_mm=np.round(MM_PER_M * profile[known], 2).tolist(),
     )
 
 

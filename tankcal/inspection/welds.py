@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 PEAKING, BANDING = "peaking", "banding"
 APART_M = 0.3  # distance beyond which a detected weld differs from a given weld

@@ -18,8 +18,9 @@ from tankcal.job.fields import Field
 from tankcal.job.folder import MAX_SETTINGS_BYTES, declared_marks, read_csv, read_toml
 from tankcal.job.tables import SEPARATORS, nearest, read_bytes
 from tankcal.messages import list_some, message
-from tankcal.record.intercomparison import ANSWERS, Answer, AnswersFile, Participant, version
+from tankcal.record.intercomparison import ANSWERS, Answer, AnswersFile, Participant
 from tankcal.text.decoding import find_encoding
+from tankcal.version import find_version
 
 PARTICIPANT = "participant.toml"
 ROWS = (
@@ -441,7 +442,7 @@ def answer_package(folder, manifest, progress=None, run=None):
     participant = Participant(
         name="tankcal",
         software="tankcal",
-        version=version(),
+        version=find_version(),
         date=datetime.date.today().isoformat(),
         contact=None,
         remarks=None,

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-FULL_TURN = 2 * np.pi
+from tankcal.units import FULL_TURN
 
 
 def signed_arc(azimuth, at, radius_m):

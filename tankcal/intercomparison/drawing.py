@@ -19,7 +19,6 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.intercomparison.defects import (
-    FULL_TURN,
     Band,
     Buckle,
     Course,
@@ -29,6 +28,7 @@ from tankcal.intercomparison.defects import (
     Seam,
 )
 from tankcal.intercomparison.tank import Fitting, Floor, Tank, Wave
+from tankcal.units import FULL_TURN
 
 FAMILIES = ("brick", "coil", "dented", "leaning", "buckled", "round")
 WIDTHS_M = (4.0, 10.0)  # smallest and largest radius

@@ -33,11 +33,11 @@ from tankcal.record.intercomparison import (
     PackageFile,
     TrueTank,
     TruthFile,
-    plain_of,
-    version,
 )
+from tankcal.record.schema import to_plain
 from tankcal.text.delimited import write_guarded
 from tankcal.text.shipped import shipped_folder
+from tankcal.version import find_version
 
 LICENCE = "CC0-1.0"  # SPDX identifier
 COVERAGE = 0.95  # coverage probability of the requested U
@@ -115,11 +115,11 @@ def make_package(count, seed, methods, *, secret="", nonce=None, is_open=False, 
             files |= {f"{folder}/{name}": data for name, data in job_files(parts).items()}
     progress(step, total, total)
     nonce = secrets.token_hex(32) if nonce is None else nonce
-    sealed = TruthFile(version(), nonce, secret, seed, list(methods), truth)
-    truth_bytes = json_bytes(plain_of(sealed))
+    sealed = TruthFile(find_version(), nonce, secret, seed, list(methods), truth)
+    truth_bytes = json_bytes(to_plain(sealed))
     files |= _documentation(used, is_open)
     manifest = PackageFile(
-        tankcal=version(),
+        tankcal=find_version(),
         open=is_open,
         licence=LICENCE,
         coverage_probability=COVERAGE,
@@ -128,7 +128,7 @@ def make_package(count, seed, methods, *, secret="", nonce=None, is_open=False, 
         jobs=jobs,
         files=[FileHash(name, digest(files[name])) for name in sorted(files)],
     )
-    files[PACKAGE.file] = json_bytes(plain_of(manifest))
+    files[PACKAGE.file] = json_bytes(to_plain(manifest))
     return Package(files, truth_bytes)
 
 
@@ -186,7 +186,9 @@ def _documentation(used, is_open):
     """Documentation of a package: README, columns, schema of the answers, licence."""
     folder = shipped_folder("report_templates") / "intercomparison"
     readme = (folder / "readme.md").read_text(encoding="utf-8")
-    readme = readme.replace("{state}", OPEN if is_open else SEALED).replace("{version}", version())
+    readme = readme.replace("{state}", OPEN if is_open else SEALED).replace(
+        "{version}", find_version()
+    )
     texts = {
         "README.md": readme,
         "COLUMNS.md": _columns_text(used),

@@ -34,9 +34,9 @@ from tankcal.record.intercomparison import (
     ScoredTable,
     ScoresFile,
     TableForm,
-    version,
 )
 from tankcal.record.texts import warnings_of
+from tankcal.version import find_version
 
 
 def score_folders(folders, truth, package=None):
@@ -160,7 +160,7 @@ def score(participants, truth, truth_sha256, coverage=0.95):
             if tables_of_method:
                 methods.append(score_method(number, method, tables_of_method, asked))
     return ScoresFile(
-        tankcal=version(),
+        tankcal=find_version(),
         truth_sha256=truth_sha256,
         coverage_probability=coverage,
         participants=[item.saved.participant for item in participants],

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.tank import REFERENCE_C
+from tankcal.units import FULL_TURN
 
 NOMINAL_E_GPA, U_E_GPA = 206.0, 2.0  # declared Young's modulus and its standard uncertainty
 NOMINAL_EXPANSION, U_EXPANSION = 1.15e-5, 4e-7  # declared thermal expansion and its u, 1/K

@@ -14,9 +14,9 @@ from functools import cached_property
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
-from tankcal.intercomparison.defects import FULL_TURN, defect_of, plain_of
+from tankcal.intercomparison.defects import defect_of, plain_of
+from tankcal.units import FULL_TURN, STANDARD_GRAVITY
 
-GRAVITY = 9.80665  # acceleration of free fall, m/s2
 NODES, MORE_NODES = 8, 12  # Gauss nodes of a panel: normal, and for the estimate of the error
 PANEL_M, PANELS_ROUND = 0.5, 48  # largest height of a panel, least number of panels round the wall
 REFERENCE_C = 20.0  # temperature of the shell at which lengths are stated
@@ -301,7 +301,7 @@ class Tank:
         """Areas of sections, with the wall expanded as a thin hoop by the liquid above, m2."""
         plate = np.asarray(self.plates_m)[self.course_at(z)]
         # Radial displacement p R^2 / (E t) with the pressure p at each height.
-        out = density * GRAVITY * (level - z) * self.radius_m**2 / (self.e_pa * plate)
+        out = density * STANDARD_GRAVITY * (level - z) * self.radius_m**2 / (self.e_pa * plate)
         return area + out * length + np.pi * out**2
 
     @cached_property

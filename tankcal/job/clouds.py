@@ -8,10 +8,10 @@ from tankcal.job.checks.clouds import has_network, poses_of, scans_of, unit_of
 from tankcal.job.contract.clouds import ASSUMED
 from tankcal.job.contract.shorthand import FREE
 from tankcal.job.hits import USUAL_INCIDENCE_MM
-from tankcal.job.measuring import ARCSEC
 from tankcal.job.model.clouds import CloudFile, Clouds
 from tankcal.survey.scans import KnownTargets, ScanSetup, ScanTarget
 from tankcal.survey.wall_hits import RangingInstrument
+from tankcal.units import ARCSEC
 
 AXES = "xyz"
 SCANNER = "scanner"  # name of a scanner without a name

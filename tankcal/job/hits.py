@@ -6,8 +6,9 @@ import numpy as np
 
 from tankcal.job.checks.hits import instruments_used, ranging_of
 from tankcal.job.contract.registers import FREE
-from tankcal.job.measuring import ARCSEC, angle_in_rad, setups_of
+from tankcal.job.measuring import angle_in_rad, setups_of
 from tankcal.survey.wall_hits import ControlReading, RangingInstrument, WallHits
+from tankcal.units import ARCSEC
 
 USUAL_INCIDENCE_MM = 1.0  # default standard uncertainty of the bias at 60 degrees incidence, mm
 AXES = "xyz"

@@ -3,7 +3,8 @@
 import numpy as np
 
 from tankcal.job.checks.lines import at_reference, plummets_of, plummets_used
-from tankcal.survey.reference_line import ARCSEC, Line, Offset, Plummet, ReferenceLines
+from tankcal.survey.reference_line import Line, Offset, Plummet, ReferenceLines
+from tankcal.units import ARCSEC
 
 
 def make_lines(tables, registers):

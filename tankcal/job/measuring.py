@@ -8,7 +8,7 @@ from tankcal.job.checks.survey.stadia import bars_of, bars_used, is_bar
 from tankcal.job.contract.observations import ANGLES, READINGS
 from tankcal.job.contract.registers import FREE, INSTRUMENT_KINDS
 from tankcal.job.imagery import imagery_of
-from tankcal.job.structure import ARCSEC, structure
+from tankcal.job.structure import structure
 from tankcal.survey.measurements import (
     AdjustmentSettings,
     CorrelatedReadings,
@@ -23,8 +23,9 @@ from tankcal.survey.measurements import (
     Targets,
 )
 from tankcal.survey.stadia import distance_of_angle_m, distance_sd_m
+from tankcal.units import ARCSEC, GON
 
-RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "dms": np.pi / 180}
+RADIANS = {"deg": np.pi / 180, "gon": GON, "dms": np.pi / 180}
 PRINTED = ("certificate", "tension_n")  # keys of instruments that the report shows
 
 

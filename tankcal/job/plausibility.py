@@ -8,6 +8,7 @@ by tankcal: wide enough for existing tanks, narrow enough to detect mistyped val
 import math
 
 from tankcal.messages import message
+from tankcal.units import FOOT_M, INCH_M
 
 AMBIENT, HEATED, REFRIGERATED = SERVICES = ("ambient", "heated", "refrigerated")
 CARBON_STEEL, STAINLESS_STEEL, ALUMINIUM = METALS = (
@@ -121,10 +122,10 @@ BATCH_SD = 1e-3  # sd of a batch by its meter, over the batch
 
 RATIO_MISS = 0.03  # relative difference of a ratio of sizes from a ratio of units
 RATIOS = {  # ratios of two sizes that should be equal, by cause
-    "feet": (1 / 0.3048,),
+    "feet": (1 / FOOT_M,),
     "radius": (2.0,),
     "girth": (math.pi,),
-    "inches": (25.4, 1 / 0.0254),
+    "inches": (25.4, 1 / INCH_M),
     "point": (10.0, 100.0, 1000.0),
 }
 

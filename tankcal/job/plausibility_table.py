@@ -434,6 +434,14 @@ TABLE = (
         ("places_assumed",),
     ),
     Plausible(
+        "tank.nominal_diameter_m with lines.csv",
+        "8 m or more",
+        "a tank on which the same errors of offsets are a larger part of the radius",
+        "",
+        ("too_small_for_lines",),
+        verified=False,
+    ),
+    Plausible(
         "clouds.toml: s_translation_mm, s_rotation_arcsec",
         "pairs of scans agree within these values and the scanner's (significance 0.1 %), and so"
         " do all overlaps together (1 %)",

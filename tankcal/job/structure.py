@@ -9,7 +9,7 @@ from dataclasses import MISSING, fields
 
 import numpy as np
 
-ARCSEC = np.pi / 180 / 3600  # rad
+from tankcal.units import ARCSEC
 
 # Unit at the end of a name in a job: unit at the end of the attribute, and conversion. Values are
 # divided by 1000, not multiplied by 0.001, which has no exact binary form.

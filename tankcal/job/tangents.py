@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from tankcal.job.measuring import ARCSEC, angle_in_rad, setups_of
+from tankcal.job.measuring import angle_in_rad, setups_of
 from tankcal.survey.tangents import Tangents
+from tankcal.units import ARCSEC
 
 
 def make_tangents(tables, registers):

@@ -18,9 +18,10 @@ from tankcal.linter.headings import (
     uncertainty_of,
 )
 from tankcal.linter.numbers import has_digit, has_letter, is_blank
-from tankcal.linter.units import INCH_M, Unit, countries_in
+from tankcal.linter.units import Unit, countries_in
 from tankcal.linter.wide import WideHeading, find_unnamed_columns, title_unit, wide_heading
 from tankcal.messages import message
+from tankcal.units import INCH_M
 
 _LINES_OF_HEADING = 3  # largest number of heading lines above the steps of a wide table
 _LONGEST_UNIT = 24  # largest number of letters of a cell in a row of units

@@ -34,9 +34,10 @@ from tankcal.linter.numbers import (
     read_number,
     style_of,
 )
-from tankcal.linter.units import FOOT_M, INCH_M, Unit, plain_text
+from tankcal.linter.units import Unit, plain_text
 from tankcal.messages import message
 from tankcal.tank.dips import INCHES_PER_FOOT, METRES_PER_INCH, parse_dip
+from tankcal.units import FOOT_M, INCH_M
 
 _SAME = 1e-9
 _FEET_DECIMALS = 4  # decimals of a metre in a label with decimals of an inch

@@ -13,9 +13,10 @@ from tankcal.linter.blocks import find_blocks, trim_cells
 from tankcal.linter.compound_heights import feet_reader, fraction_reader
 from tankcal.linter.headings import Uncertainty
 from tankcal.linter.numbers import Reading, has_digit, read_number, style_of
-from tankcal.linter.units import INCH_M, plain_text
+from tankcal.linter.units import plain_text
 from tankcal.linter.wide import wide_cells
 from tankcal.messages import message
+from tankcal.units import INCH_M
 
 _FEW_SPLIT_ROWS = 5
 _FEWEST_MULTIPLES = 3  # fewest volumes that show whether a factor is the rounding

@@ -14,9 +14,8 @@ from math import log10, prod
 
 from tankcal.messages import Message, message
 from tankcal.tank.dips import INCHES_PER_FOOT, METRES_PER_INCH, VOLUME_UNITS_M3
+from tankcal.units import FOOT_M, INCH_M
 
-INCH_M = float(METRES_PER_INCH)
-FOOT_M = float(INCHES_PER_FOOT * METRES_PER_INCH)
 FOOT3_M3 = float((INCHES_PER_FOOT * METRES_PER_INCH) ** 3)
 LENGTH, VOLUME = "length", "volume"
 US_GALLON_M3 = float(231 * METRES_PER_INCH**3)

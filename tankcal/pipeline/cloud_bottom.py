@@ -16,6 +16,7 @@ from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.messages import message
 from tankcal.survey.beams import shared_by_beams
 from tankcal.survey.results import Cause
+from tankcal.units import MM_PER_M
 
 FILE = "clouds.toml"
 MOST_POINTS = 400  # largest number of points that define the surface of the bottom
@@ -23,7 +24,6 @@ UNSEEN = 0.1  # largest share of the plan in which the surface is only interpola
 # A bottom is wet from so many cells with mirror images, or from such a share of the points inside
 # the tank that lie under the bottom.
 WET_CELLS, WET_SHARE = 2, 1e-4
-IN_MM = 1000.0  # mm per m
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def with_bottom(job, inside, registration, estimates=()):
         if cause.name in estimated:
             u = estimated[cause.name].u_after
             column = u * heights(cause.column_m)
-            causes.append(Cause(cause.name, cause.what, IN_MM * u, cause.unit, column))
+            causes.append(Cause(cause.name, cause.what, MM_PER_M * u, cause.unit, column))
     bottom = replace(job.bottom, xyz_m=xyz, sd_m=points.sd_m, shared=tuple(causes))
     return replace(job, bottom=bottom)
 

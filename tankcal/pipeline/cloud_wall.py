@@ -22,7 +22,7 @@ from tankcal.pipeline.hit_wall import through_wall
 from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.scan import fit_scan
 from tankcal.pipeline.wall import find_wall, joints_of
-from tankcal.survey.beams import Beamed, points_of_beams
+from tankcal.survey.beams import BeamPoints, points_of_beams
 from tankcal.survey.registration import Registration, register
 from tankcal.survey.scans import KnownTargets
 
@@ -46,7 +46,7 @@ class Clouded:
         Cells of the wall, obstructions, and numbers of points read.
     readings : CloudReadings
         Means of cells: the points of the job, in their order.
-    beamed : Beamed
+    beamed : BeamPoints
         Points with the causes that beams share.
     told : tuple of ToldCause
         Offsets and scales estimated by a vertical wall.
@@ -60,7 +60,7 @@ class Clouded:
     registration: Registration
     cells: object
     readings: object
-    beamed: Beamed
+    beamed: BeamPoints
     told: tuple = ()
     left_out: np.ndarray | None = None
     inside: CloudInside | None = None

@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.job import Switches
 from tankcal.messages import Message, message
 from tankcal.pipeline.tanks import as_declared, body_of, thermal_scale
-from tankcal.tank.hydrostatics import STANDARD_GRAVITY
+from tankcal.units import STANDARD_GRAVITY
 
 # Cited by title and edition only: the texts of paid standards were not read, so no clause is cited.
 ISO_7507 = "ISO 7507-1:2003"

@@ -3,7 +3,6 @@
 import numpy as np
 
 from tankcal.errors import Problem
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.shell import course_of
 from tankcal.messages import list_some, message
 from tankcal.pipeline.cause_correlations import noise_of_wall
@@ -24,6 +23,7 @@ from tankcal.pipeline.survey_limits import limit_at, limits_of, repeat_factor
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.control_drift import repeats_of
 from tankcal.survey.sighting import NETWORK, WALL
+from tankcal.units import GON
 
 RULES, CONTROL = "wall_hits", "control_readings.csv"
 UNLIKE_SDS = 3.0  # largest deviation of an offset or scale from its certificate, in sds
@@ -35,7 +35,6 @@ WAVE_M = 3e-3  # standard deviation of each long wave of the wall in the test of
 MOSTLY = 0.9
 MOVED_M = 4e-3  # smallest reported movement; less cannot be separated from the form of the wall
 SHOWN = 5  # largest number of names in a message
-GON = FULL_TURN / 400
 
 
 def least_hits(job):

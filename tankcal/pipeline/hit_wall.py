@@ -15,7 +15,7 @@ from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.wall import find_wall, joints_of
 from tankcal.sections import coordinates_of
 from tankcal.survey import wall_points
-from tankcal.survey.poses import covariance_with_points, poses_of, settled
+from tankcal.survey.poses import covariance_with_points, poses_of, settle_poses
 from tankcal.survey.sighting import Beside, sight
 
 FEWEST_AROUND = 3  # smallest number of stations that show their side of the wall
@@ -54,7 +54,7 @@ def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
         if len(estimates.poses):
             # Poses absorb a part of the form, which later rounds no longer see: keep its size.
             sizes = wall.field.amplitudes
-        poses = settled(sighting.poses, estimates.poses)
+        poses = settle_poses(sighting.poses, estimates.poses)
         sighted = sight(job.hits, poses, estimates.offsets_m)
         offsets = {name: sighting.told_m.get(name, 0.0) + correction
                    for name, correction in estimates.offsets_m.items()}  # fmt: skip

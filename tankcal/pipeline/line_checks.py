@@ -11,12 +11,12 @@ from tankcal.messages import message
 from tankcal.pipeline.line_departures import check_lines_apart, check_scale, check_sign
 from tankcal.pipeline.survey_limits import limit_at, limits_of, repeat_factor
 from tankcal.survey.reference_line import (
-    ARCSEC,
     collimation_by_faces,
     lean_of,
     level_names,
     levels_of,
 )
+from tankcal.units import ARCSEC
 
 FILE, RULES = "offsets.csv", "reference_line"
 UNLIKE_SDS = 3.0  # largest deviation of a collimation from its certificate, in sds

@@ -31,7 +31,7 @@ from tankcal.tank.liquid import (
     Effect,
     Fill,
     LiquidAdjustment,
-    Reduced,
+    ReducedSteps,
     RunEffect,
     adjust_steps,
     estimate_run_effect,
@@ -66,14 +66,14 @@ class LiquidFound:
     known : Known
     fill : Fill
         Steps between the dips.
-    reduced : Reduced
+    reduced : ReducedSteps
         Steps against the geometry with its adjusted sizes.
     loaded : Loaded
         Geometry under the calibrating liquid.
     readings : ReadingEffects
     adjusted : LiquidAdjustment
     run_effect : RunEffect
-    before : Reduced
+    before : ReducedSteps
         Steps against the geometry with its initial sizes.
     before_sd_m3 : ndarray, shape (n,)
         Standard deviations of the misclosures of `before`.
@@ -87,12 +87,12 @@ class LiquidFound:
 
     known: Known
     fill: Fill
-    reduced: Reduced
+    reduced: ReducedSteps
     loaded: Loaded
     readings: ReadingEffects
     adjusted: LiquidAdjustment
     run_effect: RunEffect
-    before: Reduced
+    before: ReducedSteps
     before_sd_m3: np.ndarray
     misfit: float
     corrections_m: np.ndarray

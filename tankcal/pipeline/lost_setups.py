@@ -9,9 +9,9 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.geometry.circles import taubin_circle
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 from tankcal.survey.sighting import certified_m, rays
+from tankcal.units import FULL_TURN
 
 # Smallest shares of rejected hits for a warning, with and without a known cause; smallest number.
 MANY, MOST, FEWEST = 0.2, 0.5, 5

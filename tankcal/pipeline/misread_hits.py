@@ -12,9 +12,9 @@ from tankcal.geometry.circles import taubin_circle
 from tankcal.messages import message
 from tankcal.survey.sighting import rays
 from tankcal.survey.untied import sees_all_around
+from tankcal.units import DEG_IN_GON, GON_IN_DEG
 
 # Factors that convert an angle read as degrees but given in gon, and the reverse.
-GON_IN_DEG, DEG_IN_GON = 0.9, 1 / 0.9
 CLOSER = 0.2  # largest ratio of the scatter in another unit to that as read, to report the unit
 # Least scatter about the circle that needs an explanation, least number of hits of a set-up.
 LEAST_M, FEWEST = 0.01, 12

@@ -7,13 +7,12 @@ stated courses. Zenith angles or distances in another unit break both properties
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import list_some, message
 from tankcal.pipeline.wall import joints_of
 from tankcal.survey.diagnosis.misread_files import OTHER_UNITS
+from tankcal.units import DEG_IN_GON, FULL_TURN, GON_IN_DEG
 
 # Factors that convert an angle read as degrees but given in gon, and the reverse.
-GON_IN_DEG, DEG_IN_GON = 0.9, 1 / 0.9
 # Limits of a line: largest range of directions, smallest number of hits, smallest height.
 NARROW_RAD, FEWEST, LEAST_RISE_M = 0.1, 5, 1.0
 # Rms from a line that needs an explanation; largest part of it left in another interpretation.

@@ -11,9 +11,10 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.survey.diagnosis.misread_files import OTHER_UNITS
 from tankcal.survey.tangents import circle_of_sights
+from tankcal.units import DEG_IN_GON, GON_IN_DEG
 
 # Factors of a direction: read as degrees but given in gon, the reverse, and anticlockwise.
-GON_IN_DEG, DEG_IN_GON, BACKWARDS = 0.9, 1 / 0.9, -1.0
+BACKWARDS = -1.0
 CLOSER = 0.2  # largest ratio of residuals to those as read, to report another interpretation
 LEAST = 0.004  # median residual over the radius that needs no explanation
 OFF_LEVEL_M = 0.3  # discrepancy between a sight and its level that needs no explanation

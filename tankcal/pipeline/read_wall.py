@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from tankcal.adjust import noncentrality
-from tankcal.geometry.field.blunders import Tested, restricted_precision
+from tankcal.geometry.field.blunders import ReadingTests, restricted_precision
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import free_design
 from tankcal.pipeline.wall_readings import columns_of, shared_effects
@@ -26,7 +26,7 @@ class ReadWall:
         Adjusted readings: straps, then offsets. Check readings are not included.
     places : ndarray of int, shape (n,)
         Index of each reading among the readings of its file.
-    tested : Tested
+    tested : ReadingTests
         Test of each reading; sd_m is infinite for an uncontrolled reading.
     field : WallField
         Field estimated from the points, if any, and from the accepted readings.
@@ -36,7 +36,7 @@ class ReadWall:
     zero_m: float
     readings: tuple
     places: np.ndarray
-    tested: Tested
+    tested: ReadingTests
     field: WallField
     # Plate thickness, not in the field.
     inner_m: np.ndarray | float = field(default=0.0, kw_only=True)

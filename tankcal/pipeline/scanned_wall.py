@@ -29,7 +29,6 @@ from tankcal.geometry.field.places import (
     wet_cells,
 )
 from tankcal.geometry.field.solids import SolidField, estimate_sizes
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.primitives import sphere_distances, unit_vectors
 from tankcal.pipeline.survey_warnings import noise_is_estimated
 from tankcal.pipeline.tanks.common import factor_of_unseen
@@ -37,6 +36,7 @@ from tankcal.pipeline.tanks.solid import solid_as_surveyed
 from tankcal.sections import coordinates_of
 from tankcal.tank.factors import Factor, survey_factors
 from tankcal.tank.surveyed_form import NODES, SurveyedForm, node_levels
+from tankcal.units import FULL_TURN
 
 KINDS = ("bulge", "ovality", "oblateness", "seams")
 MOST_ROUNDS = 10

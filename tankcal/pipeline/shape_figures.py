@@ -11,11 +11,12 @@ import scipy
 
 from tankcal.geometry.field.components import COMPONENTS, KINDS
 from tankcal.geometry.field.values import FieldValues, Spots
-from tankcal.geometry.outlines import FULL_TURN, radii_square_to_axis
+from tankcal.geometry.outlines import radii_square_to_axis
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.tanks.vertical import bearing_inputs, insets_of
 from tankcal.tank.hydrostatics import LiquidHead
 from tankcal.uncertainty import Source, combine, declared_source, group_correlated
+from tankcal.units import FULL_TURN
 
 SAME_PLACE_M = 0.1  # largest distance along the arc of a reading from its generatrix
 LEAST_U_M = 1e-9  # lower bound of a standard uncertainty, against rounding
@@ -186,7 +187,7 @@ class ShapeBase:
         rows = scipy.sparse.csr_array(rows)
         value = rows @ self._value_m
         value += rows[:, self._count :] @ self._origins()
-        unseen = self._found.unseen_of(rows)
+        unseen = self._found.undetermined_variances(rows)
         kinds = np.array([component.kind for component in COMPONENTS])
         variances = [unseen[kinds == kind].sum(axis=0) for kind in KINDS]
         parts = [Source("", np.sqrt(np.maximum(variance, 0.0))[:, None]) for variance in variances]

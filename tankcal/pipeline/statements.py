@@ -10,7 +10,7 @@ from tankcal.messages import message
 from tankcal.tank.budgets import Budget, budget, reading_sources
 from tankcal.tank.capacity import SAME_M
 from tankcal.tank.deliveries import WorstDeliveries, worst_deliveries
-from tankcal.tank.rules import Printed, StatedVolume, deliveries_to_check, judge
+from tankcal.tank.rules import PrintedU, StatedVolume, deliveries_to_check, judge
 
 MINIMA_M = (1.5, 2.0, 3.0)  # default minimum heights of deliveries
 QUARTERS = (0.25, 0.5, 0.75, 1.0)  # default dips, relative to the top of the table
@@ -121,7 +121,7 @@ def stated_volume(table, intervals, height_m):
     quantity, rows = table.at(height_m), table.rows_of(height_m)
     if np.all(intervals.by_gum[rows]):
         return quantity
-    U = Printed(intervals.U_m3, intervals.by_gum).of(table, None, height_m, quantity.U_m3)
+    U = PrintedU(intervals.U_m3, intervals.by_gum).of(table, None, height_m, quantity.U_m3)
     if len(rows) == 1:
         ends = float(intervals.low_m3[rows[0]]), float(intervals.high_m3[rows[0]])
         return _replace_interval(quantity, U, ends)
@@ -193,9 +193,9 @@ def verdict_of(job, body, table, intervals, simulation):
 
 
 def _printed(intervals, simulation):
-    """`rules.Printed` of the rows and of the simulated deliveries."""
+    """`rules.PrintedU` of the rows and of the simulated deliveries."""
     if simulation is None:
-        return Printed(intervals.U_m3)
+        return PrintedU(intervals.U_m3)
     delivered = simulation.delivered
     U = delivered.U_m3
     printed = simulation.of_delivered.U_m3
@@ -204,7 +204,7 @@ def _printed(intervals, simulation):
     factor = np.max(ratio[simulation.smooth], initial=1.0)
     pairs = zip(delivered.low_m.tolist(), delivered.high_m.tolist(), strict=True)
     of_pairs = dict(zip(pairs, printed.tolist(), strict=True))
-    return Printed(intervals.U_m3, intervals.by_gum, of_pairs, float(factor))
+    return PrintedU(intervals.U_m3, intervals.by_gum, of_pairs, float(factor))
 
 
 def _worst(job, table):

@@ -18,7 +18,6 @@ from tankcal.geometry.great_ellipses import (
     fit_ellipsoid,
     great_circle_lengths,
 )
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 from tankcal.pipeline.wall_readings import (
     WallReading,
@@ -29,11 +28,12 @@ from tankcal.pipeline.wall_readings import (
 )
 from tankcal.pipeline.wall_straps import AreaTerm
 from tankcal.survey.great_circles import KINDS
-from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
+from tankcal.survey.strapping import ReducedStrap, reduce_straps, tapes_used
 from tankcal.tank.ellipsoids import Ellipsoid
 from tankcal.tank.factors import Factor
 from tankcal.tank.surveyed_form import SurveyedForm, node_levels
 from tankcal.uncertainty import factor_of
+from tankcal.units import FULL_TURN
 
 OVALITY_SHARE = 1e-3  # prior degree-2 form over the radius, if neither measured nor declared
 NO_AREA_TERM = AreaTerm(0.0, 0.0)  # included in the field: a reading is a mean of radii
@@ -46,7 +46,7 @@ class StrappedSphere:
 
     Attributes
     ----------
-    reduced : tuple of Reduced
+    reduced : tuple of ReducedStrap
         All readings, in the order of the file.
     adjusted : ndarray of int, shape (k,)
         Indices of the adjusted readings; the other readings are checks.
@@ -64,7 +64,7 @@ class StrappedSphere:
         Tapes used, and the standard uncertainties of their scale from a master.
     """
 
-    reduced: tuple[Reduced, ...]
+    reduced: tuple[ReducedStrap, ...]
     adjusted: np.ndarray
     azimuth_rad: np.ndarray
     readings: tuple[WallReading, ...]

@@ -42,7 +42,7 @@ from tankcal.pipeline.wall_straps import (
     told_courses,
     typical_shape_m,
 )
-from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
+from tankcal.survey.strapping import ReducedStrap, reduce_straps, tapes_used
 
 STATED_BY_STRAPS, STATED_BY_LINES = (), ("mean",)
 
@@ -64,7 +64,7 @@ class TapedWall(ReadWall):
 
     Attributes
     ----------
-    reduced : tuple of Reduced
+    reduced : tuple of ReducedStrap
         All readings of the tape, in the order of the file.
     area_term : AreaTerm
     plate_sd_m : dict
@@ -76,7 +76,7 @@ class TapedWall(ReadWall):
         Declared standard deviation of the radius round the wall, m.
     """
 
-    reduced: tuple[Reduced, ...]
+    reduced: tuple[ReducedStrap, ...]
     area_term: AreaTerm
     plate_sd_m: dict
     tapes: tuple
@@ -218,14 +218,14 @@ def adjust_readings(readings, sizes, amplitudes, *, snooping, bulge_scale=1.0):
     -------
     readings : list of WallReading
         With the radii corrected for eccentricity.
-    tested : Tested
+    tested : ReadingTests
     field : WallField
     """
     joints_m, zero_m, nominal_m = sizes
     sites = replace(sites_of(readings, joints_m, zero_m), bulge_scale=bulge_scale)
     noise = noise_of(readings)
     if amplitudes is not None:
-        amplitudes = amplitudes.with_bulges(bulge_scale)
+        amplitudes = amplitudes.scale_bulges(bulge_scale)
     may_go = snooping * np.array([reading.of == "offsets" for reading in readings])
 
     def field_of(accepted):

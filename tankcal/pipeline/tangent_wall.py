@@ -12,7 +12,6 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.field.sites import free_design
 from tankcal.geometry.girth import support_of, tangent_excess
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
 from tankcal.pipeline.hit_wall import take_points
@@ -27,6 +26,7 @@ from tankcal.pipeline.wall_straps import rings_of
 from tankcal.survey.poses import poses_in_network
 from tankcal.survey.sighting import WALL
 from tankcal.survey.tangents import Hull, halfway, round_hull, touch
+from tankcal.units import FULL_TURN
 
 ROUNDS = 6  # rounds of wall and excess; two suffice unless the hull dominates the form
 # Largest change of the mean excess at the end: a length, and a share of its uncertainty.

@@ -8,13 +8,14 @@ from scipy.special import bdtrc, chdtrc, erf, pdtrc
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline.survey_limits import limits_of
+from tankcal.units import STANDARD_GRAVITY
 
 FILE, TAPES, COMPARED = "circumferences.csv", "instruments.toml", "tape_checks.csv"
 FAHRENHEIT_K = 8.0  # largest difference from the shell of a temperature read as Fahrenheit
 UNLIKE_K = 20.0  # difference of tape and shell temperatures that causes a warning
 CERTIFIED_C = (0.0, 40.0)  # range of plausible temperatures in certificates
 PULL = 2.0  # ratio of a pull to that of the certificate, either way, that causes a warning
-UNITS_N = {"kgf": 9.80665, "lbf": 4.4482216}
+UNITS_N = {"kgf": STANDARD_GRAVITY, "lbf": 4.4482216}
 THICKNESS_M = (5e-5, 1.2e-3)  # range of plausible tape thicknesses
 STIFFNESS_N = (1e5, 5e6)  # range of plausible tape stiffnesses: 0.5 to 25 mm2 of steel
 BY_CHANCE = 0.02  # probability of as many equal repeats below which copying is suspected

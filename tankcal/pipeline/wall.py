@@ -12,7 +12,7 @@ from tankcal.geometry.field.cells import MOST_SITES, cells_of, sites_of_cells
 from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES, ROUND_SHAPES
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.sites import Sites, spans_of
-from tankcal.geometry.outlines import FULL_TURN, polar
+from tankcal.geometry.outlines import polar
 from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
 from tankcal.messages import Message, message
 from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
@@ -48,6 +48,7 @@ from tankcal.sections import (
     sample_of,
 )
 from tankcal.solver.threads import threads_for
+from tankcal.units import FULL_TURN
 
 
 def find_wall(job, progress, dof=np.inf, amplitudes=None, *, sizes=None):
@@ -154,7 +155,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     if has_loose_poses(job) and not is_known:
         # Free set-ups absorb waves as numerous as themselves, so that the readings show too little
         # of the common form: its prior median is the lower bound.
-        amplitudes = amplitudes.with_least("common ovality")
+        amplitudes = amplitudes.raise_to_median("common ovality")
     if amplitudes.noise != 1.0:  # avoid a copy of up to half a gigabyte
         covariance = covariance * amplitudes.noise
         noise *= amplitudes.noise

@@ -63,7 +63,7 @@ def readings_of_straps(used, courses, term):
 
     Parameters
     ----------
-    used : sequence of Reduced
+    used : sequence of ReducedStrap
         Reduced circumferences.
     courses : list of str
         Names of the courses.
@@ -286,7 +286,7 @@ def settle_readings(field, field_of, parts, may_go):
     -------
     field : WallField
         Field of the accepted readings.
-    tested : Tested
+    tested : ReadingTests
         With an infinite sd_m for uncontrolled readings.
     """
     sites, radius, noise = parts

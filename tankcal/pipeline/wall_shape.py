@@ -15,11 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.shape_figures import Figures, Level, ShapeBase
 from tankcal.pipeline.surveyed_wall import Wall
+from tankcal.units import FOOT_M, FULL_TURN
 
-LOW_M = 0.3048  # height of the low radii: one foot above the bottom weld
+LOW_M = FOOT_M  # height of the low radii: one foot above the bottom weld
 SAME_LEVEL_M = 0.05  # largest height difference of equal levels
 # Largest number of measured azimuths of a level; number after thinning.
 MOST_AZIMUTHS, EVEN_AZIMUTHS = 72, 36

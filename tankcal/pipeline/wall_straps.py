@@ -12,12 +12,11 @@ import scipy.linalg
 
 from tankcal.adjust import noncentrality
 from tankcal.geometry.field.amplitudes import estimate_amplitudes
-from tankcal.geometry.field.blunders import Tested
+from tankcal.geometry.field.blunders import ReadingTests
 from tankcal.geometry.field.components import COMPONENTS, ROUND_SHAPES
 from tankcal.geometry.field.estimate import LEVELS, WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.girth import Ring, perimeter_excess, seen_excess
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.tanks import insets_of
 from tankcal.pipeline.untied_setups import Unbound
@@ -34,8 +33,9 @@ from tankcal.pipeline.wall_readings import (
     sites_of,
 )
 from tankcal.quadrature import panels
-from tankcal.survey.reference_line import courses_told
-from tankcal.survey.strapping import Reduced, reduce_straps, tapes_used
+from tankcal.survey.reference_line import courses_with_radius
+from tankcal.survey.strapping import ReducedStrap, reduce_straps, tapes_used
+from tankcal.units import FULL_TURN
 
 # Least number of circumferences to reject one if they alone determine an offset of the points: of
 # two contradictory circumferences either may be wrong.
@@ -113,7 +113,7 @@ class Straps:
 
     Attributes
     ----------
-    reduced : tuple of Reduced
+    reduced : tuple of ReducedStrap
         All readings, in the order of the file.
     adjusted : ndarray of int, shape (k,)
         Indices of the adjusted readings; the other readings are checks.
@@ -136,7 +136,7 @@ class Straps:
         Tapes used, and the standard uncertainties of their scale from a master.
     """
 
-    reduced: tuple[Reduced, ...]
+    reduced: tuple[ReducedStrap, ...]
     adjusted: np.ndarray
     accepted: np.ndarray
     w: np.ndarray
@@ -207,7 +207,7 @@ def told_courses(job, seen):
         strapped = (strap.course for strap in job.strapping.straps if not strap.check)
     if job.lines is not None:
         of_lines = (offset.course for offset in job.lines.offsets if not offset.check)
-    return courses_told(
+    return courses_with_radius(
         seen, {place[strap] for strap in strapped}, {place[offset] for offset in of_lines}
     )
 
@@ -281,7 +281,7 @@ def _offsets_of(lines, names, insets, sites):
 
 
 def _joined_field(job, points, readings, amplitudes, heights):
-    """`WallField` of points and accepted readings, `Tested` of the readings, and centred readings.
+    """`WallField` of points and accepted readings, `ReadingTests`, and centred readings.
 
     Parameters
     ----------
@@ -296,7 +296,7 @@ def _joined_field(job, points, readings, amplitudes, heights):
     Returns
     -------
     field : WallField
-    tested : Tested
+    tested : ReadingTests
     readings : list of WallReading
         Reduced to the centres of their levels.
     """
@@ -361,7 +361,7 @@ def _joined_field(job, points, readings, amplitudes, heights):
         field = field_of(accepted_at_first > 0)
     field, tested = settle_readings(field, field_of, (all_sites, radius, noise), may_go)
     parts = (tested.accepted, tested.departure_m, tested.w, tested.sd_m)
-    return field, Tested(*(part[n:] for part in parts)), readings
+    return field, ReadingTests(*(part[n:] for part in parts)), readings
 
 
 def _circumferences(job):

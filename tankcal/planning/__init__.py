@@ -5,7 +5,7 @@ Names are imported when they are first used.
 
 from importlib import import_module
 
-_ROOM_OF = {
+_MODULE_OF = {
     "Plan": "model",
     "Prediction": "prediction",
     "greedy": "improvements",
@@ -15,10 +15,10 @@ _ROOM_OF = {
     "what_helps": "improvements",
 }
 
-__all__ = [*_ROOM_OF]
+__all__ = [*_MODULE_OF]
 
 
 def __getattr__(name):
-    if name not in _ROOM_OF:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module 'tankcal.planning' has no attribute {name!r}")
-    return getattr(import_module(f"tankcal.planning.{_ROOM_OF[name]}"), name)
+    return getattr(import_module(f"tankcal.planning.{_MODULE_OF[name]}"), name)

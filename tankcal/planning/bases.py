@@ -7,9 +7,9 @@ import numpy as np
 from tankcal.job.checking import has_rows
 from tankcal.job.checks.survey.stadia import bars_used
 from tankcal.planning.model import Base
-from tankcal.planning.patterns import ARCSEC
 from tankcal.survey.measurements import Readings
 from tankcal.survey.stadia import angle_of_distance_rad, distance_sd_m
+from tankcal.units import ARCSEC
 
 STADIA_FILE = "stadia.csv"
 NEW_SD_RAD = ARCSEC  # standard deviation of the angle of an added base if the plan has no base
@@ -78,7 +78,7 @@ def readings_of_bases(plan, point_names):
     )
 
 
-def by_ends(bases):
+def group_by_ends(bases):
     """Group `Base`s by their two ends, whichever end each is read from: {names of ends: bases}."""
     groups = {}
     for base in bases:

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.errors import TankcalError
-from tankcal.planning.bases import by_ends, new_bases
-from tankcal.planning.model import Known, Plan
-from tankcal.planning.patterns import places_around, row_heights_m, tape_of
+from tankcal.planning.assembly import tape_of
+from tankcal.planning.bases import group_by_ends, new_bases
+from tankcal.planning.model import ControlPoint, Plan
+from tankcal.planning.places import places_around, row_heights_m
 from tankcal.planning.wall.changes import WALL_ITEMS, wall_changes_of, wall_count
 from tankcal.planning.wall.model import WallPlan
 
@@ -99,7 +100,7 @@ def changes_of(plan, actions=("add", "drop", "repeat"), items=ITEMS):
         return tuple(_changes_of_wall(plan, actions, WALL_ITEMS if items is ITEMS else items))
     changes = []
     for item in items:
-        changes += [change for change in _OF[item](plan) if change[0] in actions]
+        changes += [change for change in _CHANGES_OF[item](plan) if change[0] in actions]
     before = cost_of(plan)
     return tuple(
         Change(action, item, name, after, cost_of(after) - before)
@@ -121,23 +122,25 @@ def _changes_of_wall(plan, actions, items):
 
 def _stations(plan):
     for station in plan.stations:
-        kept_photos = tuple(photo for photo in plan.photos if photo.station != station)
-        if kept_photos or plan.setups:
-            yield "drop", "photo_station", station, replace(plan, photos=kept_photos)
+        others = tuple(photo for photo in plan.photos if photo.station != station)
+        if others or plan.setups:
+            yield "drop", "photo_station", station, replace(plan, photos=others)
     places = {photo.station: photo.xyz_m for photo in plan.photos}
-    for station, _, place in _between(plan, places):
-        first = next(photo for photo in plan.photos if photo.station == station)
-        copied = [photo for photo in plan.photos if photo.station == station]
+    for station, _, place in _halfway_positions(plan, places):
         name = f"{NEW}{station}"
-        if any(photo.station == name for photo in plan.photos):
+        if name in plan.stations:
             continue
-        turn = _azimuth(plan, place) - _azimuth(plan, first.xyz_m)
+        copied = [photo for photo in plan.photos if photo.station == station]
+        # The new station sees the tank as the copied station does, turned about the axis.
+        turn = _azimuth(plan, place) - _azimuth(plan, copied[0].xyz_m)
+        c, s = np.cos(turn), np.sin(turn)  # clockwise as seen from above
+        rotation = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         added = tuple(
             replace(
-                copied_photo, name=f"{name}.{k + 1}", station=name, xyz_m=place,
-                rotation=copied_photo.rotation @ _about_z(turn).T,
+                photo, name=f"{name}.{k}", station=name, xyz_m=place,
+                rotation=photo.rotation @ rotation.T,
             )
-            for k, copied_photo in enumerate(copied)
+            for k, photo in enumerate(copied, 1)
         )  # fmt: skip
         yield "add", "photo_station", name, replace(plan, photos=(*plan.photos, *added))
 
@@ -147,13 +150,7 @@ def _azimuth(plan, place):
     return np.arctan2(x, y)
 
 
-def _about_z(turn):
-    """Rotation matrix (3, 3) that turns positions clockwise as seen from above."""
-    c, s = np.cos(turn), np.sin(turn)
-    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _between(plan, places):
+def _halfway_positions(plan, places):
     """Yield (name, next name, position (3,)) half-way in azimuth between neighbours of one height.
 
     places: {name: position (3,)}.
@@ -165,32 +162,28 @@ def _between(plan, places):
         names = sorted(names, key=lambda name: _azimuth(plan, places[name]))
         if len(names) < 2:
             continue
-        for start, next_name in zip(names, names[1:] + names[:1], strict=True):
-            here, ends = places[start], places[next_name]
-            gap = (_azimuth(plan, ends) - _azimuth(plan, here)) % (2 * np.pi)
-            radius = [np.hypot(*(place[:2] - plan.shell.axis_m)) for place in (here, ends)]
+        for name, next_name in zip(names, names[1:] + names[:1], strict=True):
+            here, there = places[name], places[next_name]
+            gap = (_azimuth(plan, there) - _azimuth(plan, here)) % (2 * np.pi)
+            radius = [np.hypot(*(place[:2] - plan.shell.axis_m)) for place in (here, there)]
             at = places_around(plan.shell.axis_m, _azimuth(plan, here) + gap / 2, np.mean(radius))
-            yield start, next_name, np.array([*at, (here[2] + ends[2]) / 2])
+            yield name, next_name, np.array([*at, (here[2] + there[2]) / 2])
 
 
 def _setups(plan):
     for setup in plan.setups:
-        kept_setups = tuple(
+        others = tuple(
             replace(other, sights=tuple(name for name in other.sights if name != setup.name))
             for other in plan.setups
             if other is not setup
         )
-        if kept_setups or plan.photos:
+        if others or plan.photos:
             ties = tuple(tie for tie in plan.ties if setup.name not in (tie.start, tie.end))
             bases = tuple(base for base in plan.bases if setup.name not in (base.setup, base.to))
-            yield (
-                "drop",
-                "setup",
-                setup.name,
-                replace(plan, setups=kept_setups, ties=ties, bases=bases),
-            )
+            after = replace(plan, setups=others, ties=ties, bases=bases)
+            yield "drop", "setup", setup.name, after
     places = {setup.name: setup.xyz_m for setup in plan.setups}
-    for name, other, place in _between(plan, places):
+    for name, other, place in _halfway_positions(plan, places):
         template = next(setup for setup in plan.setups if setup.name == name)
         new = f"{NEW}{name}"
         if new in places:
@@ -206,26 +199,25 @@ def _setups(plan):
 
 def _tapes(plan):
     for tie in plan.ties:
-        yield "drop", "tape", tie.name, _without_tie(plan, tie)
+        yield "drop", "tape", tie.name, _drop_tie(plan, tie)
         again = replace(tie, readings=2 * tie.readings)
-        ties = tuple(again if other_tie is tie else other_tie for other_tie in plan.ties)
+        ties = tuple(again if other is tie else other for other in plan.ties)
         if again.readings <= MOST_READINGS:
             yield "repeat", "tape", tie.name, replace(plan, ties=ties)
     yield from _new_tapes(plan)
 
 
-def _without_tie(plan, tie):
+def _drop_tie(plan, tie):
     """Return the Plan without a tape, and without marks at its ends that no other item uses."""
-    kept_ties = tuple(kept for kept in plan.ties if kept is not tie)
-    needed = {control_point.name for control_point in plan.known}.union(
-        *((kept.start, kept.end) for kept in kept_ties)
-    )
+    others = tuple(other for other in plan.ties if other is not tie)
+    needed = {point.name for point in plan.known}
+    needed |= {end for other in others for end in (other.start, other.end)}
     spare = {tie.start, tie.end} - needed
     extra, facing = (
-        {name: kept for name, kept in some.items() if name not in spare}
-        for some in (plan.extra, plan.facing)
+        {name: value for name, value in values.items() if name not in spare}
+        for values in (plan.extra, plan.facing)
     )
-    return replace(plan, ties=kept_ties, extra=extra, facing=facing)
+    return replace(plan, ties=others, extra=extra, facing=facing)
 
 
 def _new_tapes(plan):
@@ -256,31 +248,28 @@ def _new_tapes(plan):
 
 def _bases(plan):
     """Yield changes of bases; the readings of a base from either end change together."""
-    for ends, group in by_ends(plan.bases).items():
+    for ends, group in group_by_ends(plan.bases).items():
         name = "-".join(ends)
-        kept_bases = tuple(base for base in plan.bases if base not in group)
-        yield "drop", "base", name, replace(plan, bases=kept_bases)
-        again = [replace(member, readings=2 * member.readings) for member in group]
-        if max(member.readings for member in again) <= MOST_READINGS:
-            yield "repeat", "base", name, replace(plan, bases=(*kept_bases, *again))
-    for base in new_bases(plan):
-        name = "-".join((base[0].setup, base[0].to))
-        yield "add", "base", name, replace(plan, bases=(*plan.bases, *base))
+        others = tuple(base for base in plan.bases if base not in group)
+        yield "drop", "base", name, replace(plan, bases=others)
+        again = [replace(base, readings=2 * base.readings) for base in group]
+        if max(base.readings for base in again) <= MOST_READINGS:
+            yield "repeat", "base", name, replace(plan, bases=(*others, *again))
+    for pair in new_bases(plan):
+        yield "add", "base", pair[0].name, replace(plan, bases=(*plan.bases, *pair))
 
 
 def _control(plan):
-    for control_point in plan.known:
-        kept_points = tuple(
-            known_point for known_point in plan.known if known_point is not control_point
-        )
-        yield "drop", "control_point", control_point.name, replace(plan, known=kept_points)
-    sds = [control_point.sd_m[control_point.sd_m > 0] for control_point in plan.known]
-    sd = min((float(group.min()) for group in sds if len(group)), default=CONTROL_SD_M)
-    names = {control_point.name for control_point in plan.known}
+    for point in plan.known:
+        others = tuple(other for other in plan.known if other is not point)
+        yield "drop", "control_point", point.name, replace(plan, known=others)
+    sds = [sd for point in plan.known for sd in point.sd_m.tolist() if sd > 0]
+    sd = min(sds, default=CONTROL_SD_M)
+    names = {point.name for point in plan.known}
     for number in _spread_targets(plan, 8):
         name = plan.targets.names[number]
         if name not in names:
-            point = Known(name, plan.targets.xyz_m[number], np.full(3, sd))
+            point = ControlPoint(name, plan.targets.xyz_m[number], np.full(3, sd))
             yield "add", "control_point", name, replace(plan, known=(*plan.known, point))
 
 
@@ -297,31 +286,28 @@ def _rows(plan):
     """Yield changes of target rows: drop one unless it is the last of a course, or add one."""
     targets = plan.targets
     for course in dict.fromkeys(targets.course.tolist()):
-        after = _with_row(plan, course)
+        after = _add_row(plan, course)
         if after is not None:
             name = f"{OF_COURSE}{plan.job.courses[course].name}"
             yield "add", "target_row", name, after
     for name in dict.fromkeys(targets.section):
         in_row = np.array([section == name for section in targets.section])
-        rest = targets.taken(~in_row)
+        rest = targets.select(~in_row)
         if set(rest.course) == set(targets.course):
-            gone = set(targets.taken(in_row).names)
-            known = tuple(
-                control_point for control_point in plan.known if control_point.name not in gone
-            )
+            gone = set(targets.select(in_row).names)
+            known = tuple(point for point in plan.known if point.name not in gone)
             ties = tuple(tie for tie in plan.ties if not {tie.start, tie.end} & gone)
             after = replace(plan, targets=rest, known=known, ties=ties)
             yield "drop", "target_row", f"{ROW}{name}", after
 
 
-def _with_row(plan, course):
+def _add_row(plan, course):
     """Return the Plan with another row in a course, all rows at Gauss levels; None if too low."""
     targets = plan.targets
     in_course = targets.course == course
-    rows = sorted(
-        {*zip(targets.height_m[in_course], np.array(targets.section)[in_course], strict=True)}
-    )
-    below = sum(lower_course.height_m for lower_course in plan.job.courses[:course])
+    sections = np.array(targets.section)[in_course]
+    rows = sorted({*zip(targets.height_m[in_course], sections, strict=True)})
+    below = sum(lower.height_m for lower in plan.job.courses[:course])
     levels, _ = row_heights_m([plan.job.courses[course]], len(rows) + 1, targets.clearance_m)
     if len(levels) <= len(rows):
         return None
@@ -331,7 +317,7 @@ def _with_row(plan, course):
         xyz[row, 2] += below + level - height
         heights[row] = below + level
     moved = replace(targets, xyz_m=xyz, height_m=heights)
-    last = moved.taken([name == rows[-1][1] for name in moved.section])
+    last = moved.select([name == rows[-1][1] for name in moved.section])
     section, rise = f"{NEW}{len(set(targets.section)) + 1}", levels[-1] - levels[-2]
     added = replace(
         last,
@@ -341,11 +327,8 @@ def _with_row(plan, course):
         xyz_m=last.xyz_m + [0.0, 0.0, rise],
     )
     places = dict(zip(moved.names, moved.xyz_m, strict=True))
-    known = tuple(
-        replace(control_point, xyz_m=places.get(control_point.name, control_point.xyz_m))
-        for control_point in plan.known
-    )
-    return replace(plan, targets=moved.followed_by(added), known=known)
+    known = tuple(replace(point, xyz_m=places.get(point.name, point.xyz_m)) for point in plan.known)
+    return replace(plan, targets=moved.append(added), known=known)
 
 
 def _readings(plan):
@@ -357,7 +340,7 @@ def _readings(plan):
         yield "repeat", "reading", SETS, replace(plan, setups=setups)
 
 
-_OF = {
+_CHANGES_OF = {
     "photo_station": _stations,
     "setup": _setups,
     "tape": _tapes,

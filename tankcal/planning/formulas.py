@@ -1,6 +1,6 @@
-"""Planning formulas: vertical photographs, close range, depth of field, diffraction, target size.
+"""Planning formulas: vertical photographs, close range, focus, diffraction, target size.
 
-    M = GSD / pixel          Z = f M          B = (1 - overlap) frame M
+    M = GSD / pixel          Z = f M
     s_X = Z/f sqrt((x/f Z/B s_p)^2 + s_x^2)   s_Y likewise with y     s_Z = Z^2/(f B) s_p
     s_p = sqrt(2) s_x        each stage may use a third of the error of the next
     s = q M s_image          close range
@@ -8,12 +8,13 @@
 The formulas hold for the normal case of two vertical photographs. A simulation of the network
 predicts the precision of a tank survey better. No plan uses these functions.
 
-    H = f^2 / (N c) + f            near = s (H - f) / (H + s - 2 f)       far = s (H - f) / (H - s)
-    m = f / (s - f)                blur = 2.44 lambda N (1 + m)           D = n pixel M
+    s = 2 near far / (near + far)                     H - f = near (s - f) / (s - near)
+    N = f^2 / (c (H - f))          m = f / (s - f)    blur = 2.44 lambda N (1 + m)
+    D = n pixel M / cos(slant)
 
 f is the focal length, N the f-number, and c the largest blur that counts as sharp. s is the focus
-distance, m the scale of the image, and M = distance over principal distance. With the focus at the
-hyperfocal distance H, all points beyond H/2 are sharp.
+distance, m the scale of the image, and M = distance over principal distance. H is the hyperfocal
+distance.
 
 Source: Pessoa 2017 (31-39); Merchant 1982 (thirds); Silva 1995 (20); Ray 2002, Applied Photographic
 Optics, chs. 22 and 6.
@@ -26,49 +27,20 @@ METRE = 1e-3  # metres per millimetre
 GREEN_MM = 550e-6  # wavelength of green light, mm
 AIRY = 2.44  # diameter of the first dark ring, in units of wavelength times f-number
 PIXELS_OF_CIRCLE = 8.0  # diameter of a circle whose centre is located to a tenth of a pixel
-PIXELS_OF_BIT = 3.0  # width of one cell of a coded target
 
 
 def scale_denominator(gsd_m, pixel_mm):
     """Scale denominator M = GSD / pixel of the scale 1 : M."""
-    return positive("gsd_m", gsd_m) / (METRE * positive("pixel_mm", pixel_mm))
-
-
-def ground_sample_distance_m(scale, pixel_mm):
-    """Ground sample distance GSD = M pixel, m."""
-    return positive("scale", scale) * METRE * positive("pixel_mm", pixel_mm)
+    return _require_positive("gsd_m", gsd_m) / (METRE * _require_positive("pixel_mm", pixel_mm))
 
 
 def flying_height_m(focal_mm, scale):
     """Flying height Z = f M above the ground, m, for principal distance f and scale 1 : M."""
-    return METRE * positive("focal_mm", focal_mm) * positive("scale", scale)
-
-
-def base_m(overlap, frame_mm, scale):
-    """Base B = (1 - overlap) frame M between neighbouring photographs, m.
-
-    Parameters
-    ----------
-    overlap : float
-        Common share of the frame, 0 to below 1.
-    frame_mm : float
-        Side of the frame along the flight, mm.
-    scale : float
-        Scale denominator M.
-    """
-    if not 0 <= overlap < 1:
-        raise ValueError(f"found overlap = {overlap!r}; expected a share from 0 to below 1")
-    frame = METRE * positive("frame_mm", frame_mm)
-    return (1 - overlap) * frame * positive("scale", scale)
-
-
-def parallax_sd(image_sd):
-    """Standard deviation s_p = sqrt(2) s_x of a difference of two image coordinates."""
-    return np.sqrt(2) * positive("image_sd", image_sd)
+    return METRE * _require_positive("focal_mm", focal_mm) * _require_positive("scale", scale)
 
 
 def object_sds_m(xy_mm, focal_mm, height_m, base_m, image_sd_mm):
-    """Standard deviations (..., 3) of X, Y, Z, m, of points in two vertical photographs.
+    """Standard deviations of X, Y, Z of points in two vertical photographs.
 
         s_X = Z/f sqrt((x/f Z/B s_p)^2 + s_x^2)        s_Z = Z^2/(f B) s_p
 
@@ -85,15 +57,22 @@ def object_sds_m(xy_mm, focal_mm, height_m, base_m, image_sd_mm):
         Base B, m.
     image_sd_mm : float
         Standard deviation s_x of an image coordinate, mm.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        m.
     """
     xy = np.asarray(xy_mm, dtype=float)
     if xy.shape[-1:] != (2,):
         raise ValueError(f"found xy_mm of shape {xy.shape}; expected (..., 2)")
-    focal, height = positive("focal_mm", focal_mm), positive("height_m", height_m)
-    base, image_sd = positive("base_m", base_m), positive("image_sd_mm", image_sd_mm)
-    parallax = parallax_sd(image_sd)
-    plan = height / focal * np.hypot(xy / focal * height / base * parallax, image_sd)
-    depth = np.full((*xy.shape[:-1], 1), height**2 / (focal * base) * parallax)
+    focal = _require_positive("focal_mm", focal_mm)
+    height = _require_positive("height_m", height_m)
+    base = _require_positive("base_m", base_m)
+    image_sd = _require_positive("image_sd_mm", image_sd_mm)
+    parallax_sd = np.sqrt(2) * image_sd  # difference of two independent image coordinates
+    plan = height / focal * np.hypot(xy / focal * height / base * parallax_sd, image_sd)
+    depth = np.full((*xy.shape[:-1], 1), height**2 / (focal * base) * parallax_sd)
     return np.concatenate([plan, depth], axis=-1)
 
 
@@ -105,25 +84,7 @@ def thirds_m(limit_m, stages=3):
     """
     if stages < 1:
         raise ValueError(f"found stages = {stages!r}; expected 1 or more")
-    return positive("limit_m", limit_m) * THIRD ** np.arange(stages)
-
-
-def classes_reached(sd_m, limits):
-    """Return the best class of each scale that a standard deviation meets, a tuple of limits.
-
-    Parameters
-    ----------
-    sd_m : float
-        Standard deviation of the product, m; in plan sqrt(s_X^2 + s_Y^2).
-    limits : sequence
-        Limits of one component with `scale` and `sd_m`, best class of a scale first
-        (`tankcal.calibration.product.limits.Limit`).
-    """
-    best = {}
-    for limit in limits:
-        if limit.scale not in best and sd_m <= limit.sd_m:
-            best[limit.scale] = limit
-    return tuple(best.values())
+    return _require_positive("limit_m", limit_m) * THIRD ** np.arange(stages)
 
 
 def close_range_sd_m(design, scale, image_sd_mm):
@@ -139,86 +100,41 @@ def close_range_sd_m(design, scale, image_sd_mm):
     image_sd_mm : float
         Standard deviation s_image of an image coordinate, mm.
     """
-    sd = METRE * positive("image_sd_mm", image_sd_mm)
-    return positive("design", design) * positive("scale", scale) * sd
-
-
-def hyperfocal_m(focal_mm, f_number, sharp_mm):
-    """Hyperfocal distance H = f^2 / (N c) + f, m.
-
-    Parameters
-    ----------
-    focal_mm : float
-        Focal length f, mm.
-    f_number : float
-        N.
-    sharp_mm : float
-        Largest blur c that counts as sharp, mm.
-    """
-    f, n, c = (
-        positive(name, value)
-        for name, value in (("focal_mm", focal_mm), ("f_number", f_number), ("sharp_mm", sharp_mm))
-    )
-    return METRE * (f * f / (n * c) + f)
-
-
-def depth_of_field_m(focal_mm, f_number, sharp_mm, focus_m):
-    """Nearest and farthest sharp distance from the lens, m.
-
-    The farthest distance is inf if the focus is at the hyperfocal distance or beyond.
-
-    Parameters
-    ----------
-    focal_mm, f_number, sharp_mm : float
-        As in `hyperfocal_m`.
-    focus_m : float
-        Focus distance, m.
-    """
-    h, f = hyperfocal_m(focal_mm, f_number, sharp_mm), METRE * focal_mm
-    s = _beyond(f, focus_m)
-    near = s * (h - f) / (h + s - 2 * f)
-    far = s * (h - f) / (h - s) if s < h else np.inf
-    return near, far
-
-
-def _beyond(focal_m, focus_m):
-    """Return the focus distance; raise ValueError if it does not exceed the focal length."""
-    if positive("focus_m", focus_m) <= focal_m:
-        expected = f"expected more than the focal length {focal_m:g} m"
-        raise ValueError(f"found focus_m = {focus_m!r}; {expected}")
-    return focus_m
+    sd = METRE * _require_positive("image_sd_mm", image_sd_mm)
+    return _require_positive("design", design) * _require_positive("scale", scale) * sd
 
 
 def focus_for_m(near_m, far_m):
     """Focus distance s = 2 near far / (near + far), m, that makes both limits equally sharp."""
-    near = positive("near_m", near_m)
+    near = _require_positive("near_m", near_m)
     if not near <= far_m:
         raise ValueError(f"found {near_m!r} to {far_m!r}; expected the nearer distance first")
     if np.isinf(far_m):
         return 2 * near
-    far = positive("far_m", far_m)
+    far = _require_positive("far_m", far_m)
     return 2 * near * far / (near + far)
 
 
 def f_number_for(focal_mm, sharp_mm, near_m, far_m):
     """Smallest f-number that keeps all points between two distances sharp.
 
-    From the depth of field: H - f = near (s - f) / (s - near) at the focus of `focus_for_m`.
+    From the depth of field: H - f = near (s - f) / (s - near) at the focus of `focus_for_m`, and
+    H - f = f^2 / (N c).
 
     Parameters
     ----------
     focal_mm : float
         Focal length f, mm.
     sharp_mm : float
-        Largest blur that counts as sharp, mm.
+        Largest blur c that counts as sharp, mm.
     near_m, far_m : float
         Nearest and farthest distance, m.
     """
-    f, s = METRE * positive("focal_mm", focal_mm), focus_for_m(near_m, far_m)
+    f, s = METRE * _require_positive("focal_mm", focal_mm), focus_for_m(near_m, far_m)
     if not f < near_m < far_m:
         raise ValueError(f"found {near_m!r} to {far_m!r}; expected two distances beyond the lens")
     beyond = near_m * (s - f) / (s - near_m)
-    return f * f / (METRE * positive("sharp_mm", sharp_mm) * beyond)
+    return f * f / (METRE * _require_positive("sharp_mm", sharp_mm) * beyond)
 
 
 def diffraction_mm(f_number, focal_mm=None, focus_m=np.inf, wavelength_mm=GREEN_MM):
@@ -235,10 +151,13 @@ def diffraction_mm(f_number, focal_mm=None, focus_m=np.inf, wavelength_mm=GREEN_
     """
     m = 0.0
     if np.isfinite(focus_m):
-        f = METRE * positive("focal_mm", focal_mm)
-        m = f / (_beyond(f, focus_m) - f)
-    wavelength = positive("wavelength_mm", wavelength_mm)
-    return AIRY * wavelength * positive("f_number", f_number) * (1 + m)
+        f = METRE * _require_positive("focal_mm", focal_mm)
+        if _require_positive("focus_m", focus_m) <= f:
+            expected = f"expected more than the focal length {f:g} m"
+            raise ValueError(f"found focus_m = {focus_m!r}; {expected}")
+        m = f / (focus_m - f)
+    wavelength = _require_positive("wavelength_mm", wavelength_mm)
+    return AIRY * wavelength * _require_positive("f_number", f_number) * (1 + m)
 
 
 def target_diameter_m(scale, pixel_mm, pixels=PIXELS_OF_CIRCLE, slant_rad=0.0):
@@ -255,29 +174,14 @@ def target_diameter_m(scale, pixel_mm, pixels=PIXELS_OF_CIRCLE, slant_rad=0.0):
     slant_rad : float, optional
         Largest angle between line of sight and target normal, rad. Its cosine narrows the image.
     """
-    n = positive("pixels", pixels)
+    n = _require_positive("pixels", pixels)
     if not 0 <= slant_rad < np.pi / 2:
         raise ValueError(f"found slant_rad = {slant_rad!r}; expected 0 to below a right angle")
-    across = METRE * positive("pixel_mm", pixel_mm) * positive("scale", scale)
+    across = METRE * _require_positive("pixel_mm", pixel_mm) * _require_positive("scale", scale)
     return n * across / np.cos(slant_rad)
 
 
-def coded_target_m(scale, pixel_mm, cells, pixels=PIXELS_OF_BIT, slant_rad=0.0):
-    """Smallest side of a coded target, m.
-
-    Parameters
-    ----------
-    scale, pixel_mm, slant_rad
-        As in `target_diameter_m`.
-    cells : float
-        Number of cells across, border included.
-    pixels : float, optional
-        Width of the image of a cell, pixels.
-    """
-    return positive("cells", cells) * target_diameter_m(scale, pixel_mm, pixels, slant_rad)
-
-
-def positive(name, value):
+def _require_positive(name, value):
     """Return the value; raise ValueError unless it is finite and above 0."""
     values = np.asarray(value, dtype=float)
     if not (np.isfinite(values).all() and (values > 0).all()):

@@ -11,13 +11,11 @@ import numpy as np
 from tankcal.errors import TankcalError
 from tankcal.messages import message
 from tankcal.planning.changes import ITEMS, Change, changes_of, cost_of
-from tankcal.planning.checks.placed import refuse_misplaced
-from tankcal.planning.checks.seen import refuse_blind
-from tankcal.planning.limits import limited_u
 from tankcal.planning.measurements import measurements_of, nominal_of
+from tankcal.planning.position_checks import refuse_misplaced
 from tankcal.planning.prediction import Prediction, predict
-from tankcal.planning.table import predicted_table, recompute_table
-from tankcal.planning.visibility import visible
+from tankcal.planning.table import predict_table, recompute_table, relative_u_of
+from tankcal.planning.visibility import find_visible, refuse_blind
 from tankcal.planning.wall.changes import SEARCHED
 from tankcal.planning.wall.model import WallPlan
 from tankcal.survey import predict_survey
@@ -55,18 +53,18 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class _NothingBefore:
+class _NoPrediction:
     """Placeholder for the Prediction of a plan without a solution."""
 
-    tabled: None = None
+    result: None = None
     relative_u: float = np.nan
 
 
-NOTHING_BEFORE = _NothingBefore()
+NO_PREDICTION = _NoPrediction()
 
 
 @dataclass(frozen=True)
-class Path:
+class SearchPath:
     """Sequence of changes, each the best of its round.
 
     Attributes
@@ -83,7 +81,7 @@ class Path:
     start: Prediction
     steps: tuple[Effect, ...]
     prediction: Prediction
-    tried: int
+    evaluations: int
 
     @property
     def plan(self):
@@ -153,7 +151,7 @@ def what_would_do(plan, progress=None):
     tuple of Effect
         Their difference is nan, as the plan has no U before.
     """
-    effects = what_helps(plan, changes_of(plan, ("add",), OF_FRAME), progress, NOTHING_BEFORE)
+    effects = what_helps(plan, changes_of(plan, ("add",), OF_FRAME), progress, NO_PREDICTION)
     return tuple(effect for effect in effects if not effect.why)
 
 
@@ -180,7 +178,7 @@ def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progres
     Path
     """
     start = now = predict(plan)
-    limit, steps_done, tried = plan.limits.relative_u, [], 0
+    limit, steps_done, evaluations = plan.limits.relative_u, [], 0
     actions = ("add", "repeat") if add else ("drop",)
     if isinstance(plan, WallPlan) and items is ITEMS:
         items = SEARCHED
@@ -189,13 +187,13 @@ def greedy(plan, *, add=True, steps=REPEATED, items=ITEMS, changes=None, progres
         if add and now.meets:
             break
         effects = what_helps(now.plan, choose(now.plan), progress, now)
-        tried += len(effects)
+        evaluations += len(effects)
         step, after = _best(effects, now, limit, add)
         if step is None:
             break
         steps_done.append(step)
         now = after
-    return Path(start, tuple(steps_done), now, tried)
+    return SearchPath(start, tuple(steps_done), now, evaluations)
 
 
 def smallest(plan, progress=None, items=ITEMS):
@@ -227,7 +225,7 @@ def smallest(plan, progress=None, items=ITEMS):
         return first
     last = greedy(first.plan, add=False, steps=1000, items=items, progress=progress)
     steps = first.steps + last.steps
-    return Path(first.start, steps, last.prediction, first.tried + last.tried)
+    return SearchPath(first.start, steps, last.prediction, first.evaluations + last.evaluations)
 
 
 def _best(effects, now, limit, add):
@@ -256,21 +254,33 @@ def _candidates(effects, now, limit, add):
 
     Dropping an item must not add to the targets that are weak already.
     """
-    works, before = [effect for effect in effects if not effect.why], now.relative_u
+    possible, before = [effect for effect in effects if not effect.why], now.relative_u
     if add:
-        gains = [effect for effect in works if effect.relative_u < (1 - LEAST_GAIN) * before]
+        gains = [effect for effect in possible if effect.relative_u < (1 - LEAST_GAIN) * before]
         return sorted(gains, key=lambda gain: _worth(gain, before), reverse=True)
-    keeps = [effect for effect in works if limit is not None and effect.relative_u <= limit]
+    keeps = [effect for effect in possible if limit is not None and effect.relative_u <= limit]
     if not isinstance(now.plan, WallPlan):
-        poor = poor_targets(now.plan, now.seen, now.tabled)
+        poor = count_poor_targets(now.plan, now.visibility, now.result)
         keeps = [effect for effect in keeps if effect.poor <= poor]
     return sorted(keeps, key=lambda effect: _saving(effect, before), reverse=True)
 
 
-def poor_targets(plan, seen, tabled):
-    """Number of targets of a plan that are not determined, or have fewer rays than the limit."""
+def count_poor_targets(plan, seen, result):
+    """Number of targets of a plan that are not determined, or have fewer rays than the limit.
+
+    Parameters
+    ----------
+    plan : Plan
+    seen : Visibility
+    result : PredictedTable
+
+    Returns
+    -------
+    int
+        With set-ups, rays are not counted, as one set-up determines a target.
+    """
     count = len(plan.targets.names)
-    lost = count - len(tabled.covariance.points)
+    lost = count - len(result.covariance.points)
     wanted = 0 if plan.setups else plan.limits.rays
     return max(lost, int(np.sum(seen.rays[:count] < wanted)))
 
@@ -295,17 +305,17 @@ def _effect(change, before):
     try:
         if change.action == "add":
             refuse_misplaced(plan, change.name)
-        seen = visible(plan)
+        seen = find_visible(plan)
         refuse_blind(plan, seen)
-        predicted = predict_survey(measurements_of(plan, seen), nominal_of(plan))
-        tabled = before.tabled and recompute_table(plan, predicted, before.tabled)
-        tabled = tabled or predicted_table(plan, predicted)
+        network = predict_survey(measurements_of(plan, seen), nominal_of(plan))
+        result = before.result and recompute_table(plan, network, before.result)
+        result = result or predict_table(plan, network)
     except TankcalError as error:
         why, inf = str(error).splitlines()[0], float("inf")
         return Effect(change, inf, inf, inf, len(plan.targets.names), why)
-    u = limited_u(tabled, plan.limits)
-    top = float(tabled.made.table.U_m3[-1])
-    return Effect(change, u, u - before.relative_u, top, poor_targets(plan, seen, tabled))
+    u = relative_u_of(result, plan.limits)
+    top = float(result.computed_table.table.U_m3[-1])
+    return Effect(change, u, u - before.relative_u, top, count_poor_targets(plan, seen, result))
 
 
 def _effect_on_wall(change, before):
@@ -313,10 +323,10 @@ def _effect_on_wall(change, before):
     why, inf = change.why, float("inf")
     if not why:
         try:
-            tabled = predict(change.plan).tabled
+            result = predict(change.plan).result
         except TankcalError as error:
             why = str(error).splitlines()[0]
     if why:
         return Effect(change, inf, inf, inf, 0, why)
-    u, top = limited_u(tabled, change.plan.limits), float(tabled.made.table.U_m3[-1])
+    u, top = relative_u_of(result, change.plan.limits), float(result.computed_table.table.U_m3[-1])
     return Effect(change, u, u - before.relative_u, top, 0)

@@ -11,11 +11,13 @@ import numpy as np
 from tankcal.geometry.rotations import angles_of
 from tankcal.planning.bases import readings_of_bases
 from tankcal.planning.model import TAPED
-from tankcal.planning.visibility import measurable
+from tankcal.planning.visibility import find_measurable
 from tankcal.survey import Nominal
 from tankcal.survey.measurements import ImageReadings, KnownPoints, Photo, Readings, Setup, Targets
 from tankcal.survey.observations import KINDS
 from tankcal.survey.readings import read_distance_m
+
+BLUNDER_SDS = 20.0  # size of a simulated blunder, in standard deviations of its reading
 
 
 def nominal_of(plan):
@@ -30,11 +32,11 @@ def measurements_of(plan, seen):
 
     Repeated readings are one value with the standard deviation of their mean.
     """
-    given, counts = plan.job.measurements, measurable(plan, seen)
+    counts = find_measurable(plan, seen)
     seen = replace(seen, on_photo=seen.on_photo & counts, on_setup=seen.on_setup & counts)
     determined = {name for name, is_there in zip(seen.points, counts, strict=True) if is_there}
     return replace(
-        given,
+        plan.job.measurements,
         photos=tuple(_photo(photo) for photo in plan.photos),
         image_points=_image_points(plan, seen),
         control=_control(plan),
@@ -71,9 +73,9 @@ def _control(plan):
     if not plan.known:
         return None
     return KnownPoints(
-        point=tuple(control_point.name for control_point in plan.known),
-        xyz_m=np.array([control_point.xyz_m for control_point in plan.known]),
-        sd_m=np.array([control_point.sd_m for control_point in plan.known]),
+        point=tuple(point.name for point in plan.known),
+        xyz_m=np.array([point.xyz_m for point in plan.known]),
+        sd_m=np.array([point.sd_m for point in plan.known]),
         system=(None,) * len(plan.known),
         check=np.zeros(len(plan.known), dtype=bool),
     )
@@ -146,7 +148,7 @@ def _readings(table, start, end, sd, **more):
     )  # fmt: skip
 
 
-def draw_measurements(plan, measurements, predicted, rng=None):
+def draw_measurements(plan, measurements, network, rng=None):
     """Return the Measurements with values computed from the nominal positions.
 
     Parameters
@@ -159,7 +161,7 @@ def draw_measurements(plan, measurements, predicted, rng=None):
         None: no errors. Otherwise each reading has its own error, and the readings of an instrument
         share errors of its scale and offset.
     """
-    values, draw = _nominal_values(predicted), _error_function(rng)
+    values, draw = _nominal_values(network), _error_function(rng)
     off = {tool.name: _instrument_errors(tool, draw) for tool in measurements.instruments}
     tools = {tool.name: tool for tool in measurements.instruments}
     setups = {setup.name: setup for setup in measurements.setups}
@@ -169,7 +171,7 @@ def draw_measurements(plan, measurements, predicted, rng=None):
     if control is not None:
         control = replace(control, xyz_m=draw(control.xyz_m, np.nan_to_num(control.sd_m)))
     readings = tuple(
-        _with_values(reading, values, draw, (tools, off), setups)
+        _fill_values(reading, values, draw, (tools, off), setups)
         for reading in measurements.readings
     )
     return replace(measurements, image_points=images, control=control, readings=readings)
@@ -182,9 +184,9 @@ def _error_function(rng):
     return lambda value, sd: value + rng.standard_normal(np.shape(value)) * sd
 
 
-def _nominal_values(predicted):
+def _nominal_values(network):
     """Return {(table, horizontal, names): value} of all readings at the nominal positions."""
-    by_key, problem = {}, predicted.adjusted.problem
+    by_key, problem = {}, network.adjusted.problem
     for table in (*problem.observations, *(held.observations for held in problem.exact)):
         trace = table.trace
         if trace is None or not trace.table:
@@ -198,7 +200,7 @@ def _nominal_values(predicted):
     return by_key
 
 
-def _with_values(readings, values, draw, tools, setups):
+def _fill_values(readings, values, draw, tools, setups):
     """Return readings with their values; readings of points that are left out keep the value 0."""
     starts = readings.setup or readings.start
     horizontal = readings.horizontal
@@ -229,3 +231,22 @@ def _instrument_reading(true_m, name, tools, off):
         return true_m
     scale, offset = off[name]
     return read_distance_m(true_m * (1.0 + scale) + offset, tools[name])
+
+
+def draw_blunders(rng, share, count):
+    """Draw errors in standard deviations: 0, or a blunder for a share of the readings.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    share : float
+        Probability of a blunder, 0 to 1.
+    count : int
+        Number of readings.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+    """
+    sign = np.where(rng.random(count) < 0.5, -1.0, 1.0)
+    return BLUNDER_SDS * sign * (rng.random(count) < share)

@@ -52,7 +52,7 @@ class Targets:
     clearance_m: float
     welds_rad: tuple = ()
 
-    def taken(self, keep):
+    def select(self, keep):
         """Return the targets selected by a mask (n,)."""
         keep, selected = np.flatnonzero(keep), {}
         for name in _OF_EACH:
@@ -61,7 +61,7 @@ class Targets:
             selected[name] = values[keep] if is_array else tuple(values[i] for i in keep)
         return replace(self, **selected)
 
-    def followed_by(self, others):
+    def append(self, others):
         """Return these targets followed by other targets."""
         both = {}
         for name in _OF_EACH:
@@ -106,7 +106,7 @@ class Photograph:
 
 
 @dataclass(frozen=True)
-class Instrumented:
+class PlannedSetup:
     """One set-up of a total station; each reading is repeated in `sets` sets.
 
     xyz_m (3,) is the centre of the instrument. direction_sd_rad, zenith_sd_rad and distance_sd_m
@@ -174,7 +174,7 @@ class Base:
 
 
 @dataclass(frozen=True)
-class Known:
+class ControlPoint:
     """Control point: nominal coordinates (3,) and sds (3,); sd nan: unknown, 0: held exactly."""
 
     name: str
@@ -214,14 +214,14 @@ class Shell:
     """Nominal shell as seen from the side of the survey, m.
 
     axis_m (2,) is the axis, radius_m the radius of the lowest course, low_m and high_m are z of
-    bottom and top. outside is True if the observer stands outside.
+    bottom and top. is_outside is True if the observer stands outside.
     """
 
     axis_m: np.ndarray
     radius_m: float
     low_m: float
     high_m: float
-    outside: bool
+    is_outside: bool
 
 
 @dataclass(frozen=True)
@@ -234,17 +234,17 @@ class Limits:
         Largest angle between the line of sight and the normal of the wall.
     relative_u : float or None
         Largest U over volume.
-    of : str
+    quantity : str
         "top": limit for the full tank; "delivery": for the worst delivery of the smallest minimum.
     rays : int
         Fewest rays of a point that is not weak.
     place : tuple
-        (file, row, column) of `of` in the plan, for messages.
+        (file, row, column) of `limits.of` in the plan, for messages.
     """
 
     incidence_rad: float
     relative_u: float | None = None
-    of: str = "top"
+    quantity: str = "top"
     rays: int = 3
     place: tuple = ("plan.toml", None, None)
 
@@ -273,7 +273,7 @@ class Plan:
         "control_point", "target", "reading".
     folder : str
         Name of the folder.
-    given : RawJob or None
+    raw : RawJob or None
         Content of the folder as read (`job.tables.RawJob`).
     """
 
@@ -281,9 +281,9 @@ class Plan:
     shell: Shell
     targets: Targets
     photos: tuple[Photograph, ...]
-    setups: tuple[Instrumented, ...]
+    setups: tuple[PlannedSetup, ...]
     ties: tuple[Tie, ...]
-    known: tuple[Known, ...]
+    known: tuple[ControlPoint, ...]
     extra: dict
     facing: dict
     obstacles: tuple
@@ -293,7 +293,7 @@ class Plan:
     amplitudes: Amplitudes = field(default_factory=assumed_amplitudes)
     costs: dict = field(default_factory=dict)
     folder: str = ""
-    given: RawJob | None = None
+    raw: RawJob | None = None
     warnings: tuple = ()
 
     @property

@@ -10,25 +10,21 @@ from tankcal.messages import message
 from tankcal.planning.model import Box, Pillar
 
 
-def check_obstacles(given, log):
+def check_obstacles(plan_input, log):
     """Check the keys of boxes and cylinders in a `Given`."""
     needed = {"box": {"from_m": 3, "to_m": 3}, "cylinder": {"axis_m": 2}}
     numbers = {"box": (), "cylinder": ("radius_m", "low_m", "high_m")}
-    for entry in given.repeated["obstacles"]:
+    for entry in plan_input.sections["obstacles"]:
         for key, count in needed.get(entry["kind"], {}).items():
             if not entry.is_refused(key) and len(entry[key] or ()) != count:
-                entry.tell(
-                    log.problem,
-                    key,
-                    message("plan_numbers_metres", "expected {count} numbers, metres", count=count),
+                expected = message(
+                    "plan_numbers_metres", "expected {count} numbers, metres", count=count
                 )
+                entry.report(log.problem, key, expected)
         for key in numbers.get(entry["kind"], ()):
-            if key not in entry.filled:
-                entry.tell(
-                    log.problem,
-                    key,
-                    message("plan_number_metres", "missing; expected a number, metres"),
-                )
+            if key not in entry.filled_keys:
+                expected = message("plan_number_metres", "missing; expected a number, metres")
+                entry.report(log.problem, key, expected)
         if None not in (entry["low_m"], entry["high_m"]) and entry["high_m"] <= entry["low_m"]:
             expected = message(
                 "plan_high_low",
@@ -36,18 +32,18 @@ def check_obstacles(given, log):
                 high=entry["high_m"],
                 low=entry["low_m"],
             )
-            entry.tell(log.problem, "high_m", expected)
+            entry.report(log.problem, "high_m", expected)
         if any(a == b for a, b in zip(entry["from_m"] or (), entry["to_m"] or (), strict=False)):
             expected = message(
                 "plan_flat_box",
                 "in a plane with from_m; expected a corner that differs in x, y and z",
             )
-            entry.tell(log.problem, "to_m", expected)
+            entry.report(log.problem, "to_m", expected)
 
 
-def obstacles_of(given):
+def obstacles_of(plan_input):
     """Return the `Box`es and `Pillar`s of valid [[obstacles]], a tuple."""
-    return tuple(map(_obstacle, given.repeated["obstacles"]))
+    return tuple(map(_obstacle, plan_input.sections["obstacles"]))
 
 
 def _obstacle(entry):
@@ -60,29 +56,29 @@ def _obstacle(entry):
     )  # fmt: skip
 
 
-def in_an_obstacle(obstacles, xyz_m):
+def message_of_obstacle_at(obstacles, xyz_m):
     """Return the message about a position (3,) within an obstacle; "" if it is in none."""
     for obstacle in obstacles:
-        if _within(obstacle, xyz_m):
+        if _contains(obstacle, xyz_m):
             return message(
                 "plan_in_an_obstacle", "stands in the obstacle {obstacle}", obstacle=obstacle.name
             )
     return ""
 
 
-def _within(obstacle, xyz):
+def _contains(obstacle, xyz):
     if hasattr(obstacle, "radius_m"):
         near = np.hypot(*(xyz[:2] - obstacle.axis_m)) < obstacle.radius_m
         return bool(near and obstacle.low_m < xyz[2] < obstacle.high_m)
     return bool(((xyz > obstacle.low_m) & (xyz < obstacle.high_m)).all())
 
 
-def misplaced(station, why):
+def message_of_misplaced_station(station, why):
     """Return the message about a station at an impossible position."""
     return message("plan_misplaced", "station {station} {why}", station=station, why=why)
 
 
-def line_cut(start, end):
+def message_of_cut_line(start, end):
     """Return the message about an obstructed line between two stations."""
     return message(
         "plan_base_hidden",
@@ -110,18 +106,18 @@ def find_hidden(obstacle, place_m, xyz_m):
     """
     along = xyz_m - place_m
     if isinstance(obstacle, Box):
-        first, last = _in_slabs(place_m, along, obstacle.low_m, obstacle.high_m)
+        first, last = _clip_to_slabs(place_m, along, obstacle.low_m, obstacle.high_m)
     else:
         low, high = np.full(3, -np.inf), np.full(3, np.inf)
         low[2], high[2] = obstacle.low_m, obstacle.high_m
-        first, last = _in_slabs(place_m, along, low, high)
-        near, far = _in_round(place_m[:2] - obstacle.axis_m, along[:, :2], obstacle.radius_m)
+        first, last = _clip_to_slabs(place_m, along, low, high)
+        near, far = _clip_to_circle(place_m[:2] - obstacle.axis_m, along[:, :2], obstacle.radius_m)
         first, last = np.maximum(first, near), np.minimum(last, far)
     # The line parameter is 0 at the observer and 1 at the point.
     return np.maximum(first, 0.0) < np.minimum(last, 1.0)
 
 
-def _in_slabs(place, along, low, high):
+def _clip_to_slabs(place, along, low, high):
     """First and last line parameters (n,), (n,) within the slabs of three axes."""
     still = along == 0  # parallel to a slab: inside it everywhere or nowhere
     step = np.where(still, 1.0, along)
@@ -132,7 +128,7 @@ def _in_slabs(place, along, low, high):
     return first.max(axis=1), last.min(axis=1)
 
 
-def _in_round(place, along, radius):
+def _clip_to_circle(place, along, radius):
     """First and last line parameters within a circle: |place + t along| < radius."""
     # a t^2 + 2 b t + c < 0 between the roots; a vertical line (a = 0) is inside if c < 0
     a, b = np.einsum("ni,ni->n", along, along), along @ place

@@ -1,22 +1,35 @@
 """Predict a plan: precision of points and sections, and U of every row of the table."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.messages import message
-from tankcal.pipeline.survey_warnings import VAGUE
-from tankcal.planning.bodies import describe_separate_bodies, find_separate_bodies
-from tankcal.planning.checks.seen import refuse_blind
-from tankcal.planning.doubtful import reliability
-from tankcal.planning.foreseen import foreseen, idle_ties
-from tankcal.planning.limits import OfTable, refuse_without_delivery
+from tankcal.job.tables import SETTINGS_FILE
+from tankcal.messages import list_some, message
+from tankcal.pipeline.section_homogeneity import OF_SCATTER
+from tankcal.pipeline.stadia_checks import check_bases
+from tankcal.pipeline.survey_warnings import SHOWN, VAGUE, open_questions
+from tankcal.pipeline.table import check_table
+from tankcal.planning.entries import PLAN_FILE
 from tankcal.planning.measurements import measurements_of, nominal_of
 from tankcal.planning.model import Plan
-from tankcal.planning.table import PredictedTable, predicted_table
-from tankcal.planning.visibility import Visibility, visible
+from tankcal.planning.reliability import assess_reliability
+from tankcal.planning.table import (
+    PredictedCovariance,
+    PredictedTable,
+    TableResults,
+    predict_table,
+    refuse_without_delivery,
+)
+from tankcal.planning.visibility import (
+    Visibility,
+    describe_separate_bodies,
+    find_separate_bodies,
+    find_visible,
+    refuse_blind,
+)
 from tankcal.planning.wall.model import WallPlan
 from tankcal.planning.wall.prediction import predict_wall
 from tankcal.survey import Predicted, predict_survey
@@ -72,56 +85,56 @@ class SectionOutlook:
 
 
 @dataclass(frozen=True)
-class Prediction(OfTable):
+class Prediction(TableResults):
     """Predicted results of a planned survey.
 
     Attributes
     ----------
     plan : Plan
-    seen : Visibility
+    visibility : Visibility
         Visible points per photograph and set-up.
     measurements : Measurements
-    predicted : Predicted
+    network : Predicted
         The network (`surveys.Predicted`).
-    tabled : PredictedTable
+    result : PredictedTable
         Wall, table and statements.
     points : tuple of PointOutlook
         All points, targets first.
     """
 
     plan: Plan
-    seen: Visibility
+    visibility: Visibility
     measurements: object
-    predicted: Predicted
-    tabled: PredictedTable
+    network: Predicted
+    result: PredictedTable
     points: tuple[PointOutlook, ...]
 
     @property
     def datum(self):
         """Definition of the datum (`surveys.DatumReport`)."""
-        return self.predicted.frame.report
+        return self.network.frame.report
 
     @cached_property
     def precision(self):
         """Mean sds and homogeneity of the determined targets (`network.quality.Precision`)."""
-        adjusted, points = self.predicted.adjusted, self.tabled.covariance.points
+        adjusted, points = self.network.adjusted, self.result.covariance.points
         return precision(adjusted.xyz_m[points], adjusted.point_covariances_m2[points])
 
     @cached_property
     def reliability(self):
         """Effects of undetected blunders, a tuple of GroupReliability."""
-        tabled = self.tabled
-        return reliability(self.plan, self.predicted, tabled.covariance, tabled.by_points_m2)
+        result = self.result
+        return assess_reliability(self.plan, self.network, result.covariance, result.by_points_m2)
 
     @cached_property
     def sections(self):
         """A tuple of SectionOutlook, from the bottom up."""
-        return sections_of(self.tabled)
+        return sections_of(self.result)
 
     @cached_property
     def warnings(self):
         """Warnings of the planned survey and of items without effect, a tuple of Problem."""
-        return foreseen(self)
+        return list_warnings(self)
 
     @property
     def undetermined(self):
@@ -154,22 +167,22 @@ def predict(plan):
     """
     if isinstance(plan, WallPlan):
         return predict_wall(plan)
-    seen = visible(plan)
+    seen = find_visible(plan)
     refuse_blind(plan, seen)
     measurements = measurements_of(plan, seen)
     _refuse_exact(measurements)
-    predicted = _predicted(plan, seen, measurements)
-    points = _points(plan, seen, predicted)
+    network = _predict_network(plan, seen, measurements)
+    points = _points(plan, seen, network)
     try:
-        tabled = predicted_table(plan, predicted)
+        result = predict_table(plan, network)
     except SolutionError as error:
-        idle = (problem.expected for problem in idle_ties(plan, points))
+        idle = (problem.expected for problem in warnings_of_idle_ties(plan, points))
         raise SolutionError(*error.texts, *idle) from error
-    refuse_without_delivery(plan, tabled, plan.shell.high_m - plan.shell.low_m)
-    return Prediction(plan, seen, measurements, predicted, tabled, points)
+    refuse_without_delivery(plan, result, plan.shell.high_m - plan.shell.low_m)
+    return Prediction(plan, seen, measurements, network, result, points)
 
 
-def _predicted(plan, seen, measurements):
+def _predict_network(plan, seen, measurements):
     """Return surveys.Predicted; if there is no solution, explain why in terms of the plan."""
     try:
         return predict_survey(measurements, nominal_of(plan))
@@ -193,27 +206,27 @@ def _refuse_exact(measurements):
         raise InputError(Problem("plan.toml", expected))
 
 
-def _points(plan, seen, predicted):
+def _points(plan, seen, network):
     """Return the PointOutlook of all points."""
-    adjusted = predicted.adjusted
+    adjusted = network.adjusted
     place = {name: i for i, name in enumerate(adjusted.survey.points)}
     index = np.array([place.get(name, -1) for name in seen.points])
     sd = np.vstack([adjusted.point_sd_m, np.full(3, np.nan)])[index]
     sd[[i for i, k in enumerate(index) if k >= 0 and adjusted.problem.set_aside[k]]] = np.nan
-    why = _reasons(predicted)
+    why = _reasons(network)
     middle = np.nanmedian(sd[: len(plan.targets.names)].max(axis=1))
     outlooks = []
     for name, rays, point_sd in zip(seen.points, seen.rays.tolist(), sd, strict=True):
         lost = ""
         if np.isnan(point_sd).any():
-            lost = why.get(name) or _too_few(rays)
+            lost = why.get(name) or _reason_of_few_readings(rays)
         outlooks.append(
             PointOutlook(name, rays, point_sd, lost, _weakness(plan, rays, point_sd, middle))
         )
     return tuple(outlooks)
 
 
-def _too_few(rays):
+def _reason_of_few_readings(rays):
     """Reason why a point with too few readings is not determined."""
     if not rays:
         return "is seen from nowhere"
@@ -230,10 +243,10 @@ def _weakness(plan, rays, sd_m, middle_m):
     return ""
 
 
-def _reasons(predicted):
+def _reasons(network):
     """Return {name: reason} of points that the survey leaves out."""
-    adjusted, reasons = predicted.adjusted, {}
-    for text in predicted.gathered.aside:
+    adjusted, reasons = network.adjusted, {}
+    for text in network.gathered.aside:
         name, _, why = text.removeprefix("point ").partition(" ")
         reasons[name] = why
     for i, why in enumerate(adjusted.problem.set_aside):
@@ -243,17 +256,17 @@ def _reasons(predicted):
     return reasons
 
 
-def sections_of(tabled):
+def sections_of(result):
     """Return the SectionOutlook of each section, from the circle through its targets.
 
     Standard deviations of the centre are relative to the wall: common motions of all points are
     excluded.
     """
-    wall, covariance = tabled.wall, tabled.covariance
+    wall, covariance = result.wall, result.covariance
     rows, n = [], 3 * len(covariance.points)
     for section in wall.sections:
         members = section.group.members
-        x, y, _ = tabled.job.points.xyz_m[wall.accepted[members]].T
+        x, y, _ = result.job.points.xyz_m[wall.accepted[members]].T
         away = np.column_stack([x - section.circle.x_m, y - section.circle.y_m])
         unit = away / np.linalg.norm(away, axis=1)[:, None]
         # Circle fit, linearised: radial error = unit vector times centre shift + radius change.
@@ -271,3 +284,109 @@ def sections_of(tabled):
         )
         for section, section_sd in zip(wall.sections, sd, strict=True)
     )  # fmt: skip
+
+
+# ---- warnings
+
+
+def list_warnings(prediction):
+    """Return a tuple of Problem for the plan, its network, the wall and the table."""
+    result = prediction.result
+    of_table = check_table(_with_full_covariance(result), result.wall, result.computed_table)
+    of_run = (
+        *prediction.network.frame.warnings,
+        *open_questions(result.job, prediction.datum, result.job.points.causes),
+        *(
+            problem
+            for problem in of_table
+            if getattr(problem.expected, "code", None) not in OF_SCATTER
+        ),
+    )
+    return (
+        *prediction.plan.warnings,
+        *_undetermined_targets(prediction),
+        *warnings_of_idle_ties(prediction.plan, prediction.points),
+        *_uncontrolled(prediction.reliability),
+        *check_bases(prediction.measurements),
+        *(
+            replace(problem, file=PLAN_FILE) if problem.file == SETTINGS_FILE else problem
+            for problem in of_run
+        ),
+    )
+
+
+def _with_full_covariance(result):
+    """Return the job of a PredictedTable with the full covariance of its points."""
+    points, adjusted = result.job.points, result.covariance.adjusted
+    number = {name: i for i, name in enumerate(adjusted.survey.points)}
+    covariance = PredictedCovariance(adjusted, np.array([number[name] for name in points.names]))
+    return replace(result.job, points=replace(points, covariance_m2=covariance))
+
+
+def _undetermined_targets(prediction):
+    """Return a Problem about targets that are not determined."""
+    targets = set(prediction.plan.targets.names)
+    lost = [point.name for point in prediction.undetermined if point.name in targets]
+    if not lost:
+        return ()
+    text = message(
+        "plan_targets_lost",
+        "targets that are not determined, because they are seen from too few places: {count} of "
+        "{all} ({points})",
+        count=len(lost),
+        all=len(targets),
+        points=list_some(lost, SHOWN),
+    )
+    return (Problem(PLAN_FILE, text, column="pattern"),)
+
+
+def warnings_of_idle_ties(plan, points):
+    """Return a Problem about tapes, bases, levels and plumb lines with an undetermined end.
+
+    points: PointOutlook of all points.
+    """
+    lost = {point.name for point in points if point.undetermined}
+    ties = [(tie.name, (tie.start, tie.end)) for tie in plan.ties]
+    ties += [(base.name, (base.setup, base.to)) for base in plan.bases]
+    idle = [
+        message("plan_tie_end", "{tie} ({points})", tie=name, points=lost_ends)
+        for name, ends in ties
+        if (lost_ends := [end for end in ends if end in lost])
+    ]
+    if not idle:
+        return ()
+    text = message(
+        "plan_ties_idle",
+        "tapes, bases, height differences and plumb lines without effect, because one of their "
+        "ends is not determined: {count} of {all}, {ties}",
+        count=len(idle),
+        all=len(ties),
+        ties=list_some(idle, SHOWN),
+    )
+    return (Problem(PLAN_FILE, text),)
+
+
+def _uncontrolled(groups):
+    """Return a Problem about kinds of readings (`GroupReliability`) with uncontrolled values."""
+    idle = [_describe_group(group) for group in groups if group.uncontrolled]
+    if not idle:
+        return ()
+    text = message(
+        "plan_uncontrolled",
+        "no other observation checks {groups}: an error there would enter the table unnoticed",
+        groups=idle,
+    )
+    return (Problem(PLAN_FILE, text),)
+
+
+def _describe_group(group):
+    if group.count == 1:
+        template = "the only value of {group} ({points})"
+        return message("plan_only_value", template, group=group.kind, points="-".join(group.of))
+    return message(
+        "plan_some_values",
+        "{uncontrolled} of {count} values of {group}",
+        uncontrolled=group.uncontrolled,
+        count=group.count,
+        group=group.kind,
+    )

@@ -47,18 +47,25 @@ from tankcal.job.tables import (
 from tankcal.job.tables import TABLES as JOB_FILES
 from tankcal.messages import message
 from tankcal.planning.assembly import assemble_plan, limits_of
-from tankcal.planning.checks.given import check_given
-from tankcal.planning.checks.placed import check_plan
-from tankcal.planning.contract import JOB_TABLES, REPEATED, SINGLE, TABLES
-from tankcal.planning.fields import Count
-from tankcal.planning.given import PLAN_FILE, Entry, Given
+from tankcal.planning.contract import (
+    JOB_TABLES,
+    REPEATED,
+    SINGLE,
+    TABLES,
+    WALL_SECTIONS,
+    WALL_TABLES,
+    Count,
+)
+from tankcal.planning.entries import PLAN_FILE, Entry, PlanInput
+from tankcal.planning.input_checks import check_input
+from tankcal.planning.position_checks import check_positions
 from tankcal.planning.wall.checks import check_sections
-from tankcal.planning.wall.contract import OF_WALL
-from tankcal.planning.wall.contract import TABLES as WALL_TABLES
 from tankcal.planning.wall.reading import is_wall_plan, wall_plan_of
 from tankcal.text.numerals import NUMBER
 
 OF_LIQUID = ("horizontal", "sphere")  # kinds of tank that a plan may measure by liquid only
+# Placeholder of a table with one row, so that the checks of a job see a survey with readings.
+NO_IMAGE_POINTS = {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
 
 
 def load_plan(path):
@@ -81,47 +88,47 @@ def load_plan(path):
     log = Log()
     folder = _folder(Path(path), log)
     log.stop_if_problems()
-    raw, given = _read(folder, log)
+    raw, plan_input = _read(folder, log)
     values = read_settings(raw, log)
-    _check_kind(raw, given, log)
+    _check_kind(raw, plan_input, log)
     registers = {name: read_register(raw, name, log) for name in REGISTERS}
     tables = _job_tables(raw, log)
-    given = replace(given, control=tables["control"])
-    if given.is_wall:
-        return _wall_plan(raw, values, tables, given, folder, log)
-    _check(raw, values, tables | _measured(given), registers, given, log)
+    plan_input = replace(plan_input, control=tables["control"])
+    if plan_input.is_wall:
+        return _wall_plan(raw, values, tables, plan_input, folder, log)
+    _check(raw, values, tables | plan_input.ties | NO_IMAGE_POINTS, registers, plan_input, log)
     log.stop_if_problems()
     job = _job(raw, values, tables, registers, log)
     log.stop_if_problems()
-    plan = assemble_plan(job, given, bars_of(registers), folder.resolve().name)
-    check_plan(plan, given, raw, log)
+    plan = assemble_plan(job, plan_input, bars_of(registers), folder.resolve().name)
+    check_positions(plan, plan_input, raw, log)
     log.stop_if_problems()
-    return replace(plan, given=_with_points(raw), warnings=tuple(log.warnings))
+    return replace(plan, raw=_with_points(raw), warnings=tuple(log.warnings))
 
 
-def _wall_plan(raw, values, tables, given, folder, log):
+def _wall_plan(raw, values, tables, plan_input, folder, log):
     """Return the WallPlan of a plan that measures the bare wall."""
     courses = None if tables["courses"] is None else tuple(tables["courses"].of("course"))
     diameter = values["tank"]["nominal_diameter_m"]
-    check_sections(given, courses, None if diameter is None else diameter / 2, raw, log)
+    check_sections(plan_input, courses, None if diameter is None else diameter / 2, raw, log)
     log.stop_if_problems()
     warnings = tuple(log.warnings)
     raw = _with_points(raw)
     check_tank(values, tables, raw, log)
     log.stop_if_problems()
-    limits = limits_of(given.single["limits"])
+    limits = limits_of(plan_input.sections["limits"])
     name = folder.resolve().name
-    plan = wall_plan_of(raw, values, tables, given, limits, name)
+    plan = wall_plan_of(raw, values, tables, plan_input, limits, name)
     return replace(plan, warnings=(*warnings, *plan.warnings))
 
 
-def _check_kind(raw, given, log):
+def _check_kind(raw, plan_input, log):
     """Check the kind of tank: upright, unless the plan measures by liquid only."""
     kind = kind_of(raw)
     if kind in (None, "vertical"):
         return
-    is_filled = bool(given.repeated["runs"])
-    others = [name for name in OF_WALL if given.repeated.get(name) or _is_filled(given, name)]
+    is_filled = bool(plan_input.sections["runs"])
+    others = [name for name in WALL_SECTIONS if plan_input.has(name)]
     if is_filled and not others and kind in OF_LIQUID:
         return
     if is_filled and kind in OF_LIQUID:
@@ -140,15 +147,11 @@ def _check_kind(raw, given, log):
     log.problem(PLAN_FILE, expected, None, "tank.kind")
 
 
-def _is_filled(given, name):
-    return name in given.single and bool(given.single[name].filled)
-
-
 def _with_points(raw):
     """Return the RawJob with decimal points in its tables and no declared marks."""
     settings = {name: entries for name, entries in raw.settings.items() if name != "csv"}
     tables = {
-        name: replace(table, decimal=".", rows=tuple(map(_in_points, table.rows)))
+        name: replace(table, decimal=".", rows=tuple(map(_row_with_points, table.rows)))
         if table is not None and table.decimal is not None
         else table
         for name, table in raw.tables.items()
@@ -156,7 +159,7 @@ def _with_points(raw):
     return replace(raw, settings=settings, tables=tables)
 
 
-def _in_points(row):
+def _row_with_points(row):
     """Return a row of cells with decimal points."""
     numbers = ((cell or "").strip().replace(",", ".") for cell in row)
     return tuple(
@@ -186,7 +189,7 @@ def _folder(path, log):
 
 
 def _read(folder, log):
-    """Return the RawJob and the Given of a plan's folder."""
+    """Return the RawJob and the PlanInput of a plan's folder."""
     files = []
 
     def content(name, limit=None):
@@ -198,38 +201,35 @@ def _read(folder, log):
     data = content(PLAN_FILE, MAX_SETTINGS_BYTES)
     parsed = None if data is None else parsed_toml(PLAN_FILE, data, log)
     log.stop_if_problems()
-    text, (whole, rows) = decode(PLAN_FILE, data, log), parsed
+    whole, rows = parsed
+    text = decode(PLAN_FILE, data, log)
     rows, text = _refuse_misspelt(whole, rows, text, log)
-    own_sections = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
-    _refuse_nothing_measured(own_sections, log)
+    plan_sections = {name: whole.pop(name) for name in (*SINGLE, *REPEATED) if name in whole}
+    _refuse_nothing_measured(plan_sections, log)
     settings, sections = flattened(PLAN_FILE, whole, rows, log)
-    needed = () if is_wall_plan(own_sections) else ("pattern",)
-    single = {
-        name: _single(name, own_sections.get(name, {}), rows, log, name in needed)
+    is_wall = is_wall_plan(plan_sections)
+    needed = () if is_wall else ("pattern",)
+    checked = {
+        name: _read_section(name, plan_sections.get(name, {}), rows, log, name in needed)
         for name in SINGLE
     }
-    repeated = {name: _repeated(name, own_sections.get(name, []), text, log) for name in REPEATED}
+    for name in REPEATED:
+        checked[name] = _read_sections(name, plan_sections.get(name, []), text, log)
     marks = declared_marks(PLAN_FILE, settings, log)
-    is_wall = is_wall_plan(own_sections)
-    beside = tuple(table_name for table_name in JOB_TABLES if table_name != "control") + WALL_TABLES
-    tables, known = (
-        {},
-        [f"{table_name}.csv" for table_name in (beside if is_wall else (*JOB_TABLES, *TABLES))],
-    )
+    # The design of a bare wall generates its control.
+    of_wall = (*(name for name in JOB_TABLES if name != "control"), *WALL_TABLES)
+    known = [f"{name}.csv" for name in (of_wall if is_wall else (*JOB_TABLES, *TABLES))]
+    tables = {}
     for path in sorted(folder.glob("*.csv")):
         if path.name not in known:
-            log.problem(
-                path.name,
-                message(
-                    "plan_unknown_file", "unknown file; expected {known}", known=", ".join(known)
-                ),
+            expected = message(
+                "plan_unknown_file", "unknown file; expected {known}", known=", ".join(known)
             )
+            log.problem(path.name, expected)
             continue
-        table = content(path.name)
-        is_readable = table is not None and marks is not None
-        tables[path.stem] = (
-            read_csv(path.name, table, *marks, log, PLAN_FILE) if is_readable else None
-        )
+        table, tables[path.stem] = content(path.name), None
+        if table is not None and marks is not None:
+            tables[path.stem] = read_csv(path.name, table, *marks, log, PLAN_FILE)
     registers = {}
     for name in REGISTERS:
         if (folder / f"{name}.toml").exists():
@@ -241,25 +241,25 @@ def _read(folder, log):
         files=tuple(files), registers=registers, is_planned=True,
     )  # fmt: skip
     ties = {name: _table(name, tables.get(name), log) for name in TABLES}
-    return raw, Given(single, repeated, ties, ties.pop("stadia"), is_wall=is_wall)
+    return raw, PlanInput(checked, ties, ties.pop("stadia"), is_wall=is_wall)
 
 
 def _refuse_misspelt(content, rows, text, log):
     """Report sections with misspelt names; return (rows, text) with the corrected names.
 
     Reading continues under the corrected name, so that the section is not also reported as missing.
-    A name that would appear twice, or with other brackets, is removed from `whole`.
+    A name that would appear twice, or with other brackets, is removed from `content`.
     """
-    of_jobs = {name.partition(".")[0] for name in KEYS}
-    known = (*of_jobs, *SINGLE, *REPEATED)
-    for name in [section_name for section_name in content if section_name not in known]:
-        entries = content[name] if isinstance(content[name], list) else [content[name]]
+    sections_of_jobs = {name.partition(".")[0] for name in KEYS}
+    known = (*sections_of_jobs, *SINGLE, *REPEATED)
+    for name in [section for section in content if section not in known]:
+        is_list = isinstance(content[name], list)
+        entries = content[name] if is_list else [content[name]]
         right = meant(name, known)
         if right is None or not all(isinstance(entry, dict) for entry in entries):
             continue
         places = _rows_of(re.escape(name), text)
         row = places[0][0] if places else rows.get(name)
-        is_list = isinstance(content[name], list)
         column = f"[[{name}]]" if is_list else f"[{name}]"
         log.problem(PLAN_FILE, unknown_section(name, known), row, column)
         entries = content.pop(name)
@@ -296,43 +296,36 @@ def _table(name, table, log):
     for field in TABLES[name]:
         if isinstance(field, Count):
             for row, count in zip(values.rows, values.of(field.name), strict=True):
-                if not _is_whole(count):
-                    log.problem(values.file, _not_whole(field, count), row, field.name)
+                if why := _explain_fraction(field, count):
+                    log.problem(values.file, why, row, field.name)
     return values
 
 
-def _single(section, entries, rows, log, is_needed):
+def _read_section(section, entries, rows, log, is_needed):
+    """Return the Entry of a [section] of a plan."""
     if not isinstance(entries, dict):
-        log.problem(
-            PLAN_FILE,
-            message("plan_one_section", "expected one [{section}]", section=section),
-            rows.get(section),
-            section,
-        )
+        expected = message("plan_one_section", "expected one [{section}]", section=section)
+        log.problem(PLAN_FILE, expected, rows.get(section), section)
         entries = {}
     key_rows = {key: rows.get(f"{section}.{key}") for key in entries}
-    return _entry(section, SINGLE[section], entries, rows.get(section), key_rows, log, is_needed)
+    return _check_entry(
+        section, SINGLE[section], entries, rows.get(section), key_rows, log, is_needed
+    )
 
 
-def _repeated(section, entries, text, log):
+def _read_sections(section, entries, text, log):
     """Return the list of Entry of a [[section]] of a plan."""
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        log.problem(
-            PLAN_FILE,
-            message(
-                "plan_double_brackets",
-                "expected [[{section}]], in double brackets",
-                section=section,
-            ),
-            None,
-            section,
+        expected = message(
+            "plan_double_brackets", "expected [[{section}]], in double brackets", section=section
         )
+        log.problem(PLAN_FILE, expected, None, section)
         return []
     result, places = [], _rows_of(section, text)
     for number, entry in enumerate(entries):
         row, rows = places[number] if number < len(places) else (None, {})
         name = f"{section}[{number + 1}]"
-        result.append(_entry(name, REPEATED[section], entry, row, rows, log, is_needed=True))
+        result.append(_check_entry(name, REPEATED[section], entry, row, rows, log, is_needed=True))
     return result
 
 
@@ -352,7 +345,8 @@ def _rows_of(section, text):
     return sections
 
 
-def _entry(name, fields, entries, row, rows, log, is_needed=False):
+def _check_entry(name, fields, entries, row, rows, log, is_needed=False):
+    """Return the Entry of the checked keys of a section; rows: {key: row} for messages."""
     known = [field.name for field in fields]
     for key in entries:
         if key not in known:
@@ -371,19 +365,18 @@ def _entry(name, fields, entries, row, rows, log, is_needed=False):
         )
         for field in fields
     }
-    filled = frozenset(key for key, value in entries.items() if not is_blank(value))
-    checked = Entry(name, values, filled, row, rows)
+    filled_keys = frozenset(key for key, value in entries.items() if not is_blank(value))
+    checked = Entry(name, values, filled_keys, row, rows)
     for field in fields:
-        if isinstance(field, Count) and not _is_whole(values[field.name]):
-            checked.tell(log.problem, field.name, _not_whole(field, values[field.name]))
+        if isinstance(field, Count) and (why := _explain_fraction(field, values[field.name])):
+            checked.report(log.problem, field.name, why)
     return checked
 
 
-def _is_whole(value):
-    return value is None or float(value).is_integer()
-
-
-def _not_whole(field, value):
+def _explain_fraction(field, value):
+    """Return the message about a value that is no whole number; "" if it is whole or blank."""
+    if value is None or float(value).is_integer():
+        return ""
     return message(
         "plan_not_whole",
         "found {found:g}; expected {expected}",
@@ -406,20 +399,15 @@ def _job_tables(raw, log):
     return tables
 
 
-def _measured(given):
-    """Return the tables of the plan, and a placeholder for image points."""
-    return given.ties | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
-
-
-def _check(raw, values, tables, registers, given, log):
+def _check(raw, values, tables, registers, plan_input, log):
     """Check all values that do not depend on positions."""
     check_tank(values, tables, raw, log)
     files = SurveyFiles(values, tables, registers, raw, log)
     check_cameras(files)
     check_instruments(files)
-    if has_rows(given.stadia):
-        check_bars(files, given.stadia)
-    check_given(values, registers, given, raw, log)
+    if has_rows(plan_input.stadia):
+        check_bars(files, plan_input.stadia)
+    check_input(values, registers, plan_input, raw, log)
 
 
 def _job(raw, values, tables, registers, log):
@@ -431,5 +419,5 @@ def _job(raw, values, tables, registers, log):
     attached = Attached(None, None, None if rule is None else find_rule(raw, rule, log))
     log.stop_if_problems()
     measurements = make_measurements(values, tables, registers)
-    tables = tables | {"image_points": ColumnValues("image_points.csv", (1,), 0, {})}
+    tables = tables | NO_IMAGE_POINTS
     return make_job(raw, values, tables, attached, measurements, tuple(log.warnings))

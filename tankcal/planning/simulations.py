@@ -14,17 +14,16 @@ from tankcal.messages import message
 from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall import find_wall
-from tankcal.planning.measurements import draw_measurements
+from tankcal.planning.measurements import draw_blunders, draw_measurements
 from tankcal.planning.prediction import Prediction
 from tankcal.survey import adjust_survey, wall_points
 
 OF_SURVEY = ("points", "instrument_scale", "instrument_offset")
 SIMULATING = message("plan_simulating", "simulating surveys")
-BLUNDER_SDS = 20.0  # size of a simulated blunder, in standard deviations of its reading
 
 
 @dataclass(frozen=True)
-class Simulated:
+class SimulatedSurveys:
     """Results of many simulated surveys of a plan.
 
     Attributes
@@ -87,7 +86,7 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
     runs, seed : int, optional
         Number of surveys, and seed of their errors.
     blunders : float, optional
-        Share of readings with an error of BLUNDER_SDS standard deviations.
+        Share of readings with an error of `measurements.BLUNDER_SDS` standard deviations.
     progress : callable, optional
         progress(text, done, total).
 
@@ -101,29 +100,27 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
         If fewer than two surveys have a solution.
     """
     rng, failed = np.random.default_rng(seed), []
-    found, volumes, aside = [], [], []
+    adjusted, volumes, aside = [], [], []
     for run in range(1, runs + 1):
         if progress:
             progress(SIMULATING, run, runs)
-        drawn = draw_measurements(
-            prediction.plan, prediction.measurements, prediction.predicted, rng
-        )
+        drawn = draw_measurements(prediction.plan, prediction.measurements, prediction.network, rng)
         try:
             adjustment, volume = _adjust_drawn(prediction.plan, _add_blunders(drawn, blunders, rng))
         except TankcalError as error:
             failed.append(error.texts[0])
             continue
-        found.append(dict(zip(adjustment.names, adjustment.xyz_m, strict=True)))
+        adjusted.append(dict(zip(adjustment.names, adjustment.xyz_m, strict=True)))
         volumes.append(volume)
         aside.append(len(adjustment.removed))
     refuse_failed(failed, runs)
-    names = tuple(name for name in found[0] if all(name in result for result in found))
-    xyz = np.array([[result[name] for name in names] for result in found])
+    names = tuple(name for name in adjusted[0] if all(name in result for result in adjusted))
+    xyz = np.array([[result[name] for name in names] for result in adjusted])
     sds = {point.name: point.sd_m for point in prediction.points}
-    return Simulated(
+    return SimulatedSurveys(
         seed=seed,
         blunders=blunders,
-        runs=len(found),
+        runs=len(adjusted),
         failed=tuple(failed),
         names=names,
         scatter_m=xyz.std(axis=0, ddof=1),
@@ -170,22 +167,16 @@ def _add_blunders(measurements, share, rng):
     images = measurements.image_points
     if images is not None:
         along = np.eye(2)[rng.integers(2, size=len(images.point))]
-        off = blunders_in_sds(rng, share, len(along))[:, None] * along * images.sd_mm
+        off = draw_blunders(rng, share, len(along))[:, None] * along * images.sd_mm
         images = replace(images, xy_mm=images.xy_mm + off)
     readings = tuple(
         replace(
             reading,
-            value=reading.value + blunders_in_sds(rng, share, len(reading.end)) * reading.sd,
+            value=reading.value + draw_blunders(rng, share, len(reading.end)) * reading.sd,
         )
         for reading in measurements.readings
     )
     return replace(measurements, image_points=images, readings=readings)
-
-
-def blunders_in_sds(rng, share, count):
-    """Errors (count,) in standard deviations: 0, or a blunder for a share of them."""
-    sign = np.where(rng.random(count) < 0.5, -1.0, 1.0)
-    return BLUNDER_SDS * sign * (rng.random(count) < share)
 
 
 def _u_by_survey(table):

@@ -1,16 +1,23 @@
-"""Visibility of points: inside the frame, incidence within the limit, line of sight free."""
+"""Visibility of points: inside the frame, incidence within the limit, line of sight free.
+
+Also photographs and set-ups that see too little, and groups of set-ups that are not connected.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from tankcal.camera.model import distort_image_points
+from tankcal.job.tables import Log
+from tankcal.messages import message
 from tankcal.planning.model import Pillar
 from tankcal.planning.obstacles import find_hidden
 
-FEWEST_READINGS = 3  # for the three coordinates of a point  # for the three coordinates of a point
+FEWEST_READINGS = 3  # for the three coordinates of a point
+FEWEST_POINTS = 3  # fewest points on a photograph
+FEWEST_SHARED = 2  # fewest common points that connect two levelled set-ups
 AHEAD_M = 0.1  # smallest depth of a point in front of a camera
-ROOM = 1.3  # half formats; limit of undistorted image coordinates of points in the frame
+WIDEST = 1.3  # half formats; limit of undistorted image coordinates of points in the frame
 GRAZE_M = 1e-3  # reduction of the tank radius, so that the tank does not hide its own targets
 
 
@@ -42,17 +49,17 @@ class Visibility:
 
         Exposures from one position are one ray.
         """
-        return self.from_places.sum(axis=0) + self.on_setup.sum(axis=0)
+        return self.photo_views.sum(axis=0) + self.on_setup.sum(axis=0)
 
     @property
-    def from_places(self):
+    def photo_views(self):
         """Mask (positions, points): whether a photograph from the position shows the point."""
         mask = np.zeros((len(set(self.place.tolist())), len(self.points)), dtype=bool)
         np.logical_or.at(mask, self.place, self.on_photo)
         return mask
 
 
-def visible(plan):
+def find_visible(plan):
     """Return the Visibility of all points of a Plan from its photographs and set-ups."""
     points = plan.points
     xyz = np.array(list(points.values()), dtype=float).reshape(-1, 3)
@@ -79,28 +86,41 @@ def visible(plan):
     return Visibility(tuple(points), place, on_photo, image, on_setup)
 
 
-def measurable(plan, seen):
+def find_measurable(plan, seen):
     """Mask (points,): points with at least three readings, known coordinates included.
 
     Photographs from one position give no depth, however many there are. They therefore count once;
     otherwise a tape between two such points would seem to determine both.
     """
     names = {name: i for i, name in enumerate(seen.points)}
-    count = 2 * seen.from_places.sum(axis=0)
+    count = 2 * seen.photo_views.sum(axis=0)
     for k, setup in enumerate(plan.setups):
         kinds = (setup.direction_sd_rad, setup.zenith_sd_rad, setup.distance_sd_m)
         count = count + seen.on_setup[k] * sum(sd is not None for sd in kinds)
         count[names[setup.name]] += FEWEST_READINGS
-    for control_point in plan.known:
-        if control_point.name in names:
-            count[names[control_point.name]] += np.isfinite(control_point.sd_m).sum()
+    for point in plan.known:
+        if point.name in names:
+            count[names[point.name]] += np.isfinite(point.sd_m).sum()
     return count >= FEWEST_READINGS
 
 
 def find_in_frame(setup, photo, xyz_m):
-    """Image coordinates (n, 2), mm, of points (n, 3), and whether they lie in the frame.
+    """Find the points in the frame of a photograph.
 
-    setup is the job.CameraSetup of the photograph.
+    Parameters
+    ----------
+    setup : CameraSetup
+        Camera of the photograph.
+    photo : Photograph
+    xyz_m : ndarray, shape (n, 3)
+        Points, m.
+
+    Returns
+    -------
+    image : ndarray, shape (n, 2)
+        Image coordinates, mm; nan far outside the frame.
+    inside : ndarray of bool, shape (n,)
+        Whether the points lie in the frame.
     """
     # camera coordinates; the camera looks along -w
     u, v, w = photo.rotation @ (xyz_m - photo.xyz_m).T
@@ -108,7 +128,7 @@ def find_in_frame(setup, photo, xyz_m):
     ahead = w < -AHEAD_M
     ideal = -camera.values[0] * np.column_stack([u, v]) / np.where(ahead, w, -1.0)[:, None]
     # Far outside the frame the distortion polynomial can fold points back into the frame.
-    near = ahead & (np.abs(ideal) < ROOM * half).all(axis=1)
+    near = ahead & (np.abs(ideal) < WIDEST * half).all(axis=1)
     image = np.full((len(xyz_m), 2), np.nan)
     image[near] = distort_image_points(ideal[near], camera.values, camera.form)
     return image, near & (np.abs(np.nan_to_num(image, nan=np.inf)) < half).all(axis=1)
@@ -137,7 +157,7 @@ def find_in_sight(plan, place_m, xyz_m, normals):
         cosine = np.einsum("ni,ni->n", normals, back) / distance
     on_wall = np.isfinite(normals[:, 0])
     seen = (distance > 0) & np.where(on_wall, cosine > np.cos(plan.limits.incidence_rad), True)
-    if plan.shell.outside:
+    if plan.shell.is_outside:
         shell = plan.shell
         tank = Pillar(shell.axis_m, shell.radius_m - GRAZE_M, shell.low_m, shell.high_m, "tank")
         seen &= on_wall | ~find_hidden(tank, place_m, xyz_m)
@@ -147,3 +167,104 @@ def find_in_sight(plan, place_m, xyz_m, normals):
     for obstacle in plan.obstacles:
         seen &= ~find_hidden(obstacle, place_m, xyz_m)
     return seen
+
+
+def refuse_blind(plan, seen):
+    """Raise InputError for photographs and set-ups that see too few points.
+
+    One message per ring.
+    """
+    log, blind = Log(), {}
+    for k, photo in enumerate(plan.photos):
+        count, targets = (int(seen.on_photo[k, :n].sum()) for n in (None, len(plan.targets.names)))
+        if count < FEWEST_POINTS or not targets:
+            text = _describe_view(count, targets)
+            blind.setdefault(photo.place, []).append(
+                (message("plan_a_photograph", "photograph {photo}", photo=photo.name), text)
+            )
+    for k, setup in enumerate(plan.setups):
+        if not seen.on_setup[k].any():
+            blind.setdefault(setup.place, []).append(
+                (message("plan_a_setup", "set-up {setup}", setup=setup.name), "nothing")
+            )
+    for (file, row, name), views in blind.items():
+        who, text = views[0]
+        more = (
+            message("plan_more_of_ring", ", and {more} more of this ring", more=len(views) - 1)
+            if len(views) > 1
+            else ""
+        )
+        log.problem(
+            file,
+            message(
+                "plan_sees_too_little",
+                "{who} sees {found}{more}: targets are outside its frame, behind it, seen at too "
+                "flat an angle (limits.incidence_deg) or hidden; expected it to see 3 points or "
+                "more, targets among them",
+                who=who,
+                found=text,
+                more=more,
+            ),
+            row,
+            name,
+        )
+    log.stop_if_problems()
+
+
+def _describe_view(count, targets):
+    """Return the number of visible points in words; targets: number of targets among them."""
+    if not count:
+        return message("plan_nothing", "nothing")
+    if not targets:
+        return message("plan_no_target", "no target (other points: {count})", count=count)
+    if count == 1:
+        return message("plan_one_point_only", "{count} point only", count=count)
+    return message("plan_points_only", "{count} points only", count=count)
+
+
+def find_separate_bodies(plan, seen):
+    """Return the groups of connected set-ups, each a tuple of names.
+
+    Parameters
+    ----------
+    plan : Plan
+    seen : Visibility
+
+    Notes
+    -----
+    A set-up is a body: the points that it sees and its own position. Points known in x, y and z are
+    another body. Bodies with two common points are merged.
+    """
+    fixed = {point.name for point in plan.known if np.isfinite(point.sd_m).all()}
+    bodies = [([], fixed)]
+    for k, setup in enumerate(plan.setups):
+        seen_there = {seen.points[i] for i in np.flatnonzero(seen.on_setup[k])}
+        bodies.append(([setup.name], seen_there | {setup.name}))
+    while (pair := _find_connected(bodies)) is not None:
+        first, second = pair
+        bodies = [body for body in bodies if body is not first and body is not second]
+        bodies.append((first[0] + second[0], first[1] | second[1]))
+    return tuple(tuple(names) for names, _ in bodies if names)
+
+
+def _find_connected(bodies):
+    """Return two bodies with enough common points, or None."""
+    for i, body in enumerate(bodies):
+        for earlier in bodies[:i]:
+            if len(body[1] & earlier[1]) >= FEWEST_SHARED:
+                return earlier, body
+    return None
+
+
+def describe_separate_bodies(groups):
+    """Return the message about the groups that `find_separate_bodies` returns."""
+    listed = "; ".join(", ".join(names) for names in groups)
+    return message(
+        "plan_apart",
+        "{count} groups of set-ups are not connected to the others: {told}; they share fewer "
+        "than {shared} points and do not see each other: add marks or control points that "
+        "neighbours both see, or set-ups between them",
+        count=len(groups),
+        told=listed,
+        shared=FEWEST_SHARED,
+    )

@@ -40,7 +40,7 @@ from tankcal.record.comparison import (
     RoofInTable,
     Waterfall,
 )
-from tankcal.record.schema import filled_from
+from tankcal.record.schema import fill_from
 from tankcal.record.texts import warnings_of
 
 MINIMUM_M = (1.5, 2.0, 3.0)  # smallest heights of deliveries
@@ -143,7 +143,7 @@ def compare(former, new, *, rule=None, courses=None, fingerprints=("", "")):
         judged_from_m=from_m,
         legal=legal,
         ages=ages,
-        rule=filled_from(ComparisonRule, chosen, file=file, is_default=rule is None),
+        rule=fill_from(ComparisonRule, chosen, file=file, is_default=rule is None),
         verdict=verdict.code,
         verified=verdict.verified,
         reasons=list(verdict.reasons),
@@ -335,7 +335,7 @@ def _waterfall(basis):
 
 
 def _table(table, fingerprint, U):
-    return filled_from(
+    return fill_from(
         ComparedTable,
         table,
         sha256=fingerprint,
@@ -344,7 +344,7 @@ def _table(table, fingerprint, U):
         low_m=float(table.height_m[0]),
         high_m=float(table.height_m[-1]),
         top_volume_m3=float(table.volume_m3[-1]),
-        roof=filled_from(RoofInTable, table.roof),
+        roof=fill_from(RoofInTable, table.roof),
         k=None if table.U_m3 is None else table.k,
         U_top_m3=None if table.U_m3 is None else float(table.U_m3[-1]),
         U_of_deliveries=U.deliveries_by,

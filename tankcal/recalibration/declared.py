@@ -19,8 +19,9 @@ from tankcal.linter.totals import NO_UNITS, Units
 from tankcal.linter.units import FOOT3_M3, IMPERIAL_GALLON_M3, US_GALLON_M3
 from tankcal.messages import message
 from tankcal.recalibration.former import FormerRoof
+from tankcal.units import FOOT_M, INCH_M
 
-HEIGHT_UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+HEIGHT_UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": INCH_M, "ft": FOOT_M}
 VOLUME_UNITS = {
     "m3": 1.0,
     "hL": 0.1,

@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from tankcal.tank.hydrostatics import STANDARD_GRAVITY
+from tankcal.units import STANDARD_GRAVITY
 
 DEGREES = np.arange(1, 11)  # degrees of the Legendre polynomials
 BULGE_SD_M = 4e-3  # prior sd of degree 2: bulges of shells are a few millimetres

@@ -1,4 +1,4 @@
-"""The record: all that workbook and report need, as plain data (docs/record-format.md)."""
+"""The record: all data of workbook and report, as plain data (docs/record-format.md)."""
 
 import json
 from pathlib import Path
@@ -9,8 +9,8 @@ from tankcal.errors import InputError, Problem, reason_of
 from tankcal.memory import without_collection
 from tankcal.messages import message
 from tankcal.record import manifest
-from tankcal.record.long_tables import attached, copy_record, split, without_tables
-from tankcal.record.plain_data import whole
+from tankcal.record.columns import whole
+from tankcal.record.long_tables import attach_tables, copy_record, omit_tables, split_tables
 from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 from tankcal.text.decoding import read_json
 
@@ -19,16 +19,16 @@ __all__ = [
     "record_of_adjustment", "save", "version_of", "whole",
 ]  # fmt: skip
 
-ROWS_AT_ONCE = 1000  # of a table, as JSON
-MOST_HEIGHT_M = 1000
+ROWS_AT_ONCE = 1000  # rows of a long list that are converted to JSON at once
+MOST_HEIGHT_M = 1000  # no tank is higher
 NOT_NEGATIVE = ("u_m3", "U_m3", "k", "area_m2")  # columns of the capacity table
-MOST_VOLUME_M3 = 1e9  # the largest tanks and ships hold less than 1e6
-VOLUME_ROUNDING = 1e-9  # of the fullest tank: what rounding may make a table fall
+MOST_VOLUME_M3 = 1e9  # the largest tanks and ships hold less than 1e6 m3
+VOLUME_ROUNDING = 1e-9  # largest decrease by rounding, relative to the largest volume
 _JSON = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
 def record_of(result):
-    """The record of a result: everything that paper needs, so that paper needs nothing else.
+    """Make the record of a result, the only input of workbook and reports.
 
     Parameters
     ----------
@@ -37,15 +37,15 @@ def record_of(result):
     Returns
     -------
     dict
-        Of plain numbers, texts and lists; every key is in docs/saved-keys.md.
+        Plain numbers, texts and lists; every key is in docs/saved-keys.md.
     """
-    from tankcal.record.making import record_of  # reading a record needs nothing of this
+    from tankcal.record.making import record_of  # not needed to read a record
 
     return record_of(result)
 
 
 def record_of_adjustment(job, adjustment):
-    """The record of a job whose survey was only adjusted.
+    """Make the record of a job whose survey was only adjusted.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def record_of_adjustment(job, adjustment):
     Returns
     -------
     dict
-        As of `record_of`.
+        Record in the form of `record_of`.
     """
     from tankcal.record.making import record_of_adjustment
 
@@ -63,25 +63,26 @@ def record_of_adjustment(job, adjustment):
 
 
 def save(record, path):
-    """Write a record as UTF-8 JSON, and its long tables into a file beside it.
+    """Write a record as UTF-8 JSON, and its long tables into a file in the same folder.
 
     Parameters
     ----------
     record : dict
-        Of `record_of`.
+        Record of `record_of` or `load`.
     path : path
+        The file, record.json.
     """
     with Path(path).open("w", encoding="utf-8") as file:
-        file.writelines(_pieces(split(record, Path(path).parent)))
+        file.writelines(_encode_in_pieces(split_tables(record, Path(path).parent)))
         file.write("\n")
 
 
-def _pieces(value):
-    """The JSON of plain data in pieces, of a long table so many rows: the whole takes much room."""
+def _encode_in_pieces(value):
+    """Yield the JSON of plain data in pieces, since the whole text would need much memory."""
     if isinstance(value, dict) and value:
         for number, (name, item) in enumerate(value.items()):
             yield f"{',' if number else '{'}{_JSON.encode(name)}:"
-            yield from _pieces(item)
+            yield from _encode_in_pieces(item)
         yield "}"
     elif isinstance(value, list) and len(value) > ROWS_AT_ONCE:
         for start in range(0, len(value), ROWS_AT_ONCE):
@@ -93,18 +94,18 @@ def _pieces(value):
 
 
 def load(path, *, is_checked=True):
-    """Read a record of this version, or of an older one, to which is added what it did not have.
+    """Read a record, and convert an older version to the current version.
 
-    Tables of many rows, which stand in a file beside it, are read when they are asked for: then
-    InputError says, in one line, when that file is missing or is not the one that it was.
+    Long tables are in a file beside the record. They are read on first access, which raises
+    InputError in one line if the file is missing or was altered.
 
     Parameters
     ----------
     path : path
-        Of a record.json.
+        The file, record.json.
     is_checked : bool, default True
-        Refuse a record that is not the file that SHA256SUMS beside it lists, and one whose volumes
-        are negative or fall.
+        Refuse a record with another SHA-256 than in SHA256SUMS of its folder, and a record with
+        negative or decreasing volumes.
 
     Returns
     -------
@@ -113,7 +114,7 @@ def load(path, *, is_checked=True):
     Raises
     ------
     InputError
-        In one line, when it is no record or of a version that cannot be read.
+        In one line, if the file is no record or has a version that cannot be read.
     """
     name = Path(path).name
     try:
@@ -124,7 +125,7 @@ def load(path, *, is_checked=True):
             "record_unreadable", "cannot be read as a record: {error}", error=reason_of(error)
         )
         raise InputError(Problem(name, expected)) from error
-    record = attached(migrated(record, name), path)
+    record = attach_tables(migrated(record, name), path)
     if is_checked:
         _refuse_altered(Path(path))
         _refuse_impossible(record, name)
@@ -132,10 +133,10 @@ def load(path, *, is_checked=True):
 
 
 def _refuse_altered(path):
-    """Raise InputError for a file that is not the one that SHA256SUMS beside it lists."""
+    """Raise InputError for a file with another SHA-256 than in SHA256SUMS of its folder."""
     try:
         listed = manifest.read_manifest(path.parent)
-    except InputError:  # a list of other things
+    except InputError:  # SHA256SUMS of another program
         return
     digest = listed.digests.get(path.name) if listed else None
     if digest not in (None, manifest.digest_of(path)):
@@ -149,12 +150,12 @@ def _refuse_altered(path):
 
 
 def _refuse_impossible(record, name):
-    """Raise InputError for a capacity table that no tank has."""
+    """Raise InputError for a capacity table that no tank can have."""
     if record["capacity"] is None:
         return
     heights = np.asarray(record["capacity"]["height_m"], dtype=float)
     volumes = np.asarray(record["capacity"]["volume_m3"], dtype=float)
-    rises = np.diff(heights) > 0  # nan does not
+    rises = np.diff(heights) > 0  # False for nan
     if len(heights) != len(volumes) or not (rises.all() and np.all(heights < MOST_HEIGHT_M)):
         expected = message(
             "record_heights",
@@ -166,7 +167,7 @@ def _refuse_impossible(record, name):
         )
         raise InputError(Problem(name, expected))
     for column in NOT_NEGATIVE:
-        values = np.asarray(record["capacity"][column], dtype=float)  # nan: it is not known
+        values = np.asarray(record["capacity"][column], dtype=float)  # null becomes nan
         if len(values) != len(volumes) or np.any(values < 0):
             expected = message(
                 "record_column",
@@ -177,7 +178,7 @@ def _refuse_impossible(record, name):
             )
             raise InputError(Problem(name, expected, column=f"capacity.{column}"))
     least = -VOLUME_ROUNDING * np.max(np.abs(volumes), initial=0.0)
-    falls = ~(np.diff(volumes, prepend=0.0) >= least)  # nan, too
+    falls = ~(np.diff(volumes, prepend=0.0) >= least)  # True for nan
     is_impossible = falls | (volumes > MOST_VOLUME_M3)
     if is_impossible.any():
         row = int(np.argmax(is_impossible))
@@ -193,15 +194,17 @@ def _refuse_impossible(record, name):
 
 
 def read(path, *, tables=True):
-    """The record in a file with each part a dataclass.
+    """Read a record as dataclasses.
+
+    For example, read("results/record.json").capacity.volume_m3[-1] is the volume at the top of the
+    table.
 
     Parameters
     ----------
     path : path
-        Of a record.json; read("results/record.json").capacity.volume_m3[-1] is the volume at the
-        top of the table.
+        The file, record.json.
     tables : bool, default True
-        False: long tables, which stand in a file beside it, are None; that file is not needed.
+        False: long tables are None, and their file is not needed.
 
     Returns
     -------
@@ -210,11 +213,11 @@ def read(path, *, tables=True):
     Raises
     ------
     InputError
-        As `load`.
+        For the reasons of `load`.
     """
     from tankcal.record.making import Record
     from tankcal.record.schema import from_plain
 
     record = load(path)
-    record = whole(record) if tables else without_tables(record)
+    record = whole(record) if tables else omit_tables(record)
     return from_plain(Record, record, Path(path).name)

@@ -1,4 +1,4 @@
-"""The part of the record that says how the survey was adjusted, and how good that is."""
+"""The part of the record on the adjustment of the survey and its quality."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -13,41 +13,39 @@ from tankcal.record.adjusted import (
     AdjustedPhoto,
     AdjustedPoint,
     ControlSystem,
+    DepthCorrection,
+    FiducialTransformation,
+    ImageReadings,
     PointPrecision,
-    adjusted_points_of,
     cameras_of,
+    depth_of,
+    fiducials_of,
+    image_readings_of,
     instruments_of,
     photos_of,
+    point_results_of,
     precision_of,
     systems_of,
 )
 from tankcal.record.columns import ArrayColumns, plain_if_short
-from tankcal.record.images import (
-    DepthCorrection,
-    FiducialTransformation,
-    ImageReadings,
-    depth_of,
-    fiducials_of,
-    image_readings_of,
-)
-from tankcal.record.schema import Columns, Finite, Saved, filled_from, key
+from tankcal.record.schema import Columns, Finite, Saved, fill_from, key
 from tankcal.record.texts import Text, text_of
 from tankcal.survey.results import DatumReport, GroupOfReadings, Reading, Readings
 
 CONFIDENCE = 0.95  # of the global test and of the intervals of variance factors
-CHECKABLE = 1.0  # a group with less redundancy says next to nothing about its variance
+CHECKABLE = 1.0  # least redundancy of a group whose variance factor is judged
 
 
 @dataclass(frozen=True, kw_only=True)
 class AdjustedReading(Reading):
-    """A value of an observation: the keys of `Reading`; what is infinite or not known is null."""
+    """A value of an observation: the keys of `Reading`; infinite or unknown values are null."""
 
-    controlled: bool = key("whether others would show an error of it")
+    controlled: bool = key("whether other readings would show an error of it")
 
 
 @dataclass(frozen=True, kw_only=True)
 class AdjustedGroup(GroupOfReadings):
-    """Is a group as good as declared? The keys of `GroupOfReadings`, and the 95 % interval."""
+    """A group of readings: the keys of `GroupOfReadings`, and the 95 % interval of its factor."""
 
     factor_low: float | None = key("lower end of the interval of `factor`")
     factor_high: float | None = key("upper end")
@@ -55,7 +53,7 @@ class AdjustedGroup(GroupOfReadings):
 
 
 class HeldValue(Saved):
-    """A value that holds exactly, and what its release would say of it."""
+    """A value that is held exactly, and the result of its release."""
 
     kind: str = key("of observation")
     ids: list[str] = key("names")
@@ -63,14 +61,14 @@ class HeldValue(Saved):
     file: str = key("where it was read")
     row: int | None = key("of the file")
     unit: str = key("of value, change, sd and mdb")
-    value: float = key("that is held")
-    released: float | None = key("value that the others give")
+    value: float = key("held value")
+    released: float | None = key("value estimated from the other readings")
     change: float | None = key("released minus value")
     sd: float | None = key("of the change")
     w: float | None = key("change over its sd")
     mdb: float = key("minimal detectable bias")
-    effect_m: float = key("of such a bias on a point")
-    controlled: bool = key("whether others would show an error of it")
+    effect_m: float = key("of a bias of the size mdb on a point")
+    controlled: bool = key("whether other readings would show an error of it")
 
 
 class CheckPoint(Saved):
@@ -97,7 +95,7 @@ class CheckedPoints(Saved):
 
 
 class SharedCause(Saved):
-    """A shared cause of uncertainty that the budget names."""
+    """A shared cause of uncertainty, named in the budget."""
 
     name: str = key("of the instrument")
     what: str = key('"instrument_scale" or "instrument_offset"')
@@ -115,28 +113,28 @@ class AdjustedSetup(Saved):
 
 
 class AdjustmentRecord(Saved):
-    """How the survey was adjusted, and how good that is."""
+    """The adjustment of the survey and its quality."""
 
-    sigma0: float = key("a posteriori; null: nothing is redundant")
+    sigma0: float = key("a posteriori; null: no redundancy")
     observations: int = key("values adjusted")
     unknowns: int = key("number")
-    redundancy: int = key("of the whole")
+    redundancy: int = key("of the whole adjustment")
     iterations: int = key("of the last adjustment")
-    rounds: int = key("adjustments that the search for blunders took")
+    rounds: int = key("number of adjustments in the search for blunders")
     chi2: float = key("v'Pv")
-    chi2_bounds: list[float] | None = key("two-sided bounds of chi2; null: nothing is redundant")
+    chi2_bounds: list[float] | None = key("two-sided bounds of chi2; null: no redundancy")
     confidence: Finite = key("of these bounds")
     passed: bool | None = key("whether chi2 lies between them")
     cov_scale: float = key("factor of every covariance of the record: 1, or sigma0 squared")
     scale: str = key('"a_priori" or "a_posteriori"')
     snooping: bool = key("whether blunders were searched for")
-    critical_w: float = key("beyond which a reading is rejected")
+    critical_w: float = key("value of |w| above which a reading is rejected")
     critical_tau: float | None = key("of tau")
     alpha: Finite = key("level of the tests of single readings")
     power: Finite = key("of these tests, for the mdb")
-    datum: DatumReport = key("what holds the frame")
+    datum: DatumReport = key("definition of the frame")
     groups: list[AdjustedGroup] = key("kinds of observations and instruments")
-    held: list[HeldValue] = key("values that hold exactly: sd 0")
+    held: list[HeldValue] = key("values held exactly: sd 0")
     removed: list[AdjustedReading] = key("readings rejected, the worst first")
     residuals: Annotated[dict, Columns(AdjustedReading)] | None = key(
         "all readings, a list for each key; null: they are in the file of `long_tables`"
@@ -145,7 +143,7 @@ class AdjustmentRecord(Saved):
     photos: list[AdjustedPhoto] = key("each photo")
     image_readings: ImageReadings | None = key("repeated readings; null: each point was read once")
     fiducials: list[FiducialTransformation] = key("photos read on a comparator")
-    depth_of_field: DepthCorrection | None = key("null: not asked for")
+    depth_of_field: DepthCorrection | None = key("null: not requested")
     instruments: list[AdjustedInstrument] = key("each instrument")
     systems: list[ControlSystem] = key("further systems of control")
     setups: list[AdjustedSetup] = key("each set-up")
@@ -154,22 +152,22 @@ class AdjustmentRecord(Saved):
     )
     precision: PointPrecision | None = key("null: every point is fixed")
     check_points: CheckedPoints | None = key("null: there are none")
-    causes: list[SharedCause] = key("that points have in common")
-    aside: list[str] = key("sentences: points that could not be adjusted, and why")
-    left_out: list[Text] = key("the same with their codes")
+    causes: list[SharedCause] = key("common to several points")
+    aside: list[str] = key("sentences: points that could not be adjusted, with the reason")
+    left_out: list[Text] = key("these sentences with their codes")
 
 
 def adjustment_of(adjustment, measurements=None):
-    """The `AdjustmentRecord` of an `Adjustment`.
+    """Return the `AdjustmentRecord` of an `Adjustment`.
 
-    measurements  `job.Measurements` that it was made from: settings, formats of the images
+    `measurements` are the `job.Measurements` of the adjustment, with settings and image formats.
     """
     from tankcal.survey.network.reliability import tau_limit
 
     settings = getattr(measurements, "settings", None)
     test = adjustment.adjusted.test(CONFIDENCE)
     dof = adjustment.redundancy
-    return filled_from(
+    return fill_from(
         AdjustmentRecord,
         adjustment,
         chi2=test.chi2,
@@ -183,8 +181,8 @@ def adjustment_of(adjustment, measurements=None):
         alpha=ALPHA,
         power=POWER,
         groups=[_group(group) for group in adjustment.groups],
-        held=_held(adjustment.readings),
-        removed=_removed(Readings.of(adjustment.removed)),
+        held=_list_held(adjustment.readings),
+        removed=_list_rejected(Readings.of(adjustment.removed)),
         residuals=_columns(adjustment.readings),
         cameras=cameras_of(adjustment, measurements),
         photos=photos_of(adjustment),
@@ -193,47 +191,48 @@ def adjustment_of(adjustment, measurements=None):
         depth_of_field=depth_of(adjustment.depth),
         instruments=instruments_of(adjustment, measurements),
         systems=systems_of(adjustment),
-        setups=[filled_from(AdjustedSetup, one) for one in getattr(measurements, "setups", ())],
-        points=adjusted_points_of(adjustment, measurements),
+        setups=[fill_from(AdjustedSetup, setup) for setup in getattr(measurements, "setups", ())],
+        points=point_results_of(adjustment, measurements),
         precision=precision_of(adjustment),
         check_points=_check_points(adjustment.check_points),
-        causes=[filled_from(SharedCause, cause) for cause in adjustment.causes],
-        left_out=[text_of(one) for one in adjustment.aside],
+        causes=[fill_from(SharedCause, cause) for cause in adjustment.causes],
+        left_out=[text_of(sentence) for sentence in adjustment.aside],
     )
 
 
-def _removed(readings):
-    """The `AdjustedReading` of each reading that was rejected."""
-    rows = zip(readings, _controlled(readings).tolist(), strict=True)
-    return [AdjustedReading(**vars(one), controlled=controlled) for one, controlled in rows]
+def _list_rejected(readings):
+    """Return the `AdjustedReading` of each rejected reading."""
+    rows = zip(readings, _are_controlled(readings).tolist(), strict=True)
+    return [AdjustedReading(**vars(reading), controlled=controlled) for reading, controlled in rows]
 
 
 def _columns(readings):
-    """The columns of all readings, as `AdjustedReading` has them; there may be 200 000."""
-    found = readings.columns | {"controlled": _controlled(readings)}
+    """Return the columns of all readings, up to 200 000, with the keys of `AdjustedReading`."""
+    arrays = readings.columns | {"controlled": _are_controlled(readings)}
     columns = {
         name: column.tolist() if column.dtype == object else column
-        for name, column in found.items()
+        for name, column in arrays.items()
     }
     return plain_if_short(ArrayColumns(columns))
 
 
-def _controlled(readings):
-    """(n,) whether others would show an error of readings, or of values that are held."""
-    found = readings.columns
-    of_others = readings.check | (found["redundancy"] > UNCONTROLLED)
-    return np.where(readings.hold, np.isfinite(found["mdb"]), of_others)
+def _are_controlled(readings):
+    """Return whether other readings would show an error of each reading or held value, (n,)."""
+    columns = readings.columns
+    of_readings = readings.check | (columns["redundancy"] > UNCONTROLLED)
+    return np.where(readings.hold, np.isfinite(columns["mdb"]), of_readings)
 
 
-def _held(readings):
-    """The `HeldValue` of each value that holds exactly."""
+def _list_held(readings):
+    """Return the `HeldValue` of each value held exactly."""
     held = readings.where(readings.hold)
-    return list(map(_held_value, held, _controlled(held).tolist()))
+    return list(map(_make_held_value, held, _are_controlled(held).tolist()))
 
 
-def _held_value(reading, controlled):
+def _make_held_value(reading, controlled):
+    # mdb = delta0 sd for a value that is released: the others determine it with sd.
     sd = reading.mdb / noncentrality(ALPHA, POWER) if controlled else None
-    return filled_from(
+    return fill_from(
         HeldValue,
         reading,
         released=reading.value + reading.w * sd if controlled else None,
@@ -245,18 +244,19 @@ def _held_value(reading, controlled):
 
 
 def _group(group):
-    """The `AdjustedGroup` of a group: with the interval of its true sd over the declared one."""
+    """Return the `AdjustedGroup` of a group, with the interval of true over declared sd."""
     low = high = None
     if group.redundancy > UNCONTROLLED and np.isfinite(group.factor):
+        # factor^2 redundancy / (true factor)^2 has a chi-square distribution.
         tail = (1 - CONFIDENCE) / 2
         square = group.factor**2 * group.redundancy
         bounds = 2 * gammaincinv(group.redundancy / 2, [1 - tail, tail])
-        low, high = (float(np.sqrt(square / one)) if one > 0 else None for one in bounds)
-    verdict = _verdict(group, low, high)
+        low, high = (float(np.sqrt(square / bound)) if bound > 0 else None for bound in bounds)
+    verdict = _judge_group(group, low, high)
     return AdjustedGroup(**vars(group), factor_low=low, factor_high=high, verdict=verdict)
 
 
-def _verdict(group, low, high):
+def _judge_group(group, low, high):
     if low is None and high is None:
         return "not_controlled"
     if group.redundancy < CHECKABLE:
@@ -266,24 +266,24 @@ def _verdict(group, low, high):
     return "better" if high < 1 else "as_declared"
 
 
-def _check_points(found):
-    if found is None:
+def _check_points(check):
+    if check is None:
         return None
-    rows = zip(found.names, found.difference_m, found.sd_m, strict=True)
+    rows = zip(check.names, check.difference_m, check.sd_m, strict=True)
     points = [
         CheckPoint(
             name,
             *difference,
             *sd,
             size_m=float(np.sqrt(np.nansum(np.square(difference)))),
-            largest_w=_largest(difference, sd),
+            largest_w=_largest_w(difference, sd),
         )
         for name, difference, sd in rows
     ]
-    return filled_from(CheckedPoints, found, points=points)
+    return fill_from(CheckedPoints, check, points=points)
 
 
-def _largest(difference, sd):
-    """Largest difference in its own sds; None where no sd is known."""
+def _largest_w(difference, sd):
+    """Return the largest difference over its sd; None if no sd is known."""
     known = np.isfinite(difference) & np.isfinite(sd) & (np.asarray(sd) > 0)
     return float(np.max(np.abs(difference[known] / sd[known]))) if known.any() else None

@@ -1,45 +1,42 @@
-"""What calibrations do to a block as it is saved: kind "influence" of camera.json."""
+"""Influence of calibrations on a block: kind "influence" of camera.json."""
 
 from typing import Literal
-
-import numpy as np
 
 from tankcal.calibration.influence.blocks import InteriorValue
 from tankcal.record.camera_product import ProductFile, product_of
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, fill_from, key, to_plain
+from tankcal.units import ARCSEC_PER_RAD
 
 MM, UM = 1e3, 1e3
-ARCSEC = np.degrees(1.0) * 3600
 
 
 class ReadingSetAside(Saved):
-    """A reading that was rejected in the reference, and is left out of all runs."""
+    """A reading that was rejected in the reference, and is excluded from all runs."""
 
     kind: str = key("of observation")
     ids: list[str] = key("names")
     element: str = key('"x", "omega", ...')
-    file: str = key("where it was read")
+    file: str = key("of the reading")
     row: int | None = key("of the file")
     w: float = key("test quantity")
 
 
 class BlunderSearch(Saved):
-    """The search in the reference; no run searches again, so that all have the same readings."""
+    """The search in the reference; all runs use the readings of the reference."""
 
     searched: bool = key("whether blunders were searched for")
-    removed: list[ReadingSetAside] = key("readings rejected")
+    removed: list[ReadingSetAside] = key("rejected readings")
 
 
 class Skipped(Saved):
-    """Why a run was left out."""
+    """Reason for skipping a run."""
 
     code: str = key('"no_sds": a calibration without sds cannot be weighted')
 
 
 class RunQuality(Saved):
-    """Global test of a run; null: nothing is redundant."""
+    """Global test of a run; null: no redundancy."""
 
     sigma0: float | None = key("a posteriori")
     chi2: float = key("v'Pv", of="test.chi2")
@@ -74,43 +71,43 @@ class RunVolume(Saved):
 
 
 class PointShifts(Saved):
-    """Differences of the points; null where there are none."""
+    """Differences of the points; null: no points."""
 
     n: int = key("points")
     rms_mm: list[float] = key("along x, y, z", of="rms_m", times=MM)
     largest_mm: list[float] = key("along x, y, z", of="largest_m", times=MM)
     rms_xyz_mm: float = key("of the magnitudes", of="rms_xyz_m", times=MM)
     largest_xyz_mm: float = key("magnitude", of="largest_xyz_m", times=MM)
-    largest_point: str | None = key("that differs most", of="largest_name")
+    largest_point: str | None = key("with the largest difference", of="largest_name")
 
 
 class PhotoShifts(Saved):
-    """Differences of the photos' places and turns about the axes of the image."""
+    """Differences in position of the photos, and rotations about the axes of the image."""
 
     n: int = key("photos")
     rms_mm: list[float] = key("along x, y, z", of="rms_m", times=MM)
     rms_xyz_mm: float = key("of the magnitudes", of="rms_xyz_m", times=MM)
     largest_xyz_mm: float = key("magnitude", of="largest_xyz_m", times=MM)
-    largest_photo: str | None = key("that differs most", of="largest_name")
-    rms_arcsec: list[float] = key("about x, y, z", of="rms_rad", times=ARCSEC)
-    rms_turn_arcsec: float = key("of the whole turns", of="rms_turn_rad", times=ARCSEC)
-    largest_turn_arcsec: float = key("whole turn", of="largest_turn_rad", times=ARCSEC)
-    largest_turn_photo: str | None = key("that turns most", of="largest_turn_name")
+    largest_photo: str | None = key("with the largest difference", of="largest_name")
+    rms_arcsec: list[float] = key("about x, y, z", of="rms_rad", times=ARCSEC_PER_RAD)
+    rms_turn_arcsec: float = key("of the total rotations", of="rms_turn_rad", times=ARCSEC_PER_RAD)
+    largest_turn_arcsec: float = key("total rotation", of="largest_turn_rad", times=ARCSEC_PER_RAD)
+    largest_turn_photo: str | None = key("with the largest rotation", of="largest_turn_name")
 
 
 class VolumeShift(Saved):
     """Difference of the capacities at the top."""
 
     difference_m3: float = key("other minus one", of="volume_m3")
-    percent: float = key("of that of one", of="volume_percent")
+    percent: float = key("of the volume of one", of="volume_percent")
 
 
 class Shifts(Saved):
-    """What a run changes against another."""
+    """Differences between two runs."""
 
     points: PointShifts = key("of the points")
     photos: PhotoShifts = key("of the photos")
-    aligned: int = key("ways that nothing observes, taken out of the differences first (0 to 7)")
+    aligned: int = key("unobserved degrees of freedom, removed from the differences (0 to 7)")
     volume: VolumeShift | None = key("of the tank")
 
 
@@ -118,23 +115,23 @@ class RunNumbers(Saved):
     """Two runs, by their numbers in `runs`."""
 
     one: int = key("the reference is 0")
-    other: int = key("that is compared with it")
+    other: int = key("compared with one")
 
 
 class PairOfRuns(Shifts, RunNumbers):
-    """Two runs that could be adjusted: other minus one. Those with the reference come first."""
+    """Two adjusted runs: other minus one. Pairs with the reference come first."""
 
 
 class AdjustedRun(Saved):
-    """One adjustment of the block; what a run that was not adjusted does not have is null."""
+    """An adjustment of the block; results of a run that was not adjusted are null."""
 
     label: str = key('"reference", or "NAME, fixed"')
     calibration: str | None = key("NAME; null for the reference")
     state: str | None = key('"fixed", "weighted" or "free"; null for the reference')
     outcome: str = key('"adjusted", "failed" or "skipped"')
-    message: str | None = key("why it failed, in words")
-    skipped: Skipped | None = key("why it was left out")
-    held: list[str] = key("parameters held at a value that is not 0, for want of an sd")
+    message: str | None = key("reason of the failure, in words")
+    skipped: Skipped | None = key("reason for skipping it")
+    held: list[str] = key("parameters held at a value other than 0, for lack of an sd")
     quality: RunQuality | None = key("global test")
     images: RunImages | None = key("residuals of the camera's photos")
     convention: str | None = key("sign of the distortion's terms")
@@ -142,57 +139,64 @@ class AdjustedRun(Saved):
     interior: list[InteriorValue] | None = key("parameters; sd 0: held; start_sd null: not given")
     product: ProductFile | None = key("check points")
     volume: RunVolume | None = key("at the top of the table")
-    volume_failed: str | None = key("why there is no volume, of a job with a tank")
-    shifts: Shifts | None = key("against the reference; null for it")
+    volume_failed: str | None = key("reason of a missing volume, for a job with a tank")
+    shifts: Shifts | None = key("against the reference; null for the reference")
 
 
 class InfluenceFile(CameraFile, kw_only=True):
-    """What calibrations do to a block."""
+    """Influence of calibrations on a block."""
 
     kind: Literal["influence"] = key("influence", default="influence")
-    camera: str = key("of the job, that was replaced")
-    states: list[str] = key("those asked for")
+    camera: str = key("of the job, whose calibration was replaced")
+    states: list[str] = key("requested states")
     calibrations: list[str] = key("names, in their order")
     photos: int = key("in the reference")
     points: int = key("in the reference")
     search: BlunderSearch = key("for blunders, in the reference")
-    free: list[str] = key('parameters that the runs "free" adjust')
-    runs: list[AdjustedRun] = key("the reference first: the job's own settings")
-    pairs: list[PairOfRuns] = key("all runs that could be adjusted, in the order of `runs`")
+    free: list[str] = key('parameters adjusted in the runs "free"')
+    runs: list[AdjustedRun] = key("the reference, with the settings of the job, first")
+    pairs: list[PairOfRuns] = key("all adjusted runs, in the order of `runs`")
 
 
-def as_json(influence):
-    """The `InfluenceFile` of an Influence, as plain data."""
+def plain_influence(influence):
+    """Return the `InfluenceFile` of an Influence, as plain data."""
     block = influence.runs[0].block
-    found = filled_from(
-        InfluenceFile,
-        influence,
-        photos=len(block.photos) if block else 0,
-        points=len(block.points) if block else 0,
-        search=BlunderSearch(
-            influence.searched, [filled_from(ReadingSetAside, one) for one in influence.removed]
-        ),
-        runs=[_run(number, one, influence) for number, one in enumerate(influence.runs)],
-        pairs=[_shifts(PairOfRuns, one, one=one.one, other=one.other) for one in influence.pairs],
+    return to_plain(
+        fill_from(
+            InfluenceFile,
+            influence,
+            photos=len(block.photos) if block else 0,
+            points=len(block.points) if block else 0,
+            search=BlunderSearch(
+                influence.searched,
+                [fill_from(ReadingSetAside, reading) for reading in influence.removed],
+            ),
+            runs=[_run(number, run, influence) for number, run in enumerate(influence.runs)],
+            pairs=[
+                _shifts(PairOfRuns, pair, one=pair.one, other=pair.other)
+                for pair in influence.pairs
+            ],
+        )
     )
-    return to_plain(found)
 
 
 def _run(number, run, influence):
-    against = [one for one in influence.pairs if (one.one, one.other) == (0, number)]
+    against_reference = next(
+        (pair for pair in influence.pairs if (pair.one, pair.other) == (0, number)), None
+    )
     block = run.block
-    return filled_from(
+    return fill_from(
         AdjustedRun,
         run,
         skipped=Skipped(run.skipped) if run.skipped else None,
         quality=_quality(block),
-        images=block and filled_from(RunImages, block.images),
+        images=block and fill_from(RunImages, block.images),
         convention=block and block.form.convention,
         affinity=block and block.form.affinity,
         interior=block and block.interior,
         product=product_of(block.check) if block and block.check else None,
-        volume=filled_from(RunVolume, run.volume),
-        shifts=_shifts(Shifts, against[0]) if against else None,
+        volume=fill_from(RunVolume, run.volume),
+        shifts=_shifts(Shifts, against_reference) if against_reference else None,
     )
 
 
@@ -200,7 +204,7 @@ def _quality(block):
     if block is None:
         return None
     test = block.test
-    return filled_from(
+    return fill_from(
         RunQuality,
         block,
         chi2_low=test.low if test.dof else None,
@@ -212,9 +216,9 @@ def _quality(block):
 
 def _shifts(cls, pair, **numbers):
     return cls(
-        points=filled_from(PointShifts, pair.points),
-        photos=filled_from(PhotoShifts, pair.photos),
+        points=fill_from(PointShifts, pair.points),
+        photos=fill_from(PhotoShifts, pair.photos),
         aligned=pair.aligned,
-        volume=None if pair.volume_m3 is None else filled_from(VolumeShift, pair),
+        volume=None if pair.volume_m3 is None else fill_from(VolumeShift, pair),
         **numbers,
     )

@@ -1,4 +1,4 @@
-"""What the parameters of a camera are worth, as it is saved: kind "parameters" of camera.json.
+"""Significance of the parameters of a camera: kind "parameters" of camera.json.
 
 Codes of `recommendation[].reasons`:
 
@@ -7,26 +7,27 @@ Codes of `recommendation[].reasons`:
     not_significant      {F, critical}
     effect_above         {edge_um, edge_px, limit_um, limit_px}
     effect_below         {edge_um, edge_px, limit_um, limit_px}
-    effect_not_known     no image accuracy to compare it with
-    significant_but_tiny            the two disagree
-    insignificant_but_large {left_um, left_px}  the two disagree; left: what is left in the corner
-                         when the others take over
+    effect_not_known     no image accuracy for comparison
+    significant_but_tiny            test and effect disagree
+    insignificant_but_large {left_um, left_px}  test and effect disagree; left: remaining effect in
+                         the corner after compensation by other parameters
     correlated           {with, correlation}
-    group_significant    {names, F, critical}: alone it may go, not all of them
-    lower_order          {of []}: stays because these higher terms stay
-    known_beforehand     its value was given with an sd: the test is of both
+    group_significant    {names, F, critical}: it may be dropped alone, but not the whole group
+    lower_order          {of []}: kept since these higher terms are kept
+    known_beforehand     its value was declared with an sd: the test includes both
     product_stays        {largest_sds, largest_mm, volume_change_m3, volume_u_m3}
     product_moves        {largest_sds, largest_mm, volume_change_m3, volume_u_m3}
-    not_with_the_others  it may go alone; with the others the product moves
-    product_not_tried    nothing was adjusted again: it stays until it is tried
+    not_with_the_others  it may be dropped alone; together with others the product changes
+    product_not_tried    no further adjustment: it is kept until the product is tested
     not_determined_without {text, [names]}
     corner_not_seen      {reach_mm, corner_mm, seen_um, seen_px}: image points do not reach the
-                         corner, the effect there is extrapolated
+                         corner, where the effect is extrapolated
     together_stay, together_move  {names, largest_sds, largest_mm, volume_change_m3, volume_u_m3}:
-                         all that may go, dropped at once
+                         all removable parameters, dropped at once
 """
 
 import math
+from dataclasses import fields
 from typing import Literal
 
 import numpy as np
@@ -35,14 +36,13 @@ from tankcal.calibration.edges import Shift
 from tankcal.calibration.parameters.recommendation import Advice
 from tankcal.camera.model import PARAMETERS, UNITS
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 
 MM = 1e3
 
 
 class ImageAccuracy(Saved):
-    """Image accuracy that effects are compared with."""
+    """Image accuracy with which effects are compared."""
 
     um: float = key("micrometres")
     px: float = key("pixels")
@@ -53,8 +53,8 @@ class EdgeShifts(Saved):
     """Shifts over the frame: largest and rms; seen: largest within reach of the image points."""
 
     own: Shift | None = key("of the value itself (null for c)")
-    left: Shift | None = key("what is left when the others take over, predicted")
-    left_turned: Shift | None = key("the same after the camera has been turned to fit, too")
+    left: Shift | None = key("predicted remainder after compensation by other parameters")
+    left_turned: Shift | None = key("predicted remainder after compensation also by a rotation")
 
 
 class ParameterJudged(Saved):
@@ -68,16 +68,16 @@ class ParameterJudged(Saved):
     critical: float | None = key("its critical value")
     p_value: float | None = key("probability of an F as large by chance")
     significant: bool | None = key("whether F is above the critical value")
-    decides: bool = key("false for c: the test against 0 means nothing for a decision")
+    decides: bool = key("false for c, for which the test against 0 is not relevant")
     state: str = key('"free", "weighted" or "fixed"')
     scope: str = key('"off", "block", "camera" or "photo"')
-    edge_um: float | None = key("shift that it makes in the worst corner of the frame")
-    edge_px: float | None = key("the same in pixels")
+    edge_um: float | None = key("shift of the worst corner of the frame by the value")
+    edge_px: float | None = key("shift of this corner in pixels")
     edge: EdgeShifts = key("over the frame")
 
 
 class GroupTest(Saved):
-    """Parameters against zero, together."""
+    """Joint test of several parameters against zero."""
 
     names: list[str] = key("of the parameters")
     F: float | None = key("test quantity", of="f")
@@ -104,12 +104,12 @@ class PrincipalComponents(Saved):
 
 
 class PointsMoved(Saved):
-    """How far adjusted points moved."""
+    """Changes of the adjusted points."""
 
     count: int = key("points compared")
     rms_mm: float = key("of the distance", of="rms_m", times=MM)
     largest_mm: float = key("distance", of="largest_m", times=MM)
-    largest_point: str = key("that moved most")
+    largest_point: str = key("with the largest change")
     axis_rms_mm: list[float] = key("x, y, z", of="axis_rms_m", times=MM)
     axis_largest_mm: list[float] = key("x, y, z", of="axis_largest_m", times=MM)
     rms_sds: float = key("of each coordinate's change over its own sd")
@@ -128,21 +128,21 @@ class TopOfTable(Saved):
 
 
 class TrialWithout(Saved):
-    """The survey without some parameters; sigma0 and what follows null: not adjusted again."""
+    """The survey without some parameters; null from sigma0 on if it was not adjusted again."""
 
-    names: list[str] = key("of those let go")
-    because: list[str] = key('"single", "group", "silva", "pessoa", "advised" (all that may go)')
-    comparable: bool = key("false where more than this set changed: the prediction is of another")
-    kept: list[str] = key("the lists below are in their order")
-    positive_definite: bool = key("false: those let go cannot be told apart")
-    values_predicted: list[float] = key("of those kept")
-    sds_predicted: list[float] = key("of those kept")
-    correlation_predicted: list[list[float]] = key("of those kept")
-    failed: str | None = key("why it could not be adjusted, or (with points) has no volume")
+    names: list[str] = key("of the dropped parameters")
+    because: list[str] = key('"single", "group", "silva", "pessoa", "advised" (all removable)')
+    comparable: bool = key("false if other sets changed too, unlike in the prediction")
+    kept: list[str] = key("names, in the order of the following lists")
+    positive_definite: bool = key("false: the dropped parameters are not separable")
+    values_predicted: list[float] = key("of the kept parameters")
+    sds_predicted: list[float] = key("of the kept parameters")
+    correlation_predicted: list[list[float]] = key("of the kept parameters")
+    failed: str | None = key("reason of a failed adjustment, or (with points) of a missing volume")
     sigma0: float | None = key("of the adjustment")
-    values_adjusted: list[float] | None = key("of those kept")
+    values_adjusted: list[float] | None = key("of the kept parameters")
     sds_adjusted: list[float] | None = key("for the sigma0 of the survey with all parameters")
-    correlation_adjusted: list[list[float]] | None = key("of those kept")
+    correlation_adjusted: list[list[float]] | None = key("of the kept parameters")
     points: PointsMoved | None = key("against the survey with all parameters")
     volume_change_m3: float | None = key("at the top of the table")
 
@@ -152,9 +152,9 @@ class TrialWithVolume(TopOfTable, TrialWithout):
 
 
 class WhyNoVolume(Saved):
-    """The first key of what the survey with all parameters gives."""
+    """The first key of the survey with all parameters."""
 
-    no_volume: str | None = key("why there is no volume")
+    no_volume: str | None = key("reason of a missing volume")
 
 
 class WithAll(TopOfTable, WhyNoVolume):
@@ -162,29 +162,29 @@ class WithAll(TopOfTable, WhyNoVolume):
 
 
 class Loading(Saved):
-    """How a parameter loads on a component."""
+    """Loading of a parameter on a component."""
 
     name: str = key("of the parameter")
     loading: float = key("on the component")
 
 
 class HighComponent(Saved):
-    """A component on which two or more parameters load high."""
+    """A component with high loadings of two or more parameters."""
 
     component: int = key("number, from 1")
     share_percent: float = key("of the eigenvalues")
-    high: list[Loading] = key("of those that load high")
+    high: list[Loading] = key("high loadings")
 
 
 class SilvasRule(Saved):
-    """What Silva's rule says."""
+    """Result of Silva's rule."""
 
     may_go: int = key("number of components with a negligible share")
     negligible_percent: float = key("limit of the share")
     loading: float = key("limit of the loading")
     alike: float = key("limit of likeness")
-    drop: list[str] = key("names, in the order in which they go")
-    components: list[HighComponent] = key("on which two or more load high")
+    drop: list[str] = key("names, in the order of removal")
+    components: list[HighComponent] = key("with two or more high loadings")
 
 
 class KeptBecause(Saved):
@@ -195,23 +195,23 @@ class KeptBecause(Saved):
 
 
 class PessoasRule(Saved):
-    """What Pessoa's rule says."""
+    """Result of Pessoa's rule."""
 
-    limit_px: float | None = key("that the shift of a corner is compared with")
-    limit_um: float | None = key("the same; the one not used is null")
+    limit_px: float | None = key("limit of the shift of a corner; null: limit_um is used")
+    limit_um: float | None = key("limit of the shift of a corner; null: limit_px is used")
     drop: list[str] = key("names")
-    keep: list[KeptBecause] = key("the others")
+    keep: list[KeptBecause] = key("all other parameters")
 
 
 class PublishedRules(Saved):
-    """What published rules say."""
+    """Results of published rules."""
 
     silva: SilvasRule = key("Silva 1995")
     pessoa: PessoasRule = key("Pessoa")
 
 
 class ParametersFile(CameraFile, kw_only=True):
-    """What the parameters of one set are worth."""
+    """Significance of the parameters of a set."""
 
     kind: Literal["parameters"] = key("parameters", default="parameters")
     camera: str = key("name", of="interior.camera")
@@ -223,7 +223,7 @@ class ParametersFile(CameraFile, kw_only=True):
     format_mm: list[float] | None = key("width and height", of="interior.format_mm")
     pixel_mm: list[float] | None = key("sides of a pixel", of="interior.frame.pixel_mm")
     half_frame_mm: list[float] = key("half width and height", of="interior.frame.half_mm")
-    frame_known: bool = key("declared, or only seen", of="interior.frame_known")
+    frame_known: bool = key("declared, not estimated from image points", of="interior.frame_known")
     reach_mm: float = key("of the farthest image point", of="interior.frame.reach_mm")
     corner_mm: float = key("of the corners from the middle", of="interior.frame.corner_mm")
     dof: float = key("of the adjustment; null: sigma0 was not estimated")
@@ -232,42 +232,42 @@ class ParametersFile(CameraFile, kw_only=True):
     alpha: float = key("level of the tests", of="choices.alpha")
     image_accuracy: ImageAccuracy | None = key("null: it is not known")
     parameters: list[ParameterJudged] = key("of the model")
-    names: list[str] = key("of those adjusted: rows and columns of `correlation`")
-    correlation: list[list[float]] = key("of those adjusted")
-    groups: list[GroupTest] = key("tests of several together")
+    names: list[str] = key("of adjusted parameters: rows and columns of `correlation`")
+    correlation: list[list[float]] = key("of the adjusted parameters")
+    groups: list[GroupTest] = key("joint tests of several parameters")
     components: PrincipalComponents = key("of the parameters")
-    without: list[TrialWithVolume] = key("sets that could be let go")
-    with_all: WithAll | None = key("null: of a record, nothing was adjusted again")
-    rules: PublishedRules = key("what published rules say")
+    without: list[TrialWithVolume] = key("sets of removable parameters")
+    with_all: WithAll | None = key("null: of a record, not adjusted again")
+    rules: PublishedRules = key("results of published rules")
     recommendation: list[Advice] = key("reasons: {code, ...}")
 
 
-def as_json(result):
-    """The `ParametersFile` of a `parameters.CameraParameters`, as plain data."""
+def plain_parameters(result):
+    """Return the `ParametersFile` of a `parameters.CameraParameters`, as plain data."""
     limit, parts = result.limit, result.components
     known = not math.isnan(limit.um) or not math.isnan(limit.px)
     unscaled = parts.unscaled or parts.of == "covariance"
-    found = filled_from(
+    file = fill_from(
         ParametersFile,
         result,
-        image_accuracy=filled_from(ImageAccuracy, limit) if known else None,
+        image_accuracy=fill_from(ImageAccuracy, limit) if known else None,
         parameters=[_parameter(result, name) for name in result.own],
-        groups=[filled_from(GroupTest, test) for test in result.groups],
-        components=filled_from(
+        groups=[fill_from(GroupTest, test) for test in result.groups],
+        components=fill_from(
             PrincipalComponents, parts, values_of="values" if unscaled else "standardised"
         ),
-        without=[_without(result, trial) for trial in result.trials],
+        without=[_trial(result, trial) for trial in result.trials],
         with_all=result.base and WithAll(result.base[1], *_volume(result.base[0])),
         rules=PublishedRules(_silva(result.silva), _pessoa(result.pessoa)),
     )
-    return to_plain(found)
+    return to_plain(file)
 
 
 def _parameter(result, name):
     interior, number = result.interior, PARAMETERS.index(name)
     adjusted = name in result.names
     test = result.tests[result.names.index(name)] if adjusted else None
-    own, left = result.own[name], result.left.get(name) or (None, None)
+    shift, remainders = result.own[name], result.left.get(name) or (None, None)
     return ParameterJudged(
         name=name,
         unit=UNITS[name],
@@ -280,15 +280,15 @@ def _parameter(result, name):
         decides=test is None or test.decides,
         state=interior.state[number],
         scope=interior.scope[number],
-        edge_um=own and own.corner_um,
-        edge_px=own and own.corner_px,
-        edge=EdgeShifts(own, *left),
+        edge_um=shift and shift.corner_um,
+        edge_px=shift and shift.corner_px,
+        edge=EdgeShifts(shift, *remainders),
     )
 
 
-def _without(result, trial):
+def _trial(result, trial):
     predicted, outcome = trial.predicted, trial.outcome
-    values, sds, correlation = _after(trial)
+    values, sds, correlation = _adjusted_values(trial)
     volume = None if outcome is None else outcome.volume
     base = None if result.base is None else result.base[0]
     return TrialWithVolume(
@@ -305,14 +305,14 @@ def _without(result, trial):
         values,
         sds,
         correlation,
-        outcome and filled_from(PointsMoved, outcome.changes),
+        outcome and fill_from(PointsMoved, outcome.changes),
         volume.value_m3 - base.value_m3 if volume and base else None,
         *_volume(volume),
     )
 
 
-def _after(trial):
-    """Values, sds, correlations of what is kept, as adjusted again; None three times without."""
+def _adjusted_values(trial):
+    """Return values, sds and correlations of kept parameters; three times None if not adjusted."""
     if trial.after is None:
         return None, None, None
     names, values, covariance = trial.after
@@ -323,18 +323,18 @@ def _after(trial):
 
 
 def _volume(volume):
-    """The values of `TopOfTable`, None of None."""
-    found = filled_from(TopOfTable, volume)
-    return [None] * 5 if found is None else vars(found).values()
+    """Return the values of `TopOfTable`; each is None without volume."""
+    top = fill_from(TopOfTable, volume)
+    return [None] * len(fields(TopOfTable)) if top is None else vars(top).values()
 
 
 def _silva(rule):
     components = [
-        HighComponent(number + 1, share, [Loading(*one) for one in high])
+        HighComponent(number + 1, share, [Loading(*loading) for loading in high])
         for number, share, high in rule.high
     ]
-    return filled_from(SilvasRule, rule, components=components)
+    return fill_from(SilvasRule, rule, components=components)
 
 
 def _pessoa(rule):
-    return filled_from(PessoasRule, rule, keep=[KeptBecause(*one) for one in rule.keep])
+    return fill_from(PessoasRule, rule, keep=[KeptBecause(*kept) for kept in rule.keep])

@@ -1,11 +1,10 @@
-"""A product check as it is saved: kind "product" of camera.json."""
+"""Check of a product at check points: kind "product" of camera.json."""
 
 from typing import Literal
 
 from tankcal.calibration.product.check import ADVISED, AxisCheck, Precision, Reached
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 
 
 class PartJudged(Saved):
@@ -13,15 +12,15 @@ class PartJudged(Saved):
 
     part: str = key('"plan" (x and y together) or "height"')
     n: int = key("points")
-    rmse_m: float = key("as the differences are")
-    rmse_unbiased_m: float = key("less the significant means")
+    rmse_m: float = key("of the differences")
+    rmse_unbiased_m: float = key("of the differences less their significant means")
     largest_m: float = key("largest magnitude")
 
 
 class ProductNote(Saved):
-    """What should be read: few_points, no_tests, share_means_all, axis_without_points, ..."""
+    """A note: few_points, no_tests, share_means_all, axis_without_points, ..."""
 
-    code: str = key("fewer than `advised`; than 2; than 10: 90 % of them are all of them; ...")
+    code: str = key("fewer points than `advised`; than 2; than 10 (90 % are all points); ...")
     n: float = key("points, or the number of the axis")
 
 
@@ -29,10 +28,10 @@ class LimitsUsed(Saved):
     """The limit table."""
 
     name: str = key("of the table")
-    source: str = key("where its limits were read")
+    source: str = key("of its limits")
     share: float = key("of the points that must lie within the tolerance, 0 to 1")
-    verified: bool | None = key("whether they were read in the text itself; null: not said")
-    remark: str = key("what is to stand beside it")
+    verified: bool | None = key("whether they were read in the text itself; null: unknown")
+    remark: str = key("to be printed with the table")
     code: str | None = key("of a shipped table")
 
 
@@ -42,26 +41,26 @@ class ClassJudged(Saved):
     part: str = key('"plan" or "height"')
     scale: str = key('text, such as "1000"')
     grade: str = key("name of the class")
-    tolerance_m: float = key("that a share of the points must keep")
+    tolerance_m: float = key("that a share of the points must meet")
     sd_m: float = key("bound of the RMSE")
     n: int = key("points")
-    as_is: Reached = key("as the differences are")
-    unbiased: Reached = key("less the significant means")
+    as_is: Reached = key("by the differences")
+    unbiased: Reached = key("by the differences less their significant means")
     precision: list[Precision] = key("of each axis")
-    precise: bool | None = key("whether all of them passed; null: cannot be said")
+    precise: bool | None = key("whether all axes passed; null: not determined")
 
 
 class BestClass(Saved):
-    """The best class of a scale; null: none is reached."""
+    """The best class of a scale; null: no class is reached."""
 
     part: str = key('"plan" or "height"')
     scale: str = key('text, such as "1000"')
-    grade: str | None = key("as the differences are")
-    grade_unbiased: str | None = key("less the significant means")
+    grade: str | None = key("by the differences")
+    grade_unbiased: str | None = key("by the differences less their significant means")
 
 
 class Difference(Saved):
-    """Product minus truth at a point; only the axes that there are; null: not known."""
+    """Product minus truth at a point; only existing axes; null: not known."""
 
     point: str = key("name")
     dx_m: float | None = key("along x", optional=True)
@@ -70,34 +69,34 @@ class Difference(Saved):
 
 
 class ProductFile(CameraFile, kw_only=True):
-    """What differences at check points say of a product."""
+    """Accuracy of a product from differences at check points."""
 
     kind: Literal["product"] = key("product", default="product")
     alpha: float = key("level of the tests of bias (two-sided) and of precision (upper)")
     n: int = key("points")
     axes: list[AxisCheck] = key("each axis")
-    parts: list[PartJudged] = key("plan and height where known")
-    notes: list[ProductNote] = key("what should be read")
-    advised: int = key("points that a test of accuracy should have")
-    table: LimitsUsed | None = key("null: no limits were asked for")
+    parts: list[PartJudged] = key("plan and height if known")
+    notes: list[ProductNote] = key("on the check")
+    advised: int = key("number of points advised for a test of accuracy")
+    table: LimitsUsed | None = key("null: no limits were requested")
     verdicts: list[ClassJudged] = key("each class")
     best: list[BestClass] = key("each scale")
     differences: list[Difference] = key("each point")
 
 
 def product_of(check):
-    """The `ProductFile` of a ProductCheck."""
-    return filled_from(
+    """Return the `ProductFile` of a ProductCheck."""
+    return fill_from(
         ProductFile,
         check,
         n=len(check.names),
         axes=check.checks,
-        parts=[filled_from(PartJudged, one, largest_m=one.size_m.max()) for one in check.parts],
-        notes=[ProductNote(*one) for one in check.notes],
+        parts=[fill_from(PartJudged, part, largest_m=part.size_m.max()) for part in check.parts],
+        notes=[ProductNote(*note) for note in check.notes],
         advised=ADVISED,
-        table=filled_from(LimitsUsed, check.table),
-        verdicts=[filled_from(ClassJudged, one) for one in check.verdicts],
-        best=_best(check),
+        table=fill_from(LimitsUsed, check.table),
+        verdicts=[fill_from(ClassJudged, verdict) for verdict in check.verdicts],
+        best=_best_classes(check),
         differences=[
             {"point": name}
             | {f"d{axis}_m": value for axis, value in zip(check.axes, row, strict=True)}
@@ -106,13 +105,13 @@ def product_of(check):
     )
 
 
-def as_json(check):
-    """The same as plain data."""
+def plain_product(check):
+    """Return the `ProductFile` of a ProductCheck, as plain data."""
     return to_plain(product_of(check))
 
 
-def _best(check):
-    scales = dict.fromkeys((one.part, one.scale) for one in check.verdicts)
+def _best_classes(check):
+    scales = dict.fromkeys((verdict.part, verdict.scale) for verdict in check.verdicts)
     return [
         BestClass(part, scale, check.best(part, scale), check.best(part, scale, unbiased=True))
         for part, scale in scales

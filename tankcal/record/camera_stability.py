@@ -1,18 +1,18 @@
-"""A comparison of calibrations as it is saved: kind "stability" of camera.json.
+"""Comparison of calibrations: kind "stability" of camera.json.
 
-Codes of `conventions`, each choice that a figure depends on, in the order of reading:
+Codes of `conventions`, the choices on which a figure depends, in their order:
 
     figure_rmse | figure_mean_distance | figure_sigma0 {points, unknowns}
         sqrt(mean(dx2 + dy2)); mean(hypot(dx, dy)); sqrt(v'v / (2 points - unknowns))
-    focal_as_they_are     image points compared as they are (mis)
-    focal_own             each bundle has its own focal length (rot, spr)
+    focal_as_they_are     image points compared without scaling (mis)
+    focal_own             each bundle has the focal length of its set (rot, spr)
     focal_scaled {of, to} second set scaled by c of the first / c of the second (zrot)
     focal_same {of}       both bundles have the focal length of the first set (rot)
-    direction {from, to}  second set brought onto the first; of spr: object points from the first
+    direction {from, to}  second set transformed to the first; of spr: object points from the first
                           set, resection of the second
-    pixel {x_um, y_um}    a pixel of this size, each axis by its own side
+    pixel {x_um, y_um}    a pixel of this size, each axis by its side
     terrain_random {position_m, low_m, range_m, seed, terrains}   (spr)
-    sds_uncorrelated | covariance_known {cameras}       (where expected_px is there)
+    sds_uncorrelated | covariance_known {cameras}       (if expected_px is given)
 """
 
 from dataclasses import make_dataclass
@@ -22,8 +22,7 @@ import numpy as np
 
 from tankcal.camera.model import KEYS, PARAMETERS
 from tankcal.record.camera_versions import CameraFile
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 
 DECIMALS = 4  # of a difference in pixels
 Interior = make_dataclass(
@@ -38,7 +37,7 @@ Interior = make_dataclass(
 
 
 class ComparisonGrid(Saved):
-    """Grid of image points that are compared."""
+    """Grid of compared image points."""
 
     columns: int = key("number")
     rows: int = key("number")
@@ -47,7 +46,7 @@ class ComparisonGrid(Saved):
 
 
 class ComparisonTerrain(Saved):
-    """Object points that the bundles are brought together by."""
+    """Object points by which the bundles are aligned."""
 
     position_m: list[float] = key("x, y, z of the projection centre")
     low_m: float = key("lowest height")
@@ -76,16 +75,16 @@ class ComparedCamera(Interior, NameOfCamera):
 class ComparedPair(Saved):
     """Two calibrations: second set minus first."""
 
-    a: str = key("name of the first, which stands before b in the file")
+    a: str = key("name of the first, which is before b in the file")
     b: str = key("name of the second")
-    method: str = key("as above")
+    method: str = key("of the comparison")
     figure_px: float = key("of spr pooled over the terrains")
     scatter_px: float | None = key("its sd from terrain to terrain (spr)")
     similar: bool = key("whether the figure is below the threshold")
     largest_px: float = key("length of a difference")
     mean_px: float = key("of the lengths")
     rmse_px: float = key("of the lengths")
-    expected_px: float | None = key("figure that the declared sds alone would make")
+    expected_px: float | None = key("figure expected from the declared sds alone")
     scale: float | None = key("of the second set (zrot)")
     rotation_deg: list[float] | None = key("omega, phi, kappa of the second bundle (rot, spr)")
     shift_m: list[float] | None = key("of the second projection centre (spr)")
@@ -99,8 +98,8 @@ class StabilityFile(CameraFile, kw_only=True):
 
     kind: Literal["stability"] = key("stability", default="stability")
     method: str = key('"mis", "zrot", "rot" or "spr"')
-    as_published: bool = key("whether Pessoa's own conventions are followed")
-    conventions: list[dict] = key("{code, ...}: each choice that a figure depends on")
+    as_published: bool = key("whether Pessoa's conventions are followed")
+    conventions: list[dict] = key("{code, ...}: choices on which a figure depends")
     grid: ComparisonGrid = key("image points")
     threshold_px: float = key("similar when the figure is below it")
     terrain: ComparisonTerrain | None = key("null but for spr")
@@ -108,22 +107,22 @@ class StabilityFile(CameraFile, kw_only=True):
     pairs: list[ComparedPair] = key("(2, 1), (3, 1), (3, 2), (4, 1) ...")
 
 
-def as_json(result):
-    """The `StabilityFile` of a Stability, as plain data."""
-    found = filled_from(
+def plain_stability(result):
+    """Return the `StabilityFile` of a Stability, as plain data."""
+    file = fill_from(
         StabilityFile,
         result,
-        conventions=[{"code": one.code, **one.values} for one in result.conventions],
-        grid=filled_from(ComparisonGrid, result.grid),
-        terrain=result.terrain and filled_from(ComparisonTerrain, result.terrain, seed=result.seed),
+        conventions=[{"code": choice.code, **choice.values} for choice in result.conventions],
+        grid=fill_from(ComparisonGrid, result.grid),
+        terrain=result.terrain and fill_from(ComparisonTerrain, result.terrain, seed=result.seed),
         cameras=[_camera(setup, result.format_px) for setup in result.setups],
         pairs=[_pair(pair, result) for pair in result.pairs],
     )
-    return to_plain(found)
+    return to_plain(file)
 
 
 def summary(result):
-    """The pairs alone, [{a, b, method, figure_px, scatter_px, similar}], a before b in the file."""
+    """Return the pairs, [{a, b, method, figure_px, scatter_px, similar}], a first in the file."""
     return [
         {
             "a": pair.a,
@@ -139,7 +138,7 @@ def summary(result):
 
 def _camera(setup, format_px):
     camera = setup.camera
-    return filled_from(
+    return fill_from(
         ComparedCamera,
         camera,
         **dict(zip(PARAMETERS, np.asarray(camera.values, dtype=float).tolist(), strict=True)),
@@ -151,8 +150,8 @@ def _camera(setup, format_px):
 
 def _pair(pair, result):
     length = np.hypot(*pair.difference_px.T)
-    along, up = (_on_grid(part, result.grid) for part in pair.difference_px.T)
-    return filled_from(
+    along, up = (_round_to_grid(part, result.grid) for part in pair.difference_px.T)
+    return fill_from(
         ComparedPair,
         pair,
         method=result.method,
@@ -160,12 +159,12 @@ def _pair(pair, result):
         mean_px=float(length.mean()),
         rmse_px=float(np.sqrt(np.mean(length**2))),
         rotation_deg=None if pair.rotation_rad is None else np.degrees(pair.rotation_rad),
-        difference_px=_on_grid(length, result.grid),
+        difference_px=_round_to_grid(length, result.grid),
         difference_x_px=along,
         difference_y_px=up,
     )
 
 
-def _on_grid(values, grid):
-    """[rows][columns] of a value for each grid point, which are stored row by row."""
+def _round_to_grid(values, grid):
+    """Return values of the grid points, stored row by row, as [rows][columns]."""
     return np.round(values, DECIMALS).reshape(grid.rows, grid.columns)

@@ -1,4 +1,4 @@
-"""The choices that a result names: what was assumed, each by a code and its value."""
+"""Choices of a result: its assumptions, each as a code with a value."""
 
 import numpy as np
 
@@ -7,26 +7,26 @@ from tankcal.record.liquid import geometry_beside
 from tankcal.record.schema import Saved, key
 from tankcal.record.table import zero_of
 
-SIGHTS = {  # of a total station, a theodolite or a level: a tape beside photographs is none
+SIGHTS = {  # kinds of readings of instruments; a tape used with photographs is no sight
     "direction", "horizontal angle", "vertical angle", "zenith angle", "azimuth",
     "height difference", "slope distance",
 }  # fmt: skip
 
 
 class Choice(Saved):
-    """Something that was assumed; the sentence is the template's, in its language."""
+    """An assumption; the template supplies the sentence in its language."""
 
     code: str = key("see below")
     value: str | float | bool | list | None = key("of the choice")
 
 
 def choices_of(result):
-    """The `Choice`s of a result: everything that was assumed."""
+    """Return the `Choice`s of a result: all its assumptions."""
     job = result.job
     values = {
         "zero": zero_of(result),
         **(_shell_choices(job, result) if result.wall is not None else {}),
-        **(_strapped_choices(job) if result.strapped is not None else {}),
+        **(_strap_choices(job) if result.strapped is not None else {}),
         **_liquid_choices(result),
         **_radii_choices(result),
         **_ring_choices(result),
@@ -36,42 +36,42 @@ def choices_of(result):
         **_sphere_choices(job),
         "height_expansion": "yes" if job.table.height_expansion else "no",
         "head": _head_choice(job),
-        "deadwood": _fitting_choice(job.switches.deadwood, job.deadwood),
+        "deadwood": _switch_choice(job.switches.deadwood, job.deadwood),
         "interpolation": "linear",
         "coverage": job.table.coverage_probability,
         "k": "normal" if np.all(np.isinf(result.table.dof)) else "student",
         "expansion": "given" if job.material.expansion_given else "default",
-        "not_in_budget": _not_in_budget(result),
+        "not_in_budget": _undeclared_inputs(result),
     }
     if result.adjustment is not None:
-        of_survey = _adjustment_values(result.adjustment, getattr(job, "measurements", None))
-        values = of_survey | values
-    return [Choice(*one) for one in values.items()]
+        adjustment = _adjustment_values(result.adjustment, getattr(job, "measurements", None))
+        values = adjustment | values
+    return [Choice(*choice) for choice in values.items()]
 
 
-def _not_in_budget(result):
-    """Inputs without u, those of the table first, then what moves only corrections of a ship."""
+def _undeclared_inputs(result):
+    """Return inputs without u: of the table, then of the corrections of a ship only."""
     of_ship = () if result.ship is None else result.ship.undeclared
     return list(dict.fromkeys((*result.body.undeclared(), *of_ship)))
 
 
 def adjustment_choices(adjustment, measurements):
-    """Each `Choice` that was assumed when the survey was adjusted."""
-    return [Choice(*one) for one in _adjustment_values(adjustment, measurements).items()]
+    """Return the `Choice`s of an adjustment of a survey."""
+    return [Choice(*choice) for choice in _adjustment_values(adjustment, measurements).items()]
 
 
 def _adjustment_values(adjustment, measurements):
     settings = getattr(measurements, "settings", None)
     kinds = {group.kind for group in adjustment.groups}
     photographs = "image coordinate" in kinds
-    others = kinds & SIGHTS
+    sights = kinds & SIGHTS
     test = "none"
     if adjustment.redundancy > 0:
         test = "passed" if adjustment.adjusted.test().passed else "failed"
     weights = getattr(settings, "image_weights", "measured")
     return {
         **({"image_weights": weights} if photographs else {}),
-        "survey": "both" if photographs and others else "photographs" if photographs else "sights",
+        "survey": "both" if photographs and sights else "photographs" if photographs else "sights",
         "adjustment_datum": adjustment.datum.choice,
         "adjustment_snooping": CRITICAL if getattr(settings, "snooping", True) else "off",
         "adjustment_test": test,
@@ -79,45 +79,46 @@ def _adjustment_values(adjustment, measurements):
     }
 
 
+# ---- choices of each kind of wall
+
+
 def _shell_choices(job, result):
-    """What was assumed about a shell of courses, and how its points were used."""
+    """Return the choices on a shell with surveyed points, and on the use of its points."""
     wall = result.wall
-    roof = job.roof and job.roof.weighing
     return {
         "bottom": _bottom_choice(job),
-        **_measured_by(job, result),
+        **_survey_choices(job, result),
         "course_of_points": "section" if any(job.points.section) else "height",
         "shape": "smoothed",
         "between_sections": "field",
         "tilt": _tilt_choice(job, wall.shell),
         "course_heights": "along_axis",
         **_top_choice(job),
-        "roof": _fitting_choice(job.switches.roof, roof, roof),
+        "roof": _roof_choice(job),
         "snooping": CRITICAL if job.snooping else "off",
         "form": "learned",
         "covariance_sd_mm": 1000 * np.sqrt(np.median(wall.covariance_m2.diagonal())),
     }
 
 
-def _measured_by(job, result):
-    """How the points came about, and what is known of them."""
-    found = {"covariance": _covariance_choice(job) if result.adjustment is None else "adjusted"}
+def _survey_choices(job, result):
+    """Return the choices on the origin of the points and of their covariance."""
+    choices = {"covariance": _covariance_choice(job) if result.adjustment is None else "adjusted"}
     if job.hits is not None:
-        found = {"survey": "wall_hits", "covariance": "hits"}
+        choices = {"survey": "wall_hits", "covariance": "hits"}
     elif job.clouds is not None:
-        found = {"survey": "clouds", "covariance": "clouds"}
+        choices = {"survey": "clouds", "covariance": "clouds"}
     elif job.tangents is not None:
-        found = {"survey": "tangents", "covariance": "tangents"}
+        choices = {"survey": "tangents", "covariance": "tangents"}
     if result.straps is not None:
-        found["straps"] = "beside_points"
+        choices["straps"] = "beside_points"
     if job.lines is not None:
-        found["lines"] = "beside_points"
-    return found
+        choices["lines"] = "beside_points"
+    return choices
 
 
-def _strapped_choices(job):
-    """What was assumed about a shell that a tape was put round."""
-    roof = job.roof and job.roof.weighing
+def _strap_choices(job):
+    """Return the choices on a strapped shell, also with offsets from reference lines."""
     return {
         "bottom": _bottom_choice(job),
         "survey": "strapping" if job.lines is None else "reference_line",
@@ -126,7 +127,7 @@ def _strapped_choices(job):
         "between_sections": "cylinders" if job.lines is None else "revolution",
         "tilt": "not_measured" if job.lines is None else "not_applied",
         "course_heights": "along_axis",
-        "roof": _fitting_choice(job.switches.roof, roof, roof),
+        "roof": _roof_choice(job),
         "form": "learned",
     }
 
@@ -138,7 +139,7 @@ def _area_term_choice(shape_sd_m):
 
 
 def _ring_choices(result):
-    """What was assumed about rings that a tape was put round."""
+    """Return the choices on the strapped rings of a horizontal tank."""
     if result.rings is None:
         return {}
     shape_mm = 1000 * result.rings.shape_sd_m
@@ -151,39 +152,37 @@ def _ring_choices(result):
 
 
 def _sphere_choices(job):
-    """How a sphere was taken that great circles describe, and the pressure that it is for."""
-    found = {}
+    """Return the choices on a strapped sphere, and on the pressure of the table."""
+    choices = {}
     if job.great_circles is not None:
-        found |= {"survey": "great_circles", "between_sections": "ellipsoid"}
+        choices |= {"survey": "great_circles", "between_sections": "ellipsoid"}
     if job.sphere is not None and job.switches.head and job.table.pressure_pa:
-        found["pressure"] = job.table.pressure_pa / 1e5
-    return found
+        choices["pressure"] = job.table.pressure_pa / 1e5
+    return choices
 
 
 def _liquid_choices(result):
-    """Whose table is printed where liquid was metered, and what stood beside the liquid."""
+    """Return the choices on metered liquid: the printed table, and the geometry used with it."""
     if result.liquid is None:
         return {}
-    job, beside = result.job, geometry_beside(result)
-    found = {"liquid": result.liquid.certified, "liquid_beside": beside}
-    if beside == "drawing":
-        roof = job.roof and job.roof.weighing
-        found |= {
+    job, geometry = result.job, geometry_beside(result)
+    choices = {"liquid": result.liquid.certified, "liquid_beside": geometry}
+    if geometry == "drawing":
+        choices |= {
             "bottom": _bottom_choice(job),
             **_top_choice(job),
             "tilt": "not_measured",
             "course_heights": "along_axis",
-            "roof": _fitting_choice(job.switches.roof, roof, roof),
+            "roof": _roof_choice(job),
         }
-    return found
+    return choices
 
 
 def _radii_choices(result):
-    """Where the radii of the courses come from."""
+    """Return the choices on former radii of the courses, and on their origin."""
     if result.radii is None:
         return {}
     job = result.job
-    roof = job.roof and job.roof.weighing
     return {
         "bottom": _bottom_choice(job),
         **_top_choice(job),
@@ -192,8 +191,11 @@ def _radii_choices(result):
         "between_sections": "radii",
         "tilt": "not_known",
         "course_heights": "along_axis",
-        "roof": _fitting_choice(job.switches.roof, roof, roof),
+        "roof": _roof_choice(job),
     }
+
+
+# ---- single choices
 
 
 def _bottom_choice(job):
@@ -201,8 +203,13 @@ def _bottom_choice(job):
 
 
 def _top_choice(job):
-    """The head on top; nothing is said of a tank without one."""
+    """Return the choice on the head on top; {} without head."""
     return {} if job.top is None else {"top": job.top.form if job.switches.top else "off"}
+
+
+def _roof_choice(job):
+    weighing = job.roof and job.roof.weighing
+    return _switch_choice(job.switches.roof, weighing, weighing)
 
 
 def _tilt_choice(job, shell):
@@ -213,20 +220,16 @@ def _tilt_choice(job, shell):
 
 def _temperature_choice(job):
     if job.radii is not None:
-        return _temperature_of_radii(job)
+        if job.radii.temperature_c == job.table.reference_temperature_c:
+            return "radii_as_they_are"
+        return "radii_applied" if job.switches.temperature else "off"
     if job.survey.shell_temperature_c is None:
         return "not_applied"
     return "applied" if job.switches.temperature else "off"
 
 
-def _temperature_of_radii(job):
-    if job.radii.temperature_c == job.table.reference_temperature_c:
-        return "radii_as_they_are"
-    return "radii_applied" if job.switches.temperature else "off"
-
-
 def _head_choice(job):
-    """Density that the table is loaded for; "unloaded" when only the survey's was taken off."""
+    """Return the density of the liquid of the table; "unloaded": only that of the survey."""
     if not job.switches.head:
         return "off"
     if job.table.liquid_density_kg_m3:
@@ -235,17 +238,18 @@ def _head_choice(job):
     return "unloaded" if loaded else "none"
 
 
-def _fitting_choice(switched_on, given, applied="declared"):
-    if not given:
+def _switch_choice(is_on, declared, value="declared"):
+    """Return `value`, "off" if the correction is off, or "none" if nothing is declared."""
+    if not declared:
         return "none"
-    return applied if switched_on else "off"
+    return value if is_on else "off"
 
 
 def _covariance_choice(job):
     if job.points.sd_m is None and job.points.covariance_m2 is None:
         return "estimated"
-    given = "given_sd" if job.points.covariance_m2 is None else "given_full"
-    return given + "_scaled" if job.scale == "a_posteriori" else given
+    code = "given_sd" if job.points.covariance_m2 is None else "given_full"
+    return code + "_scaled" if job.scale == "a_posteriori" else code
 
 
 def _thickness_choice(job, result):
@@ -257,7 +261,7 @@ def _thickness_choice(job, result):
         return "inside"
     solid = job.horizontal or job.sphere
     parts = job.courses or job.rings
-    given = any(c.thickness_m + c.paint_m for c in parts) or (solid and solid.thickness_m)
-    if not given:
+    has_thickness = any(c.thickness_m + c.paint_m for c in parts) or (solid and solid.thickness_m)
+    if not has_thickness:
         return "none"
     return "subtracted" if job.switches.plate and job.switches.paint else "off"

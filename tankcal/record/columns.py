@@ -1,8 +1,8 @@
-"""Long tables of a record by columns: arrays, looked at as the lists and dicts that they stand for.
+"""Long tables of a record as arrays by columns, with the interface of lists and dicts.
 
-A survey may have 200 000 readings. As lists of Python they take ten times the memory and the time
-of arrays. Whoever reads a record need not know which of both it has: `ArrayColumns` is a mapping
-{key: list of values}, `ArrayRows` a sequence of dicts.
+A survey may have 200 000 readings. Python lists need ten times the memory and time of arrays. A
+reader of a record needs no distinction: `ArrayColumns` is a mapping {key: list of values}, and
+`ArrayRows` a sequence of dicts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,19 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-MOST_ROWS = 10_000  # of a table of a record that is lists and dicts
-NO_INTEGER = np.iinfo(np.int64).min  # stands for null in a column of whole numbers
+MOST_ROWS = 10_000  # largest number of rows of a table that consists of lists and dicts
+NO_INTEGER = np.iinfo(np.int64).min  # replaces null in a column of integers
 
 
 @dataclass(frozen=True, eq=False)
 class Texts:
-    """A column of texts, each different one kept once.
+    """Column of texts in which equal texts are stored once.
 
     Attributes
     ----------
     codes : ndarray of int, shape (n,) or (n, k)
-        Place of each text in `texts`; -1: null, or none of a row of lists of up to k texts.
+        Index of each text in `texts`; -1: null, or the end of a row of fewer than k texts.
     texts : tuple of str
+        The different texts.
     """
 
     codes: np.ndarray
@@ -30,7 +31,7 @@ class Texts:
 
     @classmethod
     def of(cls, values):
-        """The column of texts and None, or of lists of texts.
+        """Return the column of texts and None, or of lists of texts.
 
         Examples
         --------
@@ -39,16 +40,15 @@ class Texts:
         >>> Texts.of([["A", "B"], ["A"]]).tolist()
         [['A', 'B'], ['A']]
         """
-        places = {None: -1}
-        width = max((len(one) for one in values if type(one) in (list, tuple)), default=None)
+        width = max((len(value) for value in values if type(value) in (list, tuple)), default=None)
         flat = values
         if width is not None:
-            nothing = [None] * width
-            flat = [text for one in values for text in [*one, *nothing][:width]]
-        codes = [places.setdefault(text, len(places) - 1) for text in flat]
+            flat = [text for value in values for text in [*value, *[None] * width][:width]]
+        indices = {None: -1}
+        codes = [indices.setdefault(text, len(indices) - 1) for text in flat]
         codes = np.array(codes, dtype=np.int32)
-        shaped = codes if width is None else codes.reshape(len(values), width)
-        return cls(shaped, tuple(places)[1:])
+        codes = codes if width is None else codes.reshape(len(values), width)
+        return cls(codes, tuple(indices)[1:])
 
     def __len__(self):
         return len(self.codes)
@@ -57,39 +57,44 @@ class Texts:
         return Texts(self.codes[rows], self.texts)
 
     def tolist(self):
-        """The texts as they were."""
-        found = self.filled(None).tolist()
+        """Return the texts as a list, or list of lists, without the fill of short rows."""
+        values = self.filled(None).tolist()
         if self.codes.ndim > 1 and (self.codes < 0).any():
-            return [[text for text in one if text is not None] for one in found]
-        return found
+            return [[text for text in row if text is not None] for row in values]
+        return values
 
-    def filled(self, nothing):
-        """The texts of a column as an array of objects, with another text where there is none."""
+    def filled(self, missing):
+        """Return the texts as an array of objects, with `missing` in place of null."""
         table = np.empty(len(self.texts) + 1, dtype=object)
-        table[:] = *self.texts, nothing
+        table[:] = *self.texts, missing  # the code -1 selects the last entry
         return table[self.codes]
 
     def mapped(self, function):
-        """The column with function(text) in place of each text."""
+        """Return the column with function(text) in place of each text."""
         return Texts(self.codes, tuple(map(function, self.texts)))
 
 
 def column_of(values):
-    """A column of plain values as an array or `Texts`; one of these stays as it is.
+    """Convert plain values to a column.
 
     Parameters
     ----------
     values : sequence
-        Numbers, texts, True and False, or lists of equally many of one of these; None for null.
+        Numbers, texts, booleans, or lists of equal length of these; None for null. An array or
+        `Texts` is returned unchanged.
+
+    Returns
+    -------
+    ndarray or Texts
 
     Raises
     ------
     TypeError
-        For values that are not alike.
+        For values of different types.
     """
     if isinstance(values, np.ndarray | Texts):
         return values
-    kinds = {str if issubclass(one, str) else one for one in map(type, values)} - {type(None)}
+    kinds = {str if issubclass(kind, str) else kind for kind in map(type, values)} - {type(None)}
     if not kinds:
         return np.full(len(values), np.nan)
     if kinds == {str}:
@@ -97,27 +102,28 @@ def column_of(values):
     if kinds == {bool} and None not in values:
         return np.array(values)
     if kinds == {int}:
-        return np.array([NO_INTEGER if one is None else one for one in values], dtype=np.int64)
+        integers = [NO_INTEGER if value is None else value for value in values]
+        return np.array(integers, dtype=np.int64)
     if kinds <= {int, float}:
         return np.array(values, dtype=float)  # None becomes nan
     if kinds <= {list, tuple}:
         return _column_of_lists(values)
-    raise TypeError(f"no column: values of {', '.join(sorted(one.__name__ for one in kinds))}")
+    raise TypeError(f"no column: values of {', '.join(sorted(kind.__name__ for kind in kinds))}")
 
 
 def _column_of_lists(values):
-    known = next(one for one in values if one is not None)
-    leaves = {type(leaf) for one in values if one is not None for leaf in one}
-    if leaves <= {str}:
+    known = [value for value in values if value is not None]
+    kinds = {type(item) for value in known for item in value}
+    if kinds <= {str}:
         return Texts.of(values)
-    if leaves == {bool}:
+    if kinds == {bool}:
         return np.array(values)
-    nothing = np.full(np.shape(known), np.nan)
-    return np.array([nothing if one is None else one for one in values], dtype=float)
+    missing = np.full(np.shape(known[0]), np.nan)
+    return np.array([missing if value is None else value for value in values], dtype=float)
 
 
 def values_of(column):
-    """The plain values of a column: null (None) where a number is not finite.
+    """Convert a column to plain values; numbers that are not finite become None.
 
     Examples
     --------
@@ -126,37 +132,28 @@ def values_of(column):
     >>> values_of(np.full((1, 2), np.nan))
     [None]
     """
-    found = column.tolist()
+    values = column.tolist()
     if isinstance(column, Texts) or column.dtype == bool:
-        return found
-    if column.dtype.kind == "i":
-        null = column == NO_INTEGER
-        return _with_null(found, null) if null.any() else found
-    null = ~np.isfinite(column)
-    if not null.any():
-        return found
+        return values
+    is_null = column == NO_INTEGER if column.dtype.kind == "i" else ~np.isfinite(column)
     if column.ndim == 1:
-        return _with_null(found, null)
-    null = null.reshape(len(column), -1)
-    for row in np.flatnonzero(null.any(axis=1)).tolist():
-        inner = np.where(null[row], None, column[row].astype(object).ravel())
-        found[row] = None if null[row].all() else inner.reshape(column.shape[1:]).tolist()
-    return found
-
-
-def _with_null(values, null):
-    for row in np.flatnonzero(null).tolist():
-        values[row] = None
+        for row in np.flatnonzero(is_null).tolist():
+            values[row] = None
+        return values
+    is_null = is_null.reshape(len(column), -1)
+    for row in np.flatnonzero(is_null.any(axis=1)).tolist():
+        items = np.where(is_null[row], None, column[row].astype(object).ravel())
+        values[row] = None if is_null[row].all() else items.reshape(column.shape[1:]).tolist()
     return values
 
 
 class ArrayColumns(Mapping):
-    """ArrayColumns of equal length: {key: list of plain values}, made when it is asked for.
+    """Columns of equal length: {key: list of plain values}, converted on access.
 
     Parameters
     ----------
     columns : mapping
-        {key: values, as `column_of` takes them}.
+        {key: values that `column_of` accepts}.
     """
 
     def __init__(self, columns):
@@ -164,14 +161,14 @@ class ArrayColumns(Mapping):
 
     @classmethod
     def of_rows(cls, rows):
-        """The columns of dicts with the same keys; of `ArrayRows` those that they are of."""
+        """Return the columns of dicts with common keys, or the columns of `ArrayRows`."""
         if isinstance(rows, ArrayRows):
             return rows.columns
-        return cls({key: [row[key] for row in rows] for key in (rows[0] if rows else ())})
+        return cls(columns_of(rows))
 
     @property
     def arrays(self):
-        """{key: array or `Texts`}."""
+        """The columns, {key: array or `Texts`}."""
         return self._columns
 
     @property
@@ -189,24 +186,24 @@ class ArrayColumns(Mapping):
         return len(self.arrays)
 
     def __bool__(self):
-        return True  # as a dict of empty lists; nothing is read for it
+        return True  # as a dict of empty lists; the file of the columns is not read
 
     def __or__(self, others):
         return ArrayColumns({**self.arrays, **getattr(others, "arrays", others)})
 
     def take(self, rows):
-        """The same columns of some rows: their numbers, a mask or a slice."""
+        """Return the columns of some rows, selected by indices, a mask or a slice."""
         return ArrayColumns({key: column[rows] for key, column in self.arrays.items()})
 
     def rows(self):
-        """A dict for each row, one after the other."""
+        """Yield a dict for each row."""
         names = tuple(self)
         for values in zip(*self.values(), strict=True):
             yield dict(zip(names, values, strict=True))
 
 
 class ArrayRows(Sequence):
-    """`ArrayColumns` as a sequence of dicts, each made when it is asked for."""
+    """`ArrayColumns` as a sequence of dicts, converted on access."""
 
     def __init__(self, columns):
         self.columns = columns
@@ -229,27 +226,48 @@ class ArrayRows(Sequence):
     __hash__ = None
 
 
-def as_columns(found):
-    """`ArrayColumns` of a table of a record, in whichever form it has it."""
-    if isinstance(found, ArrayColumns):
-        return found
-    return ArrayColumns(found) if isinstance(found, Mapping) else ArrayColumns.of_rows(found)
+# ---- tables of a record in either form
 
 
-def count_rows(found):
-    """Number of rows of a table of a record, in whichever form it has it."""
-    if isinstance(found, ArrayColumns):
-        return found.count
-    return len(next(iter(found.values()), ())) if isinstance(found, Mapping) else len(found)
+def as_columns(table):
+    """Return a table of a record, in any form, as `ArrayColumns`."""
+    if isinstance(table, ArrayColumns):
+        return table
+    return ArrayColumns(table) if isinstance(table, Mapping) else ArrayColumns.of_rows(table)
 
 
-def is_long(found):
-    """Whether a table of a record has more than MOST_ROWS rows."""
-    return count_rows(found) > MOST_ROWS
+def count_rows(table):
+    """Return the number of rows of a table of a record, in any form."""
+    if isinstance(table, ArrayColumns):
+        return table.count
+    return len(next(iter(table.values()), ())) if isinstance(table, Mapping) else len(table)
 
 
-def plain_if_short(found):
-    """The dict or list of `ArrayColumns` or `ArrayRows`; more than MOST_ROWS rows stay arrays."""
-    if is_long(found):
-        return found
-    return dict(found) if isinstance(found, Mapping) else list(found)
+def is_long(table):
+    """Return whether a table of a record has more than MOST_ROWS rows."""
+    return count_rows(table) > MOST_ROWS
+
+
+def plain_if_short(table):
+    """Return `ArrayColumns` as dict or `ArrayRows` as list, unless they are long."""
+    if is_long(table):
+        return table
+    return dict(table) if isinstance(table, Mapping) else list(table)
+
+
+def whole(record):
+    """Return a record whose tables, also the long ones, are lists and dicts."""
+    if isinstance(record, ArrayColumns | dict):
+        return {key: whole(value) for key, value in record.items()}
+    return list(record) if isinstance(record, ArrayRows) else record
+
+
+def columns_of(rows, names=()):
+    """Return {key: values} of dicts with common keys; without rows, empty columns `names`."""
+    return {key: [row[key] for row in rows] for key in (rows[0] if rows else names)}
+
+
+def rows_of(columns):
+    """Return the rows of {key: values} (list of dict)."""
+    names = tuple(columns)
+    return [dict(zip(names, values, strict=True)) for values in zip(*columns.values(), strict=True)]

@@ -1,9 +1,9 @@
-"""The factor of the covariance of a table's rows, as the record holds it: in blocks of rows.
+"""The covariance factor of the rows of a table, in blocks of rows, as saved in the record.
 
-Between joints the volumes are smooth in height, and so is what each input does to them: a few rows
-of a block give all others, as sums of multiples. The record holds these few and the multiples,
-which are a fifth of the numbers and less (interpolative decomposition [1]_). Of 25 000 rows and ten
-courses the whole factor would be 155 MB, nine tenths of the record.
+Between joints the volumes, and the effects of the inputs on them, are smooth in height. All rows of
+a block are therefore linear combinations of a few rows. The record contains these rows and the
+weights of the combinations, at most a fifth of the numbers (interpolative decomposition [1]_). For
+25 000 rows and ten courses the whole factor would be 155 MB, nine tenths of the record.
 
 .. [1] H. Cheng, Z. Gimbutas, P. G. Martinsson, V. Rokhlin, On the compression of low rank matrices,
    SIAM J. Sci. Comput. 26 (2005), 1389-1404.
@@ -16,27 +16,34 @@ import scipy.linalg
 
 from tankcal.record.schema import Finite, Saved, key
 
-ROWS = 200  # of a block at most: of fewer more rows are kept in all, more pass over a joint
-LEFT = 3e-15  # of a row's u, that may be left of it when no more rows are kept
-LARGEST_ERROR = 1e-14  # of a row's u: a block that is not given back as well is kept as it is
+# Largest number of rows of a block. Smaller blocks keep more rows in total; larger blocks are less
+# smooth, since they reach over a joint.
+ROWS = 200
+RESIDUAL = 3e-15  # largest remainder of a row after the kept rows, relative to its u
+LARGEST_ERROR = 1e-14  # largest error of a combined row, relative to its u; otherwise all are kept
 
 
 class FactorBlock(Saved):
-    """Rows of a table one after the other, and their factor: weights times factor_m3."""
+    """Successive rows of a table, and their factor: weights times factor_m3."""
 
-    rows: int = key("how many, from where the block before it ends")
+    rows: int = key("number of rows, from the end of the previous block")
     weights: list[list[Finite]] | None = key(
-        "rows x kept: by how much of each kept row; null: all are kept, one after the other"
+        "rows x kept: weight of each kept row; null: all rows are kept, in their order"
     )
     factor_m3: list[list[Finite]] = key("kept x inputs")
 
 
 def blocks_of(factor_m3):
-    """The `FactorBlock`s of a factor; one ends where an input begins or ceases to have an effect.
+    """Divide a factor into blocks; a block ends where an input gains or loses its effect.
 
     Parameters
     ----------
     factor_m3 : array_like, shape (rows, inputs)
+        Covariance factor, m3.
+
+    Returns
+    -------
+    list of FactorBlock
 
     Examples
     --------
@@ -45,105 +52,124 @@ def blocks_of(factor_m3):
     [(4, (4, 1), (1, 2))]
     """
     factor = np.asarray(factor_m3, dtype=float)
-    idle = factor == 0
-    changes = np.flatnonzero((idle[1:] != idle[:-1]).any(axis=1)) + 1
+    is_zero = factor == 0
+    changes = np.flatnonzero((is_zero[1:] != is_zero[:-1]).any(axis=1)) + 1
     starts = [
         start
         for first, last in pairwise([0, *changes.tolist(), len(factor)])
         for start in range(first, last, ROWS)
     ]
-    return [_block_of(factor[first:last]) for first, last in pairwise([*starts, len(factor)])]
+    return [_make_block(factor[first:last]) for first, last in pairwise([*starts, len(factor)])]
 
 
 def factor_of(capacity):
-    """The whole factor, (rows, inputs), of the part `capacity` of a record.
+    """Compute the whole factor of the part `capacity` of a record.
 
-    It is summed kept row by kept row, which gives the same bits on every machine.
+    The kept rows are added in their order, so that all machines give the same bits.
+
+    Parameters
+    ----------
+    capacity : dict
+        Part of a record.
+
+    Returns
+    -------
+    ndarray, shape (rows, inputs)
+        Covariance factor, m3.
 
     Raises
     ------
     ValueError
-        For blocks that are not those of the table's rows and inputs.
+        If the blocks do not match the rows and inputs of the table.
     """
     blocks, inputs = capacity["factor"], len(capacity["inputs"])
-    parts = [np.empty((0, inputs)), *(_whole(block, inputs) for block in blocks)]
+    parts = [np.empty((0, inputs)), *(_expand_block(block, inputs) for block in blocks)]
     factor = np.concatenate(parts)
     if len(factor) != len(capacity["height_m"]):
         raise ValueError(f"a factor of {len(factor)} rows, of {len(capacity['height_m'])}")
     return factor
 
 
-def in_blocks(capacity):
-    """The part `capacity` of a record that has its whole factor, `factor_m3`, with it as a block.
-
-    Parameters
-    ----------
-    capacity : dict
-        As records of version 1, and drafts of version 2, have it.
-    """
+def wrap_factor(capacity):
+    """Return the part `capacity` of version 1 or a draft of 2 with its whole factor as a block."""
     other = {name: value for name, value in capacity.items() if name != "factor_m3"}
     factor = capacity["factor_m3"]
     return other | {"factor": [{"rows": len(factor), "weights": None, "factor_m3": factor}]}
 
 
-def _whole(block, inputs):
-    """(rows, inputs): the factor of a block."""
+def _expand_block(block, inputs):
+    """Return the factor of a block, shape (rows, inputs)."""
     kept = np.array(block["factor_m3"], dtype=float).reshape(len(block["factor_m3"]), inputs)
     if block["weights"] is not None:
         weights = np.array(block["weights"], dtype=float).reshape(block["rows"], len(kept))
-        kept = _product(weights, kept)
+        kept = _multiply(weights, kept)
     if len(kept) != block["rows"]:
         raise ValueError(f"a block of {block['rows']} rows with {len(kept)}")
     return kept
 
 
-def _product(weights, kept):
-    """weights @ kept, each sum in its order: BLAS sums as threads and processor would have it."""
-    found = np.zeros((len(weights), kept.shape[1]))
+def _multiply(weights, kept):
+    """Return weights @ kept, summed in a fixed order.
+
+    In BLAS the order depends on the processor and on the number of threads.
+    """
+    product = np.zeros((len(weights), kept.shape[1]))
     for weight, row in zip(weights.T, kept, strict=True):
-        found += weight[:, None] * row
-    return found
+        product += weight[:, None] * row
+    return product
 
 
-def _block_of(factor):
-    """The `FactorBlock` of the rows of a factor."""
+def _make_block(factor):
+    """Return the `FactorBlock` of some rows of a factor."""
     u = np.linalg.norm(factor, axis=1)
-    scale = np.where(u > 0, u, 1.0)
-    found = _weights(factor / scale[:, None])
-    if found is not None:
-        at, weights = found
-        weights = weights * (scale[:, None] / scale[at])
-        error = np.abs(_product(weights, factor[at]) - factor)
+    scale = np.where(u > 0, u, 1.0)  # rows of norm 1, so that errors are relative to u
+    decomposition = _decompose_rows(factor / scale[:, None])
+    if decomposition is not None:
+        kept, weights = decomposition
+        weights = weights * (scale[:, None] / scale[kept])
+        error = np.abs(_multiply(weights, factor[kept]) - factor)
         if np.all(error <= LARGEST_ERROR * u[:, None]):
-            return FactorBlock(len(factor), weights, factor[at])
+            return FactorBlock(len(factor), weights, factor[kept])
     return FactorBlock(len(factor), None, factor)
 
 
-def _weights(rows):
-    """Which rows to keep, and the (rows, kept) weights by which they give all; None: too many.
+def _decompose_rows(rows):
+    """Select rows whose linear combinations give all rows.
 
-    The row of which most is left is kept, until of none is, by Gram-Schmidt: rows = C Q with
-    orthonormal rows of Q, so that rows = (C L^-1) rows[kept], L being the lower triangular C[kept].
+    The row with the largest remainder is kept next, until no remainder is left (Gram-Schmidt). With
+    orthonormal rows of Q, rows = C Q. Hence rows = (C L^-1) rows[kept], with L = C[kept], which is
+    lower triangular.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n, m)
+
+    Returns
+    -------
+    kept : list of int, length k
+        Indices of the kept rows.
+    weights : ndarray, shape (n, k)
+        Weights of the combinations. None instead of both if they save no numbers.
     """
     count, inputs = rows.shape
-    most = count * inputs // max(count + inputs, 1)  # with more there would be more numbers
-    left, at, parts = rows.copy(), [], []
+    most = count * inputs // max(count + inputs, 1)  # more kept rows would need more numbers
+    remainder, kept, columns = rows.copy(), [], []
     while True:
-        square = np.einsum("ij,ij->i", left, left)
+        square = np.einsum("ij,ij->i", remainder, remainder)
         row = int(np.argmax(square))
-        if square[row] <= LEFT**2:
+        if square[row] <= RESIDUAL**2:
             break
-        if len(at) == most:
+        if len(kept) == most:
             return None
-        direction = left[row] / np.sqrt(square[row])
-        part = left @ direction
-        left -= part[:, None] * direction
-        at.append(row)
-        parts.append(part)
-    if not at:
+        direction = remainder[row] / np.sqrt(square[row])
+        column = remainder @ direction
+        remainder -= column[:, None] * direction
+        kept.append(row)
+        columns.append(column)
+    if not kept:
         return None
-    parts = np.column_stack(parts)
-    lower = np.tril(parts[at])
-    weights = scipy.linalg.solve_triangular(lower, parts.T, lower=True, trans=1).T
-    weights[at] = np.eye(len(at))
-    return at, weights
+    C = np.column_stack(columns)
+    lower = np.tril(C[kept])  # removes the rounding errors above the diagonal
+    weights = scipy.linalg.solve_triangular(lower, C.T, lower=True, trans=1).T
+    weights[kept] = np.eye(len(kept))
+    return kept, weights

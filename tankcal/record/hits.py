@@ -1,186 +1,200 @@
-"""The part of the record that says what wall hits showed: set-ups, instruments, rings, control."""
+"""The part of the record on wall hits: set-ups, instruments, rings, control readings."""
 
 import numpy as np
 
 from tankcal.record.schema import Finite, Saved, key
-from tankcal.survey.control_drift import HOUR_S, drifts_of, repeats_of
+from tankcal.survey.control_drift import drifts_of, repeats_of
+from tankcal.units import HOUR_S
 
-CLASS_DEG, LAST_DEG = 10, 90  # of the histogram of incidence
+CLASS_DEG, LAST_DEG = 10, 90  # width of the classes of incidence, and their end
 
 
 class HitSetupUsed(Saved):
-    """A set-up that the wall was hit from."""
+    """A set-up from which the wall was hit."""
 
     setup: str = key("name")
-    station: str = key("that it stood over")
+    station: str = key("of the set-up")
     instrument: str = key("name")
     certificate: str = key('of the instrument; "": not given')
-    x_m: Finite = key("where its axes cross, in the survey's frame")
-    y_m: Finite = key("the same")
-    z_m: Finite = key("the same")
-    tie: str = key('"network", "frame" (it is the frame itself) or "wall" (nothing else)')
+    x_m: Finite = key("intersection of its axes, in the survey's frame")
+    y_m: Finite = key("intersection of its axes, in the survey's frame")
+    z_m: Finite = key("intersection of its axes, in the survey's frame")
+    tie: str = key('"network", "frame" (it is the frame itself) or "wall" (only the wall)')
     hits: int = key("adjusted and not rejected")
-    rejected: int = key("hits that are not of the wall, or contradict it")
+    rejected: int = key("hits that are not on the wall, or contradict it")
     checks: int = key("hits that are only compared")
 
 
 class SharedByHits(Saved):
-    """An offset or a scale that all hits of an instrument share."""
+    """An offset or a scale common to all hits of an instrument."""
 
     instrument: str = key("name")
     certificate: str = key('its number; "": not given')
     what: str = key('"instrument_offset" or "instrument_scale"')
     unit: str = key('"mm" or "ppm"')
-    u_before: float | None = key("standard uncertainty as declared; null: nothing was known")
-    value: float = key("by how much more than its correction it comes out with the wall")
-    u_after: float = key("standard uncertainty after that")
-    correlation: float = key("with the mean radius of the tank; near 1: nothing tells them apart")
+    u_before: float | None = key("standard uncertainty as declared; null: unknown")
+    value: float = key("estimate with the wall less the correction of the instrument")
+    u_after: float = key("standard uncertainty of the estimate")
+    correlation: float = key("with the mean radius of the tank; near 1: not separable")
 
 
 class RingOfHits(Saved):
     """The hits of a section."""
 
     section: str = key("name")
-    course: str = key("that it is on")
+    course: str = key("of the section")
     level_m: float = key("mean height above the table's zero")
-    hits: int = key("that the wall was taken from")
-    rejected: int = key("nearest to it of those that were not")
-    least: int = key("that the rule file asks for of this circumference")
+    hits: int = key("used for the wall")
+    rejected: int = key("rejected hits that are nearest to this section")
+    least: int = key("number required by the rule file for this circumference")
 
 
 class IncidenceClass(Saved):
-    """Hits that meet the wall under like angles."""
+    """Hits with similar angles of incidence."""
 
     low_deg: float = key("from the wall's normal")
-    high_deg: float = key("the same")
-    hits: int = key("all that were read")
+    high_deg: float = key("from the wall's normal")
+    hits: int = key("all readings")
 
 
 class ControlRead(Saved):
-    """A reading of a control target, less the first one."""
+    """A reading of a control target, less its first reading."""
 
     setup: str = key("name")
     target: str = key("name")
     elapsed_h: float = key("since the first control reading of the set-up")
     direction_rad: float | None = key("less that of the first reading; null: not read")
-    zenith_rad: float | None = key("the same")
-    distance_m: float | None = key("the same")
+    zenith_rad: float | None = key("less that of the first reading; null: not read")
+    distance_m: float | None = key("less that of the first reading; null: not read")
     row: int | None = key("of the file")
 
 
 class DriftOfSetup(Saved):
-    """How a set-up drifted, by all its control targets; not taken off the hits."""
+    """Drift of a set-up from all its control targets; the hits are not corrected for it."""
 
     setup: str = key("name")
     hours: float = key("between its first and its last control reading")
-    direction_rad_h: float | None = key("of the zero of its circle, per hour; null: not told")
-    zenith_rad_h: float | None = key("of its zenith angles, per hour; null: not told")
+    direction_rad_h: float | None = key("of the zero of its circle, per hour; null: not determined")
+    zenith_rad_h: float | None = key("of its zenith angles, per hour; null: not determined")
 
 
 class ComparedHit(Saved):
     """A hit that was only compared with the wall."""
 
     setup: str = key("name")
-    section: str = key("nearest to it in its course")
+    section: str = key("nearest section in its course")
     departure_m: float = key("outwards, from the outline of that section")
     row: int | None = key("of the file")
 
 
 class HitsRecord(Saved):
-    """Bare hits of the wall, and what took them."""
+    """Hits of the bare wall, and their instruments."""
 
     setups: list[HitSetupUsed] = key("in the order of their hits")
     shared: list[SharedByHits] = key("offsets and scales of the instruments")
     rings: list[RingOfHits] = key("from the bottom up")
     incidence: list[IncidenceClass] = key("histogram")
-    control: list[ControlRead] = key("readings of control targets, in the order of their time")
+    control: list[ControlRead] = key("readings of control targets, in the order of time")
     drifts: list[DriftOfSetup] = key("of set-ups that read control targets")
     compared: list[ComparedHit] = key("hits with use = check")
 
 
 def hits_of(result):
-    """`HitsRecord` of a result; None where the wall was not hit."""
+    """Return the `HitsRecord` of a result; None without hits."""
     if result.sighting is None:
         return None
     repeats = repeats_of(result.job.hits.control)
+    certificates = {name: tool.certificate for name, tool in result.job.hits.instruments.items()}
     return HitsRecord(
         setups=_setups(result),
-        shared=shared_of(
-            result.sighting.told,
-            {name: tool.certificate for name, tool in result.job.hits.instruments.items()},
-            result.sighting.told_m,
-        ),
+        shared=shared_of(result.sighting.told, certificates, result.sighting.told_m),
         rings=_rings(result),
-        incidence=_incidence(result.sighting),
-        control=_control(repeats),
+        incidence=_incidence_classes(result.sighting),
+        control=_control_readings(repeats),
         drifts=[
             DriftOfSetup(
-                setup=one.setup,
-                hours=one.hours,
-                direction_rad_h=HOUR_S * one.direction_rad_s,
-                zenith_rad_h=HOUR_S * one.zenith_rad_s,
+                setup=drift.setup,
+                hours=drift.hours,
+                direction_rad_h=HOUR_S * drift.direction_rad_s,
+                zenith_rad_h=HOUR_S * drift.zenith_rad_s,
             )
-            for one in drifts_of(repeats)
+            for drift in drifts_of(repeats)
         ],
-        compared=_compared(result),
+        compared=_compare_hits(result),
     )
 
 
 def _setups(result):
+    """Return `HitSetupUsed` of each set-up."""
     hits, poses = result.job.hits, result.sighting.poses
     setup = np.array(hits.setup)
-    counted = setup[~hits.check]  # the order of the job's points
-    used = np.zeros(len(counted), dtype=bool)
+    setup_of_point = setup[~hits.check]  # in the order of the job's points
+    is_used = np.zeros(len(setup_of_point), dtype=bool)
     accepted = result.wall.accepted
-    used[accepted[accepted < len(counted)]] = True  # targets come after the hits
-    found, first = [], {}
-    for place, (name, _) in enumerate(poses.keys):
-        first.setdefault(name, place)
-    for name, place in first.items():
-        given, mine = hits.setups[name], counted == name
-        found.append(
+    is_used[accepted[accepted < len(setup_of_point)]] = True  # targets come after the hits
+    first = {}
+    for index, (name, _) in enumerate(poses.keys):
+        first.setdefault(name, index)
+    rows = []
+    for name, index in first.items():
+        declared, is_here = hits.setups[name], setup_of_point == name
+        x_m, y_m, z_m = poses.xyz_m[index].tolist()
+        rows.append(
             HitSetupUsed(
                 setup=name,
-                station=given.station,
-                instrument=given.instrument,
-                certificate=hits.instruments[given.instrument].certificate,
-                **dict(zip(("x_m", "y_m", "z_m"), poses.xyz_m[place].tolist(), strict=True)),
-                tie=poses.ties[place],
-                hits=np.count_nonzero(mine & used),
-                rejected=np.count_nonzero(mine & ~used),
+                station=declared.station,
+                instrument=declared.instrument,
+                certificate=hits.instruments[declared.instrument].certificate,
+                x_m=x_m,
+                y_m=y_m,
+                z_m=z_m,
+                tie=poses.ties[index],
+                hits=np.count_nonzero(is_here & is_used),
+                rejected=np.count_nonzero(is_here & ~is_used),
                 checks=np.count_nonzero((setup == name) & hits.check),
             )
         )
-    return found
+    return rows
 
 
-def shared_of(told, certificates, told_m):
-    """`SharedByHits` of causes that a wall told.
+def shared_of(estimates, certificates, corrections_m):
+    """Return the `SharedByHits` of errors that a wall determines.
 
-    certificates  {instrument: number}
-    told_m        {instrument: what was taken off its readings before}, m
+    Parameters
+    ----------
+    estimates : iterable
+        Common errors of the instruments with their values and uncertainties.
+    certificates : dict
+        {instrument: number of its certificate}.
+    corrections_m : dict
+        {instrument: offset already subtracted from its readings, m}.
+
+    Returns
+    -------
+    list of SharedByHits
     """
-    found = []
-    for one in told:
-        is_offset = one.what == "instrument_offset"
-        unit, per = ("mm", 1e3) if is_offset else ("ppm", 1e6)
-        taken_off = told_m.get(one.name, 0.0) if is_offset else 0.0
-        found.append(
+    rows = []
+    for estimate in estimates:
+        is_offset = estimate.what == "instrument_offset"
+        unit, factor = ("mm", 1e3) if is_offset else ("ppm", 1e6)
+        correction = corrections_m.get(estimate.name, 0.0) if is_offset else 0.0
+        rows.append(
             SharedByHits(
-                instrument=one.name,
-                certificate=certificates.get(one.name, ""),
-                what=one.what,
+                instrument=estimate.name,
+                certificate=certificates.get(estimate.name, ""),
+                what=estimate.what,
                 unit=unit,
-                u_before=per * one.u_before,
-                value=per * (one.value + taken_off),
-                u_after=per * one.u_after,
-                correlation=one.correlation,
+                u_before=factor * estimate.u_before,
+                value=factor * (estimate.value + correction),
+                u_after=factor * estimate.u_after,
+                correlation=estimate.correlation,
             )
         )
-    return found
+    return rows
 
 
 def _rings(result):
+    """Return `RingOfHits` of each section."""
     from tankcal.pipeline.hit_checks import least_hits
 
     job, wall = result.job, result.wall
@@ -195,14 +209,15 @@ def _rings(result):
             course=job.courses[section.group.course].name,
             level_m=section.group.height_m - result.zero_m,
             hits=np.count_nonzero(wall.accepted[section.group.members] < count),
-            rejected=rejected[place],
+            rejected=rejected[index],
             least=least,
         )
-        for place, section in enumerate(wall.sections)
+        for index, section in enumerate(wall.sections)
     ]
 
 
-def _incidence(sighting):
+def _incidence_classes(sighting):
+    """Return the histogram of incidence up to the last class with hits."""
     edges = np.arange(0, LAST_DEG + 1, CLASS_DEG)
     counts = np.histogram(np.degrees(sighting.incidence_rad), edges)[0]
     last = np.flatnonzero(counts)[-1] + 1
@@ -212,41 +227,48 @@ def _incidence(sighting):
     ]
 
 
-def _control(repeats):
+def _control_readings(repeats):
     return [
         ControlRead(
-            setup=one.setup,
-            target=one.target,
-            elapsed_h=one.elapsed_s[i] / HOUR_S,
-            direction_rad=one.direction_rad[i],
-            zenith_rad=one.zenith_rad[i],
-            distance_m=one.distance_m[i],
-            row=one.rows[i],
+            setup=repeat.setup,
+            target=repeat.target,
+            elapsed_h=repeat.elapsed_s[i] / HOUR_S,
+            direction_rad=repeat.direction_rad[i],
+            zenith_rad=repeat.zenith_rad[i],
+            distance_m=repeat.distance_m[i],
+            row=repeat.rows[i],
         )
-        for one in repeats
-        for i in range(len(one.rows))
+        for repeat in repeats
+        for i in range(len(repeat.rows))
     ]
 
 
 def departure_from_sections(result, xyz_m):
-    """The section nearest to a place (3,), and how far outwards from its outline that lies, m."""
+    """Return the section nearest to a position (3,), and the distance from its outline, m.
+
+    The distance is positive outwards.
+    """
     height = xyz_m[2] - result.job.datum.bottom_z_m
-    section = min(result.wall.sections, key=lambda one: abs(one.group.height_m - height))
+    section = min(
+        result.wall.sections, key=lambda candidate: abs(candidate.group.height_m - height)
+    )
     outline, slope = section.outline, np.array(result.wall.shell.slope)
-    away = xyz_m[:2] - (height - section.group.height_m) * slope - (outline.x_m, outline.y_m)
-    return section, np.hypot(*away) - outline.radius_m(np.array([np.arctan2(*away)]))[0]
+    # The position is shifted along the axis to the height of the section.
+    offset = xyz_m[:2] - (height - section.group.height_m) * slope - (outline.x_m, outline.y_m)
+    return section, np.hypot(*offset) - outline.radius_m(np.array([np.arctan2(*offset)]))[0]
 
 
-def _compared(result):
-    job, sighting, found = result.job, result.sighting, []
-    for place in np.flatnonzero(job.hits.check):
-        section, departure = departure_from_sections(result, sighting.points.xyz_m[place])
-        found.append(
+def _compare_hits(result):
+    """Return `ComparedHit` of each hit that is only compared."""
+    job, sighting, rows = result.job, result.sighting, []
+    for index in np.flatnonzero(job.hits.check):
+        section, departure_m = departure_from_sections(result, sighting.points.xyz_m[index])
+        rows.append(
             ComparedHit(
-                setup=job.hits.setup[place],
+                setup=job.hits.setup[index],
                 section=section.group.name,
-                departure_m=departure,
-                row=job.hits.rows[place] if job.hits.rows else None,
+                departure_m=departure_m,
+                row=job.hits.rows[index] if job.hits.rows else None,
             )
         )
-    return found
+    return rows

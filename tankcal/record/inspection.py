@@ -1,26 +1,25 @@
-"""An inspection of a tank, as it is saved: inspection.json.
+"""Inspection of a tank: inspection.json.
 
-Every figure has its expanded uncertainty, every limit its source. What is said in words (checks,
-verdicts, remarks) stands here as codes with their numbers; the sentences are the templates'.
+Each value has an expanded uncertainty, each limit a source. Checks, verdicts and remarks are codes
+with numbers; the templates supply the sentences.
 """
 
-from tankcal.record.plain_data import to_plain
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.texts import WarningRecord
 from tankcal.version import find_version
 
 
-def _from_1(found):
-    """Version 2 from version 1, whose figures are readings and fail as soon as they are beyond."""
-    checks = [one | {"reading": None, "U_reading": None} for one in found["checks"]]
-    return found | {"format": "tankcal-inspection/2", "decision": "simple_beyond", "checks": checks}
+def _migrate_1(saved):
+    """Convert version 1 to 2; values of version 1 are readings, and fail beyond the limit."""
+    checks = [check | {"reading": None, "U_reading": None} for check in saved["checks"]]
+    return saved | {"format": "tankcal-inspection/2", "decision": "simple_beyond", "checks": checks}
 
 
-INSPECTION = SavedFormat("tankcal-inspection", 2, "inspection.json", {1: _from_1})
+INSPECTION = SavedFormat("tankcal-inspection", 2, "inspection.json", {1: _migrate_1})
 DECISIONS = ("guarded", "simple_beyond")
 
-CHECKS = (  # in the order of the papers
+CHECKS = (  # in the order of the report
     "plumbness_axis", "plumbness_generatrix", "plumbness_course", "roundness_low",
     "roundness_high", "peaking", "banding", "settlement_cosine", "settlement_all",
     "settlement_subset", "settlement_curvature", "settlement_de_beer", "edge_settlement",
@@ -29,11 +28,11 @@ CHECKS = (  # in the order of the papers
 VERDICTS = (  # the gravest first
     "failed", "guard_band_beyond", "guard_band", "not_determined", "passed",
 )  # fmt: skip
-_VERDICT_KEY = ", ".join(f'"{one}"' for one in VERDICTS)
+_VERDICT_KEY = ", ".join(f'"{verdict}"' for verdict in VERDICTS)
 
 
 class InspectedTank(Saved):
-    """What was inspected."""
+    """The inspected tank."""
 
     id: str = key("of the tank")
     name: str = key("of the job")
@@ -42,21 +41,23 @@ class InspectedTank(Saved):
     sha256: str | None = key("of the record; null: a job")
     survey_date: str | None = key("null: not known")
     survey_side: str | None = key('"inside" or "outside"; null: no wall was surveyed')
-    methods: list[str] = key("what observed the wall: points, straps, lines, hits, tangents, scan")
+    methods: list[str] = key(
+        "of the survey of the wall: points, straps, lines, hits, tangents, scan"
+    )
     nominal_diameter_m: float | None = key("null: not given")
-    nominal_source: str = key('"drawing": as given; "mean": that of the wall as surveyed; "none"')
+    nominal_source: str = key('"drawing": as given; "mean": of the surveyed wall; "none"')
     height_m: float | None = key("of the shell; null: not known")
     state: str = key('"as_found": loaded as it was surveyed; "unloaded": head taken off')
 
 
 class InspectionRule(Saved):
-    """What the inspection was judged by."""
+    """Rule of the inspection."""
 
     name: str = key("of the rule")
     file: str = key("name of its file")
-    source: str = key("where its values were read")
+    source: str = key("of its values")
     verified: bool = key("whether every value was read in the text itself")
-    remark: str = key("what is to stand beside it")
+    remark: str = key("to be printed with the rule")
 
 
 class InspectionLimit(Saved):
@@ -64,37 +65,37 @@ class InspectionLimit(Saved):
 
     name: str = key("of the limit in its rule file")
     value: Finite = key("in the unit of the check")
-    clause: str = key("where it stands")
-    verified: bool = key("whether it was read there")
+    clause: str = key("of the rule")
+    verified: bool = key("whether it was read in the clause")
 
 
 class InspectionCheck(Saved):
-    """One figure against one limit."""
+    """A value compared with a limit."""
 
     code: str = key("such as plumbness_generatrix, see docs/inspection.md")
     unit: str = key('"mm", "mm/m", "1/m" or "" (a ratio)')
     value: float | None = key("the largest, with its sign; null: not determined")
     reading: float | None = key(
-        "largest single reading, where the value is an estimate without the bias of the largest of "
+        "largest single reading, if the value is an estimate without the bias of the largest of "
         "many; null: the value is a reading"
     )
-    U_reading: float | None = key("expanded, of that reading; null: no such reading, or not known")
+    U_reading: float | None = key("expanded, of `reading`; null: no such reading, or not known")
     U: float | None = key("expanded; null: not known")
     k: float | None = key("coverage factor of U")
     course: int | None = key("from the bottom, 1 first; null: of no single course")
     height_m: float | None = key("above the bottom of the shell; null: of no single height")
     azimuth_deg: float | None = key("null: of no single azimuth")
     epoch: str | None = key("of a settlement; null: of the survey")
-    used: int = key("places that the largest was taken from")
+    used: int = key("number of places from which the largest was taken")
     limit: InspectionLimit | None = key("null: the rule has none")
     probability: float | None = key("of conformity; null: no limit, or not determined")
     verdict: str = key(f"one of: {_VERDICT_KEY}")
-    remark: str | None = key("code of what is to be read beside it; null: nothing")
+    remark: str | None = key("code of the remark; null: none")
     remark_values: dict = key("numbers and texts of the remark")
 
 
 class Generatrices(Saved):
-    """Departures of the wall from the plumb, along generatrices; outwards positive."""
+    """Deviations of the wall from the vertical, along generatrices; outwards positive."""
 
     azimuth_deg: list[Finite] = key("of each generatrix")
     height_m: list[Finite] = key("above the bottom of the shell")
@@ -112,15 +113,15 @@ class InspectedLevel(Saved):
     centre_x_m: float | None = key("in the frame of the survey; null: the level is estimated")
     centre_y_m: float | None = key("in the frame of the survey; null: the level is estimated")
     azimuth_deg: list[Finite] = key("of each place")
-    departure_mm: list[Finite] = key("radius from its own centre less the nominal one")
+    departure_mm: list[Finite] = key("radius about its own centre less the nominal radius")
     U_mm: list[Finite] = key("expanded, of each")
 
 
 class WeldGap(Saved):
-    """The gap of a board at one weld."""
+    """The gap of a board at a weld."""
 
     kind: str = key('"peaking" (vertical weld) or "banding" (horizontal)')
-    course: int = key("of a vertical weld; of a horizontal one that below it")
+    course: int = key("of a vertical weld; below a horizontal weld")
     height_m: Finite = key("of the middle of the board, above the bottom of the shell")
     azimuth_deg: Finite = key("of the middle of the board")
     gap_mm: float | None = key("largest within reach of the weld, outwards positive")
@@ -164,7 +165,9 @@ class Settlement(Saved):
     limit_mm: float | None = key(
         "of S_i with all points, where it is nearest its limit; null: yield or height not given"
     )
-    limit_half_mm: float | None = key("the same with every second point")
+    limit_half_mm: float | None = key(
+        "of S_i with every second point, where it is nearest its limit"
+    )
     subset_arc_m: float | None = key("between neighbours of the subset")
     subset_limit_mm: float | None = key("of S_i of the subset, where it is nearest its limit")
     harmonics: int | None = key("highest that was fitted for the curvature")
@@ -175,7 +178,7 @@ class Settlement(Saved):
 
 
 class EdgeProfile(Saved):
-    """Edge settlement along one radial line of the bottom."""
+    """Edge settlement along a radial line of the bottom."""
 
     azimuth_deg: Finite = key("clockwise from +y")
     radius_m: list[Finite] = key("of each reading")
@@ -188,28 +191,23 @@ class EdgeProfile(Saved):
 
 
 class InspectionFile(Saved, kw_only=True):
-    """What the survey says of the state of a tank, judged by a rule."""
+    """State of a tank by its survey, judged by a rule."""
 
     format: str = key("see Versions", default=INSPECTION.format)
     tankcal: str = key("version of tankcal", default_factory=find_version)
-    notice: str = key("that stands on every page, such as EXAMPLE")
-    tank: InspectedTank = key("what was inspected")
-    rule: InspectionRule | None = key("null: figures without limits")
+    notice: str = key("on every page, such as EXAMPLE")
+    tank: InspectedTank = key("the inspected tank")
+    rule: InspectionRule | None = key("null: values without limits")
     decision: str = key(
         '"guarded": guard bands on both sides of a limit; "simple_beyond" (version 1): each value '
         "beyond its limit has failed",
         default=DECISIONS[0],
     )
-    as_built: bool = key("whether an earlier epoch takes out how the tank was built")
+    as_built: bool = key("whether an earlier epoch removes deviations of construction")
     checks: list[InspectionCheck] = key("in the order of docs/inspection.md")
     generatrices: Generatrices | None = key("null: the wall was not surveyed")
     levels: list[InspectedLevel] = key("from the bottom up; none: no wall")
     gaps: list[WeldGap] = key("of every weld; none: no weld is known, or no cloud")
     settlements: list[Settlement] = key("each epoch, then differences; none: not levelled")
     edges: list[EdgeProfile] = key("none: not levelled")
-    warnings: list[WarningRecord] = key("what should be read")
-
-
-def plain_of_inspection(inspection):
-    """An `InspectionFile` as plain data."""
-    return to_plain(inspection)
+    warnings: list[WarningRecord] = key("on the inspection")

@@ -1,7 +1,5 @@
-"""A comparison of software as it is saved: package, sealed truth, answers and scores."""
+"""Intercomparison of software: package, sealed truth, answers and scores."""
 
-import tankcal
-from tankcal.record.plain_data import to_plain
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.texts import WarningRecord
@@ -23,16 +21,16 @@ class FileHash(Saved):
 
 
 class AskedTank(Saved):
-    """What is asked of a tank, the same for all methods."""
+    """The task for a tank, common to all methods."""
 
     tank: str = key("name")
-    heights_m: list[Finite] = key("above the dip plate, at which volumes are wanted")
+    heights_m: list[Finite] = key("of the requested volumes, above the dip plate")
     reference_temperature_c: Finite = key("of the shell")
     liquid_density_kg_m3: Finite = key("of the head that widens the shell; 0: empty shell")
 
 
 class AskedJob(Saved):
-    """One survey of one tank."""
+    """A survey of a tank."""
 
     tank: str = key("name")
     method: str = key("name")
@@ -40,14 +38,14 @@ class AskedJob(Saved):
 
 
 class PackageFile(Saved):
-    """What a package says of itself."""
+    """Manifest of a package."""
 
-    tankcal: str = key("version that made it")
-    open: bool = key("whether its truth lies beside it, for practice")
+    tankcal: str = key("version of tankcal")
+    open: bool = key("whether it includes the truth, for practice")
     licence: str = key("SPDX name")
-    coverage_probability: Finite = key("of the expanded uncertainties that are asked for")
+    coverage_probability: Finite = key("of the requested expanded uncertainties")
     truth_sha256: str = key("of the file truth.json, byte by byte: the commitment")
-    tanks: list[AskedTank] = key("what is asked")
+    tanks: list[AskedTank] = key("tasks")
     jobs: list[AskedJob] = key("every survey")
     files: list[FileHash] = key("all other files of the package")
     format: str = PACKAGE.format
@@ -57,22 +55,22 @@ class PackageFile(Saved):
 
 
 class TrueTank(Saved):
-    """A tank as it is, and its assigned values."""
+    """A tank with its assigned values."""
 
     tank: str = key("name")
     family: str = key("of its defects")
-    heights_m: list[Finite] = key("as asked")
+    heights_m: list[Finite] = key("as requested")
     volume_m3: list[Finite] = key("assigned values")
     numerical_error_m3: Finite = key("the largest change of them by more nodes of the quadrature")
     shape: dict = key("the tank itself, from which the volumes can be computed again")
 
 
 class TruthFile(Saved):
-    """What stays sealed until all answers are in."""
+    """Data that remain sealed until all answers have arrived."""
 
-    tankcal: str = key("version that made it")
+    tankcal: str = key("version of tankcal")
     nonce: str = key("256 random bits, so that the hash of the file cannot be found by trying")
-    secret: str = key('256 random bits that the draws hang on beside the seed; "": by the seed')
+    secret: str = key('256 random bits that determine the draws with the seed; "": seed only')
     seed: int = key("of the draws")
     methods: list[str] = key("by which each tank was surveyed")
     tanks: list[TrueTank] = key("all of them")
@@ -83,24 +81,24 @@ class TruthFile(Saved):
 
 
 class Participant(Saved):
-    """Who answers, with what."""
+    """A participant and the software used."""
 
     name: str = key("of the participant")
     software: str = key("that computed the answers")
     version: str = key("of the software")
-    date: str | None = key("of the answers, year-month-day; null: not said")
-    contact: str | None = key("null: not said")
+    date: str | None = key("of the answers, year-month-day; null: not stated")
+    contact: str | None = key("null: not stated")
     remarks: str | None = key("null: none")
     package: str = key("truth_sha256 of the package's manifest.json")
 
 
 class Answer(Saved):
-    """The table of one survey."""
+    """The table from a survey."""
 
     tank: str = key("name")
     method: str = key("name")
-    height_m: list[Finite] = key("above the dip plate, of those that are asked")
-    volume_m3: list[Finite] = key("below them")
+    height_m: list[Finite] = key("requested heights above the dip plate")
+    volume_m3: list[Finite] = key("below these heights")
     U_m3: list[float] = key("expanded uncertainties; null: none is stated")
     k: list[float] = key("coverage factors; null: not stated")
 
@@ -108,8 +106,8 @@ class Answer(Saved):
 class AnswersFile(Saved):
     """All answers of a participant."""
 
-    participant: Participant = key("who")
-    answers: list[Answer] = key("one for each survey that is answered")
+    participant: Participant = key("author of the answers")
+    answers: list[Answer] = key("for each answered survey")
     format: str = ANSWERS.format
 
 
@@ -117,7 +115,7 @@ class AnswersFile(Saved):
 
 
 class ScoredRows(Saved):
-    """Errors of one table, row by row."""
+    """Errors of a table, row by row."""
 
     height_m: list[Finite] = key("above the dip plate")
     true_m3: list[Finite] = key("assigned values")
@@ -128,38 +126,38 @@ class ScoredRows(Saved):
 
 
 class TableForm(Saved):
-    """What the errors of a table do along its height."""
+    """Variation of the errors of a table along its height."""
 
     falling_rows: int = key("pairs of rows between which the volume does not rise")
     zero_m3: float | None = key("of the line a + b V through the errors; null: fewer than 4 rows")
-    scale_ppm: float | None = key("b of that line")
-    form_ppm: float | None = key("rms of what that line leaves, of the largest volume asked")
+    scale_ppm: float | None = key("b of this line")
+    form_ppm: float | None = key("rms residual from this line, of the largest requested volume")
     delivery_1cm_percent: float | None = key("rms error of deliveries of 1 cm; null: none")
     delivery_10cm_percent: float | None = key("rms error of deliveries of 10 cm; null: none")
     delivery_2m_ppm: float | None = key("rms error of deliveries of 2 m; null: none")
-    worst_2m_ppm: float | None = key("the largest of them, with its sign; null: none")
+    worst_2m_ppm: float | None = key("largest error of these deliveries, with its sign; null: none")
 
 
 class ScoredTable(Saved):
-    """One table of one participant."""
+    """A table of a participant."""
 
     participant: int = key("place in `participants`, 0 first")
     tank: str = key("name")
     method: str = key("name")
     rows: ScoredRows = key("row by row")
-    missing: int = key("heights that were asked and not answered")
-    top_error_ppm: float | None = key("at the largest height asked; null: not answered")
-    top_E_n: float | None = key("there; null: no U")
-    rms_ppm: Finite = key("rms error of the rows, of the largest volume asked")
+    missing: int = key("requested heights without an answer")
+    top_error_ppm: float | None = key("at the largest requested height; null: no answer")
+    top_E_n: float | None = key("at the largest requested height; null: no U")
+    rms_ppm: Finite = key("rms error of the rows, of the largest requested volume")
     within: int = key("rows with |E_n| up to 1")
     judged: int = key("rows with an E_n")
-    mean_U_ppm: float | None = key("of the largest volume asked; null: no U")
+    mean_U_ppm: float | None = key("of the largest requested volume; null: no U")
     rms_zeta: float | None = key("rms error over standard uncertainty; null: no k")
     form: TableForm = key("along the height")
 
 
 class MethodScore(Saved):
-    """All tables of one participant by one method."""
+    """All tables of a participant by a method."""
 
     participant: int = key("place in `participants`, 0 first")
     method: str = key("name; *: all methods")
@@ -174,8 +172,8 @@ class MethodScore(Saved):
     u_share: float | None = key("its standard deviation, tables counted as the independent units")
     tops_within: int = key("tables whose |E_n| at the top is up to 1")
     tops_judged: int = key("tables with an E_n at the top")
-    tops_low: float | None = key("exact 95 % bounds of the probability behind them (binomial)")
-    tops_high: float | None = key("the upper one")
+    tops_low: float | None = key("exact lower 95 % bound of their probability (binomial)")
+    tops_high: float | None = key("upper bound")
     rms_zeta: float | None = key("1 where standard uncertainties are right; null: no k")
     form_ppm: float | None = key("rms of the tables' form_ppm")
     delivery_1cm_percent: float | None = key("rms")
@@ -185,23 +183,13 @@ class MethodScore(Saved):
 
 
 class ScoresFile(Saved):
-    """What a scorer says of all participants."""
+    """Scores of all participants."""
 
     tankcal: str = key("version that scored")
     truth_sha256: str = key("of the truth, as committed and as opened")
-    coverage_probability: Finite = key("that was asked for")
-    participants: list[Participant] = key("as they say")
+    coverage_probability: Finite = key("as requested")
+    participants: list[Participant] = key("as stated in the answers")
     tables: list[ScoredTable] = key("every table")
     methods: list[MethodScore] = key("by participant and method")
     warnings: list[WarningRecord] = key("of the answers")
     format: str = SCORES.format
-
-
-def plain_of(saved):
-    """Any of these files as plain data."""
-    return to_plain(saved)
-
-
-def version():
-    """The version that writes."""
-    return tankcal.__version__

@@ -1,120 +1,122 @@
-"""The part of the record that says what metered runs showed: steps, dips, causes, tables."""
+"""The part of the record on metered runs: meters, steps, dips, causes, tables."""
 
 import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
-from tankcal.record.schema import Finite, Saved, filled_from, key
+from tankcal.record.schema import Finite, Saved, fill_from, key
 
 
 class MeterUsed(Saved):
-    """A meter that the tank was filled or emptied through."""
+    """A meter through which the tank was filled or emptied."""
 
     meter: str = key("name")
     certificate: str = key('its number; "": not given')
-    prover: str = key('what it was proved against; "": not given')
+    prover: str = key('against which it was proved; "": not given')
     factor: float = key("of the certificate: true volume = factor x indicated")
     u_factor: float = key("its standard uncertainty")
     factor_found: float = key("by the adjustment with the geometry")
-    u_factor_found: float = key("standard uncertainty of that")
-    factor_after: float | None = key("as proved again afterwards; null: it was not")
+    u_factor_found: float = key("standard uncertainty of factor_found")
+    factor_after: float | None = key("as proved afterwards; null: not proved again")
     repeatability: float = key("standard deviation of a batch, relative")
     fixed_m3: float = key("part of it that does not grow with the batch")
-    indicated_m3: float = key("all that it showed, drawn off counted as well")
-    flow_lowest_m3_h: float | None = key("of its rows; null: not written down")
-    flow_highest_m3_h: float | None = key("the same")
-    flow_min_m3_h: float | None = key("that the factor was proved for; null: not given")
-    flow_max_m3_h: float | None = key("the same")
+    indicated_m3: float = key("sum of its indications, including withdrawals")
+    flow_lowest_m3_h: float | None = key("of its rows; null: not recorded")
+    flow_highest_m3_h: float | None = key("of its rows; null: not recorded")
+    flow_min_m3_h: float | None = key("for which the factor was proved; null: not given")
+    flow_max_m3_h: float | None = key("for which the factor was proved; null: not given")
 
 
 class RunOfLiquid(Saved):
-    """A run: one filling or emptying, and what all its steps are off by."""
+    """A run: a filling or emptying, with the common error of its steps."""
 
     run: str = key("name")
-    steps: int = key("between dips that count")
-    from_dip_m: float | None = key("that it began at; null: the empty, dry tank")
-    to_dip_m: float = key("that it ended at")
+    steps: int = key("between valid dips")
+    from_dip_m: float | None = key("at its beginning; null: the empty, dry tank")
+    to_dip_m: float = key("at its end")
     indicated_m3: float = key("of its steps, by the meter")
     effect: float = key("of the run, relative, as adjusted")
     u_effect: float = key("its standard uncertainty")
 
 
 class LiquidStep(Saved):
-    """A step between two dips, brought to the reference, against the geometry."""
+    """A step between two dips, at reference conditions, compared with the geometry."""
 
     row: int = key("of the file, at its end")
     run: str = key("name")
     meter: str = key("name")
     from_dip_m: float | None = key("null: from the empty, dry tank")
     to_dip_m: float = key("at its end")
-    indicated_m3: float = key("as the meter showed it")
+    indicated_m3: float = key("by the meter")
     by_factor_m3: float = key("correction by the meter's factor")
-    by_meter_temperature_m3: float = key("by the liquid cooled or warmed on its way into the tank")
-    by_tank_temperature_m3: float = key("by what was in the tank already and grew or shrank")
-    by_shell_m3: float = key("by the shell's temperature, to that of the table")
-    by_head_m3: float = key("by the load, from the calibrating liquid to that of the table")
+    by_meter_temperature_m3: float = key(
+        "correction for liquid cooled or warmed on its way into the tank"
+    )
+    by_tank_temperature_m3: float = key("correction for expansion of the liquid in the tank")
+    by_shell_m3: float = key("correction from the shell's temperature to that of the table")
+    by_head_m3: float = key("correction from the calibrating liquid to that of the table")
     reference_m3: float = key("between the dips by liquid, at the reference: the sum of these")
-    geometry_m3: float = key("the same by the geometry before the adjustment")
-    misclosure_m3: float = key("the former less the latter")
+    geometry_m3: float = key("between the dips by the geometry before the adjustment")
+    misclosure_m3: float = key("reference_m3 less geometry_m3")
     misclosure_u_m3: float = key("its standard uncertainty")
-    misclosure_U_m3: float = key("expanded, by k of the normal distribution")
+    misclosure_U_m3: float = key("its expanded uncertainty, k of the normal distribution")
     misclosure_w: float = key("the misclosure over its standard uncertainty")
     residual_m3: float = key("to be added to the batch, by the adjustment with the geometry")
-    sd_m3: float = key("of the batch, before")
-    redundancy: float = key("share of an error of it that shows")
-    w: float | None = key("test quantity of the batch; null: nothing controls it")
-    detectable_m3: float | None = key("smallest error of it that shows; null: more than metered")
+    sd_m3: float = key("of the batch, before the adjustment")
+    redundancy: float = key("share of an error that the residual shows")
+    w: float | None = key("test quantity of the batch; null: not controlled")
+    detectable_m3: float | None = key("smallest detectable error; null: larger than all metered")
 
 
 class LiquidDip(Saved):
-    """A dip that counts."""
+    """A dip of the adjustment."""
 
     row: int = key("of the file")
     run: str = key("name")
     dip_m: float = key("as read")
     residual_m: float = key("to be added to it, by the adjustment with the geometry")
-    sd_m: float = key("of the reading, before")
-    redundancy: float = key("share of an error of it that shows")
-    w: float | None = key("test quantity of the reading; null: nothing controls it")
+    sd_m: float = key("of the reading, before the adjustment")
+    redundancy: float = key("share of an error that the residual shows")
+    w: float | None = key("test quantity of the reading; null: not controlled")
 
 
 class LiquidCause(Saved):
-    """A cause that misclosures may have, tested by itself: the likeliest of each kind."""
+    """A possible cause of misclosures, tested alone: the likeliest of each kind."""
 
     kind: str = key("code of it: meter, radii, dip, dip_zero, batch, leak, bottom ...")
-    of: str | None = key("which meter or run; null: none, or a row")
-    row: int | None = key("which row of the file; null: none")
-    unit: str = key('of its size, in SI: "1", "m", "m3", "m3/h"; "": it is so, or not')
-    size: float = key("to be added to what was taken, to explain most; of a leak: lost")
-    sd: float | None = key("standard deviation of that; null: the steps cannot show it")
+    of: str | None = key("meter or run; null: none, or a row")
+    row: int | None = key("of the file; null: none")
+    unit: str = key('of its size, in SI: "1", "m", "m3", "m3/h"; "": a cause without size')
+    size: float = key("correction that explains most of the misclosures; of a leak: loss")
+    sd: float | None = key("standard deviation of the size; null: not estimable from the steps")
     w: float = key("test quantity")
-    detectable: float | None = key("smallest size that the test finds; null: beyond the tank's")
-    named: bool = key("whether it is the likeliest, or cannot be told from that, and is told")
+    detectable: float | None = key("smallest detectable size; null: beyond the tank's")
+    named: bool = key("whether it is the likeliest cause, or not separable from it")
 
 
 class LiquidControl(Saved):
-    """How far the steps control an error that would change all volumes."""
+    """Control, by the steps, of an error that would change all volumes."""
 
     kind: str = key("meter or leak")
-    of: str | None = key("which meter; null: of all runs")
+    of: str | None = key("meter; null: all runs")
     unit: str = key('of the size, in SI: "1", "m3/h", or "m3" in each step where times are blank')
-    detectable: float | None = key("smallest size that the test finds; null: none")
+    detectable: float | None = key("smallest detectable size; null: none")
     undetected_U: float | None = key(
-        "largest change of a volume by an error of that size, over the U of the volume; null: any"
+        "largest change of a volume by an undetected error, over U of the volume; null: unlimited"
     )
 
 
 class SizeByLiquid(Saved):
-    """A declared size of the geometry that the liquid moved."""
+    """A declared size of the geometry that the liquid changed."""
 
     input: str = key("name")
     unit: str = key('of the numbers: "m", "m/m" of a slope, "1" of a scale')
-    change: float = key("by how much it was moved")
-    u_before: float = key("standard uncertainty before")
-    u_after: float = key("the same after")
+    change: float = key("adjusted less declared")
+    u_before: float = key("standard uncertainty before the adjustment")
+    u_after: float = key("standard uncertainty after the adjustment")
 
 
 class VolumesBeside(Saved):
-    """Volumes of the rows of the table, by one kind of knowledge; null where it says nothing."""
+    """Volumes of the rows of the table, by one source; null: not determined."""
 
     volume_m3: list[float] = key("below each dip")
     u_m3: list[float] = key("standard uncertainty")
@@ -122,19 +124,19 @@ class VolumesBeside(Saved):
 
 
 class LiquidRecord(Saved):
-    """Metered runs, their adjustment with the geometry, and the three tables that follow."""
+    """Metered runs, their adjustment with the geometry, and the three resulting tables."""
 
-    certified: str = key('whose table is printed: "joint", "liquid" or "geometry"')
-    geometry: str = key('what stood beside the liquid: "survey", "drawing" or "sizes"')
+    certified: str = key('printed table: "joint", "liquid" or "geometry"')
+    geometry: str = key('source of the geometry: "survey", "drawing" or "sizes"')
     density_kg_m3: float = key("of the calibrating liquid, at density_c")
     u_density_kg_m3: float = key("its standard uncertainty")
-    density_c: float = key("temperature of that")
+    density_c: float = key("temperature of the density")
     expansion_per_k: float = key("of the liquid's volume")
     u_expansion_per_k: float = key("its standard uncertainty")
     u_temperature_c: Finite = key("standard deviation of one temperature")
-    u_dip_zero_m: float = key("standard uncertainty of what all dips have in common")
-    lowest_dip_m: Finite = key("that counts")
-    highest_dip_m: Finite = key("that counts")
+    u_dip_zero_m: float = key("standard uncertainty of the common error of all dips")
+    lowest_dip_m: Finite = key("of the adjustment")
+    highest_dip_m: Finite = key("of the adjustment")
     meters: list[MeterUsed] = key("in the order of their rows")
     runs: list[RunOfLiquid] = key("in their order")
     run_sd: float = key("standard deviation of the effect of a run, relative")
@@ -144,36 +146,39 @@ class LiquidRecord(Saved):
     bottom_flex_sd: float | None = key("declared for the bottom, m3 per m of head; null: none")
     bottom_flex: float | None = key("as adjusted; null: none was declared")
     u_bottom_flex: float | None = key("its standard uncertainty")
-    below_first_dip_m3: float | None = key("beyond what the geometry has there; null: not asked")
+    below_first_dip_m3: float | None = key("less that of the geometry; null: not requested")
     u_below_first_dip_m3: float | None = key("its standard uncertainty")
-    sizes: list[SizeByLiquid] = key("declared sizes that were moved")
+    sizes: list[SizeByLiquid] = key("changed declared sizes")
     chi2: float = key("of all misclosures together")
-    dof: int = key("of that")
+    dof: int = key("of chi2")
     probability: float = key("of a larger chi-square")
     detectable_radius_m: float | None = key(
-        "smallest offset of all radii that the liquid would have shown; null: it has no meaning"
+        "smallest common offset of all radii that the liquid detects; null: not applicable"
     )
     causes: list[LiquidCause] = key("the likeliest of each kind, the likeliest first")
     by_geometry: VolumesBeside = key("rows of the table by the geometry alone")
-    by_liquid: VolumesBeside | None = key("by the liquid alone; null: it does not tell the tank")
+    by_liquid: VolumesBeside | None = key("by the liquid alone; null: not determined")
     joint: VolumesBeside = key("by both")
     controls: list[LiquidControl] | None = key(
-        "errors that change all volumes; not there: the table is of geometry alone, or of older"
+        "errors that change all volumes; left out for a table of geometry alone, and in older"
         " versions",
         optional=True,
     )
 
 
+RATIOS = {"tilt": "m/m", "scale": "1"}  # units of sizes that are no lengths
+
+
 def liquid_of(result):
-    """`LiquidRecord` of a result; None where nothing was metered."""
-    found, metering = result.liquid, result.job.liquid
-    if found is None:
+    """Return the `LiquidRecord` of a result; None without metered liquid."""
+    liquid, metering = result.liquid, result.job.liquid
+    if liquid is None:
         return None
-    low, high = found.filled_m
-    flex, bottom = found.bottom_flex, found.bottom_m3
-    return filled_from(
+    low_m, high_m = liquid.filled_m
+    flex, below = liquid.bottom_flex, liquid.bottom_m3
+    return fill_from(
         LiquidRecord,
-        found,
+        liquid,
         geometry=geometry_beside(result),
         **{
             name: getattr(metering, name)
@@ -182,167 +187,156 @@ def liquid_of(result):
                 *("u_expansion_per_k", "u_temperature_c", "u_dip_zero_m"),
             )
         },
-        lowest_dip_m=low,
-        highest_dip_m=high,
-        meters=_meters(found, metering),
-        runs=_runs(found),
-        steps=_steps(found, result.job.table.coverage_probability),
-        dips=_rows_of(
-            LiquidDip,
-            found.dips,
-            w=_tests(found.dips),
-        ),
+        lowest_dip_m=low_m,
+        highest_dip_m=high_m,
+        meters=_meters(liquid, metering),
+        runs=_runs(liquid),
+        steps=_steps(liquid, result.job.table.coverage_probability),
+        dips=_make_rows(LiquidDip, liquid.dips, w=_controlled_w(liquid.dips)),
         bottom_flex_sd=flex and flex.u_before,
         bottom_flex=flex and flex.after,
         u_bottom_flex=flex and flex.u_after,
-        below_first_dip_m3=bottom and bottom.after,
-        u_below_first_dip_m3=bottom and bottom.u_after,
-        sizes=_sizes(found),
-        causes=_causes(found),
-        by_geometry=_volumes(found.tables["geometry"]),
-        by_liquid=_volumes(found.tables["liquid"]),
-        joint=_volumes(found.tables["joint"]),
-        controls=_controls(found),
+        below_first_dip_m3=below and below.after,
+        u_below_first_dip_m3=below and below.u_after,
+        sizes=[
+            SizeByLiquid(
+                input=size.name,
+                unit=RATIOS.get(size.name, "m"),
+                change=size.after,
+                u_before=size.u_before,
+                u_after=size.u_after,
+            )
+            for size in liquid.sizes
+        ],
+        causes=_causes(liquid),
+        by_geometry=fill_from(VolumesBeside, liquid.tables["geometry"]),
+        by_liquid=fill_from(VolumesBeside, liquid.tables["liquid"]),
+        joint=fill_from(VolumesBeside, liquid.tables["joint"]),
+        controls=_controls(liquid),
     )
 
 
 def geometry_beside(result):
-    """What stood beside the liquid: "survey", "drawing" (of an upright tank) or "sizes"."""
+    """Return the source of the geometry: "survey", "drawing" (of an upright tank) or "sizes"."""
     if result.wall is not None or result.strapped is not None or result.scan is not None:
         return "survey"
     return "drawing" if result.job.tank.kind == "vertical" else "sizes"
 
 
-def _meters(found, metering):
-    of, flow, volume = np.array(metering.meter), metering.flow_m3_h, metering.volume_m3
-    told = []
-    for one in found.factors:
-        meter, mine = metering.meters[one.name], of == one.name
-        flows = flow[mine & np.isfinite(flow)]
-        told.append(
-            filled_from(
+def _meters(liquid, metering):
+    """Return `MeterUsed` of each meter, in the order of their rows."""
+    meter_of_row, flow, volume = np.array(metering.meter), metering.flow_m3_h, metering.volume_m3
+    rows = []
+    for factor in liquid.factors:
+        is_row = meter_of_row == factor.name
+        flows = flow[is_row & np.isfinite(flow)]
+        rows.append(
+            fill_from(
                 MeterUsed,
-                meter,
-                meter=one.name,
-                u_factor=one.u_before,
-                factor_found=one.after,
-                u_factor_found=one.u_after,
-                indicated_m3=np.sum(np.abs(volume[mine])),
+                metering.meters[factor.name],
+                meter=factor.name,
+                u_factor=factor.u_before,
+                factor_found=factor.after,
+                u_factor_found=factor.u_after,
+                indicated_m3=np.sum(np.abs(volume[is_row])),
                 flow_lowest_m3_h=flows.min() if len(flows) else None,
                 flow_highest_m3_h=flows.max() if len(flows) else None,
             )
         )
-    return told
+    return rows
 
 
-def _runs(found):
-    steps, run = found.steps, np.array(found.steps.run)
-    told = []
-    for one in found.runs:
-        mine = np.flatnonzero(run == one.name)
-        if len(mine):
-            told.append(
+def _runs(liquid):
+    """Return `RunOfLiquid` of each run with steps."""
+    steps, run_of_step = liquid.steps, np.array(liquid.steps.run)
+    rows = []
+    for run in liquid.runs:
+        indices = np.flatnonzero(run_of_step == run.name)
+        if len(indices):
+            rows.append(
                 RunOfLiquid(
-                    run=one.name,
-                    steps=len(mine),
-                    from_dip_m=steps.from_dip_m[mine[0]],
-                    to_dip_m=steps.to_dip_m[mine[-1]],
-                    indicated_m3=steps.indicated_m3[mine].sum(),
-                    effect=one.after,
-                    u_effect=one.u_after,
+                    run=run.name,
+                    steps=len(indices),
+                    from_dip_m=steps.from_dip_m[indices[0]],
+                    to_dip_m=steps.to_dip_m[indices[-1]],
+                    indicated_m3=steps.indicated_m3[indices].sum(),
+                    effect=run.after,
+                    u_effect=run.u_after,
                 )
             )
-    return told
+    return rows
 
 
-def _steps(found, probability):
-    steps, k = found.steps, float(coverage_factor(probability, np.inf))
-    filled = np.abs(steps.indicated_m3).sum()
-    return _rows_of(
+def _steps(liquid, probability):
+    """Return `LiquidStep` of each step."""
+    steps, k = liquid.steps, float(coverage_factor(probability, np.inf))
+    metered_m3 = np.abs(steps.indicated_m3).sum()
+    return _make_rows(
         LiquidStep,
         steps,
         geometry_m3=steps.reference_m3 - steps.misclosure_m3,
         misclosure_u_m3=steps.misclosure_sd_m3,
         misclosure_U_m3=k * steps.misclosure_sd_m3,
-        w=_tests(steps),
-        detectable_m3=np.where(steps.detectable_m3 < filled, steps.detectable_m3, np.nan),
+        w=_controlled_w(steps),
+        detectable_m3=np.where(steps.detectable_m3 < metered_m3, steps.detectable_m3, np.nan),
     )
 
 
-def _tests(tested):
-    """Test quantities; nan where only rounding errors are left of a reading."""
+def _controlled_w(readings):
+    """Return the test quantities; nan for readings whose redundancy is a rounding error."""
     from tankcal.pipeline.liquid_checks import CONTROLLED
 
-    return np.where(tested.redundancy > CONTROLLED, tested.w, np.nan)
+    return np.where(readings.redundancy > CONTROLLED, readings.w, np.nan)
 
 
-def _rows_of(cls, columns, **more):
-    """An object of `cls` for each place of columns, attributes of an object or given here."""
+def _make_rows(cls, source, **columns):
+    """Return an object of `cls` for each row of columns: the given ones, or attributes."""
     names = cls.__annotations__
-    values = [more[name] if name in more else getattr(columns, name) for name in names]
+    values = [columns[name] if name in columns else getattr(source, name) for name in names]
     return [cls(*row) for row in zip(*values, strict=True)]
 
 
-def _sizes(found):
-    return [
-        SizeByLiquid(
-            input=one.name,
-            unit=RATIOS.get(one.name, "m"),
-            change=one.after,
-            u_before=one.u_before,
-            u_after=one.u_after,
-        )
-        for one in found.sizes
-    ]
-
-
-RATIOS = {"tilt": "m/m", "scale": "1"}
-
-
-def _causes(found):
-    """The likeliest of each kind, and whatever is named beside it."""
-    told, kinds = [], set()
-    filled = float(np.abs(found.steps.indicated_m3).sum())
-    most = {"m": found.filled_m[1], "1": 1.0, "": 0.0}
-    for one in found.causes:
-        kind, of = one.cause.kind, one.cause.of
-        if kind in kinds and not one.is_named:
+def _causes(liquid):
+    """Return `LiquidCause` of the likeliest cause of each kind, and of all named causes."""
+    rows, kinds = [], set()
+    metered_m3 = float(np.abs(liquid.steps.indicated_m3).sum())
+    largest = {"m": liquid.filled_m[1], "1": 1.0, "": 0.0}  # largest detectable size by unit
+    for test in liquid.causes:
+        kind, of, unit = test.cause.kind, test.cause.of, test.cause.unit
+        if kind in kinds and not test.is_named:
             continue
         kinds.add(kind)
-        is_row, unit = isinstance(of, int), one.cause.unit
-        told.append(
+        is_row = isinstance(of, int)
+        is_detectable = test.detectable < largest.get(unit, metered_m3)
+        rows.append(
             LiquidCause(
                 kind=kind,
                 of=None if is_row else of,
                 row=of if is_row else None,
                 unit=unit,
-                size=one.size,
-                sd=one.sd,
-                w=one.w,
-                detectable=one.detectable if one.detectable < most.get(unit, filled) else None,
-                named=one.is_named,
+                size=test.size,
+                sd=test.sd,
+                w=test.w,
+                detectable=test.detectable if is_detectable else None,
+                named=test.is_named,
             )
         )
-    return told
+    return rows
 
 
-def _controls(found):
-    """Of each meter, and of a steady leak in all runs; None where no reading moves the table."""
+def _controls(liquid):
+    """Return `LiquidControl` of each meter and of a steady leak; None if the table ignores them."""
     from tankcal.pipeline.liquid_naming import is_steady_leak
 
-    told = [
+    rows = [
         LiquidControl(
-            kind=one.cause.kind,
-            of=one.cause.of,
-            unit=one.cause.unit,
-            detectable=one.detectable if np.isfinite(one.detectable) else None,
-            undetected_U=one.undetected_U if np.isfinite(one.undetected_U) else None,
+            kind=test.cause.kind,
+            of=test.cause.of,
+            unit=test.cause.unit,
+            detectable=test.detectable if np.isfinite(test.detectable) else None,
+            undetected_U=test.undetected_U if np.isfinite(test.undetected_U) else None,
         )
-        for one in found.causes
-        if one.undetected_U is not None and (one.cause.kind == "meter" or is_steady_leak(one))
+        for test in liquid.causes
+        if test.undetected_U is not None and (test.cause.kind == "meter" or is_steady_leak(test))
     ]
-    return sorted(told, key=lambda one: (one.kind == "leak", one.of or "")) or None
-
-
-def _volumes(table):
-    return filled_from(VolumesBeside, table)
+    return sorted(rows, key=lambda row: (row.kind == "leak", row.of or "")) or None

@@ -1,8 +1,8 @@
-"""The long tables of a record: in a file of arrays beside record.json, which names its SHA-256.
+"""Long tables of a record, in a file of arrays beside record.json.
 
-Tables of more than MOST_ROWS rows stand there, by columns, and null in their place in record.json.
-They are read when somebody asks for them, and held against the SHA-256 then: what needs none of
-them needs no such file.
+Tables of more than MOST_ROWS rows are in this file, by columns, and null in record.json, which
+contains the SHA-256 of the file. The file is read, and compared with its SHA-256, when a table is
+first used. A program that needs no long table needs no such file.
 """
 
 import errno
@@ -32,124 +32,135 @@ from tankcal.record.versions import RECORD
 
 FILE = "record_tables.npz"
 KEY = "long_tables"
-TABLES = {  # its place: the object that a row of it is in the schema
+TABLES = {  # {place in the record: object of the schema that describes a row}
     "points": "SurveyedPoint",
     "adjustment.points": "AdjustedPoint",
     "adjustment.residuals": "AdjustedReading",
 }
-BY_COLUMNS = ("adjustment.residuals",)  # {key: values} in record.json; the others lists of rows
+BY_COLUMNS = ("adjustment.residuals",)  # {key: values} in record.json; other tables: list of rows
 MOST_UNPACKED_BYTES = 2_000_000_000
-_TEXTS = ".texts"  # behind the name of a column: its texts, of which the column has the numbers
+_TEXTS = ".texts"  # suffix of the name of a column: texts, to which the codes of the column refer
 
 
 class LongTables(Saved):
-    """The file beside record.json that holds its long tables."""
+    """The file beside record.json that contains its long tables."""
 
     file: str = key("its name")
     sha256: str = key("of its bytes")
     bytes: int = key("its size")
-    rows: dict[str, int] = key("of each table that it holds, by its place in the record")
+    rows: dict[str, int] = key("number of rows of each table in it, by the place in the record")
 
 
 # ---- writing
 
 
-def split(record, folder):
-    """The record as its file has it: its long tables are written into `folder`, and named.
+def split_tables(record, folder):
+    """Write the long tables of a record into a folder.
 
     Parameters
     ----------
     record : dict
-        As `making` makes it or `attached` gives it.
+        Record of `tankcal.record.record_of` or `attach_tables`.
     folder : path
+        Folder of the file of long tables.
 
     Returns
     -------
     dict
-        The same where no table is long.
+        Content of record.json: the record with null for long tables and a description of their
+        file. The same object if no table is long.
     """
     long = {}
     for place in TABLES:
-        found = _at(record, place)
-        if found is not None and is_long(found):
-            long[place] = as_columns(found)
+        table = _table_at(record, place)
+        if table is not None and is_long(table):
+            long[place] = as_columns(table)
     if not long:
         return record
     path = Path(folder) / FILE
-    _write_npz(path, _arrays(long))
+    _write_npz(path, _name_arrays(long))
     with path.open("rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
     rows = {place: table.count for place, table in long.items()}
-    said = {"file": FILE, "sha256": digest, "bytes": path.stat().st_size, "rows": rows}
-    return _with(record, dict.fromkeys(long)) | {KEY: said}
+    description = {"file": FILE, "sha256": digest, "bytes": path.stat().st_size, "rows": rows}
+    return _replace_tables(record, dict.fromkeys(long)) | {KEY: description}
 
 
 def _write_npz(path, arrays):
-    """Write {name: array} as numpy's savez_compressed does, but fast: noise does not pack."""
+    """Write {name: array} as numpy.savez_compressed does, but with the fastest compression.
+
+    Noise of measurements hardly compresses, so that a higher level would save little.
+    """
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:
         for name, array in arrays.items():
             with file.open(f"{name}.npy", "w", force_zip64=True) as stream:
                 np.lib.format.write_array(stream, array, allow_pickle=False)
 
 
-def _arrays(long):
-    """{name in the file: array} of {place: ArrayColumns}."""
+def _name_arrays(long):
+    """Return {name in the file: array} of {place: ArrayColumns}."""
     arrays = {}
     for place, table in long.items():
         for name, column in table.arrays.items():
             if isinstance(column, Texts):
-                told = json.dumps(column.texts, ensure_ascii=False).encode("utf-8")
-                arrays[f"{place}.{name}{_TEXTS}"] = np.frombuffer(told, dtype=np.uint8)
+                texts = json.dumps(column.texts, ensure_ascii=False).encode("utf-8")
+                arrays[f"{place}.{name}{_TEXTS}"] = np.frombuffer(texts, dtype=np.uint8)
                 column = column.codes
             arrays[f"{place}.{name}"] = column
     return arrays
 
 
 def copy_record(record, source, folder):
-    """Copy a record.json, and the file that it reads its long tables from, into a folder.
+    """Copy a record.json, with its file of long tables if any, into a folder.
 
     Parameters
     ----------
     record : dict
-        As `attached` gives it.
+        Record of `attach_tables`.
     source : path
-        Of the record.json.
+        The record.json.
     folder : path
+        Destination.
 
     Raises
     ------
     InputError
-        For a file of long tables that is missing, or another one than the record names.
+        If the file of long tables is missing or was altered.
     """
     problems = problems_of_tables(record)
     if problems:
         raise InputError(problems)
     shutil.copyfile(source, Path(folder) / RECORD.file)
-    for path in {one.path for one in _tables_in(record) if isinstance(one, _LazyColumns)}:
+    columns = _array_columns(record)
+    for path in {table.path for table in columns if isinstance(table, _LazyColumns)}:
         shutil.copyfile(path, Path(folder) / path.name)
 
 
 # ---- reading
 
 
-def attached(record, path):
-    """A record with its long tables in their places; none of them is read before it is needed.
+def attach_tables(record, path):
+    """Put the long tables of a record in their places; the file is read on first access.
 
     Parameters
     ----------
     record : dict
-        Of the last version, as parsed.
+        Record of the current version, as parsed.
     path : path
-        Of the record.json, which the file lies beside.
+        The record.json; the file of long tables is in its folder.
+
+    Returns
+    -------
+    dict
 
     Raises
     ------
     InputError
-        In one line, when a table is neither in the record nor in FILE by its word.
+        In one line, if a table is neither in the record nor listed in the description of FILE.
     """
-    said = record.get(KEY)
-    rows = said["rows"] if said and said["file"] == FILE else {}
-    places = [place for place in TABLES if _lacks(record, place)]
+    description = record.get(KEY)
+    rows = description["rows"] if description and description["file"] == FILE else {}
+    places = [place for place in TABLES if _lacks_table(record, place)]
     missing = [place for place in places if place not in rows]
     if missing:
         text = message(
@@ -159,92 +170,102 @@ def attached(record, path):
             keys=list_some(missing, len(TABLES)), file=RECORD.file,
         )  # fmt: skip
         raise InputError(Problem(Path(path).name, text))
-    if said is None:
+    if description is None:
         return record
-    beside = _Beside(Path(path), said)
-    tables = {place: _LazyColumns(beside, place, rows[place]) for place in places}
-    whole = {key: one for key, one in record.items() if key != KEY}
-    return _with(
-        whole,
-        {place: one if place in BY_COLUMNS else ArrayRows(one) for place, one in tables.items()},
+    file = _TablesFile(Path(path), description)
+    tables = {place: _LazyColumns(file, place, rows[place]) for place in places}
+    return _replace_tables(
+        {name: value for name, value in record.items() if name != KEY},
+        {
+            place: table if place in BY_COLUMNS else ArrayRows(table)
+            for place, table in tables.items()
+        },
     )
 
 
 def problems_of_tables(record):
-    """Problems, one at most, of the file that holds the long tables of a record; () without any."""
+    """Return the problem of the file of long tables of a record (list or tuple of Problem)."""
     try:
-        for table in _tables_in(record):
-            len(table)  # reads them
+        for table in _array_columns(record):
+            len(table)  # reads the file
     except InputError as error:
         return error.problems
     return ()
 
 
-def without_tables(record):
-    """The record with None in place of its long tables: nothing is read for it."""
-    held = (ArrayColumns, ArrayRows)
-    return _with(record, {one: None for one in TABLES if isinstance(_at(record, one), held)})
+def omit_tables(record):
+    """Return the record with None in place of its long tables; their file is not read."""
+    kinds = (ArrayColumns, ArrayRows)
+    return _replace_tables(
+        record, {place: None for place in TABLES if isinstance(_table_at(record, place), kinds)}
+    )
 
 
 def long_pairs(record, other):
-    """The tables of two records that are long in one of them: ({place: both as `ArrayColumns`}.
+    """Separate the tables of two records that are long in one of them.
 
-    And both records without these.
+    Returns
+    -------
+    pairs : dict
+        {place: `ArrayColumns` of both records}.
+    record, other : dict
+        Both records without these tables.
     """
-    pairs = {place: (_at(record, place), _at(other, place)) for place in TABLES}
+    pairs = {place: (_table_at(record, place), _table_at(other, place)) for place in TABLES}
     pairs = {
         place: tuple(map(as_columns, pair))
         for place, pair in pairs.items()
         if None not in pair and any(map(is_long, pair))
     }
-    return pairs, *(_with(one, dict.fromkeys(pairs)) for one in (record, other))
+    return pairs, *(_replace_tables(both, dict.fromkeys(pairs)) for both in (record, other))
 
 
-def _tables_in(record):
-    """The `ArrayColumns` of a record."""
-    found = (_at(record, place) for place in TABLES)
-    found = (one.columns if isinstance(one, ArrayRows) else one for one in found)
-    return [one for one in found if isinstance(one, ArrayColumns)]
+def _array_columns(record):
+    """Return the tables of a record that consist of arrays (list of ArrayColumns)."""
+    tables = (_table_at(record, place) for place in TABLES)
+    columns = (table.columns if isinstance(table, ArrayRows) else table for table in tables)
+    return [table for table in columns if isinstance(table, ArrayColumns)]
 
 
 class _LazyColumns(ArrayColumns):
-    """The columns of a table in the file beside a record, of `count` rows."""
+    """Columns of a table of `count` rows in a `_TablesFile`."""
 
-    count = None  # known before anything is read
+    count = None  # known before the file is read
 
-    def __init__(self, beside, place, count):
-        self._beside, self._place, self.count = beside, place, count
+    def __init__(self, file, place, count):
+        self._file, self._place, self.count = file, place, count
 
     @property
     def arrays(self):
-        """{key: array or `Texts`}; InputError for a file that is missing or another one."""
-        return self._beside.tables[self._place]
+        """Columns {key: array or `Texts`}; InputError if the file is missing or was altered."""
+        return self._file.tables[self._place]
 
     @property
     def path(self):
-        """The file that they are read from."""
-        return self._beside.path
+        """Path of the file."""
+        return self._file.path
 
 
-class _Beside:
-    """The file beside a record; said: what the record says of it, as `LongTables`."""
+class _TablesFile:
+    """File of long tables beside a record.json, with its description in the record."""
 
-    def __init__(self, record, said):
-        self._record, self._said = record.name, said
-        self.path = record.with_name(FILE)
+    def __init__(self, record_path, description):
+        self._record, self._description = record_path.name, description
+        self.path = record_path.with_name(FILE)
 
     @cached_property
     def tables(self):
-        """{place: {key: column}}."""
-        content = self._content()
+        """Tables of the file, {place: {key: column}}."""
+        content = self._read()
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-                if sum(one.file_size for one in arrays.zip.infolist()) > MOST_UNPACKED_BYTES:
+                if sum(part.file_size for part in arrays.zip.infolist()) > MOST_UNPACKED_BYTES:
                     raise ValueError("too large")
                 return {
-                    place: _table(arrays, place, rows) for place, rows in self._said["rows"].items()
+                    place: _read_table(arrays, place, rows)
+                    for place, rows in self._description["rows"].items()
                 }
-        except Exception as error:  # of a broken archive numpy raises whatever came of it
+        except Exception as error:  # numpy raises errors of any kind for a damaged archive
             text = message(
                 "record_tables_damaged",
                 "does not hold the tables that {record} says ({what}); expected it as tankcal "
@@ -253,9 +274,10 @@ class _Beside:
             )  # fmt: skip
             raise InputError(Problem(self.path.name, text)) from None
 
-    def _content(self):
+    def _read(self):
+        """Return the bytes of the file, compared with the SHA-256 in the record."""
         try:
-            if self.path.exists() and not self.path.is_file():  # a pipe would be waited for
+            if self.path.exists() and not self.path.is_file():  # reading a pipe would block
                 raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
             content = self.path.read_bytes()
         except OSError as error:
@@ -267,46 +289,48 @@ class _Beside:
             )  # fmt: skip
             raise InputError(Problem(self.path.name, text)) from None
         digest = hashlib.sha256(content).hexdigest()
-        if digest != self._said["sha256"]:
+        if digest != self._description["sha256"]:
+            recorded = str(self._description["sha256"])
             text = message(
                 "record_tables_altered",
                 "was altered: its SHA-256 is {found}, in {record} {recorded}",
-                found=digest[:12], recorded=str(self._said["sha256"])[:12], record=self._record,
+                found=digest[:12], recorded=recorded[:12], record=self._record,
             )  # fmt: skip
             raise InputError(Problem(self.path.name, text))
         return content
 
 
-def _table(arrays, place, rows):
-    """{key: column} of a table; ValueError for columns that are not those of the schema."""
-    found = {}
+def _read_table(arrays, place, rows):
+    """Return the columns {key: column} of a table; ValueError if they differ from the schema."""
+    columns = {}
     for name, schema in RECORD.schema()["$defs"][TABLES[place]]["properties"].items():
         column = arrays[f"{place}.{name}"]
         if f"{place}.{name}{_TEXTS}" in arrays:
             texts = json.loads(arrays[f"{place}.{name}{_TEXTS}"].tobytes())
-            column = _texts(column, texts)
-        if len(column) != rows or not _fits(column, schema):
+            column = _make_texts(column, texts)
+        if len(column) != rows or not _matches(column, schema):
             raise ValueError(f"{place}.{name}")
-        found[name] = column
-    return found
+        columns[name] = column
+    return columns
 
 
-def _texts(codes, texts):
-    is_sound = codes.dtype.kind == "i" and all(type(one) is str for one in texts)
-    if not is_sound or codes.max(initial=-1) >= len(texts) or codes.min(initial=0) < -1:
+def _make_texts(codes, texts):
+    """Return `Texts`; ValueError for invalid codes or texts."""
+    is_valid = codes.dtype.kind == "i" and all(type(text) is str for text in texts)
+    if not is_valid or codes.max(initial=-1) >= len(texts) or codes.min(initial=0) < -1:
         raise ValueError("texts")
     return Texts(codes, tuple(texts))
 
 
-_KINDS = {"number": "fi", "integer": "i", "boolean": "b"}  # of arrays
+_KINDS = {"number": "fi", "integer": "i", "boolean": "b"}  # kinds of numpy for a type of JSON
 
 
-def _fits(column, schema):
-    """Whether a column holds what a key of the schema may be."""
+def _matches(column, schema):
+    """Return whether a column agrees with the schema of its key."""
     names = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
     is_text = isinstance(column, Texts)
     array = column.codes if is_text else column
-    if array.dtype.itemsize > 8:  # longer numbers than those of Python
+    if array.dtype.itemsize > 8:  # wider than the numbers of Python
         return False
     if "array" in names:
         is_deep = array.ndim == 2 if is_text else array.ndim > 1
@@ -315,7 +339,7 @@ def _fits(column, schema):
         return False
     if is_text:
         return "string" in names
-    kinds = "".join(_KINDS.get(one, "") for one in names)
+    kinds = "".join(_KINDS.get(name, "") for name in names)
     is_null = "null" in names and array.dtype.kind == "f" and np.isnan(array).all()
     return is_null or array.dtype.kind in kinds
 
@@ -329,21 +353,22 @@ def _has_null(column):
 # ---- places in a record
 
 
-def _at(record, place):
+def _table_at(record, place):
+    """Return the table at a place such as "adjustment.points", or None."""
     *outer, name = place.split(".")
-    for one in outer:
-        record = record.get(one) or {}
+    for part in outer:
+        record = record.get(part) or {}
     return record.get(name)
 
 
-def _lacks(record, place):
-    """Whether the object that a table stands in is there, and the table is not."""
+def _lacks_table(record, place):
+    """Return whether the record has the object of a table, but not the table."""
     outer = place.rpartition(".")[0]
-    return (not outer or record.get(outer) is not None) and _at(record, place) is None
+    return (not outer or record.get(outer) is not None) and _table_at(record, place) is None
 
 
-def _with(record, tables):
-    """The record with other tables: {place: table}."""
+def _replace_tables(record, tables):
+    """Return the record with other tables {place: table}."""
     record = dict(record)
     for place, table in tables.items():
         outer, _, name = place.rpartition(".")

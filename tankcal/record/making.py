@@ -1,4 +1,4 @@
-"""The whole record: its keys, and how it is made of a result."""
+"""The whole record: its keys, and their values from a result."""
 
 import platform
 
@@ -17,24 +17,17 @@ from tankcal.job.model.settings import (
     Tank,
 )
 from tankcal.pipeline.corrections import Correction
-from tankcal.record import statements, survey, table, tank_parts, texts
+from tankcal.record import survey, table, tank_parts, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.choices import Choice, adjustment_choices, choices_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
 from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
 from tankcal.record.hits import HitsRecord, hits_of
-from tankcal.record.homogeneity import HomogeneityRecord, homogeneity_record
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
 from tankcal.record.long_tables import LongTables
-from tankcal.record.overrulings import (
-    OverrulingsRecord,
-    overrulings_of,
-    overrulings_of_adjustment,
-)
-from tankcal.record.plain_data import to_plain
 from tankcal.record.radii import RadiiRecord, radii_of
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 from tankcal.record.ship import ShipRecord, ship_of
 from tankcal.record.strapping import StrappingRecord, strapping_of
 from tankcal.record.tangents import TangentsRecord, tangents_of
@@ -45,7 +38,7 @@ from tankcal.version import find_version
 
 
 class Versions(Saved):
-    """Of the programs that computed."""
+    """Versions of the programs that computed the record."""
 
     python: str = key("such as 3.11.7")
     numpy: str = key("such as 2.4.6")
@@ -53,78 +46,78 @@ class Versions(Saved):
 
 
 class JobAsRead(Saved):
-    """The job as read, in SI; null is what a job that was only adjusted did not give of a tank."""
+    """The job as read, in SI; null for data of a tank that an adjusted survey does not need."""
 
     tank: Tank | None = key("kind, nominal sizes, details")
     survey: Survey | None = key("when and from where it was measured")
     datum: Datum | None = key("heights in the survey's frame")
-    table: TableSpec | None = key("what the table is to be")
+    table: TableSpec | None = key("specification of the table")
     material: Material | None = key("of the shell")
     corrections: Switches | None = key("which are on", of="switches")
     courses: list[Course] = key("from the bottom up")
-    certificate: dict = key("texts; only what was given")
+    certificate: dict = key("texts; only given keys")
     source: str = key("name of the folder or workbook")
     inspection: Inspection | None = key(
-        "what an inspection is to know; left out where nothing was said of one",
+        "data of an inspection; left out if none are given",
         default=None,
         optional=True,
     )
 
 
 class Record(Saved, kw_only=True):
-    """All that workbook and report need."""
+    """All data of workbook and report."""
 
     format: str = key("see Versions", default=FORMAT)
     tankcal: str = key("version of tankcal", default_factory=find_version)
     versions: Versions = key("of python, numpy, scipy")
-    files: list[InputFile] = key("everything that the job was read from")
+    files: list[InputFile] = key("all input files of the job")
     job: JobAsRead = key("the job as read, in SI")
     shell: survey.Wall | None = key("the wall as one body", default=None)
     points: list[survey.SurveyedPoint] | None = key(
         "of an adjusted survey every adjusted point first; null: in the file of `long_tables`"
     )
     rejected: list[survey.RejectedPoint] = key("points that are not on the wall", default=())
-    overrulings: OverrulingsRecord | None = key(
-        "decisions against the search for blunders; left out where there are none",
+    overrulings: survey.OverrulingsRecord | None = key(
+        "decisions against the search for blunders; left out if there are none",
         default=None,
         optional=True,
     )
     sections: list[survey.SectionCircle] = key("from the bottom up", default=())
-    homogeneity: HomogeneityRecord | None = key(
-        "of the noise of the sections; left out where no section has a noise of its own",
+    homogeneity: survey.HomogeneityRecord | None = key(
+        "of the noise of the sections; left out if no section has independent noise",
         default=None,
         optional=True,
     )
     strapping: StrappingRecord | None = key(
-        "circumferences by tape; left out where there are none", default=None, optional=True
+        "circumferences by tape; left out if there are none", default=None, optional=True
     )
     lines: LinesRecord | None = key(
-        "reference lines; left out where there are none", default=None, optional=True
+        "reference lines; left out if there are none", default=None, optional=True
     )
     clouds: CloudsRecord | None = key(
-        "clouds of the wall; left out where there are none", default=None, optional=True
+        "clouds of the wall; left out if there are none", default=None, optional=True
     )
     hits: HitsRecord | None = key(
-        "bare wall hits; left out where there are none", default=None, optional=True
+        "bare wall hits; left out if there are none", default=None, optional=True
     )
     tangents: TangentsRecord | None = key(
-        "tangents from outside; left out where there are none", default=None, optional=True
+        "tangents from outside; left out if there are none", default=None, optional=True
     )
     liquid: LiquidRecord | None = key(
-        "metered runs; left out where there are none", default=None, optional=True
+        "metered runs; left out if there are none", default=None, optional=True
     )
     radii: RadiiRecord | None = key(
-        "radii out of a former table; left out where there are none", default=None, optional=True
+        "radii of a former table; left out if there are none", default=None, optional=True
     )
     ship: ShipRecord | None = key(
-        "corrections for trim and list; left out where there are none", default=None, optional=True
+        "corrections for trim and list; left out if there are none", default=None, optional=True
     )
     great_circles: GreatCirclesRecord | None = key(
-        "strapped sphere; left out where there is none", default=None, optional=True
+        "strapped sphere; left out if there is none", default=None, optional=True
     )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
     wall_shape: WallShapeRecord | None = key(
-        "for inspections; left out where no upright wall was surveyed by points",
+        "for inspections; left out if no upright wall was surveyed by points",
         default=None,
         optional=True,
     )
@@ -133,24 +126,26 @@ class Record(Saved, kw_only=True):
     proportional_parts: table.PartsOfRows | None = key("of millimetres", default=None)
     densities: list[table.VolumesOfDensity] = key("further densities of the liquid", default=())
     gross: table.GrossShell | None = key("null for a tank without courses", default=None)
-    corrections: list[Correction] = key("that bear on the job, in their order", default=())
+    corrections: list[Correction] = key("that apply to the job, in their order", default=())
     solid: list[tank_parts.Detail] | None = key("sizes of a tank without courses", default=None)
-    bottom: list[tank_parts.Detail] | None = key("how it was taken; null: it is flat", default=None)
-    top: list[tank_parts.Detail] | None = key(
-        "the head on top; left out where there is none", default=None, optional=True
+    bottom: list[tank_parts.Detail] | None = key(
+        "of the calculation; null: it is flat", default=None
     )
-    deadwood: list[Deadwood] = key("as declared, whether or not it is on", default=())
+    top: list[tank_parts.Detail] | None = key(
+        "the head on top; left out if there is none", default=None, optional=True
+    )
+    deadwood: list[Deadwood] = key("as declared, also if switched off", default=())
     roof: list[tank_parts.Detail] | None = key("the floating roof", default=None)
-    budget: list[statements.BudgetLine] = key("of the top row, by the table alone", default=())
-    choices: list[Choice] = key("everything that was assumed")
-    warnings: list[texts.WarningRecord] = key("what should be read")
-    adjustment: AdjustmentRecord | None = key("null: points were handed in", default=None)
-    budgets: list[statements.StatedBudget] = key("stated volumes, then deliveries", default=())
+    budget: list[table.BudgetLine] = key("of the top row, of the table alone", default=())
+    choices: list[Choice] = key("all assumptions")
+    warnings: list[texts.WarningRecord] = key("problems that did not stop the job")
+    adjustment: AdjustmentRecord | None = key("null: points were supplied", default=None)
+    budgets: list[table.StatedBudget] = key("stated volumes, then deliveries", default=())
     deliveries: list[WorstDeliveries] = key("the worst of each minimum height", default=())
-    rule: statements.TableJudged | None = key("null: the job has no decision rule", default=None)
-    monte_carlo: statements.MonteCarlo | None = key("null: it is off", default=None)
+    rule: table.TableJudged | None = key("null: the job has no decision rule", default=None)
+    monte_carlo: table.MonteCarlo | None = key("null: it is off", default=None)
     long_tables: LongTables | None = key(
-        "the file that holds tables of more than 10 000 rows; left out where there are none",
+        "the file of tables with more than 10 000 rows; left out if there are none",
         default=None,
         optional=True,
     )
@@ -161,17 +156,17 @@ _OF_A_SURVEY = ("points", "choices", "warnings", "adjustment")
 
 
 def record_of(result):
-    """The record of a `result.Result`: a dict of plain numbers, texts and lists."""
+    """Return the record of a `result.Result`: a dict of plain numbers, texts and lists."""
     job, adjustment = result.job, result.adjustment
     return to_plain(
         Record(
-            **_beginning(job),
+            **_head_values(job),
             shell=survey.shell_of(result),
             points=survey.points_of(result),
-            rejected=survey.rejected_of(result),
-            overrulings=overrulings_of(result),
+            rejected=survey.rejections_of(result),
+            overrulings=survey.overrulings_of(result),
             sections=survey.sections_of(result),
-            homogeneity=homogeneity_record(job, result.wall),
+            homogeneity=survey.homogeneity_record(job, result.wall),
             strapping=strapping_of(result),
             lines=lines_of(result),
             hits=hits_of(result),
@@ -184,7 +179,7 @@ def record_of(result):
             courses=survey.courses_of(result),
             wall_shape=shape_record(job, result.wall),
             capacity=table.capacity_of(result),
-            interpolation=filled_from(table.InterpolationError, result.straightness),
+            interpolation=fill_from(table.InterpolationError, result.straightness),
             proportional_parts=table.proportional_parts_of(result),
             densities=table.densities_of(result),
             gross=table.gross_of(result),
@@ -194,40 +189,41 @@ def record_of(result):
             top=tank_parts.top_of(result),
             deadwood=job.deadwood,
             roof=tank_parts.roof_of(result),
-            budget=statements.budget_of(result),
+            budget=table.budget_of(result),
             choices=choices_of(result),
             warnings=texts.warnings_of(result.warnings),
             adjustment=adjustment and adjustment_of(adjustment, job.measurements),
-            budgets=statements.budgets_of(result),
+            budgets=table.budgets_of(result),
             deliveries=result.stated.worst,
-            rule=statements.rule_of(result.rule),
-            monte_carlo=statements.monte_carlo_of(result),
+            rule=table.rule_of(result.rule),
+            monte_carlo=table.monte_carlo_of(result),
         )
     )
 
 
 def record_of_adjustment(job, adjustment):
-    """The record of a survey that was only adjusted: what a tank has is null or empty."""
+    """Return the record of a survey that was only adjusted; data of a tank are null or empty."""
     measurements = getattr(job, "measurements", None)
-    found = to_plain(
+    record = to_plain(
         Record(
-            **_beginning(job),
+            **_head_values(job),
             points=survey.points_of_adjustment(adjustment),
-            overrulings=overrulings_of_adjustment(job),
+            overrulings=survey.overrulings_of_adjustment(job),
             choices=adjustment_choices(adjustment, measurements),
             warnings=texts.warnings_of(dict.fromkeys((*job.warnings, *adjustment.warnings))),
             adjustment=adjustment_of(adjustment, measurements),
         )
     )
-    of_a_tank = [one for one in found if one not in _HEAD + _OF_A_SURVEY]
-    of_a_tank.sort(key=lambda one: found[one] is not None)  # null first: as it was always written
-    return {one: found[one] for one in (*_HEAD, *of_a_tank, *_OF_A_SURVEY)}
+    tank_keys = [name for name in record if name not in _HEAD + _OF_A_SURVEY]
+    tank_keys.sort(key=lambda name: record[name] is not None)  # null first, as in earlier versions
+    return {name: record[name] for name in (*_HEAD, *tank_keys, *_OF_A_SURVEY)}
 
 
-def _beginning(job):
+def _head_values(job):
+    """Return the values of the first keys; those with a default are missing."""
     versions = Versions(platform.python_version(), np.__version__, scipy.__version__)
     return {
         "versions": versions,
         "files": job.files,
-        "job": filled_from(JobAsRead, job, inspection=job.inspection),
+        "job": fill_from(JobAsRead, job, inspection=job.inspection),
     }

@@ -1,7 +1,7 @@
-"""SHA256SUMS: the hash of every file of a folder of results, as `sha256sum -c` reads them.
+"""SHA256SUMS: the SHA-256 of every file in a folder of results, in the format of `sha256sum -c`.
 
-The first lines say what made the files: with the same programs and packages on the same kind of
-machine the same record gives the same bytes.
+The first lines list the programs, packages and machine that made the files. With these, a record
+gives files with the same bytes.
 """
 
 import hashlib
@@ -15,11 +15,11 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
 FILE = "SHA256SUMS"
-FILLED_IN = "job"  # folder of an empty job in the folder of a plan: a crew fills it in
-MOST_BYTES = 10_000_000
-PACKAGES = (  # those whose version shows in the bytes of some paper
+EMPTY_JOB = "job"  # folder of the empty job in the folder of a plan, not listed: users fill it in
+MOST_BYTES = 10_000_000  # largest size of a manifest
+PACKAGES = (  # packages that change the bytes of results
     *("numpy", "scipy", "matplotlib", "xlsxwriter", "mistune", "typst", "segno"),
-    "pypdf",  # where there is a field to sign in
+    "pypdf",  # for a signature field
 )
 _MADE = "# made by "
 _LANGUAGE = "# language asked for: "
@@ -28,18 +28,18 @@ _ROW = re.compile(r"([0-9a-f]{64}) [ *](.+)")
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a SHA256SUMS says.
+    """Content of a SHA256SUMS.
 
     Attributes
     ----------
     digests : dict
-        {path below the folder, with slashes: SHA-256 of that file}.
+        {path below the folder, with slashes: SHA-256 of the file}.
     made_by : str
-        Program, packages and machine that made the files; "" where it does not say.
+        Program, packages and machine that made the files; "" if not stated.
     language : str or None
-        That the papers were asked in; None: that of the job, or nothing is said.
+        Requested language of the reports; None: language of the job, or not stated.
     sha256 : str
-        Of the manifest itself.
+        SHA-256 of the manifest.
     """
 
     digests: dict = field(default_factory=dict)
@@ -48,16 +48,16 @@ class Manifest:
     sha256: str = ""
 
 
-def maker():
-    """Program, packages and kind of machine that make files now, one line."""
+def describe_maker():
+    """Return program, packages and kind of machine of the present process in one line."""
     packages = [f"{name} {_version(name)}" for name in PACKAGES]
-    of_python = f"python {platform.python_version()}"
+    python = f"python {platform.python_version()}"
     machine = f"{platform.system()} {platform.machine()}"
-    return ", ".join([f"tankcal {tankcal.__version__}", of_python, *packages, machine])
+    return ", ".join([f"tankcal {tankcal.__version__}", python, *packages, machine])
 
 
 def _version(name):
-    from importlib import metadata  # takes as long to load as the rest of a command's help
+    from importlib import metadata  # slow: loading it takes as long as the help of a command
 
     try:
         return metadata.version(name)
@@ -66,42 +66,43 @@ def _version(name):
 
 
 def files_below(folder):
-    """Sorted paths, below a folder and with slashes, of the files that a manifest lists.
+    """Return the sorted paths, below a folder and with slashes, of the files of its manifest.
 
-    Neither itself, nor hidden files, nor the empty job of a plan, which is to be filled in. Links
-    to folders are not followed.
+    The manifest, hidden files and the empty job of a plan are excluded. Links to folders are not
+    followed.
     """
-    folder, found, left = Path(folder), [], [Path(folder)]
-    while left:
-        for path in left.pop().iterdir():
+    folder, files, folders = Path(folder), [], [Path(folder)]
+    while folders:
+        for path in folders.pop().iterdir():
             if path.name.startswith("."):
                 continue
             if path.is_dir():
-                if not path.is_symlink() and path.name != FILLED_IN:
-                    left.append(path)
+                if not path.is_symlink() and path.name != EMPTY_JOB:
+                    folders.append(path)
             elif path != folder / FILE:
-                found.append(path.relative_to(folder).as_posix())
-    return sorted(found)
+                files.append(path.relative_to(folder).as_posix())
+    return sorted(files)
 
 
 def digest_of(path):
-    """SHA-256 of a file of any size."""
+    """Return the SHA-256 of a file of any size."""
     with open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def write_manifest(folder, language=None):
-    """Write SHA256SUMS of everything that lies in a folder.
+    """Write SHA256SUMS of all files in a folder.
 
     Parameters
     ----------
     folder : path
     language : str, optional
-        That the papers were asked in; None: that of the job.
+        Requested language of the reports; None: language of the job.
 
     Returns
     -------
     Path
+        The manifest.
 
     Examples
     --------
@@ -114,7 +115,7 @@ def write_manifest(folder, language=None):
     ('ba7816bf', 'ba7816bf')
     """
     folder = Path(folder)
-    rows = [f"{_MADE}{maker()}", f"{_LANGUAGE}{language or '-'}"]
+    rows = [f"{_MADE}{describe_maker()}", f"{_LANGUAGE}{language or '-'}"]
     rows += [f"{digest_of(folder / name)}  {name}" for name in files_below(folder)]
     path = folder / FILE
     path.write_text("\n".join([*rows, ""]), encoding="utf-8", newline="\n")
@@ -122,14 +123,14 @@ def write_manifest(folder, language=None):
 
 
 def read_manifest(folder):
-    """The Manifest of a folder; None where it has none.
+    """Read the Manifest of a folder; None if it has none.
 
     Raises
     ------
     InputError
         For a file that is no list of hashes.
     OSError
-        For one that cannot be read.
+        For a file that cannot be read.
     """
     path = Path(folder) / FILE
     if not path.is_file():
@@ -138,27 +139,29 @@ def read_manifest(folder):
         content = path.read_bytes() if path.stat().st_size <= MOST_BYTES else b"\xff"
         rows = content.decode("utf-8").splitlines()
     except ValueError:
-        raise InputError(Problem(FILE, _no_list())) from None
+        raise InputError(_invalid()) from None
     digests, made_by, language, problems = {}, "", None, []
     for number, row in enumerate(rows, 1):
         match = _ROW.fullmatch(row)
         if row.startswith(_MADE):
             made_by = row.removeprefix(_MADE)
         elif row.startswith(_LANGUAGE):
-            said = row.removeprefix(_LANGUAGE)
-            language = None if said == "-" else said
+            requested = row.removeprefix(_LANGUAGE)
+            language = None if requested == "-" else requested
         elif match:
             digests[match[2]] = match[1]
         elif row.strip() and not row.startswith("#"):
-            problems.append(Problem(FILE, _no_list(), number))
+            problems.append(_invalid(number))
     if problems or not digests:
-        raise InputError(problems[:1] or [Problem(FILE, _no_list())])
+        raise InputError(problems[:1] or [_invalid()])
     return Manifest(digests, made_by, language, hashlib.sha256(content).hexdigest())
 
 
-def _no_list():
-    return message(
+def _invalid(row=None):
+    """Return the Problem of a file that is no list of hashes."""
+    text = message(
         "verify_no_manifest",
         "is no list of hashes; expected a SHA-256, two blanks and a name in each line, as tankcal "
         "wrote it",
     )
+    return Problem(FILE, text, row)

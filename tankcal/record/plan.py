@@ -1,33 +1,35 @@
-"""A prediction as it is saved: plan.json."""
+"""Predictions of a survey before it is made: plan.json."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from tankcal.planning.bases import by_ends
-from tankcal.planning.doubtful import GroupReliability
+from tankcal.planning.bases import group_by_ends
 from tankcal.planning.prediction import PointOutlook, SectionOutlook
-from tankcal.record.plain_data import to_plain
+from tankcal.planning.reliability import GroupReliability
+from tankcal.planning.wall.changes import wall_count
+from tankcal.planning.wall.filling_outlook import FillingOutlook
+from tankcal.planning.wall.prediction import CourseOutlook, ReadingsOutlook
 from tankcal.record.saved_formats import SavedFormat
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, fill_from, key, to_plain
 from tankcal.record.texts import WarningRecord, warnings_of
 
 PLAN = SavedFormat("tankcal-plan", 1, "plan.json")  # so far one version
 
 
 class PlannedDatum(Saved):
-    """What holds the frame."""
+    """Definition of the frame."""
 
-    choice: str = key("as asked for")
-    defect: int = key("of the seven ways, those that no observation feels")
+    choice: str = key("requested datum")
+    defect: int = key("number of the seven degrees of freedom that no observation determines")
     words: str = key("a sentence that names them")
-    held: list[str] = key("what holds them: points with axes, or the photo")
+    held: list[str] = key("points with axes, or the photo, that define them")
     vertical: bool = key("whether observations determine the vertical")
     scale: bool = key("whether observations determine the scale")
 
 
 class PlannedSurvey(Saved):
-    """How large the survey is."""
+    """Size of the survey."""
 
     photo_stations: int = key("number")
     photographs: int = key("number")
@@ -38,16 +40,16 @@ class PlannedSurvey(Saved):
     observations: int = key("values")
     unknowns: int = key("number")
     redundancy: int = key("number")
-    datum: PlannedDatum = key("what holds the frame")
+    datum: PlannedDatum = key("definition of the frame")
 
 
 class PlanLimit(Saved):
-    """The limit that the plan is to keep."""
+    """The limit of the plan."""
 
     relative_u: float | None = key("U over volume; null: no limit")
-    of: str = key("what it is for")
+    of: str = key("quantity that is limited")
     predicted: float = key("U over volume")
-    met: bool | None = key("whether it is kept")
+    met: bool | None = key("whether it is met")
 
 
 class PlannedTable(Saved):
@@ -61,7 +63,7 @@ class PlannedTable(Saved):
 
 
 class PlannedSource(Saved):
-    """What an input contributes."""
+    """Contribution of an input."""
 
     input: str = key("kind of input")
     u_top_m3: float = key("to the top row")
@@ -85,40 +87,40 @@ class PlannedPrecision(Saved):
     """Precision of all points together."""
 
     mean_sd_m: float = key("sqrt(trace / 3n)")
-    axis_sd_m: list[float] = key("the same along x, y, z")
+    axis_sd_m: list[float] = key("mean sd along x, y, z")
     range_m: list[float] = key("largest minus smallest sd along x, y, z")
-    proportional: float = key("precision is 1 : this")
+    proportional: float = key("precision is 1 : this value")
 
 
 class SimulatedPlan(Saved):
-    """What many simulated surveys of the plan gave."""
+    """Results of simulated surveys of the plan."""
 
     seed: int = key("of the draws")
-    blunders: float = key("share of readings that were off")
-    runs: int = key("that had a solution")
-    failed: list[str] = key("messages of the others")
+    blunders: float = key("share of readings with a blunder")
+    runs: int = key("with a solution")
+    failed: list[str] = key("messages of runs without solution")
     coordinates_scatter_over_predicted: float = key("rms over rms", of="ratio")
     volume_scatter_over_predicted: float = key("of the full tank", of="volume_ratio")
     volume_scatter_over_predicted_sd: float = key("its sd", of="volume_ratio_sd")
-    set_aside: list[int] = key("values that the search took out, of each run")
+    set_aside: list[int] = key("values rejected by the search, of each run")
     volumes_m3: list[float] = key("of the full tank, of each run")
 
 
 class Fingerprint(Saved):
-    """A file of the empty job, by which a filled one is told from it."""
+    """A file of the empty job, to distinguish it from a completed file."""
 
     file: str = key("name")
     sha256: str = key("of its bytes")
 
 
 class PlanFile(Saved, kw_only=True):
-    """What a survey would give, before it is made."""
+    """Prediction of a survey by points."""
 
     format: str = key("see Versions", default=PLAN.format)
     tank: str = key("id", of="plan.job.tank.id")
     side: str = key('"outside" or "inside"', of="plan.job.survey.side")
-    survey: PlannedSurvey = key("how large it is")
-    limit: PlanLimit = key("that the plan is to keep")
+    survey: PlannedSurvey = key("its size")
+    limit: PlanLimit = key("of the plan")
     table: PlannedTable = key("the capacity table")
     sources: list[PlannedSource] = key("of the uncertainty of the top row")
     worst_deliveries: list[PlannedDelivery] = key("of each minimum height")
@@ -126,53 +128,169 @@ class PlanFile(Saved, kw_only=True):
     points: list[PointOutlook] = key("targets first")
     precision: PlannedPrecision = key("of the points")
     reliability: list[GroupReliability] = key("of the kinds of observations")
-    warnings: list[WarningRecord] = key("what should be read")
-    simulated: SimulatedPlan | None = key("null: it was not asked for", default=None)
+    warnings: list[WarningRecord] = key("on the plan")
+    simulated: SimulatedPlan | None = key("null: not requested", default=None)
     job: list[Fingerprint] = key("files of the empty job", default=())
 
 
 def plain_of(prediction, simulated=None, job=()):
-    """The `PlanFile` of a Prediction, as plain data.
+    """Return the `PlanFile` of a Prediction, as plain data.
 
-    simulated  `simulations.Simulated`, or None        job  [{file, sha256}] of the empty job
+    Parameters
+    ----------
+    prediction : planning.prediction.Prediction
+    simulated : simulations.Simulated, optional
+        Simulated surveys; None: not requested.
+    job : sequence of dict, optional
+        Files of the empty job, {file, sha256}.
+
+    Returns
+    -------
+    dict
     """
-    found = filled_from(
+    file = fill_from(
         PlanFile,
         prediction,
         survey=_survey(prediction),
-        precision=filled_from(PlannedPrecision, prediction.precision),
-        **parts_of_any_plan(prediction),
+        precision=fill_from(PlannedPrecision, prediction.precision),
+        **_common_parts(prediction),
     )
-    return to_plain(replace(found, simulated=filled_from(SimulatedPlan, simulated), job=job))
+    return to_plain(replace(file, simulated=fill_from(SimulatedPlan, simulated), job=job))
 
 
-def parts_of_any_plan(prediction):
-    """{key: its value} of what files of all plans have: limit, table, sources, warnings."""
+def _common_parts(prediction):
+    """Return the keys common to all plans: limit, table, sources, deliveries, warnings."""
     table, limits = prediction.table, prediction.plan.limits
     return {
-        "limit": PlanLimit(limits.relative_u, limits.of, prediction.relative_u, prediction.meets),
-        "table": filled_from(PlannedTable, table),
+        "limit": PlanLimit(
+            limits.relative_u, limits.quantity, prediction.relative_u, prediction.meets
+        ),
+        "table": fill_from(PlannedTable, table),
         "sources": [
-            PlannedSource(one.kind, np.linalg.norm(one.columns_m3[-1])) for one in table.sources
+            PlannedSource(source.kind, np.linalg.norm(source.columns_m3[-1]))
+            for source in table.sources
         ],
         "worst_deliveries": [
-            filled_from(PlannedDelivery, one) for one in prediction.tabled.stated.worst
+            fill_from(PlannedDelivery, worst) for worst in prediction.result.stated.worst
         ],
         "warnings": warnings_of(prediction.warnings),
     }
 
 
 def _survey(prediction):
-    plan, solution = prediction.plan, prediction.predicted.adjusted.solution
+    plan, solution = prediction.plan, prediction.network.adjusted.solution
     return PlannedSurvey(
         photo_stations=len(plan.stations),
         photographs=len(plan.photos),
         setups=len(plan.setups),
-        ties=len(plan.ties) + len(by_ends(plan.bases)),
+        ties=len(plan.ties) + len(group_by_ends(plan.bases)),
         control_points=len(plan.known),
         targets=len(plan.targets.names),
         observations=solution.rows,
         unknowns=solution.estimated,
         redundancy=solution.dof,
-        datum=filled_from(PlannedDatum, prediction.datum),
+        datum=fill_from(PlannedDatum, prediction.datum),
+    )
+
+
+# ---- plan of a wall by tape, lines, hits, tangents or liquid
+
+
+WALL_PLAN = SavedFormat("tankcal-wall-plan", 1, "plan.json")  # so far one version
+
+
+class PlannedWall(Saved):
+    """Number of planned measurements."""
+
+    circumferences: int = key("different circumferences by tape")
+    strap_readings: int = key("of the tape")
+    lines: int = key("reference lines")
+    faces: int = key("of their plummet; 0: no lines")
+    offsets: int = key("from them")
+    setups: int = key("of a total station")
+    hits: int = key("of the bare wall")
+    shared_targets: int = key("common to neighbouring set-ups")
+    tangents: int = key("sights to the limbs of the tank")
+    runs: int = key("of metered liquid")
+    batches: int = key("of metered liquid")
+
+
+class SimulatedWallPlan(Saved):
+    """Results of simulated surveys of the plan, each with a random wall."""
+
+    seed: int = key("of the draws")
+    blunders: float = key("share of readings with a blunder")
+    runs: int = key("with a solution")
+    failed: list[str] = key("messages of runs without solution")
+    predicted_u_m3: float = key("of the full tank, by the survey alone")
+    predicted_U_m3: float = key("expanded, of the full tank, by the survey alone")
+    errors_m3: list[float] = key("volume of the full tank less the true one, of each run")
+    U_m3: list[float] = key("U of this volume by the survey alone, of each run")
+    volume_error_over_predicted: float = key("rms over u", of="volume_ratio")
+    volume_error_over_predicted_sd: float = key("its sd", of="volume_ratio_sd")
+    covered: float = key("share of full tanks whose error is within U")
+    within: list[float] = key("share of rows whose error is within U, of each run")
+    set_aside: list[int] = key("readings rejected by the search, of each run")
+
+
+class WallPlanFile(Saved, kw_only=True):
+    """Prediction of a survey of a wall by tape, reference lines, hits, tangents or liquid."""
+
+    format: str = key("see Versions", default=WALL_PLAN.format)
+    tank: str = key("id", of="plan.job.tank.id")
+    side: str = key('"outside" or "inside"', of="plan.job.survey.side")
+    survey: PlannedWall = key("planned measurements")
+    limit: PlanLimit = key("of the plan")
+    table: PlannedTable = key("the capacity table")
+    sources: list[PlannedSource] = key("of the uncertainty of the top row")
+    worst_deliveries: list[PlannedDelivery] = key("of each minimum height")
+    courses: list[CourseOutlook] = key("from the bottom up")
+    reliability: list[ReadingsOutlook] = key("of straps, offsets and tangents")
+    filling: FillingOutlook | None = key("contribution of runs of liquid; null: no runs")
+    warnings: list[WarningRecord] = key("on the plan")
+    simulated: SimulatedWallPlan | None = key(
+        "left out if not requested", optional=True, default=None
+    )
+    job: list[Fingerprint] = key("files of the empty job", default=())
+
+
+def plain_of_wall(prediction, simulated=None, job=()):
+    """Return the `WallPlanFile` of a WallPrediction, as plain data.
+
+    Parameters
+    ----------
+    prediction : planning.wall.prediction.WallPrediction
+    simulated : SimulatedWall, optional
+        Simulated surveys; None: not requested.
+    job : sequence of dict, optional
+        Files of the empty job, {file, sha256}.
+
+    Returns
+    -------
+    dict
+    """
+    file = fill_from(
+        WallPlanFile,
+        prediction,
+        survey=survey_of(prediction.plan),
+        **_common_parts(prediction),
+    )
+    return to_plain(replace(file, simulated=fill_from(SimulatedWallPlan, simulated), job=job))
+
+
+def survey_of(plan):
+    """Return the `PlannedWall` of a WallPlan."""
+    design, job, count = plan.design, plan.job, wall_count(plan)
+    return PlannedWall(
+        circumferences=len({strap.name for strap in design.straps}),
+        strap_readings=0 if job.strapping is None else len(job.strapping.straps),
+        lines=count["line"],
+        faces=0 if design.lines is None else design.lines.faces,
+        offsets=0 if job.lines is None else len(job.lines.offsets),
+        setups=count["setup"],
+        hits=0 if job.hits is None else len(job.hits),
+        shared_targets=0 if design.ties is None else design.ties[0],
+        tangents=0 if job.tangents is None else len(job.tangents),
+        runs=count["run"],
+        batches=count["batch"],
     )

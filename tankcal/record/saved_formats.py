@@ -1,9 +1,9 @@
-"""Formats of what is saved as JSON: which versions are read, and how an older one becomes new.
+"""Formats of data saved as JSON: the versions that are read, and the migration of older versions.
 
-A key that comes, goes or changes its meaning makes a new version, once the last one has been
-released: `version` counts up, and a step says what data of the version before get for each of them.
-Every released version has kept files in the tests. The keys of the version that is written are in
-the folder `schemas`, as JSON schemas that follow from dataclasses (`tankcal.record.schema`).
+Once a version is released, an added or removed key, or a key with another meaning, needs a new
+version: `version` increases, and a step converts data of the previous version. The tests keep files
+of every released version. The folder `schemas` contains the keys of the written versions as JSON
+schemas, which follow from dataclasses (`tankcal.record.schema`).
 """
 
 import json
@@ -15,23 +15,30 @@ from pathlib import Path
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import list_some, message
-from tankcal.record.schema import checked
+from tankcal.record.schema import check_data
 
-MOST_NAMED = 3  # keys that are missing
+MOST_NAMED = 3  # largest number of missing keys in a message
 SCHEMAS = Path(__file__).with_name("schemas")
 
 
 @dataclass(frozen=True)
 class SavedFormat:
-    """A format and the versions of it that are read.
+    """A format, and the versions that are read.
 
-    name       such as "tankcal-record"
-    version    the one that is written
-    file       name of the file as tankcal writes it
-    steps      {version: function that makes data of the next version of it}
-    kinds      what may stand under the key "kind"; none: there is no such key
-    completed  function that adds to data of a version what its drafts did not have:
-               completed(data, version)
+    Attributes
+    ----------
+    name : str
+        Name of the format, such as "tankcal-record".
+    version : int
+        Version that is written.
+    file : str
+        Name of the written file.
+    steps : dict
+        {version: function that converts data of this version to the next version}.
+    kinds : tuple of str
+        Values of the key "kind"; () for a format without this key.
+    complete : callable
+        complete(data, version) adds to data of a version the keys that its drafts lacked.
     """
 
     name: str
@@ -39,36 +46,51 @@ class SavedFormat:
     file: str
     steps: dict = field(default_factory=dict)
     kinds: tuple = ()
-    completed: Callable = lambda saved, version: saved
+    complete: Callable = lambda saved, version: saved
 
     @property
     def format(self):
-        """What stands under the key "format" in what is written."""
+        """Value of the key "format" in written data."""
         return f"{self.name}/{self.version}"
 
     def schema_file(self, kind=None):
-        """Path of the JSON schema of what is written, of a kind where there are any."""
+        """Return the path of the JSON schema of written data, of a kind if the format has any."""
         name = f"{self.name}-{self.version}"
         return SCHEMAS / (f"{name}-{kind}.json" if self.kinds else f"{name}.json")
 
     def schema(self, kind=None):
-        """The JSON schema of what is written, of a kind where there are any."""
-        return _read(self.schema_file(kind))
+        """Return the JSON schema of written data, of a kind if the format has any."""
+        return _read_schema(self.schema_file(kind))
 
     def version_of(self, saved):
-        """The version of data that can be read; None of anything else."""
-        found = saved.get("format") if isinstance(saved, dict) else None
-        match = re.fullmatch(rf"{self.name}/([0-9]{{1,4}})", found) if _is_text(found) else None
+        """Return the version of data if it can be read, otherwise None."""
+        name = saved.get("format") if isinstance(saved, dict) else None
+        if not isinstance(name, str):
+            return None
+        match = re.fullmatch(rf"{self.name}/([0-9]{{1,4}})", name)
         version = int(match[1]) if match else None
         return version if version in (*self.steps, self.version) else None
 
     def migrated(self, saved, name):
-        """Data of any version that can be read, as one of `version`; the same when it is one.
+        """Return data of any readable version as data of the written version.
 
-        saved  as parsed; it is not changed        name  of its file, for problems
+        Parameters
+        ----------
+        saved : dict
+            Data as parsed; they are not changed.
+        name : str
+            Name of the file, for the problems.
 
-        Raises InputError: in one line, with the version, for what lacks keys or is of another
-        format; with a line for each value that is not of its type.
+        Returns
+        -------
+        dict
+            The same object if it has the written version.
+
+        Raises
+        ------
+        InputError
+            In one line with the version, for missing keys or another format; with a line for each
+            value of another type.
         """
         version = self.version_of(saved)
         if version is None:
@@ -87,7 +109,7 @@ class SavedFormat:
             )  # fmt: skip
             raise InputError(Problem(name, expected))
         try:
-            saved = self.completed(saved, version)
+            saved = self.complete(saved, version)
             for step in range(version, self.version):
                 saved = self.steps[step](saved)
         except (LookupError, TypeError, ValueError, AttributeError) as error:
@@ -98,7 +120,7 @@ class SavedFormat:
                 found=f"{self.name}/{version}", what=str(error), file=self.file,
             )  # fmt: skip
             raise InputError(Problem(name, expected)) from error
-        missing, problems = checked(saved, self.schema(kind), name)
+        missing, problems = check_data(saved, self.schema(kind), name)
         if missing:
             expected = message(
                 "record_lacks_keys",
@@ -113,9 +135,5 @@ class SavedFormat:
 
 
 @cache
-def _read(path):
+def _read_schema(path):
     return json.loads(path.read_text(encoding="utf-8"))
-
-
-def _is_text(found):
-    return isinstance(found, str)

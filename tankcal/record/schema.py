@@ -1,8 +1,9 @@
-"""The layout of what is saved, declared once: dataclasses, from which its JSON schema follows.
+"""Saved data, declared once as dataclasses: JSON schema, conversion to plain data, and reading.
 
-A dataclass is an object of JSON, its fields are the keys, in their order, with the unit in the
-name. A float may be null, for NaN and infinity are written so; anything else only where its type
-has None. A Message `x` is written as `x`, and as `x_code` and `x_values` at the end of its object.
+A dataclass is a JSON object. Its fields are the keys, in their order, with the unit in the name. A
+float may be null, since NaN and infinity are written as null; other values are null only if their
+type includes None. A Message `x` is written as `x`, and as `x_code` and `x_values` at the end of
+its object.
 """
 
 import re
@@ -18,14 +19,14 @@ from typing import Annotated, Any, Union, dataclass_transform, get_args, get_ori
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.messages import Message, message
+from tankcal.messages import Message, as_plain, message
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
-MOST_TOLD = 20  # problems of one file
+MOST_PROBLEMS = 20  # largest number of reported problems of a file
 Finite = Annotated[float, "finite"]  # a number that is never null
 _SCALARS = {bool: "boolean", int: "integer", str: "string"}
-_WORDS = {"None": "null", "True": "true", "False": "false"}  # of JSON, for those of Python
-_TYPES = {  # of Python, for a type of JSON
+_JSON_CONSTANTS = {"None": "null", "True": "true", "False": "false"}
+_TYPES = {  # types of Python for each type of JSON
     "boolean": {bool}, "integer": {int}, "number": {int, float}, "string": {str},
     "null": {type(None)}, "array": {list}, "object": {dict},
 }  # fmt: skip
@@ -33,54 +34,80 @@ _TYPES = {  # of Python, for a type of JSON
 
 @dataclass(frozen=True)
 class Columns:
-    """Marks a dict of columns, {key: values}, whose keys are the fields of a dataclass."""
+    """Mark of a dict of columns, {key: values}, whose keys are the fields of the dataclass `of`."""
 
     of: type
 
 
 @dataclass_transform(frozen_default=True)
 class Saved:
-    """An object of what is saved: each class below it is a frozen dataclass."""
+    """Base class of saved objects; each subclass is a frozen dataclass."""
 
     def __init_subclass__(cls, kw_only=False):
         dataclass(frozen=True, kw_only=kw_only)(cls)
 
 
 def key(doc, *, of=None, times=None, named=None, optional=False, **options):
-    """A field that is a key of what is saved.
+    """Declare a field that is saved.
 
-    doc    what it holds, in one line
-    of     the attribute that `filled_from` takes it from ("wall.shell.tilt"); None: of its own name
-    times  factor that it is multiplied by: of another unit
-    named  the key, where that is no name of Python ("from")
-    optional  whether the key is left out where the value is None
+    Parameters
+    ----------
+    doc : str
+        Description of the value in one line.
+    of : str, optional
+        Attribute from which `fill_from` takes the value, such as "wall.shell.tilt"; None: the
+        attribute with the name of the field.
+    times : float, optional
+        Factor between the attribute and the value, for another unit.
+    named : str, optional
+        The key, if it is no valid name in Python, such as "from".
+    optional : bool, optional
+        Whether the key is omitted if the value is None.
+    **options
+        Further arguments of `dataclasses.field`.
     """
     about = {"doc": doc, "of": of, "times": times, "named": named, "optional": optional}
     return field(metadata=about, **options)
 
 
-def filled_from(cls, source, **values):
-    """A `cls` with these values, the others being attributes of `source`; None of None.
+def fill_from(cls, source, **values):
+    """Make an object of `cls` from the given values and the attributes of another object.
 
-    Fields that have a default keep it.
+    Parameters
+    ----------
+    cls : type
+        Dataclass of the result.
+    source : object or None
+        Object with the attributes (see `key`).
+    **values
+        Values of fields that are not attributes of `source`.
+
+    Returns
+    -------
+    object or None
+        None if `source` is None. Fields with a default keep it unless `values` has them.
     """
     if source is None:
         return None
-    for one in fields(cls):
-        if one.name not in values and one.default is one.default_factory is MISSING:
-            found = attrgetter(one.metadata.get("of") or one.name)(source)
-            times = one.metadata.get("times")
-            scaled = times is not None and found is not None
-            values[one.name] = times * found if scaled else found
+    for declared in fields(cls):
+        if declared.name not in values and not _has_default(declared):
+            value = attrgetter(declared.metadata.get("of") or declared.name)(source)
+            times = declared.metadata.get("times")
+            scales = times is not None and value is not None
+            values[declared.name] = times * value if scales else value
     return cls(**values)
 
 
-# ---- the keys of a dataclass
+def _has_default(declared):
+    return declared.default is not MISSING or declared.default_factory is not MISSING
+
+
+# ---- keys of a dataclass
 
 
 @dataclass(frozen=True)
 class Key:
-    """One key: its name as written, the field, its type, and what it holds ("": not said)."""
+    """A key: its name in JSON, the name of its field, its type, and its description or ""."""
 
     key: str
     name: str
@@ -91,26 +118,42 @@ class Key:
 
 @cache
 def keys_of(cls):
-    """Keys of a dataclass, as they are written."""
-    hints, said = get_type_hints(cls, include_extras=True), _said_of_attributes(cls)
-    found = []
-    for one in fields(cls):
-        optional = one.metadata.get("optional", False)
-        doc = one.metadata.get("doc") or said.get(one.name, "")
-        named = one.metadata.get("named") or one.name
-        found.append(Key(named, one.name, hints[one.name], doc, not optional))
-    told = [one for one in found if one.type is Message]
-    for one in told:
-        found.append(Key(f"{one.key}_code", "", str | None, f"code of `{one.key}`"))
-        found.append(Key(f"{one.key}_values", "", dict, f"values of `{one.key}`"))
-    return tuple(found)
+    """Return the keys of a dataclass in the order of writing (tuple of Key)."""
+    hints, attribute_docs = get_type_hints(cls, include_extras=True), _attribute_docs(cls)
+    keys = [
+        Key(
+            declared.metadata.get("named") or declared.name,
+            declared.name,
+            hints[declared.name],
+            declared.metadata.get("doc") or attribute_docs.get(declared.name, ""),
+            not declared.metadata.get("optional", False),
+        )
+        for declared in fields(cls)
+    ]
+    for text in [item for item in keys if item.type is Message]:
+        keys.append(Key(f"{text.key}_code", "", str | None, f"code of `{text.key}`"))
+        keys.append(Key(f"{text.key}_values", "", dict, f"values of `{text.key}`"))
+    return tuple(keys)
 
 
-# ---- its JSON schema
+def _attribute_docs(cls):
+    """Return {attribute: description} of the section Attributes of the docstring of a class."""
+    section = re.search(r"\n\nAttributes\n-+\n(.*?\n)(?:\n|$)", f"{getdoc(cls)}\n", re.DOTALL)
+    # An entry has names, optionally a type, and indented lines of text.
+    entry = r"^(\w+(?:, \w+)*)(?: :.*)?\n((?: +.+\n)+)"
+    entries = re.findall(entry, section[1], re.MULTILINE) if section else ()
+    return {
+        name: " ".join(text.split()).rstrip(".")
+        for names, text in entries
+        for name in names.split(", ")
+    }
+
+
+# ---- JSON schema
 
 
 def json_schema(cls, title=None):
-    """The JSON schema of what `to_plain` makes of a dataclass, from the types of its fields.
+    """Return the JSON schema of the plain data of a dataclass, from the types of its fields.
 
     Parameters
     ----------
@@ -122,7 +165,7 @@ def json_schema(cls, title=None):
     Returns
     -------
     dict
-        Draft 2020-12; each dataclass below `cls` stands once, under `$defs`.
+        Draft 2020-12. Each dataclass that occurs in `cls` is under `$defs`.
     """
     definitions = {}
     schema = _schema_of(cls, definitions)
@@ -131,14 +174,15 @@ def json_schema(cls, title=None):
 
 
 def _schema_of(kind, definitions):
+    """Return the schema of a type; dataclasses are added to `definitions`."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
         base, mark = arguments
         if isinstance(mark, Columns):
-            return _columns(mark.of, definitions)
+            return _columns_schema(mark.of, definitions)
         return {"type": "number"} if mark == "finite" else _schema_of(base, definitions)
     if origin in (Union, types.UnionType):
-        return _either(arguments, definitions)
+        return _union_schema(arguments, definitions)
     if kind in _SCALARS:
         return {"type": _SCALARS[kind]}
     if kind is float:
@@ -148,7 +192,7 @@ def _schema_of(kind, definitions):
     if is_dataclass(kind):
         return _reference(kind, definitions)
     if origin in (tuple, list):
-        return _array(origin, arguments, definitions)
+        return _array_schema(origin, arguments, definitions)
     if kind in (tuple, list, np.ndarray):
         return {"type": "array"}
     if origin is dict:
@@ -156,17 +200,17 @@ def _schema_of(kind, definitions):
     return {"type": "object"} if kind is dict else {}
 
 
-def _either(arguments, definitions):
-    """One of several types, at most one of which is no scalar."""
-    found = [_schema_of(one, definitions) for one in arguments if one is not type(None)]
+def _union_schema(arguments, definitions):
+    """Return the schema of a union of types, at most one of which is no scalar."""
+    schemas = [_schema_of(kind, definitions) for kind in arguments if kind is not type(None)]
     nullable = ["null"] if type(None) in arguments else []
-    if all(set(one) == {"type"} for one in found):
-        names = [name for one in found for name in np.atleast_1d(one["type"]).tolist()]
+    if all(set(schema) == {"type"} for schema in schemas):
+        names = [name for schema in schemas for name in np.atleast_1d(schema["type"]).tolist()]
         return {"type": list(dict.fromkeys(names + nullable))}
-    return {"anyOf": [*found, *({"type": one} for one in nullable)]}
+    return {"anyOf": [*schemas, *({"type": name} for name in nullable)]}
 
 
-def _array(origin, arguments, definitions):
+def _array_schema(origin, arguments, definitions):
     items = _schema_of(arguments[0], definitions)
     if origin is list or Ellipsis in arguments:
         return {"type": "array", "items": items}
@@ -175,64 +219,59 @@ def _array(origin, arguments, definitions):
 
 
 def _reference(cls, definitions):
+    """Return a reference to the schema of a dataclass, and add the schema to `definitions`."""
     if cls.__name__ not in definitions:
         definitions[cls.__name__] = {}
-        properties = {one.key: _property(one, definitions) for one in keys_of(cls)}
         definitions[cls.__name__] = {
-            "description": _said_of(cls),
+            # The sections of the docstring, such as Attributes, are not part of the description.
+            "description": re.split(r"\n\n\w+\n---", getdoc(cls))[0],
             "type": "object",
-            "properties": properties,
-            "required": [one.key for one in keys_of(cls) if one.required],
+            "properties": {item.key: _property(item, definitions) for item in keys_of(cls)},
+            "required": [item.key for item in keys_of(cls) if item.required],
         }
     return {"$ref": f"#/$defs/{cls.__name__}"}
 
 
-def _said_of(cls):
-    """What a class says of itself before the sections of its docstring."""
-    return re.split(r"\n\n\w+\n---", getdoc(cls))[0]
+def _property(item, definitions):
+    schema = _schema_of(item.type, definitions)
+    return {"description": item.doc} | schema if item.doc else schema
 
 
-def _said_of_attributes(cls):
-    """{attribute: what the section Attributes of the docstring says of it}."""
-    section = re.search(r"\n\nAttributes\n-+\n(.*?\n)(?:\n|$)", f"{getdoc(cls)}\n", re.DOTALL)
-    entry = r"^(\w+(?:, \w+)*)(?: :.*)?\n((?: +.+\n)+)"  # names, their type, lines of text
-    entries = re.findall(entry, section[1], re.MULTILINE) if section else ()
-    return {
-        name: " ".join(text.split()).rstrip(".")
-        for names, text in entries
-        for name in names.split(", ")
-    }
-
-
-def _property(one, definitions):
-    schema = _schema_of(one.type, definitions)
-    return {"description": one.doc} | schema if one.doc else schema
-
-
-def _columns(cls, definitions):
+def _columns_schema(cls, definitions):
     columns = {
-        one.key: {"type": "array", "items": _schema_of(one.type, definitions)}
-        for one in keys_of(cls)
+        item.key: {"type": "array", "items": _schema_of(item.type, definitions)}
+        for item in keys_of(cls)
     }
     return {"type": "object", "properties": columns, "required": list(columns)}
 
 
-# ---- what is wrong with data
+# ---- comparison of data with a schema
 
 
-def checked(data, schema, name):
-    """What is wrong with data: the keys that are missing, and a Problem for each wrong value.
+def check_data(data, schema, name):
+    """Compare data with a schema.
 
-    name  of the file
+    Parameters
+    ----------
+    data : object
+        Plain data.
+    schema : dict
+        JSON schema of `json_schema`.
+    name : str
+        Name of the file, for the problems.
 
-    Returns sorted paths of the former, `[]` being any row ("sections[].modes"), and the first
-    MOST_TOLD of the latter.
+    Returns
+    -------
+    missing : list of str
+        Sorted paths of missing keys; `[]` is any row, as in "sections[].modes".
+    problems : list of Problem
+        A problem for each wrong value, at most MOST_PROBLEMS of them.
     """
     missing, problems = set(), []
-    for path, expected in _faults(data, schema, schema, ""):
+    for path, expected in _find_faults(data, schema, schema, ""):
         if expected is None:
             missing.add(re.sub(r"\[\d+\]", "[]", path))
-        elif len(problems) < MOST_TOLD:
+        elif len(problems) < MOST_PROBLEMS:
             problems.append(Problem(name, expected, column=path))
         else:
             more = message("record_has_more", "further values are not as expected either")
@@ -240,33 +279,33 @@ def checked(data, schema, name):
     return sorted(missing), problems
 
 
-def _faults(value, schema, root, path):
-    """(path, what was expected) of each fault; None in place of the latter where a key is missing.
+def _find_faults(value, schema, root, path):
+    """Yield (path, expected value) of each wrong value, and (path, None) of each missing key.
 
-    The keys that are missing come before values that are wrong, in each object and list.
+    In each object and list the missing keys come before the wrong values.
     """
     if value is None and {"type": "null"} in schema.get("anyOf", ()):
         return
-    schema = _resolved(schema, root)
+    schema = _resolve(schema, root)
     names = schema.get("type", ())
     names = [names] if isinstance(names, str) else names
-    if names and not any(type(value) in _TYPES[one] for one in names):
-        if names == ["object"] and schema.get("required"):  # it has none of its keys
-            yield from ((_below(path, one), None) for one in schema["required"])
+    if names and not any(type(value) in _TYPES[name] for name in names):
+        if names == ["object"] and schema.get("required"):  # all its keys are missing
+            yield from ((_join_path(path, name), None) for name in schema["required"])
         elif names == ["array"]:
             yield path, None
         else:
-            yield path, _expected(names, value)
+            yield path, _expected_value(names, value)
     elif isinstance(value, dict):
-        yield from _faults_of_object(value, schema, root, path)
+        yield from _find_faults_of_object(value, schema, root, path)
     elif isinstance(value, list):
-        yield from _faults_of_array(value, schema, root, path)
+        yield from _find_faults_of_array(value, schema, root, path)
     elif type(value) in (int, float) and not _are_finite([value]):
-        yield path, _expected(names, value)
+        yield path, _expected_value(names, value)
 
 
-def _resolved(schema, root):
-    """The schema that is referred to, and of several that of what is not null."""
+def _resolve(schema, root):
+    """Return the schema behind a reference; for a nullable object the schema of the object."""
     if "anyOf" in schema:
         schema = schema["anyOf"][0]
     while "$ref" in schema:
@@ -274,57 +313,62 @@ def _resolved(schema, root):
     return schema
 
 
-def _faults_of_object(value, schema, root, path):
-    for one in schema.get("required", ()):
-        if one not in value:
-            yield _below(path, one), None
+def _find_faults_of_object(value, schema, root, path):
+    for name in schema.get("required", ()):
+        if name not in value:
+            yield _join_path(path, name), None
     properties, other = schema.get("properties", {}), schema.get("additionalProperties")
-    for one, item in value.items():
-        below = properties.get(one, other)
-        if below is not None:
-            yield from _faults(item, below, root, _below(path, one))
+    for name, item in value.items():
+        item_schema = properties.get(name, other)
+        if item_schema is not None:
+            yield from _find_faults(item, item_schema, root, _join_path(path, name))
 
 
-def _faults_of_array(value, schema, root, path):
+def _find_faults_of_array(value, schema, root, path):
     length = schema.get("minItems")
     if length is not None and len(value) != length:
         yield path, message("record_length", "found {found} values, expected {length}",
                             found=len(value), length=length)  # fmt: skip
     items = schema.get("items", {})
-    if items and not _are_sound(value, items):
+    if items and not _are_valid(value, items):
         for number, item in enumerate(value):
-            yield from _faults(item, items, root, f"{path}[{number}]")
+            yield from _find_faults(item, items, root, f"{path}[{number}]")
 
 
-def _are_sound(values, items):
-    """Whether no value, or value of lists of them, needs a look: there may be 200 000 of them."""
-    found = set(map(type, values))
-    if found == {list} and items.get("type") == "array" and "minItems" not in items:
-        return not items.get("items") or _are_sound([*chain.from_iterable(values)], items["items"])
+def _are_valid(values, items):
+    """Return whether all values are certainly valid, by their types at once.
+
+    A list may have 200 000 values, too many for a check of each.
+    """
+    kinds = set(map(type, values))
+    if kinds == {list} and items.get("type") == "array" and "minItems" not in items:
+        return not items.get("items") or _are_valid([*chain.from_iterable(values)], items["items"])
     names = items.get("type", ())
-    allowed = set().union(*(_TYPES[one] for one in ([names] if isinstance(names, str) else names)))
-    if not found <= allowed - {list, dict}:
+    names = [names] if isinstance(names, str) else names
+    allowed = set().union(*(_TYPES[name] for name in names))
+    if not kinds <= allowed - {list, dict}:
         return False
-    return not found & {int, float} or _are_finite(values)
+    return not kinds & {int, float} or _are_finite(values)
 
 
 def _are_finite(values):
-    """Whether all numbers among values are such that a float holds."""
+    """Return whether a float can represent all numbers among the values."""
     try:
-        return all(map(isfinite, (one for one in values if type(one) in (int, float))))
+        return all(map(isfinite, (value for value in values if type(value) in (int, float))))
     except OverflowError:
         return False
 
 
-def _below(path, one):
-    return f"{path}.{one}" if path else one
+def _join_path(path, name):
+    return f"{path}.{name}" if path else name
 
 
-def _expected(names, value):
+def _expected_value(names, value):
+    """Return the message on a value that has none of the types `names`."""
     found = repr(value) if not isinstance(value, list | dict) else type(value).__name__
-    found = _WORDS.get(found, found)
+    found = _JSON_CONSTANTS.get(found, found)
     found = found if len(found) <= 40 else f"{found[:37]}..."
-    match next(one for one in names if one != "null"):
+    match next(name for name in names if name != "null"):
         case "number":
             expected = message("record_number", "a number")
         case "integer":
@@ -341,84 +385,152 @@ def _expected(names, value):
                    found=found, expected=expected)  # fmt: skip
 
 
+# ---- to plain data
+
+_PLAIN = {str, int, bool, type(None)}
+
+
+def to_plain(value):
+    """Convert a value to data that JSON can represent; numbers that are not finite become null.
+
+    Parameters
+    ----------
+    value : object
+        A dataclass of this module, or dicts, lists, tuples and arrays of plain values and of
+        dataclasses. `ArrayColumns` and `ArrayRows` remain unchanged.
+
+    Returns
+    -------
+    object
+        Dicts, lists, texts, numbers, booleans and None.
+    """
+    kind = type(value)
+    if kind is float:  # first, since most of a million values are floats
+        return value if isfinite(value) else None
+    if kind in _PLAIN:
+        return value
+    if isinstance(value, dict):
+        return {str(name): to_plain(item) for name, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return to_plain(value.tolist())
+    if isinstance(value, list | tuple):
+        kinds = set(map(type, value))  # a long column has a single type: convert it at once
+        if kinds <= _PLAIN:
+            return list(value)
+        if kinds == {float}:
+            return [item if isfinite(item) else None for item in value]
+        return [to_plain(item) for item in value]
+    if is_dataclass(value):
+        return _object_to_plain(value)
+    if isinstance(value, np.generic):
+        return to_plain(value.item())
+    if isinstance(value, str):  # a Message
+        return str(value)
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return value
+
+
+def _object_to_plain(value):
+    keys = [item for item in keys_of(type(value)) if item.name]
+    values = {item.key: getattr(value, item.name) for item in keys}
+    plain = {
+        item.key: to_plain(values[item.key])
+        for item in keys
+        if item.required or values[item.key] is not None
+    }
+    for item in keys:
+        if item.type is Message:
+            text = as_plain(values[item.key])
+            plain[f"{item.key}_code"] = text["code"]
+            plain[f"{item.key}_values"] = to_plain(text["values"])
+    return plain
+
+
 # ---- from plain data
 
 
 def from_plain(cls, data, name="data"):
-    """The dataclass that plain data hold, its types checked.
+    """Convert plain data to a dataclass, and check their types.
 
     Parameters
     ----------
     cls : type
         The dataclass.
     data : dict
-        As parsed from JSON.
+        Data as parsed from JSON.
     name : str, optional
-        Name of the file, for problems.
+        Name of the file, for the problems.
+
+    Returns
+    -------
+    object
+        An object of `cls`.
 
     Raises
     ------
     InputError
-        With one line for each problem: "record.json, capacity.volume_m3[3]: expected a number".
+        With a line for each problem: "record.json, capacity.volume_m3[3]: expected a number".
     """
-    missing, problems = checked(data, json_schema(cls), name)
+    missing, problems = check_data(data, json_schema(cls), name)
     if missing:
         what = message("record_key_missing", "missing")
         problems = [Problem(name, what, column=path) for path in missing]
     if problems:
         raise InputError(problems)
-    return _made(cls, data)
+    return _convert(cls, data)
 
 
-def _made(kind, data):
-    make = _maker(kind)
-    return data if make is None else make(data)
+def _convert(kind, data):
+    converter = _converter(kind)
+    return data if converter is None else converter(data)
 
 
 @cache  # a table has millions of numbers of a few types
-def _maker(kind):
-    """The function that makes a value of a type from plain data; None: the plain data are it."""
+def _converter(kind):
+    """Return the function that converts plain data to a type; None: no conversion is needed."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        return None if isinstance(arguments[1], Columns) else _maker(arguments[0])
+        return None if isinstance(arguments[1], Columns) else _converter(arguments[0])
     if origin in (Union, types.UnionType):
-        others = [one for one in arguments if one is not type(None)]
-        make = None if len(others) > 1 else _maker(others[0])
-        return make and (lambda data: None if data is None else make(data))
+        others = [argument for argument in arguments if argument is not type(None)]
+        convert = None if len(others) > 1 else _converter(others[0])
+        return convert and (lambda data: None if data is None else convert(data))
     if kind is float:
         return lambda data: np.nan if data is None else float(data)
     if is_dataclass(kind):
-        return partial(_object, kind)
+        return partial(_convert_object, kind)
     if origin in (tuple, list):
         if len(arguments) > 1 and Ellipsis not in arguments:
             pairs = partial(zip, arguments, strict=True)
-            return lambda data: origin(_made(one, item) for one, item in pairs(data))
-        make = _maker(arguments[0])
-        return origin if make is None else (lambda data: origin(map(make, data)))
+            return lambda data: origin(_convert(argument, item) for argument, item in pairs(data))
+        convert = _converter(arguments[0])
+        return origin if convert is None else (lambda data: origin(map(convert, data)))
     if kind is np.ndarray:
-        return _array_of
+        return _convert_array
     return tuple if kind is tuple else None
 
 
-def _array_of(data):
-    """An array of any shape; of numbers NaN stands for null."""
-    found = np.array(data)
-    return found if found.dtype != object else np.array(data, dtype=float)
+def _convert_array(data):
+    """Return an array of any shape; null becomes NaN in an array of numbers."""
+    array = np.array(data)
+    return array if array.dtype != object else np.array(data, dtype=float)
 
 
-def _object(cls, data):
+def _convert_object(cls, data):
     values = {}
-    for one in keys_of(cls):
-        if not one.name or one.key not in data:
+    for item in keys_of(cls):
+        if not item.name or item.key not in data:
             continue
-        value = data[one.key]
-        if one.type is Message:
+        value = data[item.key]
+        if item.type is Message:
             text = Message(value)
-            text.code, text.values = data[f"{one.key}_code"], data[f"{one.key}_values"]
-            values[one.name] = text
+            text.code, text.values = data[f"{item.key}_code"], data[f"{item.key}_values"]
+            values[item.name] = text
         else:
-            values[one.name] = _made(one.type, value)
-    for one in fields(cls):  # an optional key that is not there
-        if one.name not in values and one.default is MISSING and one.default_factory is MISSING:
-            values[one.name] = None
+            values[item.name] = _convert(item.type, value)
+    for declared in fields(cls):
+        # A missing optional key without default is None.
+        if declared.name not in values and not _has_default(declared):
+            values[declared.name] = None
     return cls(**values)

@@ -1,4 +1,4 @@
-"""Corrections of soundings for trim and list, and the pipe that is sounded."""
+"""The part of the record on a ship: its sounding pipe, and corrections for trim and list."""
 
 from math import degrees
 
@@ -8,25 +8,25 @@ from tankcal.record.schema import Finite, Saved, key
 
 
 class CorrectionsOfCell(Saved):
-    """Corrections at one trim and list, one for each sounding."""
+    """Corrections of all soundings at one trim and list."""
 
     trim_m: Finite = key("draught aft less draught forward")
     list_deg: Finite = key("to starboard positive")
     dry_m3: Finite = key("volume at which the pipe becomes dry")
     full_m: Finite = key("sounding at which the tank becomes full")
-    state: list[str] = key('"", "full": the tank is; "below": less than the table begins with')
-    correction_m: list[float] = key("to be added to the sounding; null where there is none")
+    state: list[str] = key('"", "full": tank full; "below": less than the lowest row of the table')
+    correction_m: list[float] = key("to be added to the sounding; null: none")
     u_correction_m: list[float] = key("standard uncertainty")
     U_correction_m: list[float] = key("expanded uncertainty")
-    volume_m3: list[Finite] = key("of the tank as it lies")
-    u_m3: list[float] = key("standard uncertainty of that; null where the tank is full")
+    volume_m3: list[Finite] = key("of the tank at this trim and list")
+    u_m3: list[float] = key("its standard uncertainty; null: tank full")
     U_m3: list[float] = key("expanded uncertainty")
 
 
 class ShipRecord(Saved):
-    """What a ship adds to a tank: its pipe and corrections of soundings."""
+    """Sounding pipe of a tank of a ship, and corrections of soundings."""
 
-    length_between_marks_m: Finite = key("that trims are over")
+    length_between_marks_m: Finite = key("length to which trims refer")
     bow_azimuth_deg: Finite = key("in the frame of the mesh, clockwise from +y")
     pipe_bottom_m: list[Finite] = key("x, y, z of the lower end in the frame of the mesh")
     pipe_top_m: list[Finite] = key("x, y, z of the upper end")
@@ -39,17 +39,16 @@ class ShipRecord(Saved):
 
 
 def ship_of(result):
-    """`ShipRecord` of a result; None: its tank is no ship's."""
+    """Return the `ShipRecord` of a result; None for a tank that is not on a ship."""
     ship, tables = result.job.ship, result.ship
     if tables is None:
         return None
-    share = ship.contraction
     return ShipRecord(
         ship.length_between_marks_m,
         degrees(ship.bow_azimuth_rad),
         list(ship.pipe_bottom_m),
         list(ship.pipe_top_m),
-        None if share is None else 100 * share,
+        None if ship.contraction is None else 100 * ship.contraction,
         tables.interpolated_m,
         tables.trim_m,
         np.degrees(tables.list_rad).round(9),
@@ -59,17 +58,17 @@ def ship_of(result):
 
 
 def _cell(tables, trim, list_):
-    at = trim, list_
+    cell = trim, list_
     return CorrectionsOfCell(
         tables.trim_m[trim],
         float(np.degrees(tables.list_rad[list_]).round(9)),
-        tables.dry_m3[at],
-        tables.full_m[at],
-        tables.state[at].tolist(),
-        tables.correction_m[at],
-        tables.u_correction_m[at],
-        tables.U_correction_m[at],
-        tables.volume_m3[at],
-        tables.u_m3[at],
-        tables.U_m3[at],
+        tables.dry_m3[cell],
+        tables.full_m[cell],
+        tables.state[cell].tolist(),
+        tables.correction_m[cell],
+        tables.u_correction_m[cell],
+        tables.U_correction_m[cell],
+        tables.volume_m3[cell],
+        tables.u_m3[cell],
+        tables.U_m3[cell],
     )

@@ -1,17 +1,17 @@
-"""The part of the record that says what a tape measured: readings, their corrections, tapes."""
+"""The part of the record on strapping: readings, their corrections, tapes, courses."""
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.record.schema import Finite, Saved, key
-from tankcal.record.survey import radius_sd, surveyed_shell
+from tankcal.record.survey import radius_sd, shell_by_survey
+from tankcal.units import FULL_TURN
 
 
 class StrapReading(Saved):
-    """A reading of a tape round the tank, and the circumference that it gives."""
+    """A reading of a tape round the tank, and the resulting circumference."""
 
     circumference: str = key("name; repeats share it")
-    course: str = key("that it is on")
+    course: str = key("of the circumference")
     level_m: float = key("above the table's zero")
     tape: str = key("name")
     reading_m: float = key("as read")
@@ -19,41 +19,43 @@ class StrapReading(Saved):
     temperature_m: float = key("correction for the temperature of the tape")
     tension_m: float = key("correction for its pull")
     tape_thickness_m: float = key("correction for half the thickness of the tape")
-    rise_m: float = key("correction for what keeps it off the shell")
-    sag_m: float | None = key("correction for where it hangs free", optional=True)
+    rise_m: float = key("correction for obstacles between tape and shell")
+    sag_m: float | None = key("correction for the sag of free parts", optional=True)
     out_of_level_m: float = key("correction for a tape that is not level")
     circumference_m: float = key("of the painted shell, after these corrections")
-    sd_m: float = key("of it, of what no other reading shares")
+    sd_m: float = key("its sd, from errors of this reading alone")
     difference_m: float = key("from the circumference of its course")
-    w: float | None = key("departure from what all others show over its sd; null: uncontrolled")
-    mdb_m: float | None = key("smallest blunder that this test finds; null: no other controls it")
+    w: float | None = key("deviation from all other readings over its sd; null: uncontrolled")
+    mdb_m: float | None = key("smallest blunder that the test detects; null: uncontrolled")
     used: bool = key("false: only compared, or rejected")
     row: int | None = key("of the file")
 
 
 class TapeUsed(Saved):
-    """A tape, as its readings were corrected."""
+    """A tape, with the correction of its readings."""
 
     tape: str = key("name")
     certificate: str = key('its number; "": not given')
     correction: Finite = key("true = reading (1 + correction)")
     u_scale: Finite = key("standard uncertainty of its scale, relative")
-    u_comparison: Finite = key("the same, by the comparison with its master; 0: none")
-    master: str = key('tape that it was compared with; ""')
+    u_comparison: Finite = key("relative, by the comparison with its master; 0: none")
+    master: str = key('tape with which it was compared; "": none')
     master_certificate: str = key('number of its certificate; "": not given, or no master')
-    comparisons: int = key("readings of both")
+    comparisons: int = key("number of readings of both tapes")
 
 
 class StrapOfCourse(Saved):
-    """What the straps of a course give."""
+    """Results of the straps of a course."""
 
     course: str = key("name")
     circumference_m: float = key("mean, of the painted shell")
-    area_term_m: float = key("what the area term takes off it")
+    area_term_m: float = key("its reduction by the area term")
     radius_m: float = key("of the circle of equal area, outside")
     radius_sd_m: float = key("its standard deviation, as the mean of the course")
     thickness_m: float = key("of the plates")
-    plate_sd_m: float | None = key("standard uncertainty of that by a gauge; null: none was read")
+    plate_sd_m: float | None = key(
+        "standard uncertainty of the thickness by a gauge; null: not read"
+    )
     paint_m: float = key("thickness")
     inside_radius_m: float = key("at the temperature of the survey")
 
@@ -62,111 +64,111 @@ class StrappingRecord(Saved):
     """Circumferences by tape: every reading with its corrections, tapes, courses."""
 
     readings: list[StrapReading] = key("in the order of the file")
-    tapes: list[TapeUsed] = key("those that were read")
+    tapes: list[TapeUsed] = key("used for the readings")
     courses: list[StrapOfCourse] = key(
-        "from the bottom up; beside former radii only those that were measured again"
+        "from the bottom up; with former radii only courses that were measured again"
     )
     shape_sd_m: float = key(
         "standard deviation of the radius round the wall: declared, by the points, or typical"
     )
-    area_term: Finite = key("by how much the circle of a perimeter is too large, relative")
+    area_term: Finite = key("relative excess of the circle of a perimeter")
     area_term_sd: Finite = key("its standard deviation")
-    wave_m: float | None = key("bound of how far a tape was out of level; null: not given")
-    helix_m: float | None = key("bound of how far its ends stood apart; null: not given")
+    wave_m: float | None = key("largest deviation of a tape from its level; null: not given")
+    helix_m: float | None = key("largest difference in height of its ends; null: not given")
 
 
 def strapping_of(result):
-    """`StrappingRecord` of a result; None where no tape was put round."""
-    straps, given = result.straps, result.job.strapping
+    """Return the `StrappingRecord` of a result; None without straps."""
+    straps, strapping = result.straps, result.job.strapping
     if straps is None:
         return None
     return StrappingRecord(
         readings=_readings(result),
-        tapes=tapes_of(straps.tapes, given),
+        tapes=tapes_of(straps.tapes, strapping),
         courses=_courses(result),
         shape_sd_m=straps.shape_sd_m,
         area_term=straps.area_term.mean,
         area_term_sd=straps.area_term.sd,
-        wave_m=given.wave_m,
-        helix_m=given.helix_m,
+        wave_m=strapping.wave_m,
+        helix_m=strapping.helix_m,
     )
 
 
 def _readings(result):
+    """Return `StrapReading` of each reading."""
     straps = result.straps
     names = [part.name for part in result.job.courses or result.job.rings]
-    of_course = dict(zip(names, straps.circumference_m, strict=True))
-    w, mdb = np.full((2, len(straps.reduced)), np.nan)
-    w[straps.adjusted], mdb[straps.adjusted] = straps.w, straps.mdb_m
-    set_aside = set(straps.adjusted[~straps.accepted].tolist())
+    circumference_m = dict(zip(names, straps.circumference_m, strict=True))
+    w, mdb_m = np.full((2, len(straps.reduced)), np.nan)
+    w[straps.adjusted], mdb_m[straps.adjusted] = straps.w, straps.mdb_m
+    rejected = set(straps.adjusted[~straps.accepted].tolist())
     return [
         StrapReading(
-            circumference=one.strap.name,
-            course=one.strap.course,
-            level_m=one.strap.level_m,
-            tape=one.strap.tape,
-            reading_m=one.strap.reading_m,
-            **{f"{step}_m": size for step, size in one.steps_m.items()},
-            circumference_m=one.circumference_m,
-            sd_m=one.sd_m,
-            difference_m=one.circumference_m - of_course[one.strap.course],
+            circumference=reduced.strap.name,
+            course=reduced.strap.course,
+            level_m=reduced.strap.level_m,
+            tape=reduced.strap.tape,
+            reading_m=reduced.strap.reading_m,
+            **{f"{step}_m": size for step, size in reduced.steps_m.items()},
+            circumference_m=reduced.circumference_m,
+            sd_m=reduced.sd_m,
+            difference_m=reduced.circumference_m - circumference_m[reduced.strap.course],
             w=w[index],
-            mdb_m=mdb[index],
-            used=not one.strap.check and index not in set_aside,
-            row=one.strap.row,
+            mdb_m=mdb_m[index],
+            used=not reduced.strap.check and index not in rejected,
+            row=reduced.strap.row,
         )
-        for index, one in enumerate(straps.reduced)
+        for index, reduced in enumerate(straps.reduced)
     ]
 
 
-def tapes_of(tapes, given):
-    """`TapeUsed` of each (Tape, sd of its scale by a master), of a `Strapping`."""
-    return [_tape(*one, given) for one in tapes]
-
-
-def _tape(tape, sd, given):
-    certificates = {one.name: one.certificate for one in given.tapes}
-    return TapeUsed(
-        tape=tape.name,
-        certificate=tape.certificate,
-        correction=tape.correction,
-        u_scale=tape.u_scale,
-        u_comparison=sd,
-        master=tape.master,
-        master_certificate=certificates.get(tape.master, ""),
-        comparisons=len(given.comparisons) if tape.master else 0,
-    )
+def tapes_of(tapes, strapping):
+    """Return `TapeUsed` of each (Tape, sd of its scale by the comparison with its master)."""
+    certificates = {tape.name: tape.certificate for tape in strapping.tapes}
+    return [
+        TapeUsed(
+            tape=tape.name,
+            certificate=tape.certificate,
+            correction=tape.correction,
+            u_scale=tape.u_scale,
+            u_comparison=sd,
+            master=tape.master,
+            master_certificate=certificates.get(tape.master, ""),
+            comparisons=len(strapping.comparisons) if tape.master else 0,
+        )
+        for tape, sd in tapes
+    ]
 
 
 def _radius_sds(result):
-    """(courses or rings,) standard deviations of the mean radii as measured."""
+    """Return the standard deviations of the mean radii of courses or rings as measured, m."""
     if result.rings is not None:
         scale = result.body.parts[0].scale
         return result.rings.radius_sd_m(result.body.parts[0].factors) / scale
-    shell = surveyed_shell(result)
+    shell = shell_by_survey(result)
     return [radius_sd(shell, course) for course in result.body.shell.volume.courses]
 
 
 def _courses(result):
-    """Courses, or rings; beside former radii only those that were measured again."""
-    straps, found, sds = result.straps, [], _radius_sds(result)
+    """Return `StrapOfCourse` of the courses or rings with straps."""
+    straps, radius_sds = result.straps, _radius_sds(result)
     courses = list(enumerate(result.job.courses or result.job.rings))
-    if result.radii is not None:  # what the others have is a former radius, inside: no strap's
-        measured = result.radii.updated.update.measured.tolist()
-        courses = [courses[index] for index in measured]
+    if result.radii is not None:  # the radii of other courses are former inside radii, no straps
+        courses = [courses[index] for index in result.radii.updated.update.measured.tolist()]
+    rows = []
     for index, course in courses:
-        radius, whole = straps.radius_m[index], straps.circumference_m[index]
-        found.append(
+        radius_m, circumference_m = straps.radius_m[index], straps.circumference_m[index]
+        rows.append(
             StrapOfCourse(
                 course=course.name,
-                circumference_m=whole,
-                area_term_m=FULL_TURN * radius - whole,
-                radius_m=radius,
-                radius_sd_m=sds[index],
+                circumference_m=circumference_m,
+                area_term_m=FULL_TURN * radius_m - circumference_m,
+                radius_m=radius_m,
+                radius_sd_m=radius_sds[index],
                 thickness_m=course.thickness_m,
                 plate_sd_m=straps.plate_sd_m.get(index),
                 paint_m=course.paint_m,
-                inside_radius_m=radius - course.thickness_m - course.paint_m,
+                inside_radius_m=radius_m - course.thickness_m - course.paint_m,
             )
         )
-    return found
+    return rows

@@ -1,4 +1,4 @@
-"""The parts of a tank in the record: its solid, bottom, top and floating roof, detail by detail."""
+"""The parts of a tank in the record: solid, bottom, top and floating roof."""
 
 from math import degrees
 
@@ -7,22 +7,22 @@ from tankcal.tank.heads import torispherical_radii
 
 
 class Detail(Saved):
-    """What a part is made of."""
+    """A size or another property of a part."""
 
-    code: str = key("what it is")
-    value: str | float = key("a text where unit is null, else a number in SI")
-    unit: str | None = key("that it is shown in")
+    code: str = key("of the property")
+    value: str | float = key("a text if unit is null, else a number in SI")
+    unit: str | None = key("in which it is shown")
 
 
-def described(**values):
-    """The `Detail` of each code=(value, unit), but for those whose value is None."""
+def list_details(**values):
+    """Return the `Detail` of each code=(value, unit) whose value is not None."""
     return [
         Detail(code, value, unit) for code, (value, unit) in values.items() if value is not None
     ]
 
 
 def bottom_of(result):
-    """How the bottom was taken, and what it adds; None where it is flat or there is none."""
+    """Return the details of the bottom of an upright tank; None for a flat bottom."""
     job = result.job
     bottom = job.bottom
     if job.tank.kind != "vertical" or bottom.form == "flat" or not job.switches.bottom:
@@ -32,7 +32,7 @@ def bottom_of(result):
         depth = -result.body.lowest_m
     surveyed = None if bottom.xyz_m is None else len(bottom.xyz_m)
     levels = None if bottom.level_m is None else len(bottom.level_m)
-    return described(
+    return list_details(
         bottom_form=(bottom.form, None),
         bottom_depth=(depth, "m"),
         bottom_dish_radius=(bottom.dish_radius_m, "m"),
@@ -45,54 +45,54 @@ def bottom_of(result):
 
 
 def top_of(result):
-    """The head on an upright tank, and what it holds; None without one."""
+    """Return the details of the head on an upright tank; None without head."""
     top = result.job.top
     if top is None or not result.job.switches.top:
         return None
     body = result.body
-    return described(
+    return list_details(
         top_form=(top.form, None),
         top_depth=(body.highest_m - body.shell.volume.height_m, "m"),
         top_dish_radius=(top.dish_radius_m, "m"),
         top_knuckle_radius=(top.knuckle_radius_m, "m"),
         top_standard=(top.standard, None),
-        top_capacity=(_size_of(result, "top"), "m3"),
+        top_capacity=(_correction_m3(result, "top"), "m3"),
     )
 
 
 def roof_of(result):
-    """The floating roof and what it displaces; None without one."""
+    """Return the details of the floating roof; None without roof."""
     roof = result.job.roof
     if roof is None:
         return None
-    return described(
+    return list_details(
         roof_mass=(roof.mass_kg, "kg"),
         roof_weighing=(roof.weighing, None),
         roof_reference_density=(roof.reference_density_kg_m3, "kg/m3"),
-        roof_displacement=(-_size_of(result, "roof"), "m3"),
+        roof_displacement=(-_correction_m3(result, "roof"), "m3"),
         roof_critical_bottom=(roof.critical_bottom_m, "m"),
         roof_critical_top=(roof.critical_top_m, "m"),
     )
 
 
-def _size_of(result, code):
-    return next(one.size_m3 for one in result.corrections if one.code == code)
+def _correction_m3(result, code):
+    return next(item.size_m3 for item in result.corrections if item.code == code)
 
 
 def solid_of(result):
-    """Dimensions of a tank that is one solid, inside, as they entered; None for a shell."""
+    """Return the inside dimensions of a tank without courses; None for a shell of courses."""
     job = result.job
     if job.horizontal is not None:
-        return _of_lying(result)
+        return _horizontal_details(result)
     if job.sphere is not None:
-        return described(
+        return list_details(
             diameter=(result.body.parts[0].solid.diameter_m, "m"),
-            **_of_scan(result),
-            **_of_ellipsoid(result),
+            **_scan_details(result),
+            **_ellipsoid_details(result),
             full_capacity=(result.body.parts[0].capacity_m3, "m3"),
         )
     if job.mesh is not None:
-        return described(
+        return list_details(
             mesh_file=(job.mesh.file, None),
             mesh_faces=(result.body.parts[0].solid.face_count, ""),
             full_capacity=(result.body.parts[0].capacity_m3, "m3"),
@@ -100,8 +100,8 @@ def solid_of(result):
     return None
 
 
-def _of_ellipsoid(result):
-    """Semi-axes inside of a strapped sphere, as surveyed; nothing of another."""
+def _ellipsoid_details(result):
+    """Return the inside semi-axes of a strapped sphere as surveyed; {} for other tanks."""
     if result.circles is None:
         return {}
     job = result.job
@@ -114,7 +114,7 @@ def _of_ellipsoid(result):
     }
 
 
-def _of_lying(result):
+def _horizontal_details(result):
     lying, tank = result.job.horizontal, result.body.parts[0].solid
     ends = {}
     for name, end in (("a", tank.end_a), ("b", tank.end_b)):
@@ -125,7 +125,7 @@ def _of_lying(result):
         ends[f"end_{name}_depth"] = (end.depth_m or None, "m")
         ends[f"end_{name}_dish_radius"] = (dish, "m")
         ends[f"end_{name}_knuckle_radius"] = (knuckle, "m")
-    return described(
+    return list_details(
         section_width=(tank.width_m, "m"),
         section_height=(tank.height_m, "m"),
         cylinder_length=(tank.length_m, "m"),
@@ -136,20 +136,20 @@ def _of_lying(result):
         dip_direction=(tank.dip_direction, None),
         tube_angle=(lying.tube_angle_rad and degrees(lying.tube_angle_rad), "deg"),
         tube_offset=(lying.tube_offset_m and tank.tube_offset_m, "m"),
-        **_of_scan(result),
+        **_scan_details(result),
         full_capacity=(result.body.parts[0].capacity_m3, "m3"),
-        **(_unread(tank, result.zero_m) if result.job.rings else {}),
+        **(_unmeasured_volumes(tank, result.zero_m) if result.job.rings else {}),
     )
 
 
-def _unread(tank, zero_m):
-    """What no dip reads: room below dip 0, and above the highest dip."""
+def _unmeasured_volumes(tank, zero_m):
+    """Return the volumes below dip 0 and above the highest dip, which no dip measures."""
     below = float(tank.volume_m3([zero_m])[0])
     return {"below_zero": (below, "m3"), "left_at_full": (tank.left_m3, "m3")}
 
 
-def _of_scan(result):
-    """How many points gave the sizes, and how they scatter; nothing without points."""
+def _scan_details(result):
+    """Return the number of points and their scatter; {} without points."""
     scan = result.scan
     if scan is None:
         return {}

@@ -1,36 +1,36 @@
-"""Texts with the code and the values that say them in another language, and problems."""
+"""Texts and problems, with the codes and values of their translation."""
 
 from tankcal.messages import as_plain
-from tankcal.record.schema import Saved, filled_from, key
+from tankcal.record.schema import Saved, fill_from, key
 
 
 class Text(Saved):
     """A text in English, with its code and the values in it."""
 
     text: str = key("in English")
-    code: str | None = key("its name in the words of other languages; null: it has none")
-    values: dict = key("numbers, texts, lists of these, and texts within the text")
+    code: str | None = key("of its translation; null: none")
+    values: dict = key("of the placeholders: numbers, texts, lists of these, and texts with a code")
 
 
 class WarningRecord(Saved):
-    """What did not stop the job but should be read."""
+    """A problem that did not stop the job."""
 
     file: str = key("name")
     row: int | None = key("of the file")
-    column: str | None = key("or key")
+    column: str | None = key("of the file, or key")
     text: str = key("in English")
-    code: str | None = key("its name in the words of other languages; null: it has none")
-    values: dict = key("numbers, texts, lists of these, and texts within the text")
+    code: str | None = key("of its translation; null: none")
+    values: dict = key("of the placeholders: numbers, texts, lists of these, and texts with a code")
 
 
 def text_of(message):
-    """The `Text` of a Message, or of any text."""
+    """Return the `Text` of a Message or of any text."""
     return Text(str(message), **as_plain(message))
 
 
 def warnings_of(problems):
-    """The `WarningRecord` of each `errors.Problem`."""
+    """Return the `WarningRecord` of each `errors.Problem`."""
     return [
-        filled_from(WarningRecord, one, text=str(one.expected), **as_plain(one.expected))
-        for one in problems
+        fill_from(WarningRecord, problem, text=str(problem.expected), **as_plain(problem.expected))
+        for problem in problems
     ]

@@ -1,33 +1,36 @@
-"""The versions of the record, and what is added to an older one so that it is of the last."""
+"""Versions of the record, and the migration of older versions."""
 
-from tankcal.record.covariance_factor import in_blocks
-from tankcal.record.plain_data import columns_of
+from tankcal.record.columns import columns_of
+from tankcal.record.covariance_factor import wrap_factor
 from tankcal.record.saved_formats import SavedFormat
 
 VERSION = 2
+_READING = (  # columns of readings
+    "kind", "ids", "element", "file", "row", "repeats", "unit", "value", "residual", "sd",
+    "redundancy", "w", "tau", "mdb", "effect_m", "removed", "check", "controlled",
+)  # fmt: skip
+# Keys of a budget line that drafts of version 1 lack.
+_LATER_KEYS = {"estimate": None, "halved": None, "is_default": None}
 
 
-def _completed_draft(record, version):
-    """A version from one of its drafts: of 1, which knew neither Monte Carlo nor deliveries."""
+def _complete_draft(record, version):
+    """Add the keys that drafts of a version lack; drafts of 1 had no Monte Carlo or deliveries."""
     if version != 1:
-        return _with_factor_in_blocks(record)
+        return _replace_factor(record)
     record = {"budgets": [], "rule": None, "monte_carlo": None, "proportional_parts": None} | record
-    new = {"deliveries": record.get("deliveries") or []}
+    added = {"deliveries": record.get("deliveries") or []}
     if isinstance(record.get("budget"), list):
-        new["budget"] = [_NOT_IN_DRAFTS | line for line in record["budget"]]
+        added["budget"] = [_LATER_KEYS | line for line in record["budget"]]
     if isinstance(record.get("capacity"), dict) and "interval" not in record["capacity"]:
-        new["capacity"] = record["capacity"] | _intervals_of_draft(**record["capacity"])
+        added["capacity"] = record["capacity"] | _gum_intervals(**record["capacity"])
     job = record.get("job")
     if isinstance(job, dict) and isinstance(job.get("table"), dict):
-        new["job"] = job | {"table": {"monte_carlo": False} | job["table"]}
-    return record | new
+        added["job"] = job | {"table": {"monte_carlo": False} | job["table"]}
+    return record | added
 
 
-_NOT_IN_DRAFTS = {"estimate": None, "halved": None, "is_default": None}
-
-
-def _intervals_of_draft(volume_m3=(), U_m3=(), **_):
-    """Without intervals in the record, those of the law of propagation counted."""
+def _gum_intervals(volume_m3=(), U_m3=(), **_):
+    """Return the columns of the intervals of a draft, which were all results of the GUM."""
     pairs = list(zip(volume_m3, U_m3, strict=False))
     return {
         "low_m3": [volume - U for volume, U in pairs],
@@ -37,32 +40,26 @@ def _intervals_of_draft(volume_m3=(), U_m3=(), **_):
     }
 
 
-def _from_1(record):
-    """Version 2 from version 1: readings in columns, what held coordinates react with unknown."""
+def _migrate_1(record):
+    """Convert version 1 to 2: readings in columns; released values of held ones are unknown."""
     adjustment = record.get("adjustment")
     if adjustment is not None and "residuals" in adjustment:
         columns = columns_of(adjustment["residuals"], _READING)
         adjustment = {"held": []} | adjustment | {"residuals": columns}
         record = record | {"adjustment": adjustment}
-    return _with_factor_in_blocks(record) | {"format": "tankcal-record/2"}
+    return _replace_factor(record) | {"format": "tankcal-record/2"}
 
 
-def _with_factor_in_blocks(record):
-    """A record of version 2 from 1 or a draft of 2, which had the whole factor of the table."""
+def _replace_factor(record):
+    """Replace the whole factor of the table, as in version 1 and drafts of 2, by a block."""
     capacity = record.get("capacity")
     if not isinstance(capacity, dict) or "factor_m3" not in capacity:
         return record
-    return record | {"capacity": in_blocks(capacity)}
-
-
-_READING = (
-    "kind", "ids", "element", "file", "row", "repeats", "unit", "value", "residual", "sd",
-    "redundancy", "w", "tau", "mdb", "effect_m", "removed", "check", "controlled",
-)  # fmt: skip
+    return record | {"capacity": wrap_factor(capacity)}
 
 
 RECORD = SavedFormat(
-    "tankcal-record", VERSION, "record.json", {1: _from_1}, completed=_completed_draft
+    "tankcal-record", VERSION, "record.json", {1: _migrate_1}, complete=_complete_draft
 )
 FORMAT = RECORD.format
 migrated, version_of = RECORD.migrated, RECORD.version_of

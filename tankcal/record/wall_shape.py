@@ -1,7 +1,7 @@
-"""The part of the record that an inspection is made of: the shape of an upright wall.
+"""The part of the record for inspections: the shape of an upright wall.
 
-Radii and departures from the plumb with u and degrees of freedom, not yet judged: any rule can
-judge them, also in ten years. What the figures have in common is in them already.
+It contains radii and deviations from the vertical with u and degrees of freedom, but no verdict, so
+that any rule can be applied later. u includes the common errors of the values.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ class ShapeLevel(Saved):
 
     height_m: Finite = key("above the bottom of the shell")
     course: int = key("from the bottom, 1 first")
-    is_low: bool = key("whether it is the one 0.3 m above the bottom weld")
+    is_low: bool = key("whether it is the level 0.3 m above the bottom weld")
     centre_x_m: float | None = key("in the survey's frame; null: not known")
     centre_y_m: float | None = key("in the survey's frame; null: not known")
     azimuth_deg: list[Finite] = key("of each place, clockwise from +y")
@@ -26,20 +26,20 @@ class ShapeLevel(Saved):
 
 
 class ShapePlumb(Saved):
-    """Departures of an upper level from the plumb of a lower one, along the generatrices."""
+    """Deviations of an upper level from the vertical of a lower level, along the generatrices."""
 
-    course: int | None = key("from the bottom, 1 first; null: of more than one")
+    course: int | None = key("from the bottom, 1 first; null: several courses")
     low_m: Finite = key("height of the lower level above the bottom of the shell")
     high_m: Finite = key("height of the upper level")
     azimuth_deg: list[Finite] = key("of each generatrix, clockwise from +y")
-    is_read: list[bool] = key("whether there is a reading at both ends; else one is estimated")
+    is_read: list[bool] = key("whether both ends have a reading; otherwise one is estimated")
     departure_mm: list[Finite] = key("outwards positive")
     u_mm: list[Finite] = key("standard uncertainty")
     dof: list[float] = key("degrees of freedom; null: infinite")
 
 
 class ShapeAxis(Saved):
-    """The centre of the highest level against that of the lowest."""
+    """The centre of the highest level relative to that of the lowest."""
 
     low_m: Finite = key("height of the lowest level above the bottom of the shell")
     high_m: Finite = key("height of the highest level")
@@ -50,19 +50,19 @@ class ShapeAxis(Saved):
 
 
 class ShapeSetAside(Saved):
-    """A point near the wall that was not taken for it: of a fitting, a slip, or a dent."""
+    """A rejected point near the wall: of a fitting, a blunder, or a dent."""
 
     point: str = key("name")
     height_m: Finite = key("above the bottom of the shell")
     azimuth_deg: Finite = key("about the axis, clockwise from +y")
-    residual_mm: Finite = key("outwards from the wall as the other points show it")
+    residual_mm: Finite = key("outwards from the wall by the other points")
 
 
 class WallShapeRecord(Saved):
     """The shape of an upright wall, for inspections."""
 
     state: str = key('"as_found": loaded as it was surveyed; "unloaded": head taken off')
-    set_aside: list[ShapeSetAside] = key("points near the wall that are not judged")
+    set_aside: list[ShapeSetAside] = key("rejected points near the wall")
     nominal_radius_m: Finite = key("inside, by the drawing")
     levels: list[ShapeLevel] = key("from the bottom up")
     plumbs: list[ShapePlumb] = key("each level with a known centre against the lowest of these")
@@ -71,18 +71,23 @@ class WallShapeRecord(Saved):
 
 
 def shape_record(job, wall):
-    """The `WallShapeRecord` of a wall; None where no upright wall was surveyed by points.
+    """Return the `WallShapeRecord` of a wall.
 
     Parameters
     ----------
     job : Job
-        As it was computed.
+        The computed job.
     wall : pipeline.surveyed_wall.Wall or None
+
+    Returns
+    -------
+    WallShapeRecord or None
+        None if no upright wall was surveyed by points.
     """
     shape = wall_shape_of(job, wall)
     if shape is None:
         return None
-    heights = [one.height_m for one in shape.levels]
+    heights = [level.height_m for level in shape.levels]
     axis = None
     if shape.axis is not None:
         low, high = shape.plumbs[-1].low, shape.plumbs[-1].high
@@ -93,15 +98,15 @@ def shape_record(job, wall):
         shape.state,
         [
             ShapeSetAside(
-                one.point, one.height_m, np.degrees(one.azimuth_rad), 1000 * one.residual_m
+                point.point, point.height_m, np.degrees(point.azimuth_rad), 1000 * point.residual_m
             )
-            for one in shape.set_aside
+            for point in shape.set_aside
         ],
         nominal_inside_m(job, job.courses[0]),
-        [_level(*one) for one in zip(shape.levels, shape.radii, shape.centres_m, strict=True)],
-        [_plumb(one, heights, None) for one in shape.plumbs],
+        [_level(*level) for level in zip(shape.levels, shape.radii, shape.centres_m, strict=True)],
+        [_plumb(plumb, heights, None) for plumb in shape.plumbs],
         axis,
-        [_plumb(one, heights, shape.levels[one.low].course + 1) for one in shape.courses],
+        [_plumb(plumb, heights, shape.levels[plumb.low].course + 1) for plumb in shape.courses],
     )
 
 
@@ -113,9 +118,9 @@ def _level(level, radii, centre):
     )  # fmt: skip
 
 
-def _plumb(one, heights, course):
-    found, azimuth = one.figures, np.degrees(one.azimuth_rad)
+def _plumb(plumb, heights, course):
+    figures, azimuth_deg = plumb.figures, np.degrees(plumb.azimuth_rad)
     return ShapePlumb(
-        course, heights[one.low], heights[one.high], azimuth, one.is_read,
-        1000 * found.value_m, 1000 * found.u_m, found.dof,
+        course, heights[plumb.low], heights[plumb.high], azimuth_deg, plumb.is_read,
+        1000 * figures.value_m, 1000 * figures.u_m, figures.dof,
     )  # fmt: skip

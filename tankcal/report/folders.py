@@ -234,7 +234,7 @@ def _keep_foreign(earlier, target):
     for path in sorted(earlier.rglob("*")):
         name = path.relative_to(earlier)
         is_folder = path.is_dir() and not path.is_symlink()
-        if is_folder or name.as_posix() in listed or manifest.FILLED_IN in name.parts[:-1]:
+        if is_folder or name.as_posix() in listed or manifest.EMPTY_JOB in name.parts[:-1]:
             continue
         place, count = target / name, 1
         while os.path.lexists(place):

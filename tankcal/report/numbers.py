@@ -13,6 +13,7 @@ from tankcal.text.digits import (
     shortest,
     superscript,
 )
+from tankcal.units import ARCSEC_PER_DEG, ARCSEC_PER_RAD
 
 _SHORT = range(-2, 6)  # exponents of values that are written without a power of ten
 _MOST_DEGREES = 10_000  # degrees of freedom above which k agrees with the normal k to 0.03 %
@@ -69,15 +70,15 @@ UNITS = {
     "px": Unit("px"),
     "arcsec": Unit("″"),
     "rad deg": Unit("°", 180 / pi),
-    "rad arcsec": Unit("″", 648000 / pi),
-    "deg arcsec": Unit("″", 3600.0),
+    "rad arcsec": Unit("″", ARCSEC_PER_RAD),
+    "deg arcsec": Unit("″", ARCSEC_PER_DEG),
     "L/cm": Unit("L/cm", 10.0),  # an area of 1 m2 holds 10 litres per centimetre
 }
 
 
 # Units of readings and of their residuals: {unit in the record: (printed unit, factor)}.
 _LARGE = {"mm": ("image mm", 1.0), "m": ("m", 1.0), "rad": ("deg", 180 / pi)}
-_SMALL = {"mm": ("um", 1e3), "m": ("image mm", 1e3), "rad": ("arcsec", 648000 / pi)}
+_SMALL = {"mm": ("um", 1e3), "m": ("image mm", 1e3), "rad": ("arcsec", ARCSEC_PER_RAD)}
 
 
 def large_unit(name):

@@ -1,7 +1,7 @@
 """Former radii in the papers: source, assumed change, and results."""
 
 from tankcal.report.radii_source import source_text
-from tankcal.report.tables.radii import RADII
+from tankcal.report.tables.tank import RADII
 
 
 def facts(paper):

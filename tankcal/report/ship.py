@@ -34,14 +34,14 @@ def corrections(paper):
     end of the pipe.
     """
     shown = _beyond_pipe(paper)
-    for list_deg, cells in tables.by_list(paper.record):
+    for list_deg, cells in tables.group_by_list(paper.record):
         for start in range(0, len(cells), ACROSS):
             shown.append(_matrix(paper, list_deg, cells[start : start + ACROSS]))
     return shown
 
 
 def _beyond_pipe(paper):
-    length_m, count = tables.beyond_pipe(paper.record)
+    length_m, count = tables.count_beyond_pipe(paper.record)
     if not count:
         return []
     length = paper.number(length_m, "m", decimals=3)

@@ -54,7 +54,7 @@ def make_papers_again(verification, folder, manifest, rebuild, versions=None):
     """
     made_by = manifest.made_by if manifest else ""
     _refuse_contradiction(verification, made_by, versions)
-    has_same_versions = made_by == manifests.maker()
+    has_same_versions = made_by == manifests.describe_maker()
     with tempfile.TemporaryDirectory(prefix="tankcal-") as temporary:
         new_folder = Path(temporary) / "again"
         language = manifest.language if manifest else language_of_page(folder)
@@ -152,15 +152,15 @@ def _note_other_maker(verification, made_by):
             "verify_other_maker",
             "the papers were made by other versions ({made_by}; here {here}): their words and "
             "numbers were compared, their pictures not",
-            made_by=only_in(made_by, manifests.maker()),
-            here=only_in(manifests.maker(), made_by),
+            made_by=only_in(made_by, manifests.describe_maker()),
+            here=only_in(manifests.describe_maker(), made_by),
         )
     )
 
 
 def _compare_content(verification, name, path, new_path, made_by):
     """Compare words and numbers of a paper with the paper written again."""
-    present_versions = versions_in(manifests.maker())
+    present_versions = versions_in(manifests.describe_maker())
     paper_versions = versions_in(made_by)
     same_version = (
         paper_versions.get("tankcal", present_versions["tankcal"]) == present_versions["tankcal"]

@@ -34,13 +34,13 @@ OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": FAST}
 @cache
 def available():
     """Whether loops can be compiled; TANKCAL_COMPILED=0 disables compilation."""
-    if _asked_for() == "0":
+    if _requested_mode() == "0":
         return False
     return importlib.util.find_spec("numba") is not None
 
 
 @cache
-def _asked_for():
+def _requested_mode():
     """Value of TANKCAL_COMPILED, by default "patient": compile large problems only."""
     return os.environ.get("TANKCAL_COMPILED", "patient")
 
@@ -133,7 +133,7 @@ def is_worth_compiling(rows=0):
     loops and arrays differ in the last digits, and a job must reproduce its digits. Compiled loops
     of an installation lower the threshold, see `are_kept`.
     """
-    if _asked_for() != "patient":
+    if _requested_mode() != "patient":
         return available()
     # Loading takes a fraction of the time of compilation, so fewer rows justify it.
     threshold = LOADING * AT_ONCE if are_kept() else AT_ONCE
@@ -183,7 +183,7 @@ def _compile_function(numba, function, inline):
         writable_cache = compiled._cache
     package_cache = _open_package_cache(function)
     if package_cache is not None:
-        compiled._cache = _Kept(package_cache, writable_cache)
+        compiled._cache = _FunctionCache(package_cache, writable_cache)
     return compiled
 
 
@@ -213,7 +213,7 @@ def _open_package_cache(function):
         return None
 
 
-class _Kept:
+class _FunctionCache:
     """Cache of compiled functions in numba's interface: package first, then numba's directory.
 
     Parameters

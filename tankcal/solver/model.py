@@ -61,9 +61,9 @@ class Model:
         information and a datum is chosen. None: the observations determine the datum.
     name_of : callable
         name_of(column) -> name of the unknown for the user.
-    in_words : callable, optional
-        in_words(directions) -> description of the unknowns in directions (unknowns, d), given for
-        columns of length one. None: their names.
+    describe_directions : callable, optional
+        describe_directions(directions) -> description of the unknowns in directions (unknowns, d),
+        given for columns of length one. None: their names.
     inner : ndarray, shape (unknowns,)
         1 for an unknown in the inner constraints that define the datum, else 0.
     exact : tuple of Group
@@ -78,7 +78,7 @@ class Model:
     moved: Callable
     null_space: Callable = None
     name_of: Callable = str
-    in_words: Callable = None
+    describe_directions: Callable = None
     inner: np.ndarray = None
     exact: tuple = ()
     name_of_exact: Callable = str

@@ -83,8 +83,8 @@ def weakness(work, state):
 
 def _describe_directions(model, directions):
     """Names of the unknowns that take part in directions (unknowns, d)."""
-    if model.in_words is not None:
-        return model.in_words(directions)
+    if model.describe_directions is not None:
+        return model.describe_directions(directions)
     size = np.sqrt(np.sum(directions**2, axis=1))
     worst = np.argsort(-size)[:NAMES_SHOWN]
     # Small components are rounding, or follow from the large ones.

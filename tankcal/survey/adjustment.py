@@ -8,14 +8,17 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
-from tankcal.survey.causes import causes_of
 from tankcal.survey.datum import make_frame
 from tankcal.survey.depth import adjust_in_depth
-from tankcal.survey.diagnosis.blunders import gross_readings, search_blunders, swapped_at_start
+from tankcal.survey.diagnosis.blunders import find_swapped_control, gross_readings, search_blunders
 from tankcal.survey.diagnosis.checks import check_points, check_readings, find_disagreeing_checks
 from tankcal.survey.diagnosis.diagnoses import MIRROR, diagnose
 from tankcal.survey.diagnosis.double_names import names_alike, same_place
-from tankcal.survey.diagnosis.fixed_datum_check import strained, wrong_control, wrongly_held
+from tankcal.survey.diagnosis.fixed_datum_check import (
+    find_strained_control,
+    wrong_control,
+    wrongly_held,
+)
 from tankcal.survey.diagnosis.misread_files import likely_mistake, photos_that_do_not_fit
 from tankcal.survey.diagnosis.outlier_attribution import (
     SOME,
@@ -24,14 +27,14 @@ from tankcal.survey.diagnosis.outlier_attribution import (
     find_undecided_outliers,
 )
 from tankcal.survey.diagnosis.scales import check_readings_off, scale_of_control
+from tankcal.survey.network.adjustment import find_hardly_determined
 from tankcal.survey.network.reactions import reactions
-from tankcal.survey.network.soundness import find_hardly_determined
 from tankcal.survey.network.survey import IMAGES
-from tankcal.survey.network_of_survey import gather, held_trace, named_in
-from tankcal.survey.results import Adjustment, Readings
+from tankcal.survey.network_of_survey import find_point_row, gather, held_trace
+from tankcal.survey.results import Adjustment, Readings, causes_of
 from tankcal.survey.rows import gone_with_their_points, readings_of
 from tankcal.survey.start.unstarted import SeveralPlacesError
-from tankcal.survey.start_values import add_start_values, mirrored_targets, started_like
+from tankcal.survey.start_values import add_start_values, mirrored_targets, start_like
 
 SUSPICIOUS = 4.0  # sigma0 above which whole files are suspected
 SEVERAL = 0.05  # share of rejected values above which whole files are suspected
@@ -67,7 +70,7 @@ def adjust_survey(measurements, progress=None):
     progress = progress or (lambda text: None)
 
     def adjusted(measured, like):
-        return _adjusted(measured, progress, like=like)
+        return _adjust(measured, progress, like=like)
 
     try:
         result, measurements, depth = adjust_in_depth(measurements, adjusted, progress)
@@ -85,7 +88,7 @@ def adjust_survey(measurements, progress=None):
     return replace(_complete(*result, measurements), depth=depth)
 
 
-def _adjusted(measurements, progress, snooping=None, most=100, like=None):
+def _adjust(measurements, progress, snooping=None, most=100, like=None):
     """Adjust measurements with a search for blunders.
 
     Parameters
@@ -101,7 +104,7 @@ def _adjusted(measurements, progress, snooping=None, most=100, like=None):
 
     Returns
     -------
-    tuple of (Searched, Gathered, Frame)
+    tuple of (SearchResult, GatheredSurvey, Frame)
     """
     gathered = gather(measurements)
     if not gathered.survey.points:
@@ -114,11 +117,11 @@ def _adjusted(measurements, progress, snooping=None, most=100, like=None):
             count=len(gathered.survey.points),
         )
     )
-    survey = None if like is None else started_like(like, gathered, measurements)
+    survey = None if like is None else start_like(like, gathered, measurements)
     survey = survey or add_start_values(gathered, measurements)
     # Exchanged names show at the start values, where the residuals are still large; the adjustment
     # would spread them over all points.
-    swapped = swapped_at_start(survey, gathered.known)
+    swapped = find_swapped_control(survey, gathered.known)
     if swapped:
         raise SolutionError("\n".join(map(str, swapped)))
     frame = make_frame(survey, gathered, measurements.settings)
@@ -129,9 +132,9 @@ def _adjusted(measurements, progress, snooping=None, most=100, like=None):
     return search_blunders(frame.survey, options, gross), gathered, frame
 
 
-def _tried(measurements, snooping=False, like=None):
-    """Adjust trial measurements; return network.Adjusted and Gathered."""
-    search, gathered, _ = _adjusted(measurements, lambda text: None, snooping, TRIED, like)
+def _adjust_trial(measurements, snooping=False, like=None):
+    """Adjust trial measurements; return network.Adjusted and GatheredSurvey."""
+    search, gathered, _ = _adjust(measurements, lambda text: None, snooping, TRIED, like)
     return search.adjusted, gathered
 
 
@@ -140,11 +143,11 @@ def _why_not(measurements, message):
     # These messages already name their cause.
     if "datum defect" in message or MIRROR in message:
         return []
-    photo_problems = photos_that_do_not_fit(measurements, message, _tried)
+    photo_problems = photos_that_do_not_fit(measurements, message, _adjust_trial)
     return (
         photo_problems
-        or likely_mistake(measurements, np.inf, _tried, message)
-        or wrong_control(measurements, np.inf, _tried)[0]
+        or likely_mistake(measurements, np.inf, _adjust_trial, message)
+        or wrong_control(measurements, np.inf, _adjust_trial)[0]
     )
 
 
@@ -167,11 +170,16 @@ def _complete(search, gathered, frame, measurements):
     gone = gone_with_their_points(adjusted, search.removed)
     removed = sorted([*readings.where(readings.removed), *gone], key=lambda one: -abs(one.w))
     checks = check_readings(adjusted, gathered.checks, scale)
-    readings = _in_order(Readings.joined([readings, Readings.of([*gone, *checks])]))
+    readings = _sort_readings(Readings.joined([readings, Readings.of([*gone, *checks])]))
     there = np.flatnonzero(np.isfinite(adjusted.xyz_m).all(axis=1))
     late = {i: why for i, why in enumerate(adjusted.problem.set_aside) if why}
-    warnings += [_lost(measurements, adjusted.survey.points[i], why) for i, why in late.items()]
-    warnings += [_kept(one, adjusted.survey) for one in search.needed if one.w > CRITICAL]
+    survey = adjusted.survey
+    warnings += [
+        _lost_point_problem(measurements, survey.points[i], why) for i, why in late.items()
+    ]
+    warnings += [
+        _kept_reading_problem(needed, survey) for needed in search.needed if needed.w > CRITICAL
+    ]
     diagnoses = _diagnoses(adjusted, readings, groups, gathered, measurements)
     doubts = _causes(adjusted, readings, gathered, measurements, diagnoses)
     # If the whole survey is in doubt, outliers in readings say little; only control is examined
@@ -214,7 +222,7 @@ def _complete(search, gathered, frame, measurements):
     )
 
 
-def _kept(one, survey):
+def _kept_reading_problem(one, survey):
     """Problem of a reading that disagrees but cannot be removed."""
     trace = survey.table(one.source).trace
     text = message(
@@ -227,9 +235,9 @@ def _kept(one, survey):
     return Problem(trace.file, text, trace.rows[one.row])
 
 
-def _lost(measurements, name, why):
+def _lost_point_problem(measurements, name, why):
     """Problem of a point that the search for blunders left with too few readings."""
-    file, row = named_in(measurements, name)
+    file, row = find_point_row(measurements, name)
     text = message("left_after_search", "{why} left after the search for blunders", why=why)
     return Problem(file, text, row)
 
@@ -252,9 +260,9 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
     gone = count_set_aside(adjusted.survey)
     one_sided = find_one_sided_losses(readings, gathered.known)
     if not (one_sided or adjusted.sigma0 > SUSPICIOUS or gone > SOME * len(readings)):
-        return strained(readings, gathered.known)
+        return find_strained_control(readings, gathered.known)
     # Trials start from this solution, which is close to theirs.
-    close, sigma0 = partial(_tried, like=adjusted), adjusted.sigma0
+    close, sigma0 = partial(_adjust_trial, like=adjusted), adjusted.sigma0
     # The search for blunders lowers sigma0. The test needs sigma0 of all readings, so it adjusts
     # again without snooping.
     if gone:
@@ -267,7 +275,7 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
         bad and sigma0 > SUSPICIOUS and not any(MIRROR in problem.expected for problem in diagnoses)
     )
     # A mirror image has its own diagnosis; trials of other mistakes cannot remove it.
-    misread = likely_mistake(measurements, sigma0, _tried) if bad else []
+    misread = likely_mistake(measurements, sigma0, _adjust_trial) if bad else []
     if misread:
         raise SolutionError("\n".join(["the readings do not fit together", *map(str, misread)]))
     control, left = wrong_control(measurements, gone, close)
@@ -284,10 +292,10 @@ def _causes(adjusted, readings, gathered, measurements, diagnoses):
             left=left,
         )
         raise SolutionError("\n".join(map(str, [text, *problems])))
-    return problems + (strained(readings, gathered.known) if not control else [])
+    return problems + (find_strained_control(readings, gathered.known) if not control else [])
 
 
-def _in_order(readings):
+def _sort_readings(readings):
     """Sort readings by file, then by row."""
     places = readings.columns["file"].tolist()
     # Images and control come first, as in the report; the other files follow in alphabetical order.

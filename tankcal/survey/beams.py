@@ -23,7 +23,7 @@ NOTHING = 1e-12  # share of the largest variance of a covariance, below which a 
 
 
 @dataclass(frozen=True)
-class Beamed:
+class BeamPoints:
     """Readings of a cloud as points, with the incidence of their beams on the wall.
 
     Attributes
@@ -64,7 +64,7 @@ def points_of_beams(xyz_m, sd_m, scan, normal, registration, tools, *, file="", 
 
     Returns
     -------
-    Beamed
+    BeamPoints
         Points with their full covariance. An offset without any estimate is excluded from the
         covariance and listed in `unbound`.
     """
@@ -88,7 +88,7 @@ def points_of_beams(xyz_m, sd_m, scan, normal, registration, tools, *, file="", 
         unbound=shared.unbound,
         file=file,
     )
-    return Beamed(points, np.arccos(shared.cosine), told_m or {})
+    return BeamPoints(points, np.arccos(shared.cosine), told_m or {})
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
-
-HOUR_S = 3600.0
+from tankcal.units import FULL_TURN, HOUR_S
 
 
 @dataclass(frozen=True)

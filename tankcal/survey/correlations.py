@@ -62,12 +62,12 @@ def blocks_of(measurements, observations):
                 rows.append(row)
                 components.append(component)
                 sds.append(sd[row, component])
-    pairs += _within_vectors(measurements, places)
-    pairs += _between(measurements.correlated, places)
+    pairs += _vector_correlations(measurements, places)
+    pairs += _listed_correlations(measurements.correlated, places)
     return _split(np.array(sources), np.array(rows), np.array(components), np.array(sds), pairs)
 
 
-def _within_vectors(measurements, places):
+def _vector_correlations(measurements, places):
     """Yield (place, place, r, (file, row, column)) for the components of each vector."""
     for table in measurements.readings:
         if table.table != "vectors":
@@ -79,7 +79,7 @@ def _within_vectors(measurements, places):
                     yield (*ends, table.correlation[i, k], (table.file, row, "r_xy"))
 
 
-def _between(correlated, places):
+def _listed_correlations(correlated, places):
     """Yield (place, place, r, (file, row, column)) for listed pairs of adjusted values."""
     if correlated is None:
         return

@@ -57,7 +57,7 @@ def make_frame(survey, gathered, settings):
     Parameters
     ----------
     survey : network.Survey
-    gathered : Gathered
+    gathered : GatheredSurvey
     settings : AdjustmentSettings
 
     Returns
@@ -158,7 +158,7 @@ def _control(survey, bare, problem, free, gathered, settings):
     missing = _free(assemble(survey)) if free.shape[1] else free
     if missing.shape[1]:
         raise SolutionError(datum_defect_sentence(missing, assemble(survey)))
-    return survey, {}, acting & (known.sd_m == 0), _named(survey, acting), []
+    return survey, {}, acting & (known.sd_m == 0), _names_of_coordinates(survey, acting), []
 
 
 def _minimal(survey, bare, problem, free, gathered, settings):
@@ -172,7 +172,7 @@ def _minimal(survey, bare, problem, free, gathered, settings):
         return bare, {}, none, (), [_nothing_left("minimal")]
     rows = _motions(problem, free)
     if settings.datum_points:
-        wanted = np.flatnonzero(_wanted(survey, settings))
+        wanted = np.flatnonzero(_chosen_coordinates(survey, settings))
     else:
         declared = np.isfinite(gathered.known.xyz_m) & ~gathered.idle
         candidates = declared if declared.any() else ~gathered.idle
@@ -190,7 +190,7 @@ def _minimal(survey, bare, problem, free, gathered, settings):
                 "name others in datum_points, add control or choose datum = inner",
                 defect_in_words=defect_in_words(free, problem),
                 count=len(wanted),
-                points=[*_named(survey, held)],
+                points=[*_names_of_coordinates(survey, held)],
                 rank=rank,
                 of=d,
             )
@@ -206,8 +206,8 @@ def _minimal(survey, bare, problem, free, gathered, settings):
         warnings.append(Problem("job.toml", text, None, "adjustment.datum_points"))
     xyz = np.where(held & np.isfinite(gathered.known.xyz_m), gathered.known.xyz_m, survey.xyz_m)
     chosen = replace(bare, xyz_m=xyz, fixed=bare.fixed | held)
-    warnings += _released(survey, _exact(gathered) & ~held, "minimal")
-    return chosen, {}, held, _named(survey, held), warnings
+    warnings += _released_control_problems(survey, _exact(gathered) & ~held, "minimal")
+    return chosen, {}, held, _names_of_coordinates(survey, held), warnings
 
 
 def _photo(survey, bare, problem, free, gathered, settings):
@@ -230,7 +230,7 @@ def _photo(survey, bare, problem, free, gathered, settings):
     if left.shape[1]:
         raise SolutionError(datum_defect_sentence(left, problem))
     held = np.zeros((len(survey.points), 3), dtype=bool)
-    released = _released(survey, _exact(gathered), "fixed_photo")
+    released = _released_control_problems(survey, _exact(gathered), "fixed_photo")
     # Observations determine part of the six parameters. Holding all six would strain the network,
     # so the photo is held by inner constraints.
     if free.shape[1] < 6:
@@ -245,16 +245,19 @@ def _inner(survey, bare, problem, free, gathered, settings):
     known, held = gathered.known, _exact(gathered)
     xyz = np.where(np.isfinite(known.xyz_m), known.xyz_m, survey.xyz_m)
     if not free.shape[1]:
-        warnings = [_nothing_left("inner"), *_released(survey, held, "inner")]
+        warnings = [_nothing_left("inner"), *_released_control_problems(survey, held, "inner")]
         return bare, {}, np.zeros_like(held), (), warnings
-    chosen, fixed = replace(bare, xyz_m=xyz, fixed=bare.fixed | held), _named(survey, held)
+    chosen, fixed = (
+        replace(bare, xyz_m=xyz, fixed=bare.fixed | held),
+        _names_of_coordinates(survey, held),
+    )
     # Exact control may remove part of the defect; inner constraints remove the rest.
     problem = assemble(chosen)
     left = _free(problem)
     if not left.shape[1]:
         return chosen, {}, held, fixed, [_nothing_left("inner")]
     if settings.datum_points:
-        over = np.flatnonzero(_wanted(survey, settings).any(axis=1))
+        over = np.flatnonzero(_chosen_coordinates(survey, settings).any(axis=1))
     else:
         over = np.flatnonzero(np.isfinite(known.xyz_m).all(axis=1) & ~held.all(axis=1))
         # Inner constraints need three points to fix a rotation.
@@ -283,7 +286,7 @@ def _exact(gathered):
     return np.isfinite(known.xyz_m) & (known.sd_m == 0) & ~gathered.idle
 
 
-def _released(survey, held, choice):
+def _released_control_problems(survey, held, choice):
     """Problem rows for exact control that the datum does not hold."""
     if not held.any():
         return []
@@ -291,7 +294,7 @@ def _released(survey, held, choice):
         "held_released",
         "{points} hold exactly in control.csv (sd 0), and datum = {choice} does not hold them: they"
         " are compared only; choose datum = control or inner to hold them",
-        points=list_some(_named(survey, held), SHOWN),
+        points=list_some(_names_of_coordinates(survey, held), SHOWN),
         choice=choice,
     )
     return [Problem("job.toml", text, None, "adjustment.datum")]
@@ -329,7 +332,7 @@ def _rank(rows):
     return int(np.sum(values > WEAK * np.sqrt(len(rows))))
 
 
-def _wanted(survey, settings):
+def _chosen_coordinates(survey, settings):
     """Mask (points, 3) of the coordinates named in `datum_points`."""
     mask = np.zeros((len(survey.points), 3), dtype=bool)
     missing = []
@@ -350,7 +353,7 @@ def _wanted(survey, settings):
     return mask
 
 
-def _named(survey, mask):
+def _names_of_coordinates(survey, mask):
     """Names with axes of the coordinates in a mask (points, 3)."""
     return tuple(
         f"{survey.points[i]}:{''.join(AXES[k] for k in np.flatnonzero(mask[i]))}"

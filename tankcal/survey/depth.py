@@ -28,8 +28,8 @@ def adjust_in_depth(measurements, adjust, progress):
     ----------
     measurements : Measurements
     adjust : callable
-        adjust(measurements, like) returns (Searched, ...); like is a similar network.Adjusted or
-        None.
+        adjust(measurements, like) returns (SearchResult, ...); like is a similar network.Adjusted
+        or None.
     progress : callable
         progress(text) is called before each round.
 
@@ -50,7 +50,7 @@ def adjust_in_depth(measurements, adjust, progress):
     original, current = measurements.image_points, measurements
     for rounds in range(1, MOST_ROUNDS + 1):
         # Always correct the original readings: correcting corrected ones would accumulate.
-        corrected, left = _corrected(original, result[0].adjusted, lenses)
+        corrected, left = _correct_for_depth(original, result[0].adjusted, lenses)
         change = float(np.abs(corrected - current.image_points.xy_mm).max(initial=0.0))
         if change < CLOSE_MM:
             size = corrected - original.xy_mm
@@ -77,7 +77,7 @@ def adjust_in_depth(measurements, adjust, progress):
     )
 
 
-def _corrected(images, adjusted, lenses):
+def _correct_for_depth(images, adjusted, lenses):
     """Return image points (n, 2) in focus, and the number of points without a usable depth."""
     survey, problem, state = adjusted.survey, adjusted.problem, adjusted.solution.unknowns
     points = {name: i for i, name in enumerate(survey.points)}

@@ -31,7 +31,7 @@ TOLD = 10  # warnings listed singly; further omitted points are only counted
 
 
 @dataclass(frozen=True)
-class Gathered:
+class GatheredSurvey:
     """A survey without start values, whose observations keep a Trace to their readings.
 
     Attributes
@@ -40,7 +40,7 @@ class Gathered:
         Unknown coordinates are nan. Control is observed or fixed with datum "control" only.
     checks : tuple of Observations
         Compared, not adjusted.
-    known : Known
+    known : KnownControl
         Control in the frame of the survey.
     idle : ndarray of bool, shape (points, 3)
         True: no observation determines this coordinate; it keeps its start value.
@@ -64,7 +64,7 @@ class Gathered:
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownControl:
     """Control coordinates and their standard deviations in the frame of the survey; nan: none.
 
     Attributes
@@ -80,7 +80,7 @@ class Known:
 
 
 def gather(measurements):
-    """Convert Measurements to a Gathered survey.
+    """Convert Measurements to a GatheredSurvey.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def gather(measurements):
 
     Returns
     -------
-    Gathered
+    GatheredSurvey
 
     Raises
     ------
@@ -100,13 +100,13 @@ def gather(measurements):
     # Omitting a point removes observations of its neighbours, so repeat until every point has
     # enough.
     while True:
-        gathered = _gathered(measurements, excluded)
+        gathered = _gather(measurements, excluded)
         poor = find_left_out(gathered.survey)
         if not poor:
             break
         excluded |= poor
-    excluded = _unmeasured(measurements, gathered.survey.points, excluded)
-    where = {name: named_in(measurements, name) for name in excluded}
+    excluded = _omitted_points(measurements, gathered.survey.points, excluded)
+    where = {name: find_point_row(measurements, name) for name in excluded}
     idle, warnings = find_untouched_coordinates(gathered.survey)
     warnings += _omission_warnings(excluded, where)
     # A coordinate without observation would make the normal matrix singular.
@@ -136,7 +136,7 @@ def _omission_warnings(excluded, where):
     return [*problems[: TOLD - 1], Problem("job.toml", text, None, "adjustment")]
 
 
-def _unmeasured(measurements, points, excluded):
+def _omitted_points(measurements, points, excluded):
     """{name: reason} of omitted points, including unmeasured points of control.csv and
     check.csv."""
     reasons = dict(excluded)
@@ -147,7 +147,7 @@ def _unmeasured(measurements, points, excluded):
     return reasons
 
 
-def named_in(measurements, name):
+def find_point_row(measurements, name):
     """File and row of the first occurrence of a point."""
     tables = [(measurements.image_points, ("point",)), (measurements.control, ("point",))]
     tables += [
@@ -162,11 +162,11 @@ def named_in(measurements, name):
     return "setups.csv", None
 
 
-def _gathered(measurements, excluded):
-    """The Gathered of measurements without the excluded points."""
+def _gather(measurements, excluded):
+    """The GatheredSurvey of measurements without the excluded points."""
     warnings = []
     numbers = _numbers(measurements, excluded)
-    known = _known(measurements.control, numbers.points)
+    known = _known_control(measurements.control, numbers.points)
     observations, checks = [], []
     fixed = None
     if measurements.settings.datum == "control":
@@ -199,7 +199,7 @@ def _gathered(measurements, excluded):
         correlated=blocks_of(measurements, observations), set_names=tuple(numbers.sets),
         kept=measurements.kept,
     )  # fmt: skip
-    return Gathered(survey, tuple(checks), known, None, {}, (), tuple(warnings))
+    return GatheredSurvey(survey, tuple(checks), known, None, {}, (), tuple(warnings))
 
 
 def _numbers(measurements, excluded):
@@ -254,7 +254,7 @@ def _rows_in_survey_frame(control):
     ]
 
 
-def _known(control, points):
+def _known_control(control, points):
     """The Known control of the points of the survey."""
     xyz, sd = np.full((2, len(points), 3), np.nan)
     row = {}
@@ -265,7 +265,7 @@ def _known(control, points):
             new = np.isfinite(control.xyz_m[i])
             xyz[number, new], sd[number, new] = control.xyz_m[i, new], control.sd_m[i, new]
             row.setdefault(control.point[i], control.rows[i] if control.rows else None)
-    return Known(xyz, sd, row)
+    return KnownControl(xyz, sd, row)
 
 
 def _coordinates(control, rows, points):

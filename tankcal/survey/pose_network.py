@@ -1,4 +1,9 @@
-"""Adjustment of a registration: start values of poses, observation equations of targets, tests."""
+"""Adjustment of a registration: start values of poses, observation equations of targets, tests.
+
+Targets with wrong names, a wrong frame or a wrong unit are detected by rigid motions of a scan.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -8,7 +13,6 @@ from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import apply_small_rotation, vector_derivatives
 from tankcal.messages import message
 from tankcal.survey.beams import by_turn
-from tankcal.survey.misnamed_targets import FEWEST, fit_motion, refuse_misnamed
 from tankcal.survey.readings import certified_distance_m
 from tankcal.survey.sighting import FRAME, NETWORK
 
@@ -18,6 +22,9 @@ LOOSE_OFFSET_M = 0.01  # sd of an unknown offset on targets
 DETECTED = 4.13  # noncentrality, in sds: 3.29 (level 0.1 %) + 0.84 (power 80 %)
 # breadth over length of targets, below which they do not determine the rotation about their line
 LIKE_A_LINE = 0.02
+FEWEST = 3  # targets that determine a pose
+FAR_BETTER = 5.0  # ratio of misfits that makes a wrong name, frame or unit credible
+LEAST_CHANGE = 0.01  # scale error larger than that of any scanner: indicates another unit
 
 
 class PoseNetwork:
@@ -143,7 +150,7 @@ class PoseNetwork:
         prior_rows, prior, covariance = self._priors()
         used = np.flatnonzero(chosen)
         # Held unknowns are removed from the vector rather than given a large weight.
-        held = self._held(used)
+        held = self._held_mask(used)
         free = np.flatnonzero(~held)
         at_start = state.copy()
 
@@ -168,7 +175,7 @@ class PoseNetwork:
         self.last = used, whole, cofactor
         return adjustment
 
-    def _held(self, used):
+    def _held_mask(self, used):
         """Mask (u,) of constant unknowns: exact poses, scales and offsets, unobserved targets."""
         s, k, t = len(self.scans), len(self.scanners), len(self.names)
         held = np.zeros(6 * s + 2 * k + 3 * t, dtype=bool)
@@ -316,3 +323,107 @@ def _pose(scan):
 def left_jacobian(vectors):
     """Left Jacobians (n, 3, 3): small rotation per change of a rotation vector."""
     return np.linalg.inv(vector_derivatives(vectors))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Similarity between two sets of places, with its rms misfit in metres."""
+
+    rotation: np.ndarray
+    shift_m: np.ndarray
+    scale: float
+    rms_m: float
+
+
+def fit_motion(scan_m, tank_m, *, scaled=False, mirrored=False):
+    """Fit the rigid motion that maps places of a scan to places of the tank.
+
+    Parameters
+    ----------
+    own_m, there_m : ndarray, shape (n, 3)
+        Places in the frame of the scan and in the frame of the tank.
+    scaled : bool
+        Whether to estimate a scale.
+    mirrored : bool
+        Whether one frame is left-handed.
+
+    Returns
+    -------
+    Fit
+
+    Examples
+    --------
+    >>> places = np.array([[0.0, 0, 0], [3, 0, 0], [0, 2, 0], [1, 1, 4]])
+    >>> found = fit_motion(1000 * places, places + [5, 0, 1], scaled=True)
+    >>> round(found.scale, 6), round(found.rms_m, 9)
+    (0.001, 0.0)
+    """
+    # Centring both sets separates the rotation from the translation.
+    middle, centre = scan_m.mean(axis=0), tank_m.mean(axis=0)
+    a, b = scan_m - middle, tank_m - centre
+    u, size, v = np.linalg.svd(b.T @ a)
+    turn = np.linalg.det(u) * np.linalg.det(v)
+    # Arun et al. 1987: the sign of the smallest singular direction selects rotation or reflection.
+    sign = np.array([1.0, 1.0, -turn if mirrored else turn])
+    rotation = (u * sign) @ v
+    # Least squares scale: trace(S D) over the sum of squared coordinates (Umeyama 1991).
+    scale = float(sign @ size / max(np.sum(a**2), 1e-30)) if scaled else 1.0
+    shift = centre - scale * rotation @ middle
+    residuals = tank_m - scale * scan_m @ rotation.T - shift
+    return Fit(rotation, shift, scale, float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))))
+
+
+def refuse_misnamed(scan, scan_m, tank_m, names, sd_m):
+    """Raise SolutionError if targets fit far better mirrored, scaled or with exchanged names.
+
+    Parameters
+    ----------
+    scan : str
+    own, there : ndarray, shape (n, 3)
+        Places of the targets in the frame of the scan and in the frame of the tank, m.
+    names : sequence of str, length n
+    sd_m : array_like, shape (n,)
+        Standard deviations of the targets.
+    """
+    plain = fit_motion(scan_m, tank_m).rms_m
+    far_better = plain / FAR_BETTER
+    limit = max(3 * float(np.max(sd_m)), 1e-6)
+    # Three points and their mirror image are congruent; only a fourth point shows the difference.
+    if len(scan_m) > FEWEST and fit_motion(scan_m, tank_m, mirrored=True).rms_m < min(
+        far_better, limit
+    ):
+        text = message(
+            "targets_mirrored",
+            "the targets of scan {scan!r} fit as their mirror image only; expected a right-handed"
+            " frame: was an axis turned round, or x and y exchanged?",
+            scan=scan,
+        )
+        raise SolutionError(text)
+    scaled = fit_motion(scan_m, tank_m, scaled=True)
+    if abs(scaled.scale - 1) > LEAST_CHANGE and scaled.rms_m < far_better:
+        text = message(
+            "targets_in_other_unit",
+            "the targets of scan {scan!r} are {factor:.4g} times as far apart as those of the"
+            " survey; expected the same: is its unit another one?",
+            scan=scan,
+            factor=1 / scaled.scale,
+        )
+        raise SolutionError(text)
+    # Try every exchange of two names.
+    swaps = []
+    for i in range(len(scan_m)):
+        for j in range(i + 1, len(scan_m)):
+            order = np.arange(len(scan_m))
+            order[[i, j]] = j, i
+            swaps.append((fit_motion(scan_m[order], tank_m).rms_m, i, j))
+    swaps.sort()
+    if swaps and swaps[0][0] < min(far_better, limit):
+        text = message(
+            "targets_exchanged",
+            "targets {one!r} and {other!r} of scan {scan!r} fit with their names exchanged;"
+            " expected each under its own",
+            scan=scan,
+            one=names[swaps[0][1]],
+            other=names[swaps[0][2]],
+        )
+        raise SolutionError(text)

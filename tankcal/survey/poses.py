@@ -43,9 +43,9 @@ def poses_of(hits, adjustment=None, *, nominal_m, is_inside):
     prior = (
         np.array([[tool.u_scale, np.nan_to_num(tool.u_offset_m)] for tool in known]).ravel() ** 2
     )
-    poses = _unplaced(hits, tools, prior)
+    poses = _poses_at_stations(hits, tools, prior)
     if adjustment is not None:
-        poses = _in_network(hits, poses, adjustment)
+        poses = _take_network_poses(hits, poses, adjustment)
     untied = np.array([i for i, tie in enumerate(poses.ties) if tie == WALL], dtype=int)
     if len(untied):
         _refuse_sets(hits, poses, untied)
@@ -72,14 +72,14 @@ def poses_in_network(tangents, adjustment):
     """
     known = adjustment.adjusted.survey.instruments
     names = tuple(tool.name for tool in known)
-    poses = _unplaced(tangents, names, np.zeros(2 * len(names)))
+    poses = _poses_at_stations(tangents, names, np.zeros(2 * len(names)))
     poses = replace(poses, ties=(WALL,) * len(poses.keys))
-    return _in_network(tangents, poses, adjustment), tuple(
+    return _take_network_poses(tangents, poses, adjustment), tuple(
         (tool.scale_sd, tool.offset_sd_m) for tool in known
     )
 
 
-def _unplaced(hits, tools, prior):
+def _poses_at_stations(hits, tools, prior):
     """Poses at the heights of their stations; a single set-up defines the frame."""
     keys = tuple(dict.fromkeys(zip(hits.setup, hits.set, strict=True)))
     names = list(dict.fromkeys(name for name, _ in keys))
@@ -103,7 +103,7 @@ def _unplaced(hits, tools, prior):
     )
 
 
-def _in_network(hits, poses, adjustment):
+def _take_network_poses(hits, poses, adjustment):
     """Return the poses with values from the network where it contains their set-ups."""
     adjusted = adjustment.adjusted
     tied, place, circle, tool_numbers, where = _numbers(hits, poses, adjustment)
@@ -130,7 +130,7 @@ def _in_network(hits, poses, adjustment):
     return Poses(poses.keys, xyz, zero, poses.instruments, scale, offset, covariance, tuple(ties))
 
 
-def settled(poses, change):
+def settle_poses(poses, change):
     """Return the poses with the positions that the wall determined.
 
     Parameters

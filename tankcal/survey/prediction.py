@@ -8,7 +8,7 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.survey.datum import Frame, make_frame
 from tankcal.survey.network import Adjusted, predict
-from tankcal.survey.network_of_survey import Gathered, gather
+from tankcal.survey.network_of_survey import GatheredSurvey, gather
 from tankcal.survey.start_values import finish_start_values
 
 
@@ -36,14 +36,14 @@ class Predicted:
     ----------
     adjusted : Adjusted
         network.Adjusted at the nominal values; its residuals and sigma0 have no meaning.
-    gathered : Gathered
+    gathered : GatheredSurvey
         Its `aside` lists points that cannot be determined.
     frame : Frame
         Datum of the survey.
     """
 
     adjusted: Adjusted
-    gathered: Gathered
+    gathered: GatheredSurvey
     frame: Frame
 
 

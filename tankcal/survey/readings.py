@@ -114,7 +114,7 @@ def observations_of_readings(readings, numbers, *, bend, warnings, correlated=fr
     kind = KINDS[readings.table]
     if not len(readings.value):
         return [], []
-    for observations in _observed(readings, numbers, kind, bend):
+    for observations in _collect_observations(readings, numbers, kind, bend):
         check = np.asarray(readings.check, dtype=bool)[observations.trace.reading]
         # Vectors have correlated components, so a weighted mean by components would be wrong.
         alone = np.full(len(observations), np.ndim(readings.value) > 1)
@@ -128,7 +128,7 @@ def observations_of_readings(readings, numbers, *, bend, warnings, correlated=fr
     ]
 
 
-def _observed(readings, numbers, kind, bend):
+def _collect_observations(readings, numbers, kind, bend):
     """Observations of all readings between numbered points, not averaged.
 
     Distances give a spatial and a horizontal table; other kinds give one table.
@@ -144,19 +144,19 @@ def _observed(readings, numbers, kind, bend):
     # Heights of instrument and target reduce the sight to the marks.
     rise = heights - (0.0 if target is None else np.nan_to_num(target))
     columns = {
-        "start": _numbered(start, numbers.points),
-        "end": _numbered(readings.end, numbers.points),
-        "origin": _numbered(readings.origin or start, numbers.points),
-        "instrument": _numbered(tools, numbers.instruments),
-        "set": _numbered(zip(readings.setup or sets, sets, strict=True), numbers.sets),
+        "start": _numbers_of(start, numbers.points),
+        "end": _numbers_of(readings.end, numbers.points),
+        "origin": _numbers_of(readings.origin or start, numbers.points),
+        "instrument": _numbers_of(tools, numbers.instruments),
+        "set": _numbers_of(zip(readings.setup or sets, sets, strict=True), numbers.sets),
         "rise_m": rise if rise.any() else None,
         "bend_per_m": bend,
     }
     columns = {name: column for name, column in columns.items() if kind.has(name)} | kind.options
     value = np.array(readings.value, dtype=float)
     if kind.has("instrument"):
-        value = _corrected(value, tools, readings.temperature_c, numbers.tools)
-    value, sd = (_as_rows(of, n, kind.observes.rows) for of in (value, readings.sd))
+        value = _correct_distances(value, tools, readings.temperature_c, numbers.tools)
+    value, sd = (_reshape_rows(of, n, kind.observes.rows) for of in (value, readings.sd))
     trace = _source(readings, kind, tools).trace()
     observations = kind.observes(value, sd, **columns, trace=trace)
     numbered = (*observations.ties, "set") if kind.has("set") else observations.ties
@@ -170,7 +170,7 @@ def _observed(readings, numbers, kind, bend):
     ]
 
 
-def _as_rows(values, n, m):
+def _reshape_rows(values, n, m):
     """Reshape to (n,) or, with several values per row, (n, m); a single value applies to all m."""
     values = np.array(np.broadcast_to(np.asarray(values, dtype=float).reshape(n, -1), (n, m)))
     return values[:, 0] if m == 1 else values
@@ -189,12 +189,12 @@ def _source(readings, kind, tools):
     )
 
 
-def _numbered(names, numbers):
+def _numbers_of(names, numbers):
     """Numbers (n,) of the names; -1: without a number."""
     return np.array([numbers.get(name, -1) for name in names], dtype=int)
 
 
-def _corrected(value, tools, temperature_c, known):
+def _correct_distances(value, tools, temperature_c, known):
     """Distances (n,) after correction by the instruments, m."""
     temperature = np.full(len(value), np.nan) if temperature_c is None else temperature_c
     for name in set(tools) - {None}:

@@ -20,9 +20,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tankcal.geometry.form import harmonics
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import ARCSEC as ARCSEC  # for callers, who state angles in arc seconds
 
-ARCSEC = FULL_TURN / 1_296_000
 SAME_LEVEL_M = 0.02  # largest difference of heights regarded as one level
 FEWEST_LINES = 4  # lines per level: three for radius and centre, and one redundant
 
@@ -178,7 +177,7 @@ class Lean:
     sd: float
 
 
-def courses_told(seen, strapped, read):
+def courses_with_radius(seen, strapped, read):
     """Set of the courses with a known radius: from points, a tape, or by transfer along lines.
 
     A line transfers the radius of one of its courses to all its other courses.
@@ -194,9 +193,9 @@ def courses_told(seen, strapped, read):
 
     Examples
     --------
-    >>> sorted(courses_told({1}, {4}, {1, 2, 3}))
+    >>> sorted(courses_with_radius({1}, {4}, {1, 2, 3}))
     [1, 2, 3, 4]
-    >>> sorted(courses_told({1}, set(), {2, 3}))
+    >>> sorted(courses_with_radius({1}, set(), {2, 3}))
     [1]
     """
     with_radius = set(seen) | set(strapped)

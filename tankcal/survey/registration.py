@@ -141,11 +141,11 @@ def register(scans, tools, targets=(), known=None):
     # targets.
     if solution.dof > 0 and solution.chi2 > chdtri(solution.dof, ALPHA):
         network.refuse_misnamed()
-        is_used, solution = _without_blunders(network, is_used, solution)
+        is_used, solution = _reject_blunders(network, is_used, solution)
     return _registration(network, solution, is_used)
 
 
-def _without_blunders(network, is_used, solution):
+def _reject_blunders(network, is_used, solution):
     """Reject the worst target repeatedly while one exceeds the limit; return mask and solution."""
     for _ in range(len(network.targets)):
         w, _ = network.tests(is_used)

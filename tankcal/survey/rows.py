@@ -30,7 +30,7 @@ def readings_of(adjusted, held, held_trace):
             trace = _known_trace(adjusted, adjusted.problem.observations[number])
             value = adjusted.problem.observations[number].value
         else:
-            trace, value = _observed(adjusted.survey, table, held_trace)
+            trace, value = _trace_and_values(adjusted.survey, table, held_trace)
         if not len(table.rows):
             continue
         rows = table.rows.tolist()
@@ -85,7 +85,7 @@ def gone_with_their_points(adjusted, removed):
     return rejected
 
 
-def _observed(survey, table, held_trace):
+def _trace_and_values(survey, table, held_trace):
     """Trace and observed values of a table of residuals."""
     if table.source == HELD:
         return held_trace, survey.xyz_m.ravel()[table.rows]

@@ -33,10 +33,10 @@ def plan_fit(points, source, target):
     misfit : float
         Largest distance between corresponding places.
     """
-    return _plan_fit(points, source, target, -1.0 if turned_over(source, target) else 1.0)
+    return _plan_fit(points, source, target, -1.0 if is_turned_over(source, target) else 1.0)
 
 
-def turned_over(source, target):
+def is_turned_over(source, target):
     """Whether a reflection in plan maps points (k, 3) onto others far better than a rotation."""
     if len(source) < 3:
         return False
@@ -74,7 +74,7 @@ def add_start_values(gathered, measurements):
 
     Parameters
     ----------
-    gathered : Gathered
+    gathered : GatheredSurvey
     measurements : Measurements
 
     Returns
@@ -88,7 +88,7 @@ def add_start_values(gathered, measurements):
     """
     survey, known = gathered.survey, gathered.known.xyz_m
     failure = None
-    observations = survey.observations + _trusted(survey, known, measurements.settings)
+    observations = survey.observations + _control_observations(survey, known, measurements.settings)
     for xyz, photos in _attempts(survey, known, measurements):
         try:
             started = approximate(
@@ -103,13 +103,13 @@ def add_start_values(gathered, measurements):
     raise failure
 
 
-def started_like(adjusted, gathered, measurements):
+def start_like(adjusted, gathered, measurements):
     """Start a survey from an adjusted survey of the same points and photos.
 
     Parameters
     ----------
     adjusted : network.Adjusted
-    gathered : Gathered
+    gathered : GatheredSurvey
     measurements : Measurements
 
     Returns
@@ -126,7 +126,7 @@ def started_like(adjusted, gathered, measurements):
     return finish_start_values(started_from(survey, adjusted), gathered, measurements)
 
 
-def _trusted(survey, known, settings):
+def _control_observations(survey, known, settings):
     """Control as observations for the start values, where the datum does not use it."""
     point, axis = np.nonzero(np.isfinite(known))
     if settings.datum == "control" or not len(point):
@@ -141,7 +141,7 @@ def _attempts(survey, known, measurements):
     base = np.where(idle, 0.0, known)
     choices = []
     if nominal is not None:
-        placed = _in_frame_of(known, nominal, measurements.nominal.radius_m)
+        placed = _move_to_frame_of(known, nominal, measurements.nominal.radius_m)
         if placed is not None:
             choices.append(np.where(np.isnan(base), placed, base))
     control = np.isfinite(known).all(axis=1).sum()
@@ -202,7 +202,7 @@ def mirrored_targets(xyz_m, points, measurements):
     if nominal is None:
         return []
     common = np.isfinite(nominal).all(axis=1) & np.isfinite(xyz_m).all(axis=1)
-    if not turned_over(nominal[common], xyz_m[common]):
+    if not is_turned_over(nominal[common], xyz_m[common]):
         return []
     text = message(
         "mirrored_generatrices",
@@ -218,7 +218,7 @@ def _whole(name):
     return float(name) if name is not None and str(name).strip().isdigit() else np.nan
 
 
-def _in_frame_of(known, nominal, radius_m):
+def _move_to_frame_of(known, nominal, radius_m):
     """Nominal coordinates in the frame of control; None if they cannot be fitted."""
     common = np.isfinite(known).all(axis=1) & np.isfinite(nominal).all(axis=1)
     if not common.any():
@@ -237,7 +237,7 @@ def finish_start_values(survey, gathered, measurements):
     Parameters
     ----------
     survey : network.Survey
-    gathered : Gathered
+    gathered : GatheredSurvey
     measurements : Measurements
 
     Returns
@@ -251,12 +251,12 @@ def finish_start_values(survey, gathered, measurements):
     xyz = np.where(gathered.idle & np.isnan(xyz), 0.0, xyz)
     survey = replace(survey, xyz_m=xyz)
     if photos is not None:
-        survey = replace(survey, photos=_with_fixed(photos, gathered.survey.photos))
+        survey = replace(survey, photos=_set_fixed_elements(photos, gathered.survey.photos))
     survey = replace(survey, systems=_systems(survey))
     return _bent(survey, gathered, measurements)
 
 
-def _with_fixed(photos, original):
+def _set_fixed_elements(photos, original):
     """Photos with their fixed elements at the given values."""
     is_fixed = original.fixed[:, :3] & np.isfinite(original.xyz_m)
     turned = original.fixed[:, 3] & np.isfinite(original.rotation).all(axis=(1, 2))

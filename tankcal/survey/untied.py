@@ -21,13 +21,13 @@ from itertools import combinations
 
 import numpy as np
 
-from tankcal.adjust import SD_OVER_MEDIAN
+from tankcal.adjust import SD_OVER_MEDIAN, gauss_newton
 from tankcal.errors import InputError, Problem
 from tankcal.geometry.circles import taubin_circle
 from tankcal.geometry.field.components import SETTLEMENT_MODES
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 from tankcal.survey.sighting import certified_m, rays
+from tankcal.units import FULL_TURN
 
 LEVEL_GAP_M = 0.15  # gap of heights that separates levels with radii of their own
 NARROW_RAD = 0.1  # range of directions of a set-up that sees a line of the wall, along its normal
@@ -80,26 +80,26 @@ def place_untied(hits, poses, untied, *, nominal_m, is_inside):
     ]
     known_azimuths = _azimuths(hits, poses, untied, axis)
 
-    def placed(azimuth):
+    def place_at(azimuth):
         xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
         for number, at, centre in zip(untied, azimuth, centres, strict=True):
             # The set-up looks at the axis: the azimuth back to the axis fixes its circle zero.
             xyz[number, :2] = axis + np.hypot(*centre) * np.array([np.sin(at), np.cos(at)])
             zero[number] = at + np.pi - np.arctan2(*centre)
         start = replace(poses, xyz_m=xyz, orientation_rad=zero)
-        return _fitted(start, sights, pose, untied, axis, is_even=np.isnan(known_azimuths))
+        return _fit_surface(start, sights, pose, untied, axis, is_even=np.isnan(known_azimuths))
 
     even = FULL_TURN * np.arange(len(untied)) / len(untied)
-    result, misfit = placed(np.where(np.isnan(known_azimuths), even, known_azimuths))
+    result, misfit = place_at(np.where(np.isnan(known_azimuths), even, known_azimuths))
     # Tied poses, or fewer than three set-ups, leave no order to be tested.
     if tied.any() or len(untied) < 3:
         return result
     if np.isnan(known_azimuths).all():
-        reversed_poses, more = placed(-even)
+        reversed_poses, more = place_at(-even)
         return reversed_poses if more < misfit else result
     if not np.isnan(known_azimuths).any():
         _refuse_order(
-            hits, [poses.keys[number][0] for number in untied], known_azimuths, placed, misfit
+            hits, [poses.keys[number][0] for number in untied], known_azimuths, place_at, misfit
         )
     return result
 
@@ -115,9 +115,9 @@ def _azimuths(hits, poses, untied, axis):
     return azimuths
 
 
-def _refuse_order(hits, names, azimuth, placed, misfit_m):
+def _refuse_order(hits, names, azimuth, place_at, misfit_m):
     """Raise InputError if stations fit much better mirrored, or with two of them exchanged."""
-    mirrored = placed(-azimuth)[1]
+    mirrored = place_at(-azimuth)[1]
     if misfit_m > MIRRORED * mirrored:
         text = message(
             "stations_mirrored",
@@ -132,7 +132,7 @@ def _refuse_order(hits, names, azimuth, placed, misfit_m):
     for one, other in combinations(range(len(names)), 2):
         exchanged = azimuth.copy()
         exchanged[[one, other]] = azimuth[[other, one]]
-        rms = placed(exchanged)[1]
+        rms = place_at(exchanged)[1]
         if misfit_m > EXCHANGED * rms:
             text = message(
                 "stations_exchanged",
@@ -153,7 +153,7 @@ def sees_all_around(sights):
     return np.max(np.diff(turn, append=turn[0] + FULL_TURN)) < np.pi
 
 
-def _turned(sights, zero):
+def _rotate_sights(sights, zero):
     """Horizontal components (n, 2) of sights after rotation by the circle zeros."""
     sin, cos = np.sin(zero), np.cos(zero)
     x, y = sights[:, 0], sights[:, 1]
@@ -163,7 +163,7 @@ def _turned(sights, zero):
 def _axis(hits, poses, sights, pose, tied, untied):
     """Position (2,) of the axis: from tied hits, else the mean of the stations, else the origin."""
     if tied.any():
-        places = _turned(sights[tied], poses.orientation_rad[pose[tied]])
+        places = _rotate_sights(sights[tied], poses.orientation_rad[pose[tied]])
         places += poses.xyz_m[pose[tied], :2]
         middle = places.mean(axis=0)
         return middle + taubin_circle(places - middle)[:2]
@@ -182,24 +182,28 @@ def _centre(sights, nominal_m, is_inside):
     nearest = np.hypot(*places.T).min()
     # From outside, the nearest hit lies at the distance of the axis minus the radius.
     start = ray / size * (nearest + nominal_m)
-    centre = start.copy()
-    for _ in range(CENTRE_ROUNDS):
+    # A weak prior fixes the direction that a narrow arc leaves undetermined.
+    weight = np.diag([1e-4 * len(places)] * 2)
+
+    def step_at(centre, _):
         away = places - centre
         distance = np.hypot(*away.T)
         jacobian = -away / distance[:, None]
-        # A weak prior fixes the direction that a narrow arc leaves undetermined.
-        weight = np.diag([1e-4 * len(places)] * 2)
-        change = np.linalg.solve(
+        return np.linalg.solve(
             jacobian.T @ jacobian + weight,
             jacobian.T @ (nominal_m - distance) + weight @ (start - centre),
         )
-        centre = centre + change
-        if np.hypot(*change) < 1e-9:
-            break
-    return centre
+
+    return gauss_newton(
+        step_at,
+        start,
+        move=np.add,
+        is_small=lambda step: np.hypot(*step) < 1e-9,
+        most_steps=CENTRE_ROUNDS,
+    )
 
 
-def _fitted(poses, sights, pose, untied, axis, *, is_even):
+def _fit_surface(poses, sights, pose, untied, axis, *, is_even):
     """Adjust the untied poses to the leaning surface of the module docstring.
 
     Parameters
@@ -221,66 +225,78 @@ def _fitted(poses, sights, pose, untied, axis, *, is_even):
         Root mean square of the hits about the surface, each limited to FAR_SDS of a wall, m.
     """
     z = poses.xyz_m[pose, 2] + sights[:, 2]
-    middle = z.mean()
     order = np.argsort(z, kind="stable")
     level = np.empty(len(z), dtype=int)
     # A gap larger than LEVEL_GAP_M starts a new level.
     level[order] = np.cumsum(np.diff(z[order], prepend=z[order[0]]) > LEVEL_GAP_M)
-    place = {number: i for i, number in enumerate(untied)}
-    free, levels = 3 * len(untied), level.max() + 1
-    settled = np.full(2 * len(SETTLEMENT_MODES), SETTLEMENT_SD_M)
+    levels, free, waves = level.max() + 1, 3 * len(untied), 2 * len(SETTLEMENT_MODES)
+    # Unknowns: changes of x, y and rotation of each pose, shift and lean of the axis, waves of
+    # settlement. The radii of the levels follow from them.
+    lean_from, waves_from, unknowns = free + 2, free + 4, free + 4 + waves
+    above, share_of_height = z - z.mean(), (z - z.min()) / max(np.ptp(z), LEVEL_GAP_M)
     # Priors keep undetermined parameters at their start values without constraining the others.
-    prior = np.diag(np.concatenate([np.ones(free), AXIS_SDS, settled]) ** -2.0)
-    for number, i in place.items():
+    sds = np.concatenate([np.ones(free), AXIS_SDS, np.full(waves, SETTLEMENT_SD_M)])
+    prior = np.diag(sds**-2.0)
+    for i, number in enumerate(untied):
         prior[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] = _prior_weight(
             poses.xyz_m[number, :2] - axis, sights[pose == number], is_even=is_even[i]
         )
-    shift, lean, waves = np.zeros(2), np.zeros(2), np.zeros(2 * len(SETTLEMENT_MODES))
-    xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
-    up = (z - z.min()) / max(np.ptp(z), LEVEL_GAP_M)
-    first, constrained = free + 4, free + 4 + len(waves)
-    moved = np.zeros(constrained)
-    for _ in range(ROUNDS):
-        turned = _turned(sights, zero[pose])
-        away = xyz[pose, :2] + turned - axis - shift - np.outer(z - middle, lean)
+
+    def poses_at(x):
+        changes = x[:free].reshape(-1, 3)
+        xyz, zero = poses.xyz_m.copy(), poses.orientation_rad.copy()
+        xyz[untied, :2] += changes[:, :2]
+        zero[untied] += changes[:, 2]
+        return xyz, zero
+
+    def linearise(x):
+        """Return the distances (n,) of the hits from the surface, and their derivatives."""
+        xyz, zero = poses_at(x)
+        turned = _rotate_sights(sights, zero[pose])
+        away = xyz[pose, :2] + turned - axis - x[free:lean_from]
+        away -= np.outer(above, x[lean_from:waves_from])
         distance = np.hypot(*away.T)
         normal = away / distance[:, None]
-        jacobian = np.zeros((len(z), constrained + levels))
-        for number, i in place.items():
+        jacobian = np.zeros((len(z), unknowns + levels))
+        for i, number in enumerate(untied):
             is_of_pose = pose == number
             jacobian[is_of_pose, 3 * i : 3 * i + 2] = normal[is_of_pose]
             # A rotation of the circle moves a hit perpendicular to its sight.
             across = np.column_stack([turned[is_of_pose, 1], -turned[is_of_pose, 0]])
             jacobian[is_of_pose, 3 * i + 2] = np.sum(normal[is_of_pose] * across, axis=1)
-        jacobian[:, free : free + 2] = -normal
-        jacobian[:, free + 2 : first] = -normal * (z - middle)[:, None]
+        jacobian[:, free:lean_from] = -normal
+        jacobian[:, lean_from:waves_from] = -normal * above[:, None]
         f = np.multiply.outer(np.arctan2(*away.T), SETTLEMENT_MODES)
-        jacobian[:, first:constrained] = -up[:, None] * np.hstack([np.cos(f), np.sin(f)])
-        jacobian[np.arange(len(z)), constrained + level] = -1.0
+        by_waves = -share_of_height[:, None] * np.hstack([np.cos(f), np.sin(f)])
+        jacobian[:, waves_from:unknowns] = by_waves
+        jacobian[np.arange(len(z)), unknowns + level] = -1.0
         # Settlement moves the shell horizontally in proportion to the height, so it is removed
-        # first.
-        round_m = distance + jacobian[:, first:constrained] @ waves
+        # before the radii of the levels are taken.
+        round_m = distance + by_waves @ x[waves_from:]
         radii = np.array([np.median(round_m[level == number]) for number in range(levels)])
-        off = round_m - radii[level]
+        return round_m - radii[level], jacobian
+
+    def step_at(x, _):
+        off, jacobian = linearise(x)
         # Scale from the median absolute deviation, at least that of a wall.
         spread = max(WALL_SD_M, SD_OVER_MEDIAN * float(np.median(np.abs(off))))
         weight = np.minimum(1.0, FAR_SDS * spread / np.maximum(np.abs(off), 1e-12)) / spread**2
         normals = jacobian.T @ (weight[:, None] * jacobian)
-        normals[:constrained, :constrained] += prior
-        rhs = -jacobian.T @ (weight * off)
-        # The prior refers to the start values, so the accumulated change enters the right-hand
-        # side.
-        rhs[:constrained] -= prior @ moved
-        change = np.linalg.solve(normals, rhs)
-        for number, i in place.items():
-            xyz[number, :2] += change[3 * i : 3 * i + 2]
-            zero[number] += change[3 * i + 2]
-        shift += change[free : free + 2]
-        lean += change[free + 2 : first]
-        waves += change[first:constrained]
-        moved += change[:constrained]
-        if np.abs(change[:constrained]).max() < 1e-7:
-            break
+        normals[:unknowns, :unknowns] += prior
+        right = -jacobian.T @ (weight * off)
+        # The prior refers to the start values, hence to x = 0.
+        right[:unknowns] -= prior @ x
+        return np.linalg.solve(normals, right)[:unknowns]
+
+    x = gauss_newton(
+        step_at,
+        np.zeros(unknowns),
+        move=np.add,
+        is_small=lambda step: np.abs(step).max() < 1e-7,
+        most_steps=ROUNDS,
+    )
+    xyz, zero = poses_at(x)
+    off = linearise(x)[0]
     misfit = np.sqrt(np.mean(np.minimum(np.abs(off), FAR_SDS * WALL_SD_M) ** 2))
     return replace(poses, xyz_m=xyz, orientation_rad=zero), float(misfit)
 

@@ -186,22 +186,23 @@ class SolidPart(Part):
 
     def volume_m3(self, levels_m):
         """Return the volume (rows,) below each level."""
-        volume = self.solid.volume_m3(self._of_solid(levels_m))
+        volume = self.solid.volume_m3(self._solid_levels(levels_m))
         if self.form is None:
             return volume
         return volume * self.form.factor(self._shares(levels_m))
 
     def area_m2(self, levels_m):
         """Return the derivative (rows,) of the volume by the level."""
-        area = self.solid.area_m2(self._of_solid(levels_m))
+        area = self.solid.area_m2(self._solid_levels(levels_m))
         if self.form is None:
             return area
-        volume = self.solid.volume_m3(self._of_solid(levels_m))
+        volume = self.solid.volume_m3(self._solid_levels(levels_m))
         return self._formed_area(levels_m, volume, area)
 
     def derivatives(self, levels_m):
         """Return {input: (rows,)}, m3 per SI unit, by measured inputs and temperature."""
-        derivatives = self._formed(levels_m, self.solid.derivatives(self._of_solid(levels_m)))
+        of_solid = self.solid.derivatives(self._solid_levels(levels_m))
+        derivatives = self._form_derivatives(levels_m, of_solid)
         # Measured lengths are multiplied by the temperature factor.
         derivatives |= {
             name: self.scale * derivatives[name] for name in MEASURED if name in derivatives
@@ -213,7 +214,7 @@ class SolidPart(Part):
         if "diameter" in self.surveyed:
             derivatives["offset"] = 2 * derivatives["diameter"]
         if self.read_with:
-            by_survey = self._by_survey(levels_m, derivatives)
+            by_survey = self._survey_derivatives(levels_m, derivatives)
             for name, column in self.read_with.items():
                 derivatives[name] = derivatives.get(name, 0.0) + by_survey @ column
         excluded = {*self.unused, *self.surveyed}
@@ -223,15 +224,15 @@ class SolidPart(Part):
 
     def sources(self, levels_m):
         """Return the sources of uncertainty of the survey of the wall, then those of the solid."""
-        solid_sources = tuple(self.solid.sources(self._of_solid(levels_m)))
+        solid_sources = tuple(self.solid.sources(self._solid_levels(levels_m)))
         if not self.surveyed:
             return solid_sources
         by_solid = self.solid.derivatives(levels_m) if self.form is None else {}
-        by_survey = self._by_survey(levels_m, by_solid)
+        by_survey = self._survey_derivatives(levels_m, by_solid)
         factors = self.factors if self.form is None else self.form.factors
         return (*(factor.source(by_survey @ factor.columns) for factor in factors), *solid_sources)
 
-    def _by_survey(self, levels_m, derivatives):
+    def _survey_derivatives(self, levels_m, derivatives):
         """Return derivatives (rows, f) by the results of the survey.
 
         The results are the volumes at the nodes of the form, or the surveyed inputs of the solid.
@@ -244,21 +245,21 @@ class SolidPart(Part):
     def _stretch(self):
         return 1.0 if self.form is None else self.form.stretch
 
-    def _of_solid(self, levels_m):
+    def _solid_levels(self, levels_m):
         return np.asarray(levels_m, dtype=float) / self._stretch
 
     def _shares(self, levels_m):
-        share, _ = self.solid.height_share(self._of_solid(levels_m))
+        share, _ = self.solid.height_share(self._solid_levels(levels_m))
         return share
 
     def _formed_area(self, levels_m, volume, area):
         """Return the area of the wall, from volume and area of the solid."""
-        shares, by_level = self.solid.height_share(self._of_solid(levels_m))
+        shares, by_level = self.solid.height_share(self._solid_levels(levels_m))
         # Product rule: V = W(L / s) f(share), with s the stretch of the dips.
         slope = self.form.factor_slope(shares) * by_level / self._stretch
         return area * self.form.factor(shares) / self._stretch + volume * slope
 
-    def _formed(self, levels_m, derivatives):
+    def _form_derivatives(self, levels_m, derivatives):
         """Return derivatives of the wall from those of the solid at the corresponding levels.
 
         All lengths times t give the volume t^3 W(d / t): its derivative by the scale is 3 W - d
@@ -266,7 +267,7 @@ class SolidPart(Part):
         """
         if self.form is None:
             return derivatives
-        levels, factor = self._of_solid(levels_m), self.form.factor(self._shares(levels_m))
+        levels, factor = self._solid_levels(levels_m), self.form.factor(self._shares(levels_m))
         volume = self.solid.volume_m3(levels)
         area = self._formed_area(levels_m, volume, derivatives["datum"])
         formed = {name: factor * derivative for name, derivative in derivatives.items()}

@@ -63,7 +63,7 @@ class ShapedBottom(Part):
     def volume_m3(self, levels_m):
         """Return the volume (rows,) of the head below its edge, or minus that above it."""
         levels = as_levels(levels_m)
-        return self._of_tip(levels, self.tip.beyond_m3) if self.tip else 0.0 * levels
+        return self._tip_contribution(levels, self.tip.beyond_m3) if self.tip else 0.0 * levels
 
     def area_m2(self, levels_m):
         """Return the derivative (rows,) of `volume_m3` by the level."""
@@ -86,12 +86,12 @@ class ShapedBottom(Part):
             return derivatives
         for name in self.tip.derivatives(0.0):
             input_name = "bottom_depth" if name == "depth" else name
-            derivatives[input_name] = self._of_tip(
+            derivatives[input_name] = self._tip_contribution(
                 levels, lambda x, name=name: self.tip.derivatives(x)[name]
             )
         return derivatives
 
-    def _of_tip(self, levels, content_beyond):
+    def _tip_contribution(self, levels, content_beyond):
         """Return the contribution of the head at levels, from its content beyond a plane."""
         # Bulging down: content beyond the level. Bulging up: minus the volume that the head
         # occupies.

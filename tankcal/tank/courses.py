@@ -11,7 +11,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from tankcal.geometry.field.estimate import gauss_heights
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 
 @dataclass(frozen=True)

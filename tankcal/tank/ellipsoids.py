@@ -10,9 +10,9 @@ import numpy as np
 
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.tank.hydrostatics import STANDARD_GRAVITY
 from tankcal.tank.lying import levels_inside, require_length
 from tankcal.tank.parts import Solid
+from tankcal.units import STANDARD_GRAVITY
 
 ROUNDS = 60  # iterations of the highest dip; each reduces the error by the strain, about 1e-4
 
@@ -232,16 +232,16 @@ class PressedSphere(Solid):
 
     def volume_m3(self, levels_m):
         """Return the volume (rows,) below each dip."""
-        wider, dips = self._unloaded(levels_m)
+        wider, dips = self._unload(levels_m)
         # Similar spheres: lengths times t give volumes times t^3 at dips divided by t.
         return wider**3 * self.solid.volume_m3(dips)
 
     def area_m2(self, levels_m):
         """Return the derivative (rows,) of the volume by the dip, including its load."""
-        wider, dips = self._unloaded(levels_m)
-        return wider**2 * self.solid.area_m2(dips) + self._by_strain(wider, dips) * self._slope(
-            levels_m
-        )
+        wider, dips = self._unload(levels_m)
+        return wider**2 * self.solid.area_m2(dips) + self._strain_derivatives(
+            wider, dips
+        ) * self._slope(levels_m)
 
     def derivatives(self, levels_m):
         """Return {input: derivative (rows,) of the volume at a fixed dip}.
@@ -250,9 +250,9 @@ class PressedSphere(Solid):
         survey_pressure, liquid_density, survey_density, survey_level. A thicker plate is also
         stiffer.
         """
-        wider, dips = self._unloaded(levels_m)
+        wider, dips = self._unload(levels_m)
         levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
-        loads, by_strain, strain = self.pressure, self._by_strain(wider, dips), wider - 1
+        loads, by_strain, strain = self.pressure, self._strain_derivatives(wider, dips), wider - 1
         head = self._compliance * STANDARD_GRAVITY / (4 * self._radius_m)  # strain per kg/m
         # The strain due to gas is proportional to r; the strain due to a head does not depend on r.
         by_radius = self._compliance * self._gas_pa / self._radius_m
@@ -279,14 +279,14 @@ class PressedSphere(Solid):
             * loads.survey_level_m,
         }
 
-    def _unloaded(self, levels_m):
+    def _unload(self, levels_m):
         """Return relative lengths (rows,) of the loaded sphere, and dips of the surveyed sphere."""
         levels = np.atleast_1d(np.asarray(levels_m, dtype=float))
         levels_inside(levels, self.top_m)
         wider = 1 + self.strain(levels)
         return wider, np.minimum(levels / wider, self.solid.top_m)
 
-    def _by_strain(self, wider, dips):
+    def _strain_derivatives(self, wider, dips):
         """Return the derivative (rows,) of the volume at a fixed dip by the strain."""
         return wider**2 * self.solid.derivatives(dips)["scale"]
 

@@ -195,7 +195,7 @@ class FloatingRoof(Part):
         density not above that of air.
         """
         density = self.reference_density_kg_m3 if density_kg_m3 is None else density_kg_m3
-        return self.mass_kg * self._per_kg(density)
+        return self.mass_kg * self._displacement_per_kg(density)
 
     def density_correction_m3(self, observed_kg_m3):
         """Return the correction of a volume read from the table for the observed density.
@@ -220,7 +220,7 @@ class FloatingRoof(Part):
 
     def derivatives(self, levels_m):
         """Return {"roof_mass": (rows,)}, m3 per kg; the heights are dips and move with the zero."""
-        by_mass = -self._per_kg(self.reference_density_kg_m3) * self._afloat(levels_m)
+        by_mass = -self._displacement_per_kg(self.reference_density_kg_m3) * self._afloat(levels_m)
         return {"roof_mass": by_mass}
 
     def _afloat(self, levels_m):
@@ -229,7 +229,7 @@ class FloatingRoof(Part):
         levels = as_levels(levels_m)
         return np.clip((levels - low) / (high - low), 0.0, 1.0)
 
-    def _per_kg(self, density):
+    def _displacement_per_kg(self, density):
         """Return the displaced volume per kg of the weighed mass."""
         # Without air buoyancy the formula reduces to M / rho.
         air = AIR_KG_M3 if self.weighing == "air" else 0.0

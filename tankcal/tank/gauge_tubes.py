@@ -86,7 +86,7 @@ class GaugeTube:
 
     def depth_m(self, dips_m):
         """Return depths (rows,) above the lowest point of the section."""
-        return self.radius_m + self._over_axis(dips_m)
+        return self.radius_m + self._heights_over_axis(dips_m)
 
     def derivatives(self, dips_m):
         """Return {input: derivative of the depth at a fixed dip}.
@@ -101,7 +101,7 @@ class GaugeTube:
             "tube_offset": self.offset_m / self.foot_m * cos - sin,
         }
 
-    def _over_axis(self, dips_m):
+    def _heights_over_axis(self, dips_m):
         """Return heights (rows,) of the liquid above the axis."""
         sin, cos = np.sin(self.angle_rad), np.cos(self.angle_rad)
         return (dips_m - self.foot_m) * cos - self.offset_m * sin

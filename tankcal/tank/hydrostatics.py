@@ -31,8 +31,8 @@ from tankcal.quadrature import height_polynomials
 from tankcal.tank.courses import CourseShape, gauss_levels
 from tankcal.tank.parts import Part, as_levels
 from tankcal.tank.volumes import ShellVolume
+from tankcal.units import STANDARD_GRAVITY
 
-STANDARD_GRAVITY = 9.80665  # m/s2
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact to degree seven
 INPUTS = (
     "datum",
@@ -144,7 +144,8 @@ class LiquidHead(Part):
             )
         place = np.searchsorted([hoop.course.bottom_m for hoop in self.hoops], levels, "right") - 1
         sums = np.zeros((1 + len(INPUTS), len(levels)))
-        for index, (hoop, lower_courses) in enumerate(zip(self.hoops, self._below, strict=True)):
+        courses = zip(self.hoops, self._lower_courses, strict=True)
+        for index, (hoop, lower_courses) in enumerate(courses):
             rows = np.flatnonzero(place == index)
             course_levels = levels[rows]
             values = _integrate_load(
@@ -153,7 +154,7 @@ class LiquidHead(Part):
                 course_levels,
                 np.minimum(course_levels, shell) if self.headroom_m else course_levels,
             )
-            values[1] += _at_surface(self, hoop, course_levels) * (
+            values[1] += _girth_at_surface(self, hoop, course_levels) * (
                 (course_levels < shell) | (self.headroom_m == 0)
             )
             # Courses below contribute a quadratic polynomial of the level.
@@ -165,7 +166,7 @@ class LiquidHead(Part):
         return sums
 
     @cached_property
-    def _below(self):
+    def _lower_courses(self):
         """Coefficients (1 + inputs, 3) of the contribution of the courses below each course.
 
         The contribution is quadratic in the level, so three levels determine it.
@@ -369,7 +370,7 @@ def _integrate_load(head, hoop, levels, ends):
     return np.array([volume, *(derivatives_by[name] for name in INPUTS)])
 
 
-def _at_surface(head, hoop, levels):
+def _girth_at_surface(head, hoop, levels):
     """Return girth d + pi d^2 (rows,) at each level, where only the unloading acts."""
     survey_depth = np.maximum(head.survey_level_m - levels, 0)
     widening = -hoop.compliance * head.survey_density_kg_m3 * survey_depth

@@ -15,7 +15,7 @@ from tankcal.uncertainty import Source
 class MeasuredBottom(Part):
     """Lowest zone of a tank, measured with liquid; it replaces all parts in that zone.
 
-    All other parts count only above `highest_m` (`Above`). The measured volumes already contain
+    All other parts count only above `highest_m` (`PartAbove`). The measured volumes already contain
     shell, deadwood and head of that zone, and their uncertainty replaces that of these parts.
 
     levels_m    (n,) ascending
@@ -52,12 +52,12 @@ class MeasuredBottom(Part):
         Interpolation between dips is by monotone cubics (Fritsch & Carlson 1980). Raises
         HeightError below the lowest dip, unless the tank is empty there.
         """
-        return self.curve(self._measured(levels_m))
+        return self.curve(self._limit_levels(levels_m))
 
     def area_m2(self, levels_m):
         """Return the derivative (rows,) of `volume_m3` by the level; 0 from `highest_m` up."""
         inside = (as_levels(levels_m) >= self.levels_m[0]) & (as_levels(levels_m) < self.highest_m)
-        return np.where(inside, self.curve(self._measured(levels_m), 1), 0.0)
+        return np.where(inside, self.curve(self._limit_levels(levels_m), 1), 0.0)
 
     def derivatives(self, levels_m):
         """Return no derivatives: volumes refer to dips, wherever the zero of the table is."""
@@ -70,7 +70,7 @@ class MeasuredBottom(Part):
         lines, with a rectangular distribution. Above `highest_m`, all rows share the error of the
         last volume.
         """
-        levels = self._measured(levels_m)
+        levels = self._limit_levels(levels_m)
         errors = [np.interp(levels, self.levels_m, column) for column in self.errors_m3.T]
         # Distance of the curve from straight lines between the measured volumes.
         bend = self.curve(levels) - np.interp(levels, self.levels_m, self.volumes_m3)
@@ -81,7 +81,7 @@ class MeasuredBottom(Part):
             ),
         )
 
-    def _measured(self, levels_m):
+    def _limit_levels(self, levels_m):
         """Return the levels limited to the zone."""
         levels, lowest = as_levels(levels_m), self.levels_m[0]
         if self.volumes_m3[0] > 0 and not np.all(levels >= lowest):
@@ -171,7 +171,7 @@ def measured_bottom(levels_m, volumes_m3, u_m3=None):
 
 
 @dataclass(frozen=True)
-class Above(Part):
+class PartAbove(Part):
     """Another part of the tank above a level: P(L) - P(level) for L above the level, else 0.
 
     Its derivatives and sources are reduced likewise, so that errors of the replaced zone cancel.

@@ -173,7 +173,7 @@ class RingedTank(LyingSolid):
             "ring_radii": by_radii,
             "dip_radius": -surface,
             "ring_waves": (waves + zero[:, :, None]).reshape(len(surface), -1),
-            "ring_lengths": self._by_lengths(levels, by_ring[0], surface_of_b),
+            "ring_lengths": self._length_derivatives(levels, by_ring[0], surface_of_b),
             "ring_axes": -by_ring[0] - zero,
             "end_depth": by_depth,
             "dish": by_dish,
@@ -186,7 +186,7 @@ class RingedTank(LyingSolid):
             "scale": 3 * volume - levels * datum,
         }
 
-    def _by_lengths(self, levels, surface, of_end_b):
+    def _length_derivatives(self, levels, surface, of_end_b):
         """Return derivatives (rows, rings) by the length of each ring.
 
         surface (rows, rings) includes the ends; of_end_b (rows,) is the surface of end B alone

@@ -175,7 +175,7 @@ class LyingTank(LyingSolid):
         datum = squeeze * self._depth_slope * surface
         by_squeeze = stretch * levels * surface - tilt * moment
         by_tube = self._tube.derivatives(stretch * levels)
-        radius_by, squeeze_by = self._by_diameter
+        radius_by, squeeze_by = self._diameter_derivatives
         # A larger radius lowers the bottom, where dips begin: the surface falls relative to the
         # axis.
         by_radius = by_radius - (1 - by_tube["radius"]) * surface
@@ -244,7 +244,7 @@ class LyingTank(LyingSolid):
         return self._radius_m / self._half_height_m
 
     @property
-    def _by_diameter(self):
+    def _diameter_derivatives(self):
         """Derivatives of the radius of the round tank and of the squeeze by width and height."""
         sin2, cos2 = np.sin(self.roll_rad) ** 2, np.cos(self.roll_rad) ** 2
         # Derivative of sqrt(w h) / 2 for equal changes of w and h.

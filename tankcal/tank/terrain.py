@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FULL_TURN = 2 * np.pi
+from tankcal.units import FULL_TURN
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,7 @@ class Tip:
             return np.pi * s**2 * (self._sphere_m - s / 3)
         if self.form == "ellipsoidal":
             return plan * s**2 * (1 / h - s / (3 * h**2))
-        return self._revolved(x_m, _square)
+        return self._integrate_revolution(x_m, _square)
 
     def area_m2(self, x_m):
         """Return the area (rows,) of the cut at each x."""
@@ -98,7 +98,7 @@ class Tip:
         names = {"radius": "scale", "end_depth": "depth"} | dict(zip(RADII, RADII, strict=True))
         available = {name for arc in self._arcs for name in arc.by_input}
         derivatives = {
-            input_name: self._revolved(x_m, partial(_square_by, name=name))
+            input_name: self._integrate_revolution(x_m, partial(_square_by, name=name))
             for name, input_name in names.items()
             if name in available
         }
@@ -125,7 +125,7 @@ class Tip:
     def _arcs(self):
         return meridian(self.end, self._radius_m)
 
-    def _revolved(self, x_m, integrand):
+    def _integrate_revolution(self, x_m, integrand):
         """Return integrals over the head beyond x, shape of x_m."""
         rows = np.atleast_1d(np.asarray(x_m, dtype=float))
         parts = [revolved(arc, _parameter(arc, rows), [integrand])[0] for arc in self._arcs]

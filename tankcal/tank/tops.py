@@ -68,7 +68,7 @@ class HeadedShell(Part):
         shell_levels, x = self._split(levels_m)
         in_head, cut_m2 = as_levels(levels_m) >= self.base_m, self.tip.area_m2(x)
         derivatives = self.shell.derivatives(shell_levels)
-        plan, by_tip = self.tip.plan_m2, self._of_tip(x)
+        plan, by_tip = self.tip.plan_m2, self._tip_derivatives(x)
         # The plan grows with the square of its scale.
         by_plan = by_tip.pop("scale") / (2 * plan)
         for name, by_input in self._plan_by().items():
@@ -88,7 +88,7 @@ class HeadedShell(Part):
             by_stretch = (by_heights + by_lift * self.base_m) / self.shell.stretch
             for name in MOVED_BY_HEIGHT:
                 if name in derivatives:
-                    derivatives[name] = derivatives[name] + self._warmed_by(name) * by_stretch
+                    derivatives[name] = derivatives[name] + self._thermal_growth(name) * by_stretch
         derivatives |= {
             "top_depth" if name == "depth" else name: derivative
             for name, derivative in by_tip.items()
@@ -101,7 +101,7 @@ class HeadedShell(Part):
         if not factors:
             return ()
         shell_levels, x = self._split(levels_m)
-        by_plan = self._of_tip(x)["scale"] / (2 * self.tip.plan_m2)
+        by_plan = self._tip_derivatives(x)["scale"] / (2 * self.tip.plan_m2)
         weights = self.shell.volume.top_weights
         return tuple(
             factor.source(source.columns_m3 + by_plan[:, None] * (weights @ factor.columns))
@@ -124,7 +124,7 @@ class HeadedShell(Part):
         x = np.clip(levels - self.base_m, 0.0, self.tip.depth_m)
         return np.minimum(levels, self.base_m), x
 
-    def _of_tip(self, x):
+    def _tip_derivatives(self, x):
         """Return {input of the tip: derivative (rows,) of the volume of the head below x}."""
         complete, remaining = self.tip.derivatives(np.zeros(1)), self.tip.derivatives(x)
         return {name: complete[name] - remaining[name] for name in complete}
@@ -153,7 +153,7 @@ class HeadedShell(Part):
             "tilt": self.tip.plan_m2 * shell.tilt / (1 + shell.tilt**2),
             "plate_thickness": -girth * shell.subtracts,
             "paint": -girth * shell.subtracts,
-            **{name: self._warmed_by(name) * scale for name in MOVED_BY_HEIGHT},
+            **{name: self._thermal_growth(name) * scale for name in MOVED_BY_HEIGHT},
             **departures,
         }
         derivatives = {
@@ -165,7 +165,7 @@ class HeadedShell(Part):
             derivatives[name] = derivatives.get(name, 0.0) + derivative
         return derivatives
 
-    def _warmed_by(self, name):
+    def _thermal_growth(self, name):
         """Return the growth of lengths by the temperature of the shell, or by its coefficient."""
         shell = self.shell
         if name == "shell_temperature":

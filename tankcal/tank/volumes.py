@@ -48,7 +48,7 @@ class ShellVolume:
     @property
     def joint_steps_m2(self):
         """Area just below each joint less the area just above it, shape (courses - 1,)."""
-        polynomials = self._by_height(self.features)
+        polynomials = self._course_polynomials(self.features)
         return np.array([below.sum() - above[0] for below, above in pairwise(polynomials)])
 
     @property
@@ -108,7 +108,7 @@ class ShellVolume:
         result = np.empty((columns.shape[1], len(heights)))
         below = np.zeros(columns.shape[1])
         divisors = np.arange(1.0, LEVELS + 1)[:, None]
-        for course, rows, polynomial in self._by_course(heights, columns):
+        for course, rows, polynomial in self._rows_by_course(heights, columns):
             # Primitive of sum a_k t^k: height times a_k / (k + 1), above the sum of the courses
             # below.
             primitive = np.concatenate([below[None], course.height_m * polynomial / divisors])
@@ -132,7 +132,7 @@ class ShellVolume:
         """Return the inside area (rows,) at each height; at a joint, of the upper course."""
         heights = self._inside(heights_m)
         area = np.empty(len(heights))
-        for course, rows, polynomial in self._by_course(heights, self.features):
+        for course, rows, polynomial in self._rows_by_course(heights, self.features):
             t = (heights[rows] - course.bottom_m) / course.height_m
             area[rows] = np.polynomial.polynomial.polyval(t, polynomial)
         return area
@@ -187,14 +187,14 @@ class ShellVolume:
         radii = [np.sqrt(course.areas_m2 / np.pi) for course in self.courses]
         return np.array([-1.5 * 2.5 * np.sum(weights * parabola * radius) for radius in radii])
 
-    def _by_height(self, features):
+    def _course_polynomials(self, features):
         """Return, for each course, coefficients of sum l_i(t) features_i by powers of t."""
         return [
             _height_polynomials() @ features[start : start + LEVELS]
             for start in range(0, len(features), LEVELS)
         ]
 
-    def _by_course(self, heights, features):
+    def _rows_by_course(self, heights, features):
         """Return (course, its rows, polynomial) for each course.
 
         The rows are those whose height is in the course, at a joint in the upper course; a slice if
@@ -206,7 +206,7 @@ class ShellVolume:
         else:
             place = np.searchsorted(self.joints_m, heights, side="right")
             rows = [place == index for index in range(len(self.courses))]
-        return zip(self.courses, rows, self._by_height(features), strict=True)
+        return zip(self.courses, rows, self._course_polynomials(features), strict=True)
 
     def _inside(self, heights_m):
         """Return heights (rows,) as an array; raise HeightError outside the shell."""

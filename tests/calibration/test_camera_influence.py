@@ -27,8 +27,8 @@ from tankcal.errors import InputError
 from tankcal.geometry.rotations import rotation_of_angles, rotation_vector
 from tankcal.job.model import Job, Material
 from tankcal.record.adjustment import adjustment_of
-from tankcal.record.camera_influence import as_json
-from tankcal.record.plain_data import to_plain
+from tankcal.record.camera_influence import plain_influence
+from tankcal.record.schema import to_plain
 from tankcal.survey.measurements import (
     AdjustmentSettings,
     CameraSetup,
@@ -248,7 +248,7 @@ def test_a_calibration_without_sds_is_not_weighted():
     ]
     assert found.runs[2].skipped == "no_sds"
     assert found.runs[4].held == ("K1", "K2", "P1", "P2", "A", "B")
-    assert as_json(found)["runs"][2]["skipped"] == {"code": "no_sds"}
+    assert plain_influence(found)["runs"][2]["skipped"] == {"code": "no_sds"}
 
 
 @pytest.mark.slow
@@ -258,7 +258,7 @@ def test_a_run_that_fails_is_a_result():
     assert [run.outcome for run in found.runs] == ["adjusted", "adjusted", "failed"]
     assert "c of own and the places of" in found.runs[2].message
     assert [(one.one, one.other) for one in found.pairs] == [(0, 1)]
-    written = as_json(found)
+    written = plain_influence(found)
     json.dumps(written, allow_nan=False)
     assert written["runs"][2]["message"] == found.runs[2].message
     assert written["runs"][2]["shifts"] is None
@@ -396,7 +396,7 @@ def test_a_long_camera_moves_back(of_tank):
 
 
 def test_the_json_holds_every_run_and_pair(of_tank):
-    found = as_json(of_tank[0])
+    found = plain_influence(of_tank[0])
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert (found["kind"], len(found["runs"]), len(found["pairs"])) == ("influence", 5, 10)
     assert found["runs"][0]["shifts"] is None
@@ -523,8 +523,8 @@ def test_blunders_are_searched_once(with_blunders):
     }
     assert not fixed.block.test.passed
     assert reference.volume is None
-    assert len(as_json(found)["search"]["removed"]) == 3
-    json.dumps(as_json(found), allow_nan=False)
+    assert len(plain_influence(found)["search"]["removed"]) == 3
+    json.dumps(plain_influence(found), allow_nan=False)
 
 
 def removed(ids, file, row, repeats=1, element=""):

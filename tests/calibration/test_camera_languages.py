@@ -124,7 +124,7 @@ def test_numbers_have_the_marks_of_the_language(result, language, tmp_path):
 
 @pytest.mark.parametrize(("language", "count"), [("en", "1610"), ("pt-BR", "1.610")])
 def test_counts_have_the_marks_of_the_language(language, count):
-    result = stability_json.as_json(compare(sets(("a", "b")), "spr"))
+    result = stability_json.plain_stability(compare(sets(("a", "b")), "spr"))
     text = " ".join(" ".join(camera_papers.lines(result, language)).split())
     assert f"n = {count} " in text
     assert ("(300; 300; 450)" if language == "pt-BR" else "(300, 300, 450)") in text

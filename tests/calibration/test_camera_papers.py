@@ -137,7 +137,7 @@ def test_lines_of_a_comparison(stability):
 
 def test_two_sets_need_no_matrix():
     found = compare(sets(("a", "b")), "zrot", grid=SMALL, as_published=True)
-    lines = camera_papers.lines(stability_json.as_json(found))
+    lines = camera_papers.lines(stability_json.plain_stability(found))
     text = text_of(lines)
     assert "The two sets are similar" in text
     assert "rows: later set" not in text
@@ -204,7 +204,7 @@ def test_lines_of_a_product(product):
 
 def test_product_of_one_point_is_reported():
     found = check_product(np.array([[0.001, 0.002, 0.003]]), limits=shipped_limits())
-    text = text_of(camera_papers.lines(product_json.as_json(found)))
+    text = text_of(camera_papers.lines(product_json.plain_product(found)))
     assert "no test is possible" in text
 
 

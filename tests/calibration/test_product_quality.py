@@ -13,7 +13,7 @@ from tankcal.calibration.product.check import check_product, chi2_limit, t_limit
 from tankcal.calibration.product.differences import collect_differences, read_differences
 from tankcal.calibration.product.limits import Limit, LimitTable, read_limits, shipped_limits
 from tankcal.errors import InputError
-from tankcal.record.camera_product import as_json
+from tankcal.record.camera_product import plain_product
 from tankcal.record.camera_versions import FORMAT
 from tankcal.survey.results import CheckPoints
 
@@ -189,7 +189,9 @@ def test_axes_that_are_not_known_are_reported():
     assert [one.n for one in found.checks] == [0, 0, 12]
     assert ("no_plan", 0) in found.notes
     assert {one.part for one in found.verdicts} == {"height"}
-    assert json.loads(json.dumps(as_json(found), allow_nan=False))["axes"][0]["mean_m"] is None
+    assert (
+        json.loads(json.dumps(plain_product(found), allow_nan=False))["axes"][0]["mean_m"] is None
+    )
 
 
 def test_points_of_one_part_only_still_count_there():
@@ -214,7 +216,7 @@ def test_too_few_points_are_reported(n, codes):
     d = np.random.default_rng(1).normal(0, 0.1, (n, 3))
     found = check_product(d, limits=shipped_limits())
     assert {code for code, _ in found.notes} == codes
-    json.dumps(as_json(found), allow_nan=False)
+    json.dumps(plain_product(found), allow_nan=False)
 
 
 def test_one_point_cannot_be_tested():
@@ -252,7 +254,7 @@ def test_nonsense_is_refused(call, match):
 def test_no_points_at_all():
     found = check_product(np.zeros((0, 3)), limits=shipped_limits())
     assert found.verdicts == ()
-    json.dumps(as_json(found), allow_nan=False)
+    json.dumps(plain_product(found), allow_nan=False)
 
 
 # limit tables of one's own
@@ -402,7 +404,7 @@ def test_differences_of_adjustment_and_record_agree():
 
 def test_json_agrees_with_the_check():
     d = np.column_stack([scattered(20, 0.4, 0.05), scattered(20, 0, 0.05, 1)])
-    found = as_json(check_product(d, ("x", "y"), limits=shipped_limits()))
+    found = plain_product(check_product(d, ("x", "y"), limits=shipped_limits()))
     assert (found["format"], found["kind"]) == (FORMAT, "product")
     first = next(one for one in found["best"] if one["scale"] == "1000")
     assert (first["grade"], first["grade_unbiased"]) == ("C", "A")

@@ -12,9 +12,9 @@ from generated_columns import make_scene
 from generated_seams import SHAPES, Ladder, Pipe, Seam, put_before, scan_of, wall_of
 from generated_walls import job_of, survey
 
-from tankcal.geometry.columns import find_columns
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.field.hidden_seams import hidden_seams_m
+from tankcal.geometry.patches import find_columns
 from tankcal.geometry.shell import UNDECIDED
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.undecided_columns import factors_of_undecided

@@ -8,7 +8,12 @@ from generated_walls import job_of, make_wall, survey
 from jacobians import assert_derivative
 
 import tankcal.pipeline.wall as pipeline_wall
-from tankcal.geometry.field.amplitudes import Amplitudes, assumed_amplitudes, estimate_amplitudes
+from tankcal.geometry.field.amplitudes import (
+    Amplitudes,
+    assumed_amplitudes,
+    estimate_amplitudes,
+    likelihood_of,
+)
 from tankcal.geometry.field.cells import cells_of, sites_of_cells
 from tankcal.geometry.field.components import (
     COMPONENTS,
@@ -20,9 +25,8 @@ from tankcal.geometry.field.components import (
     seam_correlation,
 )
 from tankcal.geometry.field.estimate import LEVELS, WallField, gauss_heights
-from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.hidden_seams import hidden_covariance_m2, hidden_seams_m
-from tankcal.geometry.field.misfit import Misfit
+from tankcal.geometry.field.likelihood import Misfit
 from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall

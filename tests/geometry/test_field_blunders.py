@@ -10,17 +10,20 @@ from generated_walls import make_wall, survey
 from test_field import RADIUS_M, sites_of
 
 from tankcal.geometry.clutter import find_rings
-from tankcal.geometry.field.amplitudes import assumed_amplitudes
-from tankcal.geometry.field.blunders import against_others, find_blunders, restricted_precision
+from tankcal.geometry.field.amplitudes import assumed_amplitudes, likelihood_of
+from tankcal.geometry.field.blunders import (
+    Precision,
+    find_blunders,
+    judge_by_others,
+    restricted_precision,
+)
 from tankcal.geometry.field.components import (
     COMPONENTS,
     azimuth_correlations,
     seam_correlation,
 )
 from tankcal.geometry.field.covariances import Covariances
-from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, MIRRORED, invert
-from tankcal.geometry.field.precision import Precision
 from tankcal.geometry.field.sites import Sites, free_design
 
 STEP = 1e-4  # of a logarithm, in differences
@@ -194,7 +197,7 @@ def test_half_an_inverse_tests_as_the_whole_one():
         accepted = ~np.isin(np.arange(size), gone)
         assert half[:, gone] == pytest.approx(other[:, gone], abs=1e-9 * largest)
         assert half[np.ix_(gone, gone)] == pytest.approx(other[np.ix_(gone, gone)], rel=1e-6)
-        one, two = (against_others(each, each @ radius, accepted) for each in (half, other))
+        one, two = (judge_by_others(each, each @ radius, accepted) for each in (half, other))
         assert one.w == pytest.approx(two.w, rel=1e-6, abs=1e-9)
 
 
@@ -208,7 +211,7 @@ def test_a_departure_is_from_the_wall_that_all_others_show():
     accepted = np.ones(len(sites), dtype=bool)
     accepted[[3, 4, 40]] = False
     precision = restricted_precision(whole.copy(), design)
-    found = against_others(precision, precision @ (radius - RADIUS_M), accepted)
+    found = judge_by_others(precision, precision @ (radius - RADIUS_M), accepted)
     for one in (0, 3, 4, 17, 40, 80):
         others = accepted.copy()
         others[one] = False
@@ -288,7 +291,7 @@ def test_points_of_a_course_that_was_set_aside_are_compared_with_each_other():
     precision = restricted_precision(covariance, free_design(sites)[0])
     radius = 1e-3 * rng.normal(size=len(sites))
     moved = radius + gone * (0.3 + 0.02 * np.sin(sites.azimuth_rad))
-    found, other = (against_others(precision, precision @ one, ~gone) for one in (radius, moved))
+    found, other = (judge_by_others(precision, precision @ one, ~gone) for one in (radius, moved))
     assert other.departure_m == pytest.approx(found.departure_m, abs=1e-8)
     assert np.all(np.abs(found.w[gone]) < 4)
     assert np.all(found.sd_m[gone] < 0.01)

@@ -82,7 +82,7 @@ def test_values_and_their_doubt_by_conditioning():
         np.testing.assert_allclose(found.value_m, expected, atol=2e-6)
         rows = sums_of(count, len(found.value_m), rng)
         own = np.einsum("rn,rn->r", *2 * [rows @ found.weights @ np.sqrt(field.noise_m2)])
-        own += found.unseen_of(scipy.sparse.csr_array(rows)).sum(axis=0)
+        own += found.undetermined_variances(scipy.sparse.csr_array(rows)).sum(axis=0)
         expected = np.einsum("rf,rf->r", rows @ doubt, rows)
         np.testing.assert_allclose(np.sqrt(own), np.sqrt(expected), rtol=2e-3)
 

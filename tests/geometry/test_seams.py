@@ -20,7 +20,7 @@ from generated_seams import (
 )
 from generated_walls import job_of
 
-from tankcal.geometry.seams import find_seams
+from tankcal.geometry.patches import find_seams
 from tankcal.geometry.shell import find_shell
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall

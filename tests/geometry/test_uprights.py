@@ -15,7 +15,7 @@ from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.field.blunders import find_blunders, restricted_precision
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.sites import free_design
-from tankcal.geometry.field.uprights import _eliminated, _jump, find_uprights
+from tankcal.geometry.field.uprights import _eliminate, _jump, find_uprights
 from tankcal.geometry.shell import UNDECIDED
 
 POINTS, NOISE_M = 24, 1e-3
@@ -30,7 +30,7 @@ def test_the_jump_is_an_unknown_more_in_the_adjustment():
     aside, design = np.array([0, 7]), free_design(sites)[0]
     reading = rng.multivariate_normal(np.zeros(len(sites)), covariance)
     precision = restricted_precision(covariance, design)
-    found = _jump(*_eliminated(precision, precision @ reading, aside), column)
+    found = _jump(*_eliminate(precision, precision @ reading, aside), column)
 
     kept = np.delete(np.arange(len(sites)), aside)
     more = np.column_stack([design, np.isin(np.arange(len(sites)), column)])[kept].astype(float)

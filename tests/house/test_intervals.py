@@ -16,8 +16,8 @@ from tankcal.gum.monte_carlo import Verdict
 from tankcal.job import StatedVolume
 from tankcal.pipeline.simulation.intervals import gum_intervals, judged_intervals
 from tankcal.record import record_of, save
-from tankcal.record.plain_data import to_plain
-from tankcal.record.statements import budgets_of
+from tankcal.record.schema import to_plain
+from tankcal.record.table import budgets_of
 from tankcal.report import workbook
 from tankcal.report.outputs.tables import write_tables
 from tankcal.text.display import volume_text

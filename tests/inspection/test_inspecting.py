@@ -15,7 +15,8 @@ from tankcal.inspection.inspecting import Asked, inspect_files
 from tankcal.inspection.rules import find_rule, parse_rule
 from tankcal.job.tables import Log
 from tankcal.record import record_of, save
-from tankcal.record.inspection import CHECKS, plain_of_inspection
+from tankcal.record.inspection import CHECKS
+from tankcal.record.schema import to_plain
 
 LEVELLED = EXAMPLE.parent / "inspection"
 OF_WALL = CHECKS[:5]
@@ -174,7 +175,7 @@ def test_foreign_folders_are_left_alone(tmp_path, capsys):
 def test_json_is_what_is_saved(capsys, kept):
     assert main(["inspect", str(kept), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    expected = plain_of_inspection(inspect_files(Asked(kept)))
+    expected = to_plain(inspect_files(Asked(kept)))
     assert {key: found[key] for key in expected} == json.loads(json.dumps(expected))
 
 

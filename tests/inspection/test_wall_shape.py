@@ -13,7 +13,7 @@ from tankcal.inspection.shape import Sizes, inspect_shape, spread_of
 from tankcal.inspection.verdict import make_check, verdict_of
 from tankcal.pipeline.wall import find_wall
 from tankcal.pipeline.wall_shape import LOW_M, wall_shape_of
-from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import to_plain
 from tankcal.record.wall_shape import shape_record
 
 LEAN_OF_PAGE = (2.10e-3, -1.30e-3)

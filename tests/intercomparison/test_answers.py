@@ -11,7 +11,8 @@ from tankcal.errors import InputError
 from tankcal.intercomparison.answers import read_answers
 from tankcal.intercomparison.scoring import score_folders
 from tankcal.job.tables import Log
-from tankcal.record.intercomparison import ANSWERS, SCORES, plain_of
+from tankcal.record.intercomparison import ANSWERS, SCORES
+from tankcal.record.schema import to_plain
 
 
 @pytest.fixture
@@ -23,7 +24,7 @@ def world(tmp_path):
 
 
 def scored(world, *folders):
-    return plain_of(score_folders(folders or [world["folder"]], world["truth"]))
+    return to_plain(score_folders(folders or [world["folder"]], world["truth"]))
 
 
 def asked_of(manifest):
@@ -65,7 +66,7 @@ def test_brazilian_spreadsheets(world):
 
 
 def test_answers_as_json(world):
-    from tankcal.record.plain_data import to_plain
+    from tankcal.record.schema import to_plain
 
     folder = world["tmp"] / "json"
     folder.mkdir()
@@ -191,7 +192,7 @@ def test_a_filled_form_is_scored(world):
     lambda one: one.update(format="other/1"),
 ])  # fmt: skip
 def test_bad_json_is_told(world, spoil):
-    from tankcal.record.plain_data import to_plain
+    from tankcal.record.schema import to_plain
 
     folder = world["tmp"] / "json"
     folder.mkdir()

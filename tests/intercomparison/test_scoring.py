@@ -12,7 +12,8 @@ from tankcal.intercomparison.scoring import (
     score_table,
     share_within,
 )
-from tankcal.record.intercomparison import Answer, plain_of
+from tankcal.record.intercomparison import Answer
+from tankcal.record.schema import to_plain
 
 HEIGHTS = [1.0, 1.01, 1.1, 3.0]
 TRUE = {
@@ -61,7 +62,7 @@ def test_order_of_the_rows_is_free():
     other = score_table(
         0, answer([300.6, 110.2, 100.3, 101.3], heights=[3.0, 1.1, 1.0, 1.01]), TRUE
     )
-    assert plain_of(first) == plain_of(other)
+    assert to_plain(first) == to_plain(other)
 
 
 def test_form_by_hand():

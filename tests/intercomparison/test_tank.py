@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose
 from tankcal.intercomparison.defects import Band, Buckle, Course, Dent, Flat, Oval, Seam
 from tankcal.intercomparison.drawing import FAMILIES, draw_tank
 from tankcal.intercomparison.site import request_table
-from tankcal.intercomparison.tank import GRAVITY, Fitting, Floor, Tank, Wave, tank_of
+from tankcal.intercomparison.tank import Fitting, Floor, Tank, Wave, tank_of
+from tankcal.units import STANDARD_GRAVITY
 
 LEVEL = Floor()
 
@@ -40,7 +41,7 @@ EVERYTHING = (
 def test_a_cylinder():
     """Closed form: a cylinder with a head is pi (R + w)^2, w linear in the depth of each course."""
     tank, rho, dip = make_tank(), 850.0, 5.0
-    expected, soft = 0.0, rho * GRAVITY * 49.0 / 206e9
+    expected, soft = 0.0, rho * STANDARD_GRAVITY * 49.0 / 206e9
     for low, high, plate in ((0, 2, 0.010), (2, 4, 0.008), (4, 5, 0.006)):
         a, b = soft / plate * (dip - low), soft / plate * (dip - high)
         mean_square = (a * a + a * b + b * b) / 3
@@ -91,7 +92,7 @@ def test_volume_by_many_points(density):
     total = 0.0
     for one in z:
         plate = tank.plates_m[int(tank.course_at(one))]
-        out = density * GRAVITY * (dip - one) * 49.0 / (206e9 * plate)
+        out = density * STANDARD_GRAVITY * (dip - one) * 49.0 / (206e9 * plate)
         total += np.mean((tank.radii_m(azimuth, one) + out) ** 2) * np.pi * dip / count
     assert_allclose(tank.volumes_m3(dip, density), total, rtol=2e-6)
 

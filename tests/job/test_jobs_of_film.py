@@ -15,10 +15,10 @@ from survey_builder import read_on_comparator, survey_parts
 
 import tankcal
 from tankcal.job import load
+from tankcal.record.adjusted import fiducials_of
 from tankcal.record.adjustment import adjustment_of
-from tankcal.record.images import fiducials_of
-from tankcal.record.plain_data import to_plain
-from tankcal.report.survey.images import images
+from tankcal.record.schema import to_plain
+from tankcal.report.survey.results import image_coordinates
 from tankcal.survey.network_of_survey import gather
 from tankcal.text.words import load_words
 
@@ -475,7 +475,7 @@ def test_the_working_papers_show_readings_and_marks(tmp_path):
             [one.heading or one.key for one in columns],
         ),
     )
-    found = {block[0]: block for block in images(paper)}
+    found = {block[0]: block for block in image_coordinates(paper)}
     assert list(found) == ["repeated_readings", "rejected_readings", "fiducials", "depth_of_field"]
     assert len(found["fiducials"][1]) == 11
     worst = [row["largest_um"] for row in found["fiducials"][1]]

@@ -544,5 +544,10 @@ def test_the_examples_load(name):
 
 
 def test_rules_of_liquid_that_are_not_verified_say_so():
-    unverified = {one.codes[0] for one in TABLE if not one.verified}
-    assert unverified == {"tank_temperature_jumps", "meter_drifted", "flow_out_of_range"}
+    unverified = {rule.codes[0] for rule in TABLE if not rule.verified}
+    of_lines = {"too_small_for_lines"}
+    assert unverified - of_lines == {
+        "tank_temperature_jumps",
+        "meter_drifted",
+        "flow_out_of_range",
+    }

@@ -23,7 +23,7 @@ from tankcal.clouds.wall.surfaces import CylinderSurface
 from tankcal.job.model.parts import Bottom
 from tankcal.pipeline.cloud_bottom import CloudInside, with_bottom
 from tankcal.record import record_of
-from tankcal.record.schema import checked
+from tankcal.record.schema import check_data
 from tankcal.record.versions import RECORD
 from tankcal.survey.registration import register
 from tankcal.survey.scans import ScanSetup
@@ -91,7 +91,7 @@ def test_a_post_and_the_roof_are_told_and_not_taken_off(run, tmp_path):
     assert any(one.startswith("clouds.toml: a roof is seen") for one in told)
     assert not any("as in a mirror" in one for one in told)
     record = record_of(found)
-    assert checked(record, RECORD.schema(), "record.json") == ([], [])
+    assert check_data(record, RECORD.schema(), "record.json") == ([], [])
     (post,) = record["clouds"]["inside"]["things"]
     height = scene.height_m - cone(*POST[:2])
     assert post["volume_m3"] == pytest.approx(-np.pi * POST[2] ** 2 * height, abs=2 * post["u_m3"])

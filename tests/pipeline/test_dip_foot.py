@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from generated_solids import LyingShell, job_of
 
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.cross_checks import check_scan
 from tankcal.pipeline.scan import fit_scan
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.capacity import Capacity
+from tankcal.units import FULL_TURN
 
 RADIUS_M, LENGTH_M, DENT_M = 1.2, 8.0, 0.012
 

@@ -343,7 +343,7 @@ def test_straps_and_hits_are_one_least_squares_solution(tmp_path):
     normal = bare.T @ weight @ bare
     dense = np.linalg.solve(normal, bare.T @ weight @ y)
     means = np.array([field.radius_m[field.sites.course == c].mean() for c in range(4)])
-    np.testing.assert_allclose(field._solved[0][starts] + means, dense[starts], atol=1e-9)
+    np.testing.assert_allclose(field._solution[0][starts] + means, dense[starts], atol=1e-9)
     (told,) = told_causes(result.job, wall)[:1]
     assert told.value == pytest.approx(offset.u / 1000 * dense[-1], abs=1e-9)
     sd = offset.u / 1000 * np.sqrt(np.linalg.inv(normal)[-1, -1])

@@ -31,7 +31,7 @@ import tankcal
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.pipeline.line_checks import check_leans, compare_leans, levels_and_lean
-from tankcal.survey.reference_line import ARCSEC
+from tankcal.units import ARCSEC
 
 KAPPA, COUNT = 15 * ARCSEC, 12
 
@@ -319,7 +319,7 @@ def test_points_straps_and_offsets_are_one_dense_adjustment(tmp_path, seen):
     field = result.wall.field
     means = np.array([field.radius_m[field.sites.course == c].mean() for c in range(4)])
     starts = field._columns[1]
-    radii = field._solved[0][starts] + means
+    radii = field._solution[0][starts] + means
     np.testing.assert_allclose(radii, 6.5 + found[:4], rtol=1e-9)
     normal = field._columns[0].T @ np.linalg.solve(field.covariance_m2, field._columns[0])
     ours = np.linalg.inv(normal)[np.ix_(starts, starts)]

@@ -12,7 +12,7 @@ from tankcal.geometry.field.sites import free_design
 from tankcal.pipeline.line_checks import least_lines
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.tanks import body_of
-from tankcal.survey.reference_line import ARCSEC
+from tankcal.units import ARCSEC
 
 HEIGHTS, RADII = (1.2, 1.7, 1.5, 1.7, 1.9), (5.231, 5.2306, 5.2298, 5.2292, 5.2289)
 LEAN, KAPPA = (-0.012, 0.016), 20 * ARCSEC

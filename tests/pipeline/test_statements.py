@@ -6,8 +6,8 @@ from job_builder import job_parts, write_folder, write_job
 
 import tankcal
 from tankcal.errors import InputError
-from tankcal.record.plain_data import to_plain
-from tankcal.record.statements import budgets_of
+from tankcal.record.schema import to_plain
+from tankcal.record.table import budgets_of
 
 RULE = """
 [rule]

@@ -29,7 +29,7 @@ from tankcal.errors import InputError
 from tankcal.pipeline import cloud_checks, cloud_wall
 from tankcal.pipeline.cloud_overlaps import RegistrationTest, overlap_test, overlaps_of
 from tankcal.record import record_of
-from tankcal.record.schema import checked
+from tankcal.record.schema import check_data
 from tankcal.record.versions import RECORD
 
 TOOL = Tool(offset_m=3e-4, scale=5e-6, bias_m=5e-4, sd_m=1e-3, sd_rad=5e-5)
@@ -95,7 +95,7 @@ def test_budget_names_what_is_shared(result):
 @pytest.mark.slow
 def test_record_tells_files_scans_and_what_is_hidden(result):
     record = record_of(result)
-    assert checked(record, RECORD.schema(), "record.json") == ([], [])
+    assert check_data(record, RECORD.schema(), "record.json") == ([], [])
     clouds = record["clouds"]
     assert [one["declared"] for one in clouds["files"]] == [None, None]
     assert [one["tie"] for one in clouds["scans"]] == ["network", "network"]

@@ -14,8 +14,8 @@ from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict, what_helps
 from tankcal.planning.changes import changes_of, cost_of
-from tankcal.planning.wall.prediction import foresee_table
-from tankcal.report.planning import wall_files
+from tankcal.planning.wall.prediction import predict_wall_table
+from tankcal.report.planning import empty_job
 from tankcal.report.planning.wall_paper import WallPaper, wall_sheets
 from tankcal.report.planning.wall_rows import field_tables_of_wall
 
@@ -33,17 +33,17 @@ def prediction(tmp_path_factory):
 def test_the_empty_job_filled_in_is_the_plan(prediction, tmp_path):
     """Second method: U of the job with the plan's amplitudes, in every row."""
     plan = prediction.plan
-    wall_files.write_empty_job(prediction, tmp_path / "job")
+    empty_job.write_wall(prediction, tmp_path / "job")
     assert not (tmp_path / "job" / "slope_distances.csv").read_text().count("\n1,")
     fill(tmp_path / "job", plan.job, DAY)
-    found = foresee_table(tankcal.load(tmp_path / "job"), plan.amplitudes).made.table
+    found = predict_wall_table(tankcal.load(tmp_path / "job"), plan.amplitudes).computed_table.table
     np.testing.assert_allclose(found.U_m3, prediction.table.U_m3, rtol=1e-8)
     np.testing.assert_allclose(found.volume_m3, prediction.table.volume_m3, rtol=1e-9)
 
 
 def test_rows_of_the_workbook(prediction, tmp_path):
     """Two angles from each of eight stations, without a value, in the language's own sheet."""
-    wall_files.write_empty_job(prediction, tmp_path / "job", workbook=True)
+    empty_job.write_wall(prediction, tmp_path / "job", workbook=True)
     assert [one.name for one in (tmp_path / "job").iterdir()] == ["job.xlsx"]
     sheet = openpyxl.load_workbook(tmp_path / "job" / "job.xlsx")["stadia"]
     rows = [[cell.value for cell in row][1:3] for row in sheet.iter_rows()]
@@ -137,6 +137,6 @@ def test_numbers_in_names_of_changes(tmp_path):
     found = next(one for one in changes_of(plan, ("add",), ("station",)))
     assert "." in found.name
     prediction = predict(plan)
-    papers = {one: WallPaper(prediction, one).change(found) for one in ("en", "pt-BR")}
+    papers = {one: WallPaper(prediction, one).describe_change(found) for one in ("en", "pt-BR")}
     assert found.name in papers["en"]
     assert found.name.replace(".", ",") in papers["pt-BR"]

@@ -10,8 +10,8 @@ from scipy.spatial import ConvexHull
 from wall_plan_folders import HITS, LINES, TANGENTS
 
 from tankcal.planning import load_plan
-from tankcal.planning.wall.nominal_readings import levels_read, with_readings
-from tankcal.planning.wall.reading_errors import EXACT, Errors, with_network_errors
+from tankcal.planning.wall.nominal_readings import levels_of_readings, set_readings
+from tankcal.planning.wall.reading_errors import EXACT, Errors, add_network_errors
 from tankcal.planning.wall.tank_walls import DrawnWall, RoundWall, plates_of
 from tankcal.survey.sighting import rays
 from tankcal.survey.strapping import reduce_straps
@@ -27,7 +27,7 @@ def plan(request):
 def drawn_on(plan, factor=1.0, seed=5):
     job = plan.job
     sizes = factor * plan.amplitudes.likely_m2
-    return DrawnWall(job, sizes, levels_read(job), np.random.default_rng(seed))
+    return DrawnWall(job, sizes, levels_of_readings(job), np.random.default_rng(seed))
 
 
 def outline_of(wall, course, level, *, inside=False, count=40_000):
@@ -40,7 +40,7 @@ def outline_of(wall, course, level, *, inside=False, count=40_000):
 def test_a_wall_without_departures_is_the_round_one(plan):
     """Closed form; but for the hull, which the round one has as walls have it on average."""
     still, job = drawn_on(plan, 0.0), plan.job
-    course, level = next(iter(levels_read(job)))
+    course, level = next(iter(levels_of_readings(job)))
     radius = still.nominal_m + plates_of(job)[course]
     assert still.girth_m(course, level) == pytest.approx(2 * np.pi * radius, rel=1e-9)
     azimuth, length = still.limb((radius * 2, 0.0), course, level, is_right=True)
@@ -52,7 +52,7 @@ def test_a_wall_without_departures_is_the_round_one(plan):
 @pytest.mark.slow(after=1)
 def test_girth_and_limbs_are_those_of_the_outline(plan):
     wall = drawn_on(plan)
-    for course, level in sorted(levels_read(plan.job))[::7]:
+    for course, level in sorted(levels_of_readings(plan.job))[::7]:
         azimuth, places = outline_of(wall, course, level)
         hull = ConvexHull(places).area
         assert wall.girth_m(course, level) == pytest.approx(hull, rel=2e-6)
@@ -89,7 +89,7 @@ def test_what_a_drawn_wall_holds(plan):
 def test_readings_come_back_to_the_wall(plan):
     """Without errors: circumferences are girths, hits lie on the wall, offsets are its radii."""
     wall, nominal = drawn_on(plan), plan.job.tank.nominal_diameter_m / 2
-    job = with_readings(plan.job, wall)
+    job = set_readings(plan.job, wall)
     if job.strapping is not None:
         reduced = reduce_straps(job.strapping, job.survey.shell_temperature_c, 2 * nominal)
         for one in reduced:
@@ -117,7 +117,7 @@ def test_readings_come_back_to_the_wall(plan):
 def levels_read_at(job):
     """(course, its levels) of all that is read."""
     found = {}
-    for course, level in levels_read(job):
+    for course, level in levels_of_readings(job):
         found.setdefault(course, []).append(level)
     return found.items()
 
@@ -125,11 +125,11 @@ def levels_read_at(job):
 def test_errors_of_a_cause_are_shared_and_seeded(plan):
     """All readings of a wall are off by the scale of one instrument together; a seed repeats it."""
     errors = Errors(np.random.default_rng(1))
-    assert errors.of_cause("instrument_scale", "T") == errors.of_cause("instrument_scale", "T")
-    assert errors.of_cause("instrument_scale", "T") != errors.of_cause("instrument_scale", "U")
+    assert errors.draw_cause("instrument_scale", "T") == errors.draw_cause("instrument_scale", "T")
+    assert errors.draw_cause("instrument_scale", "T") != errors.draw_cause("instrument_scale", "U")
     job, wall = plan.job, RoundWall(plan.job, plan.amplitudes)
     one, same, other = (
-        with_readings(job, wall, Errors(np.random.default_rng(seed))) for seed in (1, 1, 2)
+        set_readings(job, wall, Errors(np.random.default_rng(seed))) for seed in (1, 1, 2)
     )
     for given in ("strapping", "lines", "hits", "tangents"):
         if getattr(job, given) is not None:
@@ -143,10 +143,10 @@ def test_readings_between_stations_are_off_by_their_sds():
     """Simulation: rms of the errors over their sds, the scale of the instrument among them."""
     given, found = load_plan(TANGENTS).job.measurements, []
     for seed in range(40):
-        drawn = with_network_errors(given, Errors(np.random.default_rng(seed)))
+        drawn = add_network_errors(given, Errors(np.random.default_rng(seed)))
         for before, after in zip(given.readings, drawn.readings, strict=True):
             found.append((after.value - before.value) / before.sd)
     assert np.sqrt(np.mean(np.concatenate(found) ** 2)) == pytest.approx(1.0, abs=0.05)
-    same = with_network_errors(given, EXACT)
+    same = add_network_errors(given, EXACT)
     for before, after in zip(given.readings, same.readings, strict=True):
         np.testing.assert_array_equal(before.value, after.value)

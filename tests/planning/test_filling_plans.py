@@ -21,11 +21,11 @@ import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict, smallest, what_helps
-from tankcal.planning.wall.filling_changes import changes_of_runs
-from tankcal.planning.wall.prediction import foresee_table
-from tankcal.record.wall_plan import WALL_PLAN
-from tankcal.report.planning import wall_files
-from tankcal.report.planning.filling import rows_of_runs
+from tankcal.planning.wall.changes import wall_changes_of
+from tankcal.planning.wall.prediction import predict_wall_table
+from tankcal.record.plan import WALL_PLAN
+from tankcal.report.planning import empty_job
+from tankcal.report.planning.wall_rows import rows_of_runs
 from tankcal.tank.liquid.run_effect import averaged
 from tankcal.uncertainty import combine
 
@@ -145,8 +145,8 @@ def test_the_dense_model_has_the_published_table(scale, dip_mm, top, known):
 def test_the_prediction_is_that_of_the_dense_model(tmp_path):
     """Second method: U at the dips of the plan, of deliveries, of scale and meter after."""
     found = predict(load_plan(plan_of(tmp_path / "plan", FILLING, *EXACT)))
-    metering, made = found.plan.job.liquid, found.tabled.made
-    body = found.tabled.measured.joint.known.geometry.body()
+    metering, made = found.plan.job.liquid, found.result.computed_table
+    body = found.result.measured.joint.known.geometry.body()
     dips = metering.dip_m[np.isfinite(metering.dip_m)]
     rows = np.array([one.dip_m for one in found.filling.dips])
 
@@ -241,17 +241,17 @@ def test_the_empty_job_filled_in_is_the_plan(tmp_path):
     """
     prediction = predict(load_plan(FILLING))
     plan, rng = prediction.plan, np.random.default_rng(4)
-    wall_files.write_empty_job(prediction, tmp_path / "job")
+    empty_job.write_wall(prediction, tmp_path / "job")
     with pytest.raises(InputError):  # nothing is read yet
         tankcal.load(tmp_path / "job")
     fill(tmp_path / "job", plan.job)
-    found = foresee_table(tankcal.load(tmp_path / "job"), plan.amplitudes).made.table
+    found = predict_wall_table(tankcal.load(tmp_path / "job"), plan.amplitudes).computed_table.table
     np.testing.assert_allclose(found.U_m3, prediction.table.U_m3, rtol=1e-8)
     np.testing.assert_allclose(found.volume_m3, prediction.table.volume_m3, rtol=1e-9)
-    wall_files.write_empty_job(prediction, tmp_path / "other")
+    empty_job.write_wall(prediction, tmp_path / "other")
     fill(tmp_path / "other", read_with_errors(plan.job, rng))
     job = tankcal.load(tmp_path / "other")
-    found = foresee_table(job, plan.amplitudes).made.table
+    found = predict_wall_table(job, plan.amplitudes).computed_table.table
     rows = slice(30, None)
     np.testing.assert_allclose(found.U_m3[rows], prediction.table.U_m3[rows], rtol=5e-3)
     learned = tankcal.run(job, simulated=False).table
@@ -269,7 +269,7 @@ def test_liquid_alone_is_the_job_that_is_run(tmp_path):
     (folder / "meters.toml").write_text((FILLING / "meters.toml").read_text(), encoding="utf-8")
     plan = load_plan(folder)
     prediction, rng = predict(plan), np.random.default_rng(1)
-    wall_files.write_empty_job(prediction, tmp_path / "job")
+    empty_job.write_wall(prediction, tmp_path / "job")
     fill(tmp_path / "job", plan.job)
     job = tankcal.load(tmp_path / "job")
     table = tankcal.run(job, simulated=False).table
@@ -360,7 +360,7 @@ def test_dips_of_runs_are_those_that_are_asked(tmp_path):
     volume = plan.job.liquid.volume_m3
     assert (volume[1:5] > 0).all()
     assert (volume[6:] < 0).all()
-    steps = [one for one in changes_of_runs(plan, lambda **parts: parts, lambda *one: one)
+    steps = [one for one in wall_changes_of(plan)
              if one[1] in ("step", "top_of_run") and one[2] == "2"]  # fmt: skip
     assert [one[0] for one in steps] == ["drop"]  # nobody goes on below the bottom
 

@@ -65,12 +65,12 @@ def test_the_filled_job_is_the_triangulation_that_was_planned(prediction, tmp_pa
     empty_job.write(prediction, folder, workbook=path is not folder)
     if path is folder:
         assert (folder / "stadia.csv").read_text().count("T1-1,T1-2,bar 1") == 2
-    fill(path, draw_measurements(prediction.plan, prediction.measurements, prediction.predicted))
+    fill(path, draw_measurements(prediction.plan, prediction.measurements, prediction.network))
     result = tankcal.run(load(path), simulated=False)
     adjustment = result.adjustment
     assert adjustment.sigma0 < 1e-6
     known = dict(zip(adjustment.names, adjustment.covariance_m2, strict=True))
-    of_plan = prediction.predicted.adjusted
+    of_plan = prediction.network.adjusted
     foreseen = dict(zip(of_plan.survey.points, of_plan.point_covariances_m2, strict=True))
     assert set(known) == set(foreseen)
     for name, covariance in known.items():
@@ -84,7 +84,7 @@ def test_the_filled_job_is_the_triangulation_that_was_planned(prediction, tmp_pa
 def test_reliability_is_of_single_readings(prediction, tmp_path, monkeypatch):
     """Second method: the filled job, with no reading averaged before the adjustment."""
     empty_job.write(prediction, tmp_path / "job")
-    exact = draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)
+    exact = draw_measurements(prediction.plan, prediction.measurements, prediction.network)
     fill_folder(tmp_path / "job", exact)
     monkeypatch.setattr(tankcal.survey.readings, "_labels", lambda one, kind: np.arange(len(one)))
     adjustment = tankcal.adjust_job(load(tmp_path / "job"))
@@ -241,7 +241,7 @@ def test_papers_of_a_base(prediction, tmp_path, language):
     rows = [[cell.value for cell in row] for row in sheet.iter_rows()]
     assert sum(row[:2] in (["T1-1", "T1-2"], ["T1-2", "T1-1"]) for row in rows) == 4
     for one in changes_of(prediction.plan, items=("base",)):
-        assert one.name in paper.change(one)
+        assert one.name in paper.describe_change(one)
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from tankcal.pipeline.table import compute_table
 from tankcal.pipeline.wall import find_wall
 from tankcal.planning import load_plan, predict
 from tankcal.planning.measurements import draw_measurements
-from tankcal.planning.table import predicted_table, recompute_table
+from tankcal.planning.table import predict_table, recompute_table
 from tankcal.record.plan import plain_of
 from tankcal.survey import Nominal, adjust_survey, predict_survey, wall_points
 
@@ -35,7 +35,7 @@ def prediction(plan):
 @pytest.fixture(scope="module")
 def filled(prediction):
     """The measurements of the plan with the values that they would have, without errors."""
-    return draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)
+    return draw_measurements(prediction.plan, prediction.measurements, prediction.network)
 
 
 def test_the_plan_is_the_network_of_the_dissertation(prediction):
@@ -43,8 +43,8 @@ def test_the_plan_is_the_network_of_the_dissertation(prediction):
     assert len(prediction.plan.stations) == 11
     assert len(prediction.points) == 137
     assert len(prediction.plan.ties) == 8
-    assert prediction.predicted.adjusted.solution.estimated == 487
-    assert prediction.seen.rays.min() >= 3
+    assert prediction.network.adjusted.solution.estimated == 487
+    assert prediction.visibility.rays.min() >= 3
     assert not prediction.undetermined
     assert not prediction.weak
 
@@ -88,10 +88,10 @@ def test_a_wall_whose_covariance_is_not_written_out(plan, prediction, monkeypatc
     from tankcal.planning import table
 
     monkeypatch.setattr(table, "MANY", 10)
-    other = predicted_table(plan, prediction.predicted)
-    assert other.made.table.U_m3 == pytest.approx(prediction.table.U_m3, rel=1e-5)
-    again = recompute_table(plan, prediction.predicted, prediction.tabled)
-    assert again.made.table.U_m3 == pytest.approx(prediction.table.U_m3, rel=1e-9)
+    other = predict_table(plan, prediction.network)
+    assert other.computed_table.table.U_m3 == pytest.approx(prediction.table.U_m3, rel=1e-5)
+    again = recompute_table(plan, prediction.network, prediction.result)
+    assert again.computed_table.table.U_m3 == pytest.approx(prediction.table.U_m3, rel=1e-9)
 
 
 @pytest.mark.slow
@@ -106,15 +106,15 @@ def test_a_free_network(plan, figure):
         for one in plan.photos
     )  # fmt: skip
     found = predict(replace(plan, job=job, photos=(*plan.photos, *rolled)))
-    covariance = found.tabled.covariance
+    covariance = found.result.covariance
     points = s_transform(
         replace(
-            found.tabled.job.points,
+            found.result.job.points,
             covariance_m2=covariance.adjusted.covariance_m2(covariance.points),
             causes=(),
         )
     )
-    assert covariance.written_out() == pytest.approx(points.covariance_m2, abs=1e-15)
+    assert covariance.dense() == pytest.approx(points.covariance_m2, abs=1e-15)
     columns = np.random.default_rng(1).standard_normal((covariance.shape[0], 3))
     assert covariance @ columns == pytest.approx(points.covariance_m2 @ columns, abs=1e-13)
 
@@ -157,7 +157,7 @@ def rows(name):
 def test_sections_of_independent_points(prediction):
     """Closed form: n evenly spread points of sd s give s/sqrt(n) for the radius and s sqrt(2/n)
     for the centre; neighbours that share their errors are worse by a small factor."""
-    adjusted = prediction.predicted.adjusted
+    adjusted = prediction.network.adjusted
     number = {name: i for i, name in enumerate(adjusted.survey.points)}
     for section in prediction.sections:
         names = [f"{g}-{section.name}" for g in range(1, 25)]
@@ -170,7 +170,7 @@ def test_sections_of_independent_points(prediction):
 
 def test_sections_against_the_written_covariance(prediction):
     """Second method: the radius of a section by its derivative and the full covariance."""
-    tabled_, adjusted = prediction.tabled, prediction.predicted.adjusted
+    tabled_, adjusted = prediction.result, prediction.network.adjusted
     section = prediction.sections[2]
     members = tabled_.wall.sections[2].group.members
     points = tabled_.covariance.points[members]
@@ -203,7 +203,7 @@ def test_effect_of_blunder_on_volume(prediction, filled, figure):
 
 def residual_sizes(prediction, group):
     """Minimal detectable biases of the distances, as the adjustment itself tells them."""
-    table = next(one for one in prediction.predicted.adjusted.residuals if one.kind == group.kind)
+    table = next(one for one in prediction.network.adjusted.residuals if one.kind == group.kind)
     assert group.blunder == pytest.approx(table.mdb.max(), rel=1e-9)
     sizes = np.zeros(len(table.rows))
     sizes[table.rows] = table.mdb[:, 0]
@@ -257,7 +257,7 @@ def test_a_total_station_plan(tmp_path):
     assert len(found.plan.setups) == 6
     assert not found.undetermined
     drawn = draw_measurements(
-        found.plan, found.measurements, found.predicted, np.random.default_rng(5)
+        found.plan, found.measurements, found.network, np.random.default_rng(5)
     )
     adjustment = adjust_survey(drawn)
     assert not adjustment.removed

@@ -130,7 +130,7 @@ def test_at_least_three_rays_a_point(figure):
     plan = load_plan(EXAMPLE.parent / "plan-silva")
     few = predict(replace(plan, photos=plan.photos[:9]))
     rays = {one.name: one.rays for one in few.points}
-    adjusted = few.predicted.adjusted
+    adjusted = few.network.adjusted
     table = next(one for one in adjusted.residuals if one.kind == "image coordinate")
     points = adjusted.problem.observations[[*adjusted.problem.sources].index("image points")].point
     count = np.array([rays[adjusted.survey.points[i]] for i in points])

@@ -99,7 +99,7 @@ def load_two_rows(plan):
         xyz_m=own.xyz_m + [0, 0, 0.5],
         height_m=own.height_m + 0.5,
     )
-    return replace(plan, targets=own.followed_by(again))
+    return replace(plan, targets=own.append(again))
 
 
 def test_a_row_that_is_added_keeps_away_from_the_welds(plan):

@@ -236,8 +236,8 @@ def test_decimal_commas_and_semicolons(changed):
     plan, same = load_plan(folder), load_plan(PLAN)
     assert plan.job.courses == same.job.courses
     assert [one.sd_m.tolist() for one in plan.known] == [one.sd_m.tolist() for one in same.known]
-    assert "csv" not in plan.given.settings
-    assert plan.given.tables["courses"].rows == same.given.tables["courses"].rows
+    assert "csv" not in plan.raw.settings
+    assert plan.raw.tables["courses"].rows == same.raw.tables["courses"].rows
 
 
 def test_measured_values_do_not_belong_into_a_plan(changed):

@@ -49,7 +49,7 @@ def empty(planned, tmp_path):
 
 
 def exact(prediction):
-    return draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)
+    return draw_measurements(prediction.plan, prediction.measurements, prediction.network)
 
 
 def rows_of(path):
@@ -135,7 +135,7 @@ def test_a_filled_job_with_errors_runs(empty, figure):
     """Simulation: the volume lies within what was predicted (four standard uncertainties)."""
     prediction, folder = empty
     drawn = draw_measurements(
-        prediction.plan, prediction.measurements, prediction.predicted, np.random.default_rng(3)
+        prediction.plan, prediction.measurements, prediction.network, np.random.default_rng(3)
     )
     fill_folder(folder, drawn)
     result = tankcal.run(load(folder), simulated=False)
@@ -153,7 +153,7 @@ def test_a_total_station_job_filled_in(tmp_path):
     names = {path.stem for path in (tmp_path / "job").iterdir()}
     assert {"setups", "directions", "zenith_angles", "slope_distances"} <= names
     assert not {"photos", "cameras"} & names
-    sights = sum(int(row.sum()) for row in prediction.seen.on_setup)
+    sights = sum(int(row.sum()) for row in prediction.visibility.on_setup)
     directions = rows_of(tmp_path / "job" / "directions.csv")
     assert len(directions) == 2 * sights
     assert {row["set"] for row in directions} == {"1", "2"}

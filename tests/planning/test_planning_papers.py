@@ -24,7 +24,7 @@ from tankcal.report.planning import rows, workbook
 from tankcal.report.planning.field_sheets import sheets
 from tankcal.report.planning.outlook import outlook
 from tankcal.report.planning.paper import PlanPaper
-from tankcal.report.planning.tables import field_tables
+from tankcal.report.planning.rows import field_tables
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
@@ -97,7 +97,7 @@ def test_places_by_closed_form(prediction):
     place = place_of(plan, east)
     assert (place.arc_m, place.off_m) == pytest.approx((np.pi / 2 * radius, 2.0))
     assert (place.azimuth_rad, place.height_m) == pytest.approx((np.pi / 2, 1.0))
-    inside = replace(plan, shell=replace(plan.shell, outside=False))
+    inside = replace(plan, shell=replace(plan.shell, is_outside=False))
     assert place_of(inside, east).off_m == pytest.approx(-2.0)
     assert reference_rad(plan) == pytest.approx(0.0, abs=1e-12)
 
@@ -170,8 +170,8 @@ def test_limits_are_judged_in_words(prediction):
 
     assert "The limit of 0.200 % for the full tank is met." in told().replace("\xa0", " ")
     assert "for the full tank is NOT met" in told(relative_u=1e-5)
-    assert "for the worst delivery is met" in told(of="delivery")
-    assert "for the worst delivery is NOT met" in told(of="delivery", relative_u=1e-5)
+    assert "for the worst delivery is met" in told(quantity="delivery")
+    assert "for the worst delivery is NOT met" in told(quantity="delivery", relative_u=1e-5)
     assert "The limit of" not in told(relative_u=None)
 
 

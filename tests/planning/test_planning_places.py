@@ -10,8 +10,8 @@ from tankcal.errors import InputError
 from tankcal.geometry.rotations import view_of_rotation
 from tankcal.planning import load_plan, predict
 from tankcal.planning.changes import changes_of
-from tankcal.planning.patterns import row_heights_m
-from tankcal.planning.visibility import visible
+from tankcal.planning.places import row_heights_m
+from tankcal.planning.visibility import find_visible
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_a_camera_points_to_the_height_on_the_wall(plan, tmp_path):
 
 def test_tape_ends_face_as_the_tape_does(plan, tmp_path):
     """Closed form: an end is not seen from more than the limit beside the normal of its tape."""
-    seen, normals = visible(plan), plan.facing
+    seen, normals = find_visible(plan), plan.facing
     assert len(normals) == 16
     for name, out in normals.items():
         point = seen.points.index(name)
@@ -70,7 +70,7 @@ def test_a_level_tape_within_is_a_chord(tmp_path):
     away = np.hypot(*(ends[:, :2] - plan.shell.axis_m).T)
     assert away == pytest.approx(plan.shell.radius_m - 0.15)
     assert np.linalg.norm(ends[0] - ends[1]) == pytest.approx(6.9)
-    seen = visible(plan)
+    seen = find_visible(plan)
     beyond = np.hypot(*(plan.points["M1"][:2] - plan.shell.axis_m)) > plan.shell.radius_m
     assert beyond
     assert not seen.on_photo[:, seen.points.index("M1")].any()
@@ -88,7 +88,7 @@ def test_the_order_of_control_changes_nothing(tmp_path):
         plan = load_plan(folder)
         places = {name: plan.points[name] for name in ("M9", "T1-1")}
         assert places["M9"] == pytest.approx([10, 10, 12])
-        seen = visible(plan)
+        seen = find_visible(plan)
         found.append({name: seen.on_setup[:, seen.points.index(name)].tolist() for name in places})
     assert found[0] == found[1]
     neighbours = [one.name in ("T1-2", "T1-6") for one in plan.setups]
@@ -98,7 +98,7 @@ def test_the_order_of_control_changes_nothing(tmp_path):
 def test_photographs_show_no_instruments(plan, tmp_path):
     surveyed = load_plan(with_setups(tmp_path))
     both = replace(surveyed, photos=plan.photos, job=plan.job)
-    seen = visible(both)
+    seen = find_visible(both)
     at = [seen.points.index(one.name) for one in both.setups]
     assert not seen.on_photo[:, at].any()
     assert seen.on_photo.any()
@@ -106,7 +106,7 @@ def test_photographs_show_no_instruments(plan, tmp_path):
 
 def test_a_row_takes_its_tapes_along(plan):
     """A tape between targets of a row goes with the row."""
-    rows = plan.targets.followed_by(
+    rows = plan.targets.append(
         replace(
             plan.targets,
             names=tuple(f"{name}b" for name in plan.targets.names),

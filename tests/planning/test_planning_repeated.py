@@ -36,7 +36,7 @@ def filled(prediction, folder):
     """The measurements of the job made from a plan, with the values that it computes."""
     empty_job.write(prediction, folder)
     fill_folder(
-        folder, draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)
+        folder, draw_measurements(prediction.plan, prediction.measurements, prediction.network)
     )
     return load(folder).measurements
 
@@ -97,7 +97,7 @@ def test_images_that_are_read_again(tmp_path):
         load_plan(changed_plan(tmp_path, ("stations = 11", "readings = 4\nstations = 11")))
     )
     (images,) = (one for one in found.reliability if one.kind == "image coordinate")
-    (means,) = (one for one in found.predicted.adjusted.residuals if one.kind == "image coordinate")
+    (means,) = (one for one in found.network.adjusted.residuals if one.kind == "image coordinate")
     assert images.count == 4 * means.redundancy.size
     single = 1 - (1 - means.redundancy) / 4
     assert images.redundancy == pytest.approx(single.mean(), rel=1e-9)

@@ -13,8 +13,7 @@ from tankcal.pipeline.plot_style import INK, RED
 from tankcal.planning import load_plan, predict
 from tankcal.planning.improvements import what_helps
 from tankcal.planning.model import Pillar, Tie
-from tankcal.planning.patterns import full_turn
-from tankcal.planning.places import place_of
+from tankcal.planning.places import full_turn, place_of
 from tankcal.report.planning import figures, files, rows, sketches, workbook
 from tankcal.report.planning.field_sheets import sheets
 from tankcal.report.planning.outlook import outlook
@@ -99,10 +98,10 @@ def test_where_all_is_seen_nothing_is_said_of_it(prediction):
 
 
 def test_only_set_ups_that_can_be_seen_are_to_be_sighted(stationed):
-    seen = stationed.seen
+    seen = stationed.visibility
     on_setup = seen.on_setup.copy()
     on_setup[0, seen.points.index("T1-2")] = False
-    found = rows.setups(replace(stationed, seen=replace(seen, on_setup=on_setup)))
+    found = rows.setups(replace(stationed, visibility=replace(seen, on_setup=on_setup)))
     assert found[0]["sights"] == ["T1-6"]
 
 
@@ -133,7 +132,7 @@ def test_a_plumb_line_is_no_tape(hidden):
     tie = Tie("1-1-1-5", "plumb_lines", "1-1", "1-5", 0.002)
     plan = replace(hidden.plan, ties=(tie,))
     paper = PlanPaper(replace(hidden, plan=plan))
-    found = {paper.change(one.change) for one in _changes(plan, "tape")}
+    found = {paper.describe_change(one.change) for one in _changes(plan, "tape")}
     assert {"without plumb line 1-1-1-5", "plumb line 1-1-1-5 hung twice as often"} <= found
     assert "plumb lines" in labels_of(sketches.wall(paper))
 
@@ -206,7 +205,7 @@ def test_additions_have_a_place(prediction, effects, tmp_path):
     assert place["arc_m"] == pytest.approx(east_of_weld, abs=1e-9)
     assert place["height_m"] == pytest.approx(0.05 * 9.5)
     paper = PlanPaper(prediction, effects=effects)
-    assert paper.change(tape) == "additional vertical tape of 8.6\N{NO-BREAK SPACE}m, N-V1"
+    assert paper.describe_change(tape) == "additional vertical tape of 8.6\N{NO-BREAK SPACE}m, N-V1"
     files.write(paper, tmp_path, [])
     with open(tmp_path / "changes.csv", encoding="utf-8") as file:
         listed = {row["name"]: row for row in csv.DictReader(file) if row["action"] == "add"}
@@ -226,11 +225,9 @@ def test_spared_items_are_listed_with_helpful_ones(prediction, effects):
     assert len(tables["Effect of omissions"]["rows"]) == min(30, len(drops))
     assert len(tables["Effect of additions"]["rows"]) == min(30, len(effects) - len(drops))
     text = texts_of(outlook(paper))
-    assert (
-        f"{paper.change(drop.change)}: the remaining observations would not determine all unknowns"
-        in text
-    )
-    assert f"{paper.change(add.change)}: see changes.csv" not in text
+    dropped = paper.describe_change(drop.change)
+    assert f"{dropped}: the remaining observations would not determine all unknowns" in text
+    assert f"{paper.describe_change(add.change)}: see changes.csv" not in text
     assert "Weak or lost" in text
 
 

@@ -10,7 +10,7 @@ from plan_folders import changed_plan
 from tankcal.geometry.rotations import rotation_of_view
 from tankcal.planning import load_plan, predict
 from tankcal.planning.model import Box, Limits, Pillar, Shell
-from tankcal.planning.visibility import find_hidden, find_in_frame, find_in_sight, visible
+from tankcal.planning.visibility import find_hidden, find_in_frame, find_in_sight, find_visible
 
 EYE = np.array([0.0, 0.0, 2.0])
 
@@ -52,7 +52,7 @@ def test_a_cylinder_hides_within_its_radius_and_height():
 def test_the_own_wall_hides_the_far_side(plan):
     """Closed form: from a distance d of the axis of a tank of radius R the azimuths within
     acos(R/d) are seen; a limit of incidence takes some more."""
-    shell = Shell(np.zeros(2), 5.0, 0.0, 10.0, outside=True)
+    shell = Shell(np.zeros(2), 5.0, 0.0, 10.0, is_outside=True)
     azimuth = np.radians(np.arange(0.5, 180.0))
     normals = np.column_stack([np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)])
     place = np.array([0.0, 20.0, 5.0])
@@ -74,7 +74,7 @@ def test_the_own_wall_hides_the_far_side(plan):
 
 
 def test_inside_a_tank_the_wall_hides_nothing(plan):
-    shell = Shell(np.zeros(2), 5.0, 0.0, 10.0, outside=False)
+    shell = Shell(np.zeros(2), 5.0, 0.0, 10.0, is_outside=False)
     azimuth = np.radians(np.arange(0, 360, 10))
     inwards = -np.column_stack([np.sin(azimuth), np.cos(azimuth), np.zeros_like(azimuth)])
     inside = replace(plan, shell=shell, obstacles=(), limits=Limits(np.radians(90)))
@@ -100,12 +100,12 @@ def test_the_frame_with_its_distortion(plan):
 
 def test_an_obstacle_takes_rays_and_nothing_else(plan):
     """Property: with a wall before one station that station sees less, the others the same."""
-    free = visible(plan)
+    free = find_visible(plan)
     here = plan.photos[0].xyz_m
     towards = np.append(plan.shell.axis_m, here[2]) - here
     middle = here + 0.2 * towards
     wide = Box(middle - [3, 3, 3], middle + [3, 3, 3])
-    hidden = visible(replace(plan, obstacles=(wide,)))
+    hidden = find_visible(replace(plan, obstacles=(wide,)))
     assert hidden.on_photo[0].sum() < 0.2 * free.on_photo[0].sum()
     assert not (hidden.on_photo & ~free.on_photo).any()
     opposite = 5
@@ -117,7 +117,7 @@ def test_exposures_from_one_place_are_one_ray(tmp_path):
     """Property: rolled exposures add no ray; what one station alone sees is left out, and told."""
     rolled = ("rolls_deg = [0]", "rolls_deg = [0, 90]")
     found = predict(load_plan(changed_plan(tmp_path, ("stations = 11", "stations = 7"), rolled)))
-    seen, plan = found.seen, found.plan
+    seen, plan = found.visibility, found.plan
     assert len(plan.photos) == 14
     names = np.array([one.station for one in plan.photos])
     stations = [seen.on_photo[names == name].any(axis=0) for name in plan.stations]

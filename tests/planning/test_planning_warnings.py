@@ -39,7 +39,7 @@ def test_plan_gives_the_warnings_of_its_run(prediction):
 
     The first warning is of the certificate, the others are of readings without errors.
     """
-    measurements = draw_measurements(prediction.plan, prediction.measurements, prediction.predicted)
+    measurements = draw_measurements(prediction.plan, prediction.measurements, prediction.network)
     job = replace(prediction.plan.job, measurements=measurements)
     of_run = [one.expected for one in tankcal.run(job, simulated=False).warnings]
     of_values = ("certificate_incomplete", "test_and_cause", *OF_SCATTER)

@@ -22,9 +22,8 @@ from wall_plan_folders import HITS, LINES, TANGENTS, fill, plan_of
 import tankcal
 from tankcal.cli import main
 from tankcal.errors import InputError
-from tankcal.geometry.field.amplitudes import assumed_amplitudes
+from tankcal.geometry.field.amplitudes import assumed_amplitudes, likelihood_of
 from tankcal.geometry.field.estimate import WallField
-from tankcal.geometry.field.evidence import likelihood_of
 from tankcal.geometry.field.information import expect_amplitudes
 from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.surveying import find_survey
@@ -33,15 +32,15 @@ from tankcal.pipeline.tangent_wall import touch_wall
 from tankcal.planning import load_plan, predict, smallest, what_helps
 from tankcal.planning.changes import changes_of
 from tankcal.planning.improvements import Effect
-from tankcal.planning.wall.changes import instruments_read, wall_changes_of
-from tankcal.planning.wall.foreseen_tables import tangent_sight
+from tankcal.planning.wall.changes import instruments_in_use, wall_changes_of
+from tankcal.planning.wall.design_tables import tangent_sight
 from tankcal.planning.wall.model import PlannedHits, PlannedStrap, even_radius_m, evenness_of_limbs
-from tankcal.planning.wall.nominal_readings import with_nominal_readings
-from tankcal.planning.wall.prediction import foresee_table
-from tankcal.planning.wall.reading import changed, tables_of
-from tankcal.record.wall_plan import WALL_PLAN, plain_of_wall
-from tankcal.report.planning import figures, wall_files, workbook
-from tankcal.report.planning.wall_files import form_of_wall
+from tankcal.planning.wall.nominal_readings import set_nominal_readings
+from tankcal.planning.wall.prediction import predict_wall_table
+from tankcal.planning.wall.reading import change_plan, tables_of
+from tankcal.record.plan import WALL_PLAN, plain_of_wall
+from tankcal.report.planning import empty_job, figures, workbook
+from tankcal.report.planning.empty_job import form_of_wall
 from tankcal.report.planning.wall_paper import WallPaper, wall_outlook, wall_sheets
 from tankcal.report.planning.wall_rows import field_tables_of_wall
 
@@ -72,7 +71,7 @@ def test_limbs_and_untied_setups_leave_sizes_that_tell_nothing_of_each_other(pre
 def test_the_empty_job_filled_in_is_the_plan(prediction, tmp_path):
     """Its U with the plan's amplitudes is the prediction's, in every row."""
     plan = prediction.plan
-    wall_files.write_empty_job(prediction, tmp_path / "job")
+    empty_job.write_wall(prediction, tmp_path / "job")
     settings = {
         "date": '"2026-07-01"',
         "shell_temperature_c": plan.job.survey.shell_temperature_c,
@@ -80,7 +79,7 @@ def test_the_empty_job_filled_in_is_the_plan(prediction, tmp_path):
     }
     fill(tmp_path / "job", plan.job, settings)
     job = tankcal.load(tmp_path / "job")
-    found = foresee_table(job, plan.amplitudes).made.table
+    found = predict_wall_table(job, plan.amplitudes).computed_table.table
     np.testing.assert_allclose(found.U_m3, prediction.table.U_m3, rtol=1e-8)
     np.testing.assert_allclose(found.volume_m3, prediction.table.volume_m3, rtol=1e-9)
 
@@ -117,7 +116,7 @@ def test_u_is_that_of_a_job_but_for_the_amplitudes_that_it_learns(tmp_path, kind
         found = find_survey(job, lambda text: None)
         table = compute_table(found.job, found.survey).table
         learned = found.survey.field.amplitudes
-        nominal = with_nominal_readings(about_its_axis(job, found.survey), learned)
+        nominal = set_nominal_readings(about_its_axis(job, found.survey), learned)
         same = find_survey(nominal, lambda text: None, learned)
         foreseen = compute_table(same.job, same.survey).table
         rows = slice(10, min(len(table.U_m3), len(foreseen.U_m3)))
@@ -222,8 +221,10 @@ def test_u_of_jobs_on_generated_walls_study(tmp_path, figure):
                 found = find_survey(job, lambda text: None)
                 u = compute_table(found.job, found.survey).table.U_m3[-1]
                 amplitudes = assumed_amplitudes()
-                nominal = with_nominal_readings(about_its_axis(job, found.survey), amplitudes)
-                ratios.append(u / foresee_table(nominal, amplitudes).made.table.U_m3[-1])
+                nominal = set_nominal_readings(about_its_axis(job, found.survey), amplitudes)
+                ratios.append(
+                    u / predict_wall_table(nominal, amplitudes).computed_table.table.U_m3[-1]
+                )
         figure(f"U of jobs by {kind} over that of their plans", np.round(np.median(ratios), 2))
         assert 0.7 < np.median(ratios) < 1.1
         # by hits of one set-up on a wall with 7 mm of ovality, which a plan does not assume: 1.53;
@@ -263,7 +264,7 @@ def test_a_further_strap_never_widens_u(prediction):
         course = str(rng.integers(1, len(plan.job.courses) + 1))
         one = PlannedStrap(course, float(rng.integers(2, 98)), 0.5, more=(("instrument", "T-12"),))
         design = replace(plan.design, straps=(*plan.design.straps, one))
-        after = predict(changed(plan, design)).table
+        after = predict(change_plan(plan, design)).table
         assert after.U_m3[-1] < prediction.table.U_m3[-1]
         assert np.all(after.U_m3[1:] <= prediction.table.U_m3[1:] * (1 + 1e-6))
 
@@ -279,7 +280,7 @@ def test_a_further_strap_of_a_tank_that_is_strapped_alone(tmp_path):
         course = str(rng.integers(1, 7))
         one = PlannedStrap(course, float(rng.integers(2, 98)), 0.5, more=(("instrument", "T-12"),))
         design = replace(plan.design, straps=(*plan.design.straps, one))
-        after = predict(changed(plan, design)).table.U_m3
+        after = predict(change_plan(plan, design)).table.U_m3
         assert after[-1] < before[-1]
         assert np.all(after[1:] < 1.03 * before[1:])
 
@@ -334,8 +335,8 @@ def test_set_ups_round_the_tank_that_share_targets(tmp_path):
     loose = predict(load_plan(plan_of(tmp_path / "loose", HITS, *pairs)))
     ties = ("[limits]", "[setup_ties]\ntargets = 3\ns_mm = 1\ns_arcsec = 3\n\n[limits]")
     tied = predict(load_plan(plan_of(tmp_path / "tied", HITS, *pairs, ties)))
-    assert {*loose.tabled.sighting.poses.ties} == {"wall"}
-    assert {*tied.tabled.sighting.poses.ties} == {"network"}
+    assert {*loose.result.sighting.poses.ties} == {"wall"}
+    assert {*tied.result.sighting.poses.ties} == {"network"}
     assert tied.relative_u < loose.relative_u
 
 
@@ -579,7 +580,7 @@ SHEETS = {  # of a plan: sheets of its workbook, and how many rows they have
 @pytest.mark.parametrize("folder", SHEETS, ids=lambda one: one.name)
 def test_field_sheets_as_a_workbook(folder, tmp_path):
     """A sheet for each table of the paper, a row for each reading."""
-    workbook.write_of_wall(WallPaper(predict(load_plan(folder)), "en"), tmp_path / "x.xlsx")
+    workbook.write_wall(WallPaper(predict(load_plan(folder)), "en"), tmp_path / "x.xlsx")
     book = openpyxl.load_workbook(tmp_path / "x.xlsx")
     for name, rows in SHEETS[folder].items():
         (table,) = book[name].tables.values()
@@ -593,7 +594,7 @@ def test_field_sheets_as_a_workbook(folder, tmp_path):
 def test_a_workbook_of_the_same_plan_has_the_same_bytes(tmp_path):
     paper = WallPaper(predict(load_plan(HITS)), "pt-BR")
     for name in ("one.xlsx", "two.xlsx"):
-        workbook.write_of_wall(paper, tmp_path / name)
+        workbook.write_wall(paper, tmp_path / name)
     assert (tmp_path / "one.xlsx").read_bytes() == (tmp_path / "two.xlsx").read_bytes()
 
 
@@ -623,12 +624,12 @@ def test_only_instruments_that_read_something_are_certified_anew(tmp_path):
     plan = load_plan(TANGENTS)  # its instruments.toml has a tape, too
     named = {name for _, item, name, _ in wall_changes_of(plan) if item == "certificate"}
     assert named == {"TS"}
-    assert instruments_read(plan.job) == {"TS"}
-    assert instruments_read(load_plan(LINES).job) == {"T-12", "ZL-3"}
+    assert instruments_in_use(plan.job) == {"TS"}
+    assert instruments_in_use(load_plan(LINES).job) == {"T-12", "ZL-3"}
     tape = replace(load_plan(LINES).job.strapping.tapes[0], master="M-1")
     job = load_plan(LINES).job
     job = replace(job, strapping=replace(job.strapping, tapes=(tape,)))
-    assert instruments_read(job) == {"T-12", "ZL-3", "M-1"}
+    assert instruments_in_use(job) == {"T-12", "ZL-3", "M-1"}
 
 
 @pytest.mark.slow

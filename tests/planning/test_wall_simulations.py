@@ -16,9 +16,9 @@ from wall_plan_folders import HITS, LINES, TANGENTS, plan_of
 
 from tankcal.cli import main
 from tankcal.planning import load_plan, predict
-from tankcal.planning.wall.nominal_readings import with_readings
-from tankcal.planning.wall.reading_errors import Errors, with_network_errors
-from tankcal.planning.wall.simulations import by_survey, compare_survey, simulate_walls
+from tankcal.planning.wall.nominal_readings import set_readings
+from tankcal.planning.wall.reading_errors import Errors, add_network_errors
+from tankcal.planning.wall.simulations import combine_survey, compare_survey, simulate_walls
 from tankcal.planning.wall.tank_walls import plates_of
 
 STRAPS_ALONE = (
@@ -152,12 +152,12 @@ def test_surveys_of_walls_that_are_no_model_study(name, tmp_path, figure):
                 shape = replace(job.strapping, shape_sd_m=shape_of(made))
                 job = replace(job, strapping=shape)
             if job.measurements is not None:
-                job = replace(job, measurements=with_network_errors(job.measurements, errors))
+                job = replace(job, measurements=add_network_errors(job.measurements, errors))
             wall = WallOfFamily(job, made)
-            found.append(compare_survey(prediction, wall, with_readings(job, wall, errors)))
+            found.append(compare_survey(prediction, wall, set_readings(job, wall, errors)))
     errors, expanded, within, _ = (np.array(one) for one in zip(*found, strict=True))
     covered = np.mean(np.abs(errors) <= expanded)
-    predicted = by_survey(plan_job, prediction.table).expanded(0.95)[-1]
+    predicted = combine_survey(plan_job, prediction.table).expanded(0.95)[-1]
     figure(f"{name}: generated walls, within U", np.round([covered, within.mean()], 3))
     figure(f"{name}: their U over the plan's", np.round(np.median(expanded) / predicted, 2))
     assert covered > 0.85

@@ -13,8 +13,8 @@ from tables_of_s1 import HEIGHTS, PLATES, RADII, former_s1, new_s1, rings_m3
 from tankcal.errors import InputError
 from tankcal.recalibration.comparison import compare
 from tankcal.recalibration.inputs import Asked, compare_files
-from tankcal.record.comparison import COMPARISON, STEPS, ComparisonFile, plain_of_comparison
-from tankcal.record.schema import from_plain
+from tankcal.record.comparison import COMPARISON, STEPS, ComparisonFile
+from tankcal.record.schema import from_plain, to_plain
 
 EXAMPLE = Path(__file__).with_name("comparison.json")
 RECORDS = Path(__file__).parents[1] / "records" / "1"
@@ -31,7 +31,7 @@ def example():
 
 def write_example():
     """Keep the example anew."""
-    plain = plain_of_comparison(example())
+    plain = to_plain(example())
     EXAMPLE.write_text(json.dumps(plain, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
 
 
@@ -50,10 +50,10 @@ def same(one, two, path=""):
 def test_the_example_is_what_is_made():
     """To keep it anew after a change that is meant: `write_example()`."""
     kept = json.loads(EXAMPLE.read_text(encoding="utf-8"))
-    made = json.loads(json.dumps(plain_of_comparison(example()), allow_nan=False))
+    made = json.loads(json.dumps(to_plain(example()), allow_nan=False))
     assert same(kept | {"tankcal": ""}, made | {"tankcal": ""}) == []
     assert COMPARISON.migrated(kept, "comparison.json") == kept
-    assert plain_of_comparison(from_plain(ComparisonFile, kept)) == kept
+    assert to_plain(from_plain(ComparisonFile, kept)) == kept
 
 
 def test_the_waterfall_adds_up():

@@ -11,8 +11,8 @@ from tables_of_s1 import HEIGHTS, PLATES, former_s1
 from tankcal.errors import InputError
 from tankcal.recalibration.comparison import compare
 from tankcal.recalibration.history import DatedTable, history_of
-from tankcal.record.history import HISTORY, HistoryFile, plain_of_history
-from tankcal.record.schema import from_plain
+from tankcal.record.history import HISTORY, HistoryFile
+from tankcal.record.schema import from_plain, to_plain
 
 K = 1.959963984540054
 COURSES = HEIGHTS, PLATES
@@ -107,9 +107,9 @@ def test_one_table_has_nothing_to_compare_with():
 
 
 def test_a_history_goes_into_its_dataclass_and_back():
-    saved = plain_of_history(history_of(drawn_tables(3), inspections()))
+    saved = to_plain(history_of(drawn_tables(3), inspections()))
     assert HISTORY.migrated(saved, "history.json") == saved
-    assert plain_of_history(from_plain(HistoryFile, saved)) == saved
+    assert to_plain(from_plain(HistoryFile, saved)) == saved
     assert [one["date"] for one in saved["inspections"]] == ["2003-02-01", "2006-02-01", None]
 
 

@@ -13,7 +13,7 @@ from kept_releases import kept_records
 
 from tankcal.record import load, migrated
 from tankcal.record.covariance_factor import LARGEST_ERROR, ROWS, blocks_of, factor_of
-from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import to_plain
 
 
 def capacity_of(factor):

@@ -24,8 +24,7 @@ from tankcal.record import (
     record_of_adjustment,
     save,
 )
-from tankcal.record.columns import ArrayColumns, ArrayRows, Texts, column_of, values_of
-from tankcal.record.plain_data import whole
+from tankcal.record.columns import ArrayColumns, ArrayRows, Texts, column_of, values_of, whole
 from tankcal.record.recomputation import compare_records
 from tankcal.report import outputs
 from tankcal.report.attachments import sha256
@@ -323,6 +322,6 @@ def test_columns_that_are_not_alike_are_told_as_those_of_lists(was, now, monkeyp
 
 def test_texts_of_a_file_are_looked_at():
     with pytest.raises(ValueError, match="texts"):
-        long_tables._texts(np.array([0, 2]), ["a", "b"])
-    assert long_tables._texts(np.array([1, -1]), ["a", "b"]).tolist() == ["b", None]
+        long_tables._make_texts(np.array([0, 2]), ["a", "b"])
+    assert long_tables._make_texts(np.array([1, -1]), ["a", "b"]).tolist() == ["b", None]
     assert isinstance(Texts.of([]), Texts)

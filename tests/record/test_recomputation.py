@@ -11,8 +11,8 @@ import pytest
 
 from tankcal.cli import verifying
 from tankcal.record.covariance_factor import blocks_of
-from tankcal.record.plain_data import to_plain
 from tankcal.record.recomputation import compare_records
+from tankcal.record.schema import to_plain
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 MACHINES = {"Prescott": "0", "Haswell": "1"}  # kernels of OpenBLAS; whether loops are compiled

@@ -15,8 +15,7 @@ from tankcal.cli import main
 from tankcal.errors import CellError, InputError
 from tankcal.record import FORMAT, VERSION, load, migrated, version_of
 from tankcal.record.making import Record
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import MOST_TOLD, checked, from_plain
+from tankcal.record.schema import MOST_PROBLEMS, check_data, from_plain, to_plain
 from tankcal.record.versions import RECORD
 from tankcal.report import outputs
 
@@ -53,7 +52,7 @@ def test_a_record_has_every_key_of_its_version(made):
     for record in made.values():
         assert record["format"] == FORMAT
         plain = json.loads(json.dumps(record))
-        assert checked(plain, RECORD.schema(), "record.json") == ([], [])
+        assert check_data(plain, RECORD.schema(), "record.json") == ([], [])
 
 
 @pytest.mark.slow
@@ -81,7 +80,7 @@ def test_a_kept_record_is_read_as_one_of_this_version(path):
     read = migrated(record, "record.json")
     assert json.dumps(record) == before
     assert read["format"] == FORMAT
-    assert checked(read, RECORD.schema(), "record.json") == ([], [])
+    assert check_data(read, RECORD.schema(), "record.json") == ([], [])
 
 
 @pytest.mark.slow
@@ -197,7 +196,7 @@ def test_null_in_place_of_a_number_is_one_line_with_its_key():
             if not nullable and key not in seen:
                 found.setdefault((key, place[-1]), place)
         seen |= {key for key, _ in found}
-        for places in batched(found.values(), MOST_TOLD):
+        for places in batched(found.values(), MOST_PROBLEMS):
             other, names = spoilt(record, places)
             with pytest.raises(InputError) as told:
                 migrated(other, "record.json")

@@ -10,11 +10,10 @@ from schemas import SAVED, keys_in, keys_of_schema
 from tankcal.calibration.product.check import check_product
 from tankcal.errors import InputError
 from tankcal.planning import load_plan, predict
-from tankcal.record.camera_product import as_json
+from tankcal.record.camera_product import plain_product
 from tankcal.record.camera_versions import CAMERA
-from tankcal.record.plain_data import to_plain
 from tankcal.record.plan import PLAN, plain_of
-from tankcal.record.schema import checked, from_plain
+from tankcal.record.schema import check_data, from_plain, to_plain
 from tankcal.report import camera as camera_papers
 from tankcal.report.camera.paper import load
 from tankcal.report.planning import empty_job
@@ -35,7 +34,7 @@ def listed_keys(saved_format, version, kind="plan"):
 def assert_is_of_its_schema(saved, saved_format):
     """Every key is there, none is unknown, every value is of its type."""
     schema = saved_format.schema(saved.get("kind"))
-    assert checked(saved, schema, "kept") == ([], [])
+    assert check_data(saved, schema, "kept") == ([], [])
     unknown = keys_in(saved, FREE) - keys_of_schema(schema, optional=True)
     assert unknown == set()
 
@@ -89,7 +88,7 @@ def test_a_kept_file_is_read_as_one_of_this_version(saved_format, version, path)
 def test_a_check_of_the_plan_alone_is_read():
     """Its differences have no z."""
     found = check_product(np.array([[0.1, 0.2], [0.0, -0.1], [-0.1, 0.1]]), ("x", "y"))
-    saved = json.loads(json.dumps(as_json(found)))
+    saved = json.loads(json.dumps(plain_product(found)))
     assert set(saved["differences"][0]) == {"point", "dx_m", "dy_m"}
     assert CAMERA.migrated(saved, "camera.json") == saved
 

@@ -19,15 +19,15 @@ from tankcal.errors import InputError
 from tankcal.messages import Message, message
 from tankcal.record import load, migrated
 from tankcal.record.making import Record
-from tankcal.record.plain_data import to_plain
 from tankcal.record.schema import (
-    MOST_TOLD,
+    MOST_PROBLEMS,
     Finite,
-    checked,
-    filled_from,
+    check_data,
+    fill_from,
     from_plain,
     json_schema,
     key,
+    to_plain,
 )
 
 STALE = "make schemas writes schemas and docs anew"
@@ -63,7 +63,7 @@ class Thing:
 
 def thing(**changed):
     said = message("a_test", "{count} of them", count=3)
-    parts = [filled_from(Part, type("Source", (), {"name": "a", "size_m": 0.002}))]
+    parts = [fill_from(Part, type("Source", (), {"name": "a", "size_m": 0.002}))]
     values = dict(
         source="x", count=3, volume_m3=[1.0, 2.0], matrix=np.eye(2), pair=(1.0, 2.0), said=said,
         parts=parts, sd=np.nan, note=None, extra=None,
@@ -139,8 +139,8 @@ def test_a_number_that_no_float_holds_is_refused():
 
 def test_first_of_many_problems_are_reported():
     plain = to_plain(thing()) | {"volume_m3": ["x"] * 99}
-    _, found = checked(plain, json_schema(Thing), "t")
-    assert len(found) == MOST_TOLD + 1
+    _, found = check_data(plain, json_schema(Thing), "t")
+    assert len(found) == MOST_PROBLEMS + 1
     assert "further values" in str(found[-1])
 
 

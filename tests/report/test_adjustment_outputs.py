@@ -28,15 +28,15 @@ from tankcal.cli import main
 from tankcal.job.covariance import read_covariance
 from tankcal.memory import return_freed_memory, without_collection
 from tankcal.pipeline.chain import adjust_job
-from tankcal.record.adjusted import _edge_effect, adjusted_points_of
+from tankcal.record.adjusted import _edge_effect, point_results_of
 from tankcal.record.adjustment import _group
-from tankcal.record.plain_data import rows_of
+from tankcal.record.columns import rows_of
 from tankcal.report import attachments, outputs, workbook
 from tankcal.report.document import blocks_of
 from tankcal.report.notebook import execute, joined
 from tankcal.report.outputs.csv_files import write_csv
 from tankcal.report.paper import Paper
-from tankcal.report.survey import common, figures, readings, results, statistics
+from tankcal.report.survey import figures, quality, results
 from tankcal.survey import observations
 from tankcal.survey.results import Adjustment, GroupOfReadings
 from tankcal.text.words import load_words, verdict_sentences
@@ -281,7 +281,7 @@ def made(covariance_m2, cov_scale=1.0, redundancy=10):
 
 def test_error_ellipsoid_and_ellipse_in_closed_form():
     """Closed form: axes of a diagonal covariance; published factors 2.80 (3-D) and 2.45 (2-D)."""
-    (point,) = adjusted_points_of(made(np.diag([1e-6, 9e-6, 4e-6])))
+    (point,) = point_results_of(made(np.diag([1e-6, 9e-6, 4e-6])))
     assert point["ellipsoid_m"] == pytest.approx([0.0083865, 0.0055910, 0.0027955], rel=1e-4)
     assert point["ellipse_m"] == pytest.approx([0.0073432, 0.0024477], rel=1e-4)
     assert point["ellipse_azimuth_deg"] == pytest.approx(0.0)
@@ -289,12 +289,12 @@ def test_error_ellipsoid_and_ellipse_in_closed_form():
     assert point["spherical_sd_m"] == pytest.approx(0.002)
     assert point["quadratic_sd_m"] == pytest.approx(np.sqrt(14e-6))
     turned = np.array([[5e-6, 4e-6, 0], [4e-6, 5e-6, 0], [0, 0, 1e-6]])
-    assert adjusted_points_of(made(turned))[0]["ellipse_azimuth_deg"] == pytest.approx(45.0)
+    assert point_results_of(made(turned))[0]["ellipse_azimuth_deg"] == pytest.approx(45.0)
 
 
 def test_ellipsoids_with_estimated_variance_factor_use_fisher():
     """Closed form: 3 F(0.95; 3, 10) in place of the chi-square."""
-    (point,) = adjusted_points_of(made(np.diag([1e-6] * 3), cov_scale=1.1))
+    (point,) = point_results_of(made(np.diag([1e-6] * 3), cov_scale=1.1))
     factor = np.sqrt(3 * scipy.stats.f.ppf(0.95, 3, 10))
     assert point["ellipsoid_m"] == pytest.approx([factor * 1e-3] * 3)
 
@@ -343,7 +343,7 @@ def test_a_reading_that_nothing_controls_is_named(station):
     assert len(alone) == 3 * 12
     assert {tuple(row["ids"]) for row in alone} >= {("set-up 0", "W1")}
     assert all(row["mdb"] is None for row in alone)
-    shown = readings.control(Paper(path))
+    shown = quality.control(Paper(path))
     assert "36 of 132" in shown[0].data["caption"]
     assert ["zenith angle", "set-up 0 – W1"] in [row[:2] for row in shown[0].data["rows"]]
 
@@ -463,8 +463,8 @@ def test_of_very_many_points_the_sheet_has_the_weakest(only, tmp_path, monkeypat
 
 def test_papers_send_nobody_to_a_sheet_that_is_cut(monkeypatch):
     paper = SimpleNamespace(paragraph=lambda name, **_: name)
-    monkeypatch.setattr(common, "MOST_IN_SHEET", 10)
-    named = [common.with_note(paper, "table", [1], range(rows))[1] for rows in (10, 11)]
+    monkeypatch.setattr(quality, "MOST_IN_SHEET", 10)
+    named = [quality.with_note(paper, "table", [1], range(rows))[1] for rows in (10, 11)]
     assert named == ["only_worst", "only_worst_of_many"]
 
 
@@ -554,8 +554,8 @@ def test_the_chapter_vanishes_without_an_adjustment():
 
 def test_long_tables_are_cut_with_a_note(only):
     paper = Paper(only[1] / "record.json")
-    rows = 30 * readings.removed(paper)
-    table, note = readings.table(paper, "removed_readings", rows)
+    rows = 30 * quality.list_rejected(paper)
+    table, note = quality.readings_table(paper, "removed_readings", rows)
     assert len(table.data["rows"]) == 50
     assert note.data["text"].startswith(f"50 of {len(rows)} rows")
 
@@ -644,7 +644,7 @@ def test_marks_of_many_points_are_one_picture(only, monkeypatch):
     assert marks > 20
     assert pictures == 0
     monkeypatch.setattr("tankcal.pipeline.plot_style.MANY", 2)
-    assert counted() == (0, len(figures.shown_photos(paper)), words)
+    assert counted() == (0, len(figures.select_photos(paper)), words)
 
 
 def test_more_photos_than_fit_are_those_that_fit_worst(only):
@@ -654,7 +654,7 @@ def test_more_photos_than_fit_are_those_that_fit_worst(only):
         row | {"photo": f"{row['photo']}/{k}", "rms_mm": 0.001 * k} for k in range(3)
         for row in photos
     ]  # fmt: skip
-    shown = figures.shown_photos(paper)
+    shown = figures.select_photos(paper)
     assert len(shown) == figures.MOST_PHOTOS
     assert {row["photo"][-2:] for row in shown} == {"/1", "/2"}
 
@@ -674,7 +674,7 @@ def test_coordinates_of_a_large_frame_stay_readable(only):
 def test_nothing_redundant_is_said(only):
     paper = Paper(only[1] / "record.json")
     paper.record["adjustment"] |= {"chi2_bounds": None, "passed": None, "sigma0": None}
-    facts = dict(statistics.facts(paper).data["items"])
+    facts = dict(quality.facts(paper).data["items"])
     assert facts["Global test"].startswith("none: no observation is redundant")
     assert facts["σ₀ a posteriori"] == "–"
 
@@ -683,7 +683,7 @@ def test_nothing_redundant_is_said(only):
 def test_failed_global_test_names_its_side(chi2, words, only):
     paper = Paper(only[1] / "record.json")
     paper.record["adjustment"] |= {"chi2": chi2, "passed": False}
-    facts = dict(statistics.facts(paper).data["items"])
+    facts = dict(quality.facts(paper).data["items"])
     assert facts["Global test"].startswith("FAILED")
     assert words in facts["Global test"]
 

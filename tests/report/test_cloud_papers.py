@@ -2,7 +2,6 @@
 
 import json
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import openpyxl
@@ -11,9 +10,7 @@ from browser import Browser
 from paper_cells import paper_blocks
 
 import tankcal
-from tankcal.clouds.wall.cells import CellGrid
 from tankcal.record import record_of
-from tankcal.record.cloud_map import map_of
 from tankcal.record.clouds import shared_part_of
 from tankcal.report import clouds as drawn
 from tankcal.report import workbook
@@ -24,60 +21,6 @@ from tankcal.report.web import page
 from tankcal.tank.capacity import Capacity, Source
 from tankcal.text.languages import LANGUAGES
 from tankcal.text.words import load_words, translate_record
-
-
-def wall_of(radius_m, joints_m, sides=("inside",)):
-    """Cells of a wall whose radius (scans, rows, columns) is nan where it is hidden."""
-    rows, columns = radius_m.shape[1:]
-    edges = np.linspace(joints_m[0], joints_m[-1], rows + 1)
-    return SimpleNamespace(
-        grid=CellGrid(edges, columns),
-        joints_m=joints_m,
-        sides=sides,
-        radius_m=radius_m,
-        is_wall=np.isfinite(radius_m),
-    )
-
-
-# ---- the map
-
-
-def test_a_small_wall_is_kept_as_it_is():
-    """Closed form: departures from the mean of each course, in tenths; hidden is null."""
-    radius = np.array([[[5.001, 4.999, 5.0], [5.011, np.nan, 5.009]]])
-    found = map_of(wall_of(radius, (1.0, 2.0, 3.0)), low_m=1.0)
-    assert found.departure_tenths_mm == [[10, -10, 0], [10, None, -10]]
-    assert found.height_edges_m == pytest.approx([0, 1, 2])
-    assert found.azimuth_edges_deg == pytest.approx([0, 120, 240, 360])
-
-
-def test_a_large_wall_is_put_together_within_its_courses():
-    """Closed form: means of blocks of a plane in azimuth; no block passes a joint."""
-    turn = (np.arange(300) + 0.5) / 300
-    radius = np.tile(0.006 * (turn - 0.5), (1, 130, 1)) + 5.0
-    radius[0, 70:] += 0.02
-    found = map_of(wall_of(radius, (0.0, 7.0, 13.0)), most=1000)
-    shape = len(found.height_edges_m) - 1, len(found.azimuth_edges_deg) - 1
-    assert shape[0] * shape[1] <= 1000 < 2 * shape[0] * shape[1]
-    assert 7.0 in np.round(found.height_edges_m, 9)
-    edges = np.array(found.azimuth_edges_deg)
-    expected = 60 * ((edges[1:] + edges[:-1]) / 720 - 0.5)
-    np.testing.assert_allclose(found.departure_tenths_mm, np.tile(expected, (shape[0], 1)), atol=1)
-
-
-def test_two_faces_of_the_plate_are_one_departure():
-    """Property: scans from outside are held against the mean of their own side."""
-    form = 0.002 * np.sin(np.arange(8) * np.pi / 4)
-    radius = np.array([[5.0 + form], [5.01 + form]])
-    found = map_of(wall_of(radius, (0.0, 1.0), ("inside", "outside")))
-    assert found.departure_tenths_mm == [np.rint(1e4 * form).astype(int).tolist()]
-
-
-def test_less_than_half_of_the_cells_is_hidden():
-    radius = np.full((1, 2, 4), 5.0)
-    radius[0, :, 0] = radius[0, 0, 1] = np.nan
-    assert map_of(wall_of(radius, (0.0, 1.0)), most=2).departure_tenths_mm == [[None, 0]]
-
 
 # ---- U with and without the shared part
 

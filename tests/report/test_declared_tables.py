@@ -17,7 +17,7 @@ from tankcal.report.paper import Paper
 from tankcal.report.pdf import pdf
 from tankcal.report.tables import Column, capacity, survey, tank
 from tankcal.report.terminal import lines_of
-from tankcal.report.uncertainty import budget, deliveries, method, monte_carlo, rule
+from tankcal.report.uncertainty import budget, method, monte_carlo, rule, stated
 from tankcal.report.web import page
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.tables import columns_of
@@ -91,7 +91,7 @@ def test_an_added_column_is_in_the_csv_file(added, tmp_path):
 def every_table():
     """{name: declared Table} of all that a record may have."""
     record = kept("uncertain")
-    declared = [one for room in (tank, survey, deliveries, monte_carlo, rule)
+    declared = [one for room in (tank, survey, stated, monte_carlo, rule)
                 for one in vars(room).values() if hasattr(one, "on_paper")]  # fmt: skip
     made = [
         capacity.capacity_table(record),

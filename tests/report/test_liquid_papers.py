@@ -15,8 +15,7 @@ from paper_words import assert_tables_have_words, instruments_said
 import tankcal
 from tankcal.record import load, record_of, save
 from tankcal.record.making import Record
-from tankcal.record.plain_data import to_plain
-from tankcal.record.schema import from_plain
+from tankcal.record.schema import from_plain, to_plain
 from tankcal.report import build, missing, workbook
 from tankcal.report import liquid as drawn
 from tankcal.report.plain import PlainPaper

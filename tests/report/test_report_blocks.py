@@ -14,7 +14,7 @@ from tankcal.report.markdown import nodes
 from tankcal.report.numbers import symbol, unit
 from tankcal.report.paper import Column, Paper
 from tankcal.report.web import block_html
-from tankcal.report.web.tables import decimal_fills
+from tankcal.report.web.elements import decimal_fills
 from tankcal.text.digits import ENGLISH, Marks
 from tankcal.text.words import load_words
 

@@ -22,8 +22,8 @@ from tankcal.job.contract.uncertainty import INPUTS
 from tankcal.pipeline import plot_style
 from tankcal.record import record_of, save
 from tankcal.record.covariance_factor import blocks_of
-from tankcal.record.plain_data import to_plain
-from tankcal.record.statements import budgets_of
+from tankcal.record.schema import to_plain
+from tankcal.record.table import budgets_of
 from tankcal.report import figures
 from tankcal.report.paper import Paper
 from tankcal.report.pdf import pdf
@@ -429,7 +429,7 @@ def test_the_differences_of_the_ends_are_drawn(record):
 def test_the_usual_sentence_on_k_is_of_the_rows_whose_U_is_k_u(record, k, dof, simulated, said):
     interval = ["monte_carlo" if one else "gum" for one in simulated]
     columns = {"k": k, "dof": dof, "U_m3": [0.1, 0.2, 0.3], "interval": interval}
-    found = method.on_k(Paper(changed(record, **columns)))
+    found = method.k_sentences(Paper(changed(record, **columns)))
     assert len(found) == (said is not None)
     for sentence in found:
         assert said in sentence

@@ -13,7 +13,7 @@ from tankcal.report.outputs import write
 from tankcal.report.outputs.tables import write_tables
 from tankcal.report.paper import Paper
 from tankcal.report.tables.facts import REFERENCES
-from tankcal.report.tables.great_circles import CIRCLES
+from tankcal.report.tables.strapping import CIRCLES
 from tankcal.text.languages import LANGUAGES
 
 STEPS = ("certificate", "temperature", "tension", "tape_thickness", "rise", "sag")

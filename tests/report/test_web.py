@@ -24,9 +24,8 @@ from tankcal.report.paper import Paper
 from tankcal.report.pdf import pdf
 from tankcal.report.web import page
 from tankcal.report.web.capacity_data import BEND, calculator, sources_of, straight_rows
+from tankcal.report.web.elements import PIECE, embed_fonts
 from tankcal.report.web.packing import script_data
-from tankcal.report.web.svg_fonts import with_fonts
-from tankcal.report.web.tables import PIECE
 from tankcal.report.web.tank_shape import tank_view
 
 
@@ -301,10 +300,10 @@ def test_a_chart_brings_the_letters_of_its_font():
         '<svg width="1"><text style="font: 8px \'STIXGeneral\'">U / m³ &amp; 4</text>'
         "<text style=\"font-family: 'STIXGeneral'\">h</text></svg>"
     )
-    made = with_fonts(svg)
-    assert made == with_fonts(svg)  # the same bytes
+    made = embed_fonts(svg)
+    assert made == embed_fonts(svg)  # the same bytes
     assert made.startswith('<svg width="1"><style>@font-face{font-family:STIXGeneral;src:url(data:')
     data = re.search(r"base64,([^)]+)", made)[1]
     letters = TTFont(io.BytesIO(base64.b64decode(data))).getBestCmap()
     assert set("U / m³ & 4h") == set(map(chr, letters))
-    assert with_fonts("<svg><path/></svg>") == "<svg><path/></svg>"
+    assert embed_fonts("<svg><path/></svg>") == "<svg><path/></svg>"

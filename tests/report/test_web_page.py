@@ -13,7 +13,7 @@ from browser import Browser
 from paper_cells import paper_blocks
 from uncertain_job import write_uncertain_record
 
-from tankcal.record.covariance_factor import factor_of, in_blocks
+from tankcal.record.covariance_factor import factor_of, wrap_factor
 from tankcal.report.web import page
 from tankcal.text import digits
 from tankcal.text.digits import (
@@ -433,5 +433,5 @@ def lengthened(record, times):
             capacity[key] = [values[row] for row in nearest]
     capacity["dip"] = [fixed(height, 4, digits.PROGRAM) for height in capacity["height_m"]]
     whole = {"factor_m3": factor_of(record["capacity"])[nearest].tolist()}
-    capacity["factor"] = in_blocks(whole)["factor"]
+    capacity["factor"] = wrap_factor(whole)["factor"]
     return found | {"monte_carlo": None, "densities": []}

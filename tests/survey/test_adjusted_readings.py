@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tankcal.survey.adjusted_readings import Reading, Readings
+from tankcal.survey.results import Reading, Readings
 
 
 def reading(row, *, sd=0.001, removed=False, check=False):

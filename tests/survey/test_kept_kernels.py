@@ -74,7 +74,7 @@ def test_what_is_compiled_for_all_is_a_sound_survey():
 
 def test_less_work_is_enough_where_loops_are_kept(monkeypatch):
     monkeypatch.setattr(compiled, "available", lambda: True)
-    monkeypatch.setattr(compiled, "_asked_for", lambda: "patient")
+    monkeypatch.setattr(compiled, "_requested_mode", lambda: "patient")
     for kept, rows in ((False, compiled.AT_ONCE), (True, compiled.LOADING * compiled.AT_ONCE)):
         monkeypatch.setattr(compiled, "are_kept", lambda kept=kept: kept)
         assert not compiled.is_worth_compiling(rows - 1)
@@ -106,6 +106,6 @@ def test_the_garbage_collector_rests_while_loops_are_loaded():
             resting.append(not gc.isenabled())
             return "loop"
 
-    assert compiled._Kept(Beside(), None).load_overload("signature", "target") == "loop"
+    assert compiled._FunctionCache(Beside(), None).load_overload("signature", "target") == "loop"
     assert resting == [True]
     assert gc.isenabled()

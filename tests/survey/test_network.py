@@ -174,7 +174,7 @@ def test_small_jobs_do_not_wait_for_a_compiler(monkeypatch):
     """The size of a problem decides, for each part of it; never what was done before."""
     room = tankcal.solver.compiled
     monkeypatch.setattr(room, "available", lambda: True)
-    monkeypatch.setattr(room, "_asked_for", lambda: "patient")
+    monkeypatch.setattr(room, "_requested_mode", lambda: "patient")
     monkeypatch.setattr(room, "are_kept", lambda: False)
     assert not any(room.is_worth_compiling(room.AT_ONCE - 1) for _ in range(1000))
     assert room.is_worth_compiling(room.AT_ONCE)

@@ -11,8 +11,8 @@ from tankcal.camera.model import Form, distort_image_points
 from tankcal.errors import SolutionError
 from tankcal.geometry.rotations import rotation_of_view
 from tankcal.survey.network import Camera, Photos, Survey, adjust
-from tankcal.survey.network.soundness import find_hardly_determined
-from tankcal.survey.network.unknowns import in_words
+from tankcal.survey.network.adjustment import find_hardly_determined
+from tankcal.survey.network.unknowns import describe_directions
 from tankcal.survey.observations import ControlCoordinates, Distances, ImageCoordinates
 
 SQUARE = np.column_stack(
@@ -99,7 +99,7 @@ def test_photos_that_nothing_determines_are_named(count, which):
     photos = SimpleNamespace(names=tuple(f"S{i}" for i in range(9)))
     moving = np.zeros((len(columns), 1))
     moving[layout.photos[:count, :3].ravel()] = moving[:3] = 1.0
-    told = in_words(SimpleNamespace(points=("P",), photos=photos), layout, None, moving)
+    told = describe_directions(SimpleNamespace(points=("P",), photos=photos), layout, None, moving)
     assert told == f"{which} and the place of point P cannot be told apart"
 
 

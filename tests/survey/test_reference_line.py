@@ -5,7 +5,6 @@ import pytest
 from job_builder import LEVELS_B
 
 from tankcal.survey.reference_line import (
-    ARCSEC,
     Line,
     Offset,
     Plummet,
@@ -15,6 +14,7 @@ from tankcal.survey.reference_line import (
     level_names,
     levels_of,
 )
+from tankcal.units import ARCSEC
 
 LEVELS_A = {0.4: ["151.1 148.9 150.2 150.8 149.3 150.0 150.5 149.7"],
             1.2: ["153.4 146.9 146.5 149.6 149.5 148.9 150.2 152.4"],

@@ -11,9 +11,9 @@ from tankcal.survey.strapping import (
     Strapping,
     Tape,
     certified,
+    mean_tension_n,
     reduce_strap,
 )
-from tankcal.survey.tape_tension import mean_tension_n
 
 ROUND = Strapping((), ())
 PLAIN = Tape("T")

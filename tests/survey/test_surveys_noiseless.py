@@ -7,7 +7,7 @@ import pytest
 from surveyed import by_instruments, by_photographs, known, table
 
 from tankcal.record.adjustment import adjustment_of
-from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import to_plain
 from tankcal.survey import adjust_survey
 from tankcal.survey.measurements import Instrument, Measurements
 from tankcal.survey.network import adjust

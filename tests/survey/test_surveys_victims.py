@@ -10,7 +10,7 @@ from tankcal.adjust import CRITICAL
 from tankcal.cli import main
 from tankcal.errors import SolutionError
 from tankcal.record.adjustment import adjustment_of
-from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import to_plain
 from tankcal.survey import adjust_survey
 from tankcal.survey.means import average_readings, contradictory_labels
 from tankcal.survey.measurements import Measurements

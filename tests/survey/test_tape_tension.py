@@ -14,9 +14,11 @@ from tankcal.survey.strapping import (
     Strap,
     Strapping,
     Tape,
+    mean_tension_n,
     reduce_strap,
+    sag_excess_m,
+    sag_of,
 )
-from tankcal.survey.tape_tension import mean_tension_n, sag_excess_m, sag_of
 
 ROUND = Strapping((), ())
 TAPE = Tape("T", tension_n=50.0, stiffness_n=5e5, weight_n_per_m=0.2)

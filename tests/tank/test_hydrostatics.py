@@ -8,8 +8,9 @@ from jacobians import assert_derivative
 from shapes import course_of, modes
 
 from tankcal.errors import HeightError, SolutionError
-from tankcal.tank.hydrostatics import STANDARD_GRAVITY, liquid_head
+from tankcal.tank.hydrostatics import liquid_head
 from tankcal.tank.volumes import ShellVolume
+from tankcal.units import STANDARD_GRAVITY
 
 E_PA, JOINTS, PLATES = 206e9, np.array([0, 3.2, 6.4, 9.5]), np.array([0.010, 0.008, 0.006])
 LEVELS = np.array([-0.1, 0.0, 0.4, 1.7, 3.2, 3.3, 4.99, 5.0, 5.01, 6.4, 7.7, 9.4, 9.5])

@@ -7,7 +7,7 @@ from jacobians import assert_derivative
 from tankcal.errors import HeightError, SolutionError
 from tankcal.tank.bottoms import shaped_bottom
 from tankcal.tank.fittings import deadwood
-from tankcal.tank.liquid_zone import Above, measured_bottom
+from tankcal.tank.liquid_zone import PartAbove, measured_bottom
 from tankcal.tank.parts import Part
 
 AREA = np.pi * 6.5**2
@@ -48,14 +48,14 @@ def test_the_measured_volumes_are_the_table():
 def test_above_the_zone_the_shell_is_added():
     """V_measured + V_shell(h) - V_shell(highest), the truth here."""
     levels = np.array([0.30, 0.31, 2.0, 9.5])
-    total = measured().volume_m3(levels) + Above(Cylinder(), 0.30).volume_m3(levels)
+    total = measured().volume_m3(levels) + PartAbove(Cylinder(), 0.30).volume_m3(levels)
     assert total == pytest.approx(cone_tank(levels), rel=1e-13)
-    assert not np.any(Above(Cylinder(), 0.30).volume_m3(LEVELS))
+    assert not np.any(PartAbove(Cylinder(), 0.30).volume_m3(LEVELS))
 
 
 def test_above_the_zone_only_increments_are_uncertain():
     """Both parts of the shell's errors that the measured zone replaced cancel."""
-    part = Above(Cylinder(), 0.30)
+    part = PartAbove(Cylinder(), 0.30)
     levels = np.array([0.1, 0.30, 0.5, 9.5])
     beyond = np.maximum(levels - 0.30, 0)
     assert part.derivatives(levels)["scale"] == pytest.approx(2 * AREA * beyond, abs=1e-12)

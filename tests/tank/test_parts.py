@@ -17,7 +17,7 @@ from tankcal.tank.factors import Factor
 from tankcal.tank.fittings import deadwood, floating_roof
 from tankcal.tank.heads import End
 from tankcal.tank.hydrostatics import liquid_head
-from tankcal.tank.liquid_zone import Above, measured_bottom
+from tankcal.tank.liquid_zone import PartAbove, measured_bottom
 from tankcal.tank.meshes import closed_mesh, mesh_part
 from tankcal.tank.parts import Part
 from tankcal.tank.solids import LyingTank, Sphere
@@ -148,7 +148,7 @@ EXAMPLES = {
         liquid_zone, (0.0, 1.0), 1, ("bottom_liquid", "bottom_curve"), {}, 64, 1e-6
     ),
     "shell above a zone": Example(
-        lambda **changes: Above(shell(**changes), 0.4), (0.4, 6.0), 1, ("points", "form"),
+        lambda **changes: PartAbove(shell(**changes), 0.4), (0.4, 6.0), 1, ("points", "form"),
         {"scale": 1e-4, "paint": 1e-4},
     ),
     "lying cylinder": Example(

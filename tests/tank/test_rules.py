@@ -10,11 +10,11 @@ from scipy import stats
 
 from tankcal.errors import HeightError
 from tankcal.job.rule_files import shipped_names, shipped_rule
-from tankcal.record.plain_data import to_plain
-from tankcal.record.statements import rule_of
+from tankcal.record.schema import to_plain
+from tankcal.record.table import rule_of
 from tankcal.tank.capacity import Capacity
 from tankcal.tank.deliveries import worst_deliveries
-from tankcal.tank.rules import TANKS, Printed, StatedVolume, conformity_probability, judge
+from tankcal.tank.rules import TANKS, PrintedU, StatedVolume, conformity_probability, judge
 from tankcal.tank.rules.deviation import judge_deviation
 from tankcal.tank.rules.expanded import judge_uncertainty
 from tankcal.tank.rules.model import DeviationLimit, UncertaintyLimit
@@ -451,7 +451,7 @@ def printed(rows=None, pairs=None, factor=1.0):
     U, by_gum = table(datum=0.1).U_m3.copy(), np.full(101, True)
     for row, value in (rows or {}).items():
         U[row], by_gum[row] = value, False
-    return Printed(U, by_gum, pairs or {}, factor)
+    return PrintedU(U, by_gum, pairs or {}, factor)
 
 
 def test_rows_are_judged_by_the_U_that_is_printed():
@@ -484,7 +484,7 @@ def test_deviation_in_guard_band_of_printed_U_is_refused():
     stated = [StatedVolume(500.0 + 9.37, 5.0)]
     assert judge(rule, one, "sphere", stated=stated).code == "passed"
     U = np.where(np.arange(101) == 50, 0.64, one.U_m3)
-    larger = Printed(U, one.U_m3 == U)
+    larger = PrintedU(U, one.U_m3 == U)
     assert judge(rule, one, "sphere", stated=stated, printed=larger).code == "not_accepted"
 
 

@@ -25,7 +25,7 @@ from tankcal.messages import (
     printable_lines,
 )
 from tankcal.record import record_of
-from tankcal.record.plain_data import to_plain
+from tankcal.record.schema import to_plain
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import MESSAGES, load_words, message_sentence, translate_record
 

@@ -238,7 +238,7 @@ def test_run_saves_and_writes_the_record_of_the_files(folder, tmp_path):
     assert result.at(5.0).value_m3 == again.at(5.0).value_m3
     kept = json.loads((tmp_path / "out" / "record.json").read_text())
     from tankcal.record import record_of
-    from tankcal.record.plain_data import to_plain
+    from tankcal.record.schema import to_plain
 
     fresh = json.loads(json.dumps(to_plain(record_of(again))))
     assert kept["capacity"] == fresh["capacity"]

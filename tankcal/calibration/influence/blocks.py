@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tankcal.adjust import gauss_newton
 from tankcal.calibration.product.check import ALPHA, ProductCheck, check_product
 from tankcal.calibration.product.differences import collect_differences
 from tankcal.camera.model import PARAMETERS, UNITS, Form
@@ -335,15 +336,25 @@ def _align(reference, target, xyz, place, rotation):
     scale = np.array([1, 1, 1, *(1 / size,) * 4])
     motions = reference.free_motions
     motions = motions / np.linalg.norm(motions / scale[:, None], axis=0)
-    for _ in range(MAX_ITERATIONS):
-        design = _motion_derivatives(xyz) @ motions
-        misclosure = (target - centre - xyz)[is_known]
-        step = motions @ np.linalg.lstsq(design[is_known], misclosure, rcond=None)[0]
+
+    def step_at(block, _):
+        design = _motion_derivatives(block[0]) @ motions
+        misclosure = (target - centre - block[0])[is_known]
+        return motions @ np.linalg.lstsq(design[is_known], misclosure, rcond=None)[0]
+
+    def move(block, step):
+        xyz, place, rotation = block
         turn = apply_small_rotation(np.eye(3)[None], step[None, 3:6])[0]
         xyz, place = (step[:3] + (1 + step[6]) * a @ turn.T for a in (xyz, place))
-        rotation = rotation @ turn.T
-        if np.abs(step / scale).max() < CONVERGENCE * size:
-            break
+        return xyz, place, rotation @ turn.T
+
+    xyz, place, rotation = gauss_newton(
+        step_at,
+        (xyz, place, rotation),
+        move=move,
+        is_small=lambda step: np.abs(step / scale).max() < CONVERGENCE * size,
+        most_steps=MAX_ITERATIONS,
+    )
     return xyz + centre, place + centre, rotation
 
 

@@ -17,11 +17,11 @@ from tankcal.camera.model import PARAMETERS
 from tankcal.errors import SolutionError, TankcalError
 from tankcal.messages import message
 from tankcal.survey import Adjustment
-from tankcal.survey.causes import causes_of
 from tankcal.survey.datum import make_frame
 from tankcal.survey.network import adjust
 from tankcal.survey.network.snooping import start_from_adjusted
 from tankcal.survey.network_of_survey import gather
+from tankcal.survey.results import causes_of
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
+from tankcal.units import FULL_TURN
 
 PIECE = 1 << 15  # points added at a time, so that their arrays fit into the processor cache
 FINE_BITS = 8  # a bin is 2**8 units wide

@@ -29,7 +29,7 @@ from tankcal.clouds.wall.growing import (
 )
 from tankcal.clouds.wall.screens import FILE, two_surfaces_error
 from tankcal.errors import InputError, Problem
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 from tankcal.messages import message
 
 LEAST_SD_M = 5e-5  # least standard deviation of the mean of a cell, m

@@ -11,7 +11,7 @@ import scipy
 from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.clouds.wall.cells import FAR_BINS, FAR_M
 from tankcal.clouds.wall.growing import EMPTY, WALL, estimate_spread
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 # Rows on each side of a step; least step, m, and as a multiple of the scatter
 JOINT_ROWS, LEAST_STEP_M, SURE_STEP = 4, 0.002, 5.0

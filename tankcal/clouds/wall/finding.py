@@ -13,8 +13,8 @@ from tankcal.clouds.wall.cells import CellGrid
 from tankcal.clouds.wall.deciding import decide_wall
 from tankcal.clouds.wall.passes import Passes
 from tankcal.clouds.wall.start import find_surface
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
+from tankcal.units import FULL_TURN
 
 SAMPLE = 500_000  # points of the sample
 # Height and width of a cell, m; least number of columns, if memory and points suffice

@@ -9,8 +9,8 @@ among the rearmost distances of coarse cells.
 import numpy as np
 
 from tankcal.errors import InputError, Problem
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
+from tankcal.units import FULL_TURN
 
 FILE = "clouds.toml"
 

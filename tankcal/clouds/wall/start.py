@@ -17,10 +17,10 @@ from tankcal.clouds.wall.screens import (
 )
 from tankcal.clouds.wall.surfaces import CylinderSurface, SphereSurface
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.geometry.primitives import fit_sphere
 from tankcal.geometry.shell import consensus_circle, find_shell
 from tankcal.messages import message
+from tankcal.units import FOOT_M, FULL_TURN, INCH_M, MM_PER_M
 
 LEVELS, LEAST_LEVELS = 24, 0.3  # levels of height; least share of levels with points in a square
 SQUARE, LEAST_SQUARES = 1 / 75, 20  # side of a square as a share of the radius; least number
@@ -30,7 +30,7 @@ DIAGNOSED = 60_000  # points used to search the cause of a failure
 AROUND, FITTED_LEVELS = 72, 24  # columns and rows of cells that give points for the fit of the axis
 WIDE = 0.03  # tolerance of the nominal radius, and of points about the first circle, as a share
 FEWEST = 500  # least number of points between the ends of the shell
-UNITS = {"mm": 1000.0, "cm": 100.0, "ft": 1 / 0.3048, "in": 1 / 0.0254}  # units in one metre
+UNITS = {"mm": MM_PER_M, "cm": 100.0, "ft": 1 / FOOT_M, "in": 1 / INCH_M}  # units in one metre
 LEAST_ON_SPHERE = 0.3  # least share of the points on a sphere
 # Random samples of four points; bands of successive fits as shares of the radius
 SPHERE_TRIES, SPHERE_BANDS = 400, (0.03, 0.02, 0.01, 0.006, 0.006)

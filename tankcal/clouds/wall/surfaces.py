@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 
 def _turn(x, y):

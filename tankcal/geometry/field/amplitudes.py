@@ -3,15 +3,39 @@
 The logarithms of the variances have a normal prior (`components`). The estimated amplitudes
 maximise the posterior density given the readings (`likelihood`); the curvature at the maximum gives
 their covariance.
+
+Readings y = X beta + sum of components + noise, with X the design of the radius of each course and
+of the centre of each ring of points. With N an orthonormal basis of the complement of X in a
+course, N'y is a part of the likelihood. The common values of all courses are values at the azimuths
+of the survey and at the heights of the bulge.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 
-from tankcal.geometry.field.components import COMPONENTS, log_covariance
-from tankcal.geometry.field.evidence import BULGES, likelihood_of
-from tankcal.geometry.field.likelihood import LEAST_M
+from tankcal.adjust import find_determined
+from tankcal.geometry.field.components import (
+    COMPONENTS,
+    azimuth_correlations,
+    log_covariance,
+    mode_shares,
+    seam_correlations,
+    wave_columns,
+    weld_columns,
+)
+from tankcal.geometry.field.likelihood import LEAST_M, LEAST_NOISE_M, Likelihood, Part, prior_of
+from tankcal.geometry.field.sites import free_design
+from tankcal.geometry.form import multiples
+from tankcal.units import FULL_TURN
+
+SMALLEST = 1e-8  # keeps the remainder of a covariance without its modelled part positive
+NEAR_M = 0.02  # azimuths within this distance along the arc count as equal for the common form
+WIDE_M = 1.0  # prior sd of a shared unknown about its first estimate (practically free)
+MOST_FOLLOWED = 80  # largest number of values of the common form over all courses
+BULGES = np.array([one.shape == "mean" and one.orders != "joints" for one in COMPONENTS])
+MOST_ASKED = 200  # readings used of a course: each step of a search inverts their covariance
 
 
 @dataclass(frozen=True)
@@ -43,7 +67,7 @@ class Amplitudes:
         """Degrees of freedom of the noise factor; inf if the covariance is known."""
         return 2 / self.noise_log_sd**2 if self.noise_log_sd else np.inf
 
-    def with_bulges(self, scale):
+    def scale_bulges(self, scale):
         """Return amplitudes with those of bulges and tapers multiplied by a scale."""
         return replace(self, likely_m2=np.where(BULGES, scale**2, 1.0) * self.likely_m2)
 
@@ -66,7 +90,7 @@ class Amplitudes:
         """
         return self.likely_m2 * np.exp(np.diag(self.log_covariance) / 2)
 
-    def with_least(self, name):
+    def raise_to_median(self, name):
         """Return amplitudes with a named component at least as large as its prior median."""
         index = [component.name for component in COMPONENTS].index(name)
         likely_m2 = self.likely_m2.copy()
@@ -177,3 +201,204 @@ def likely_variances(sites, radius_m, variance_m2, nominal_m, start_m2=None):
     """
     likelihood = likelihood_of(sites, radius_m, variance_m2, nominal_m, True)
     return np.exp(likelihood.near_top(None if start_m2 is None else np.log(start_m2)))
+
+
+def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
+    """Return the `Likelihood` of radii at sites.
+
+    A course with more than `MOST_ASKED` readings contributes a sample of its readings.
+
+    Parameters
+    ----------
+    sites, radius_m, noise_m2, nominal_m, estimate_noise
+        As in `estimate_amplitudes`.
+
+    Returns
+    -------
+    Likelihood
+    """
+    sample = _sample_readings(sites)
+    if len(sample) < len(sites):
+        selection = np.ix_(sample, sample) if np.ndim(noise_m2) == 2 else sample
+        sites, radius_m, noise_m2 = sites.take(sample), radius_m[sample], noise_m2[selection]
+    common = _common_values(sites, nominal_m)
+    if sites.shared is not None:
+        radius_m = radius_m - _fit_free(sites, radius_m)
+    parts = tuple(
+        _build_part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise)
+        for members in sites.members
+    )
+    columns, spread, missed = common
+    wide = np.zeros(columns.shape[1])
+    if sites.shared is not None:
+        wide[-sites.shared.shape[1] :] = WIDE_M**2
+    shared, own_indices = _component_indices(sites)
+    own_indices = own_indices + missed + [len(COMPONENTS)] * estimate_noise
+    variances = np.diag(noise_m2) if np.ndim(noise_m2) == 2 else noise_m2
+    middle, *others = prior_of(
+        COMPONENTS, log_covariance(sites.smoothed), variances if estimate_noise else None
+    )
+    # A scale on amplitudes is twice its logarithm on the log variances.
+    middle[: len(COMPONENTS)][BULGES] += 2 * np.log(sites.bulge_scale)  # logarithms of variances
+    return Likelihood(parts, np.array(own_indices), np.array(shared), spread, wide, middle, *others)
+
+
+def _sample_readings(sites):
+    """Return indices of the readings in use: all, or pairs of neighbours.
+
+    Courses with many readings are sampled. The common part of two close readings distinguishes form
+    from noise.
+    """
+    samples = []
+    for members in sites.members:
+        step = -(-len(members) // MOST_ASKED)
+        keys = sites.zeta[members], sites.azimuth_rad[members], sites.ring[members]
+        samples.append(members[np.lexsort(keys)][np.arange(len(members)) // 2 % step == 0])
+    return np.sort(np.concatenate(samples))
+
+
+def _fit_free(sites, radius_m):
+    """Return the part (n,) of the radii explained by the parameters without prior."""
+    design = free_design(sites)[0]
+    return design @ np.linalg.lstsq(design, radius_m, rcond=None)[0]
+
+
+def _component_indices(sites):
+    """Return the indices of common components and of own components; welds only if known."""
+    indices = [
+        i for i, component in enumerate(COMPONENTS) if sites.welds_rad or component.shape != "weld"
+    ]
+    return [i for i in indices if COMPONENTS[i].common], [
+        i for i in indices if not COMPONENTS[i].common
+    ]
+
+
+def _common_values(sites, nominal_m):
+    """Return derivatives of the radii by common values, their covariances, and missed components.
+
+    The common values refer to the azimuths of the survey. For too many azimuths, they are the
+    cosines and sines of the first modes, and the rest of the seams counts as independent in each
+    course. Then follow the values of the heights, the modes of settlement, the peak of all welds,
+    and the shared unknowns without prior.
+
+    Returns
+    -------
+    columns : ndarray, shape (n, k)
+        Derivative of the radii by the values.
+    spread : ndarray, shape (p, k, k)
+        Covariance of the values for each common component, of unit variance.
+    missed : list of int
+        Components that the values represent only in part.
+    """
+    common = [(i, COMPONENTS[i]) for i in _component_indices(sites)[0]]
+    waves, heights = wave_columns(sites.azimuth_rad), sites.heights
+    welds = np.zeros((len(sites), 1))
+    for members, selected in zip(sites.members, sites.welds_at(nominal_m), strict=True):
+        welds[members, 0] = selected.sum(axis=1)
+    values = {
+        row: welds if item.shape == "weld" else item.columns(waves, heights)
+        for row, (_, item) in enumerate(common)
+        if item.shape in ("mean", "settled", "weld")
+    }
+    selected = np.isfinite(sites.azimuth_rad)
+    place, azimuths = _group_azimuths(sites.azimuth_rad[selected], NEAR_M / nominal_m)
+    differences = np.angle(np.exp(1j * (sites.azimuth_rad[selected] - azimuths[place])))
+    largest = np.abs(differences).max(initial=0.0)
+    missed = []
+    # Values at distinct azimuths are exact; modes are an approximation for many azimuths.
+    if len(azimuths) <= MOST_FOLLOWED and largest <= NEAR_M / nominal_m:
+        by_azimuth = np.zeros((len(sites), len(azimuths)))
+        by_azimuth[selected, place] = 1.0
+        correlations = azimuth_correlations(azimuths, azimuths, nominal_m)
+    else:
+        modes = np.arange(2.0, MOST_FOLLOWED // 2 + 2)
+        first = multiples(sites.azimuth_rad, int(modes[-1]))
+        by_azimuth = np.nan_to_num(np.hstack([item[:, 1:] for item in first]))
+        correlations = {
+            shape: np.diag(np.tile(share, 2))
+            for shape, share in mode_shares(modes, nominal_m).items()
+        }
+        missed = [i for i, item in common if item.shape == "seam"]
+    columns = np.hstack([by_azimuth, *values.values()])
+    if sites.shared is not None:
+        scale = np.abs(sites.shared).max(axis=0)  # 0: no remaining reading has this unknown
+        columns = np.hstack([columns, sites.shared / np.where(scale > 0, scale, 1.0)])
+    spread, begin = np.zeros((len(common), columns.shape[1], columns.shape[1])), by_azimuth.shape[1]
+    for row, (_, item) in enumerate(common):
+        if row in values:
+            width = values[row].shape[1]
+            spread[row, begin : begin + width, begin : begin + width] = np.eye(width)
+            begin += width
+        else:
+            spread[row, : by_azimuth.shape[1], : by_azimuth.shape[1]] = correlations[item.shape]
+    return columns, spread, missed
+
+
+def _group_azimuths(azimuth_rad, near_rad):
+    """Return the group (n,) of each azimuth and the mean azimuths of the groups.
+
+    Successive azimuths closer than near_rad belong to a group.
+    """
+    if not len(azimuth_rad):
+        return np.zeros(0, dtype=int), np.zeros(0)
+    order = np.argsort(azimuth_rad % FULL_TURN)
+    turns = (azimuth_rad % FULL_TURN)[order]
+    gap = np.diff(turns, prepend=turns[-1] - FULL_TURN)
+    widest = int(np.argmax(gap))
+    # Start the turn at its widest gap, so that no group crosses the end of the turn.
+    turns = np.roll(turns, -widest)
+    turns[len(turns) - widest :] += FULL_TURN
+    group = np.cumsum(np.roll(gap, -widest) > near_rad) - 1
+    means = np.bincount(group, turns) / np.bincount(group)
+    groups_of_azimuths = np.empty(len(order), dtype=int)
+    groups_of_azimuths[np.roll(order, -widest)] = group
+    return groups_of_azimuths, means % FULL_TURN
+
+
+def _complement_basis(columns):
+    """Return an orthonormal basis (n, m) of the complement of columns (n, p)."""
+    basis, r, _ = scipy.linalg.qr(columns, pivoting=True, check_finite=False)
+    return basis[:, np.count_nonzero(find_determined(np.diag(r), len(columns))) :]
+
+
+def _build_part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise):
+    """Return the `Part` of the likelihood for the readings of a course."""
+    columns, spread, missed = common
+    common_indices, own_indices = _component_indices(sites)
+    azimuth, heights = sites.azimuth_rad[members], sites.heights[members]
+    basis = _complement_basis(sites.free_columns(members))
+
+    def project(covariance):
+        return basis.T @ covariance @ basis
+
+    if np.ndim(noise_m2) == 2:
+        noise = project(noise_m2[np.ix_(members, members)])
+    else:
+        noise = (basis.T * noise_m2[members]) @ basis
+    waves, seams = wave_columns(azimuth), seam_correlations(azimuth, azimuth, nominal_m)
+    welds = weld_columns(azimuth, sites.welds_of(sites.course[members[0]]), nominal_m)
+    own_covariances, level = [], project(seams)
+    for component in (COMPONENTS[i] for i in own_indices):
+        if component.shape == "seam":
+            over_height = (
+                1.0 if component.is_level else component.height_covariance(heights, heights)
+            )
+            own_covariances.append(level if component.is_level else project(seams * over_height))
+        else:
+            projected = basis.T @ (
+                welds if component.shape == "weld" else component.columns(waves, heights)
+            )
+            own_covariances.append(projected @ projected.T)
+    # The part of common seams that the modes do not represent counts as independent in the course.
+    values, smallest = basis.T @ columns[members], SMALLEST * np.eye(basis.shape[1])
+    for i in missed:
+        represented = values @ spread[common_indices.index(i)] @ values.T
+        own_covariances.append(level - represented + smallest)
+    own_covariances += [noise] * estimate_noise
+    least_noise = LEAST_NOISE_M**2 * np.eye(basis.shape[1])
+    return Part(
+        basis.T @ radius_m[members],
+        np.array(own_covariances),
+        least_noise + noise * (not estimate_noise),
+        values,
+    )

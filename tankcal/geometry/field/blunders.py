@@ -13,6 +13,13 @@ rejected). Its pseudo-inverse then compares the rejected readings with each othe
 parameters. A reading that agrees with its neighbours along the wall belongs to the wall, however
 large their common departure.
 
+P follows from the inverse W of the Cholesky factor U of V = U' U:
+
+    P = W W' - Z Z',  Z Z' = V^-1 X (X' V^-1 X)^-1 X' V^-1.
+
+Its diagonal and its products with vectors are available immediately. Columns, required only for the
+few rejected readings, are computed on demand.
+
 Source: Cook & Weisberg 1982 (deletion residuals); Baarda 1968.
 """
 
@@ -26,9 +33,8 @@ from tankcal.geometry.field.amplitudes import likely_variances
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, invert
-from tankcal.geometry.field.precision import Precision
 from tankcal.geometry.field.sites import free_design
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 MOST_ROUNDS = 4  # rounds: amplitudes from the accepted readings, then tests of all readings
 FEW = 0.005  # share of readings that change between accepted and rejected, at convergence
@@ -39,7 +45,7 @@ NOTHING_LEFT = 1e-9  # relative to the largest eigenvalue of P_SS: smaller ones 
 
 
 @dataclass(frozen=True)
-class Tested:
+class ReadingTests:
     """Accepted and rejected readings, and their departures from the prediction.
 
     Attributes
@@ -62,10 +68,10 @@ class Tested:
     sizes_m2: np.ndarray | None = None
 
 
-def nothing_tested(accepted):
-    """Return a `Tested` with zeros, to be filled."""
+def empty_tests(accepted):
+    """Return a `ReadingTests` with zeros, to be filled."""
     zero_rows = np.zeros((3, len(accepted)))
-    return Tested(accepted.copy(), *zero_rows)
+    return ReadingTests(accepted.copy(), *zero_rows)
 
 
 def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None, may_go=True):
@@ -91,13 +97,13 @@ def find_blunders(sites, radius_m, variance_m2, nominal_m, accepted, barred=None
 
     Returns
     -------
-    Tested
+    ReadingTests
     """
     barred = np.zeros(len(sites), dtype=bool) if barred is None else barred
     may_go = np.broadcast_to(may_go, len(sites))
     accepted = (accepted | ~may_go) & ~barred
     pieces = [Piece(sites, members, nominal_m) for members in _split_readings(sites)]
-    centred, results, sizes = radius_m - radius_m.mean(), nothing_tested(accepted), None
+    centred, results, sizes = radius_m - radius_m.mean(), empty_tests(accepted), None
     for _ in range(MOST_ROUNDS):
         accepted_sites = sites.take(accepted)
         accepted_readings = radius_m[accepted], variance_m2[accepted]
@@ -171,6 +177,60 @@ class Piece:
         return Precision(covariance, self._design), prior_sd
 
 
+class Precision:
+    """P for a covariance (n, n), which is overwritten, and a design (n, p).
+
+    The class has the array operations that tests of readings require: `diagonal()`, products with a
+    vector, and columns, P[rows, columns] with rows and columns from `numpy.ix_` or a slice.
+
+    Examples
+    --------
+    >>> precision = Precision(np.diag([1.0, 0.5]), np.ones((2, 1)))
+    >>> precision.diagonal().round(9), precision[:, [1]].round(9).ravel()
+    (array([0.66666667, 0.66666667]), array([-0.66666667,  0.66666667]))
+    """
+
+    def __init__(self, covariance, design):
+        # The matrix is symmetric: its transpose is in the column order of LAPACK.
+        root, info = scipy.linalg.lapack.dpotrf(covariance.T, overwrite_a=True)
+        if info:
+            raise np.linalg.LinAlgError("Matrix is not positive definite")
+        self._half = scipy.linalg.lapack.dtrtri(root, overwrite_c=True)[0]
+        white = self._times(design, transposed=True)
+        normal = scipy.linalg.pinvh(white.T @ white)  # the points may not determine a parameter
+        self._by_design = self._times(white)
+        self._back = self._by_design @ normal
+        self._known = np.zeros(len(covariance), dtype=bool)
+        self._columns = np.empty_like(self._half)  # filled on demand, see `_known`
+
+    def diagonal(self):
+        """Return the diagonal (n,) of P."""
+        unrestricted = np.einsum("ij,ij->i", self._half, self._half)
+        return unrestricted - np.sum(self._back * self._by_design, axis=1)
+
+    def __matmul__(self, vector):
+        unrestricted = self._half @ (self._half.T @ vector)
+        return unrestricted - self._back @ (self._by_design.T @ vector)
+
+    def __getitem__(self, places):
+        rows, columns = (
+            selection if isinstance(selection, slice) else np.ravel(selection)
+            for selection in places
+        )
+        index = np.arange(len(self._known))[columns]
+        # Compute only the columns that no earlier request has computed.
+        new = index[~self._known[index]]
+        if len(new):
+            unrestricted = self._times(self._half[new].T)
+            self._columns[:, new] = unrestricted - self._back @ self._by_design[new].T
+            self._known[new] = True
+        return self._columns[:, index][rows]
+
+    def _times(self, columns, *, transposed=False):
+        """Return W @ columns, or W' @ columns if transposed."""
+        return scipy.linalg.blas.dtrmm(1.0, self._half, columns, trans_a=transposed)
+
+
 def restricted_precision(covariance, design):
     """Return P of the module docstring as an array (n, n); the design has the shape (n, p)."""
     # `invert` allocates a new array, which is overwritten by P.
@@ -201,7 +261,7 @@ def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf, barred=
 
     Returns
     -------
-    Tested
+    ReadingTests
     """
 
     def tests(result):
@@ -209,20 +269,20 @@ def snoop_wall(precision, pull, accepted, may_go=True, most_sd_m=np.inf, barred=
         return result.accepted, np.where(barred, np.nan, statistic), CRITICAL
 
     def again(previous, goes, comes):
-        return against_others(precision, pull, previous.accepted & ~goes | comes)
+        return judge_by_others(precision, pull, previous.accepted & ~goes | comes)
 
-    start = against_others(precision, pull, accepted)
+    start = judge_by_others(precision, pull, accepted)
     return snoop(start, tests, again, at_once=AT_ONCE, returns=1).adjustment
 
 
-def carried_over(precision, aside):
+def eliminators(precision, aside):
     """Return P_SS^-1 and P_.S P_SS^-1 of rejected readings S, the terms that eliminate S from P."""
     inverse_block = scipy.linalg.pinvh(precision[np.ix_(aside, aside)], rtol=NOTHING_LEFT)
     return inverse_block, precision[:, aside] @ inverse_block
 
 
-def against_others(precision, pull, accepted):
-    """Return `Tested` from P and P y of the module docstring.
+def judge_by_others(precision, pull, accepted):
+    """Return `ReadingTests` from P and P y of the module docstring.
 
     Parameters
     ----------
@@ -234,12 +294,12 @@ def against_others(precision, pull, accepted):
 
     Returns
     -------
-    Tested
+    ReadingTests
     """
     rejected = np.flatnonzero(~accepted)
     departure, weight = pull.copy(), precision.diagonal().copy()
     if len(rejected):
-        inverse_block, eliminator = carried_over(precision, rejected)
+        inverse_block, eliminator = eliminators(precision, rejected)
         # Eliminate S: the accepted rows of P and P y refer to the accepted readings alone.
         departure -= eliminator @ pull[rejected]
         weight -= np.sum(eliminator * precision[:, rejected], axis=1)
@@ -249,4 +309,4 @@ def against_others(precision, pull, accepted):
         departure[rejected] *= weight[rejected]
     # departure holds e_i and weight P_ii: their quotient is the difference in metres.
     weight = np.maximum(weight, 1e-300)
-    return Tested(accepted, departure / weight, departure / np.sqrt(weight), weight**-0.5)
+    return ReadingTests(accepted, departure / weight, departure / np.sqrt(weight), weight**-0.5)

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.geometry.field.sites import Sites
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 MOST_SITES = 1600  # largest number of sites of a field, whose covariance is a dense matrix
 CELL_M, CELL_ZETA, WIDER = 0.1, 0.1, 1.3  # first width and height of a cell, and growth factor

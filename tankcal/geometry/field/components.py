@@ -33,7 +33,7 @@ from functools import cached_property
 import numpy as np
 
 from tankcal.geometry.form import multiples
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 OVALITY_MODES = np.arange(2.0, 37.0)
 OVALITY_WEIGHTS = OVALITY_MODES**-3 / np.sum(OVALITY_MODES**-3)

@@ -14,7 +14,7 @@ from tankcal.geometry.field.components import COMPONENTS, seam_correlations, wav
 from tankcal.geometry.field.sites import distinct_azimuths
 
 
-def without_rounding(covariance):
+def clip_to_semidefinite(covariance):
     """Return the nearest positive semidefinite matrix, as differences may be indefinite."""
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
     return (vectors * np.maximum(values, 0.0)) @ vectors.T
@@ -51,7 +51,7 @@ class Covariances:
         """Return the indices of the sites of each course."""
         return self.sites.members
 
-    def at_sites(self, columns, members=slice(None)):
+    def columns_at_sites(self, columns, members=slice(None)):
         """Return columns (k, a) of the distinct azimuths, rearranged for some sites."""
         if self._in_order:
             return columns[:, members]

@@ -28,12 +28,12 @@ from tankcal.geometry.field.components import (
     azimuth_correlations,
     weld_columns,
 )
-from tankcal.geometry.field.covariances import Covariances, without_rounding
+from tankcal.geometry.field.covariances import Covariances, clip_to_semidefinite
 from tankcal.geometry.field.hidden_seams import hidden_covariance_m2
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.geometry.field.sites import Sites, free_design
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import panels
+from tankcal.units import FULL_TURN
 
 LEVELS = 7  # number of Gauss levels of a course, at which its outlines are estimated
 SHAPES = ("mean", *ROUND_SHAPES, "weld")
@@ -97,7 +97,7 @@ class WallField:
         # Parameters without prior first, then the conditional mean K_g V^-1 (y - X beta) of each
         # shape.
         outlines[:] = self._mean_m[:, None, None] + self._circles[:, None]
-        for shape in self._to_grid:
+        for shape in self._grid_covariances:
             if shape not in self.stated:
                 continue
             for course, members in enumerate(self._covariances.runs):
@@ -109,7 +109,7 @@ class WallField:
                 outlines[course] += common_part + self._drawn(shape, heights, members, common=False)
         if "weld" in self.stated:
             for i, at_grid in self.peaks_at_grid.items():
-                peaks = self._explained @ self._covariances.peaks[i]
+                peaks = self._weighted_residuals @ self._covariances.peaks[i]
                 outlines += self.amplitudes.variances_m2[i] * (at_grid @ peaks)[:, None]
         return outlines
 
@@ -123,10 +123,10 @@ class WallField:
         ]
         if not parts:
             return 0.0
-        pull = sum(parts) * self._explained[members]
+        pull = sum(parts) * self._weighted_residuals[members]
         if shape == "mean":
             return pull.sum(axis=1, keepdims=True)
-        return pull @ self._covariances.at_sites(self._to_grid[shape], members).T
+        return pull @ self._covariances.columns_at_sites(self._grid_covariances[shape], members).T
 
     def functionals(self, gradients_m):
         """Return `Functionals` of the wall: integrals of gradients times the radius.
@@ -154,7 +154,7 @@ class WallField:
     @property
     def centres_m(self):
         """{ring: (x, y) of its centre}, for level rings, m."""
-        free, starts = self._solved[0], self._columns[1]
+        free, starts = self._solution[0], self._columns[1]
         centres = {}
         for start, members in zip(starts, self._members, strict=True):
             rings = np.unique(self.sites.ring[members])
@@ -167,7 +167,7 @@ class WallField:
     @property
     def shared(self):
         """Estimates (s,) of the unknowns shared by courses, and their covariance (s, s)."""
-        free, normal = self._solved[0], self._factored[2]
+        free, normal = self._solution[0], self._factors[2]
         count = self.sites.shared.shape[1]
         covariance = scipy.linalg.cho_solve(normal, np.eye(len(free))[:, -count:])
         return free[-count:], covariance[-count:]
@@ -175,7 +175,7 @@ class WallField:
     @property
     def shared_by_readings(self):
         """Derivatives (s, n) of the unknowns shared by courses by the readings."""
-        _, by_columns, normal = self._factored
+        _, by_columns, normal = self._factors
         return scipy.linalg.cho_solve(normal, by_columns.T)[-self.sites.shared.shape[1] :]
 
     # The following quantities are computed once and cached.
@@ -194,7 +194,7 @@ class WallField:
         return Covariances(self.sites, self.nominal_m)
 
     @cached_property
-    def _to_grid(self):
+    def _grid_covariances(self):
         """{shape: covariance c (g, azimuths) between the grid and the distinct azimuths}."""
         correlations = azimuth_correlations(
             self.grid_rad, self._covariances.azimuths_rad, self.nominal_m
@@ -232,7 +232,7 @@ class WallField:
         return covariance
 
     @cached_property
-    def _factored(self):
+    def _factors(self):
         """Cholesky factor of V, V^-1 X, and Cholesky factor of X' V^-1 X."""
         covariance = (
             self.covariance_m2.T
@@ -245,23 +245,23 @@ class WallField:
         return factor, by_columns, scipy.linalg.cho_factor(columns.T @ by_columns)
 
     @cached_property
-    def _solved(self):
+    def _solution(self):
         """beta (p,) less the mean radii, and V^-1 (y - X beta) (n,)."""
-        factor, by_columns, normal = self._factored
+        factor, by_columns, normal = self._factors
         residuals = self.radius_m - self._mean_m[self.sites.course]
         beta = scipy.linalg.cho_solve(normal, by_columns.T @ residuals)
         residuals = residuals - self._columns[0] @ beta
         return beta, scipy.linalg.cho_solve(factor, residuals, check_finite=False)
 
     @property
-    def _explained(self):
+    def _weighted_residuals(self):
         """V^-1 (y - X beta), shape (n,)."""
-        return self._solved[1]
+        return self._solution[1]
 
     @cached_property
     def _circles(self):
         """Free radius less the mean (courses, g), about the mean centre of the rings."""
-        free, radii = self._solved[0], self._columns[1]
+        free, radii = self._solution[0], self._columns[1]
         turn = np.stack([np.sin(self.grid_rad), np.cos(self.grid_rad)])
         circles, first_plumbed = [], np.inf if self.plumbed is None else self.plumbed
         for start, members in zip(radii, self._members, strict=True):
@@ -293,14 +293,14 @@ class Functionals:
     def __init__(self, field, gradients):
         self._field, self._gradients = field, gradients
         self._totals = gradients.sum(axis=2)
-        factor, by_columns, normal = field._factored
+        factor, by_columns, normal = field._factors
         self._along = {
             shape: self._along_sites(to_grid)
-            for shape, to_grid in field._to_grid.items()
+            for shape, to_grid in field._grid_covariances.items()
             if shape != "mean"
         }
         self._along["mean"] = self._totals[:, :, None] * np.ones(len(field.sites))
-        self._across = [self._with_component(index) for index in range(len(COMPONENTS))]
+        self._across = [self._site_covariance(index) for index in range(len(COMPONENTS))]
         # K_g: components outside the estimate do not enter the weights, only the uncertainty.
         covariance = np.zeros((len(field._members) * LEVELS, len(field.sites)))
         for component, part in zip(COMPONENTS, self._across, strict=True):
@@ -319,7 +319,7 @@ class Functionals:
     def _along_sites(self, to_grid):
         """Return integrals (courses, LEVELS, n) of gradients times a covariance (g, azimuths)."""
         flat = self._gradients.reshape(-1, len(to_grid)) @ to_grid  # a single matrix product
-        flat = self._field._covariances.at_sites(flat)
+        flat = self._field._covariances.columns_at_sites(flat)
         return flat.reshape(*self._totals.shape, -1)
 
     def unseen(self, index):
@@ -330,7 +330,8 @@ class Functionals:
         cross_term = self.weights @ self._across[index].T
         size = self._field.amplitudes.variances_m2[index]
         spread = size * self._field._covariances.spread(self.weights, index)
-        return without_rounding(self._within(index) - cross_term - cross_term.T + spread)
+        prior = self._prior_covariance(index)
+        return clip_to_semidefinite(prior - cross_term - cross_term.T + spread)
 
     def hidden_seams(self):
         """Return the covariance (f, f) due to seams between the columns of points."""
@@ -342,13 +343,13 @@ class Functionals:
         np.add.at(by_course, (slice(None), sites.course[has_azimuth]), self.weights[:, has_azimuth])
         return by_course @ covariance @ by_course.T
 
-    def _with_component(self, index):
+    def _site_covariance(self, index):
         """Return the covariance (f, n) of the functionals with a component at the sites."""
         field, component = self._field, COMPONENTS[index]
         count, sites = len(field._members), field.sites
         if component.shape == "weld":
             size = field.amplitudes.variances_m2[index]
-            return size * self._by_peaks(index) @ field._covariances.peaks[index].T
+            return size * self._peak_derivatives(index) @ field._covariances.peaks[index].T
         covariance = np.zeros((count, LEVELS, len(sites)))
         integrals = self._along[component.shape]
         for course, members in enumerate(field._members):
@@ -358,15 +359,15 @@ class Functionals:
             covariance[course][:, chosen] = integrals[course][:, chosen] * height
         return field.amplitudes.variances_m2[index] * covariance.reshape(-1, len(sites))
 
-    def _by_peaks(self, index):
+    def _peak_derivatives(self, index):
         """Return the derivative (f, k) of the functionals by the peaks of welds of a component."""
         return (self._gradients @ self._field.peaks_at_grid[index]).reshape(self._totals.size, -1)
 
-    def _within(self, index):
+    def _prior_covariance(self, index):
         """Return the covariance (f, f) of the functionals due to a component, without readings."""
         field, component = self._field, COMPONENTS[index]
         if component.shape == "weld":
-            peaks = self._by_peaks(index)
+            peaks = self._peak_derivatives(index)
             return field.amplitudes.variances_m2[index] * peaks @ peaks.T
         count = len(field._members)
         integrals = self._along_each_other[component.shape]

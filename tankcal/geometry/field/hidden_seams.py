@@ -18,7 +18,7 @@ from math import factorial
 
 import numpy as np
 
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 DEPTH_M, PART, WIDTH_M = 0.035, 0.0046, 0.8  # seam: depth, at most PART of the radius; width
 SAME_RAD = 1e-9  # azimuths with a smaller difference are equal up to rounding

@@ -13,7 +13,7 @@ import numpy as np
 
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
 from tankcal.geometry.field.components import COMPONENTS
-from tankcal.geometry.field.covariances import without_rounding
+from tankcal.geometry.field.covariances import clip_to_semidefinite
 from tankcal.geometry.field.estimate import FEWEST_OF_GRID, LEVELS, gauss_heights
 from tankcal.geometry.field.sites import Sites
 from tankcal.quadrature import panels
@@ -99,7 +99,8 @@ class MeanFunctionals:
         height = about_mean @ component.height_covariance(levels, levels) @ about_mean.T
         count, flat = len(self._totals), self._totals.ravel()
         course_correlation = np.ones((count, count)) if component.common else np.eye(count)
-        return without_rounding(size * np.outer(flat, flat) * np.kron(course_correlation, height))
+        of_heights = np.kron(course_correlation, height)
+        return clip_to_semidefinite(size * np.outer(flat, flat) * of_heights)
 
 
 def _level_weights():

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.geometry.field.components import wave_columns
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 WRAPS = np.arange(-2, 3)  # turns over which a short covariance is summed to make it periodic
 CELL_M, LARGEST_CELL_M = 0.15, 120  # length of a cell along the axis; largest number of cells
@@ -100,26 +100,27 @@ class OnCylinder:
 
     def covariance(self, departure):
         """Return the covariance (n, n) of a departure of unit variance between the places."""
-        return self._around(departure, self.turn_rad, self.turn_rad) * _fading(
+        return self._correlate_turns(departure, self.turn_rad, self.turn_rad) * _fading(
             np.subtract.outer(self.along_m, self.along_m), departure.length_m
         )
 
     def across(self, departure, functionals):
         """Return the covariance (f, n) of `CylinderFunctionals` with a departure at the places."""
-        circumferential = self._around(departure, functionals.turn_rad, self.turn_rad)
+        circumferential = self._correlate_turns(departure, functionals.turn_rad, self.turn_rad)
         axial = _fading(np.subtract.outer(functionals.along_m, self.along_m), departure.length_m)
         covariance = np.einsum(
             "ftn,tn->fn", functionals.weights @ axial, circumferential, optimize=True
         )
         # The reference point at the bottom is separate from the grid of cells.
-        at_point = self._around(departure, np.zeros(1), self.turn_rad)[0]
+        at_point = self._correlate_turns(departure, np.zeros(1), self.turn_rad)[0]
         at_point = at_point * _fading(functionals.point_m - self.along_m, departure.length_m)
         return covariance + np.outer(functionals.at_point, at_point)
 
     def within(self, departure, functionals):
         """Return the covariance (f, f) of `CylinderFunctionals` due to a departure."""
         count = len(functionals.weights)
-        circumferential = self._around(departure, functionals.turn_rad, functionals.turn_rad)
+        turn = functionals.turn_rad
+        circumferential = self._correlate_turns(departure, turn, turn)
         axial = np.subtract.outer(functionals.along_m, functionals.along_m)
         spread = circumferential @ (functionals.weights @ _fading(axial, departure.length_m))
         flat = functionals.weights.reshape(count, -1)
@@ -130,7 +131,7 @@ class OnCylinder:
         covariance = spread.reshape(count, -1) @ flat.T + over_grid @ functionals.at_point[None, :]
         return covariance + np.outer(functionals.at_point, point[:, 0])
 
-    def _around(self, departure, turn, other):
+    def _correlate_turns(self, departure, turn, other):
         """Return c (n, m) between turns (n,) and (m,)."""
         if departure.shape == "oval":
             return wave_columns(turn)["oval"] @ wave_columns(other)["oval"].T
@@ -140,13 +141,14 @@ class OnCylinder:
         if departure.shape == "mean":
             return np.ones(difference.shape)
         if departure.shape == "bottom":
-            return np.outer(*(self._of_bottom(departure, places) for places in (turn, other)))
+            amplitudes = (self._bottom_amplitudes(departure, places) for places in (turn, other))
+            return np.outer(*amplitudes)
         # Sum over several turns: the covariance becomes periodic and remains positive definite.
         arcs = self.radius_m * (difference[..., None] + FULL_TURN * WRAPS)
         variance = _smooth(self.radius_m * FULL_TURN * WRAPS / departure.width_m).sum()
         return _smooth(arcs / departure.width_m).sum(axis=-1) / variance
 
-    def _of_bottom(self, departure, turn):
+    def _bottom_amplitudes(self, departure, turn):
         """Return the amplitude (n,) at turns of a departure limited to the bottom."""
         arc = self.radius_m * (turn - FULL_TURN * np.round(turn / FULL_TURN))
         return np.exp(-((arc / departure.width_m) ** 2))
@@ -211,7 +213,7 @@ class OnSphere:
     def covariance(self, departure):
         """Return the covariance (n, n) of a departure of unit variance between the places."""
         if departure.shape == "zonal":
-            return np.outer(*(self._flattened() for _ in "ab"))
+            return np.outer(*(self._flattening() for _ in "ab"))
         cosine = np.clip(self.direction @ self.direction.T, -1.0, 1.0)
         return _zonal(cosine, degree_shares(departure, self.radius_m))
 
@@ -221,7 +223,7 @@ class OnSphere:
         functionals  (f, degrees) values of the functionals for P_l of the angle from the bottom
         """
         if departure.shape == "zonal":
-            return np.outer(ZONAL * functionals[:, 0], self._flattened())
+            return np.outer(ZONAL * functionals[:, 0], self._flattening())
         shares = degree_shares(departure, self.radius_m)
         # Addition theorem: the covariance of two places, expanded at the bottom, is a product in l.
         return (functionals * shares) @ _nadir_waves(self.direction).T
@@ -232,7 +234,7 @@ class OnSphere:
             return ZONAL**2 * np.outer(functionals[:, 0], functionals[:, 0])
         return (functionals * degree_shares(departure, self.radius_m)) @ functionals.T
 
-    def _flattened(self):
+    def _flattening(self):
         """Return the departure (n,) of a sphere flattened by an rms of 1, at the places."""
         return ZONAL * (1.5 * self.direction[:, 2] ** 2 - 0.5)
 
@@ -252,14 +254,14 @@ class OnGreatCircles:
     def covariance(self, departure):
         """Return the covariance (n, n) of a departure of unit variance between the means."""
         if departure.shape == "band":
-            return np.outer(*(self._of_band(departure) for _ in "ab"))
+            return np.outer(*(self._band_means(departure) for _ in "ab"))
         shares = self._shares(departure) * AT_EQUATOR**2
         return _zonal(np.clip(self.normal @ self.normal.T, -1.0, 1.0), shares)
 
     def across(self, departure, functionals):
         """Return the covariance (f, n) of functionals with the means, as `OnSphere.across`."""
         if departure.shape == "band":
-            return np.outer(functionals @ _band(departure), self._of_band(departure))
+            return np.outer(functionals @ _band(departure), self._band_means(departure))
         of_means = functionals * self._shares(departure) * AT_EQUATOR
         return of_means @ _nadir_waves(self.normal).T
 
@@ -269,7 +271,7 @@ class OnGreatCircles:
             return np.outer(*(functionals @ _band(departure) for _ in "ab"))
         return (functionals * self._shares(departure)) @ functionals.T
 
-    def _of_band(self, departure):
+    def _band_means(self, departure):
         """Return the means (n,) of a band over the circles."""
         return _nadir_waves(self.normal) @ (_band(departure) * AT_EQUATOR)
 

@@ -63,8 +63,8 @@ def noise_of_sections(field, sections):
     -------
     tuple of SectionNoise
     """
-    (lower, _), by_columns, normal = field._factored
-    explained, results = field._explained, []
+    (lower, _), by_columns, normal = field._factors
+    explained, results = field._weighted_residuals, []
     for members in sections:
         noise = field.noise_m2[np.ix_(members, members)]
         root = np.linalg.cholesky(noise + LEAST_NOISE_M**2 * np.eye(len(members)))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.geometry.field.components import Heights, weld_columns
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 SAME_AZIMUTH_RAD = 1e-12  # azimuths with a smaller difference are equal up to rounding
 

@@ -20,8 +20,8 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.amplitudes import Amplitudes, most_likely
-from tankcal.geometry.field.blunders import against_others, restricted_precision
-from tankcal.geometry.field.covariances import without_rounding
+from tankcal.geometry.field.blunders import judge_by_others, restricted_precision
+from tankcal.geometry.field.covariances import clip_to_semidefinite
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M, Likelihood, Part, prior_of
 
 
@@ -83,7 +83,7 @@ class SolidField:
     amplitudes: Amplitudes
 
     @cached_property
-    def _solved(self):
+    def _solution(self):
         """Cholesky factors of V and X' V^-1 X with V^-1 X between, beta, and V^-1 (y - X beta)."""
         factor = scipy.linalg.cho_factor(self._covariance, lower=True)
         by_columns = scipy.linalg.cho_solve(factor, self.design)
@@ -124,7 +124,7 @@ class SolidField:
         pull = precision @ self.distance_m
         accepted, rejected = np.ones(len(pull), dtype=bool), []
         while np.count_nonzero(accepted) > self.design.shape[1] + 1:
-            tested = against_others(precision, pull, accepted)
+            tested = judge_by_others(precision, pull, accepted)
             deep = accepted & (np.abs(tested.departure_m) > least_m)
             statistics = np.where(deep, np.abs(tested.w), 0.0)
             worst = int(np.argmax(statistics))
@@ -135,7 +135,7 @@ class SolidField:
         return np.array(rejected, dtype=int)
 
     def estimated(self, functionals, by_shape):
-        """Return `Estimated` of functionals of the wall.
+        """Return `FieldEstimate` of functionals of the wall.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class SolidField:
         by_shape : ndarray, shape (f, p)
             Derivatives by the parameters of the shape, in the order of the design.
         """
-        factor, by_columns, normal, beta, pull = self._solved
+        factor, by_columns, normal, beta, pull = self._solution
         sized_departures = list(
             zip(self.amplitudes.variances_m2, self.places.departures, strict=True)
         )
@@ -166,12 +166,12 @@ class SolidField:
             difference = (
                 size * self.places.within(departure, functionals) - cross_term - cross_term.T
             )
-            unseen.append(without_rounding(difference + weights @ part @ weights.T))
-        return Estimated(beta, total @ pull, weights, unseen)
+            unseen.append(clip_to_semidefinite(difference + weights @ part @ weights.T))
+        return FieldEstimate(beta, total @ pull, weights, unseen)
 
 
 @dataclass(frozen=True)
-class Estimated:
+class FieldEstimate:
     """Estimated functionals of a wall.
 
     Attributes

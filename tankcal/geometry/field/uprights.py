@@ -20,10 +20,10 @@ import numpy as np
 import scipy.linalg
 
 from tankcal.geometry.field.amplitudes import likely_variances
-from tankcal.geometry.field.blunders import NOTHING_LEFT, Piece, carried_over
+from tankcal.geometry.field.blunders import NOTHING_LEFT, Piece, eliminators
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.units import FULL_TURN
 
 LINK_M, WIDEST_M = 0.2, 0.4  # along the arc: largest gap in a column, and its largest width
 LEAST_RINGS, LEAST_SHARE = 3, 0.5  # rings with a point of the column: least number, least share
@@ -43,7 +43,7 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
         n readings.
     radius_m, variance_m2, nominal_m
         As in `blunders.find_blunders`.
-    tested : Tested
+    tested : ReadingTests
         Result of `blunders.find_blunders`.
     sure : ndarray of bool, shape (n,)
         Readings that certainly belong to the wall.
@@ -67,7 +67,7 @@ def find_uprights(sites, radius_m, variance_m2, nominal_m, tested, sure, scatter
     def without(sizes):
         noise = sizes[-1] * variance_m2 + LEAST_NOISE_M**2
         precision = piece.precision(sizes[:-1], noise)[0][:, :]  # most of its columns are required
-        return _eliminated(precision, precision @ centred, np.flatnonzero(~tested.accepted))
+        return _eliminate(precision, precision @ centred, np.flatnonzero(~tested.accepted))
 
     sizes, least_jump = tested.sizes_m2, max(LEAST_M, LEAST_W * scatter_m)
     reduced = without(sizes)
@@ -102,7 +102,7 @@ def _select_unlikely(precision, pull, columns, least_m):
         members = np.arange(start, stop)
         # Eliminate the other columns of the selection: each is tested against regular wall only.
         jump = _jump(
-            *_eliminated(block, block_pull, np.delete(np.arange(len(block_pull)), members)), members
+            *_eliminate(block, block_pull, np.delete(np.arange(len(block_pull)), members)), members
         )
         if abs(jump.size_m) > least_m and abs(jump.w) > LEAST_W:
             selected.append(column)
@@ -118,11 +118,11 @@ class _Jump:
     members: np.ndarray
 
 
-def _eliminated(precision, pull, eliminated):
+def _eliminate(precision, pull, eliminated):
     """Return P and P y after elimination of readings, whose rows are then meaningless."""
     if not len(eliminated):
         return precision, pull
-    eliminator = carried_over(precision, eliminated)[1]
+    eliminator = eliminators(precision, eliminated)[1]
     return precision - eliminator @ precision[eliminated], pull - eliminator @ pull[eliminated]
 
 

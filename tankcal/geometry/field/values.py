@@ -71,10 +71,10 @@ class FieldValues:
     def __init__(self, field, spots, centres=()):
         self._field, self._spots = field, spots
         self._covariances = field._covariances
-        factor, by_columns, normal = field._factored
-        free, explained = field._solved
+        factor, by_columns, normal = field._factors
+        free, explained = field._solution
         design = self._design(centres)
-        self._across = [self._with_sites(index) for index in range(len(COMPONENTS))]
+        self._across = [self._site_covariances(index) for index in range(len(COMPONENTS))]
         stated = [one.shape in field.stated for one in COMPONENTS]
         covariance = np.zeros((len(design), len(field.sites)))
         for part, included in zip(self._across, stated, strict=True):
@@ -92,17 +92,17 @@ class FieldValues:
     def _take_as_read(self, rows):
         """Replace estimates by readings, less all parameters without prior except the radius."""
         field, sites = self._field, self._spots.site[rows]
-        factor, _, normal = field._factored
+        factor, _, normal = field._factors
         design, radii = field._columns
         # Keep only centre and shared unknowns: the reading less these is the radius at the place.
         others = design[sites].copy()
         others[np.arange(len(rows)), radii[field.sites.course[sites]]] = 0.0
         by_parameters = scipy.linalg.cho_solve(normal, others.T).T @ design.T
-        self.value_m[rows] = field.radius_m[sites] - others @ field._solved[0]
+        self.value_m[rows] = field.radius_m[sites] - others @ field._solution[0]
         self.weights[rows] = -scipy.linalg.cho_solve(factor, by_parameters.T, check_finite=False).T
         self.weights[rows, sites] += 1.0
 
-    def unseen_of(self, rows):
+    def undetermined_variances(self, rows):
         """Return variances of sums of the values due to the undetermined part of each component.
 
         Parameters
@@ -118,14 +118,16 @@ class FieldValues:
         """
         weights, of_places = rows @ self.weights, rows[:, : len(self._spots)]
         row, first, second, product = _enumerate_pairs(of_places)
-        correlations = self._around(first, second)
+        correlations = self._correlate_places(first, second)
         variances = np.empty((len(COMPONENTS), len(weights)))
         sizes = self._field.amplitudes.variances_m2
         for index, (size, covariance) in enumerate(zip(sizes, self._across, strict=True)):
             # Diagonal of A K A' - 2 K_g A' + K_gg, term by term.
             variances[index] = size * self._covariances.spread_alone(weights, index)
             variances[index] -= 2 * np.einsum("rn,rn->r", weights, of_places @ covariance)
-            prior_variance = size * product * self._between(index, first, second, correlations)
+            prior_variance = (
+                size * product * self._pair_covariances(index, first, second, correlations)
+            )
             variances[index] += np.bincount(row, prior_variance, len(weights))
         return variances
 
@@ -151,7 +153,7 @@ class FieldValues:
                 column += 4 if leans else 2
         return derivative
 
-    def _with_sites(self, index):
+    def _site_covariances(self, index):
         """Return the covariance (p, n) of the places with a component at the sites, m2."""
         component, spots, sites = COMPONENTS[index], self._spots, self._field.sites
         size = self._field.amplitudes.variances_m2[index]
@@ -164,7 +166,7 @@ class FieldValues:
             covariance = covariance * (spots.course[:, None] == sites.course)
         return size * covariance
 
-    def _around(self, first, second):
+    def _correlate_places(self, first, second):
         """Return {shape: c (k,) between places (k,) and others}."""
         azimuth = self._spots.azimuth_rad
         correlations = {
@@ -177,7 +179,7 @@ class FieldValues:
             "seam": seam_correlation(difference, self._field.nominal_m),
         }
 
-    def _between(self, index, first, second, around):
+    def _pair_covariances(self, index, first, second, around):
         """Return the covariance (k,) between pairs of places due to a unit component."""
         component, spots = COMPONENTS[index], self._spots
         if component.shape == "weld":
@@ -200,9 +202,8 @@ class FieldValues:
         correlations = azimuth_correlations(
             self._spots.azimuth_rad, self._covariances.azimuths_rad, self._field.nominal_m
         )
-        return {
-            shape: self._covariances.at_sites(columns) for shape, columns in correlations.items()
-        }
+        expand = self._covariances.columns_at_sites
+        return {shape: expand(columns) for shape, columns in correlations.items()}
 
     @cached_property
     def _peaks(self):

@@ -190,7 +190,7 @@ class Lines:
         half = e @ (self.twist[block].T / 2)
         half += slope / 2
         turning_share = np.mean(half < STEADY * np.abs(bend) * self.reach[block], axis=0)
-        probability_between, exact = self._between(along), np.all(self.pure[block])
+        probability_between, exact = self._interval_probability(along), np.all(self.pure[block])
         remainder = None if exact else np.subtract(place, linear_value / slope, out=linear_value)
         means = np.empty((len(levels), len(draws[0]), len(block)))
         find_root, spare = _Roots(half, bend), np.empty_like(place)
@@ -205,7 +205,7 @@ class Lines:
             means[i] += level
         return means, turning_share
 
-    def _between(self, along):
+    def _interval_probability(self, along):
         """Function for P(first < place along a direction <= last), which may overwrite `last`.
 
         Every input is symmetric, so that the sign of the direction is irrelevant.

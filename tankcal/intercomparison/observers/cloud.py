@@ -4,9 +4,9 @@ import struct
 
 import numpy as np
 
-from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.observers.sighting import Tool, incidence, rays_of, read_targets
 from tankcal.intercomparison.site import finish, observe_site
+from tankcal.units import FULL_TURN
 
 # Standard uncertainties of the scanner: offset, scale, and bias at 60 degrees of incidence.
 U_OFFSET_M, U_SCALE, U_BIAS_M = 1e-3, 10e-6, 1e-3

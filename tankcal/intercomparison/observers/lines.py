@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.observers.tape import strap
 from tankcal.intercomparison.site import finish, observe_site
+from tankcal.units import FULL_TURN
 
 # Least number of lines, largest arc between them, and levels as shares of a course.
 FEWEST, ARC_M, PARTS = 8, 3.5, (0.2, 0.8)

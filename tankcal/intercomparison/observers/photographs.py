@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.site import finish, observe_site
+from tankcal.units import FULL_TURN
 
 FRAME_M = (100.0, 200.0, 50.0)  # foot of the axis in the coordinate system of the survey
 FORMAT_MM, C_MM = (36.0, 24.0), 20.0  # size of the image, nominal principal distance

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.site import finish, observe_site
+from tankcal.units import FULL_TURN
 
 U_SCALE, U_OFFSET_M = 15e-6, 3e-4  # standard uncertainties of scale and offset
 FRAME_M = (512.0, 347.0, 21.0)  # foot of the axis in the coordinate system of the survey

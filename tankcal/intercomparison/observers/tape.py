@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.site import finish, observe_site
+from tankcal.units import FULL_TURN
 
 LEVELS, REPEATS = (0.2, 0.8), 2  # levels as shares of a course, measurements at a level
 # Tape: u of its scale, thermal expansion, 1/K, certified temperature and tension.

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tankcal.intercomparison.defects import FULL_TURN
 from tankcal.intercomparison.observers.sighting import Tool, read_targets, read_wall
 from tankcal.intercomparison.site import finish, observe_site
+from tankcal.units import FULL_TURN
 
 # Standard uncertainties of scale, offset and incidence bias; standard deviation of a distance.
 U_SCALE, U_OFFSET_M, U_BIAS_M, HIT_SD_M, ARCSEC = 10e-6, 5e-4, 1e-3, 1.2e-3, 1 / 206265

@@ -5,7 +5,7 @@ import numpy as np
 from tankcal.job.checking import UNIT_FACTOR, course_heights, places_of, tell
 from tankcal.job.checks.extent import has_radii
 from tankcal.messages import message
-from tankcal.survey.reference_line import courses_told
+from tankcal.survey.reference_line import courses_with_radius
 
 MIN_POINTS_PER_COURSE = 5  # fewer points are a problem
 FEW_POINTS_PER_COURSE = 10  # fewer points cause a warning
@@ -168,7 +168,7 @@ def _check_points_in_courses(z, unplaced, edges, tables, raw, log):
     counts, _ = np.histogram(z, bins=edges)
     names = np.array(courses.of("course"))
     with_points = set(names[counts + unplaced >= MIN_POINTS_PER_COURSE].tolist())
-    determined = courses_told(
+    determined = courses_with_radius(
         with_points, _courses_of(tables["circumferences"]), _courses_of(tables["offsets"])
     )
     known = has_radii(tables)  # radii of courses that were not measured again

@@ -13,12 +13,13 @@ from tankcal.job.checks.extent import has_wall_points
 from tankcal.job.contract.bottom import rise_of_bottom
 from tankcal.job.plausibility import DENSITIES_KG_M3
 from tankcal.messages import message
+from tankcal.units import INCH_M
 
 # Rows of the capacity table: step, fine zones, number of rows.
 
 MAX_TABLE_ROWS = 25_000  # a tank of 20 m in millimetres has a certificate of 90 pages
 COARSE_STEP_M = 0.5  # largest plausible step
-INCH_STEPS_M = {"ft-in-8": 0.0254 / 8, "ft-in-16": 0.0254 / 16}
+INCH_STEPS_M = {"ft-in-8": INCH_M / 8, "ft-in-16": INCH_M / 16}
 
 
 def check_steps(table, extent, raw, log):

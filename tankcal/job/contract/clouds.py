@@ -4,8 +4,9 @@ from tankcal.job.contract.hits import SURFACES
 from tankcal.job.contract.kinds import WITH_POINTS
 from tankcal.job.contract.shorthand import FREE, choice, number, positive
 from tankcal.job.fields import Field
+from tankcal.units import FOOT_M, INCH_M, US_SURVEY_FOOT_M
 
-UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "us_ft": 1200 / 3937, "in": 0.0254}
+UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": FOOT_M, "us_ft": US_SURVEY_FOOT_M, "in": INCH_M}
 OF_FILE = "file"  # in place of a pose: the pose stored in the file
 DOCUMENTED = "documented"  # value of the key assume
 KINDS = WITH_POINTS

@@ -4,8 +4,9 @@ from tankcal.job.contract.kinds import LOADED, VERTICAL, WITH_POINTS
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
 from tankcal.job.plausibility import DIAMETERS, MOST_YIELD_MPA, SERVICES, SHELLS, TARGETS
+from tankcal.units import FOOT_M, INCH_M
 
-MESH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254}
+MESH_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": FOOT_M, "in": INCH_M}
 
 
 MESH = (

@@ -6,7 +6,6 @@ import numpy as np
 
 from tankcal.geometry.field.components import COMPONENTS, KINDS
 from tankcal.geometry.field.estimate import gauss_heights
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.job.plausibility import INSIDE, PLATES_TO_INSIDE
 from tankcal.pipeline.tanks.common import (
@@ -29,6 +28,7 @@ from tankcal.tank.tips import FORMS as TIPS
 from tankcal.tank.tips import tip_of
 from tankcal.tank.tops import HeadedShell
 from tankcal.tank.volumes import ShellVolume
+from tankcal.units import FULL_TURN
 
 # The plan of a bottom is that of the shell, so it widens with the shell.
 
@@ -231,10 +231,10 @@ def _on_its_bottom(job, wall, shell, zero, parts):
     """Parts with the bottom: beside them, or below them if it was calibrated by liquid."""
     bottom = job.bottom
     if bottom.form == "liquid":
-        from tankcal.tank.liquid_zone import Above, measured_bottom
+        from tankcal.tank.liquid_zone import PartAbove, measured_bottom
 
         measured = measured_bottom(bottom.level_m + zero, bottom.volume_m3, bottom.u_m3)
-        return [*(Above(part, measured.highest_m) for part in parts), measured]
+        return [*(PartAbove(part, measured.highest_m) for part in parts), measured]
     return [*parts, widen_bottom(_bottom(job, wall, shell), shell)]
 
 

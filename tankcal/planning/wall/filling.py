@@ -8,19 +8,27 @@ import numpy as np
 
 from tankcal.job.checks.liquid import MOST_ROWS
 from tankcal.messages import message
-from tankcal.planning.fields import too_many_sections
-from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.entries import PLAN_FILE, too_many_sections
 from tankcal.planning.wall.model import PlannedRun
 
 LEAST_STEP_M = 0.001  # smallest step between two dips
 LEAST_BATCH_M3 = 1e-3  # replaces a batch volume that is zero or unknown
 MOST_RUNS = 50
+SAME_M = 1e-6  # largest difference of equal dips
 
 
-def check_runs(given, is_run_declared, log):
-    """Check [[runs]] and [filling]; is_run_declared: whether [liquid] has a run_ppm."""
-    runs, filling = given.repeated["runs"], given.single["filling"]
-    if filling.filled and not runs:
+def check_runs(plan_input, is_run_declared, log):
+    """Check [[runs]] and [filling].
+
+    Parameters
+    ----------
+    plan_input : PlanInput
+    is_run_declared : bool
+        Whether [liquid] has a run_ppm.
+    log : Log
+    """
+    runs, filling = plan_input.sections["runs"], plan_input.sections["filling"]
+    if filling.filled_keys and not runs:
         expected = message(
             "plan_filling_alone",
             "given without [[runs]]; expected runs of liquid from dip to dip",
@@ -30,7 +38,7 @@ def check_runs(given, is_run_declared, log):
         log.problem(PLAN_FILE, too_many_sections(len(runs), MOST_RUNS), None, "runs")
     for entry in runs:
         _check_steps(entry, log)
-    _check_run_effect(given, is_run_declared, log)
+    _check_run_effect(plan_input, is_run_declared, log)
     rows = sum(len(run.dips_m) + 1 for run in map(_planned, runs) if run is not None)
     if rows > MOST_ROWS:
         expected = message(
@@ -46,12 +54,12 @@ def _check_steps(run, log):
     first, last, step, steps = (
         run[key] for key in ("first_dip_m", "last_dip_m", "step_m", "steps")
     )
-    if {"step_m", "steps"} <= run.filled or not {"step_m", "steps"} & run.filled:
+    if {"step_m", "steps"} <= run.filled_keys or not {"step_m", "steps"} & run.filled_keys:
         expected = message(
             "plan_step_or_steps",
             "expected one of them: step_m, the way from dip to dip, or steps, how many",
         )
-        run.tell(log.problem, "step_m", expected)
+        run.report(log.problem, "step_m", expected)
         return
     if None in (first, last):
         return  # reported already
@@ -62,7 +70,7 @@ def _check_steps(run, log):
             " liquid is drawn off",
             last=last,
         )
-        run.tell(log.problem, "last_dip_m", expected)
+        run.report(log.problem, "last_dip_m", expected)
         return
     way = abs(last - first) / steps if steps else step
     if way is not None and way < LEAST_STEP_M and last != first:
@@ -72,12 +80,12 @@ def _check_steps(run, log):
             step=1000 * way,
             least=1000 * LEAST_STEP_M,
         )
-        run.tell(log.problem, "steps" if steps else "step_m", expected)
+        run.report(log.problem, "steps" if steps else "step_m", expected)
 
 
-def _check_run_effect(given, is_declared, log):
+def _check_run_effect(plan_input, is_declared, log):
     """Check that the run effect is declared, or that at least two runs determine it."""
-    runs, filling = given.repeated["runs"], given.single["filling"]
+    runs, filling = plan_input.sections["runs"], plan_input.sections["filling"]
     expected_ppm = filling["expected_run_ppm"]
     if expected_ppm is not None and is_declared:
         expected = message(
@@ -85,7 +93,7 @@ def _check_run_effect(given, is_declared, log):
             "given beside liquid.run_ppm; expected one of them: what is declared is not shown by"
             " the runs",
         )
-        filling.tell(log.problem, "expected_run_ppm", expected)
+        filling.report(log.problem, "expected_run_ppm", expected)
     if len(runs) > 1 and expected_ppm is None and not is_declared:
         expected = message(
             "plan_run_effect_missing",
@@ -129,10 +137,10 @@ def _dips(first, last, step, steps):
     return tuple(np.round(dips, 4).tolist())
 
 
-def rows_of_runs(runs, holds):
+def rows_of_runs(runs, volume_at):
     """Return the rows of liquid.csv, {column: value} each.
 
-    holds: function of a dip, m, that returns the approximate volume, m3.
+    volume_at: function of a dip, m, that returns the approximate volume, m3.
     """
     for number, run in enumerate(runs, 1):
         common = {"run": str(number), "meter": run.meter}
@@ -144,15 +152,11 @@ def rows_of_runs(runs, holds):
             yield common | {"volume_m3": 0.0}
             before = 0.0
         for dip in run.dips_m:
-            below = holds(dip)
+            below = volume_at(dip)
             if before is None:
                 yield common | sd | warm | {"volume_m3": 0.0, "dip_m": dip}
             else:
                 way = below - before
-                way = np.copysign(max(abs(way), LEAST_BATCH_M3), _sign(run))
+                way = np.copysign(max(abs(way), LEAST_BATCH_M3), run.dips_m[-1] - run.dips_m[0])
                 yield common | sd | at_meter | {"volume_m3": float(way), "dip_m": dip}
             before = below
-
-
-def _sign(run):
-    return run.dips_m[-1] - run.dips_m[0] if len(run.dips_m) > 1 else 1.0

@@ -10,12 +10,12 @@ from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.pipeline.liquid_alone import filled_range_m
 from tankcal.pipeline.liquid_body import join_body
-from tankcal.planning.given import PLAN_FILE
+from tankcal.planning.entries import PLAN_FILE
+from tankcal.planning.wall.filling import SAME_M
 from tankcal.uncertainty import combine
 
 LEAST_SHARE = 0.01  # smallest relative reduction of the u of a cause that is listed
 UNCONTROLLED = 1e-4  # redundancy
-SAME_M = 1e-6  # largest difference of equal dips
 OF_INSTRUMENTS = "instrument"  # part of the kinds of causes whose note names the instrument
 
 
@@ -153,18 +153,18 @@ class FillingOutlook:
     run_dof: float | None
 
 
-def outlook_of_filling(plan, measured, result, table):
+def outlook_of_filling(plan, metering, result, table):
     """Return the `FillingOutlook` of a WallPlan.
 
     Parameters
     ----------
     plan : WallPlan
-    measured : Measured
+    metering : Measured
     result : LiquidResult
     table : ComputedTable
     """
     dips = _dips_of(plan, table)
-    bodies = _bodies(measured)
+    bodies = _bodies(metering)
     rows = _rows(plan, bodies, dips, table)
     dof = result.run_dof
     return FillingOutlook(
@@ -172,7 +172,7 @@ def outlook_of_filling(plan, measured, result, table):
         batches=len(result.steps.row),
         dips=rows,
         differences=_differences(bodies, dips, table),
-        causes=_causes(measured.joint),
+        causes=_causes(metering.joint),
         readings=_readings(result),
         redundancy=result.dof,
         detectable_radius_m=None if plan.design.is_metered_alone else result.detectable_radius_m,
@@ -204,15 +204,15 @@ def refuse_other_dips(dips_m, table):
         raise InputError(Problem(PLAN_FILE, expected, None, "filling.dips_m"))
 
 
-def _bodies(measured):
+def _bodies(metering):
     """Return {"geometry", "liquid", "joint": Body}.
 
     None if liquid only does not determine the tank.
     """
-    joint = measured.joint.known
+    joint = metering.joint.known
     return {
         "geometry": joint.geometry.moved_to({}).body(),
-        "liquid": None if measured.alone is None else join_body(measured.alone.known),
+        "liquid": None if metering.alone is None else join_body(metering.alone.known),
         "joint": join_body(joint),
     }
 
@@ -240,8 +240,14 @@ def _rows(plan, bodies, dips, table):
     volumes = bodies["joint"].volume_m3(np.clip(levels, None, bodies["joint"].highest_m))
     columns = (dips, volumes, U_of["geometry"], liquid, U_of["joint"])
     return tuple(
-        DipOutlook(float(dip), float(volume), float(by_geometry), _or_none(alone), float(U))
-        for dip, volume, by_geometry, alone, U in zip(*columns, strict=True)
+        DipOutlook(
+            float(dip),
+            float(volume),
+            float(by_geometry),
+            float(by_liquid) if np.isfinite(by_liquid) else None,
+            float(U),
+        )
+        for dip, volume, by_geometry, by_liquid, U in zip(*columns, strict=True)
     )
 
 
@@ -259,41 +265,27 @@ def _differences(bodies, dips, table):
     )
 
 
-def _or_none(number):
-    return float(number) if np.isfinite(number) else None
-
-
 def _causes(result):
     """Return the meters, and other scalar causes whose uncertainty liquid reduces."""
     adjusted, fill = result.adjusted, result.fill
     metering = result.known.geometry.job.liquid
     outlooks = []
-    columns = dict(zip(fill.meters, _columns(adjusted, "meter_factor", len(fill.meters)),
-                       strict=True))  # fmt: skip
-    for name in fill.meters:
+    effects = (effect for effect in adjusted.effects if effect.kind == "meter_factor")
+    columns = next((effect.columns.T for effect in effects), None)
+    for number, name in enumerate(fill.meters):
         u = 1e6 * metering.meters[name].u_factor
-        outlooks.append(
-            CauseOutlook("meter_factor", name, "ppm", u, u * _left(adjusted, columns[name]))
-        )
+        left = 1.0 if columns is None else _left(adjusted, columns[number])
+        outlooks.append(CauseOutlook("meter_factor", name, "ppm", u, u * left))
     of_geometry = [source for source in result.known.sources if not source.parts]
     of_liquid = [cause for cause in result.known.liquid if cause.kind != "meter_factor"]
     for cause in (*of_geometry, *of_liquid):
         if cause.u and cause.unit and cause.columns_m3.shape[1] == 1:
             left = _left(adjusted, cause.columns_m3[:, 0])
             if left < 1 - LEAST_SHARE:
-                name, u = (
-                    cause.note if cause.kind.startswith(OF_INSTRUMENTS) else "",
-                    float(cause.u),
-                )
+                name = cause.note if cause.kind.startswith(OF_INSTRUMENTS) else ""
+                u = float(cause.u)
                 outlooks.append(CauseOutlook(cause.kind, name, cause.unit, u, u * left))
     return tuple(outlooks)
-
-
-def _columns(adjusted, kind, count):
-    for effect in adjusted.effects:
-        if effect.kind == kind:
-            return effect.columns.T
-    return [None] * count
 
 
 def _left(adjusted, column):
@@ -301,8 +293,8 @@ def _left(adjusted, column):
 
     Column (n,): effect of one u on the misclosures.
     """
-    if column is None:
-        return 1.0
+    # A cause with prior variance 1 has the posterior variance 1 - c' M c, with the weights M of
+    # all tests (`tank.liquid.adjustment`).
     return float(np.sqrt(max(1.0 - column @ adjusted.weight @ column, 0.0)))
 
 

@@ -222,12 +222,12 @@ class WallPlan:
         Dips listed with their volumes and differences; (): those of the runs and the full tank.
     expected_run : float or None
         Relative standard deviation of the run effect that the runs are to estimate.
-    holds : callable or None
+    volume_at : callable or None
         Function of a dip, m, that returns the approximate volume, m3, of a tank to be filled.
     obstacles : tuple of Box or Pillar
         Obstacles to lines of sight.
     folder : str
-    given : RawJob
+    raw : RawJob
         Content of the folder as read.
     warnings : tuple of Problem
     """
@@ -239,15 +239,15 @@ class WallPlan:
     costs: dict = field(default_factory=dict)
     dips_m: tuple = ()
     expected_run: float | None = None
-    holds: object = None
+    volume_at: object = None
     obstacles: tuple = ()
     folder: str = ""
-    given: RawJob | None = None
+    raw: RawJob | None = None
     warnings: tuple = ()
 
     def with_instrument(self, name, values, of="instruments"):
-        """Return `given` with new values {key: value} of an instrument or meter."""
-        register = self.given.registers[of]
+        """Return `raw` with new values {key: value} of an instrument or meter."""
+        register = self.raw.registers[of]
         entry = register.entries[name] | {key: Value(value) for key, value in values.items()}
         register = replace(register, entries=register.entries | {name: entry})
-        return replace(self.given, registers=self.given.registers | {of: register})
+        return replace(self.raw, registers=self.raw.registers | {of: register})

@@ -1,7 +1,8 @@
 """Nominal readings of a tank: readings that agree with each other, or have simulated errors.
 
 The wall is round with the nominal inside radius, or any other wall of `tank_walls`, with plates and
-paint around it. The reductions of the job are inverted, so that they leave no residuals.
+paint around it. The reductions of the job are inverted, so that they leave no residuals. Meters
+show the volumes of the geometry of the job.
 """
 
 from dataclasses import replace
@@ -9,21 +10,25 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.geometry.field.information import expect_amplitudes
-from tankcal.geometry.outlines import FULL_TURN
+from tankcal.pipeline.liquid_adjustment import adjust_liquid
+from tankcal.pipeline.liquid_alone import geometry_beside
+from tankcal.pipeline.liquid_geometry import load_geometry
 from tankcal.pipeline.surveying import find_survey
-from tankcal.planning.wall.foreseen_tables import OFF_WALL_M
-from tankcal.planning.wall.nominal_filling import with_nominal_batches
+from tankcal.planning.wall.design_tables import OFF_WALL_M
 from tankcal.planning.wall.reading_errors import EXACT
 from tankcal.planning.wall.tank_walls import RoundWall, plates_of
 from tankcal.survey.readings import read_distance_m
 from tankcal.survey.sighting import bias_by_incidence, rays
 from tankcal.survey.strapping import reduce_straps
+from tankcal.tank.liquid import fill_of, reduce_steps
+from tankcal.tank.liquid.reduction import load_densities
+from tankcal.units import FULL_TURN
 
 CLOSE_M, ROUNDS = 1e-12, 20  # convergence limit and largest number of iterations
 MILLIMETRES = 3  # decimals to which heights of hits are rounded to form levels
 
 
-def with_nominal_readings(job, amplitudes, expected_run=None):
+def set_nominal_readings(job, amplitudes, expected_run=None):
     """Return the job with nominal readings of tapes, offsets, hits, tangents and meters.
 
     Parameters
@@ -36,43 +41,51 @@ def with_nominal_readings(job, amplitudes, expected_run=None):
     """
     if job.tank.kind == "vertical":
         if job.tangents is not None:
-            amplitudes = _expected(_nominal(job, amplitudes), amplitudes)
-        job = _nominal(job, amplitudes)
+            # Tangents are reduced with amplitudes of the precision that the readings would reach.
+            first = _set_nominal_wall(job, amplitudes)
+            survey = find_survey(first, lambda text: None, amplitudes).survey
+            amplitudes = expect_amplitudes(survey.field)
+        job = _set_nominal_wall(job, amplitudes)
     if job.liquid is None:
         return job
     survey = find_survey(job, lambda text: None, amplitudes).survey
-    return with_nominal_batches(job, survey, expected_run)
+    return _set_nominal_batches(job, survey, expected_run)
 
 
-def _expected(job, amplitudes):
-    """Return `Amplitudes` with the precision of the readings, to reduce the tangents."""
-    return expect_amplitudes(find_survey(job, lambda text: None, amplitudes).survey.field)
-
-
-def _nominal(job, amplitudes):
+def _set_nominal_wall(job, amplitudes):
     measurements = job.measurements
     if job.tangents is not None:
         measurements = replace(
             measurements, readings=tuple(map(_ranger(job), measurements.readings))
         )
-    return with_readings(replace(job, measurements=measurements), RoundWall(job, amplitudes))
+    return set_readings(replace(job, measurements=measurements), RoundWall(job, amplitudes))
 
 
-def with_readings(job, wall, errors=EXACT):
+def set_readings(job, wall, errors=EXACT):
     """Return the job with the circumferences, offsets, hits and limbs of a wall of its tank.
 
-    wall is a RoundWall or DrawnWall; errors are the Errors of the readings.
+    Parameters
+    ----------
+    job : Job
+        Job with readings at the planned places; their values are replaced.
+    wall : RoundWall or DrawnWall
+    errors : Errors, optional
+        Errors of the readings; default: none.
+
+    Returns
+    -------
+    Job
     """
     return replace(
         job,
-        strapping=job.strapping and _strapped(job, wall, errors),
-        lines=job.lines and _plumbed(job, wall, errors),
-        hits=job.hits and _hit(job, wall, errors),
-        tangents=job.tangents and _sighted(job, wall, errors),
+        strapping=job.strapping and _read_straps(job, wall, errors),
+        lines=job.lines and _read_offsets(job, wall, errors),
+        hits=job.hits and _read_hits(job, wall, errors),
+        tangents=job.tangents and _read_tangents(job, wall, errors),
     )
 
 
-def levels_read(job):
+def levels_of_readings(job):
     """Return {(course, level above the table's zero, m)} of all readings of the wall."""
     levels = set()
     for readings in (job.strapping and job.strapping.straps, job.lines and job.lines.offsets):
@@ -82,16 +95,18 @@ def levels_read(job):
     return levels | (set() if job.hits is None else set(_levels_of_hits(job)))
 
 
-def _strapped(job, wall, errors):
+def _read_straps(job, wall, errors):
     """Return tape readings whose reduction gives the perimeters of the wall, by iteration."""
     strapping, diameter = job.strapping, job.tank.nominal_diameter_m
     shell_c = job.survey.shell_temperature_c
     girth = np.array([wall.girth_m(strap.course, strap.level_m) for strap in strapping.straps])
     reduced = reduce_straps(strapping, shell_c, diameter)
-    girth += errors.own([strap.sd_m for strap in reduced])
+    # Errors are added to the reduced perimeters, in which the standard deviations are defined.
+    girth += errors.draw([strap.sd_m for strap in reduced])
     girth += [
-        sum(errors.of_cause(e.kind, e.name) * e.by_m for e in strap.effects) for strap in reduced
+        sum(errors.draw_cause(e.kind, e.name) * e.by_m for e in strap.effects) for strap in reduced
     ]
+    # The reduction (temperature, tension, friction) depends on the reading: invert by iteration.
     for _ in range(ROUNDS):
         reduced = reduce_straps(strapping, shell_c, diameter)
         short = girth - [strap.circumference_m for strap in reduced]
@@ -107,7 +122,7 @@ def _strapped(job, wall, errors):
     return strapping
 
 
-def _plumbed(job, wall, errors):
+def _read_offsets(job, wall, errors):
     """Return offsets from vertical lines.
 
     A larger radius lowers them outside and raises them inside.
@@ -116,7 +131,7 @@ def _plumbed(job, wall, errors):
     constant = wall.nominal_m + plates_of(job)[first]
     offsets = []
     for reading, off in zip(
-        lines.offsets, errors.own([offset.sd_m for offset in lines.offsets]), strict=True
+        lines.offsets, errors.draw([offset.sd_m for offset in lines.offsets]), strict=True
     ):
         line, plummet = lines.of(reading)
         place = reading.course, reading.level_m, line.azimuth_rad
@@ -146,7 +161,7 @@ def _levels_of_hits(job):
     return list(zip(hits.course, np.round(z, MILLIMETRES).tolist(), strict=True))
 
 
-def _hit(job, wall, errors):
+def _read_hits(job, wall, errors):
     """Return hits along their own sights, up to the inside or outside of the wall."""
     hits, levels = job.hits, _levels_of_hits(job)
     station, ray = _stations_of_hits(hits)[:, :2], rays(hits.direction_rad, hits.zenith_rad)[0]
@@ -155,11 +170,12 @@ def _hit(job, wall, errors):
     kinds = list(zip(levels, inside.tolist(), strict=True))
     for level, within in dict.fromkeys(kinds):
         of_kind = np.array([kind == (level, within) for kind in kinds])
-        distance[of_kind], cosine[of_kind] = _met(
+        distance[of_kind], cosine[of_kind] = _intersect(
             wall, station[of_kind], ray[of_kind], level, inside=within
         )
+    # Distances with their common errors, then the inverse of the corrections by the certificate.
     known = [hits.instruments[name] for name in hits.instrument]
-    bias = [errors.of_cause("incidence", tool.name) * tool.u_incidence_m for tool in known]
+    bias = [errors.draw_cause("incidence", tool.name) * tool.u_incidence_m for tool in known]
     distance *= 1 + np.array([errors.scale(tool) for tool in known])
     distance += np.array([errors.offset_m(tool) for tool in known])
     distance += np.array(bias) * bias_by_incidence(cosine)
@@ -167,18 +183,20 @@ def _hit(job, wall, errors):
     distance -= np.array([tool.correction_m for tool in known])
     return replace(
         hits,
-        distance_m=distance + errors.own(hits.sd_m),
-        direction_rad=hits.direction_rad + errors.own(hits.sd_rad),
-        zenith_rad=hits.zenith_rad + errors.own(hits.sd_rad),
+        distance_m=distance + errors.draw(hits.sd_m),
+        direction_rad=hits.direction_rad + errors.draw(hits.sd_rad),
+        zenith_rad=hits.zenith_rad + errors.draw(hits.sd_rad),
     )
 
 
-def _met(wall, station_m, ray, level, *, inside):
+def _intersect(wall, station_m, ray, level, *, inside):
     """Distance along horizontal rays (n, 2) to a level of the wall, and cosine of incidence."""
+    # First the circle of nominal radius: |station + far ray|^2 = R^2, a quadratic in far.
     square, along = np.sum(ray**2, axis=1), np.sum(station_m * ray, axis=1)
     beyond = along**2 - square * (np.sum(station_m**2, axis=1) - wall.nominal_m**2)
     root = np.sqrt(np.maximum(beyond, 0.0))
     far = (-along + (root if inside else -root)) / square
+    # Then Newton: the distance from the axis changes by the slope (cosine of incidence) per metre.
     for _ in range(ROUNDS):
         x, y = (station_m + far[:, None] * ray).T
         away = np.hypot(x, y)
@@ -190,7 +208,7 @@ def _met(wall, station_m, ray, level, *, inside):
     return far, np.abs(slope)
 
 
-def _sighted(job, wall, errors):
+def _read_tangents(job, wall, errors):
     """Return sights past the outside of each course at the aimed height."""
     tangents, datum = job.tangents, job.datum
     zero = datum.bottom_z_m + datum.plate_level_m
@@ -205,8 +223,8 @@ def _sighted(job, wall, errors):
     direction, zenith = np.array(sights).T
     return replace(
         tangents,
-        direction_rad=direction + errors.own(tangents.sd_rad),
-        zenith_rad=zenith + errors.own(tangents.sd_rad),
+        direction_rad=direction + errors.draw(tangents.sd_rad),
+        zenith_rad=zenith + errors.draw(tangents.sd_rad),
     )
 
 
@@ -235,3 +253,57 @@ def place_stations(job):
         name: places[setup.station] + [0, 0, setup.height_m]
         for name, setup in job.tangents.setups.items()
     }
+
+
+# ---- metered liquid
+
+
+def _set_nominal_batches(job, survey, expected_run=None):
+    """Return the job with the metered volumes that follow from its own geometry.
+
+    Parameters
+    ----------
+    job : Job
+        Job whose runs have volumes of approximately the right size.
+    survey : Wall, StrappedWall, NominalWall or None
+        Wall by its readings.
+    expected_run : float, optional
+        Relative standard deviation of the run effect, if the runs are to estimate it.
+    """
+    metering, fill = job.liquid, fill_of(job.liquid)
+    rows = fill.dip_row
+    densities = np.append(metering.density_kg_m3, load_densities(metering, fill))
+    dips, shell = metering.dip_m[rows], metering.shell_c[rows]
+    loaded = load_geometry(geometry_beside(job, survey), densities, dips, shell)
+    reduced = reduce_steps(metering, fill, loaded.volume_m3, loaded.growth)
+    shown = (reduced.geometry_m3 - reduced.by_tank_temperature_m3) / reduced.metered_m3
+    job = _scale_batches(job, fill, shown)
+    if expected_run is None or metering.run_sd is not None:
+        return job
+    return _scale_batches(job, fill, 1 - _expect_runs(job, survey, expected_run)[fill.run])
+
+
+def _scale_batches(job, fill, share):
+    """Return the job with the batch of each step multiplied by a share.
+
+    Here a step has one batch.
+    """
+    volume = job.liquid.volume_m3.copy()
+    volume[fill.dip_row[fill.end]] *= share
+    return replace(job, liquid=replace(job.liquid, volume_m3=volume))
+
+
+def _expect_runs(job, survey, sd):
+    """Run effects (runs,) whose differences have the size expected for a standard deviation sd.
+
+    The observed differences d ~ N(0, theta + s) each have the size of their standard deviation
+    (`tank.liquid.run_effect`). The common effect of all runs, which acts like the meter, is 0.
+    """
+    without = replace(job, liquid=replace(job.liquid, run_sd=0.0))
+    result = adjust_liquid(geometry_beside(without, survey))
+    by_run = result.readings.run_m3
+    eigen, turn = np.linalg.eigh(by_run.T @ result.adjusted.weight @ by_run)
+    shows = eigen > 1e-9 * eigen[-1]
+    differences = np.where(shows, np.sqrt(sd**2 + 1 / np.where(shows, eigen, 1.0)), 0.0)
+    differences[0] = 0.0
+    return turn @ differences

@@ -1,5 +1,6 @@
 """Predict a plan of a bare wall: compute its job with nominal readings."""
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,14 +22,14 @@ from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
 from tankcal.pipeline.tangent_checks import judge_tangents
-from tankcal.planning.limits import OfTable, refuse_without_delivery
+from tankcal.planning.table import TableResults, refuse_without_delivery
 from tankcal.planning.wall.filling_outlook import (
     FillingOutlook,
     outlook_of_filling,
     refuse_other_dips,
 )
 from tankcal.planning.wall.model import WallPlan
-from tankcal.planning.wall.telling import told_of_plan
+from tankcal.planning.wall.reading import locate_in_plan
 from tankcal.quadrature import panels
 
 OF_READINGS = (  # warnings that need real readings or a drawing; not predicted
@@ -94,81 +95,81 @@ class WallTable:
     job : Job
     wall : Wall, StrappedWall, NominalWall or None
         None: declared sizes only describe the tank.
-    made : ComputedTable
+    computed_table : ComputedTable
     sighting : Sighting or Touching or None
         As `check_table` expects it.
-    measured : Measured or None
+    metering : Measured or None
         Result of the runs of liquid.
     """
 
     job: Job
     wall: object
-    made: ComputedTable
+    computed_table: ComputedTable
     sighting: object = None
-    measured: Measured | None = None
+    metering: Measured | None = None
 
     @cached_property
     def liquid(self) -> LiquidResult | None:
         """Predicted results of the runs of liquid other than table rows."""
-        return self.measured and self.measured.result(self.made.levels_m)
+        return self.metering and self.metering.result(self.computed_table.levels_m)
 
     @cached_property
     def stated(self):
         """Budgets and worst deliveries (`statements.Statements`)."""
-        return statements(self.job, self.made.table, self.made.straightness.largest_m3)
+        return statements(
+            self.job, self.computed_table.table, self.computed_table.straightness.largest_m3
+        )
 
 
 @dataclass(frozen=True)
-class WallPrediction(OfTable):
+class WallPrediction(TableResults):
     """Predicted results of a planned survey of a bare wall.
 
     Attributes
     ----------
     plan : WallPlan
-    tabled : WallTable
+    result : WallTable
     """
 
     plan: WallPlan
-    tabled: WallTable
+    result: WallTable
 
     @cached_property
     def courses(self):
         """A tuple of CourseOutlook, from the bottom up."""
-        return courses_of(self.tabled)
+        return courses_of(self.result)
 
     @cached_property
     def reliability(self):
         """A tuple of ReadingsOutlook of straps, offsets and tangents."""
-        return readings_of(self.tabled)
+        return readings_of(self.result)
 
     @cached_property
     def filling(self) -> FillingOutlook | None:
         """Predicted effect of the runs of liquid; None without runs."""
-        tabled = self.tabled
-        if tabled.measured is None:
+        result = self.result
+        if result.metering is None:
             return None
-        return outlook_of_filling(self.plan, tabled.measured, tabled.liquid, tabled.made)
+        return outlook_of_filling(self.plan, result.metering, result.liquid, result.computed_table)
 
     @cached_property
     def warnings(self):
         """Warnings of the planned survey, a tuple of Problem."""
-        tabled = self.tabled
+        result = self.result
         of_run = (
-            *check_table(tabled.job, tabled.wall, tabled.made, tabled.sighting),
-            *check_liquid_result(tabled.job, tabled.liquid),
+            *check_table(result.job, result.wall, result.computed_table, result.sighting),
+            *check_liquid_result(result.job, result.liquid),
         )
         problems = (
             *self.plan.warnings,
             *self.plan.job.warnings,
-            *told_of_plan(of_run, self.plan.design),
+            *locate_in_plan(of_run, self.plan.design),
         )
         return tuple(
-            problem for problem in dict.fromkeys(problems) if _code(problem) not in OF_READINGS
+            problem
+            for problem in dict.fromkeys(problems)
+            if getattr(problem.expected, "code", None) not in OF_READINGS
         )
-
-
-def _code(problem):
-    return getattr(problem.expected, "code", None)
 
 
 def predict_wall(plan):
@@ -185,80 +186,81 @@ def predict_wall(plan):
         If the readings do not determine the wall.
     """
     try:
-        tabled = foresee_table(plan.job, plan.amplitudes)
+        result = predict_wall_table(plan.job, plan.amplitudes)
     except InputError as error:
-        raise InputError(told_of_plan(error.problems, plan.design)) from error
-    tall = sum(course.height_m for course in plan.job.courses) or tabled.made.top_m
-    refuse_without_delivery(plan, tabled, tall)
-    refuse_other_dips(plan.dips_m, tabled.made)
-    return WallPrediction(plan, tabled)
+        raise InputError(locate_in_plan(error.problems, plan.design)) from error
+    tall = sum(course.height_m for course in plan.job.courses) or result.computed_table.top_m
+    refuse_without_delivery(plan, result, tall)
+    refuse_other_dips(plan.dips_m, result.computed_table)
+    return WallPrediction(plan, result)
 
 
-def foresee_table(job, amplitudes):
+def predict_wall_table(job, amplitudes):
     """Return the `WallTable` of a job with nominal readings.
 
     Amplitudes: assumed ones of the wall.
     """
     surveyed = find_survey(job, lambda text: None, amplitudes)
     if surveyed.survey is None or isinstance(surveyed.survey, NominalWall):
-        return _tabled(surveyed, surveyed.survey)  # no readings that could estimate amplitudes
+        # No readings could estimate the amplitudes.
+        return _wall_table(surveyed, surveyed.survey)
     field = surveyed.survey.field
     expected = expect_amplitudes(field)
     if surveyed.touching is not None:  # tangents estimate only the excess of the hull
         surveyed = find_survey(job, lambda text: None, expected)
         field = surveyed.survey.field
-    return _tabled(surveyed, replace(surveyed.survey, field=replace(field, amplitudes=expected)))
+    wall = replace(surveyed.survey, field=replace(field, amplitudes=expected))
+    return _wall_table(surveyed, wall)
 
 
-def _tabled(surveyed, wall):
+def _wall_table(surveyed, wall):
     """Return the `WallTable` of a `Surveyed` with a wall of the predicted precision."""
-    measured = measure_by_liquid(surveyed.job, wall)
-    table = compute_table(surveyed.job, wall, body=measured and measured.body)
-    return WallTable(surveyed.job, wall, table, surveyed.sighting or surveyed.touching, measured)
+    metering = measure_by_liquid(surveyed.job, wall)
+    table = compute_table(surveyed.job, wall, body=metering and metering.body)
+    return WallTable(surveyed.job, wall, table, surveyed.sighting or surveyed.touching, metering)
 
 
-def courses_of(tabled):
+def courses_of(result):
     """Return the CourseOutlook of each course; () if only liquid measures them."""
-    if tabled.wall is None or isinstance(tabled.wall, NominalWall):
+    if result.wall is None or isinstance(result.wall, NominalWall):
         return ()
-    job, field = tabled.job, tabled.wall.field
+    job, field = result.job, result.wall.field
     courses = len(job.courses)
+    # Mean radius of a course: Gauss weights over its height. Its variance has two parts: the
+    # part of each component of the wall that the readings do not show, and their noise.
     mean = np.kron(np.eye(courses), panels([0.0, 1.0], LEVELS)[1])
     weights = mean @ field.means.weights
     covariance = sum(mean @ field.means.unseen(i) @ mean.T for i in range(len(COMPONENTS)))
-    wall = tabled.wall
+    wall = result.wall
     noise = field.noise_m2 if isinstance(wall, StrappedWall) else noise_of_wall(wall)
     sds = np.sqrt(np.diag(covariance) + np.einsum("ij,jk,ik->i", weights, noise, weights))
     names = [course.name for course in job.courses]
-    counts = {kind: dict.fromkeys(names, 0) for kind in ("straps", "offsets", "hits", "tangents")}
-    for reading in () if job.strapping is None else job.strapping.straps:
-        counts["straps"][reading.course] += 1
-    for reading in () if job.lines is None else job.lines.offsets:
-        counts["offsets"][reading.course] += 1
-    for course in () if job.hits is None else job.hits.course:
-        counts["hits"][course] += 1
-    for course in () if job.tangents is None else job.tangents.course:
-        counts["tangents"][course] += 1
+    straps = Counter(
+        () if job.strapping is None else (strap.course for strap in job.strapping.straps)
+    )
+    offsets = Counter(() if job.lines is None else (offset.course for offset in job.lines.offsets))
+    hits = Counter(() if job.hits is None else job.hits.course)
+    tangents = Counter(() if job.tangents is None else job.tangents.course)
     return tuple(
-        CourseOutlook(name, *(counts[kind][name] for kind in counts), float(sd))
+        CourseOutlook(name, straps[name], offsets[name], hits[name], tangents[name], float(sd))
         for name, sd in zip(names, sds, strict=True)
     )
 
 
-def readings_of(tabled):
+def readings_of(result):
     """Return the ReadingsOutlook of straps, offsets and tangents, if any."""
-    wall = tabled.wall
+    wall = result.wall
     if not isinstance(wall, ReadWall):
         wall = wall and wall.read
     kinds = () if wall is None or isinstance(wall, NominalWall) else ("straps", "offsets")
     tested = [(kind, wall.tests_of(kind)[1]) for kind in kinds]
-    if tabled.job.tangents is not None:
-        tests = judge_tangents(tabled.job, tabled.wall, tabled.sighting)
-        tested.append(("tangents", tests.mdb_m[~tabled.job.tangents.check]))
-    return tuple(_outlook(kind, mdb) for kind, mdb in tested if len(mdb))
-
-
-def _outlook(kind, mdb_m):
-    known = mdb_m[np.isfinite(mdb_m)]
-    largest = float(known.max()) if len(known) else float("nan")
-    return ReadingsOutlook(kind, len(mdb_m), len(mdb_m) - len(known), largest)
+    if result.job.tangents is not None:
+        tests = judge_tangents(result.job, result.wall, result.sighting)
+        tested.append(("tangents", tests.mdb_m[~result.job.tangents.check]))
+    outlooks = []
+    for kind, mdb_m in tested:
+        if len(mdb_m):
+            known = mdb_m[np.isfinite(mdb_m)]  # the others are uncontrolled
+            largest = float(known.max()) if len(known) else float("nan")
+            outlooks.append(ReadingsOutlook(kind, len(mdb_m), len(mdb_m) - len(known), largest))
+    return tuple(outlooks)

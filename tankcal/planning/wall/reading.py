@@ -8,12 +8,13 @@ from tankcal.job.building import job_of
 from tankcal.job.checking import zero_z
 from tankcal.job.checks.sized_volumes import volume_by_sizes
 from tankcal.job.checks.survey.stadia import is_bar
-from tankcal.job.tables import Log, Value
+from tankcal.job.tables import SETTINGS_FILE, Log, Value
+from tankcal.planning.contract import MEASURING
+from tankcal.planning.entries import PLAN_FILE, forms_m
 from tankcal.planning.obstacles import obstacles_of
-from tankcal.planning.wall.checks import percents_of
-from tankcal.planning.wall.contract import MEASURING
+from tankcal.planning.wall.checks import percents_of, refuse_cut, warnings_of_obstacles
+from tankcal.planning.wall.design_tables import DesignTables
 from tankcal.planning.wall.filling import runs_of
-from tankcal.planning.wall.foreseen_tables import Foreseen
 from tankcal.planning.wall.model import (
     Design,
     PlannedControl,
@@ -23,11 +24,31 @@ from tankcal.planning.wall.model import (
     PlannedTangents,
     WallPlan,
 )
-from tankcal.planning.wall.nominal_readings import with_nominal_readings
-from tankcal.planning.wall.obstructed import refuse_cut, warnings_of_obstacles
-from tankcal.planning.wall.telling import told_of_plan
+from tankcal.planning.wall.nominal_readings import set_nominal_readings
 
 USUAL_HEIGHT_M = 1.6  # default height of an instrument above the bottom
+SECTION_OF_TABLE = {  # tables that a design generates, and the section that messages name
+    "circumferences.csv": "straps",
+    "lines.csv": "lines",
+    "offsets.csv": "lines",
+    "wall_hits.csv": "hits",
+    "setups.csv": "hits",
+    "control.csv": "hits",
+    "control_readings.csv": "control_targets",
+    "directions.csv": "setup_ties",
+    "zenith_angles.csv": "setup_ties",
+    "slope_distances.csv": "setup_ties",
+    "tangents.csv": "tangents",
+    "liquid.csv": "runs",
+}
+SECTION_OF_TRAVERSE = {  # sections of tables if limbs are sighted from traverse stations
+    "setups.csv": "tangents",
+    "control.csv": "tangents",
+    "directions.csv": "traverse",
+    "zenith_angles.csv": "traverse",
+    "slope_distances.csv": "traverse",
+    "stadia.csv": "traverse",
+}
 
 
 def is_wall_plan(sections):
@@ -38,25 +59,36 @@ def is_wall_plan(sections):
     return any(name in sections for name in MEASURING)
 
 
-def design_of(given, courses, celsius=None):
-    """Return the `Design` of valid sections for the given courses.
+def design_of(plan_input, courses, celsius=None):
+    """Return the `Design` of valid sections.
 
-    celsius: temperature of the table.
+    Parameters
+    ----------
+    plan_input : PlanInput
+    courses : tuple of str
+        Names of the courses, from the bottom up.
+    celsius : float, optional
+        Temperature of the table.
+
+    Returns
+    -------
+    Design
     """
     straps = (
         PlannedStrap(course, percent, entry["s_mm"], int(entry["readings"] or 1), _more(entry))
-        for entry in given.repeated["straps"]
+        for entry in plan_input.sections["straps"]
         for course in entry["courses"] or courses
         for percent in percents_of(entry)
     )
+    ties = plan_input.sections["setup_ties"]
     return Design(
         straps=tuple(straps),
-        lines=_lines(given.single["lines"]),
-        hits=tuple(_hits(entry, courses) for entry in given.repeated["hits"]),
-        ties=_ties(given.single["setup_ties"]),
-        control=_control(given.single["control_targets"]),
-        tangents=_tangents(given.single["tangents"], given.single["traverse"]),
-        runs=runs_of(given.repeated["runs"], celsius),
+        lines=_lines(plan_input.sections["lines"]),
+        hits=tuple(_hits(entry, courses) for entry in plan_input.sections["hits"]),
+        ties=(int(ties["targets"]), ties["s_mm"], ties["s_arcsec"]) if ties.filled_keys else None,
+        control=_control(plan_input.sections["control_targets"]),
+        tangents=_tangents(plan_input.sections["tangents"], plan_input.sections["traverse"]),
+        runs=runs_of(plan_input.sections["runs"], celsius),
     )
 
 
@@ -66,7 +98,7 @@ def _more(entry):
 
 
 def _lines(entry):
-    if not entry.filled:
+    if not entry.filled_keys:
         return None
     return PlannedLines(
         count=int(entry["count"]),
@@ -94,12 +126,6 @@ def _hits(entry, courses):
     )
 
 
-def _ties(entry):
-    if not entry.filled:
-        return None
-    return int(entry["targets"]), entry["s_mm"], entry["s_arcsec"]
-
-
 def _control(entry):
     values = {"targets": entry["targets"], "every_min": entry["every_min"]}
     values = {key: value for key, value in values.items() if value is not None}
@@ -109,15 +135,16 @@ def _control(entry):
 
 
 def _tangents(entry, traverse):
-    if not entry.filled:
+    if not entry.filled_keys:
         return None
+    bar_sd = traverse["s_bar_arcsec"]
     return PlannedTangents(
         stations=int(entry["stations"]),
         radius_m=entry["radius_m"],
         at_percent=percents_of(entry),
         sd_arcsec=entry["s_arcsec"],
         traverse=(traverse["s_mm"], traverse["s_arcsec"]),
-        bar=_bar(traverse),
+        bar=None if bar_sd is None else (traverse["bar"], bar_sd),
         start_deg=entry["start_azimuth_deg"] or 0.0,
         height_m=USUAL_HEIGHT_M if entry["height_m"] is None else entry["height_m"],
         readings=int(entry["readings"] or 1),
@@ -125,73 +152,101 @@ def _tangents(entry, traverse):
     )
 
 
-def _bar(traverse):
-    sd = traverse["s_bar_arcsec"]
-    return None if sd is None else (traverse["bar"], sd)
-
-
-def wall_plan_of(raw, values, tables, given, limits, folder):
+def wall_plan_of(raw, values, tables, plan_input, limits, folder):
     """Return the WallPlan of valid sections; its job is read like any other job.
 
-    Raises InputError. Problems of generated tables are reported for the sections that generate
-    them.
+    Parameters
+    ----------
+    raw : RawJob
+        Content of the plan's folder.
+    values : dict
+        {section: {key: value}} of the settings of the job.
+    tables : dict
+        {name: ColumnValues or None} of the tables of the job.
+    plan_input : PlanInput
+    limits : Limits
+    folder : str
+        Name of the folder.
+
+    Returns
+    -------
+    WallPlan
+
+    Raises
+    ------
+    InputError
+        Problems of generated tables are reported for the sections that generate them.
     """
-    table, holds = tables["courses"], volume_by_sizes(values, raw)
+    table, volume_at = tables["courses"], volume_by_sizes(values, raw)
     courses = ()
     if table is not None:
         courses = tuple(zip(table.of("course"), table.of("height_m"), strict=True))
     celsius = values["table"]["reference_temperature_c"]
-    design = design_of(given, tuple(name for name, _ in courses), celsius)
-    wall, filling = given.single["wall"], given.single["filling"]
-    sizes = (
-        None if wall[key] is None else wall[key] / 1000 for key in ("form_mm", "common_form_mm")
-    )
-    amplitudes = assumed_amplitudes(*sizes, smoothed=design.is_smoothed)
+    design = design_of(plan_input, tuple(name for name, _ in courses), celsius)
+    wall, filling = plan_input.sections["wall"], plan_input.sections["filling"]
+    amplitudes = assumed_amplitudes(*forms_m(wall), smoothed=design.is_smoothed)
     bottom, diameter = values["datum"]["bottom_z_m"], values["tank"]["nominal_diameter_m"]
     zero = 0.0 if bottom is None else zero_z(values) - bottom
-    obstacles = () if bottom is None else obstacles_of(given)
-    tank = (courses, diameter and diameter / 2, bottom, zero, holds, obstacles)
+    obstacles = () if bottom is None else obstacles_of(plan_input)
+    tank = (courses, diameter and diameter / 2, bottom, zero, volume_at, obstacles)
     warnings = ()
     if obstacles:
-        foreseen = Foreseen(design, *tank, bars=lengths_of_bars(raw))
-        refuse_cut(foreseen, _rows_of(given))
-        warnings = warnings_of_obstacles(foreseen, _rows_of(given))
+        design_tables = DesignTables(design, *tank, bars=lengths_of_bars(raw))
+        refuse_cut(design_tables, _rows_of(plan_input))
+        warnings = warnings_of_obstacles(design_tables, _rows_of(plan_input))
     ppm = filling["expected_run_ppm"]
     expected = None if ppm is None else ppm / 1e6
     return WallPlan(
-        job=job_of_design(raw, design, tank, (amplitudes, expected), _rows_of(given)),
+        job=job_of_design(raw, design, tank, (amplitudes, expected), _rows_of(plan_input)),
         design=design,
         limits=limits,
         amplitudes=amplitudes,
-        costs={key: value or 0.0 for key, value in given.single["costs"].values.items()},
+        costs={key: value or 0.0 for key, value in plan_input.sections["costs"].values.items()},
         dips_m=tuple(sorted(set(filling["dips_m"] or ()))),
         expected_run=expected,
-        holds=holds,
+        volume_at=volume_at,
         obstacles=obstacles,
         folder=folder,
-        given=raw,
+        raw=raw,
         warnings=warnings,
     )
 
 
-def _rows_of(given):
+def _rows_of(plan_input):
     """Return {section: first row in plan.toml}."""
-    rows = {name: entry.row for name, entry in given.single.items()}
-    return rows | {name: entries[0].row for name, entries in given.repeated.items() if entries}
+    first = {name: plan_input.entries(name)[:1] for name in plan_input.sections}
+    return {name: entries[0].row for name, entries in first.items() if entries}
 
 
-def changed(plan, design=None, raw=None):
-    """Return the WallPlan with another Design or other instruments."""
-    design, raw = design or plan.design, raw or plan.given
+def change_plan(plan, design=None, raw=None):
+    """Return the WallPlan with another design or other instruments, and its new job.
+
+    Parameters
+    ----------
+    plan : WallPlan
+    design : Design, optional
+    raw : RawJob, optional
+        Content of the folder with other instruments.
+
+    Returns
+    -------
+    WallPlan
+
+    Raises
+    ------
+    InputError
+        If the readings of the new design are no valid job.
+    """
+    design, raw = design or plan.design, raw or plan.raw
     expected = plan.amplitudes, plan.expected_run
     job = job_of_design(raw, design, _tank_of(plan), expected)
-    return replace(plan, job=job, design=design, given=raw)
+    return replace(plan, job=job, design=design, raw=raw)
 
 
 def tables_of(plan):
     """Return {name: Table} of all readings; their values are not defined."""
-    bars = lengths_of_bars(plan.given)
-    return Foreseen(plan.design, *_tank_of(plan), bars=bars).tables()
+    bars = lengths_of_bars(plan.raw)
+    return DesignTables(plan.design, *_tank_of(plan), bars=bars).tables()
 
 
 def lengths_of_bars(raw):
@@ -213,7 +268,7 @@ def _tank_of(plan):
     datum, diameter = job.datum, job.tank.nominal_diameter_m
     radius, bottom = diameter and diameter / 2, datum.bottom_z_m
     zero = 0.0 if bottom is None else datum.plate_level_m
-    return courses, radius, bottom, zero, plan.holds, plan.obstacles
+    return courses, radius, bottom, zero, plan.volume_at, plan.obstacles
 
 
 def job_of_design(raw, design, tank, expected, rows=None):
@@ -231,7 +286,7 @@ def job_of_design(raw, design, tank, expected, rows=None):
     rows : dict, optional
         {section: row of plan.toml}, for messages.
     """
-    tables = Foreseen(design, *tank, bars=lengths_of_bars(raw)).tables()
+    tables = DesignTables(design, *tank, bars=lengths_of_bars(raw)).tables()
     settings = dict(raw.settings)
     datum = datum_of(design)
     if datum is not None:
@@ -240,9 +295,9 @@ def job_of_design(raw, design, tank, expected, rows=None):
     try:
         job = job_of(whole, Log())
     except InputError as error:
-        raise InputError(told_of_plan(error.problems, design, rows)) from error
-    job = with_nominal_readings(job, *expected)
-    return replace(job, warnings=told_of_plan(job.warnings, design, rows))
+        raise InputError(locate_in_plan(error.problems, design, rows)) from error
+    job = set_nominal_readings(job, *expected)
+    return replace(job, warnings=locate_in_plan(job.warnings, design, rows))
 
 
 def datum_of(design):
@@ -250,3 +305,34 @@ def datum_of(design):
     if design.tangents is not None:
         return "minimal"
     return None if design.ties is None else "inner"
+
+
+def locate_in_plan(problems, design, rows=None):
+    """Return problems of generated tables as problems of the sections that generate them.
+
+    Parameters
+    ----------
+    problems : iterable of Problem
+    design : Design
+        Design that generated the tables.
+    rows : dict, optional
+        {section: row of plan.toml}.
+
+    Returns
+    -------
+    tuple of Problem
+        Without duplicates.
+    """
+    section_of = SECTION_OF_TABLE
+    if design.tangents is not None:
+        section_of = SECTION_OF_TABLE | SECTION_OF_TRAVERSE
+    located = []
+    for problem in problems:
+        if problem.file in section_of:
+            section = section_of[problem.file]
+            row = (rows or {}).get(section)
+            problem = replace(problem, file=PLAN_FILE, row=row, column=section, cell=None)
+        elif problem.file == SETTINGS_FILE:
+            problem = replace(problem, file=PLAN_FILE)
+        located.append(problem)
+    return tuple(dict.fromkeys(located))

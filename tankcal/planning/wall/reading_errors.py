@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.planning.simulations import blunders_in_sds
+from tankcal.planning.measurements import draw_blunders
 from tankcal.survey.observations import KINDS
 
 UNKNOWN_OFFSET_M = 2e-3  # sd of the offset of an instrument without a prior
@@ -18,21 +18,21 @@ class Errors:
     """Errors of one simulated survey.
 
     rng is a numpy generator; blunders is the share of readings with an error of
-    `simulations.BLUNDER_SDS` standard deviations.
+    `measurements.BLUNDER_SDS` standard deviations.
     """
 
     def __init__(self, rng, blunders=0.0):
         self._rng, self._blunders, self._causes = rng, blunders, {}
 
-    def own(self, sd):
+    def draw(self, sd):
         """Independent errors (n,) of readings with standard deviations (n,)."""
         sd = np.asarray(sd, dtype=float)
         errors = self._rng.standard_normal(sd.shape)
         if self._blunders:
-            errors += blunders_in_sds(self._rng, self._blunders, len(sd))
+            errors += draw_blunders(self._rng, self._blunders, len(sd))
         return errors * sd
 
-    def of_cause(self, kind, name):
+    def draw_cause(self, kind, name):
         """Error of a cause in this survey, in its standard uncertainties."""
         if (kind, name) not in self._causes:
             self._causes[kind, name] = float(self._rng.standard_normal())
@@ -40,17 +40,17 @@ class Errors:
 
     def scale(self, tool):
         """Relative error of the scale of an instrument."""
-        return self.of_cause("instrument_scale", tool.name) * _known(tool.u_scale, 0.0)
+        return self.draw_cause("instrument_scale", tool.name) * _known(tool.u_scale, 0.0)
 
     def offset_m(self, tool):
         """Error of the offset of an instrument, m."""
         u = _known(tool.u_offset_m, UNKNOWN_OFFSET_M)
-        return self.of_cause("instrument_offset", tool.name) * u
+        return self.draw_cause("instrument_offset", tool.name) * u
 
     def collimation_rad(self, plummet):
         """Collimation error of a plummet, rad."""
         u = _known(plummet.u_collimation_rad, UNKNOWN_COLLIMATION_RAD)
-        return self.of_cause("collimation", plummet.name) * u
+        return self.draw_cause("collimation", plummet.name) * u
 
 
 class _Exact(Errors):
@@ -59,17 +59,17 @@ class _Exact(Errors):
     def __init__(self):
         super().__init__(None)
 
-    def own(self, sd):
+    def draw(self, sd):
         return np.zeros(np.shape(sd))
 
-    def of_cause(self, kind, name):
+    def draw_cause(self, kind, name):
         return 0.0
 
 
 EXACT = _Exact()
 
 
-def with_network_errors(measurements, errors):
+def add_network_errors(measurements, errors):
     """Return Measurements with errors of the readings and of the distance instruments."""
     tools = {tool.name: tool for tool in measurements.instruments}
     used = {setup.name: setup.instrument for setup in measurements.setups}
@@ -81,7 +81,7 @@ def with_network_errors(measurements, errors):
             known = [tools.get(name) for name in names]
             value = value * [1.0 if tool is None else 1 + errors.scale(tool) for tool in known]
             value = value + [0.0 if tool is None else errors.offset_m(tool) for tool in known]
-        return replace(readings, value=value + errors.own(readings.sd))
+        return replace(readings, value=value + errors.draw(readings.sd))
 
     return replace(measurements, readings=tuple(map(read, measurements.readings)))
 

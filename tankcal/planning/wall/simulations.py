@@ -17,9 +17,9 @@ from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import compute_table
 from tankcal.planning.simulations import SIMULATING, refuse_failed
-from tankcal.planning.wall.nominal_readings import levels_read, with_readings
+from tankcal.planning.wall.nominal_readings import levels_of_readings, set_readings
 from tankcal.planning.wall.prediction import WallPrediction
-from tankcal.planning.wall.reading_errors import Errors, with_network_errors
+from tankcal.planning.wall.reading_errors import Errors, add_network_errors
 from tankcal.planning.wall.tank_walls import DrawnWall
 from tankcal.uncertainty import combine
 
@@ -98,7 +98,7 @@ def simulate_walls(prediction: WallPrediction, runs=500, seed=1, blunders=0.0, p
     runs, seed : int, optional
         Number of surveys, and seed of their walls and errors.
     blunders : float, optional
-        Share of readings with an error of `simulations.BLUNDER_SDS` standard deviations.
+        Share of readings with an error of `measurements.BLUNDER_SDS` standard deviations.
     progress : callable, optional
         progress(text, done, total).
 
@@ -115,7 +115,7 @@ def simulate_walls(prediction: WallPrediction, runs=500, seed=1, blunders=0.0, p
     for run in range(1, runs + 1):
         if progress:
             progress(SIMULATING, run, runs)
-        wall, job = _drawn(prediction, rng, blunders)
+        wall, job = _draw_survey(prediction, rng, blunders)
         try:
             results.append(compare_survey(prediction, wall, job))
         except TankcalError as error:
@@ -123,7 +123,7 @@ def simulate_walls(prediction: WallPrediction, runs=500, seed=1, blunders=0.0, p
     refuse_failed(failed, runs)
     errors, expanded, within, aside = (np.array(values) for values in zip(*results, strict=True))
     table = prediction.table
-    known = by_survey(prediction.plan.job, table)
+    known = combine_survey(prediction.plan.job, table)
     return SimulatedWall(
         seed=seed,
         blunders=blunders,
@@ -138,21 +138,22 @@ def simulate_walls(prediction: WallPrediction, runs=500, seed=1, blunders=0.0, p
     )
 
 
-def _drawn(prediction, rng, blunders):
+def _draw_survey(prediction, rng, blunders):
     """Return a `DrawnWall`, and the Job of a survey of it."""
     job, errors = prediction.plan.job, Errors(rng, blunders)
-    sizes = _drawn_sizes(job, prediction.tabled.wall.field.amplitudes, rng)
-    wall = DrawnWall(job, sizes, levels_read(job), rng)
+    sizes = _draw_sizes(job, prediction.result.wall.field.amplitudes, rng)
+    wall = DrawnWall(job, sizes, levels_of_readings(job), rng)
     if job.measurements is not None:
-        job = replace(job, measurements=with_network_errors(job.measurements, errors))
-    return wall, with_readings(job, wall, errors)
+        job = replace(job, measurements=add_network_errors(job.measurements, errors))
+    return wall, set_readings(job, wall, errors)
 
 
-def _drawn_sizes(job, known, rng):
+def _draw_sizes(job, known, rng):
     """Variances (components,) drawn with the uncertainty of the `Amplitudes`.
 
     A shape declared in the job determines the size of the ovality.
     """
+    # Sizes are positive and known to a factor: their logarithms are normal.
     sizes = np.exp(rng.multivariate_normal(np.log(known.likely_m2), known.log_covariance))
     shape_m = None if job.strapping is None else job.strapping.shape_sd_m
     if shape_m is not None:
@@ -163,30 +164,44 @@ def _drawn_sizes(job, known, rng):
 
 
 def compare_survey(prediction, wall, job):
-    """Return error and U of the full tank, share of rows within U, and number of rejected readings.
+    """Compare the table of a simulated survey with the true volumes of its wall.
 
-    wall is the simulated wall (`tank_walls.DrawnWall` or another with a known volume); job is the
-    Job with its readings.
+    Parameters
+    ----------
+    prediction : WallPrediction
+    wall : DrawnWall
+        Simulated wall, or another wall with a known volume.
+    job : Job
+        Job with the readings of the wall.
+
+    Returns
+    -------
+    error_m3, U_m3 : float
+        Error and U by the survey of the full tank, m3.
+    within : float
+        Share of the rows within U of the true volume.
+    rejected : int
+        Number of rejected readings.
     """
     surveyed = find_survey(job, lambda text: None)
     table = compute_table(surveyed.job, surveyed.survey).table
     dips = prediction.table.height_m
     true = prediction.table.volume_m3 + wall.more_m3(dips)
     errors = np.interp(dips, table.height_m, table.volume_m3) - true
-    expanded = by_survey(job, table).expanded(table.probability)
+    expanded = combine_survey(job, table).expanded(table.probability)
     expanded = np.interp(dips, table.height_m, expanded)
     within = np.mean(np.abs(errors) <= expanded)
-    return errors[-1], expanded[-1], within, _set_aside(surveyed)
+    return errors[-1], expanded[-1], within, _count_rejected(surveyed)
 
 
-def by_survey(job, table):
+def combine_survey(job, table):
     """Return Combined rows of a table, with the uncertainty of the survey only."""
     declared = {quantity.name for quantity in job.inputs}
     sources = [source for source in table.sources if source.kind not in declared]
     return combine(sources, len(table.height_m))
 
 
-def _set_aside(surveyed):
+def _count_rejected(surveyed):
     """Number of rejected readings of a `Surveyed`."""
     survey = surveyed.survey
     read = survey if isinstance(survey, ReadWall) else survey.read

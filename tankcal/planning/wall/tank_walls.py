@@ -11,10 +11,10 @@ import numpy as np
 from tankcal.geometry.drawn_outlines import draw_departures
 from tankcal.geometry.field.sites import spans_of
 from tankcal.geometry.girth import girth_of, tangent_excess
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.pipeline.wall_straps import area_term
-from tankcal.planning.wall.foreseen_tables import azimuth_of_axis, limb_of_circle
+from tankcal.planning.wall.design_tables import azimuth_of_axis, limb_of_circle
 from tankcal.quadrature import panels
+from tankcal.units import FULL_TURN
 
 PANELS, NODES = 4, 6  # Gauss panels per course and nodes per panel for the volume of a drawn wall
 DECIMALS = 6  # decimals to which heights within a course are compared
@@ -101,6 +101,7 @@ class DrawnWall:
 
     def limb(self, station_m, course, level_m, *, is_right):
         """See `RoundWall.limb`."""
+        # The limb is the point of the outline farthest left or right of the sight to the axis.
         radii = self._outline(course, level_m, inside=False)
         ray = np.array([np.sin(self._azimuth), np.cos(self._azimuth)])
         way = radii * ray - np.asarray(station_m)[:, None]
@@ -111,6 +112,7 @@ class DrawnWall:
 
     def more_m3(self, dips_m):
         """Volumes (n,) below dips minus those of the round wall, m3."""
+        # Area of an outline: pi times its mean square radius; Gauss weights sum over the heights.
         radii = self.nominal_m + self._departures[:, self._summed]
         more = np.pi * (np.mean(radii**2, axis=2) - self.nominal_m**2)
         step = self._heights[:, None] * self._shares

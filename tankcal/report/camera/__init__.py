@@ -1,7 +1,7 @@
 """Output of the camera analyses: lines in the terminal, papers, CSV tables and JSON.
 
-A result is the dict of `tankcal.record.camera_<kind>.as_json`. Its optional key "made_from" names
-the input files. This package computes no number.
+A result is the dict of `plain_<kind>` of `tankcal.record.camera_<kind>`, possibly with the key
+"made_from". This package computes no number.
 """
 
 import json

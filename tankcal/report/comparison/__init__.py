@@ -10,7 +10,8 @@ from typing import ClassVar
 from tankcal.job.rule_files import shipped_names, shipped_rule
 from tankcal.messages import message
 from tankcal.record import manifest, save
-from tankcal.record.comparison import COMPARISON, plain_of_comparison
+from tankcal.record.comparison import COMPARISON
+from tankcal.record.schema import to_plain
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL, unit_symbol
 from tankcal.report.plain import words_with_part
 from tankcal.report.saved_folder import SavedFolder, write_pages
@@ -80,7 +81,7 @@ def write_comparison(comparison, folder, language=None, progress=None, letterhea
     InputError
         For a folder with other files, or for data that are not a comparison.
     """
-    plain = comparison if isinstance(comparison, dict) else plain_of_comparison(comparison)
+    plain = comparison if isinstance(comparison, dict) else to_plain(comparison)
     paper = ComparisonPaper(plain, language, letterhead)
     return _FOLDER.write(folder, partial(_write, paper), language, progress)
 

@@ -1,19 +1,27 @@
-"""Who calibrated what, for whom, when: administrativeData of the certificate's XML."""
+"""Element administrativeData of the XML certificate: laboratory, customer, tank, dates."""
 
 import tankcal
-from tankcal.report import certificate as papers
-from tankcal.report.dcc.elements import CUBIC_METRE, METRE, child, clean, contact, contents, real
+from tankcal.report.certificate import doubts_of
+from tankcal.report.dcc.elements import (
+    CUBIC_METRE,
+    METRE,
+    add_child,
+    add_contact,
+    add_real,
+    add_text,
+    clean,
+)
 from tankcal.report.tables.facts import CERTIFICATE, REFERENCES, tank_facts
 
-UNKNOWN_COUNTRY = "ZZ"  # no country has it in ISO 3166-1: an element for users, "not stated"
+UNKNOWN_COUNTRY = "ZZ"  # not stated: a code that ISO 3166-1 reserves for users
 NAMESPACE = "tankcal"
-_LINK = "docs/certificate-digital.md"  # of tankcal: what its types are
-_SAID_ELSEWHERE = (
+_LINK = "docs/certificate-digital.md"  # page of tankcal on its types
+_OTHER_ELEMENTS = (  # keys of the certificate with elements of their own
     *("number", "country", "date_of_issue", "method", "procedure", "accreditation_number"),
     *("laboratory", "laboratory_address", "customer", "customer_address"),
     *("authorised_by", "authorised_role", "operator", "notice"),
 )
-_NEEDED = (
+_REQUIRED = (  # keys whose absence a statement names
     "country",
     "laboratory",
     "laboratory_address",
@@ -21,89 +29,89 @@ _NEEDED = (
     "customer",
     "customer_address",
 )
-_VERDICTS = {"passed": "pass", "failed": "fail", "not_accepted": "noPass"}
+# Codes of the schema for verdicts.
+_CONFORMITY = {"passed": "pass", "failed": "fail", "not_accepted": "noPass"}
 
 
-def administrative_data(parent, tongues, digest):
-    """Fill the element: software, types, core data, the tank, laboratory, persons, customer."""
-    software(child(parent, "dccSoftware"), "tankcal", tankcal.__version__, "application")
-    _types(child(parent, "refTypeDefinitions"), tongues)
-    _core_data(child(parent, "coreData"), tongues, digest)
-    _tank(child(child(parent, "items"), "item"), tongues)
-    _laboratory(child(parent, "calibrationLaboratory"), tongues)
-    _persons(child(parent, "respPersons"), tongues)
-    given = tongues.job["certificate"]
-    who, where = (tongues.or_not_stated(given.get(f"customer{of}")) for of in ("", "_address"))
-    contact(parent, "customer", who, where)
-    _statements(child(parent, "statements"), tongues)
+def add_administrative_data(parent, languages, digest):
+    """Fill the element: software, types, core data, tank, laboratory, persons, customer."""
+    add_software(add_child(parent, "dccSoftware"), "tankcal", tankcal.__version__, "application")
+    _types(add_child(parent, "refTypeDefinitions"), languages)
+    _core_data(add_child(parent, "coreData"), languages, digest)
+    _tank(add_child(add_child(parent, "items"), "item"), languages)
+    _laboratory(add_child(parent, "calibrationLaboratory"), languages)
+    _persons(add_child(parent, "respPersons"), languages)
+    _add_contact_of(parent, "customer", languages, "customer")
+    _statements(add_child(parent, "statements"), languages)
 
 
-def software(parent, name, release, kind):
-    """A program with its version, added to a list of software."""
-    found = child(parent, "software")
-    contents(found, "name", name)
-    child(found, "release", f"v{release}")
-    child(found, "type", kind)
+def add_software(parent, name, release, kind):
+    """Add a program with its version to a list of software."""
+    element = add_child(parent, "software")
+    add_text(element, "name", name)
+    add_child(element, "release", f"v{release}")
+    add_child(element, "type", kind)
 
 
 def country_of(certificate):
-    """The country of issue, two letters; None where the job does not state it."""
-    given = clean(certificate.get("country")).upper()
-    return given if len(given) == 2 and given.isascii() and given.isalpha() else None
+    """Return the country of issue, two letters; None if the job does not state it."""
+    code = clean(certificate.get("country")).upper()
+    return code if len(code) == 2 and code.isascii() and code.isalpha() else None
 
 
-def _types(parent, tongues):
-    found = child(parent, "refTypeDefinition")
-    contents(found, "name", NAMESPACE)
-    contents(found, "description", tongues.word("dcc.types"))
-    child(found, "namespace", NAMESPACE)
-    child(found, "link", _LINK)
-    child(found, "release", f"v{tankcal.__version__}")
+def _types(parent, languages):
+    element = add_child(parent, "refTypeDefinition")
+    add_text(element, "name", NAMESPACE)
+    add_text(element, "description", languages.word("dcc.types"))
+    add_child(element, "namespace", NAMESPACE)
+    add_child(element, "link", _LINK)
+    add_child(element, "release", f"v{tankcal.__version__}")
 
 
-def _core_data(parent, tongues, digest):
-    certificate, day = tongues.job["certificate"], tongues.job["survey"]["date"]
-    child(parent, "countryCodeISO3166_1", country_of(certificate) or UNKNOWN_COUNTRY)
-    for language in tongues.papers:
-        child(parent, "usedLangCodeISO639_1", language)
-    child(parent, "mandatoryLangCodeISO639_1", next(iter(tongues.papers)))
-    child(parent, "uniqueIdentifier", clean(certificate.get("number")) or f"sha256:{digest}")
-    identified = child(parent, "identifications")
-    identification(identified, f"sha256:{digest}", tongues.word("dcc.record"), "tankcal_record")
-    child(parent, "beginPerformanceDate", day)
-    child(parent, "endPerformanceDate", day)
-    child(parent, "performanceLocation", "other")
+def _core_data(parent, languages, digest):
+    certificate, day = languages.job["certificate"], languages.job["survey"]["date"]
+    add_child(parent, "countryCodeISO3166_1", country_of(certificate) or UNKNOWN_COUNTRY)
+    for language in languages.papers:
+        add_child(parent, "usedLangCodeISO639_1", language)
+    add_child(parent, "mandatoryLangCodeISO639_1", next(iter(languages.papers)))
+    add_child(parent, "uniqueIdentifier", clean(certificate.get("number")) or f"sha256:{digest}")
+    identified = add_child(parent, "identifications")
+    names = languages.word("dcc.record")
+    add_identification(identified, f"sha256:{digest}", names, "tankcal_record")
+    add_child(parent, "beginPerformanceDate", day)
+    add_child(parent, "endPerformanceDate", day)
+    add_child(parent, "performanceLocation", "other")
     if certificate.get("date_of_issue"):
-        child(parent, "issueDate", str(certificate["date_of_issue"]))
+        add_child(parent, "issueDate", str(certificate["date_of_issue"]))
 
 
-def identification(parent, value, names, kind):
-    """A name or number that something goes by; by whom it was given is not known."""
-    found = child(parent, "identification", refType=kind)
-    child(found, "issuer", "other")
-    child(found, "value", value)
-    contents(found, "name", names)
+def add_identification(parent, value, names, kind):
+    """Add an identifying name or number; its issuer is not known."""
+    element = add_child(parent, "identification", refType=kind)
+    add_child(element, "issuer", "other")
+    add_child(element, "value", value)
+    add_text(element, "name", names)
 
 
-def _tank(parent, tongues):
-    tank = tongues.job["tank"]
-    contents(parent, "name", tongues.word(f"kinds.{tank['kind']}"))
-    contents(parent, "description", tongues.each(_facts_of_tank))
-    identified = child(parent, "identifications")
-    identification(identified, clean(tank["id"]), tongues.label("tank_id"), "tankcal_tank")
+def _tank(parent, languages):
+    tank = languages.job["tank"]
+    add_text(parent, "name", languages.word(f"kinds.{tank['kind']}"))
+    add_text(parent, "description", languages.each(_facts_of_tank))
+    identified = add_child(parent, "identifications")
+    add_identification(identified, clean(tank["id"]), languages.label("tank_id"), "tankcal_tank")
     sizes = {"diameter": METRE, "height": METRE, "volume": CUBIC_METRE}
-    given = {key: tank.get(f"nominal_{key}_{'m3' if key == 'volume' else 'm'}") for key in sizes}
-    if any(value is not None for value in given.values()):
-        nominal = child(parent, "itemQuantities")
-        for key, value in given.items():
-            names = tongues.label(f"nominal_{key}")
-            real(
+    values = {key: tank.get(f"nominal_{key}_{'m3' if key == 'volume' else 'm'}") for key in sizes}
+    if any(value is not None for value in values.values()):
+        nominal = add_child(parent, "itemQuantities")
+        for key, value in values.items():
+            names = languages.label(f"nominal_{key}")
+            add_real(
                 nominal, key, value, sizes[key], names, of="itemQuantity", kind="basic_nominalValue"
             )
 
 
 def _facts_of_tank(paper):
-    """What the tank is, and what its table refers to, as the certificate says it, in one text."""
+    """Return the facts of the certificate on the tank and its reference conditions as a text."""
     shown = [
         fact
         for table in (tank_facts(paper.record), REFERENCES)
@@ -112,76 +120,83 @@ def _facts_of_tank(paper):
     return "; ".join(f"{paper.label(key)}: {text}" for key, text in shown if text)
 
 
-def _laboratory(parent, tongues):
-    given = tongues.job["certificate"]
-    if clean(given.get("accreditation_number")):
-        child(parent, "calibrationLaboratoryCode", clean(given["accreditation_number"]))
-    who, where = (tongues.or_not_stated(given.get(f"laboratory{of}")) for of in ("", "_address"))
-    contact(parent, "contact", who, where)
+def _laboratory(parent, languages):
+    certificate = languages.job["certificate"]
+    if clean(certificate.get("accreditation_number")):
+        add_child(parent, "calibrationLaboratoryCode", clean(certificate["accreditation_number"]))
+    _add_contact_of(parent, "contact", languages, "laboratory")
 
 
-def _persons(parent, tongues):
-    given = tongues.job["certificate"]
-    signs = child(parent, "respPerson")
-    contents(child(signs, "person"), "name", tongues.or_not_stated(given.get("authorised_by")))
-    contents(signs, "description", tongues.label("authorised_by"))
-    if clean(given.get("authorised_role")):
-        child(signs, "role", clean(given["authorised_role"]))
-    child(signs, "mainSigner", "true")
-    if clean(given.get("operator")):
-        surveyed = child(parent, "respPerson")
-        contents(child(surveyed, "person"), "name", given["operator"])
-        contents(surveyed, "description", tongues.label("operator"))
+def _add_contact_of(parent, name, languages, role):
+    """Add the contact of the laboratory or customer (`role`) as the element `name`."""
+    certificate = languages.job["certificate"]
+    texts = (languages.or_not_stated(certificate.get(key)) for key in (role, f"{role}_address"))
+    add_contact(parent, name, *texts)
 
 
-def _statements(parent, tongues):
-    """What a job says beside: its notice first, what it does not state, the verdict of its rule."""
-    given = tongues.job["certificate"]
-    if clean(given.get("notice")):
-        statement(parent, tongues.word("dcc.notice"), given["notice"], "tankcal_notice")
-    if papers.doubts_of(tongues.record["warnings"]):
-        doubts = tongues.each(_doubts)
-        statement(parent, tongues.word("certificate.doubtful"), doubts, "tankcal_doubt")
-    statement(
-        parent, tongues.word("dcc.validity"), tongues.word("certificate.only_items"),
+def _persons(parent, languages):
+    certificate = languages.job["certificate"]
+    signs = add_child(parent, "respPerson")
+    name = languages.or_not_stated(certificate.get("authorised_by"))
+    add_text(add_child(signs, "person"), "name", name)
+    add_text(signs, "description", languages.label("authorised_by"))
+    if clean(certificate.get("authorised_role")):
+        add_child(signs, "role", clean(certificate["authorised_role"]))
+    add_child(signs, "mainSigner", "true")
+    if clean(certificate.get("operator")):
+        surveyed = add_child(parent, "respPerson")
+        add_text(add_child(surveyed, "person"), "name", certificate["operator"])
+        add_text(surveyed, "description", languages.label("operator"))
+
+
+def _statements(parent, languages):
+    """Add the statements: notice, doubts, missing data, further keys of the job, verdict."""
+    certificate = languages.job["certificate"]
+    if clean(certificate.get("notice")):
+        add_statement(parent, languages.word("dcc.notice"), certificate["notice"], "tankcal_notice")
+    if doubts_of(languages.record["warnings"]):
+        doubts = languages.each(_doubts)
+        add_statement(parent, languages.word("certificate.doubtful"), doubts, "tankcal_doubt")
+    add_statement(
+        parent, languages.word("dcc.validity"), languages.word("certificate.only_items"),
         "tankcal_validity",
     )  # fmt: skip
-    missing = [key for key in _NEEDED if not clean(given.get(key))]
+    missing = [key for key in _REQUIRED if not clean(certificate.get(key))]
     if missing:
-        names = tongues.each(lambda paper: ", ".join(map(paper.label, missing)))
-        statement(parent, tongues.word("dcc.not_stated"), names, "tankcal_notStated")
-    for key in given:
-        if key not in _SAID_ELSEWHERE and clean(given[key]):
-            statement(parent, tongues.label(key), given[key], f"tankcal_{_kind(key)}")
-    rule = tongues.record.get("rule")
+        names = languages.each(lambda paper: ", ".join(map(paper.label, missing)))
+        add_statement(parent, languages.word("dcc.not_stated"), names, "tankcal_notStated")
+    for key in certificate:
+        if key not in _OTHER_ELEMENTS and clean(certificate[key]):
+            add_statement(parent, languages.label(key), certificate[key], f"tankcal_{_kind(key)}")
+    rule = languages.record.get("rule")
     if rule:
-        _verdict(parent, tongues, rule)
+        _verdict(parent, languages, rule)
 
 
 def _doubts(paper):
-    return " ".join(papers.doubts_of(paper.record["warnings"]))
+    return " ".join(doubts_of(paper.record["warnings"]))
 
 
-def statement(parent, names, declared, kind):
-    """A statement: what it is about, and what is declared; gives its element."""
-    found = child(parent, "statement", refType=kind)
-    contents(found, "name", names)
-    contents(found, "declaration", declared)
-    return found
+def add_statement(parent, names, declared, kind):
+    """Add a statement with its subject and declaration, and return its element."""
+    element = add_child(parent, "statement", refType=kind)
+    add_text(element, "name", names)
+    add_text(element, "declaration", declared)
+    return element
 
 
-def _verdict(parent, tongues, rule):
-    """The verdict of the decision rule; its code only where the schema has a word for it."""
-    said = tongues.word(f"rule_codes.{rule['code']}")
-    found = child(parent, "statement", refType="tankcal_rule")
-    contents(found, "name", tongues.word("headings.rule"))
-    child(found, "norm", clean(rule["rule"]["name"]))
-    child(found, "reference", clean(rule["rule"]["source"]))
-    contents(found, "declaration", said)
-    if rule["code"] in _VERDICTS:
-        child(found, "conformity", _VERDICTS[rule["code"]])
+def _verdict(parent, languages, rule):
+    """Add the verdict of the decision rule; its code only if the schema has an equivalent."""
+    text = languages.word(f"rule_codes.{rule['code']}")
+    element = add_child(parent, "statement", refType="tankcal_rule")
+    add_text(element, "name", languages.word("headings.rule"))
+    add_child(element, "norm", clean(rule["rule"]["name"]))
+    add_child(element, "reference", clean(rule["rule"]["source"]))
+    add_text(element, "declaration", text)
+    if rule["code"] in _CONFORMITY:
+        add_child(element, "conformity", _CONFORMITY[rule["code"]])
 
 
 def _kind(key):
-    """A key as part of a type's name."""
-    return "".join(one if one.isascii() and one.isalnum() else "_" for one in key)
+    """Return a key as a part of the name of a type."""
+    return "".join(sign if sign.isascii() and sign.isalnum() else "_" for sign in key)

@@ -1,7 +1,7 @@
-"""What was found, how and under what conditions: measurementResults of the certificate's XML."""
+"""Element measurementResults of the XML certificate: methods, conditions, results, provenance."""
 
-from tankcal.report import certificate as papers
-from tankcal.report.dcc.administrative import identification, software
+from tankcal.report.certificate import instruments_of
+from tankcal.report.dcc.administrative import add_identification, add_software
 from tankcal.report.dcc.elements import (
     CELSIUS,
     CUBIC_METRE,
@@ -12,18 +12,18 @@ from tankcal.report.dcc.elements import (
     ONE,
     PER_KELVIN,
     SQUARE_METRE,
-    child,
+    add_child,
+    add_real,
+    add_real_list,
+    add_text,
+    add_uncertainty,
+    add_words,
     clean,
-    contents,
-    real,
-    real_list,
-    state_uncertainty,
-    words_list,
 )
 from tankcal.report.tables import overrulings
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
 
-_UNITS = {  # by the unit that a size is shown in; its value is in SI, but of an angle in degrees
+_UNITS = {  # {printed unit: unit of the value}; values are in SI, angles in degrees
     "m": METRE,
     "mm": METRE,
     "mm/m": ONE,
@@ -36,154 +36,155 @@ _UNITS = {  # by the unit that a size is shown in; its value is in SI, but of an
 _PUBLISHERS = ("ISO", "IEC", "OIML", "API", "EN", "ABNT", "JCGM")
 
 
-def measured_results(parent, tongues, digest):
-    """Fill the element: one result, the table, with all that belongs to it."""
-    found = child(parent, "measurementResult", refType="tankcal_calibration")
-    contents(found, "name", tongues.word("titles.certificate"))
-    _methods(child(found, "usedMethods"), tongues)
-    _software(child(found, "usedSoftware"), tongues.record)
-    used = papers.instruments_of(tongues.record)
+def add_results(parent, languages, digest):
+    """Fill the element with one calibration, whose first result is the table."""
+    element = add_child(parent, "measurementResult", refType="tankcal_calibration")
+    add_text(element, "name", languages.word("titles.certificate"))
+    _methods(add_child(element, "usedMethods"), languages)
+    _software(add_child(element, "usedSoftware"), languages.record)
+    used = instruments_of(languages.record)
     if used:
-        _equipment(child(found, "measuringEquipments"), tongues, used)
-    _conditions(child(found, "influenceConditions"), tongues)
-    _results(child(found, "results"), tongues)
-    _meta_data(child(found, "measurementMetaData"), tongues, digest)
+        _equipment(add_child(element, "measuringEquipments"), languages, used)
+    _conditions(add_child(element, "influenceConditions"), languages)
+    _results(add_child(element, "results"), languages)
+    _meta_data(add_child(element, "measurementMetaData"), languages, digest)
 
 
-def _methods(parent, tongues):
-    """The method, as the job names it, with the standards of its corrections; then that of U."""
-    given, record = tongues.job["certificate"], tongues.record
-    method = child(parent, "usedMethod", refType="tankcal_method")
-    contents(method, "name", tongues.label("method"))
-    contents(method, "description", tongues.or_not_stated(_joined(given, "method", "procedure")))
+def _methods(parent, languages):
+    """Add the method of the job with the standards of its corrections, and the method of U."""
+    record = languages.record
+    method = add_child(parent, "usedMethod", refType="tankcal_method")
+    add_text(method, "name", languages.label("method"))
+    names = (clean(languages.job["certificate"].get(key)) for key in ("method", "procedure"))
+    add_text(method, "description", languages.or_not_stated("; ".join(filter(None, names))))
     for source in _sources(record):
         is_norm = source.split()[0] in _PUBLISHERS
-        child(method, "norm" if is_norm else "reference", source)
-    uncertain = child(parent, "usedMethod", refType="basic_methodMeasurementUncertainty")
-    contents(uncertain, "name", tongues.word("headings.uncertainty"))
-    child(uncertain, "norm", "JCGM 100:2008")
+        add_child(method, "norm" if is_norm else "reference", source)
+    uncertain = add_child(parent, "usedMethod", refType="basic_methodMeasurementUncertainty")
+    add_text(uncertain, "name", languages.word("headings.uncertainty"))
+    add_child(uncertain, "norm", "JCGM 100:2008")
     if record.get("monte_carlo"):
-        child(uncertain, "norm", "JCGM 101:2008")
-
-
-def _joined(given, *keys):
-    return "; ".join(clean(given.get(key)) for key in keys if clean(given.get(key)))
+        add_child(uncertain, "norm", "JCGM 101:2008")
 
 
 def _sources(record):
-    """Where the formulas of the applied corrections stand, norms first, each once."""
-    named = [one["source"] for one in record["corrections"] if one["applied"] and one["source"]]
-    single = dict.fromkeys(clean(part) for source in named for part in source.split(";"))
-    return sorted(filter(None, single), key=lambda one: one.split()[0] not in _PUBLISHERS)
+    """Return the different sources of the applied corrections, standards first."""
+    sources = [
+        correction["source"]
+        for correction in record["corrections"]
+        if correction["applied"] and correction["source"]
+    ]
+    parts = dict.fromkeys(clean(part) for source in sources for part in source.split(";"))
+    return sorted(filter(None, parts), key=lambda part: part.split()[0] not in _PUBLISHERS)
 
 
 def _software(parent, record):
-    software(parent, "tankcal", record["tankcal"], "application")
+    add_software(parent, "tankcal", record["tankcal"], "application")
     for name, release in record["versions"].items():
-        software(parent, name, release, "library")
+        add_software(parent, name, release, "library")
 
 
-def _equipment(parent, tongues, used):
+def _equipment(parent, languages, used):
     for name, certificate in used.items():
-        one = child(parent, "measuringEquipment", refType="tankcal_instrument")
-        contents(one, "name", name)
+        element = add_child(parent, "measuringEquipment", refType="tankcal_instrument")
+        add_text(element, "name", name)
         if clean(certificate):
-            identified = child(one, "identifications")
-            names = tongues.word("dcc.certificate_of_instrument")
-            identification(identified, clean(certificate), names, "tankcal_certificate")
+            identified = add_child(element, "identifications")
+            names = languages.word("dcc.certificate_of_instrument")
+            add_identification(identified, clean(certificate), names, "tankcal_certificate")
 
 
-def _conditions(parent, tongues):
-    """What the table refers to, and how the tank was surveyed."""
-    table, survey = tongues.job["table"], tongues.job["survey"]
-    given = {
+def _conditions(parent, languages):
+    """Add the reference conditions of the table and the conditions of the survey."""
+    table, survey = languages.job["table"], languages.job["survey"]
+    conditions = {
         "reference_temperature": (table["reference_temperature_c"], CELSIUS),
         "table_density": (table["liquid_density_kg_m3"] or None, DENSITY),
         "shell_temperature": (survey["shell_temperature_c"], CELSIUS),
         "liquid_level": (survey["liquid_level_m"], METRE),
         "liquid_density": (survey["liquid_density_kg_m3"], DENSITY),
-        "expansion": (tongues.job["material"]["expansion_per_k"], PER_KELVIN),
+        "expansion": (languages.job["material"]["expansion_per_k"], PER_KELVIN),
     }
-    for key, (value, unit) in given.items():
+    for key, (value, unit) in conditions.items():
         if value is not None:
-            _condition(parent, tongues, key, value, unit)
+            _condition(parent, languages, key, value, unit)
 
 
-def _condition(parent, tongues, key, value, unit):
-    found = child(parent, "influenceCondition", refType=f"tankcal_{key}")
-    contents(found, "name", tongues.label(key))
-    real(child(found, "data"), key, value, unit, tongues.label(key))
+def _condition(parent, languages, key, value, unit):
+    element = add_child(parent, "influenceCondition", refType=f"tankcal_{key}")
+    add_text(element, "name", languages.label(key))
+    add_real(add_child(element, "data"), key, value, unit, languages.label(key))
 
 
 # ---- results
 
 
-def _results(parent, tongues):
-    """The table first; then what the tank was found to be."""
-    _capacity(_result(parent, "capacity", tongues.word("headings.capacity")), tongues)
-    record = tongues.record
+def _results(parent, languages):
+    """Add the table, the courses, the parts of the tank, and deadwood."""
+    _capacity(_result(parent, "capacity", languages.word("headings.capacity")), languages)
+    record = languages.record
     if record["courses"]:
-        of = _result(parent, "courses", tongues.word("headings.courses"))
+        of = _result(parent, "courses", languages.word("headings.courses"))
         for course in record["courses"]:
-            _course(of, tongues, course)
+            _course(of, languages, course)
     for name in ("solid", "bottom", "top", "roof"):
         if record.get(name):
-            _described(parent, tongues, name)
+            _part(parent, languages, name)
     if record["deadwood"]:
-        of = _result(parent, "deadwood", tongues.word("captions.deadwood"))
+        of = _result(parent, "deadwood", languages.word("captions.deadwood"))
         for thing in record["deadwood"]:
-            _thing(of, tongues, thing)
+            _thing(of, languages, thing)
 
 
 def _result(parent, name, names):
-    """The data of a new result."""
-    found = child(parent, "result", refType=f"tankcal_{name}Result")
-    contents(found, "name", names)
-    return child(found, "data")
+    """Add a result, and return the element of its data."""
+    element = add_child(parent, "result", refType=f"tankcal_{name}Result")
+    add_text(element, "name", names)
+    return add_child(element, "data")
 
 
-def _capacity(parent, tongues):
-    """The table: dips, volumes with their uncertainty in every row, which rows are for use."""
-    capacity, job = tongues.record["capacity"], tongues.job
-    table = child(parent, "list", refType="tankcal_table")
-    contents(table, "name", tongues.word("headings.capacity"))
-    said = tongues.each(lambda paper: _said_of_table(paper, capacity))
-    contents(table, "description", said)
-    real_list(table, "dip", capacity["height_m"], METRE, tongues.word("dcc.dip"))
-    names = tongues.word("dcc.volume")
-    numbers = real_list(
+def _capacity(parent, languages):
+    """Add the table: dips, volumes with the uncertainty of each row, and rows for use."""
+    capacity, job = languages.record["capacity"], languages.job
+    table = add_child(parent, "list", refType="tankcal_table")
+    add_text(table, "name", languages.word("headings.capacity"))
+    text = languages.each(lambda paper: _table_description(paper, capacity))
+    add_text(table, "description", text)
+    add_real_list(table, "dip", capacity["height_m"], METRE, languages.word("dcc.dip"))
+    names = languages.word("dcc.volume")
+    numbers = add_real_list(
         table, "volume", capacity["volume_m3"], CUBIC_METRE, names, kind="basic_measuredValue"
     )
     stated, factors = stated_U_m3(capacity), k_of_rows(capacity)
     probability = job["table"]["coverage_probability"]
-    if any(stated) and not state_uncertainty(numbers, stated, factors, capacity, probability):
-        U, k = tongues.word("dcc.U"), tongues.word("dcc.k")
-        real_list(table, "expandedUncertainty", stated, CUBIC_METRE, U)
-        real_list(table, "coverageFactor", factors, ONE, k)
+    if any(stated) and not add_uncertainty(numbers, stated, factors, capacity, probability):
+        U, k = languages.word("dcc.U"), languages.word("dcc.k")
+        add_real_list(table, "expandedUncertainty", stated, CUBIC_METRE, U)
+        add_real_list(table, "coverageFactor", factors, ONE, k)
     if not all(capacity["for_use"]):
-        use = ["yes" if one else "no" for one in capacity["for_use"]]
-        words_list(table, "forUse", use, tongues.word("dcc.for_use"))
-    for one in tongues.record["densities"]:
-        density = tongues.each(_density(one["density_kg_m3"]))
-        real_list(table, "volumeOfDensity", one["volume_m3"], CUBIC_METRE, density)
+        use = ["yes" if is_for_use else "no" for is_for_use in capacity["for_use"]]
+        add_words(table, "forUse", use, languages.word("dcc.for_use"))
+    for volumes in languages.record["densities"]:
+        names = languages.each(_density_writer(volumes["density_kg_m3"]))
+        add_real_list(table, "volumeOfDensity", volumes["volume_m3"], CUBIC_METRE, names)
 
 
-def _density(value):
-    """For a paper: that the volumes are those for a liquid of another density."""
+def _density_writer(value):
+    """Return a function of a paper: caption of the volumes for another density of the liquid."""
     return lambda paper: paper.word(
         "captions.capacity_density", density=paper.number(value, "kg/m3", digits=4)
     )
 
 
-def _said_of_table(paper, capacity):
-    """What heights count from, and how the table is read between its rows."""
+def _table_description(paper, capacity):
+    """Return sentences on the zero of the heights and on interpolation between rows."""
     zero = f"{paper.label('zero')}: {paper.word('zeros.' + capacity['zero'])}"
     return " ".join([f"{zero}.", *paper.choices("interpolation")])
 
 
-def _course(parent, tongues, course):
-    found = child(parent, "list", refType="tankcal_course")
-    contents(found, "name", tongues.word("dcc.course", name=course["course"]))
+def _course(parent, languages, course):
+    element = add_child(parent, "list", refType="tankcal_course")
+    add_text(element, "name", languages.word("dcc.course", name=course["course"]))
     for key, unit, u in (
         ("bottom_m", METRE, None),
         ("top_m", METRE, None),
@@ -194,71 +195,74 @@ def _course(parent, tongues, course):
         ("volume_m3", CUBIC_METRE, "u_m3"),
     ):
         name = key.rpartition("_")[0]
-        names = tongues.word(f"dcc.course_{name}")
-        real(found, name, course[key], unit, names, course[u] if u else None)
+        names = languages.word(f"dcc.course_{name}")
+        add_real(element, name, course[key], unit, names, course[u] if u else None)
 
 
-def _described(parent, tongues, name):
-    """Sizes of a part as numbers; all that is said of it stands in the description, too."""
+def _part(parent, languages, name):
+    """Add a part of the tank: sizes as numbers, and a description of all its details."""
     heading = "dimensions" if name == "solid" else "inside"
-    found = child(parent, "result", refType=f"tankcal_{name}Result")
-    contents(found, "name", tongues.word(f"headings.{heading}"))
-    details = tongues.record[name]
-    contents(found, "description", tongues.each(lambda paper: _sizes(paper, details)))
-    data = child(found, "data")
-    sized = [one for one in details if one["unit"] in _UNITS]
-    for one in sized:
-        real(data, one["code"], one["value"], _UNITS[one["unit"]], tongues.label(one["code"]))
-    if not sized:
-        contents(data, "text", tongues.each(lambda paper: _sizes(paper, details)))
+    element = add_child(parent, "result", refType=f"tankcal_{name}Result")
+    add_text(element, "name", languages.word(f"headings.{heading}"))
+    details = languages.record[name]
+    add_text(element, "description", languages.each(lambda paper: _details_text(paper, details)))
+    data = add_child(element, "data")
+    sizes = [detail for detail in details if detail["unit"] in _UNITS]
+    for size in sizes:
+        code, unit = size["code"], _UNITS[size["unit"]]
+        add_real(data, code, size["value"], unit, languages.label(code))
+    if not sizes:
+        add_text(data, "text", languages.each(lambda paper: _details_text(paper, details)))
 
 
-def _sizes(paper, details):
-    return "; ".join(f"{paper.label(one['code'])}: {paper.size_text(one)}" for one in details)
+def _details_text(paper, details):
+    return "; ".join(
+        f"{paper.label(detail['code'])}: {paper.size_text(detail)}" for detail in details
+    )
 
 
-def _thing(parent, tongues, thing):
-    found = child(parent, "list", refType="tankcal_thing")
-    contents(found, "name", thing["name"])
-    real(found, "bottom", thing["bottom_m"], METRE, tongues.word("dcc.course_bottom"))
-    real(found, "top", thing["top_m"], METRE, tongues.word("dcc.course_top"))
-    names = tongues.word("dcc.volume_of_thing")
-    real(found, "volume", thing["volume_m3"], CUBIC_METRE, names, thing["u_m3"])
+def _thing(parent, languages, thing):
+    element = add_child(parent, "list", refType="tankcal_thing")
+    add_text(element, "name", thing["name"])
+    add_real(element, "bottom", thing["bottom_m"], METRE, languages.word("dcc.course_bottom"))
+    add_real(element, "top", thing["top_m"], METRE, languages.word("dcc.course_top"))
+    names = languages.word("dcc.volume_of_thing")
+    add_real(element, "volume", thing["volume_m3"], CUBIC_METRE, names, thing["u_m3"])
 
 
-# ---- what it rests on
+# ---- provenance
 
 
-def _meta_data(parent, tongues, digest):
-    """The record and the files that it was made of, by their hashes; then what is told."""
-    made = {"file": "record.json", "sha256": digest}
-    _file(parent, tongues.word("dcc.record"), made, "tankcal_record")
-    for one in tongues.record["files"]:
-        _file(parent, tongues.word("dcc.input_file"), one, "tankcal_inputFile")
-    choices = tongues.each(lambda paper: " ".join(paper.choices()))
-    _said(parent, tongues.word("headings.choices"), choices, "tankcal_assumptions")
-    for number in range(len(overrulings.decisions_of(tongues.record))):
-        told = tongues.each(lambda paper, at=number: overrulings.sentences(paper)[at])
-        _said(parent, tongues.word("headings.overrulings"), told, "tankcal_overruling")
-    for number in range(len(tongues.record["warnings"])):
-        told = tongues.each(lambda paper, at=number: _warning(paper.record["warnings"][at]))
-        _said(parent, tongues.word("headings.warnings"), told, "tankcal_warning")
+def _meta_data(parent, languages, digest):
+    """Add the record and its input files with their hashes, and the sentences of the report."""
+    record_file = {"file": "record.json", "sha256": digest}
+    _file(parent, languages.word("dcc.record"), record_file, "tankcal_record")
+    for file in languages.record["files"]:
+        _file(parent, languages.word("dcc.input_file"), file, "tankcal_inputFile")
+    choices = languages.each(lambda paper: " ".join(paper.choices()))
+    _declaration(parent, languages.word("headings.choices"), choices, "tankcal_assumptions")
+    for i in range(len(overrulings.decisions_of(languages.record))):
+        sentence = languages.each(lambda paper, i=i: overrulings.sentences(paper)[i])
+        _declaration(parent, languages.word("headings.overrulings"), sentence, "tankcal_overruling")
+    for i in range(len(languages.record["warnings"])):
+        text = languages.each(lambda paper, i=i: _warning_text(paper.record["warnings"][i]))
+        _declaration(parent, languages.word("headings.warnings"), text, "tankcal_warning")
 
 
 def _file(parent, names, file, kind):
-    """A file by its name and its SHA-256, which stands alone in `reference`."""
-    found = child(parent, "metaData", refType=kind)
-    contents(found, "name", names)
-    contents(found, "description", file["file"])
-    child(found, "reference", f"sha256:{file['sha256']}")
+    """Add a file with its name; `reference` contains only its SHA-256."""
+    element = add_child(parent, "metaData", refType=kind)
+    add_text(element, "name", names)
+    add_text(element, "description", file["file"])
+    add_child(element, "reference", f"sha256:{file['sha256']}")
 
 
-def _said(parent, names, declared, kind):
-    found = child(parent, "metaData", refType=kind)
-    contents(found, "name", names)
-    contents(found, "declaration", declared)
+def _declaration(parent, names, declaration, kind):
+    element = add_child(parent, "metaData", refType=kind)
+    add_text(element, "name", names)
+    add_text(element, "declaration", declaration)
 
 
-def _warning(one):
-    place = ", ".join(part for part in (one["file"], one["column"]) if part)
-    return f"{place}: {one['text']}"
+def _warning_text(warning):
+    place = ", ".join(part for part in (warning["file"], warning["column"]) if part)
+    return f"{place}: {warning['text']}"

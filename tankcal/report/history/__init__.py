@@ -8,7 +8,8 @@ from typing import ClassVar
 
 from tankcal.messages import message
 from tankcal.record import manifest, save
-from tankcal.record.history import HISTORY, plain_of_history
+from tankcal.record.history import HISTORY
+from tankcal.record.schema import to_plain
 from tankcal.report.history.tables import (
     CERTIFICATES,
     CHANGES,
@@ -81,7 +82,7 @@ def write_history(history, folder, language=None, progress=None, letterhead=None
     InputError
         For a folder with other files, or for data that are not a history.
     """
-    plain = history if isinstance(history, dict) else plain_of_history(history)
+    plain = history if isinstance(history, dict) else to_plain(history)
     paper = HistoryPaper(plain, language, letterhead)
     return _FOLDER.write(folder, partial(_write, paper), language, progress)
 

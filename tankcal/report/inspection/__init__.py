@@ -8,7 +8,8 @@ from functools import partial
 
 from tankcal.messages import message
 from tankcal.record import manifest, save
-from tankcal.record.inspection import INSPECTION, plain_of_inspection
+from tankcal.record.inspection import INSPECTION
+from tankcal.record.schema import to_plain
 from tankcal.report.inspection.paper import FILE, WORKBOOK, InspectionPaper
 from tankcal.report.saved_folder import SavedFolder, write_pages
 
@@ -58,7 +59,7 @@ def write_inspection(inspection, out, language=None, progress=None, letterhead=N
     InputError
         If the folder has other files, or if the data are no inspection.
     """
-    plain = inspection if isinstance(inspection, dict) else plain_of_inspection(inspection)
+    plain = inspection if isinstance(inspection, dict) else to_plain(inspection)
     paper = InspectionPaper(plain, language, letterhead)
     return _FOLDER.write(out, partial(_write, paper), language, progress)
 

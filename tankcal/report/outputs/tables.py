@@ -7,7 +7,6 @@ from tankcal.record.columns import count_rows
 from tankcal.report.outputs.csv_files import write_table
 from tankcal.report.tables import (
     capacity,
-    great_circles,
     lines,
     liquid,
     readings,
@@ -45,7 +44,7 @@ def write_tables(record, directory):
     if record.get("strapping"):
         tables["strapping"] = strapping.straps_of(record), None
     if record.get("great_circles"):
-        tables["great_circles"] = great_circles.CIRCLES, None
+        tables["great_circles"] = strapping.CIRCLES, None
     if record.get("lines"):
         tables["offsets"] = lines.OFFSETS, None
     if record.get("liquid"):
@@ -61,7 +60,7 @@ def write_tables(record, directory):
             "photos": (survey.PHOTOS, None),
             "cameras": (survey.camera_table(free), None),
             "groups": (readings.GROUPS, None),
-            "residuals": (readings.READINGS, readings.in_their_units(observed)),
+            "residuals": (readings.READINGS, readings.convert_units(observed)),
         }
     for name, (table, columns) in tables.items():
         rows = table.rows(record) if columns is None else columns

@@ -1,6 +1,6 @@
-"""What a plan becomes on paper: prediction, field sheets, an empty job, files for programs.
+"""Documents of a plan: prediction, field sheets, an empty job, files for programs.
 
-Nothing here computes a number.
+This package computes no results.
 """
 
 from pathlib import Path
@@ -8,12 +8,11 @@ from pathlib import Path
 from tankcal.messages import message
 from tankcal.record import manifest
 from tankcal.report import folders
-from tankcal.report.planning.paper import PlanPaper
+from tankcal.report.planning.paper import DESIGN, PlanPaper
 
 __all__ = ["DESIGN", "FILES", "JOB", "PlanPaper", "refuse_foreign", "write"]
 
 JOB = "job"  # folder of the empty job
-DESIGN = "design"  # folder of the plan that a search ends with
 WRITING_JOB = message("plan_writing_job", "writing the empty job")
 WRITING_TABLES = message("plan_writing_tables", "writing the tables")
 FILES = (
@@ -34,35 +33,52 @@ def write(
     language=None,
     workbook=False,
 ):
-    """Write everything that a `planning.predicting.Prediction` gives, all or nothing; the paths.
+    """Write all files and documents of a prediction to a folder, all or nothing.
 
-    directory  made when missing; earlier results of a plan there are replaced
-    progress   called with a line of text as each step begins
-    effects    `planning.helping.Effect` of changes that were tried
-    design     `planning.helping.Path`, whose last plan has the same papers in a folder of its own;
-               None: none was looked for
-    simulated  `planning.simulations.Simulated` of the prediction, or None
-    language   of papers and workbook, one of languages.LANGUAGES; None: that of the plan
-    workbook   write the empty job as job.xlsx in place of text files
+    Parameters
+    ----------
+    prediction : Prediction or WallPrediction
+    directory : path
+        Created if missing; earlier results of a plan in it are replaced.
+    progress : callable, optional
+        Called with a line of text at the start of each step.
+    effects : sequence of Effect, optional
+        Effects of the evaluated changes.
+    design : Path, optional
+        Search for a design; the documents of its last plan are in a folder of their own.
+    simulated : Simulated or SimulatedWall, optional
+        Simulated surveys of the prediction.
+    language : str, optional
+        Language of documents and workbook, one of languages.LANGUAGES; None: that of the plan.
+    workbook : bool, optional
+        Write the empty job as job.xlsx instead of text files.
 
-    Raises InputError for a folder that holds other things, or an empty job that was filled in.
+    Returns
+    -------
+    list of Path
+        The written files and folders.
+
+    Raises
+    ------
+    InputError
+        For a folder with other content, or an empty job that was completed.
     """
     refuse_foreign(directory)
     progress = progress or (lambda text: None)
     with folders.replaced(directory, language) as temporary:
-        kind = _paper_of(prediction)
-        paper = kind(prediction, language, effects, design, simulated)
+        paper_class = _paper_class(prediction)
+        paper = paper_class(prediction, language, effects, design, simulated)
         _write(paper, temporary, progress, workbook)
         if design is not None and design.steps:
             (temporary / DESIGN).mkdir()
-            designed = kind(design.prediction, language)
+            designed = paper_class(design.prediction, language)
             _write(designed, temporary / DESIGN, progress, workbook)
-        _refuse_filled(directory)  # meanwhile
+        _refuse_filled(directory)  # completed while the files were written
     names = (*FILES, JOB, DESIGN)
     return [path for path in (Path(directory) / name for name in names) if path.exists()]
 
 
-def _paper_of(prediction):
+def _paper_class(prediction):
     from tankcal.planning.wall.prediction import WallPrediction
     from tankcal.report.planning.wall_paper import WallPaper
 
@@ -70,49 +86,39 @@ def _paper_of(prediction):
 
 
 def _write(paper, folder, progress, as_workbook):
-    """The files of a PlanPaper."""
-    if paper.is_wall:
-        _write_wall(paper, folder, progress, as_workbook)
-        return
+    """Write the files of a PlanPaper or WallPaper."""
     from tankcal.report.planning import empty_job, files, workbook
     from tankcal.report.planning.field_sheets import sheets
     from tankcal.report.planning.outlook import outlook
-
-    progress(WRITING_JOB)
-    empty_job.write(paper.prediction, folder / JOB, as_workbook)
-    progress(WRITING_TABLES)
-    files.write(paper, folder, empty_job.fingerprints(folder / JOB))
-    workbook.write(paper, folder / "field-sheets.xlsx")
-    _set(paper, folder, progress, outlook(paper), sheets(paper))
-
-
-def _write_wall(paper, folder, progress, as_workbook):
-    """The files of a WallPaper."""
-    from tankcal.report.planning import empty_job, wall_files, workbook
     from tankcal.report.planning.wall_paper import wall_outlook, wall_sheets
 
+    write_job, write_tables, write_book = empty_job.write, files.write, workbook.write
+    if paper.is_wall:
+        write_job = empty_job.write_wall
+        write_tables, write_book = files.write_wall, workbook.write_wall
+        outlook, sheets = wall_outlook, wall_sheets
     progress(WRITING_JOB)
-    wall_files.write_empty_job(paper.prediction, folder / JOB, as_workbook)
+    write_job(paper.prediction, folder / JOB, as_workbook)
     progress(WRITING_TABLES)
-    wall_files.write_wall(paper, folder, empty_job.fingerprints(folder / JOB))
-    workbook.write_of_wall(paper, folder / "field-sheets.xlsx")
-    _set(paper, folder, progress, wall_outlook(paper), wall_sheets(paper))
+    write_tables(paper, folder, empty_job.fingerprints(folder / JOB))
+    write_book(paper, folder / "field-sheets.xlsx")
+    _typeset(paper, folder, progress, outlook(paper), sheets(paper))
 
 
-def _set(paper, folder, progress, prediction, sheets):
-    """The PDFs of a paper, and the picture of the changes."""
+def _typeset(paper, folder, progress, prediction, sheets):
+    """Write the PDFs of a paper, and the figure of the changes."""
     from tankcal.report.pdf import pdf
     from tankcal.report.planning import figures
 
     progress(message("plan_setting_papers", "setting prediction and field sheets"))
     for name, blocks in (("prediction.pdf", prediction), ("field-sheets.pdf", sheets)):
         (folder / name).write_bytes(pdf([block.data for block in blocks], folder))
-    if any(not one.why for one in paper.effects):
+    if any(not effect.why for effect in paper.effects):
         figures.changes(paper).savefig(folder / "changes.png", dpi=150)
 
 
 def refuse_foreign(directory):
-    """Raise InputError when `directory` holds anything but results of write(), as it left them."""
+    """Raise InputError if a folder contains anything but unchanged results of `write`."""
     directory = Path(directory)
     folders.refuse_foreign(directory, (*FILES, JOB, DESIGN))
     if (directory / DESIGN).exists():
@@ -121,7 +127,7 @@ def refuse_foreign(directory):
 
 
 def _refuse_filled(directory):
-    """Raise InputError when a crew filled in an empty job of a plan."""
+    """Raise InputError if an empty job of a plan was completed."""
     from tankcal.report.planning import empty_job
 
     for folder in (Path(directory), Path(directory) / DESIGN):

@@ -1,4 +1,4 @@
-"""The empty job of a plan: all that is known beforehand, with room for what will be measured."""
+"""The empty job of a plan: all known input, and blank cells for the measurements."""
 
 import hashlib
 from math import degrees, isfinite
@@ -11,28 +11,53 @@ from tankcal.job.starter import FilledForm, write_form
 from tankcal.messages import message
 from tankcal.planning.measurements import targets_of
 from tankcal.planning.model import TAPED
-from tankcal.record.plan import PLAN
-from tankcal.record.wall_plan import WALL_PLAN
+from tankcal.planning.wall.reading import datum_of, tables_of
+from tankcal.record.plan import PLAN, WALL_PLAN
 from tankcal.text.decoding import read_json
 from tankcal.text.languages import DEFAULT
+from tankcal.units import ARCSEC_PER_DEG
 
-ARCSEC = 3600.0
 MEASURED = (
     *("survey.date", "survey.shell_temperature_c", "survey.liquid_level_m"),
     *("survey.liquid_density_kg_m3", "datum.bottom_z_m", "datum.dip_plate_z_m", "datum.dip_x_m"),
     *("datum.dip_y_m", "datum.reference_height_m"),
-)  # settings that are known on the day of the survey only
-AS_GIVEN = ("courses", "welds", "bottom", "deadwood", "uncertainty", "correlations", "stated")
-SIGHTS = {"directions": "direction", "zenith_angles": "zenith", "slope_distances": "distance"}
+)  # settings known only on the day of the survey
+COPIED = ("courses", "welds", "bottom", "deadwood", "uncertainty", "correlations", "stated")
+COPIED_OF_WALL = (*COPIED, "obstructions", "thickness", "tape_checks")
+SIGHTS = ("directions", "zenith_angles", "slope_distances")
+READINGS = (  # columns left blank in the tables of a bare wall
+    *("reading_m", "offset_mm", "direction_deg", "zenith_deg", "distance_m", "angle_deg", "time"),
+)
+BATCHES = (  # columns left blank in liquid.csv
+    *("volume_m3", "dip_m", "meter_temperature_c", "tank_temperature_c"),
+    "shell_temperature_c",
+)
 
 
 def write(prediction, directory, workbook=False):
-    """Write the empty job of a Prediction into a new folder, as text files or as job.xlsx."""
+    """Write the empty job of a plan of targets.
+
+    Parameters
+    ----------
+    prediction : Prediction
+    directory : path
+        New folder.
+    workbook : bool, optional
+        Write job.xlsx instead of text files.
+    """
     write_form(directory, form_of(prediction), workbook)
 
 
+def write_wall(prediction, directory, workbook=False):
+    """Write the empty job of a plan of the bare wall.
+
+    Parameters are those of `write`, with a WallPrediction.
+    """
+    write_form(directory, form_of_wall(prediction.plan), workbook)
+
+
 def fingerprints(folder):
-    """[{file, sha256}] of an empty job, by which a filled one is told from it."""
+    """Return [{file, sha256}] of an empty job, which distinguish it from a completed job."""
     return [
         {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
         for path in sorted(folder.iterdir())
@@ -40,20 +65,20 @@ def fingerprints(folder):
 
 
 def refuse_filled(folder, plan_file):
-    """Raise InputError when the job in `folder` is not the empty one that `plan_file` tells of.
+    """Raise InputError if the job in a folder differs from the empty job listed in plan.json.
 
-    Nor is it when the file is of a version that cannot be read: then nobody knows.
+    The error is also raised if plan.json cannot be read, as the job may then be completed.
     """
     if not folder.exists():
         return
     try:
         plan = read_json(plan_file)
     except (OSError, ValueError, RecursionError):
-        written = None
+        expected = None
     else:
         is_wall = WALL_PLAN.version_of(plan) is not None
-        written = (WALL_PLAN if is_wall else PLAN).migrated(plan, plan_file.name)["job"]
-    if not folder.is_dir() or fingerprints(folder) != written:
+        expected = (WALL_PLAN if is_wall else PLAN).migrated(plan, plan_file.name)["job"]
+    if not folder.is_dir() or fingerprints(folder) != expected:
         raise InputError(
             Problem(
                 folder.name,
@@ -66,46 +91,69 @@ def refuse_filled(folder, plan_file):
         )
 
 
+# ---- plans of targets
+
+
 def form_of(prediction):
-    """The FilledForm of a Prediction whose plan was read from files."""
+    """Return the FilledForm of a Prediction whose plan was read from files."""
     plan = prediction.plan
-    raw = plan.given
-    settings = {
-        f"{section}.{key}": text(one.raw)
-        for section, entries in raw.settings.items()
-        for key, one in entries.items()
-    }
-    used = [name for name, found in _tables(prediction).items() if found]
-    return FilledForm(
+    tables = _tables(prediction)
+    filled = [name for name, rows in tables.items() if rows]
+    return _form(
+        plan,
         kind="vertical",
-        survey=_survey(plan),
-        language=plan.job.table.language or DEFAULT,
-        settings={key: text for key, text in settings.items() if key not in MEASURED},
-        given={name: as_given(raw.tables[name]) for name in AS_GIVEN if name in raw.tables}
-        | _tables(prediction),
-        registered={name: entries(name, found) for name, found in raw.registers.items()},
-        to_fill=tuple(key for key in settings if key in MEASURED),
-        more=tuple(name for name in COLUMNS if name in used),
+        survey=_kind_of_survey(plan),
+        settings=_settings_of(plan.raw),
+        copied=COPIED,
+        tables=tables,
+        more=tuple(name for name in COLUMNS if name in filled),
     )
 
 
-def _survey(plan):
-    """The kind of survey, as `tankcal new` calls it."""
+def _form(plan, *, kind, survey, settings, copied, tables, more):
+    """Return the FilledForm of a Plan or WallPlan with its settings, tables and registers."""
+    raw = plan.raw
+    given = {name: rows_of_table(raw.tables[name]) for name in copied if name in raw.tables}
+    return FilledForm(
+        kind=kind,
+        survey=survey,
+        language=plan.job.table.language or DEFAULT,
+        settings={key: value for key, value in settings.items() if key not in MEASURED},
+        given=given | tables,
+        registered={
+            name: _entries_of_register(name, register) for name, register in raw.registers.items()
+        },
+        to_fill=tuple(key for key in settings if key in MEASURED),
+        more=more,
+    )
+
+
+def _settings_of(raw):
+    """Return {"section.key": text} of the settings of a RawJob."""
+    return {
+        f"{section}.{key}": _text_of(value.raw)
+        for section, entries in raw.settings.items()
+        for key, value in entries.items()
+    }
+
+
+def _kind_of_survey(plan):
+    """Kind of the survey, as in `tankcal new`."""
     if plan.photos:
         return "photos"
     return "triangulation" if plan.bases else "total-station"
 
 
 def _tables(prediction):
-    """{table: rows} of what the survey will measure, without values."""
+    """Return {table: rows} of the readings of the survey, without values."""
     plan = prediction.plan
     return {
         "targets": _targets(plan),
-        "photos": tuple(_photo(plan, one) for one in plan.photos),
-        "control": tuple(_control(one) for one in plan.known),
+        "photos": tuple(_photo(plan, photo) for photo in plan.photos),
+        "control": tuple(_control(known) for known in plan.known),
         "setups": tuple(
-            {"setup": one.name, "station": one.name, "instrument": one.instrument}
-            for one in plan.setups
+            {"setup": setup.name, "station": setup.name, "instrument": setup.instrument}
+            for setup in plan.setups
         ),
         **{table: _ties(plan, table) for table in TAPED},
         "stadia": _bases(plan),
@@ -114,122 +162,196 @@ def _tables(prediction):
 
 
 def _targets(plan):
-    found = targets_of(plan)
-    columns = (found.point, found.section, found.generatrix, found.z_m, found.offset_m)
+    targets = targets_of(plan)
+    columns = (targets.point, targets.section, targets.generatrix, targets.z_m, targets.offset_m)
     return tuple(
         {
             "point": point,
             "section": section,
             "generatrix": line,
-            "z_m": short(z, 4),
-            "offset_mm": short(1000 * offset, 3),
+            "z_m": _shorten(z, 4),
+            "offset_mm": _shorten(1000 * offset, 3),
         }
         for point, section, line, z, offset in zip(*columns, strict=True)
     )
 
 
-def _photo(plan, one):
-    """A row of photos.csv; where control holds the frame the orientation is found from it."""
-    row = {"photo": one.name, "camera": one.camera}
-    settings = plan.job.measurements.settings
-    if settings.datum == "control":
+def _photo(plan, photo):
+    """Row of photos.csv; if control defines the frame, the orientation is estimated from it."""
+    row = {"photo": photo.name, "camera": photo.camera}
+    if plan.job.measurements.settings.datum == "control":
         return row
-    places = {f"{axis}_m": short(x, 3) for axis, x in zip("xyz", one.xyz_m, strict=True)}
+    position = {f"{axis}_m": _shorten(x, 3) for axis, x in zip("xyz", photo.xyz_m, strict=True)}
     angles = {
-        f"{name}_deg": short(degrees(angle), 2)
-        for name, angle in zip(("omega", "phi", "kappa"), angles_of(one.rotation), strict=True)
+        f"{name}_deg": _shorten(degrees(angle), 2)
+        for name, angle in zip(("omega", "phi", "kappa"), angles_of(photo.rotation), strict=True)
     }
-    return row | places | angles
+    return row | position | angles
 
 
-def _control(one):
-    """A row of control.csv: with the planned sds, and no coordinate yet."""
-    sds = zip("xyz", one.sd_m, strict=True)
-    return {"point": one.name} | {f"s{axis}_mm": _mm(sd) for axis, sd in sds if isfinite(sd)}
+def _control(known):
+    """Row of control.csv: the planned sds, without coordinates."""
+    sds = zip("xyz", known.sd_m, strict=True)
+    return {"point": known.name} | {f"s{axis}_mm": _mm(sd) for axis, sd in sds if isfinite(sd)}
 
 
 def _ties(plan, table):
     rows = []
-    for one in plan.ties:
-        if one.table != table:
+    for tie in plan.ties:
+        if tie.table != table:
             continue
-        row = {"from": one.start, "to": one.end, "s_mm": _mm(one.sd_m)}
+        row = {"from": tie.start, "to": tie.end, "s_mm": _mm(tie.sd_m)}
         if table == "distances":
-            row |= {"kind": one.kind, "instrument": one.instrument or ""}
-        rows += [row] * one.readings
+            row |= {"kind": tie.kind, "instrument": tie.instrument or ""}
+        rows += [row] * tie.readings
     return tuple(rows)
 
 
 def _bases(plan):
     """Rows of stadia.csv, one for each reading."""
     rows = []
-    for one in plan.bases:
-        row = {"setup": one.setup, "to": one.to, "bar": one.bar}
-        row |= {"s_arcsec": short(ARCSEC * degrees(one.angle_sd_rad), 6)}
-        rows += [row] * one.readings
+    for base in plan.bases:
+        row = {"setup": base.setup, "to": base.to, "bar": base.bar}
+        row |= {"s_arcsec": _arcsec(base.angle_sd_rad)}
+        rows += [row] * base.readings
     return tuple(rows)
 
 
 def _sights(prediction):
-    """{table: rows} of what is sighted from each set-up, set by set."""
-    setups = {one.name: one for one in prediction.plan.setups}
-    found = {table: [] for table in SIGHTS}
+    """Return {table: rows} of the sights from each set-up, set by set."""
+    setups = {setup.name: setup for setup in prediction.plan.setups}
+    rows = {table: [] for table in SIGHTS}
     for readings in prediction.measurements.readings:
-        if readings.table not in SIGHTS:
+        table = readings.table
+        if table not in SIGHTS:
             continue
-        ends = {}
+        ends_of = {}
         for name, end in zip(readings.setup, readings.end, strict=True):
-            ends.setdefault(name, []).append(end)
-        for name, sighted in ends.items():
-            sd = _sd(readings.table, setups[name])
+            ends_of.setdefault(name, []).append(end)
+        for name, ends in ends_of.items():
+            sd = _sd_of_sight(table, setups[name])
             for number in range(1, setups[name].sets + 1):
-                numbered = {"set": str(number)} if readings.table == "directions" else {}
-                rows = [{"setup": name, "to": end} | sd | numbered for end in sighted]
-                found[readings.table] += rows
-    return {table: tuple(rows) for table, rows in found.items()}
+                set_number = {"set": str(number)} if table == "directions" else {}
+                rows[table] += [{"setup": name, "to": end} | sd | set_number for end in ends]
+    return {table: tuple(of_table) for table, of_table in rows.items()}
 
 
-def _sd(table, setup):
+def _sd_of_sight(table, setup):
     if table == "slope_distances":
         return {"s_mm": _mm(setup.distance_sd_m)}
-    sd = setup.direction_sd_rad if table == "directions" else setup.zenith_sd_rad
-    return {"s_arcsec": short(ARCSEC * degrees(sd), 6)}
+    return {
+        "s_arcsec": _arcsec(
+            setup.direction_sd_rad if table == "directions" else setup.zenith_sd_rad
+        )
+    }
 
 
-def as_given(table):
-    """The rows of a Table, {column: text} each."""
+# ---- plans of the bare wall
+
+
+def form_of_wall(plan):
+    """Return the FilledForm of a WallPlan: a row for each reading, without its value."""
+    design, settings = plan.design, _settings_of(plan.raw)
+    datum = datum_of(design)
+    if datum is not None:
+        settings.setdefault("adjustment.datum", datum)
+    tables = {name: _without_values(table) for name, table in tables_of(plan).items()}
+    if design.runs:
+        tables["liquid"] = _runs(plan)
+    return _form(
+        plan,
+        kind=plan.job.tank.kind,
+        survey=_kind_of_wall_survey(design),
+        settings=settings,
+        copied=COPIED_OF_WALL,
+        tables=tables,
+        more=tuple(tables),
+    )
+
+
+def _kind_of_wall_survey(design):
+    """Kind of the survey of a `Design`, as in `tankcal new`."""
+    if design.is_metered_alone:
+        return "liquid"
+    if design.hits or design.tangents is not None:
+        return "wall-hits" if design.hits else "tangents"
+    return "strapping" if design.lines is None else "reference-line"
+
+
+def _runs(plan):
+    """Rows of liquid.csv without readings; the planned dip is a note.
+
+    The start of a run from a dip has the volume 0. Without dip and volume, it would mean the dry
+    tank.
+    """
+    rows = []
+    for row in rows_of_table(tables_of(plan)["liquid"]):
+        dip = row.get("dip_m", "")
+        kept = {name: _shorten_cell(cell) for name, cell in row.items() if name not in BATCHES}
+        volume = {} if dip else {"volume_m3": "0"}
+        rows.append(kept | volume | {"note": f"{_shorten_cell(dip)} m" if dip else ""})
+    return tuple(rows)
+
+
+def _without_values(table):
     return tuple(
-        {name: text(cell) for name, cell in zip(table.headings, row, strict=True)}
+        {
+            name: "" if name in READINGS else _shorten_cell(cell)
+            for name, cell in zip(table.headings, row, strict=True)
+        }
         for row in table.rows
     )
 
 
-def entries(register, found):
-    """{name: {key: text}} with the spelling of keys that a starter job has."""
-    usual = {short: name for name, short in SHORT_KEYS[register].items()}
+# ---- texts
+
+
+def rows_of_table(table):
+    """Return the rows of a Table, {column: text} each."""
+    return tuple(
+        {name: _text_of(cell) for name, cell in zip(table.headings, row, strict=True)}
+        for row in table.rows
+    )
+
+
+def _entries_of_register(name, register):
+    """Return {entry: {key: text}} of a register, with the keys of a starter job."""
+    long_keys = {short: long for long, short in SHORT_KEYS[name].items()}
     return {
-        name: {usual.get(key, key): text(one.raw) for key, one in given.items()}
-        for name, given in found.entries.items()
+        entry: {long_keys.get(key, key): _text_of(value.raw) for key, value in values.items()}
+        for entry, values in register.entries.items()
     }
 
 
-def text(raw):
-    """A value of TOML or CSV as a text that means the same in a job."""
+def _text_of(raw):
+    """Text of a value of TOML or CSV, with the same meaning in a job."""
     if raw is None:
         return ""
     if isinstance(raw, bool):
         return "true" if raw else "false"
     if isinstance(raw, list):
-        pairs = ["-".join(map(str, one)) if isinstance(one, list) else str(one) for one in raw]
-        return "; ".join(pairs)
+        items = ["-".join(map(str, item)) if isinstance(item, list) else str(item) for item in raw]
+        return "; ".join(items)
     return str(raw)
 
 
 def _mm(metres):
-    return short(1000 * metres, 6)
+    return _shorten(1000 * metres, 6)
 
 
-def short(value, decimals):
-    """A number without zeros at its end."""
+def _arcsec(angle_rad):
+    return _shorten(ARCSEC_PER_DEG * degrees(angle_rad), 6)
+
+
+def _shorten(value, decimals):
+    """Text of a number without final zeros."""
     text = f"{value:.{decimals}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def _shorten_cell(cell):
+    """Return a cell; a number is returned without final zeros."""
+    try:
+        return _shorten(float(cell), 6)
+    except ValueError:
+        return cell

@@ -1,19 +1,18 @@
-"""The field sheets: what to mark, where to stand, what to take along and to read."""
+"""The field sheets: marks, positions, readings and equipment."""
 
 from math import ceil
 
-from tankcal.planning.bases import by_ends
+from tankcal.planning.bases import group_by_ends
 from tankcal.report import blocks
 from tankcal.report.planning import sketches
-from tankcal.report.planning.rows import lost_ties
+from tankcal.report.planning.rows import field_tables, lost_ties
 from tankcal.report.planning.stands import stands
-from tankcal.report.planning.tables import field_tables
 
-SHORT = 12  # rows: fewer stand one below the other
+SHORT = 12  # rows; shorter tables are not set in groups side by side
 
 
 def sheets(paper):
-    """The blocks of the field sheets of a PlanPaper."""
+    """Return the blocks of the field sheets of a PlanPaper."""
     tables = field_tables(paper.prediction)
     return [
         *paper.head("field_sheets"),
@@ -22,16 +21,16 @@ def sheets(paper):
         *_stands(paper, tables),
         *_readings(paper, tables),
         *_equipment(paper, tables),
-        blocks.signature([paper.word(f"signatures.{one}") for one in ("marked", "surveyed")]),
+        blocks.signature([paper.word(f"signatures.{name}") for name in ("marked", "surveyed")]),
     ]
 
 
 def _overview(paper, tables):
     plan = paper.plan
-    exposures = sum(one.readings for one in plan.photos)
+    exposures = sum(photo.readings for photo in plan.photos)
     counts = {
         "targets": len(plan.targets.names),
-        "unseen_targets": unseen_targets(paper.prediction),
+        "unseen_targets": count_unseen_targets(paper.prediction),
         "rows_and_lines": f"{len(tables['levels'][0])} × {len(tables['lines'][0])}",
         "photo_stations": len(plan.stations),
         "photographs": len(plan.photos),
@@ -39,7 +38,7 @@ def _overview(paper, tables):
         "setups": len(plan.setups),
         "tapes": len(plan.ties),
         "lost_ties": len(lost_ties(paper.prediction)),
-        "bases": len(by_ends(plan.bases)),
+        "bases": len(group_by_ends(plan.bases)),
         "control_points": len(plan.known),
     }
     shown = [
@@ -47,23 +46,20 @@ def _overview(paper, tables):
         for key, value in counts.items()
         if value
     ]
-    items = [("planned_for", paper.day()), ("side", _side(paper)), *shown]
+    side = paper.words["sides"][plan.job.survey.side]
+    items = [("planned_for", paper.day()), ("side", side), *shown]
     return [paper.facts(items), *paper.warnings(plan.warnings)]
 
 
-def unseen_targets(prediction):
-    """How many targets the planned survey does not determine."""
+def count_unseen_targets(prediction):
+    """Number of targets that the planned survey does not determine."""
     targets = prediction.points[: len(prediction.plan.targets.names)]
-    return sum(bool(one.undetermined) for one in targets)
-
-
-def _side(paper):
-    return paper.words["sides"][paper.plan.job.survey.side]
+    return sum(bool(target.undetermined) for target in targets)
 
 
 def _marks(paper, tables):
     unseen = [paper.paragraph("unseen")] if paper.prediction.undetermined else []
-    found = [
+    marks = [
         paper.heading("marks"),
         paper.paragraph("how_arcs_count"),
         paper.paragraph("marks"),
@@ -73,15 +69,15 @@ def _marks(paper, tables):
         _side_by_side(paper.table("lines", *tables["lines"]), 4),
         paper.table("targets", *tables["targets"], across=2),
     ]
-    others = [_side_by_side(one, 2) for one in _optional(paper, tables, "others")]
-    return found + others
+    return marks + [_side_by_side(table, 2) for table in _optional(paper, tables, "others")]
 
 
 def _side_by_side(table, across):
-    """A table (Block) with its rows in groups side by side where there are many."""
+    """Return a table (Block), with its rows in `across` groups side by side if it is long."""
     data, high = table.data, ceil(len(table.data["rows"]) / across)
     if len(data["rows"]) < SHORT:
         return table
+    # Fill the last group, so that all groups have the same number of rows.
     rows = data["rows"] + [[""] * len(data["columns"])] * (across * high - len(data["rows"]))
     wide = [[cell for row in rows[i::high] for cell in row] for i in range(high)]
     more = {key: data[key] * across for key in ("columns", "align")}
@@ -93,38 +89,40 @@ def _optional(paper, tables, *names):
 
 
 def _stands(paper, tables):
-    found = [paper.heading("stands"), paper.figure(stands(paper), "stands")]
+    positions = [paper.heading("stands"), paper.figure(stands(paper), "stands")]
     if "stations" in tables:
-        found += [
+        positions += [
             paper.paragraph("stations"),
             paper.table("stations", *tables["stations"]),
             paper.table("photographs", *tables["photographs"]),
         ]
-    return found + _optional(paper, tables, "setups")
+    return positions + _optional(paper, tables, "setups")
 
 
 def _readings(paper, tables):
-    """Headings stand right above their tables: a page never ends between them."""
-    found = []
+    """Return the blocks of ties, bases and control, each heading directly above its table.
+
+    A page never ends between a heading and its table.
+    """
+    readings = []
     if "ties" in tables:
-        found += [paper.heading("ties"), paper.table("ties", *tables["ties"])]
-        found.append(paper.paragraph("ties"))
-        if any(one.table == "plumb_lines" for one in paper.plan.ties):
-            found.append(paper.paragraph("plumb_lines"))
+        readings += [paper.heading("ties"), paper.table("ties", *tables["ties"])]
+        readings.append(paper.paragraph("ties"))
+        if any(tie.table == "plumb_lines" for tie in paper.plan.ties):
+            readings.append(paper.paragraph("plumb_lines"))
     if "bases" in tables:
-        found += [paper.heading("bases"), paper.table("bases", *tables["bases"])]
-        found.append(paper.paragraph("bases"))
+        readings += [paper.heading("bases"), paper.table("bases", *tables["bases"])]
+        readings.append(paper.paragraph("bases"))
     if "control" in tables:
-        found += [paper.heading("control"), paper.table("control", *tables["control"])]
-    return found
+        readings += [paper.heading("control"), paper.table("control", *tables["control"])]
+    return readings
 
 
 def _equipment(paper, tables):
-    found = _optional(paper, tables, "cameras", "instruments")
     steps = ("job", "names", *(("images",) if paper.plan.photos else ()), "run")
     return [
         paper.heading("equipment"),
-        *found,
+        *_optional(paper, tables, "cameras", "instruments"),
         paper.heading("afterwards"),
-        blocks.listing([paper.word(f"texts.after_{one}") for one in steps]),
+        blocks.listing([paper.word(f"texts.after_{step}") for step in steps]),
     ]

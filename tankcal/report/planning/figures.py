@@ -1,4 +1,4 @@
-"""The figures of a prediction: U against dip, weak areas, rays of the points, what helps most."""
+"""Figures of a prediction: U against dip, weak areas, rays of the points, effects of changes."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,18 +13,18 @@ from tankcal.pipeline.plot_style import (
     set_margins,
     styled,
 )
-from tankcal.report.planning.sketches import unrolled
+from tankcal.report.planning.sketches import unrolled_wall
 
-MOST = 32  # bars
-LABELS, ROOM = 2.4, 0.12  # inches that the names of bars have at least; beside the longest
+MOST = 32  # bars in a figure
+LABELS, GAP = 2.4, 0.12  # inches: least width of the names of bars; space beside the longest name
 COLOURS = {"add": INK, "repeat": PALE, "drop": RED}
 
 
 @styled
 def uncertainty(paper):
-    """U of every row, in m3 and over the volume, against the dip; the limit where there is one."""
+    """U of every row against the dip, in m3 and relative to the volume, with the limit if any."""
     table, limits = paper.prediction.table, paper.plan.limits
-    some = table.volume_m3 > 0.02 * table.volume_m3[-1]
+    some = table.volume_m3 > 0.02 * table.volume_m3[-1]  # near the bottom U over volume diverges
     figure = Figure(figsize=(WIDTH, 2.4))
     left, right = figure.subplots(1, 2)
     for ax, values in zip((left, right), _by_geometry(paper, some), strict=False):
@@ -34,7 +34,7 @@ def uncertainty(paper):
     share = 100 * table.U_m3[some] / table.volume_m3[some]
     right.plot(table.height_m[some], share, color=INK)
     right.set_ylabel(paper.word("axes.relative_u"))
-    if limits.relative_u is not None and limits.of == "top":
+    if limits.relative_u is not None and limits.quantity == "top":
         right.axhline(100 * limits.relative_u, color=RED, linewidth=0.9)
     for ax in (left, right):
         ax.set_xlabel(paper.word("axes.dip"))
@@ -48,8 +48,8 @@ def uncertainty(paper):
 
 
 def _by_geometry(paper, some):
-    """((dips, U), (dips, U over volume in percent)) without the runs of liquid; () of no such."""
-    liquid = getattr(paper.prediction.tabled, "liquid", None)
+    """Return ((dips, U), (dips, U over volume in percent)) by geometry only; () without liquid."""
+    liquid = getattr(paper.prediction.result, "liquid", None)
     if liquid is None:
         return ()
     before, dips = liquid.tables["geometry"], paper.prediction.table.height_m
@@ -58,21 +58,21 @@ def _by_geometry(paper, some):
 
 @styled
 def weak_areas(paper):
-    """The wall unrolled: every target coloured by its largest sd; weak and lost ones are marked."""
-    targets, points = paper.plan.targets, _of_targets(paper)
-    sd_mm = np.array([1000 * one.sd_m.max() for one in points])
+    """The unrolled wall: targets coloured by largest sd; weak and undetermined ones marked."""
+    targets, points = paper.plan.targets, _points_of_targets(paper)
+    sd_mm = np.array([1000 * point.sd_m.max() for point in points])
     known = np.isfinite(sd_mm)
-    figure, ax = unrolled(paper, 2.9)
+    figure, ax = unrolled_wall(paper, 2.9)
     shown = ax.scatter(
         targets.arc_m[known], targets.height_m[known], c=sd_mm[known], s=18, cmap="viridis_r",
         zorder=3, **rasterize_many(points),
     )  # fmt: skip
     for name, mark in (("weak", "o"), ("undetermined", "x")):
-        mine = np.array([bool(getattr(one, name)) for one in points])
-        if mine.any():
+        marked = np.array([bool(getattr(point, name)) for point in points])
+        if marked.any():
             fill = {"markerfacecolor": "none"} if mark == "o" else {}
             ax.plot(
-                targets.arc_m[mine], targets.height_m[mine], mark, color=RED, markersize=7,
+                targets.arc_m[marked], targets.height_m[marked], mark, color=RED, markersize=7,
                 label=paper.word(f"legend.{name}"), **fill, zorder=4,
             )  # fmt: skip
     if ax.get_legend_handles_labels()[0]:
@@ -85,8 +85,8 @@ def weak_areas(paper):
 
 @styled
 def rays(paper):
-    """How many targets are seen from how many stations; those too few to be sound in red."""
-    counts = np.bincount([one.rays for one in _of_targets(paper)])
+    """Number of targets by number of rays; numbers of rays below the limit are red."""
+    counts = np.bincount([point.rays for point in _points_of_targets(paper)])
     few = np.arange(len(counts)) < max(paper.fewest_rays, 1)
     figure = Figure(figsize=(WIDTH, 1.9))
     ax = figure.subplots()
@@ -100,31 +100,29 @@ def rays(paper):
     return figure
 
 
-def _of_targets(paper):
+def _points_of_targets(paper):
     return paper.prediction.points[: len(paper.plan.targets.names)]
 
 
 @styled
 def changes(paper):
-    """Bars of the change of U over volume, in ppm, by each `helping.Effect` that still works.
-
-    Of many, those that change most, on either side.
-    """
-    works = [one for one in paper.effects if not one.why]
-    shown = sorted(works, key=lambda one: -abs(one.difference))[:MOST]
-    shown = sorted(shown, key=lambda one: one.difference)
+    """Bars of the change of U over volume, in ppm, by the largest possible effects of changes."""
+    possible = [effect for effect in paper.effects if not effect.why]
+    shown = sorted(possible, key=lambda effect: -abs(effect.difference))[:MOST]
+    shown = sorted(shown, key=lambda effect: effect.difference)
     figure = Figure(figsize=(WIDTH, 0.9 + 0.17 * len(shown)))
     ax = figure.subplots()
     places = range(len(shown))
-    values = [1e6 * one.difference for one in shown]
-    ax.barh(places, values, color=[COLOURS[one.change.action] for one in shown])
-    ax.set_yticks(places, [paper.change(one.change) for one in shown], parse_math=False)
+    values = [1e6 * effect.difference for effect in shown]
+    ax.barh(places, values, color=[COLOURS[effect.change.action] for effect in shown])
+    names = [paper.describe_change(effect.change) for effect in shown]
+    ax.set_yticks(places, names, parse_math=False)
     ax.invert_yaxis()
     ax.axvline(0.0, color=GREY, linewidth=0.5)
     ax.set_xlabel(paper.word("axes.change_of_u"))
     ax.grid(True, axis="x")
     ax.set_axisbelow(True)
-    wide = [one.get_window_extent().width / figure.dpi for one in ax.get_yticklabels()]
-    left = max(LABELS, max(wide, default=0.0) + ROOM)
+    wide = [label.get_window_extent().width / figure.dpi for label in ax.get_yticklabels()]
+    left = max(LABELS, max(wide, default=0.0) + GAP)
     set_margins(figure, left=left, right=0.12, bottom=0.45, top=0.08)
     return figure

@@ -1,33 +1,46 @@
-"""The prediction on paper: U of the table, weak areas, reliability, what helps most."""
+"""The prediction paper: U of the table, weak areas, reliability, effects of changes, design."""
 
 import numpy as np
 
-from tankcal.planning.bases import by_ends
+from tankcal.planning.bases import group_by_ends
 from tankcal.planning.changes import cost_of
-from tankcal.planning.simulations import BLUNDER_SDS
+from tankcal.planning.measurements import BLUNDER_SDS
 from tankcal.report import blocks
 from tankcal.report.numbers import unit
 from tankcal.report.plain import Column
 from tankcal.report.planning import figures
-from tankcal.report.planning.field_sheets import SHORT, unseen_targets
-from tankcal.report.planning.improvements import changes, design
-from tankcal.report.planning.rows import lost_ties
+from tankcal.report.planning.field_sheets import SHORT, count_unseen_targets
+from tankcal.report.planning.paper import DESIGN
+from tankcal.report.planning.rows import lost_ties, place_of_change
 from tankcal.text.digits import format_with_u
 from tankcal.text.words import group_name, name_of_input
 from tankcal.uncertainty import combine
 
-DIPS = 12  # rows of the table that are shown
-MOST_POINTS = 40
-NOTHING = 1e-9  # of the largest u: an input that contributes less is not listed
+DIPS = 12  # rows of the capacity table in the paper
+MOST_POINTS = 40  # weak points listed
+MOST_CHANGES = 30  # changes in each table
+NEGLIGIBLE = 1e-9  # of the largest u: smaller inputs are not listed
+SHOWN_IN = {"m": "mm", "mm": "image um", "rad": "rad arcsec"}  # printed units of blunders
 SHARE = Column("relative", "share", digits=3)
+_EFFECT = (
+    Column("relative", "share", digits=3, heading="u_over_v"), Column("U_m3", "m3", digits=3),
+    Column("difference", "share ppm", decimals=1), Column("poor", decimals=0),
+    Column("cost", digits=4),
+)  # fmt: skip
+EFFECTS = (Column("change"), *_EFFECT)
+EFFECTS_ON_WALL = tuple(column for column in EFFECTS if column.key != "poor")
+EFFECTS_WITH_PLACE = (
+    Column("change"), *(Column(key, "m", decimals=1) for key in ("arc_m", "off_m", "height_m")),
+    *_EFFECT,
+)  # fmt: skip
 
 
 def outlook(paper):
-    """The blocks of the prediction of a PlanPaper."""
+    """Return the blocks of the prediction of a PlanPaper."""
     return [
         *paper.head("prediction"),
         result(paper),
-        *_facts(paper),
+        _facts(paper),
         *paper.warnings(paper.prediction.warnings),
         *table(paper),
         *_weak(paper),
@@ -39,8 +52,8 @@ def outlook(paper):
 
 
 def result(paper):
-    """The full tank with its U, and whether the limit is met."""
-    found, table = paper.prediction, paper.prediction.table
+    """Return the block of the full tank with its U and the verdict on the limit."""
+    prediction, table = paper.prediction, paper.prediction.table
     value = format_with_u(table.volume_m3[-1], table.U_m3[-1], paper.marks, least=0)
     text = paper.word(
         "texts.top",
@@ -53,55 +66,49 @@ def result(paper):
     limits = paper.plan.limits
     if limits.relative_u is not None:
         verdict = paper.word(
-            f"texts.limit_{limits.of}_{'met' if found.meets else 'missed'}",
+            f"texts.limit_{limits.quantity}_{'met' if prediction.meets else 'missed'}",
             limit=paper.three_digits(limits.relative_u),
-            share=paper.three_digits(found.relative_u),
+            share=paper.three_digits(prediction.relative_u),
         )
         note = f"{verdict} {note}"
     return blocks.result(paper.word("texts.top_label"), text, note)
 
 
 def _facts(paper):
-    found, plan = paper.prediction, paper.plan
-    solution, datum = found.predicted.adjusted.solution, found.datum
+    prediction, plan = paper.prediction, paper.plan
+    solution, datum = prediction.network.adjusted.solution, prediction.datum
     cost = cost_of(plan)
-    return [
-        paper.facts(
-            [
-                ("planned_for", paper.day()),
-                ("photo_stations", _count(paper, len(plan.stations))),
-                ("photographs", _count(paper, len(plan.photos))),
-                ("setups", _count(paper, len(plan.setups))),
-                ("tapes", _count(paper, len(plan.ties))),
-                ("lost_ties", _count(paper, len(lost_ties(found)))),
-                ("bases", _count(paper, len(by_ends(plan.bases)))),
-                ("control_points", _count(paper, len(plan.known))),
-                ("targets", _count(paper, len(plan.targets.names))),
-                ("unseen_targets", _count(paper, unseen_targets(found))),
-                ("observations", _count(paper, solution.rows)),
-                ("unknowns", _count(paper, solution.estimated)),
-                ("redundancy", _count(paper, solution.dof)),
-                ("mean_sd", paper.number(found.precision.mean_sd_m, "mm", digits=2)),
-                ("homogeneity", _axes(paper, found.precision.range_m)),
-                ("datum", paper.said(datum.words) if datum.words else None),
-                ("cost", paper.plain(cost) if cost else None),
-            ]
-        )
-    ]
+    ranges = [paper.number(float(sd), "mm", digits=2) for sd in prediction.precision.range_m]
+    homogeneity = ", ".join(f"{axis} {text}" for axis, text in zip("xyz", ranges, strict=True))
+    return paper.facts(
+        [
+            ("planned_for", paper.day()),
+            ("photo_stations", paper.count(len(plan.stations))),
+            ("photographs", paper.count(len(plan.photos))),
+            ("setups", paper.count(len(plan.setups))),
+            ("tapes", paper.count(len(plan.ties))),
+            ("lost_ties", paper.count(len(lost_ties(prediction)))),
+            ("bases", paper.count(len(group_by_ends(plan.bases)))),
+            ("control_points", paper.count(len(plan.known))),
+            ("targets", paper.count(len(plan.targets.names))),
+            ("unseen_targets", paper.count(count_unseen_targets(prediction))),
+            ("observations", paper.count(solution.rows)),
+            ("unknowns", paper.count(solution.estimated)),
+            ("redundancy", paper.count(solution.dof)),
+            ("mean_sd", paper.number(prediction.precision.mean_sd_m, "mm", digits=2)),
+            ("homogeneity", homogeneity),
+            ("datum", paper.translate(datum.words) if datum.words else None),
+            ("cost", paper.plain(cost) if cost else None),
+        ]
+    )
 
 
-def _count(paper, number):
-    return paper.number(number, decimals=0) if number else None
-
-
-def _axes(paper, values_m):
-    texts = [paper.number(float(one), "mm", digits=2) for one in values_m]
-    return ", ".join(f"{axis} {text}" for axis, text in zip("xyz", texts, strict=True))
+# ---- uncertainty of the table
 
 
 def table(paper):
-    """U against the dip, the table at some dips, the worst deliveries, the budget."""
-    table, stated = paper.prediction.table, paper.prediction.tabled.stated
+    """Return the blocks of U against the dip, some rows, the worst deliveries and the budget."""
+    table, stated = paper.prediction.table, paper.prediction.result.stated
     last = len(table.height_m) - 1
     places = dict.fromkeys(np.linspace(0, last, DIPS + 1).round().astype(int)[1:].tolist())
     rows = [
@@ -115,6 +122,7 @@ def table(paper):
     ]
     dip = Column("height_m", "m", height=True, heading="dip")
     columns = [dip, Column("volume_m3", "m3", u="U_m3"), Column("U_m3", "m3", digits=2), SHARE]
+    sources = sorted(_sources(paper).items(), key=lambda source: -source[1])
     return [
         paper.heading("uncertainty"),
         paper.figure(figures.uncertainty(paper), "uncertainty"),
@@ -122,53 +130,53 @@ def table(paper):
         *_worst(paper, stated.worst),
         paper.table(
             "sources",
-            [
-                {"source": name, "U_m3": float(u)}
-                for name, u in sorted(_sources(paper).items(), key=lambda one: -one[1])
-            ],
+            [{"source": name, "U_m3": float(u)} for name, u in sources],
             [Column("source"), Column("U_m3", "m3", digits=2, heading="u_top")],
         ),
     ]
 
 
 def _sources(paper):
-    """{input: its standard uncertainty of the full tank}."""
+    """Return {input: standard uncertainty of the full tank, m3}, without negligible inputs."""
     table, variances = paper.prediction.table, {}
     of_top = combine(table.sources, len(table.height_m)).variances[-1]
-    for one, variance in zip(table.sources, of_top, strict=True):
-        name = name_of_input(paper.words, one.kind)
+    for source, variance in zip(table.sources, of_top, strict=True):
+        name = name_of_input(paper.words, source.kind)
         variances[name] = variances.get(name, 0.0) + variance
-    found = {name: np.sqrt(variance) for name, variance in variances.items()}
-    least = NOTHING * max(found.values(), default=0.0)
-    return {name: u for name, u in found.items() if u > least}
+    u_of = {name: np.sqrt(variance) for name, variance in variances.items()}
+    least = NEGLIGIBLE * max(u_of.values(), default=0.0)
+    return {name: u for name, u in u_of.items() if u > least}
 
 
 def _worst(paper, worst):
     rows = [
         {
-            "minimum_m": one.minimum_m,
-            "low_m": one.relative.low_m,
-            "high_m": one.relative.high_m,
-            "U_m3": one.relative.U_m3,
-            "relative": one.relative.relative,
+            "minimum_m": delivery.minimum_m,
+            "low_m": delivery.relative.low_m,
+            "high_m": delivery.relative.high_m,
+            "U_m3": delivery.relative.U_m3,
+            "relative": delivery.relative.relative,
         }
-        for one in worst
+        for delivery in worst
     ]
     heights = [Column(key, "m", height=True) for key in ("minimum_m", "low_m", "high_m")]
     columns = [*heights, Column("U_m3", "m3", digits=2), SHARE]
     return [paper.table("worst", rows, columns)] if rows else []
 
 
+# ---- weak areas and reliability
+
+
 def _weak(paper):
-    found = paper.prediction
+    prediction = paper.prediction
     rows = [
         {
-            "point": one.name,
-            "rays": one.rays,
-            "sd_m": None if one.undetermined else float(one.sd_m.max()),
-            "why": paper.word(f"texts.{_why(paper, one)}", rays=one.rays),
+            "point": point.name,
+            "rays": point.rays,
+            "sd_m": None if point.undetermined else float(point.sd_m.max()),
+            "why": paper.word(f"texts.{_weakness(paper, point)}", rays=point.rays),
         }
-        for one in (*found.undetermined, *found.weak)
+        for point in (*prediction.undetermined, *prediction.weak)
     ]
     columns = [
         Column("point"), Column("rays", decimals=0), Column("sd_m", "mm", digits=2), Column("why"),
@@ -182,48 +190,52 @@ def _weak(paper):
         paper.figure(figures.weak_areas(paper), "weak_areas"),
         paper.figure(figures.rays(paper), "rays"),
         *(listed or [paper.paragraph("none_weak")]),
-        paper.table("sections", *_sections(found)),
+        _sections(paper),
     ]
 
 
-def _why(paper, one):
-    if one.undetermined:
-        return {0: "why_unseen", 1: "why_one_ray"}.get(one.rays, "why_undetermined")
-    if one.rays >= paper.fewest_rays:
+def _weakness(paper, point):
+    """Key of the text that states why a point is undetermined or weak."""
+    if point.undetermined:
+        return {0: "why_unseen", 1: "why_one_ray"}.get(point.rays, "why_undetermined")
+    if point.rays >= paper.fewest_rays:
         return "why_large_sd"
-    return "why_one_ray" if one.rays == 1 else "why_few_rays"
+    return "why_one_ray" if point.rays == 1 else "why_few_rays"
 
 
-def _sections(found):
+def _sections(paper):
     rows = [
         {
-            "section": one.name,
-            "height_m": one.height_m,
-            "targets": one.targets,
-            "centre_x_m": float(one.centre_sd_m[0]),
-            "centre_y_m": float(one.centre_sd_m[1]),
-            "radius_m": float(one.radius_sd_m),
+            "section": section.name,
+            "height_m": section.height_m,
+            "targets": section.targets,
+            "centre_x_m": float(section.centre_sd_m[0]),
+            "centre_y_m": float(section.centre_sd_m[1]),
+            "radius_m": float(section.radius_sd_m),
         }
-        for one in found.sections
+        for section in paper.prediction.sections
     ]
     sds = [Column(key, "mm", digits=2) for key in ("centre_x_m", "centre_y_m", "radius_m")]
     height = Column("height_m", "m", decimals=3)
-    return rows, [Column("section"), height, Column("targets", decimals=0), *sds]
+    columns = [Column("section"), height, Column("targets", decimals=0), *sds]
+    return paper.table("sections", rows, columns)
 
 
 def _reliability(paper):
     rows = [
         {
-            "readings": group_name(paper.words, {"name": one.name, "kind": one.kind}),
-            "count": one.count,
-            "uncontrolled": one.uncontrolled,
-            "redundancy": one.redundancy,
-            "blunder": _blunder(paper, one),
-            "of": " – ".join(one.of),
-            "volume_m3": None if np.isnan(one.volume_m3) else one.volume_m3,
-            "volume_of": " – ".join(one.volume_of),
+            "readings": _name_of_group(paper, group),
+            "count": group.count,
+            "uncontrolled": group.uncontrolled,
+            "redundancy": group.redundancy,
+            "blunder": None
+            if np.isnan(group.blunder)
+            else paper.number(group.blunder, SHOWN_IN[group.unit], digits=3),
+            "of": " – ".join(group.of),
+            "volume_m3": None if np.isnan(group.volume_m3) else group.volume_m3,
+            "volume_of": " – ".join(group.volume_of),
         }
-        for one in paper.prediction.reliability
+        for group in paper.prediction.reliability
     ]
     columns = [
         Column("readings"), Column("count", decimals=0), Column("uncontrolled", decimals=0),
@@ -238,19 +250,25 @@ def _reliability(paper):
     ]
 
 
+def _name_of_group(paper, group):
+    return group_name(paper.words, {"name": group.name, "kind": group.kind})
+
+
 def _uncontrolled(paper):
-    """What an error in a reading that nothing controls does to the volume."""
-    rows = [
-        {
-            "readings": group_name(paper.words, {"name": one.name, "kind": one.kind}),
-            "uncontrolled": one.uncontrolled,
-            "per_unit_m3": one.per_unit_m3 / unit(SHOWN_IN[one.unit]).factor,
-            "per": unit(SHOWN_IN[one.unit]).symbol,
-            "volume_of": " – ".join(one.per_unit_of),
-        }
-        for one in paper.prediction.reliability
-        if one.uncontrolled
-    ]
+    """Return the blocks of the effect of errors in uncontrolled readings on the volume."""
+    rows = []
+    for group in paper.prediction.reliability:
+        if group.uncontrolled:
+            shown = unit(SHOWN_IN[group.unit])
+            rows.append(
+                {
+                    "readings": _name_of_group(paper, group),
+                    "uncontrolled": group.uncontrolled,
+                    "per_unit_m3": group.per_unit_m3 / shown.factor,
+                    "per": shown.symbol,
+                    "volume_of": " – ".join(group.per_unit_of),
+                }
+            )
     columns = [
         Column("readings"), Column("uncontrolled", decimals=0),
         Column("per_unit_m3", "m3", digits=2, heading="volume_of_blunder"), Column("per"),
@@ -261,47 +279,137 @@ def _uncontrolled(paper):
     return [paper.paragraph("uncontrolled"), paper.table("uncontrolled", rows, columns)]
 
 
-SHOWN_IN = {"m": "mm", "mm": "image um", "rad": "rad arcsec"}
-
-
-def _blunder(paper, one):
-    if np.isnan(one.blunder):
-        return None
-    return paper.number(one.blunder, SHOWN_IN[one.unit], digits=3)
+# ---- simulated surveys
 
 
 def _simulated(paper):
-    found = paper.simulated
-    if found is None:
+    simulated = paper.simulated
+    if simulated is None:
         return []
     values = {
-        "simulated_coordinates": paper.number(found.ratio, decimals=3),
-        "simulated_volume": paper.number(found.volume_ratio, decimals=3),
+        "simulated_coordinates": paper.number(simulated.ratio, decimals=3),
+        "simulated_volume": paper.number(simulated.volume_ratio, decimals=3),
     }
     return simulated_surveys(paper, "simulated", values)
 
 
-def simulated_surveys(paper, about, values):
-    """The blocks of simulated surveys of any plan.
+def simulated_surveys(paper, name, values):
+    """Return the blocks of simulated surveys of any plan.
 
-    about   the text that says how they were drawn
-    values  {label: text} of what they gave
+    Parameters
+    ----------
+    paper : PlanPaper
+    name : str
+        Key of the text that describes the simulation.
+    values : dict
+        {label: text} of the results.
+
+    Returns
+    -------
+    list of blocks.Block
     """
-    found = paper.simulated
-    known = paper.number(found.volume_ratio_sd, digits=2)
-    said = [paper.paragraph(about, seed=str(found.seed), sd=known)]
-    if found.blunders:
-        share, times = paper.three_digits(found.blunders), paper.plain(BLUNDER_SDS)
-        said.append(paper.paragraph("simulated_blunders", share=share, times=times))
+    simulated = paper.simulated
+    sd = paper.number(simulated.volume_ratio_sd, digits=2)
+    texts = [paper.paragraph(name, seed=str(simulated.seed), sd=sd)]
+    if simulated.blunders:
+        share, times = paper.three_digits(simulated.blunders), paper.plain(BLUNDER_SDS)
+        texts.append(paper.paragraph("simulated_blunders", share=share, times=times))
+    rejected = paper.number(float(simulated.set_aside.mean()), decimals=1)
     return [
         paper.heading("simulated"),
-        *said,
+        *texts,
         paper.facts(
             [
-                ("simulated_surveys", _count(paper, found.runs)),
+                ("simulated_surveys", paper.count(simulated.runs)),
                 *values.items(),
-                ("simulated_aside", paper.number(float(found.set_aside.mean()), decimals=1)),
-                ("simulated_failed", _count(paper, len(found.failed))),
+                ("simulated_aside", rejected),
+                ("simulated_failed", paper.count(len(simulated.failed))),
             ]
         ),
     ]
+
+
+# ---- changes and the smallest design
+
+
+def changes(paper):
+    """Return the blocks of the evaluated changes."""
+    possible = [effect for effect in paper.effects if not effect.why]
+    if not possible:
+        return []
+    drops = [effect for effect in possible if effect.change.action == "drop"]
+    gains = [effect for effect in possible if effect.change.action != "drop"]
+    return [
+        paper.heading("changes"),
+        paper.paragraph("wall_changes" if paper.is_wall else "changes"),
+        *_best(paper, "gains", gains, EFFECTS_ON_WALL if paper.is_wall else EFFECTS_WITH_PLACE),
+        *_best(paper, "drops", drops, EFFECTS_ON_WALL if paper.is_wall else EFFECTS),
+        *_indispensable(paper),
+        paper.figure(figures.changes(paper), "changes"),
+    ]
+
+
+def _best(paper, name, effects, columns):
+    """Return the blocks of the first effects, and of the number of further effects."""
+    if not effects:
+        return []
+    best = [paper.table(name, _rows_of_effects(paper, effects[:MOST_CHANGES]), columns)]
+    if len(effects) > MOST_CHANGES:
+        best.append(paper.paragraph("more_changes", count=len(effects) - MOST_CHANGES))
+    return best
+
+
+def _indispensable(paper):
+    """Return the blocks of items without which the survey has no solution, with the reasons."""
+    lost = [
+        paper.word(
+            f"texts.needed_{_reason(effect.why)}", change=paper.describe_change(effect.change)
+        )
+        for effect in paper.effects
+        if effect.why and effect.change.action == "drop"
+    ]
+    return [paper.paragraph("needed"), blocks.listing(lost)] if lost else []
+
+
+def _reason(why):
+    return next((code for code in ("datum", "rank") if why.startswith(f"{code} defect")), "other")
+
+
+def _rows_of_effects(paper, effects):
+    return [
+        {
+            "change": paper.describe_change(effect.change),
+            "relative": effect.relative_u,
+            "U_m3": effect.U_m3,
+            "difference": effect.difference,
+            "poor": effect.poor,
+            "cost": effect.change.cost or None,
+        }
+        | place_of_change(effect.change)
+        for effect in effects
+    ]
+
+
+def design(paper):
+    """Return the blocks of the smallest design, if it was searched for."""
+    path = paper.design
+    if path is None:
+        return []
+    text = paper.paragraph(
+        "design" if path.start_cost or path.cost else "design_without_cost",
+        before=paper.three_digits(path.start_u),
+        after=paper.three_digits(path.relative_u),
+        cost_before=paper.plain(path.start_cost),
+        cost=paper.plain(path.cost),
+        tried=path.evaluations,
+    )
+    missed = []
+    if path.prediction.meets is False:
+        limit = paper.three_digits(paper.plan.limits.relative_u)
+        missed = [paper.paragraph("design_missed", limit=limit)]
+    if not path.steps:
+        return [paper.heading("design"), paper.paragraph("no_step"), text, *missed]
+    columns = EFFECTS_ON_WALL if paper.is_wall else EFFECTS_WITH_PLACE
+    steps = paper.table("design", _rows_of_effects(paper, path.steps), columns)
+    folder = paper.paragraph("design_has_papers", folder=DESIGN)
+    return [paper.heading("design"), text, *missed, folder, steps]

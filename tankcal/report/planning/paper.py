@@ -1,26 +1,36 @@
-"""A prediction on paper: its plan, what was tried, and the words of a language."""
+"""PlanPaper: a prediction with its plan and the words of a language."""
 
 import numpy as np
 
 import tankcal
 from tankcal.messages import as_plain
-from tankcal.planning.changes import IMAGES
-from tankcal.record.plain_data import to_plain
+from tankcal.planning.changes import IMAGES, OF_COURSE, ROW
+from tankcal.record.schema import to_plain
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper, words_with_part
-from tankcal.report.planning import rows
+from tankcal.report.planning.rows import find_by_name
 from tankcal.text.languages import DEFAULT
 from tankcal.text.words import load_words, message_sentence
 
+DESIGN = "design"  # folder of the documents of the smallest design
+
 
 class PlanPaper(PlainPaper):
-    """A `planning.predicting.Prediction` with the words of a language.
+    """A Prediction with the words of a language.
 
-    language  one of languages.LANGUAGES; None: that of the plan
-    effects   `planning.helping.Effect` of every change that was tried      design  `Path` or None
-    simulated  `planning.simulations.Simulated` or None
+    Words are looked up in the part of a group under `planning` first, then in the group itself.
 
-    Words are looked up in the group's part under `planning` first, then in the group itself.
+    Parameters
+    ----------
+    prediction : Prediction
+    language : str, optional
+        One of languages.LANGUAGES; None: that of the plan.
+    effects : sequence of Effect, optional
+        Effects of all evaluated changes.
+    design : Path, optional
+        Search for the smallest design.
+    simulated : Simulated, optional
+        Simulated surveys.
     """
 
     is_wall = False
@@ -32,15 +42,15 @@ class PlanPaper(PlainPaper):
         super().__init__(words_with_part(words, "planning"))
 
     def subject(self):
-        """What the papers are about."""
+        """Subject of the documents: the tank."""
         return f"{self.word('page.tank')} {self.plan.job.tank.id}"
 
     def day(self, iso=None):
-        """The day that the survey is planned for, in words."""
+        """Format a date in the language; None: the planned date of the survey."""
         return super().day(iso or self.plan.job.survey.date)
 
     def head(self, part):
-        """The start of the document `part`, and the head of its first page."""
+        """Return the blocks at the start of the document `part`."""
         title = self.word(f"titles.{part}")
         return [
             blocks.document(
@@ -55,28 +65,33 @@ class PlanPaper(PlainPaper):
 
     @property
     def fewest_rays(self):
-        """Rays of a target that is not weak; 0 where set-ups measure, one of which is enough."""
+        """Fewest rays of a target that is not weak; 0 with set-ups, as one set-up is enough."""
         return 0 if self.plan.setups else self.plan.limits.rays
 
     def three_digits(self, share):
-        """A share in percent, to three digits."""
+        """Format a share in percent with three digits."""
         return self.number(float(share), "share", digits=3)
 
-    def said(self, text):
-        """A Message of the program in the language."""
-        found = to_plain(as_plain(text))
-        return message_sentence(self.words, str(text), found["code"], found["values"])
+    def count(self, number):
+        """Format a number of items; 0 returns None."""
+        return self.number(number, decimals=0) if number else None
 
-    def change(self, change):
-        """A `planning.changes.Change` in words."""
-        name = change.name.removeprefix("row ").removeprefix("in course ")
+    def translate(self, text):
+        """Return a Message of the program in the language."""
+        plain = to_plain(as_plain(text))
+        return message_sentence(self.words, str(text), plain["code"], plain["values"])
+
+    def describe_change(self, change):
+        """Return a `planning.changes.Change` in words."""
+        prefix = OF_COURSE if change.name.startswith(OF_COURSE) else ROW
+        name = change.name.removeprefix(prefix)
         if change.item == "reading":
             return self.word("changes.repeat_images" if name == IMAGES else "changes.repeat_sets")
         if change.item != "tape":
             return self.word(f"changes.{change.action}_{change.item}", name=name)
-        ties = (*change.plan.ties, *self.plan.ties)
-        tie = rows.named(ties, name)
-        if change.action != "add":  # a tape that a search adds and drops again is in neither plan
+        tie = find_by_name((*change.plan.ties, *self.plan.ties), name)
+        if change.action != "add":
+            # A tape that a search adds and later drops is in neither plan.
             table = "distances" if tie is None else tie.table
             return self.word(f"changes.{change.action}_{table}", name=name)
         rise = change.plan.points[tie.end] - change.plan.points[tie.start]
@@ -85,15 +100,15 @@ class PlanPaper(PlainPaper):
         return self.word(f"changes.add_tape_{kind}", name=name, length=length)
 
     def warnings(self, problems):
-        """The blocks of some warnings (errors.Problem), each with its place in the plan."""
+        """Return the blocks of warnings (errors.Problem), each with its place in the plan."""
         if not problems:
             return []
-        said = [f"{_place(one)}{self.said(one.expected)}" for one in problems]
-        return [self.heading("warnings"), blocks.listing(said)]
+        texts = [f"{_place(problem)}{self.translate(problem.expected)}" for problem in problems]
+        return [self.heading("warnings"), blocks.listing(texts)]
 
 
 def _place(problem):
-    """Where to look, for what stands in a file."""
+    """Return file and column of a problem in a file, as a prefix of its text."""
     if "." not in problem.file:
         return ""
     return f"{problem.file}{f', {problem.column}' if problem.column else ''}: "

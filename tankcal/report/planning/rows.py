@@ -1,6 +1,6 @@
-"""What has to be marked, set up, taken and read, row by row: the same on paper and in sheets.
+"""Tables of the field sheets of a plan of targets: rows and columns, for paper and workbook.
 
-Lengths are metres, angles radians; a text that is a code is looked up in words.
+Lengths are in metres, angles in radians. A text that is a code is looked up in the words.
 """
 
 import numpy as np
@@ -10,29 +10,100 @@ from tankcal.geometry.rotations import view_of_rotation
 from tankcal.planning.bases import angle_of_base_rad, base_m
 from tankcal.planning.places import joints_m, place_of
 from tankcal.planning.wall.model import WallPlan
+from tankcal.report.plain import Column
 
-LEVEL = 0.01  # rise over run, or run over rise, of what is called level or upright
+ARC, OFF, HEIGHT = (Column(key, "m", decimals=3) for key in ("arc_m", "off_m", "height_m"))
+AZIMUTH = Column("azimuth_rad", "rad deg", decimals=1)
+IN_COURSE = Column("height_in_course_m", "m", decimals=3)
+POINT, DONE = Column("point"), Column("done", nothing="____", words="marks")
+LEVELS = (Column("row"), Column("course"), IN_COURSE, HEIGHT, Column("targets", decimals=0))
+LINES = (Column("line"), ARC)
+TARGETS = (POINT, Column("course"), IN_COURSE, HEIGHT, ARC, DONE)
+OTHERS = (POINT, ARC, OFF, HEIGHT, DONE)
+STATIONS = (
+    Column("station"), ARC, OFF, HEIGHT, AZIMUTH, Column("camera"),
+    Column("photographs", decimals=0), Column("rolls"),
+)  # fmt: skip
+PHOTOGRAPHS = (
+    Column("photo"), Column("station"), Column("turn_rad", "rad deg", decimals=1),
+    Column("tilt_rad", "rad deg", decimals=1), Column("roll_rad", "rad deg", decimals=0),
+    Column("points", decimals=0), Column("file", nothing="_" * 12), DONE,
+)  # fmt: skip
+SETUPS = (
+    Column("setup"), ARC, OFF, HEIGHT, Column("instrument"), Column("sets", decimals=0),
+    Column("points", decimals=0), Column("sights"),
+    Column("direction_sd_rad", "rad arcsec", decimals=1),
+    Column("zenith_sd_rad", "rad arcsec", decimals=1), Column("distance_sd_m", "mm", decimals=1),
+)  # fmt: skip
+TIES = (
+    Column("tape"), Column("what", words="ties"), Column("from"), Column("to"),
+    Column("expected_m", "m", decimals=2), Column("sd_m", "mm", decimals=1),
+    Column("instrument"), Column("reading", decimals=0),
+    Column("value", nothing="_" * 14, words="marks"), Column("temperature", nothing="_" * 6),
+)  # fmt: skip
+BASES = (
+    Column("setup"), Column("to"), Column("bar"),
+    Column("expected_m", "m", decimals=2, heading="base"),
+    Column("expected_rad", "rad deg", decimals=3, heading="expected_m"),
+    Column("angle_sd_rad", "rad arcsec", decimals=1, heading="sd_m"),
+    Column("reading", decimals=0), Column("value", nothing="_" * 14, words="marks"),
+)  # fmt: skip
+CONTROL = (
+    POINT, ARC, OFF, HEIGHT, Column("sx_m", "mm", decimals=1), Column("sy_m", "mm", decimals=1),
+    Column("sz_m", "mm", decimals=1),
+)  # fmt: skip
+CAMERAS = (
+    Column("camera"), Column("width_mm", "image mm", decimals=1),
+    Column("height_mm", "image mm", decimals=1), Column("c_mm", "image mm", decimals=2),
+    Column("photographs", decimals=0), Column("readings", decimals=0),
+    Column("sd_mm", "image um", decimals=1),
+)  # fmt: skip
+INSTRUMENTS = (
+    Column("instrument"), Column("kind", words="instruments"), Column("certificate"),
+    Column("u_scale", "share ppm", digits=3),
+)  # fmt: skip
+LEVEL = 0.01  # largest slope of a level line, and of an upright line from the vertical
 SD_KEYS = ("direction_sd_rad", "zenith_sd_rad", "distance_sd_m")
+
+
+def field_tables(prediction):
+    """Return {name: (rows, columns)} of all tables of the field sheets that have rows."""
+    plan = prediction.plan
+    tables = {
+        "levels": (levels(prediction), LEVELS),
+        "lines": (lines(prediction), LINES),
+        "targets": (targets(prediction), TARGETS),
+        "others": (others(prediction), OTHERS),
+        "stations": (stations(plan), STATIONS),
+        "photographs": (photographs(prediction), PHOTOGRAPHS),
+        "setups": (setups(prediction), SETUPS),
+        "ties": (ties(prediction), TIES),
+        "bases": (bases(prediction), BASES),
+        "control": (control(plan), CONTROL),
+        "cameras": (cameras(plan), CAMERAS),
+        "instruments": (instruments(plan), INSTRUMENTS),
+    }
+    return {name: table for name, table in tables.items() if table[0]}
 
 
 def lost_points(prediction):
     """Names of the points that the planned survey does not determine."""
-    return {one.name for one in prediction.undetermined}
+    return {point.name for point in prediction.undetermined}
 
 
 def lost_ties(prediction):
-    """Names of tapes, levelled heights and plumb lines with an end that is not determined."""
+    """Names of tapes, levelled heights and plumb lines with an undetermined end."""
     lost = lost_points(prediction)
-    return {one.name for one in prediction.plan.ties if {one.start, one.end} & lost}
+    return {tie.name for tie in prediction.plan.ties if {tie.start, tie.end} & lost}
 
 
 def targets(prediction):
-    """Every target, with its height above the bottom of its course and its arc."""
+    """Return a row for each target, with its height above the bottom of its course and its arc."""
     plan, lost = prediction.plan, lost_points(prediction)
-    found, joints = plan.targets, joints_m(plan)
+    planned, joints = plan.targets, joints_m(plan)
     columns = zip(
-        found.names, found.section, found.generatrix, found.course.tolist(),
-        found.height_m.tolist(), found.arc_m.tolist(), strict=True,
+        planned.names, planned.section, planned.generatrix, planned.course.tolist(),
+        planned.height_m.tolist(), planned.arc_m.tolist(), strict=True,
     )  # fmt: skip
     return [
         {
@@ -50,69 +121,62 @@ def targets(prediction):
 
 
 def levels(prediction):
-    """The rows of targets, from the bottom up."""
-    found = {}
-    for one in targets(prediction):
-        found.setdefault(one["row"], one | {"targets": 0})["targets"] += 1
-    return sorted(found.values(), key=lambda one: one["height_m"])
+    """Return the rows of targets on the wall with their numbers of targets, from the bottom up."""
+    by_row = {}
+    for target in targets(prediction):
+        by_row.setdefault(target["row"], target | {"targets": 0})["targets"] += 1
+    return sorted(by_row.values(), key=lambda level: level["height_m"])
 
 
 def lines(prediction):
-    """The vertical lines of targets, by their arcs; a line that bends is there at each arc."""
-    found = {(one["line"], round(one["arc_m"], 4)): one for one in targets(prediction)}
-    return sorted(found.values(), key=lambda one: one["arc_m"])
+    """Return the vertical lines of targets by their arcs; a bent line is listed at each arc."""
+    by_arc = {(target["line"], round(target["arc_m"], 4)): target for target in targets(prediction)}
+    return sorted(by_arc.values(), key=lambda line: line["arc_m"])
 
 
 def others(prediction):
-    """Points that are no targets: ends of tapes, marks, control off the wall."""
+    """Return a row for each point that is no target: tape ends, marks, control off the wall."""
     plan, lost = prediction.plan, lost_points(prediction)
-    setups = {one.name for one in plan.setups}
+    setup_names = {setup.name for setup in plan.setups}
     return [
-        {"point": name, "done": "unseen" if name in lost else None} | _at(plan, xyz)
+        {"point": name, "done": "unseen" if name in lost else None} | vars(place_of(plan, xyz))
         for name, xyz in plan.extra.items()
-        if name not in setups
+        if name not in setup_names
     ]
 
 
-def _at(plan, xyz_m):
-    place = place_of(plan, xyz_m)
-    return {
-        "arc_m": place.arc_m,
-        "azimuth_rad": place.azimuth_rad,
-        "off_m": place.off_m,
-        "height_m": place.height_m,
-    }
-
-
 def stations(plan):
-    """Photo stations, with the number of exposures and the turns about the camera's axis."""
-    found = []
+    """Return a row for each photo station, with its exposures and the rolls of the camera."""
+    rows = []
     for name in plan.stations:
-        mine = [one for one in plan.photos if one.station == name]
-        rolls = dict.fromkeys(round(np.degrees(float(_angles(plan, one)[2]))) for one in mine)
-        row = {"station": name, "camera": mine[0].camera, "photographs": len(mine)}
-        rolled = ", ".join(f"{roll}°" for roll in rolls)
-        found.append(row | {"rolls": rolled} | _at(plan, mine[0].xyz_m))
-    return found
+        exposures = [photo for photo in plan.photos if photo.station == name]
+        rolls = dict.fromkeys(
+            round(np.degrees(float(_angles(plan, photo)[2]))) for photo in exposures
+        )
+        first = exposures[0]
+        row = {"station": name, "camera": first.camera, "photographs": len(exposures)}
+        row["rolls"] = ", ".join(f"{roll}°" for roll in rolls)
+        rows.append(row | vars(place_of(plan, first.xyz_m)))
+    return rows
 
 
 def photographs(prediction):
-    """Every exposure: where it points to, how it is rolled, how many points it should show."""
-    plan, found = prediction.plan, []
-    for one, seen in zip(plan.photos, prediction.seen.on_photo, strict=True):
-        turn, tilt, roll = map(float, _angles(plan, one))
-        found.append(
+    """Return a row for each exposure, with its orientation and the number of visible points."""
+    plan, rows = prediction.plan, []
+    for photo, seen in zip(plan.photos, prediction.visibility.on_photo, strict=True):
+        turn, tilt, roll = map(float, _angles(plan, photo))
+        rows.append(
             {
-                "photo": one.name, "station": one.station, "camera": one.camera,
+                "photo": photo.name, "station": photo.station, "camera": photo.camera,
                 "turn_rad": turn, "tilt_rad": tilt, "roll_rad": roll,
-                "points": int(seen.sum()), "readings": one.readings, "done": None,
+                "points": int(seen.sum()), "readings": photo.readings, "done": None,
             }
         )  # fmt: skip
-    return found
+    return rows
 
 
 def _angles(plan, photo):
-    """Turn to the right of the axis of the tank, tilt, roll, rad."""
+    """Turn to the right of the axis of the tank, tilt and roll of a photograph, rad."""
     azimuth, tilt, roll = view_of_rotation(photo.rotation)
     east, north = plan.shell.axis_m - photo.xyz_m[:2]
     turn = np.angle(np.exp(1j * (azimuth - np.arctan2(east, north))))
@@ -120,60 +184,41 @@ def _angles(plan, photo):
 
 
 def setups(prediction):
-    """Set-ups of total stations, and which others each can sight."""
+    """Return a row for each set-up of a total station, with the other set-ups in sight."""
     plan = prediction.plan
-    number = {name: i for i, name in enumerate(prediction.seen.points)}
+    number = {name: i for i, name in enumerate(prediction.visibility.points)}
     return [
         {
-            "setup": one.name, "instrument": one.instrument, "sets": one.sets,
-            "sights": [name for name in one.sights if seen[number[name]]] or None,
+            "setup": setup.name, "instrument": setup.instrument, "sets": setup.sets,
+            "sights": [name for name in setup.sights if seen[number[name]]] or None,
             "points": int(seen.sum()),
         }
-        | {key: getattr(one, key) for key in SD_KEYS}
-        | _at(plan, one.xyz_m)
-        for one, seen in zip(plan.setups, prediction.seen.on_setup, strict=True)
+        | {key: getattr(setup, key) for key in SD_KEYS}
+        | vars(place_of(plan, setup.xyz_m))
+        for setup, seen in zip(plan.setups, prediction.visibility.on_setup, strict=True)
     ]  # fmt: skip
 
 
 def ties(prediction):
-    """Tapes, levelled heights and plumb lines, a row for each reading."""
+    """Return a row for each reading of a tape, a levelled height or a plumb line."""
     plan, lost = prediction.plan, lost_ties(prediction)
-    found, points = [], plan.points
-    for one in plan.ties:
-        rise = points[one.end] - points[one.start]
+    rows, points = [], plan.points
+    for tie in plan.ties:
+        rise = points[tie.end] - points[tie.start]
         row = {
-            "tape": one.name, "what": _kind(one, rise), "from": one.start, "to": one.end,
-            "expected_m": _expected(one, rise), "sd_m": one.sd_m,
-            "instrument": one.instrument or "",
-            "temperature": None if one.table == "distances" else "",
-            "value": "on_one_line" if one.table == "plumb_lines" else None,
+            "tape": tie.name, "what": _kind_of_tie(tie, rise), "from": tie.start, "to": tie.end,
+            "expected_m": _expected_m(tie, rise), "sd_m": tie.sd_m,
+            "instrument": tie.instrument or "",
+            "temperature": None if tie.table == "distances" else "",
+            "value": "on_one_line" if tie.table == "plumb_lines" else None,
         }  # fmt: skip
-        if one.name in lost:
+        if tie.name in lost:
             row |= {"temperature": "", "value": "unseen_end"}
-        found += [row | {"reading": number} for number in range(1, one.readings + 1)]
-    return found
+        rows += [row | {"reading": number} for number in range(1, tie.readings + 1)]
+    return rows
 
 
-def bases(prediction):
-    """Angles to the ends of a stadia, a row for each reading."""
-    plan, lost = prediction.plan, lost_points(prediction)
-    return [
-        {
-            "setup": one.setup,
-            "to": one.to,
-            "bar": one.bar,
-            "expected_m": base_m(plan, one),
-            "expected_rad": angle_of_base_rad(plan, one),
-            "angle_sd_rad": one.angle_sd_rad,
-            "reading": number,
-            "value": "unseen_end" if {one.setup, one.to} & lost else None,
-        }
-        for one in plan.bases
-        for number in range(1, one.readings + 1)
-    ]
-
-
-def _kind(tie, rise):
+def _kind_of_tie(tie, rise):
     if tie.table != "distances":
         return tie.table
     if tie.kind == "horizontal":
@@ -184,7 +229,7 @@ def _kind(tie, rise):
     return "level" if high < LEVEL * flat else "spatial"
 
 
-def _expected(tie, rise):
+def _expected_m(tie, rise):
     if tie.table == "plumb_lines":
         return None
     if tie.table == "height_differences":
@@ -192,80 +237,99 @@ def _expected(tie, rise):
     return float(np.linalg.norm(rise[:2] if tie.kind == "horizontal" else rise))
 
 
-def control(plan):
-    """Control points, with the sds that their coordinates need; 0: held, None: not needed."""
+def bases(prediction):
+    """Return a row for each reading of the angle between the ends of a stadia."""
+    plan, lost = prediction.plan, lost_points(prediction)
     return [
-        {"point": one.name}
+        {
+            "setup": base.setup,
+            "to": base.to,
+            "bar": base.bar,
+            "expected_m": base_m(plan, base),
+            "expected_rad": angle_of_base_rad(plan, base),
+            "angle_sd_rad": base.angle_sd_rad,
+            "reading": number,
+            "value": "unseen_end" if {base.setup, base.to} & lost else None,
+        }
+        for base in plan.bases
+        for number in range(1, base.readings + 1)
+    ]
+
+
+def control(plan):
+    """Return a row for each control point, with the sds that its coordinates require.
+
+    An sd of 0 means held exactly, None not required.
+    """
+    return [
+        {"point": known.name}
         | {
             f"s{axis}_m": float(sd) if np.isfinite(sd) else None
-            for axis, sd in zip("xyz", one.sd_m, strict=True)
+            for axis, sd in zip("xyz", known.sd_m, strict=True)
         }
-        | _at(plan, one.xyz_m)
-        for one in plan.known
+        | vars(place_of(plan, known.xyz_m))
+        for known in plan.known
     ]
 
 
 def cameras(plan):
-    """Cameras that take photographs."""
-    found, c = [], PARAMETERS.index("c")
-    for one in plan.job.measurements.cameras:
-        mine = [photo for photo in plan.photos if photo.camera == one.camera.name]
-        if mine:
-            width, height = one.format_mm.tolist()
-            found.append(
+    """Return a row for each camera that takes photographs."""
+    rows, c = [], PARAMETERS.index("c")
+    for setup in plan.job.measurements.cameras:
+        camera = setup.camera
+        photos = [photo for photo in plan.photos if photo.camera == camera.name]
+        if photos:
+            width, height = setup.format_mm.tolist()
+            rows.append(
                 {
-                    "camera": one.camera.name, "width_mm": width, "height_mm": height,
-                    "c_mm": float(one.camera.values[c]), "photographs": len(mine),
-                    "sd_mm": max(photo.sd_mm for photo in mine),
-                    "readings": max(photo.readings for photo in mine),
+                    "camera": camera.name, "width_mm": width, "height_mm": height,
+                    "c_mm": float(camera.values[c]), "photographs": len(photos),
+                    "sd_mm": max(photo.sd_mm for photo in photos),
+                    "readings": max(photo.readings for photo in photos),
                 }
             )  # fmt: skip
-    return found
+    return rows
 
 
 def instruments(plan):
-    """Instruments that measure something, with their certificates."""
-    used = {one.instrument for one in (*plan.ties, *plan.setups)} | {one.bar for one in plan.bases}
+    """Return a row for each instrument in use, with its certificate."""
+    used = {item.instrument for item in (*plan.ties, *plan.setups)}
+    used |= {base.bar for base in plan.bases}
     return [
         {
-            "instrument": one.name,
-            "kind": one.kind,
-            "certificate": str(one.details.get("certificate", "")),
-            "u_scale": one.u_scale if one.u_scale and np.isfinite(one.u_scale) else None,
+            "instrument": tool.name,
+            "kind": tool.kind,
+            "certificate": str(tool.details.get("certificate", "")),
+            "u_scale": tool.u_scale if tool.u_scale and np.isfinite(tool.u_scale) else None,
         }
-        for one in plan.job.measurements.instruments
-        if one.name in used
+        for tool in plan.job.measurements.instruments
+        if tool.name in used
     ]
 
 
 def place_of_change(change):
-    """Where what a `changes.Change` adds stands: {key: m}, {} for what has no single place.
+    """Return the position {key: m} of the item that a `Change` adds; {} if it has no position.
 
-    A tape hangs or lies about its middle; its height is that of its lowest end.
+    The position of a tape is its middle in plan and the height of its lowest end.
     """
     plan, name = change.plan, change.name
-    of_wall = isinstance(plan, WallPlan)
-    if of_wall or change.action != "add" or change.item not in _ADDED:
+    if isinstance(plan, WallPlan) or change.action != "add":
         return {}
-    return _at(plan, _ADDED[change.item](plan, name))
+    if change.item == "photo_station":
+        xyz = next(photo.xyz_m for photo in plan.photos if photo.station == name)
+    elif change.item == "setup":
+        xyz = find_by_name(plan.setups, name).xyz_m
+    elif change.item == "control_point":
+        xyz = find_by_name(plan.known, name).xyz_m
+    elif change.item == "tape":
+        tie = find_by_name(plan.ties, name)
+        ends = np.array([plan.points[tie.start], plan.points[tie.end]])
+        xyz = np.array([*ends[:, :2].mean(axis=0), ends[:, 2].min()])
+    else:
+        return {}
+    return vars(place_of(plan, xyz))
 
 
-def _of_tape(plan, name):
-    tie = named(plan.ties, name)
-    ends = np.array([plan.points[tie.start], plan.points[tie.end]])
-    return np.array([*ends[:, :2].mean(axis=0), ends[:, 2].min()])
-
-
-def named(found, name):
-    """The first thing of that name, or None."""
-    return next((one for one in found if one.name == name), None)
-
-
-_ADDED = {
-    "photo_station": lambda plan, name: next(
-        one.xyz_m for one in plan.photos if one.station == name
-    ),
-    "setup": lambda plan, name: named(plan.setups, name).xyz_m,
-    "control_point": lambda plan, name: named(plan.known, name).xyz_m,
-    "tape": _of_tape,
-}
+def find_by_name(items, name):
+    """Return the first item of a name, or None."""
+    return next((item for item in items if item.name == name), None)

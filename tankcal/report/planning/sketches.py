@@ -1,4 +1,4 @@
-"""The wall of a plan unrolled: targets, control, tapes, welds."""
+"""Sketch of the unrolled wall of a plan: targets, control, tapes, welds."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,14 +14,13 @@ from tankcal.pipeline.plot_style import (
     styled,
 )
 from tankcal.planning.model import TAPED
-from tankcal.planning.patterns import full_turn
-from tankcal.planning.places import joints_m, place_of, reference_rad
+from tankcal.planning.places import full_turn, joints_m, place_of, reference_rad
 from tankcal.report.planning.rows import lost_points
 
 GREEN, OCHRE = "#2e7d5b", "#b9770e"
 SMALL = 6.5
-MOST_LABELS = 60  # lines of targets that are all numbered
-NEAR_M = 1.0  # from the wall: marks further off have no place on it
+MOST_LABELS = 60  # largest number of lines of targets that are all numbered
+NEAR_M = 1.0  # largest distance from the wall of a mark that is drawn on it
 DASHES = {"distances": "-", "height_differences": ":", "plumb_lines": "--"}
 BEHIND = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6}
 
@@ -30,7 +29,7 @@ BEHIND = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6}
 def wall(paper):
     """The wall unrolled from the reference weld: targets by line and row, control, tapes."""
     plan, lost = paper.plan, lost_points(paper.prediction)
-    figure, ax = unrolled(paper, named=True)
+    figure, ax = unrolled_wall(paper, named=True)
     targets = plan.targets
     seen = np.array([name not in lost for name in targets.names])
     ax.plot(targets.arc_m[seen], targets.height_m[seen], ".", color=INK, markersize=3,
@@ -48,10 +47,21 @@ def wall(paper):
     return figure
 
 
-def unrolled(paper, high=2.8, named=False):
-    """A figure with the unrolled wall: its courses and welds, arc by height; (figure, axes).
+def unrolled_wall(paper, high=2.8, named=False):
+    """Draw the unrolled wall with courses and welds, arc by height.
 
-    named  True: welds have names for a legend
+    Parameters
+    ----------
+    paper : PlanPaper
+    high : float, optional
+        Height of the figure, inches.
+    named : bool, optional
+        Whether welds have names for a legend.
+
+    Returns
+    -------
+    figure : Figure
+    ax : Axes
     """
     plan, joints = paper.plan, joints_m(paper.plan)
     around = 2 * np.pi * plan.shell.radius_m
@@ -72,43 +82,49 @@ def unrolled(paper, high=2.8, named=False):
 
 
 def _control(ax, paper):
-    places = [place_of(paper.plan, one.xyz_m) for one in paper.plan.known]
-    places = [one for one in places if abs(one.off_m) < NEAR_M]
+    look = {"color": GREEN, "markersize": 5.5, "markerfacecolor": "none"}
+    positions = [known.xyz_m for known in paper.plan.known]
+    _mark_near(ax, paper, positions, "s", label=paper.word("legend.control"), **look)
+
+
+def _mark_near(ax, paper, positions, mark, **look):
+    """Draw marks at the positions (3,) near the wall."""
+    places = [place_of(paper.plan, xyz) for xyz in positions]
+    places = [place for place in places if abs(place.off_m) < NEAR_M]
     if places:
-        ax.plot(
-            [one.arc_m for one in places], [one.height_m for one in places], "s", color=GREEN,
-            markersize=5.5, markerfacecolor="none", label=paper.word("legend.control"),
-        )  # fmt: skip
+        arcs, heights = zip(*((place.arc_m, place.height_m) for place in places), strict=True)
+        ax.plot(arcs, heights, mark, **look)
 
 
 def marks_of(plan):
-    """{name: (3,)} of the points that are no targets, no ends of tapes and no set-ups."""
-    ends = {end for one in plan.ties for end in (one.start, one.end)}
-    ends |= {one.name for one in plan.setups}
-    return {name: xyz for name, xyz in plan.extra.items() if name not in ends}
+    """Return {name: (3,)} of the points that are neither targets, tape ends nor set-ups."""
+    others = {end for tie in plan.ties for end in (tie.start, tie.end)}
+    others |= {setup.name for setup in plan.setups}
+    return {name: xyz for name, xyz in plan.extra.items() if name not in others}
 
 
 def _marks(ax, paper, lost):
-    """Marks beside the wall, with their names."""
+    """Draw the marks beside the wall, with their names."""
     places = {name: place_of(paper.plan, xyz) for name, xyz in marks_of(paper.plan).items()}
-    near = {name: one for name, one in places.items() if abs(one.off_m) < NEAR_M}
+    near = {name: place for name, place in places.items() if abs(place.off_m) < NEAR_M}
     label = paper.word("legend.marks")
-    for name, one in near.items():
+    for name, place in near.items():
         if name not in lost:
-            ax.plot(one.arc_m, one.height_m, "+", color=GREY, markersize=5, label=label)
+            ax.plot(place.arc_m, place.height_m, "+", color=GREY, markersize=5, label=label)
             label = None
-        text(ax, one.arc_m, one.height_m, f"  {name}", ha="left", va="center")
+        add_text(ax, place.arc_m, place.height_m, f"  {name}", ha="left", va="center")
 
 
 def _ties(ax, paper, table):
-    """Tapes, levelled heights or plumb lines, with their ends and names."""
+    """Draw tapes, levelled heights or plumb lines, with their ends and names."""
     plan, points = paper.plan, paper.plan.points
     around, label = 2 * np.pi * plan.shell.radius_m, paper.word(f"legend.{table}")
     look = {"linestyle": DASHES[table], "color": OCHRE, "linewidth": 1, "markersize": 3}
-    for one in plan.ties:
-        if one.table != table:
+    for tie in plan.ties:
+        if tie.table != table:
             continue
-        start, end = (place_of(plan, points[name]) for name in (one.start, one.end))
+        start, end = (place_of(plan, points[name]) for name in (tie.start, tie.end))
+        # The shorter way round the tank; a tie across the reference weld is drawn at both edges.
         across = (end.arc_m - start.arc_m + around / 2) % around - around / 2
         for shift in (0.0, around if start.arc_m + across < 0 else -around):
             x = np.array([start.arc_m, start.arc_m + across]) + shift
@@ -116,39 +132,35 @@ def _ties(ax, paper, table):
                 continue
             ax.plot(x, [start.height_m, end.height_m], marker=".", label=label, **look)
             label = None
-            if own_name(plan, one):
+            if has_own_marks(plan, tie):
                 middle = np.clip(x.mean(), 0, around), (start.height_m + end.height_m) / 2
-                text(ax, *middle, one.name, color=OCHRE, ha="center", va="center", bbox=BEHIND,
+                add_text(ax, *middle, tie.name, color=OCHRE, ha="center", va="center", bbox=BEHIND,
                      zorder=2.5, clip_on=True)  # fmt: skip
 
 
-def own_name(plan, tie):
-    """Whether a tie has marks of its own; the names of targets say where one between them is."""
+def has_own_marks(plan, tie):
+    """Whether an end of a tie is no target; a tie between targets needs no name of its own."""
     return bool({tie.start, tie.end} - set(plan.targets.names))
 
 
 def _unseen(ax, paper, lost):
-    """Points that the planned survey does not determine."""
-    places = [place_of(paper.plan, xyz) for name, xyz in paper.plan.points.items() if name in lost]
-    places = [one for one in places if abs(one.off_m) < NEAR_M]
-    if places:
-        ax.plot(
-            [one.arc_m for one in places], [one.height_m for one in places], "x", color=RED,
-            markersize=4.5, zorder=4, label=paper.word("legend.unseen"),
-        )  # fmt: skip
+    """Draw the points that the planned survey does not determine."""
+    positions = [xyz for name, xyz in paper.plan.points.items() if name in lost]
+    look = {"color": RED, "markersize": 4.5, "zorder": 4}
+    _mark_near(ax, paper, positions, "x", label=paper.word("legend.unseen"), **look)
 
 
 def _names(ax, targets):
-    """Numbers of the lines above the wall, of the rows at its right."""
+    """Write the numbers of the lines above the wall, and of the rows at its right."""
     lines = dict(zip(targets.generatrix, targets.arc_m.tolist(), strict=True))
     every = -(-len(lines) // MOST_LABELS)
     top, right = ax.get_ylim()[1], ax.get_xlim()[1]
     for name, arc in [*lines.items()][::every]:
-        text(ax, arc, top, name, va="bottom", ha="center")
+        add_text(ax, arc, top, name, va="bottom", ha="center")
     for name, height in dict(zip(targets.section, targets.height_m, strict=True)).items():
-        text(ax, right, height, f" {name}", va="center", ha="left")
+        add_text(ax, right, height, f" {name}", va="center", ha="left")
 
 
-def text(ax, x, y, words, **more):
-    """A small text, never read as a formula."""
+def add_text(ax, x, y, words, **more):
+    """Add a small text that is never parsed as a formula."""
     ax.text(x, y, words, **{"fontsize": SMALL, "color": GREY, "parse_math": False} | more)

@@ -1,15 +1,14 @@
-"""What a crew will read of a wall, row by row: straps, lines, offsets, hits, set-ups, tangents."""
+"""Tables of the field sheets of a plan of the bare wall: one row per reading, and the columns."""
 
 import datetime
 
 import numpy as np
 
-from tankcal.planning.wall.changes import instruments_read
+from tankcal.planning.wall.changes import instruments_in_use
 from tankcal.planning.wall.nominal_readings import place_stations
 from tankcal.planning.wall.reading import lengths_of_bars, tables_of
 from tankcal.report.plain import Column
-from tankcal.report.planning.filling import RUNS, rows_of_runs
-from tankcal.report.planning.tables import BASES, INSTRUMENTS
+from tankcal.report.planning.rows import BASES, INSTRUMENTS
 from tankcal.survey.stadia import angle_of_distance_rad
 
 HEIGHT = Column("height_m", "m", decimals=3)
@@ -51,6 +50,14 @@ TRAVERSE = (
     Column("direction", **BY_PEN), Column("zenith", **BY_PEN), Column("distance", **BY_PEN),
     Column("target_height", nothing="_" * 6, words="marks"),
 )  # fmt: skip
+DIP = Column("dip_m", "m", height=True, heading="dip")
+RUNS = (
+    Column("run"), Column("meter"), DIP, Column("batch_m3", "m3", decimals=2),
+    Column("volume_read", **SHORT), Column("dip_read", **SHORT),
+    Column("meter_c", nothing="_" * 5, words="marks"),
+    Column("tank_c", nothing="_" * 5, words="marks"),
+    Column("shell_c", nothing="_" * 5, words="marks"), Column("time", **SHORT),
+)  # fmt: skip
 TANGENTS = (
     Column("setup"), COURSE, IN_COURSE, LEVEL, Column("side", words="marks"),
     Column("expected_rad", "rad deg", decimals=2, heading="expected_zenith"), SD_ARCSEC,
@@ -63,8 +70,8 @@ COURSES = (
 
 
 def field_tables_of_wall(plan):
-    """{name: (rows, columns)} of every table of the field sheets that has rows."""
-    found = {
+    """Return {name: (rows, columns)} of all tables of the field sheets that have rows."""
+    tables = {
         "circumferences": (_straps(plan), STRAPS),
         "sight_lines": (_lines(plan), LINES),
         "offsets": (_offsets(plan), OFFSETS),
@@ -73,136 +80,142 @@ def field_tables_of_wall(plan):
         "hit_levels": (_hits(plan), HITS),
         "shared_targets": (_ties(plan), TIES),
         "control_targets": (_control(plan), CONTROL),
-        "tangent_stations": (_stands(plan), STANDS),
+        "tangent_stations": (_stations(plan), STANDS),
         "traverse": (_traverse(plan), _columns_of_traverse(plan)),
         "bases": (_bases(plan), BASES),
         "tangents": (_tangents(plan), TANGENTS),
         "runs": (rows_of_runs(plan), RUNS),
         "instruments": (_instruments(plan), INSTRUMENTS),
     }
-    return {name: table for name, table in found.items() if table[0]}
+    return {name: table for name, table in tables.items() if table[0]}
 
 
 def _feet(plan):
-    """{course: height of its lower edge above the table's zero}."""
-    heights = np.cumsum([0.0] + [one.height_m for one in plan.job.courses])
+    """Return {course: height of its lower edge above the table's zero, m}."""
+    courses = plan.job.courses
+    heights = np.cumsum([0.0] + [course.height_m for course in courses])
     zero = plan.job.datum.plate_level_m
-    return {one.name: low - zero for one, low in zip(plan.job.courses, heights, strict=False)}
+    return {course.name: low - zero for course, low in zip(courses, heights, strict=False)}
 
 
 def _straps(plan):
-    given, feet, seen = plan.job.strapping, _feet(plan), {}
+    strapping, feet, count = plan.job.strapping, _feet(plan), {}
     rows = []
-    for one in () if given is None else given.straps:
-        seen[one.name] = seen.get(one.name, 0) + 1
+    for strap in () if strapping is None else strapping.straps:
+        count[strap.name] = count.get(strap.name, 0) + 1
         rows.append(
             {
-                "circumference": one.name,
-                "course": one.course,
-                "height_in_course_m": one.level_m - feet[one.course],
-                "level_m": one.level_m,
-                "expected_m": one.reading_m,
-                "sd_m": one.sd_m,
-                "instrument": one.tape,
-                "reading": seen[one.name],
+                "circumference": strap.name,
+                "course": strap.course,
+                "height_in_course_m": strap.level_m - feet[strap.course],
+                "level_m": strap.level_m,
+                "expected_m": strap.reading_m,
+                "sd_m": strap.sd_m,
+                "instrument": strap.tape,
+                "reading": count[strap.name],
             }
         )
     return rows
 
 
 def _lines(plan):
-    given = plan.job.lines
+    lines = plan.job.lines
     return [
-        {"line": one.name, "azimuth_rad": one.azimuth_rad, "instrument": one.instrument}
-        for one in (() if given is None else given.lines.values())
+        {"line": line.name, "azimuth_rad": line.azimuth_rad, "instrument": line.instrument}
+        for line in (() if lines is None else lines.lines.values())
     ]
 
 
 def _offsets(plan):
-    """Each level once, with how often it is read on each line."""
-    given, feet, rows = plan.job.lines, _feet(plan), {}
-    for one in () if given is None else given.offsets:
+    """Return a row for each level, with the number of its readings on each line."""
+    lines, feet, rows = plan.job.lines, _feet(plan), {}
+    for offset in () if lines is None else lines.offsets:
         rows.setdefault(
-            (one.course, one.level_m),
+            (offset.course, offset.level_m),
             {
-                "course": one.course,
-                "height_in_course_m": one.level_m - feet[one.course],
-                "level_m": one.level_m,
-                "reference": "reference" if one.reference else None,
+                "course": offset.course,
+                "height_in_course_m": offset.level_m - feet[offset.course],
+                "level_m": offset.level_m,
+                "reference": "reference" if offset.reference else None,
                 "readings": plan.design.lines.faces * plan.design.lines.readings,
-                "sd_m": one.sd_m,
+                "sd_m": offset.sd_m,
             },
         )
     return list(rows.values())
 
 
 def _offset_readings(plan):
-    """Each level on each line, as often as one face reads it."""
-    given, seen, rows = plan.job.lines, {}, []
-    for one in () if given is None else given.offsets:
-        if one.face == 1:
-            place = one.line, one.course, one.level_m
-            seen[place] = seen.get(place, 0) + 1
+    """Return a row for each reading of a level on a line in the first face."""
+    lines, count, rows = plan.job.lines, {}, []
+    for offset in () if lines is None else lines.offsets:
+        if offset.face == 1:
+            place = offset.line, offset.course, offset.level_m
+            count[place] = count.get(place, 0) + 1
             rows.append(
                 {
-                    "line": one.line,
-                    "course": one.course,
-                    "level_m": one.level_m,
-                    "reference": "reference" if one.reference else None,
-                    "reading": seen[place],
+                    "line": offset.line,
+                    "course": offset.course,
+                    "level_m": offset.level_m,
+                    "reference": "reference" if offset.reference else None,
+                    "reading": count[place],
                 }
             )
     return rows
 
 
 def _columns_of_offsets(plan):
-    """Those of OFFSET_READINGS, without a second face or a number where there is one of them."""
+    """Return OFFSET_READINGS without the second face or the number of a reading if not needed."""
     lines = plan.design.lines
-    left_out = set()
+    omitted = set()
     if lines is not None:
-        left_out |= {"face_2"} if lines.faces == 1 else set()
-        left_out |= {"reading"} if lines.readings == 1 else set()
-    return tuple(one for one in OFFSET_READINGS if one.key not in left_out)
+        omitted |= {"face_2"} if lines.faces == 1 else set()
+        omitted |= {"reading"} if lines.readings == 1 else set()
+    return tuple(column for column in OFFSET_READINGS if column.key not in omitted)
 
 
 def _instruments(plan):
-    """Instruments that read something, and the masters of tapes, as instruments.toml has them."""
-    register = plan.given.registers.get("instruments")
-    used, rows = instruments_read(plan.job), []
+    """Return a row for each instrument in use and each master of a tape, from instruments.toml."""
+    register = plan.raw.registers.get("instruments")
+    used, rows = instruments_in_use(plan.job), []
     for name, entry in {} if register is None else register.entries.items():
-        given = {key: one.raw for key, one in entry.items()}
-        scale = given.get("u_scale_ppm")
+        values = {key: value.raw for key, value in entry.items()}
+        scale = values.get("u_scale_ppm")
         if name in used:
             rows.append(
                 {
                     "instrument": name,
-                    "kind": str(given.get("kind", "")).strip().lower(),
-                    "certificate": str(given.get("certificate", "")),
+                    "kind": str(values.get("kind", "")).strip().lower(),
+                    "certificate": str(values.get("certificate", "")),
                     "u_scale": scale / 1e6 if isinstance(scale, int | float) and scale else None,
                 }
             )
     return rows
 
 
+def _polar(x, y):
+    """Return azimuth and distance of a position from the axis of the tank."""
+    azimuth = np.arctan2(x, y) % (2 * np.pi)
+    return {"azimuth_rad": float(azimuth), "from_axis_m": float(np.hypot(x, y))}
+
+
 def _setups(plan):
     hits = plan.job.hits
     rows = []
-    for name, one in {} if hits is None else hits.setups.items():
-        x, y, _ = hits.stations[one.station]
+    for name, setup in {} if hits is None else hits.setups.items():
+        x, y, _ = hits.stations[setup.station]
         rows.append(
             {
                 "setup": name,
-                "azimuth_rad": float(np.arctan2(x, y) % (2 * np.pi)),
-                "from_axis_m": float(np.hypot(x, y)),
-                "height_m": one.height_m,
-                "instrument": one.instrument,
+                **_polar(x, y),
+                "height_m": setup.height_m,
+                "instrument": setup.instrument,
             }
         )
     return rows
 
 
 def _hits(plan):
-    """Each level once, with its set-ups and the hits of each."""
+    """Return a row for each level, with the number of its set-ups and of the hits of each."""
     rows, foot = [], 0.0
     for course in plan.job.courses:
         for ring in plan.design.hits:
@@ -222,7 +235,7 @@ def _hits(plan):
 
 
 def _control(plan):
-    """Each reading of a control target, and when it is due after the first."""
+    """Return a row for each reading of a control target, with its time after the first reading."""
     table = tables_of(plan).get("control_readings")
     rows, first = [], {}
     for cells in () if table is None else table.rows:
@@ -235,54 +248,54 @@ def _control(plan):
     return rows
 
 
-def _stands(plan):
+def _stations(plan):
+    """Return a row for each station of a traverse, with the distance to its neighbours."""
     tangents = plan.job.tangents
     if tangents is None:
         return []
     places = place_stations(plan.job)
-    beside = {row["setup"]: row["expected_m"] for row in _traverse(plan)}
+    to_neighbour = {row["setup"]: row["expected_m"] for row in _traverse(plan)}
     return [
         {
             "setup": name,
-            "azimuth_rad": float(np.arctan2(x, y) % (2 * np.pi)),
-            "from_axis_m": float(np.hypot(x, y)),
-            "height_m": tangents.setups[name].height_m,
-            "expected_m": beside[name],
-            "instrument": tangents.setups[name].instrument,
+            **_polar(*places[name][:2]),
+            "height_m": setup.height_m,
+            "expected_m": to_neighbour[name],
+            "instrument": setup.instrument,
         }
-        for name, (x, y, _) in places.items()
+        for name, setup in tangents.setups.items()
     ]
 
 
-def _of_traverse(plan):
-    """{table: Readings} between neighbouring stations, all in the same order."""
-    return {one.table: one for one in plan.job.measurements.readings}
+def _readings_of_traverse(plan):
+    """Return {table: Readings} between neighbouring stations, all in one order."""
+    return {readings.table: readings for readings in plan.job.measurements.readings}
 
 
 def _traverse(plan):
-    """Each sight between neighbouring stations."""
+    """Return a row for each sight between neighbouring stations."""
     if plan.job.tangents is None:
         return []
-    given = _of_traverse(plan)
-    sighted, ranged = given["directions"], given.get("slope_distances") or given["distances"]
-    pairs = zip(sighted.setup, sighted.end, ranged.value, strict=True)
-    return [{"setup": name, "to": end, "expected_m": float(m)} for name, end, m in pairs]
+    read = _readings_of_traverse(plan)
+    directions, distances = read["directions"], read.get("slope_distances") or read["distances"]
+    sights = zip(directions.setup, directions.end, distances.value, strict=True)
+    return [{"setup": name, "to": end, "expected_m": float(m)} for name, end, m in sights]
 
 
 def _columns_of_traverse(plan):
-    """Those of TRAVERSE; without distances where a stadia alone tells them."""
+    """Return TRAVERSE, without distances if only a stadia determines them."""
     ring = plan.design.tangents
     is_ranged = ring is not None and ring.traverse[0] is not None
-    return tuple(one for one in TRAVERSE if is_ranged or one.key != "distance")
+    return tuple(column for column in TRAVERSE if is_ranged or column.key != "distance")
 
 
 def _bases(plan):
-    """Each angle to the ends of a stadia over a neighbouring station."""
+    """Return a row for each angle between the ends of a stadia over a neighbouring station."""
     ring = plan.design.tangents
     if ring is None or ring.bar is None:
         return []
-    read, lengths = _of_traverse(plan)["distances"], lengths_of_bars(plan.given)
-    pairs = zip(_traverse(plan), read.value, read.instrument, strict=True)
+    read, lengths = _readings_of_traverse(plan)["distances"], lengths_of_bars(plan.raw)
+    sights = zip(_traverse(plan), read.value, read.instrument, strict=True)
     return [
         {
             "setup": row["setup"],
@@ -293,7 +306,7 @@ def _bases(plan):
             "angle_sd_rad": np.radians(ring.bar[1] / 3600),
             "reading": 1,
         }
-        for row, base, bar in pairs
+        for row, base, bar in sights
     ]
 
 
@@ -320,24 +333,44 @@ def _tangents(plan):
 
 
 def _ties(plan):
-    found = {}
+    """Return a row for each target that neighbouring set-ups share."""
+    setups_of = {}
     measurements = None if plan.job.tangents is not None else plan.job.measurements
-    for one in () if measurements is None else measurements.readings:
-        for setup, target in zip(one.setup or (), one.end, strict=True):
-            found.setdefault(target, dict.fromkeys(())).setdefault(setup)
-    return [{"point": name, "setup": ", ".join(setups)} for name, setups in found.items()]
+    for readings in () if measurements is None else measurements.readings:
+        for setup, target in zip(readings.setup or (), readings.end, strict=True):
+            setups_of.setdefault(target, {}).setdefault(setup)
+    return [{"point": name, "setup": ", ".join(setups)} for name, setups in setups_of.items()]
+
+
+def rows_of_runs(plan):
+    """Return a row for each dip of each run, with the expected batch before it."""
+    metering, rows = plan.job.liquid, []
+    for place in range(0 if metering is None else len(metering)):
+        run, dip = metering.run[place], float(metering.dip_m[place])
+        is_first, is_dry = place == 0 or metering.run[place - 1] != run, np.isnan(dip)
+        rows.append(
+            {
+                "run": run,
+                "meter": metering.meter[place],
+                "dip_m": None if is_dry else dip,
+                "batch_m3": None if is_first else float(metering.volume_m3[place]),
+                "volume_read": "start" if is_first else None,
+                "dip_read": "dry" if is_dry else None,
+            }
+        )
+    return rows
 
 
 def courses_of(prediction):
-    """A row for each course: its readings, and the standard deviation of its mean radius."""
+    """Return a row for each course: its readings, and the standard deviation of its mean radius."""
     return [
         {
-            "course": one.name,
-            "straps": one.straps or None,
-            "offsets": one.offsets or None,
-            "hits": one.hits or None,
-            "tangents": one.tangents or None,
-            "radius_m": one.radius_sd_m,
+            "course": course.name,
+            "straps": course.straps or None,
+            "offsets": course.offsets or None,
+            "hits": course.hits or None,
+            "tangents": course.tangents or None,
+            "radius_m": course.radius_sd_m,
         }
-        for one in prediction.courses
+        for course in prediction.courses
     ]

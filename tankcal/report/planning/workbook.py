@@ -8,93 +8,94 @@ import tankcal
 from tankcal.report import numbers
 from tankcal.report.plain import Column
 from tankcal.report.planning import sketches
+from tankcal.report.planning.rows import field_tables
 from tankcal.report.planning.stands import stands
-from tankcal.report.planning.tables import field_tables
 from tankcal.report.planning.wall_rows import field_tables_of_wall
 from tankcal.report.workbook.book import Book, about_saved
 from tankcal.report.workbook.look import Column as Cells
 from tankcal.report.workbook.tables import HEAD_ROW, set_widths
 
-ONE_A_SHEET = (
+ONE_PER_SHEET = (
     *("targets", "others", "stations", "photographs", "setups", "ties", "bases", "control"),
 )
 LANDSCAPE = ("ties", "setups", "circumferences", "runs", "tangents")
 EQUIPMENT = ("cameras", "instruments")
 SKETCHES = {"wall": sketches.wall, "stands": stands}
 FIRST = {"targets": ("point", "line", "row")}  # columns of a sheet before those of the paper
-COUNTED = ("line", "row", "course")  # names that sort as numbers where they are
-LONGEST = 30  # letters of a column that wraps no text
-DPI, PT, ROOM_PT = 110, 72.0, 8.0
+COUNTED = ("line", "row", "course")  # columns of names that sort as numbers if they are numbers
+LONGEST = 30  # letters of a column without wrapped text
+DPI, PT, MARGIN_PT = 110, 72.0, 8.0
 
 
 def write(paper, path):
-    """Write the workbook of a PlanPaper; the same plan gives the same bytes."""
+    """Write the workbook of a PlanPaper; equal plans give equal bytes."""
     tables = field_tables(paper.prediction)
-    of_sheets = {name: tables[name] for name in ONE_A_SHEET if name in tables}
+    of_sheets = {name: tables[name] for name in ONE_PER_SHEET if name in tables}
     _write(paper, path, of_sheets, tables, SKETCHES)
 
 
-def write_of_wall(paper, path):
-    """Write the workbook of a WallPaper, a sheet for each table."""
+def write_wall(paper, path):
+    """Write the workbook of a WallPaper, one sheet per table."""
     tables = field_tables_of_wall(paper.plan)
-    of_sheets = {name: one for name, one in tables.items() if name not in EQUIPMENT}
+    of_sheets = {name: table for name, table in tables.items() if name not in EQUIPMENT}
     _write(paper, path, of_sheets, tables, {})
 
 
 def _write(paper, path, of_sheets, tables, pictures):
-    with Book(path, _about(paper.plan.job), paper.words, about="plan") as book:
+    job = paper.plan.job
+    about = about_saved(tankcal.__version__, tank=job.tank.id, date=job.survey.date)
+    with Book(path, about, paper.words, about="plan") as book:
         if pictures:
             _draw(book, paper, pictures)
-        for name, one in of_sheets.items():
-            _sheet(book, paper, name, {name: one})
-        found = {name: tables[name] for name in EQUIPMENT if name in tables}
-        if found:
-            _sheet(book, paper, "equipment", found)
+        for name, table in of_sheets.items():
+            _add_sheet(book, paper, name, {name: table})
+        equipment = {name: tables[name] for name in EQUIPMENT if name in tables}
+        if equipment:
+            _add_sheet(book, paper, "equipment", equipment)
 
 
-def _about(job):
-    return about_saved(tankcal.__version__, tank=job.tank.id, date=job.survey.date)
+def _add_sheet(book, paper, code, tables):
+    """Add a sheet of tables, one below the other.
 
-
-def _sheet(book, paper, code, tables):
-    """Tables one below the other; a single one can be sorted, and its headings print again."""
+    A single table can be sorted, and its headings are repeated on every page.
+    """
     sheet = book.sheet(code, landscape=code in LANDSCAPE, tab="input")
     columns = {
-        name: [_column(paper, found, one) for one in _columns_of(name, of_paper)]
-        for name, (found, of_paper) in tables.items()
+        name: [_cells(paper, rows, column) for column in _columns_of(name, of_paper)]
+        for name, (rows, of_paper) in tables.items()
     }
-    widths, row, single = set_widths(book, sheet, *columns.values()), HEAD_ROW, len(columns) == 1
-    if single:
+    widths, row, is_single = set_widths(book, sheet, *columns.values()), HEAD_ROW, len(columns) == 1
+    if is_single:
         book.freeze(sheet, HEAD_ROW, 1)
     for name, of_sheet in columns.items():
-        if not single:
+        if not is_single:
             book.heading(sheet, row, paper.word(f"captions.{name}"), len(of_sheet))
             row += 1
-        last = book.table(sheet, row, name, of_sheet, autofilter=single, widths=widths)
+        last = book.table(sheet, row, name, of_sheet, autofilter=is_single, widths=widths)
         sheet.unprotect_range(xl_range_abs(row, 0, last, len(of_sheet) - 1), name)
         row = last + 2
 
 
 def _columns_of(name, of_paper):
-    """Columns of a sheet: those of the paper, after what its rows can be sorted by."""
+    """Return the columns of a sheet: sort keys first, then the columns of the paper."""
     first = FIRST.get(name, ())
-    return [*map(Column, first), *(one for one in of_paper if one.key not in first)]
+    return [*map(Column, first), *(column for column in of_paper if column.key not in first)]
 
 
 def _draw(book, paper, pictures):
-    """The sketches, each in one high row."""
+    """Add the sheet of sketches, each in one high row."""
     sheet, row = book.sheet("sketches", tab="input"), HEAD_ROW
     for name, draw in pictures.items():
         figure, picture = draw(paper), io.BytesIO()
         figure.savefig(picture, format="png", dpi=DPI, metadata={"Software": None})
-        book.set_height(sheet, row, PT * figure.get_figheight() + ROOM_PT)
+        book.set_height(sheet, row, PT * figure.get_figheight() + MARGIN_PT)
         described = {"image_data": picture, "description": paper.word(f"captions.{name}_alt")}
         sheet.insert_image(row, 0, f"{name}.png", described)
         row += 1
 
 
-def _column(paper, rows, column):
-    """A column of the paper as one of the workbook: numbers as numbers, in the same unit."""
+def _cells(paper, rows, column):
+    """Return a column of the paper as a column of the workbook, numbers in the same unit."""
     unit = numbers.unit(column.unit)
     heading = paper.word(f"table_headings.{column.heading or column.key}")
     heading = f"{heading}, {unit.symbol}" if unit.symbol else heading

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tankcal.messages import message
 from tankcal.record import save
-from tankcal.record.intercomparison import plain_of
+from tankcal.record.schema import to_plain
 from tankcal.report import folders
 from tankcal.report.scores.paper import FILE, PAGE, WORKBOOK, ScoresPaper
 
@@ -49,7 +49,7 @@ def write_scores(scores, out, language=None, progress=None):
 
     refuse_foreign(out)
     progress = progress or (lambda text: None)
-    plain = scores if isinstance(scores, dict) else plain_of(scores)
+    plain = scores if isinstance(scores, dict) else to_plain(scores)
     paper = ScoresPaper(plain, language)
     with folders.replaced(out) as temporary:
         progress(message("ic_papers", "writing scores, page and workbook"))

@@ -1,4 +1,4 @@
-"""The adjustment of a survey on paper: its sentences, tables and figures (docs/report.md).
+"""The adjustment of a survey in the papers: sentences, tables and figures (docs/report.md).
 
-Every function takes a Paper and gives blocks, texts or a figure; nothing here computes a number.
+The functions take a Paper and return blocks, texts or a figure. They compute no number.
 """

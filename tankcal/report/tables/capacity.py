@@ -1,9 +1,9 @@
 """The capacity table and its proportional parts, in the units of the job."""
 
-from tankcal.record.plain_data import rows_of
+from tankcal.record.columns import rows_of
 from tankcal.report import numbers
 from tankcal.report.tables.table import Column, Table
-from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, k_of_rows, stated_U_m3
+from tankcal.report.uncertainty.stated import MARK, flag_simulated, k_of_rows, stated_U_m3
 from tankcal.text.digits import LITRE_DECIMALS, round_u
 
 # Names of the capacity tables in the papers.
@@ -19,7 +19,7 @@ def capacity_columns(record):
     feet and inches, litres or barrels.
     """
     capacity, spec = record["capacity"], record["job"]["table"]
-    U_m3, simulated = stated_U_m3(capacity), by_monte_carlo(capacity)
+    U_m3, simulated = stated_U_m3(capacity), flag_simulated(capacity)
     columns = {key: capacity[key] for key in ("height_m", "volume_m3", "u_m3", "area_m2")}
     columns |= {
         "stated_U_m3": U_m3,

@@ -10,15 +10,15 @@ DIP_DECIMALS = 4  # decimals of a dip reading in m
 _SHOWN = {"m": "mm", "m/m": "mm/m", "1": "share ppm", "m3": "L", "m3/h": "L/h", "": ""}
 
 
-def _named(key, heading, unit="", **more):
+def _column(key, heading, unit="", **more):
     """Return a column with equal headings in paper and workbook; the workbook adds the unit."""
     return Column(key, unit, heading=f"liquid_{heading}", sheet=True, **more)
 
 
-_ROW = _named("row", "row", decimals=0, width=8)
-_RUN = _named("run", "run", width=8)
-_METER = _named("meter", "meter", width=10)
-_TO = _named("to_dip_m", "to", "m", decimals=DIP_DECIMALS)
+_ROW = _column("row", "row", decimals=0, width=8)
+_RUN = _column("run", "run", width=8)
+_METER = _column("meter", "meter", width=10)
+_TO = _column("to_dip_m", "to", "m", decimals=DIP_DECIMALS)
 
 
 def _dip_before_step(paper, row):
@@ -32,25 +32,25 @@ def _dip_text(paper, dip_m):
     return paper.number(dip_m, decimals=DIP_DECIMALS)
 
 
-_FROM = _named("from_dip_m", "from", "m", text=_dip_before_step, align="right",
+_FROM = _column("from_dip_m", "from", "m", text=_dip_before_step, align="right",
                in_sheet={"text": None, "decimals": DIP_DECIMALS})  # fmt: skip
 _W = Column("w", decimals=2, heading="liquid_w", sheet=True, width=8)
-_REDUNDANCY = _named("redundancy", "redundancy", decimals=2, width=10)
+_REDUNDANCY = _column("redundancy", "redundancy", decimals=2, width=10)
 
 METERS = Table(
     "liquid_meters",
     (
         _METER,
-        _named("certificate", "certificate", width=14),
-        _named("prover", "prover", width=14),
-        _named("factor", "factor", u="u_factor", width=11),
-        _named("u_factor", "u", u="u_factor", width=11),
-        _named("factor_found", "factor_found", u="u_factor_found", width=11),
-        _named("u_factor_found", "u_found", u="u_factor_found", width=11),
-        _named("factor_after", "factor_after", u="u_factor", width=11),
-        _named("repeatability", "repeatability", "share ppm", digits=3),
-        _named("fixed_m3", "fixed", "L", digits=2),
-        *(_named(f"flow_{end}_m3_h", f"flow_{end}", "m3/h", digits=3, on="")
+        _column("certificate", "certificate", width=14),
+        _column("prover", "prover", width=14),
+        _column("factor", "factor", u="u_factor", width=11),
+        _column("u_factor", "u", u="u_factor", width=11),
+        _column("factor_found", "factor_found", u="u_factor_found", width=11),
+        _column("u_factor_found", "u_found", u="u_factor_found", width=11),
+        _column("factor_after", "factor_after", u="u_factor", width=11),
+        _column("repeatability", "repeatability", "share ppm", digits=3),
+        _column("fixed_m3", "fixed", "L", digits=2),
+        *(_column(f"flow_{end}_m3_h", f"flow_{end}", "m3/h", digits=3, on="")
           for end in ("lowest", "highest", "min", "max")),
     ),
     rows=lambda record: [
@@ -63,44 +63,44 @@ RUNS = Table(
     "liquid_runs",
     (
         _RUN,
-        _named("steps", "steps", decimals=0, width=8),
+        _column("steps", "steps", decimals=0, width=8),
         _FROM,
         _TO,
-        _named("indicated_m3", "indicated", "m3", decimals=3),
-        _named("effect", "effect", "share ppm", decimals=0),
-        _named("u_effect", "u", "share ppm", decimals=0),
+        _column("indicated_m3", "indicated", "m3", decimals=3),
+        _column("effect", "effect", "share ppm", decimals=0),
+        _column("u_effect", "u", "share ppm", decimals=0),
     ),
     rows=lambda record: record["liquid"]["runs"],
 )
 
 
-def _tested(key, heading, unit="", **more):
+def _step(key, heading, unit="", **more):
     """Return a column of the steps whose name in the CSV file is its key in the record."""
-    return _named(key, heading, unit, csv=key, **more)
+    return _column(key, heading, unit, csv=key, **more)
 
 
 STEPS = Table(
     "liquid_steps",
     (
-        _tested("row", "row", decimals=0, width=8),
-        _tested("run", "run", width=8),
-        _tested("meter", "meter", width=10, on=""),
+        _step("row", "row", decimals=0, width=8),
+        _step("run", "run", width=8),
+        _step("meter", "meter", width=10, on=""),
         replace(_FROM, csv="from_dip_m"),
         replace(_TO, csv="to_dip_m"),
-        _tested("indicated_m3", "indicated", "m3", u="sd_m3", on="liquid_steps"),
-        *(_tested(f"by_{name}_m3", name, "L", u="sd_m3", on="liquid_steps")
+        _step("indicated_m3", "indicated", "m3", u="sd_m3", on="liquid_steps"),
+        *(_step(f"by_{name}_m3", name, "L", u="sd_m3", on="liquid_steps")
           for name in ("factor", "meter_temperature", "tank_temperature", "shell", "head")),
-        _tested("reference_m3", "reference", "m3", u="sd_m3"),
-        _tested("geometry_m3", "geometry", "m3", u="sd_m3", on="liquid_misclosures"),
-        _tested("misclosure_m3", "misclosure", "L", u="misclosure_u_m3", on="liquid_misclosures"),
-        _tested("misclosure_U_m3", "U", "L", u="misclosure_u_m3", on="liquid_misclosures"),
-        replace(_tested("misclosure_w", "misclosure_w", decimals=2, on="liquid_misclosures"),
+        _step("reference_m3", "reference", "m3", u="sd_m3"),
+        _step("geometry_m3", "geometry", "m3", u="sd_m3", on="liquid_misclosures"),
+        _step("misclosure_m3", "misclosure", "L", u="misclosure_u_m3", on="liquid_misclosures"),
+        _step("misclosure_U_m3", "U", "L", u="misclosure_u_m3", on="liquid_misclosures"),
+        replace(_step("misclosure_w", "misclosure_w", decimals=2, on="liquid_misclosures"),
                 sheet="liquid_of_misclosure"),
-        _tested("residual_m3", "residual", "L", u="sd_m3", on="liquid_residuals"),
-        _tested("sd_m3", "sd", "L", u="sd_m3", on="liquid_residuals"),
-        _tested("redundancy", "redundancy", decimals=3, width=10, on="liquid_residuals"),
-        _tested("w", "w", decimals=2, width=8, on="liquid_residuals"),
-        _tested("detectable_m3", "detectable", "L", digits=2, on="liquid_residuals"),
+        _step("residual_m3", "residual", "L", u="sd_m3", on="liquid_residuals"),
+        _step("sd_m3", "sd", "L", u="sd_m3", on="liquid_residuals"),
+        _step("redundancy", "redundancy", decimals=3, width=10, on="liquid_residuals"),
+        _step("w", "w", decimals=2, width=8, on="liquid_residuals"),
+        _step("detectable_m3", "detectable", "L", digits=2, on="liquid_residuals"),
     ),
     rows=lambda record: record["liquid"]["steps"],
 )  # fmt: skip
@@ -110,9 +110,9 @@ DIPS = Table(
     (
         _ROW,
         _RUN,
-        _named("dip_m", "dip", "m", decimals=DIP_DECIMALS),
-        _named("residual_m", "residual", "mm", u="sd_m"),
-        _named("sd_m", "sd", "mm", u="sd_m"),
+        _column("dip_m", "dip", "m", decimals=DIP_DECIMALS),
+        _column("residual_m", "residual", "mm", u="sd_m"),
+        _column("sd_m", "sd", "mm", u="sd_m"),
         _REDUNDANCY,
         _W,
     ),
@@ -138,15 +138,15 @@ def _sizes(record):
     return _convert_units(rows, ("change", "u_before", "u_after"))
 
 
-_UNIT = _named("shown_unit", "unit", width=8)
+_UNIT = _column("shown_unit", "unit", width=8)
 
 SIZES = Table(
     "liquid_sizes",
     (
         Column("input", words="inputs", heading="liquid_input", sheet=True, width=30),
-        _named("change", "change", u="u_after"),
-        _named("u_after", "u_after", u="u_after"),
-        _named("u_before", "u_before", digits=2),
+        _column("change", "change", u="u_after"),
+        _column("u_after", "u_after", u="u_after"),
+        _column("u_before", "u_before", digits=2),
         _UNIT,
     ),
     rows=_sizes,
@@ -176,10 +176,10 @@ CAUSES = Table(
     "liquid_causes",
     (
         Column("kind", text=_cause, heading="liquid_cause", sheet=True, width=44),
-        _named("size", "size", u="sd"),
-        _named("sd", "sd", u="sd"),
+        _column("size", "size", u="sd"),
+        _column("sd", "sd", u="sd"),
         _W,
-        _named("detectable", "detectable", digits=2),
+        _column("detectable", "detectable", digits=2),
         _UNIT,
         Column("named", words="yes_no", heading="liquid_named", sheet=True, width=10),
     ),
@@ -210,11 +210,11 @@ def volumes_table(record):
     """Return the Table that compares the volumes, in the unit of the capacity table."""
     unit = record["job"]["table"]["volume_unit"]
     least = numbers.unit(unit).least
-    columns = [_named("height_m", "dip", "m", height=True)]
+    columns = [_column("height_m", "dip", "m", height=True)]
     for kind in KINDS:
         U = f"{kind}_U_m3"
         columns += [
-            _named(f"{kind}_volume_m3", f"by_{kind}", unit, u=U, least=least, width=16),
+            _column(f"{kind}_volume_m3", f"by_{kind}", unit, u=U, least=least, width=16),
             Column(U, unit, u=U, heading=f"liquid_U_{kind}", sheet=f"liquid_U_{kind}",
                    named={"unit": numbers.unit(unit).symbol}, width=14),
         ]  # fmt: skip

@@ -106,7 +106,7 @@ GROUPS = Table(
 # ---- readings
 
 
-def in_their_units(readings):
+def convert_units(readings):
     """Convert readings to their printed units.
 
     The result contains the names of the units as further columns.
@@ -236,7 +236,7 @@ READINGS = Table(
                in_sheet={"text": None}),
         Column("row", decimals=0, sheet="row", width=7, csv="row", in_sheet={"nothing": ""}),
     ),
-    rows=lambda record: list(in_their_units(record["adjustment"]["residuals"]).rows()),
+    rows=lambda record: list(convert_units(record["adjustment"]["residuals"]).rows()),
     last={
         "sheet": "residual sd mdb unit redundancy w tau effect_m use repeats file row",
         "csv": "residual sd mdb unit redundancy w tau effect_m controlled removed check repeats "

@@ -7,19 +7,19 @@ from tankcal.report.tables.table import Column, Table
 ROUNDING_M = 0.0005  # half of the last printed digit of a sounding
 
 
-def _named(key, unit="", **more):
+def _column(key, unit="", **more):
     return Column(key, unit, heading=f"ship_{key}", sheet=True, **more)
 
 
 CELLS = Table(
     "ship_cells",
     (
-        _named("trim_m", "m", decimals=2),
-        _named("list_deg", "deg", decimals=2),
-        _named("dry_m3", "m3", decimals=3, width=16),
-        _named("full_m", "m", decimals=3, width=16),
-        _named("largest_m", "mm", decimals=1, width=16),
-        _named("largest_U_m", "mm", digits=2, width=16),
+        _column("trim_m", "m", decimals=2),
+        _column("list_deg", "deg", decimals=2),
+        _column("dry_m3", "m3", decimals=3, width=16),
+        _column("full_m", "m", decimals=3, width=16),
+        _column("largest_m", "mm", decimals=1, width=16),
+        _column("largest_U_m", "mm", digits=2, width=16),
     ),
     rows=lambda record: [_cell(cell) for cell in record["ship"]["cells"]],
 )
@@ -39,7 +39,7 @@ def _cell(cell):
     }
 
 
-def beyond_pipe(record):
+def count_beyond_pipe(record):
     """Return (length of the pipe, m; number of states in which the tank is full beyond its end)."""
     ship = record["ship"]
     length_m = dist(ship["pipe_bottom_m"], ship["pipe_top_m"])
@@ -47,23 +47,23 @@ def beyond_pipe(record):
     return length_m, len(beyond)
 
 
-def _filed(key, heading=None, unit=""):
+def _csv_column(key, heading=None, unit=""):
     return Column(key, csv=heading or key, csv_unit=unit)
 
 
 CORRECTIONS = Table(
     "ship_corrections",
     (
-        _filed("trim_m"),
-        _filed("list_deg"),
-        _filed("sounding_m"),
-        _filed("state"),
-        _filed("correction_m", "correction_mm", "mm"),
-        _filed("u_correction_m", "u_correction_mm", "mm"),
-        _filed("U_correction_m", "U_correction_mm", "mm"),
-        _filed("volume_m3"),
-        _filed("u_m3"),
-        _filed("U_m3"),
+        _csv_column("trim_m"),
+        _csv_column("list_deg"),
+        _csv_column("sounding_m"),
+        _csv_column("state"),
+        _csv_column("correction_m", "correction_mm", "mm"),
+        _csv_column("u_correction_m", "u_correction_mm", "mm"),
+        _csv_column("U_correction_m", "U_correction_mm", "mm"),
+        _csv_column("volume_m3"),
+        _csv_column("u_m3"),
+        _csv_column("U_m3"),
     ),
 )
 _OF_CELL = (
@@ -91,7 +91,7 @@ def corrections_columns(record):
     return columns
 
 
-def by_list(record):
+def group_by_list(record):
     """Return [(list in degrees, its cells by trim)] for the tables of the papers."""
     cells = record["ship"]["cells"]
     return [

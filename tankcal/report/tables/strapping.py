@@ -1,4 +1,4 @@
-"""Tables of a strapped tank: readings and corrections, tapes, courses."""
+"""Tables of a strapped tank or sphere: readings and corrections, tapes, courses."""
 
 from tankcal.report.tables.table import Column, Table
 
@@ -36,7 +36,7 @@ STRAPS = Table(
 )  # fmt: skip
 
 
-def in_ppm(tape):
+def convert_to_ppm(tape):
     """Return a tape with its scale in ppm; values of a missing comparison are None."""
     shown = {key: 1e6 * tape[key] for key in ("correction", "u_scale", "u_comparison")}
     shown["certificate"] = tape["certificate"] or None
@@ -58,7 +58,7 @@ TAPES = Table(
         Column("master", heading="tape_master", sheet="tape_master"),
         Column("comparisons", decimals=0, heading="tape_comparisons", sheet="tape_comparisons"),
     ),
-    rows=lambda record: [in_ppm(tape) for tape in record["strapping"]["tapes"]],
+    rows=lambda record: [convert_to_ppm(tape) for tape in record["strapping"]["tapes"]],
 )  # fmt: skip
 
 STRAPPED_COURSES = Table(
@@ -97,3 +97,43 @@ def _headed(table, record):
         course={"heading": "ring", "sheet": "ring", "csv": "ring"},
         level_m={"heading": "from_a_m", "sheet": "strap_from_a_m", "csv": "from_a_m"},
     )
+
+
+# ---- a strapped sphere
+
+
+_CIRCLE_STEPS = ("certificate", "temperature", "tension", "tape_thickness", "rise", "sag")
+_ON_BOTH = "circles circle_corrections"
+
+CIRCLES = Table(
+    "circles",
+    (
+        Column("circle", sheet="circle", width=12, csv="circle", on=_ON_BOTH),
+        Column("azimuth_deg", "deg", decimals=1, on="circles", heading="line_azimuth",
+               sheet="circle_azimuth_deg", csv="azimuth_deg"),
+        Column("tape", on="circles", sheet="tape", width=12, csv="tape"),
+        Column("reading_m", "m", decimals=4, on=_ON_BOTH, sheet="strap_reading_m",
+               csv="reading_m"),
+        *(
+            Column(f"{step}_m", "mm", decimals=2, heading=f"strap_{step}", on="circle_corrections",
+                   sheet=f"strap_{step}_mm", csv=f"{step}_mm", csv_unit="mm")
+            for step in _CIRCLE_STEPS
+        ),
+        Column("circumference_m", "m", decimals=4, heading="strap_circumference_m", on=_ON_BOTH,
+               sheet="strap_circumference_m", csv="circumference_m"),
+        Column("sd_m", "mm", decimals=2, heading="strap_sd", on="circles", sheet="strap_sd_mm",
+               csv="s_mm", csv_unit="mm"),
+        Column("difference_m", "mm", decimals=1, heading="circle_difference", on="circles",
+               sheet="circle_difference_mm", csv="difference_mm", csv_unit="mm"),
+        Column("w", decimals=1, on="circles", sheet="w", width=8, csv="w"),
+        Column("used", sheet="used", width=8, csv="used", on="circles"),
+    ),
+    rows=lambda record: record["great_circles"]["readings"],
+    csv_style="%.6f",
+)  # fmt: skip
+
+TAPES_OF_SPHERE = Table(
+    "tapes",
+    TAPES.columns,
+    rows=lambda record: [convert_to_ppm(tape) for tape in record["great_circles"]["tapes"]],
+)

@@ -1,6 +1,6 @@
 """Tables of tangents: set-ups, levels with perimeter and area, and all sights."""
 
-from tankcal.report.tables.sights import (
+from tankcal.report.tables.hits import (
     CHECKS,
     COURSE,
     DEPARTURE,

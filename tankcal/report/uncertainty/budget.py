@@ -4,12 +4,12 @@ from tankcal.pipeline.plot_style import even_groups
 from tankcal.report import blocks
 from tankcal.report.numbers import degrees_of_freedom, like_its_sd, symbol
 from tankcal.report.tables import Column, Table
+from tankcal.report.uncertainty.stated import UNLIMITED
 from tankcal.text.digits import NOTHING, decimals_of, fixed, shortest
 from tankcal.text.words import name_of_input
 
 ACROSS = 7  # largest number of volumes and deliveries in a table
 USEFUL = 0.995  # largest ratio of U, after halving the u of an input, that is reported
-UNLIMITED = "∞"  # infinite degrees of freedom
 LEAST_WRITTEN_OUT = 1e-4  # smallest sensitivity without a power of ten in the workbook
 SMALL = 5e-4  # share of the variance that is printed as 0.0 %
 # Inputs whose note is a code for the source of their size.

@@ -1,7 +1,7 @@
 """The capacity table of the certificate, with the coverage interval of each row."""
 
 from tankcal.report.tables.capacity import NOT_FOR_USE, capacity_rows, capacity_table
-from tankcal.report.uncertainty.stated import by_monte_carlo, uneven_rows
+from tankcal.report.uncertainty.stated import flag_simulated, uneven_rows
 
 MOST_ACROSS, MOST_ACROSS_OF_DENSITIES = 4, 5  # largest number of parts side by side
 LETTERS_OF_A_LINE = 114  # letters of a line of the table, without gaps between columns
@@ -15,7 +15,7 @@ def capacity_blocks(paper):
     k_printed = set(paper.column_texts([row for row in rows if row["k"] is not None], column_of_k))
     if len(k_printed) < 2:  # the caption states a common k
         rows = [{key: value for key, value in row.items() if key != "k"} for row in rows]
-    name = _caption(set(by_monte_carlo(record["capacity"])), k_printed)
+    name = _caption(set(flag_simulated(record["capacity"])), k_printed)
     block = paper.show(
         table,
         rows,

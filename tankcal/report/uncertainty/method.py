@@ -4,7 +4,7 @@ from math import inf
 
 from tankcal.report import blocks, numbers
 from tankcal.report.tables import Column, Table
-from tankcal.report.uncertainty.stated import MARK, by_monte_carlo, k_of_rows, stated_rows
+from tankcal.report.uncertainty.stated import MARK, flag_simulated, k_of_rows, stated_rows
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 
 # Inputs that are estimated from the survey.
@@ -67,7 +67,7 @@ def sentences(paper, mark=MARK):
     low, high = (paper.number(end(capacity["k"]), decimals=2) for end in (min, max))
     common_k = paper.word("texts.k_one", k=low)
     k = common_k if low == high else paper.word("texts.k_range", low=low, high=high)
-    texts = [paper.word("texts.uncertainty", coverage=paper.coverage(), k=k), *on_k(paper)]
+    texts = [paper.word("texts.uncertainty", coverage=paper.coverage(), k=k), *k_sentences(paper)]
     if paper.record.get("monte_carlo"):
         texts.append(_simulated(paper, mark))
     elif paper.record["job"]["table"].get("monte_carlo") is False:
@@ -75,7 +75,7 @@ def sentences(paper, mark=MARK):
     return texts
 
 
-def on_k(paper):
+def k_sentences(paper):
     """Return the sentence on k in the wording of EA-4/02, in a list; [] without any k."""
     capacity = paper.record["capacity"]
     rows = zip(k_of_rows(capacity), capacity["dof"], capacity["U_m3"], strict=True)
@@ -125,7 +125,7 @@ def draws(paper):
 
 def verdict(paper, mark):
     """Return a sentence on the number of rows in which the GUM interval is validated."""
-    simulated = by_monte_carlo(paper.record["capacity"])
+    simulated = flag_simulated(paper.record["capacity"])
     if not any(simulated):
         return paper.word("texts.validated_all")
     if all(simulated):

@@ -2,7 +2,7 @@
 
 from itertools import groupby
 
-from tankcal.record.plain_data import rows_of
+from tankcal.record.columns import rows_of
 from tankcal.report import blocks
 from tankcal.report.tables import Column, Table
 from tankcal.report.uncertainty import method

@@ -4,9 +4,11 @@ If Monte Carlo does not validate the GUM interval, the Monte Carlo interval is s
 larger distance of its ends from the volume (docs/uncertainty.md).
 """
 
-from tankcal.text.digits import decimals_of
+from tankcal.report.tables import Column, Table
+from tankcal.text.digits import LITRE_DECIMALS, decimals_of
 
 MONTE_CARLO = "monte_carlo"  # code of a Monte Carlo interval in the record
+UNLIMITED = "∞"  # infinite degrees of freedom
 MARK = "*"  # mark of rows with a Monte Carlo interval
 _SAME_M = 1e-9  # tolerance for equal dips
 
@@ -16,14 +18,16 @@ def stated_U_m3(capacity):
     return capacity.get("stated_U_m3", capacity["U_m3"])
 
 
-def by_monte_carlo(capacity):
+def flag_simulated(capacity):
     """Return for all rows whether the interval is a result of Monte Carlo."""
-    return [code == MONTE_CARLO for code in capacity.get("interval", ["gum"] * _count(capacity))]
+    # Records of earlier versions have no intervals: all are results of the GUM.
+    sources = capacity.get("interval", ["gum"] * len(capacity["volume_m3"]))
+    return [source == MONTE_CARLO for source in sources]
 
 
 def k_of_rows(capacity):
     """Return the coverage factors of all rows; None for a Monte Carlo interval."""
-    pairs = zip(capacity["k"], by_monte_carlo(capacity), strict=True)
+    pairs = zip(capacity["k"], flag_simulated(capacity), strict=True)
     return [None if simulated else k for k, simulated in pairs]
 
 
@@ -31,7 +35,7 @@ def uneven_rows(capacity):
     """Return the indices of rows whose interval is asymmetric within the digits of U."""
     indices = []
     for row, (simulated, U) in enumerate(
-        zip(by_monte_carlo(capacity), stated_U_m3(capacity), strict=True)
+        zip(flag_simulated(capacity), stated_U_m3(capacity), strict=True)
     ):
         if simulated:
             values = (capacity[key][row] for key in ("volume_m3", "low_m3", "high_m3"))
@@ -86,12 +90,12 @@ def _stated(record, budget):
 def _minimum(record, budget):
     """Return the minimum height for which a delivery is the worst, or None."""
     for worst in record.get("deliveries") or []:
-        if same(worst["at_minimum"], budget):
+        if is_same_delivery(worst["at_minimum"], budget):
             return worst["minimum_m"]
     return None
 
 
-def same(first, second):
+def is_same_delivery(first, second):
     """Return whether two deliveries have equal dips; False if one of them is None."""
     if first is None or second is None or second["low_m"] is None:
         return False
@@ -102,5 +106,41 @@ def _is_uneven(volume, low, high, U):
     return abs((high - volume) - (volume - low)) > 10.0 ** -decimals_of(U)
 
 
-def _count(capacity):
-    return len(capacity["volume_m3"])
+# ---- deliveries with the largest uncertainty, for each minimum height
+
+# Keys of the worst deliveries in the record.
+CRITERIA = ("absolute", "relative", "at_minimum")
+
+
+def worst_delivery_rows(paper):
+    """Return a row for each minimum height and criterion, each delivery once (list of dict)."""
+    return [
+        delivery | {"minimum_m": entry["minimum_m"], "which": paper.word(f"worst.{name}")}
+        for entry in paper.record["deliveries"]
+        for name in CRITERIA
+        if (delivery := entry[name])
+        and not (name == "relative" and is_same_delivery(delivery, entry["at_minimum"]))
+    ]
+
+
+def worst_deliveries(paper):
+    """Table of the worst deliveries."""
+    return [paper.show(WORST_DELIVERIES, worst_delivery_rows(paper))]
+
+
+WORST_DELIVERIES = Table(
+    "worst_deliveries",
+    (
+        Column("minimum_m", "m", height=True, sheet="at_least_m"),
+        Column("which", sheet="largest", width=44),
+        Column("high_m", "m", height=True, heading="dip_high", sheet="from_dip_m"),
+        Column("low_m", "m", height=True, heading="dip_low", sheet="down_to_m"),
+        Column("volume_m3", "m3", u="U_m3", least=LITRE_DECIMALS, sheet="volume_m3", width=14),
+        Column("U_m3", "m3", u="U_m3", sheet="U_m3"),
+        Column("k", decimals=2, sheet="k", width=10),
+        Column("relative", "share", digits=2, align="right", sheet="relative"),
+        Column("u_m3", "m3", u="u_m3", on="", sheet="standard_u_m3", width=14),
+        Column("dof", decimals=0, nothing=UNLIMITED, on="", sheet="dof"),
+    ),
+    last={"sheet": "minimum_m u_m3 dof which"},
+)

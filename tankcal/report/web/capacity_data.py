@@ -11,8 +11,8 @@ from tankcal.record.covariance_factor import factor_of
 from tankcal.report.blocks import Block
 from tankcal.report.numbers import unit
 from tankcal.report.uncertainty.sources import critical_zone, groups_of
-from tankcal.report.uncertainty.stated import by_monte_carlo, stated_rows, stated_U_m3
-from tankcal.report.web.packing import packed
+from tankcal.report.uncertainty.stated import flag_simulated, stated_rows, stated_U_m3
+from tankcal.report.web.packing import pack_numbers
 from tankcal.text.digits import decimals_of_rows
 from tankcal.uncertainty import coverage_factor
 
@@ -36,13 +36,13 @@ def calculator(paper):
             "reference_height_m": record["job"]["datum"]["reference_height_m"],
             "coverage": paper.coverage(),
             "critical_m": critical_zone(record),
-            "height_m": packed(height_m),
-            "volume": packed(np.array(capacity["volume_m3"]) * shown.factor),
-            "U": packed(U),
-            "u": packed(np.array(capacity["u_m3"]) * shown.factor, "<f4"),
-            "k": packed(capacity["k"], "<f4"),
-            "decimals": packed(decimals_of_rows(U), "u1"),
-            "simulated": packed(by_monte_carlo(capacity), "u1"),
+            "height_m": pack_numbers(height_m),
+            "volume": pack_numbers(np.array(capacity["volume_m3"]) * shown.factor),
+            "U": pack_numbers(U),
+            "u": pack_numbers(np.array(capacity["u_m3"]) * shown.factor, "<f4"),
+            "k": pack_numbers(capacity["k"], "<f4"),
+            "decimals": pack_numbers(decimals_of_rows(U), "u1"),
+            "simulated": pack_numbers(flag_simulated(capacity), "u1"),
             "deliveries": _deliveries(record, shown.factor),
         }
     )
@@ -58,9 +58,9 @@ def _deliveries(record, unit_factor):
     owner, dof = sources_of(record)
     least_dof = min((nu for nu in dof if nu is not None), default=None)
     return {
-        "rows": packed(rows, "<u4"),
+        "rows": pack_numbers(rows, "<u4"),
         "columns": factor.shape[1],
-        "factor": packed(factor[rows], "<f4"),
+        "factor": pack_numbers(factor[rows], "<f4"),
         "source": owner,
         "dof": dof,
         "k": _k_of_dof(record["job"]["table"]["coverage_probability"], least_dof),
@@ -121,4 +121,8 @@ def _k_of_dof(probability, least_dof):
     nodes = widest * (1 - np.cos(np.pi * np.arange(_NODES + 1) / _NODES)) / 2
     with np.errstate(divide="ignore"):
         k = coverage_factor(probability, 1 / nodes)
-    return {"inverse_dof": packed(nodes), "log_k": packed(np.log(k)), "least_dof": least_dof}
+    return {
+        "inverse_dof": pack_numbers(nodes),
+        "log_k": pack_numbers(np.log(k)),
+        "least_dof": least_dof,
+    }

@@ -6,7 +6,7 @@ import json
 _UNSAFE = {sign: f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
 
-def packed(numbers, kind="<f8"):
+def pack_numbers(numbers, kind="<f8"):
     """Return numbers as base64 text of little-endian values of a numpy type, such as "<f8"."""
     import numpy as np
 

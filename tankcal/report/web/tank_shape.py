@@ -11,8 +11,8 @@ import numpy as np
 
 from tankcal.pipeline.plot_style import round_factor
 from tankcal.report.blocks import Block
-from tankcal.report.web.packing import packed
-from tankcal.report.web.wall_map import rejected_in_space
+from tankcal.report.web.packing import pack_numbers
+from tankcal.report.web.wall_map import limit_rejected
 
 MOST_POINTS = 4000  # largest number of drawn points
 TENTH_MM = 1e4  # tenths of a millimetre per metre, the unit of outlines
@@ -54,11 +54,11 @@ def shell_of(record):
         "radius_m": radius_m,
         "zero_m": record["capacity"]["zero_m"],
         "steps": len(form_m[0]),
-        "form": packed(np.round(TENTH_MM * np.array(form_m)), "<i2"),
+        "form": pack_numbers(np.round(TENTH_MM * np.array(form_m)), "<i2"),
         "rings": _rings(record["courses"], sections, shell, bottom_z_m, radius_m),
         "exaggeration": exaggeration,
         "points": _points(record, bottom_z_m),
-        "rejected": rejected_in_space(record, largest),
+        "rejected": limit_rejected(record, largest),
     }
 
 
@@ -111,10 +111,10 @@ def _points(record, bottom_z_m):
     names, azimuth, height, residual, section = zip(*rows, strict=True) if rows else ((),) * 5
     return {
         "names": list(names),
-        "azimuth_deg": packed(azimuth, "<f4"),
-        "height_m": packed(height, "<f4"),
-        "residual_m": packed(residual, "<f4"),
-        "section": packed(section, "<u2"),
+        "azimuth_deg": pack_numbers(azimuth, "<f4"),
+        "height_m": pack_numbers(height, "<f4"),
+        "residual_m": pack_numbers(residual, "<f4"),
+        "section": pack_numbers(section, "<u2"),
     }
 
 

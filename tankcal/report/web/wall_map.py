@@ -1,7 +1,7 @@
-"""Data of a record for the unrolled wall in the web page: used and rejected points.
+"""Data of a record for the unrolled wall in the web page: points, or the map of a scanned wall.
 
-`looked_at` lists the points for inspection in the order of their distance from the wall: rejected
-points, points with reduced weight, and points that a person decided to keep.
+`list_inspected` lists the points for inspection in the order of their distance from the wall:
+rejected points, points with reduced weight, and points that a person decided to keep.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.report.blocks import Block
-from tankcal.report.web.packing import packed
+from tankcal.report.web.packing import pack_numbers
 
 MOST_POINTS = 4000  # largest number of drawn points
 MOST_REJECTED = 2000  # largest number of drawn rejected points
@@ -17,7 +17,7 @@ LARGEST = 3.0  # largest drawn distance of a rejected point, in largest deviatio
 
 
 @dataclass(frozen=True)
-class LookedAt:
+class InspectedPoint:
     """A point that the outlier test or a person decided on.
 
     Attributes
@@ -45,16 +45,16 @@ class LookedAt:
     is_kept: bool = False
 
 
-def looked_at(record):
-    """Return the points for inspection (tuple of LookedAt), largest distance first."""
+def list_inspected(record):
+    """Return the points for inspection (tuple of InspectedPoint), largest distance first."""
     place = _places(record) if record.get("shell") else _nowhere
     listed = [
-        LookedAt(row["point"], row["reason"], *place(row), row["residual_m"], row["w"])
+        InspectedPoint(row["point"], row["reason"], *place(row), row["residual_m"], row["w"])
         for row in record["rejected"]
     ]
     points = {point["point"]: point for point in record["points"]}
     listed += [
-        LookedAt(row["what"], "", *place(points[row["what"]]), row["off_m"], row["w"], True)
+        InspectedPoint(row["what"], "", *place(points[row["what"]]), row["off_m"], row["w"], True)
         for row in (record.get("overrulings") or {"each": ()})["each"]
         if row["decision"] == "keep" and row["kind"] == "point" and row["what"] in points
     ]
@@ -79,7 +79,7 @@ def _nowhere(_point):
     return None, None
 
 
-def why(paper, point):
+def reason_text(paper, point):
     """Return the reason for the inspection of a point in words."""
     if point.is_kept:
         return paper.word("overruling_decisions.keep")
@@ -105,9 +105,9 @@ def wall_map_view(paper):
             "kind": "wall_map",
             "text": paper.word("web.wall_map_here"),
             "names": list(names),
-            "azimuth_deg": packed(azimuth, "<f4"),
-            "height_m": packed(height, "<f4"),
-            "residual_m": packed(residual, "<f4"),
+            "azimuth_deg": pack_numbers(azimuth, "<f4"),
+            "height_m": pack_numbers(height, "<f4"),
+            "residual_m": pack_numbers(residual, "<f4"),
             "joints_m": [0.0, *(course["top_m"] for course in record["courses"])],
             "rejected": [
                 {
@@ -115,16 +115,16 @@ def wall_map_view(paper):
                     "azimuth": round(point.azimuth_deg, 3),
                     "height": round(point.height_m, 4),
                     "off_mm": round(1e3 * (point.off_m or 0.0), 2),
-                    "reason": why(paper, point),
+                    "reason": reason_text(paper, point),
                     "is_kept": point.is_kept,
                 }
-                for point in looked_at(record)[:MOST_REJECTED]
+                for point in list_inspected(record)[:MOST_REJECTED]
             ],
         }
     )
 
 
-def rejected_in_space(record, largest_m):
+def limit_rejected(record, largest_m):
     """Return points for the three-dimensional view, [{name, azimuth, height, off_m}].
 
     The distance is limited to LARGEST times `largest_m`.
@@ -137,5 +137,43 @@ def rejected_in_space(record, largest_m):
             "height": round(point.height_m, 4),
             "off_m": round(float(np.clip(point.off_m or 0.0, -most, most)), 5),
         }
-        for point in looked_at(record)[:MOST_REJECTED]
+        for point in list_inspected(record)[:MOST_REJECTED]
     ]
+
+
+# ---- map of a scanned wall
+
+
+HIDDEN = -32768  # code of a hidden cell, in tenths of a millimetre
+_LARGEST = 32767  # largest deviation, in tenths of a millimetre
+
+
+def cloud_map_view(paper):
+    """Block of the map, which only the web page shows."""
+    from tankcal.report.clouds import departures_mm, joints_m, limit_mm, of_turn  # matplotlib
+
+    record = paper.record
+    wall_map = record["clouds"]["map"]
+    tenths = np.nan_to_num(10 * departures_mm(record), nan=HIDDEN).round()
+    return Block(
+        {
+            "kind": "cloud_map",
+            "text": paper.word("web.cloud_map_here"),
+            "columns": len(wall_map["azimuth_edges_deg"]) - 1,
+            "tenths": pack_numbers(np.clip(tenths, HIDDEN, _LARGEST), "<i2"),
+            "azimuth_deg": pack_numbers(wall_map["azimuth_edges_deg"], "<f4"),
+            "height_m": pack_numbers(wall_map["height_edges_m"], "<f4"),
+            "joints_m": joints_m(record),
+            "limit_mm": limit_mm(record),
+            "hidden": [
+                [
+                    *interval,
+                    obstruction["bottom_m"],
+                    obstruction["top_m"],
+                    paper.word(f"obstructions.{obstruction['guess']}"),
+                ]
+                for obstruction in record["clouds"]["obstructions"]
+                for interval in of_turn(obstruction)
+            ],
+        }
+    )

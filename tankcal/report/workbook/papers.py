@@ -2,11 +2,9 @@
 
 from tankcal.report.tables import (
     clouds,
-    great_circles,
     hits,
     lines,
     liquid,
-    radii,
     ship,
     strapping,
     tangents,
@@ -54,8 +52,8 @@ def great_circles_sheet(book, record):
     sheet = book.sheet("great_circles", book.word("texts.circles_subtitle"), landscape=True)
     tables = [
         (book.word("headings.great_circles"), "great_circles",
-         columns_of(book, great_circles.CIRCLES)),
-        (book.word("headings.tapes"), "tapes", columns_of(book, great_circles.TAPES_OF_SPHERE)),
+         columns_of(book, strapping.CIRCLES)),
+        (book.word("headings.tapes"), "tapes", columns_of(book, strapping.TAPES_OF_SPHERE)),
     ]  # fmt: skip
     write_tables(book, sheet, _HEAD_ROW, tables)
 
@@ -136,7 +134,7 @@ def radii_sheet(book, record):
     """Write the radii of the courses: former, measured and adopted."""
     sheet = book.sheet("radii", book.word("texts.radii_subtitle"), landscape=True)
     heading = book.word("headings.radii")
-    columns = columns_of(book, radii.RADII)
+    columns = columns_of(book, tank.RADII)
     write_tables(book, sheet, _HEAD_ROW, [(heading, "radii", columns)])
 
 
@@ -144,7 +142,7 @@ def ship_sheet(book, record):
     """Write the corrections for trim and list: range of the pipe, and a table for each list."""
     sheet = book.sheet("ship", book.word("texts.ship_subtitle"), landscape=True)
     tables = [(book.word("headings.ship_cells"), "ship_cells", columns_of(book, ship.CELLS))]
-    for number, (list_deg, cells) in enumerate(ship.by_list(record), 1):
+    for number, (list_deg, cells) in enumerate(ship.group_by_list(record), 1):
         title = book.word("texts.ship_list", list=f"{list_deg:g}")
         tables.append((title, f"ship_list_{number}", _corrections(book, record, cells)))
     write_tables(book, sheet, _HEAD_ROW, tables)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.record.columns import as_columns
-from tankcal.report.tables.readings import GROUPS, MOST_IN_SHEET, READINGS, in_their_units
+from tankcal.report.tables.readings import GROUPS, MOST_IN_SHEET, READINGS, convert_units
 from tankcal.report.tables.survey import (
     CHECK_POINTS,
     INSTRUMENTS,
@@ -159,7 +159,7 @@ def observations_sheet(book, record):
     if count > MOST_READINGS:
         subtitle = book.word("texts.worst_subtitle", shown=MOST_READINGS, all=count)
         readings = _worst(readings)
-    rows = list(in_their_units(readings).rows())
+    rows = list(convert_units(readings).rows())
     sheet = book.sheet("observations", subtitle, landscape=True)
     columns = columns_of(book, READINGS, rows)
     set_widths(book, sheet, columns)

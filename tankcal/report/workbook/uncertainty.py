@@ -1,8 +1,8 @@
 """Sheets of budgets, stated volumes, deliveries, Monte Carlo, and decision rule."""
 
 from tankcal.report.uncertainty import budget, monte_carlo, rule
-from tankcal.report.uncertainty.deliveries import WORST_DELIVERIES, worst_rows
 from tankcal.report.uncertainty.method import stated_table
+from tankcal.report.uncertainty.stated import WORST_DELIVERIES, worst_delivery_rows
 from tankcal.report.workbook.look import number_format
 from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
 from tankcal.text.digits import decimals_of
@@ -77,7 +77,7 @@ def deliveries_sheet(book, record):
     """Write the stated volumes and deliveries, and the worst deliveries."""
     sheet = book.sheet("deliveries", landscape=True, tab="result")
     tables = [(book.word("headings.stated"), "stated", columns_of(book, stated_table(record)))]
-    worst = worst_rows(book.paper)
+    worst = worst_delivery_rows(book.paper)
     if worst:
         title = book.word("headings.worst_deliveries")
         tables.append((title, "worst_deliveries", columns_of(book, WORST_DELIVERIES, worst)))

@@ -16,14 +16,14 @@ from tankcal.survey.diagnosis.diagnoses import find_swapped_points, mirrored_fit
 from tankcal.survey.network import adjust, snoop
 from tankcal.survey.network.assembly import assemble
 from tankcal.survey.network.blocks import CORRELATED
-from tankcal.survey.network.snooping import kept_of, set_use, start_from_adjusted
+from tankcal.survey.network.snooping import kept_rows, set_use, start_from_adjusted
 from tankcal.survey.observations import Directions, Distances
 from tankcal.survey.start.photographs import sights_of
 from tankcal.survey.start.resection import bearings, intersect_rays
 
 
 @dataclass(frozen=True)
-class Searched:
+class SearchResult:
     """An adjusted survey after the search for blunders.
 
     Attributes
@@ -60,12 +60,12 @@ def search_blunders(survey, options, gross=None):
 
     Returns
     -------
-    Searched
+    SearchResult
     """
     if gross is None:
-        return Searched(adjust(survey, **options), (), 1)
+        return SearchResult(adjust(survey, **options), (), 1)
     try:
-        cleaned = _without(survey, options, gross) if gross else snoop(survey, **options)
+        cleaned = _search_without(survey, options, gross) if gross else snoop(survey, **options)
     except SolutionError as error:
         adjusted = adjust(survey, **options)
         text = message(
@@ -74,10 +74,10 @@ def search_blunders(survey, options, gross=None):
             " the result",
             error=error.args[0],
         )
-        return Searched(
+        return SearchResult(
             adjusted, (), 1, (), (Problem("job.toml", text, None, "adjustment.snooping"),)
         )
-    again = _readmitted(cleaned, gross)
+    again = _readmit(cleaned, gross)
     if again is not None:
         try:
             # The start values are good now, so a robust start is not needed.
@@ -87,11 +87,11 @@ def search_blunders(survey, options, gross=None):
         # Accept the second search only if it recovers points.
         if second.adjusted.problem.aside.sum() < cleaned.adjusted.problem.aside.sum():
             rounds = cleaned.rounds + second.rounds
-            return Searched(second.adjusted, second.removed, rounds, second.needed)
-    return Searched(cleaned.adjusted, cleaned.removed, cleaned.rounds, cleaned.needed)
+            return SearchResult(second.adjusted, second.removed, rounds, second.needed)
+    return SearchResult(cleaned.adjusted, cleaned.removed, cleaned.rounds, cleaned.needed)
 
 
-def _counted_anew(block, gross):
+def _renumber(block, gross):
     """Renumber the rows of a Block after readings outside the block left the tables."""
     row = block.row.copy()
     for source, removed in gross.items():
@@ -101,7 +101,7 @@ def _counted_anew(block, gross):
     return replace(block, row=row)
 
 
-def _without(survey, options, gross):
+def _search_without(survey, options, gross):
     """Search a survey twice: first without some readings, then with these readings rejected.
 
     Parameters
@@ -113,7 +113,7 @@ def _without(survey, options, gross):
 
     Returns
     -------
-    network.Cleaned
+    network.CleanedSurvey
     """
     images = survey.image_points
     thin = replace(  # without traces: the scatter of repeated readings does not count here
@@ -123,7 +123,7 @@ def _without(survey, options, gross):
             replace(one.taken(~gross[number]) if number in gross else one, trace=None)
             for number, one in enumerate(survey.observations)
         ),
-        correlated=tuple(_counted_anew(one, gross) for one in survey.correlated),
+        correlated=tuple(_renumber(one, gross) for one in survey.correlated),
     )
     first = snoop(thin, **options)
     uses = {}
@@ -141,7 +141,7 @@ def _without(survey, options, gross):
     return replace(cleaned, rounds=first.rounds + cleaned.rounds)
 
 
-def _readmitted(cleaned, gross):
+def _readmit(cleaned, gross):
     """Restore all readings of points that lost too many to the search; None: no such point."""
     lost_points = cleaned.adjusted.problem.aside
     if not lost_points.any():
@@ -197,18 +197,18 @@ def gross_readings(survey):
         if source == "image points":
             _refuse_mirrored(survey, np.linalg.norm(off, axis=1), rows)
             continue
-        off = _about_their_sets(group, off) if isinstance(group, Directions) else np.abs(off)
+        off = _centre_on_sets(group, off) if isinstance(group, Directions) else np.abs(off)
         # All readings of a kind may be off because the start values are poor.
         limit = np.maximum(_limit(group, problem.state), AS_OTHERS * np.median(off[:, 0]))
         gross = off[:, 0] > limit
         if gross.any() and gross.mean() < MOST:
             gross_rows[source] = np.zeros(len(survey.observations[source]), dtype=bool)
             gross_rows[source][rows[gross]] = True
-            gross_rows[source] &= ~kept_of(survey.observations[source], survey.kept)
+            gross_rows[source] &= ~kept_rows(survey.observations[source], survey.kept)
     return gross_rows
 
 
-def swapped_at_start(survey, known):
+def find_swapped_control(survey, known):
     """Problem rows for fixed control points whose rays meet where x and y are exchanged.
 
     Weighted points are left to the adjustment, which can reject them.
@@ -238,7 +238,7 @@ def _limit(observations, state):
     return ASKEW_RAD if observations.unit == "rad" else np.inf
 
 
-def _about_their_sets(directions, misclosure):
+def _centre_on_sets(directions, misclosure):
     """Misclosures (n, 1) of directions relative to the median of their set."""
     off = np.zeros_like(misclosure)
     for number in np.unique(directions.set):

@@ -13,15 +13,16 @@ from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.survey.start.photographs import sights_of
 from tankcal.survey.start.resection import resect
+from tankcal.units import FOOT_M
 
 MISPLACED = message("misplaced_point", "a misplaced decimal point")
 FACTORS = (
     (1000.0, message("millimetres_as_metres", "millimetres given as metres")),
-    (1 / 0.3048, message("feet_as_metres", "feet given as metres")),
+    (1 / FOOT_M, message("feet_as_metres", "feet given as metres")),
     (100.0, message("centimetres_as_metres", "centimetres given as metres")),
     (0.001, message("kilometres_as_metres", "kilometres given as metres")),
     (
-        0.3048,
+        FOOT_M,
         message("feet_twice", "metres that were converted from feet once too often"),
     ),
     (10.0, MISPLACED),

@@ -40,7 +40,7 @@ def wrongly_held(measurements, sigma0, rejected, run):
     gone : int
         Number of values rejected by data snooping; inf likewise.
     run : callable
-        run(measurements, snooping=False) returns (network.Adjusted, Gathered).
+        run(measurements, snooping=False) returns (network.Adjusted, GatheredSurvey).
 
     Returns
     -------
@@ -115,7 +115,7 @@ class _Release:
         self.control = replace(control, sd=sd, use=np.where(self.doubted | ~self.gone, 1.0, 0.0))
         self.limit = CRITICAL**2 * max(1.0, np.nan_to_num(trial.sigma0) ** 2)
 
-    def _without(self, rows):
+    def _survey_without(self, rows):
         """The survey without the given rows of control."""
         use = self.control.use.copy()
         use[list(rows)] = 0.0
@@ -127,7 +127,7 @@ class _Release:
         """Adjust without some rows of control; None if the adjustment fails."""
         try:
             with np.errstate(all="ignore"):  # a trial may diverge
-                return adjust(self._without(rows), max_iterations=MOST)
+                return adjust(self._survey_without(rows), max_iterations=MOST)
         except SolutionError:
             return None
 
@@ -137,7 +137,7 @@ class _Release:
             return np.inf
         try:
             with np.errstate(all="ignore"):
-                cleaned = snoop(self._without(rows), robust=False, max_iterations=MOST)
+                cleaned = snoop(self._survey_without(rows), robust=False, max_iterations=MOST)
         except SolutionError:
             return np.inf
         return count_set_aside(cleaned.adjusted.survey)
@@ -149,9 +149,9 @@ class _Release:
         suffices.
         """
         control = self.control
-        single = self._tried([(row,) for row in self._likely()])
+        single = self._adjust_trials([(row,) for row in self._likely()])
         points = dict.fromkeys(int(control.point[rows[0]]) for rows, _ in single)
-        of_points = self._tried(
+        of_points = self._adjust_trials(
             [np.flatnonzero(self.doubted & (control.point == point)) for point in points]
         )
         if of_points and single[0][1].chi2 - of_points[0][1].chi2 > self.limit:
@@ -164,7 +164,7 @@ class _Release:
             for rows, trial in single
             if trial.chi2 - single[0][1].chi2 < self.limit
             for row in rows
-            if len(rows) == 1 or self._moved(trial, row)
+            if len(rows) == 1 or self._has_moved(trial, row)
         ]  # fmt: skip
         return explanations, single[0][0]
 
@@ -181,13 +181,13 @@ class _Release:
         order = np.argsort(-size, kind="stable")
         return order[(size[order] > LIKELY * most) & (most > CRITICAL)][:TRIED]
 
-    def _tried(self, trials):
+    def _adjust_trials(self, trials):
         """[(rows, Adjusted without them)] of trials that could be adjusted, the best first."""
         results = [(rows, self.adjusted(rows)) for rows in trials]
         results = [(rows, adjusted) for rows, adjusted in results if adjusted is not None]
         return sorted(results, key=lambda pair: pair[1].chi2)
 
-    def _moved(self, adjusted, row):
+    def _has_moved(self, adjusted, row):
         """Whether a released coordinate moved significantly."""
         point, axis = self.control.point[row], self.control.axis[row]
         away = adjusted.xyz_m[point, axis] - self.control.value[row]
@@ -223,7 +223,7 @@ def _wrong(adjusted, known, point, axis, here_m, value_m):
     return Problem("control.csv", text, known.row.get(name), f"{'xyz'[axis]}_m")
 
 
-def strained(readings, known):
+def find_strained_control(readings, known):
     """Problem rows on held coordinates that the readings contradict, all equivalent ones.
 
     A held coordinate is not suspected where a reading explains the contradiction better.
@@ -249,7 +249,7 @@ def strained(readings, known):
     least = max(most, used[~np.isnan(used)].max(initial=0.0)) ** 2 - CRITICAL**2
     suspects = [reading for reading in held if reading.w**2 > least]
     return [
-        _strained(reading)
+        _strain_problem(reading)
         for reading in sorted(suspects, key=lambda reading: -abs(reading.w))[: 2 * LISTED]
     ]
 
@@ -260,7 +260,7 @@ def _are_tested(readings):
     return readings.are("control coordinate") & (data["sd"] == 0) & np.isfinite(data["mdb"])
 
 
-def _strained(reading):
+def _strain_problem(reading):
     """Problem of a held coordinate with a large reaction."""
     # The MDB is delta0 times the standard deviation of the released coordinate.
     sd = reading.mdb / noncentrality()

@@ -15,12 +15,13 @@ from tankcal.messages import message
 from tankcal.survey.diagnosis.diagnoses import GON, MIRROR, mirrored_fits, mirrored_photo
 from tankcal.survey.diagnosis.fixed_datum_check import ALIKE
 from tankcal.survey.observations import KINDS
+from tankcal.units import FOOT_M
 
 BETTER = 0.2  # largest remaining share of sigma0 under a valid explanation
 SOUND = 5.0  # sigma0 of a survey that fits moderately; a single blunder causes more
 CERTAIN = 2.0  # sigma0 below which no other mistake is tried
 OTHER_UNITS = (
-    (0.3048, message("feet", "feet")),
+    (FOOT_M, message("feet", "feet")),
     (0.001, message("millimetres", "millimetres")),
 )
 HORIZONTAL = ("directions", "horizontal_angles", "azimuths")
@@ -41,7 +42,7 @@ def likely_mistake(measurements, sigma0, run, failure=None):
     sigma0 : float
         Without data snooping; inf if the survey could not be adjusted.
     run : callable
-        run(measurements) returns (network.Adjusted, Gathered), without data snooping.
+        run(measurements) returns (network.Adjusted, GatheredSurvey), without data snooping.
     failure : str, optional
         Error message of the failed adjustment.
 
@@ -51,7 +52,8 @@ def likely_mistake(measurements, sigma0, run, failure=None):
     """
     limit = min(BETTER * sigma0, SOUND)
     explained, failures, alike = [], 0, 0
-    for suppositions in (_mirrored, _files_in_other_unit, _exchanged, _setup_in_other_unit):
+    mistakes = (_mirror_mistakes, _files_in_other_unit, _name_exchanges, _setup_in_other_unit)
+    for suppositions in mistakes:
         for problem, changed in suppositions(measurements):
             try:
                 trial_sigma0 = run(changed)[0].sigma0
@@ -73,7 +75,7 @@ def likely_mistake(measurements, sigma0, run, failure=None):
     return sorted(likely, key=lambda problem: problem.file == CONTROL)
 
 
-def _mirrored(measurements):
+def _mirror_mistakes(measurements):
     """Yield (Problem, corrected measurements) for mistakes that mirror the survey.
 
     The mistakes are not always distinguishable.
@@ -92,7 +94,7 @@ def _mirrored(measurements):
             )
 
 
-def _exchanged(measurements):
+def _name_exchanges(measurements):
     """Yield (Problem, corrected measurements) for two control points with exchanged names."""
     control = measurements.control
     names = [] if control is None else list(control.point)

@@ -108,12 +108,14 @@ def _lost_control(readings):
         if reading.kind.startswith("control coordinate") and np.isfinite(reading.residual)
     ]
     return [
-        Problem(reading.file, _lost(reading), reading.row, f"{reading.element}_m")
+        Problem(
+            reading.file, _lost_coordinate_sentence(reading), reading.row, f"{reading.element}_m"
+        )
         for reading in rejected[: 2 * LISTED]
     ]
 
 
-def _lost(reading):
+def _lost_coordinate_sentence(reading):
     """Sentence about a rejected known coordinate."""
     return message(
         "control_set_aside",

@@ -67,7 +67,10 @@ def scale_of_control(adjusted, readings, measurements, cov_scale=1.0):
     if table is None:
         return []
     place = _plan(table)
-    comparisons = [*_adjusted(adjusted, place, cov_scale), *_read(readings, place, measurements)]
+    comparisons = [
+        *_distance_differences(adjusted, place, cov_scale),
+        *_read(readings, place, measurements),
+    ]
     off = [(ratio, names) for ratio, sd, names in comparisons if abs(ratio) > DISAGREE * sd]
     # A scale error has the same sign everywhere.
     signs = {np.sign(ratio) for ratio, _ in off}
@@ -95,7 +98,7 @@ def _plan(table):
     }
 
 
-def _adjusted(adjusted, place, cov_scale):
+def _distance_differences(adjusted, place, cov_scale):
     """Yield (relative difference, its sd, names) of each pair: adjusted minus given distance.
 
     Where control holds the adjusted points both are correlated, so the sd is an upper bound.

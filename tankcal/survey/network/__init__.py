@@ -8,7 +8,7 @@ from importlib import import_module
 _ROOM_OF = {
     "Adjusted": "results",
     "Camera": "survey",
-    "Cleaned": "snooping",
+    "CleanedSurvey": "snooping",
     "Instrument": "survey",
     "Photos": "survey",
     "Residuals": "reliability",

@@ -1,6 +1,7 @@
 """Assembly of the least squares problem of a survey: unknowns and their columns."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -11,8 +12,8 @@ from tankcal.solver.rows import PART
 from tankcal.survey.network.blocks import CORRELATED, correlated_groups, is_in_block
 from tankcal.survey.network.survey import FEWEST, IMAGES, SCOPES
 from tankcal.survey.network.unknowns import (
+    describe_directions,
     eliminated_points,
-    in_words,
     layout_of,
     name_of,
     name_of_exact,
@@ -26,7 +27,7 @@ from tankcal.survey.observations import (
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldObservations:
     """Observations that hold exactly (sd 0).
 
     Attributes
@@ -70,7 +71,7 @@ class Problem:
         True for points eliminated from the normal equations.
     interior_of : ndarray of int, shape (photos, 13)
         Indices of the parameters of each photo in State.interior.
-    exact : tuple of Held
+    exact : tuple of HeldObservations
         Observations that hold exactly.
     points, photos : tuple
         Names.
@@ -166,7 +167,7 @@ def assemble(survey):
         groups=_groups(groups, layout),
         moved=layout.moved,
         name_of=lambda column: name_of(survey, layout, table, column),
-        in_words=lambda directions: in_words(survey, layout, table, directions),
+        describe_directions=partial(describe_directions, survey, layout, table),
         exact=_groups([held.conditions for held in exact], layout),
         name_of_exact=lambda row: name_of_exact(survey, exact, row),
     )
@@ -276,7 +277,7 @@ def _other_groups(survey, is_used, centre):
         Numbers in the survey.
     rows_of : list of ndarray
         Row numbers.
-    exact : tuple of Held
+    exact : tuple of HeldObservations
         Observations that hold exactly.
     """
     groups, sources, rows_of, exact = [], [], [], []
@@ -288,7 +289,7 @@ def _other_groups(survey, is_used, centre):
         # Exact observations become conditions of the solver; a weight 1/0 would be infinite.
         if holds.any() and (sharp := (keep & holds & table.in_use).nonzero()[0]).size:
             taken = table.taken(sharp).relative(centre)
-            exact.append(Held(taken, *taken.conditions(), number, sharp))
+            exact.append(HeldObservations(taken, *taken.conditions(), number, sharp))
             if holds.all():
                 continue
         rows = (keep & ~holds & ~is_in_block(survey, number)).nonzero()[0]

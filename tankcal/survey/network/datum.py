@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.messages import join_with_and, message
-from tankcal.survey.observations.nuisance import NUISANCES
+from tankcal.survey.observations.base import NUISANCES
 
 SHIFTS, TURNS = ("x", "y", "z"), ("X", "Y", "Z")
 THREE_TURNS = message("rotations", "three rotations")
@@ -231,7 +231,7 @@ def defect_in_words(combinations, problem=None):
     parts = _ways(pure)
     if len(pure) < d:
         mixed = [i for i in range(7) if 1e-6 < share[i] <= 1 - 1e-6]
-        about = None if problem is None else _about_what_stays(combinations, problem)
+        about = None if problem is None else _fixed_place_sentence(combinations, problem)
         parts.append(about or _mixture(d - len(pure), _ways(mixed)))
     if d == 1:
         single = "datum defect 1: {what} is not determined by any observation"
@@ -265,7 +265,7 @@ def _mixture(count, ways):
     return message("combinations", "{count} combinations of {ways}", count=count, ways=ways)
 
 
-def _about_what_stays(combinations, problem):
+def _fixed_place_sentence(combinations, problem):
     """Rotations and scale about fixed positions, in words; None if no position stays."""
     turns, stretches = (
         np.linalg.matrix_rank(combinations[rows], tol=1e-6 * np.abs(combinations[rows]).max())

@@ -140,7 +140,7 @@ def accuracy(adjusted, points, xyz_m, sd_m):
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedObservations:
     """Observations left out of the adjustment, compared with the adjusted survey.
 
     Attributes
@@ -169,7 +169,7 @@ def compare_left_out(adjusted, observations):
 
     Returns
     -------
-    Compared
+    ComparedObservations
     """
     problem, state = adjusted.problem, adjusted.solution.unknowns
     relative_observations = problem.relative(observations)
@@ -182,7 +182,7 @@ def compare_left_out(adjusted, observations):
     difference = relative_observations.difference(computed)
     sd = np.sqrt(variance)
     w = np.divide(difference, sd, out=np.zeros_like(sd), where=sd > 0)
-    return Compared(difference, sd, w)
+    return ComparedObservations(difference, sd, w)
 
 
 @dataclass(frozen=True)

@@ -116,7 +116,7 @@ def reactions(problem, solution, fixed):
     x = -solution.cofactor.times((a.T @ c).toarray())
     sound = np.ones(k, dtype=bool)
     if problem.exact:
-        x, sound = _conditioned(problem, solution, layout, x)
+        x, sound = _apply_conditions(problem, solution, layout, x)
     w = np.concatenate([np.zeros(0), *(values.ravel() for values in solution.normalised)])
     reaction, square, step = np.zeros(k), np.zeros(k), max(1, int(AT_ONCE / max(len(w), 1)))
     # R is dense; work in slices to limit memory.
@@ -134,7 +134,7 @@ def _rows_of(parts, layout, width):
     return scipy.sparse.vstack([scipy.sparse.csr_array((0, width)), *blocks], format="csr")
 
 
-def _conditioned(problem, solution, layout, x):
+def _apply_conditions(problem, solution, layout, x):
     """Return X under the exact conditions, and a mask (k,) of releases that the conditions
     permit."""
     unknowns, parts = problem.model.unknowns, []

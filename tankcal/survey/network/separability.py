@@ -84,7 +84,7 @@ def alternatives(adjusted, source, row, held=None):
             if tests is not None:
                 candidates.append((*tests, table.source, int(table.rows[i])))
     for k, members in problem.blocks:
-        candidates += _correlated(problem, solution, k, members, aside)
+        candidates += _correlated_moves(problem, solution, k, members, aside)
     candidates = [(significance, *which) for significance, instead, *which in candidates if instead]
     if held is not None and len(held.rows):
         place = aside.one.columns(held.layout)[0] - problem.model.unknowns
@@ -92,7 +92,7 @@ def alternatives(adjusted, source, row, held=None):
         # Derivatives of the rejected reading by the held coordinates.
         c[:, place[place >= 0]] = aside.jac[:, place >= 0]
         changes = np.vstack([held.changes, np.zeros((1, len(held.rows)))])
-        candidates += _released(
+        candidates += _release_moves(
             held, c + aside.jac @ changes[aside.columns], aside.inverse, aside.e
         )
     return [one[1:] for one in sorted(candidates, key=lambda one: -one[0])]
@@ -168,7 +168,7 @@ def _make_aside(solution, e, jac, columns, *more):
     return _Aside(e, jac, columns[0], moves, inverse, *more)
 
 
-def _correlated(problem, solution, number, members, aside):
+def _correlated_moves(problem, solution, number, members, aside):
     """Yield (T of j, whether i agrees without it, source, row) of observations j of a block."""
     if number is None:
         return
@@ -259,7 +259,7 @@ def _square(v, cofactors):
     return float(np.sum(part**2 / size[controlled])), int(controlled.sum())
 
 
-def _released(held, r, inverse, e):
+def _release_moves(held, r, inverse, e):
     """(T, source, row) of held coordinates whose release makes reading i agree.
 
     Parameters

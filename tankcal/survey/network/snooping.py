@@ -24,7 +24,7 @@ RETURNS = 3  # restorations of one observation, so that the search terminates
 
 
 @dataclass(frozen=True)
-class Cleaned:
+class CleanedSurvey:
     """A survey without its blunders.
 
     Attributes
@@ -33,14 +33,14 @@ class Cleaned:
         Adjusted without the rejected observations.
     survey : Survey
         With `use` set.
-    removed : tuple of Removed
+    removed : tuple of RemovedObservation
         Rejected observations.
     rounds : int
         Number of adjustments.
-    suspects : tuple of Removed
+    suspects : tuple of RemovedObservation
         Exact observations, which are never rejected, that were significant in the first adjustment;
         rejected readings may be consequences of their errors.
-    needed : tuple of Removed
+    needed : tuple of RemovedObservation
         Significant observations that were kept because unknowns would otherwise be undetermined.
     """
 
@@ -53,7 +53,7 @@ class Cleaned:
 
 
 @dataclass(frozen=True)
-class Removed:
+class RemovedObservation:
     """A rejected observation: kind, source, row in the source, and test statistic."""
 
     kind: str
@@ -83,7 +83,7 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
 
     Returns
     -------
-    Cleaned
+    CleanedSurvey
 
     Raises
     ------
@@ -95,7 +95,7 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
     if test not in ("w", "tau"):
         raise ValueError(f"test {test!r}: w or tau")
     candidates = _Candidates(survey)
-    survey = candidates.with_kept(survey)
+    survey = candidates.restore_kept(survey)
     adjusted, rounds = adjust(survey, **options), 1
     limit = _limit(adjusted, critical, test)
     suspects = _suspects(adjusted, limit)
@@ -120,18 +120,21 @@ def snoop(survey, *, critical=CRITICAL, test="w", robust=True, max_rounds=200, *
 
     result = search(
         adjusted, tests, readjust, at_once=AT_ONCE, returns=RETURNS,
-        choose=candidates.one_of_each_point, keep=True, rounds=max_rounds,
+        choose=candidates.choose_one_per_point, keep=True, rounds=max_rounds,
     )  # fmt: skip
     survey = result.adjustment.survey
-    removed = candidates.listed(candidates.shares(survey) == 0, result.statistic)
-    needed = candidates.listed(result.needed, result.statistic)
-    return Cleaned(result.adjustment, survey, removed, rounds + result.rounds, suspects, needed)
+    removed = candidates.list_removed(candidates.shares(survey) == 0, result.statistic)
+    needed = candidates.list_removed(result.needed, result.statistic)
+    rounds += result.rounds
+    return CleanedSurvey(result.adjustment, survey, removed, rounds, suspects, needed)
 
 
 def _suspects(adjusted, limit):
     """Exact observations that contradict the others, the worst first."""
     suspects = [
-        Removed(table.kind, table.source, int(table.rows[i]), float(table.test_statistic[i]))
+        RemovedObservation(
+            table.kind, table.source, int(table.rows[i]), float(table.test_statistic[i])
+        )
         for table in adjusted.residuals
         if table.exact
         for i in np.flatnonzero(table.test_statistic > limit)
@@ -147,7 +150,7 @@ def _limit(adjusted, critical, test):
     return adjusted.sigma0 * tau_limit(alpha, adjusted.dof)
 
 
-def kept_of(observations, kept):
+def kept_rows(observations, kept):
     """Mask (n,) of observations from readings that are kept, (file, row) each."""
     trace = observations.trace
     if trace is None:
@@ -230,9 +233,9 @@ class _Candidates:
         self.kinds = {source: table.kind for source, table in tables.items()}
         self.kept = np.zeros(self.count, dtype=bool)
         for source, table in tables.items() if survey.kept else ():
-            self.kept[self.slices[source]] = kept_of(table, survey.kept)
+            self.kept[self.slices[source]] = kept_rows(table, survey.kept)
 
-    def with_kept(self, survey):
+    def restore_kept(self, survey):
         """The survey in which all kept readings are adjusted, even if initially rejected."""
         if not self.kept.any():
             return survey
@@ -264,7 +267,7 @@ class _Candidates:
         """The survey with weight factors (k,)."""
         return set_use(survey, {source: share[places] for source, places in self.slices.items()})
 
-    def one_of_each_point(self, adjusted, goes, share):
+    def choose_one_per_point(self, adjusted, goes, share):
         """Reduce rejections to one per point: the others may result from its blunder.
 
         Of two equal observations (each the only control of the other), the first one read is
@@ -301,11 +304,11 @@ class _Candidates:
         largest[order[np.append(True, np.diff(owner[order]) > 0)]] = True
         return goes & largest
 
-    def listed(self, which, statistic):
+    def list_removed(self, which, statistic):
         """Removed for each of `which`, the worst first."""
         w = np.where(np.isnan(statistic), 0.0, statistic)
         rows = [
-            Removed(self.kinds[source], source, int(i), float(w[places][i]))
+            RemovedObservation(self.kinds[source], source, int(i), float(w[places][i]))
             for source, places in self.slices.items()
             for i in np.flatnonzero(which[places])
         ]

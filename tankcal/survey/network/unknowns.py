@@ -159,7 +159,7 @@ LISTED = 3  # parts listed in a sentence; more of a kind are counted
 NAMED = 5  # names listed
 
 
-def in_words(survey, layout, table, directions):
+def describe_directions(survey, layout, table, directions):
     """Describe the unknowns in undetermined directions (unknowns, d)."""
     size = np.append(np.sqrt(np.sum(directions**2, axis=1)), 0.0)
     # Small components of a singular vector are rounding, not participation.

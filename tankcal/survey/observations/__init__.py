@@ -1,6 +1,6 @@
 """Kinds of observation: their equations and derivatives."""
 
-from tankcal.survey.observations.base import Layout, Observations, State
+from tankcal.survey.observations.base import NUISANCES, Layout, Observations, State
 from tankcal.survey.observations.coordinates import (
     ControlCoordinates,
     HeightDifferences,
@@ -11,7 +11,6 @@ from tankcal.survey.observations.coordinates import (
 )
 from tankcal.survey.observations.correlated import Block, Correlated
 from tankcal.survey.observations.kinds import KINDS, Kind
-from tankcal.survey.observations.nuisance import NUISANCES
 from tankcal.survey.observations.photographs import (
     HeldOrientation,
     ImageCoordinates,

@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.survey.observations.base import Observations
-from tankcal.survey.observations.nuisance import NUISANCES
+from tankcal.survey.observations.base import NUISANCES, Observations
 
 _UNITS = np.eye(3)  # derivatives of a coordinate by x, y, z
 

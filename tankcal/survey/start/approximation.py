@@ -107,7 +107,7 @@ def approximate(survey, seed=0, wall=None):
         if odds < ODDS:
             break
     _, _, piece, reasons = min(results, key=lambda result: result[:2])
-    return _filled(clues, piece, sure, hints, centre, reasons)
+    return _fill_start_values(clues, piece, sure, hints, centre, reasons)
 
 
 def _grow_all(clues, sure, hints):
@@ -148,7 +148,7 @@ def _centre(sure, hints):
 
 def _extend_by_hints(clues, piece, sure, hints, least):
     """Extend a Piece by approximate values, joined by common places or used directly."""
-    if _all_found(piece) or hints.nothing:
+    if _is_complete(piece) or hints.nothing:
         return piece
     if (piece.known.sum() + piece.oriented.sum()) >= ENOUGH:
         local = grow_piece(clues, _credible(clues, hints.without(sure).piece), least)
@@ -156,9 +156,9 @@ def _extend_by_hints(clues, piece, sure, hints, least):
         motion = joint(local, piece, clues.rng) if common >= ENOUGH else None
         # A good joint shows that the hints only have another frame.
         if motion is not None and motion.misfit_m < BAD_JOINT * piece.extent:
-            joined = piece.filled_from(local.moved(motion))
+            joined = piece.fill_from(local.moved(motion))
             return grow_piece(clues, add_points(clues.sights, joined), least)
-    merged = _credible(clues, piece.filled_from(hints.piece), piece.oriented)
+    merged = _credible(clues, piece.fill_from(hints.piece), piece.oriented)
     return grow_piece(clues, merged, least)
 
 
@@ -177,7 +177,7 @@ def _credible(clues, piece, held=False):
     removable = piece.oriented & ~np.asarray(held)
     remaining = removable.copy()
     while remaining.any():
-        piece = _without(piece, removable & ~remaining)
+        piece = _remove_photos(piece, removable & ~remaining)
         trial, photos = add_points(clues.sights, piece), np.flatnonzero(remaining)
         errors = np.array([photo_error(clues.sights[i], trial, i) for i in photos])
         bad = errors > KEPT_ERROR
@@ -188,10 +188,10 @@ def _credible(clues, piece, held=False):
         remaining[photos[order[: max(1, bad.sum() // 2)]]] = False
         if remaining.sum() < MOSTLY * removable.sum():
             remaining[:] = False
-    return _without(piece, removable & ~remaining)
+    return _remove_photos(piece, removable & ~remaining)
 
 
-def _without(piece, photos):
+def _remove_photos(piece, photos):
     """The Piece without the photos of a mask (photos,)."""
     return replace(
         piece,
@@ -200,11 +200,11 @@ def _without(piece, photos):
     )
 
 
-def _all_found(piece):
+def _is_complete(piece):
     return piece.known.all() and piece.oriented.all()
 
 
-def _filled(clues, piece, sure, hints, centre, reasons):
+def _fill_start_values(clues, piece, sure, hints, centre, reasons):
     """The Survey with the start values; given values stay where they agree with the computed
     ones."""
     survey, given_piece = clues.survey, hints.piece

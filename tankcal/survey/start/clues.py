@@ -12,7 +12,7 @@ from tankcal.survey.start.photographs import Wall, grow_by_photos, wall_of
 from tankcal.survey.start.pieces import empty, joint
 from tankcal.survey.start.plan import Plan
 from tankcal.survey.start.plan_frames import find_plan_positions
-from tankcal.survey.start.polar import improved_in_plan
+from tankcal.survey.start.polar import improve_plan_positions
 from tankcal.survey.start.single_points import misfit_of_places, position_single_points
 
 AS_WELL = 1e-6  # share of the extent: misfits closer than this are equal
@@ -72,7 +72,7 @@ def grow_piece(clues, piece, least, free=False):
     while True:
         before = np.isfinite(piece.xyz_m).sum() + piece.oriented.sum()
         piece = _add_by_vectors(clues, piece, free)
-        piece = _add_by_tapes(clues, _surveyed(clues, piece, free), free)
+        piece = _add_by_tapes(clues, _add_by_survey(clues, piece, free), free)
         wall = clues.wall or wall_of(piece.xyz_m)
         piece = grow_by_photos(clues.sights, piece, clues.rng, wall, least)
         if np.isfinite(piece.xyz_m).sum() + piece.oriented.sum() == before:
@@ -115,7 +115,7 @@ def _add_by_mixtures(clues, piece):
     return replace(piece, xyz_m=xyz, by_photos=piece.by_photos & ~new)
 
 
-def _surveyed(clues, piece, free):
+def _add_by_survey(clues, piece, free):
     """Add points from angles, distances and levels."""
     if clues.silent:
         return piece
@@ -125,7 +125,7 @@ def _surveyed(clues, piece, free):
         return piece
     # Compute the new positions again from all their sights, so that blunders are outvoted.
     if np.isfinite(xyz[:, 2]).any():
-        xy = improved_in_plan(clues.plan, xyz[:, :2], xyz[:, 2], ~new[:, 0])
+        xy = improve_plan_positions(clues.plan, xyz[:, :2], xyz[:, 2], ~new[:, 0])
         first = np.where(new[:, 2], np.nan, xyz[:, 2])
         if not np.isfinite(first).any():
             # Heights without a known value start from one of the computed heights.
@@ -166,14 +166,14 @@ def _add_by_tapes(clues, piece, free):
         # Distances do not determine the handedness, so both mirror images are tried.
         either = [_piece_of(clues, points, places * mirror) for mirror in ([1, 1, 1], [1, 1, -1])]
         if free and not known.any():
-            return piece.filled_from(either[0])
-        joined = _joined(clues, piece, either)
+            return piece.fill_from(either[0])
+        joined = _join_mirror_image(clues, piece, either)
         if joined is not None:
             return joined
     return piece
 
 
-def _joined(clues, piece, either):
+def _join_mirror_image(clues, piece, either):
     """Join the mirror image that agrees with the readings; None if neither or both do.
 
     Known points in one plane leave the side of the other points undetermined.
@@ -183,7 +183,7 @@ def _joined(clues, piece, either):
     for image, motion in zip(either, motions, strict=True):
         if motion is None:
             continue
-        filled = piece.filled_from(image.moved(motion))
+        filled = piece.fill_from(image.moved(motion))
         new = np.flatnonzero(filled.known & ~piece.known)
         misfit = misfit_of_places(clues.survey, clues.plan, filled.xyz_m, new)
         candidates.append((misfit + motion.misfit_m, filled))

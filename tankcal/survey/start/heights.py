@@ -50,7 +50,7 @@ def add_heights(survey, plan, xyz_m, free):
     unknown = tied[has_datum[label[tied]] & ~np.isfinite(z[tied])]
     if len(unknown):
         rows = has_datum[label[start]]
-        z[unknown] = _balanced(z, unknown, start[rows], end[rows], rise[rows])
+        z[unknown] = _balance_heights(z, unknown, start[rows], end[rows], rise[rows])
     return np.column_stack([xyz_m[:, :2], z])
 
 
@@ -72,7 +72,7 @@ def _differences(survey, plan, xyz_m):
     return start, end, rise
 
 
-def _balanced(z, unknown, start, end, rise):
+def _balance_heights(z, unknown, start, end, rise):
     """Heights (k,) of unknown points with the least sum of absolute misfits."""
     place = np.full(len(z), -1)
     place[unknown] = np.arange(len(unknown))

@@ -10,7 +10,7 @@ from tankcal.survey.start.pieces import Piece
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownPositions:
     """Known positions as a Piece; each coordinate of a point may be known separately."""
 
     piece: Piece
@@ -24,7 +24,7 @@ class Known:
         """Omit points and photos known in another Known."""
         piece, is_known = self.piece, np.isfinite(reference.piece.xyz_m).any(axis=1)
         photos = reference.piece.oriented
-        return Known(
+        return KnownPositions(
             replace(
                 piece,
                 xyz_m=np.where(is_known[:, None], np.nan, piece.xyz_m),
@@ -37,21 +37,22 @@ class Known:
     def shifted(self, shift_m):
         """Shift the frame."""
         piece = self.piece
-        return Known(replace(piece, xyz_m=piece.xyz_m + shift_m, place_m=piece.place_m + shift_m))
+        xyz_m, place_m = piece.xyz_m + shift_m, piece.place_m + shift_m
+        return KnownPositions(replace(piece, xyz_m=xyz_m, place_m=place_m))
 
 
 def certain_places(survey):
     """Known positions that are fixed or observed, of points with measurements."""
     xyz = np.full((len(survey.points), 3), np.nan)
     if survey.fixed is not None:
-        xyz = np.where(survey.fixed & _measured(survey)[:, None], survey.xyz_m, xyz)
+        xyz = np.where(survey.fixed & _measured_points(survey)[:, None], survey.xyz_m, xyz)
     for item in survey.observations:
         if isinstance(item, ControlCoordinates):
             accepted = item.in_use
             xyz[item.point[accepted], item.axis[accepted]] = item.value[accepted]
     photos = survey.photos
     if photos is None:
-        return Known(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
+        return KnownPositions(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
     place, angles, rotation = _photos_observed(survey)
     if photos.fixed is not None:
         place = np.where(photos.fixed[:, :3], photos.xyz_m, place)
@@ -59,7 +60,7 @@ def certain_places(survey):
     has_angles = np.isfinite(angles).all(axis=1) & np.isnan(rotation).any(axis=(1, 2))
     if has_angles.any():
         rotation[has_angles] = rotation_of_angles(*angles[has_angles].T)
-    return Known(_piece(xyz, place, rotation))
+    return KnownPositions(_piece(xyz, place, rotation))
 
 
 def _photos_observed(survey):
@@ -76,13 +77,13 @@ def _photos_observed(survey):
 
 def hinted_places(survey):
     """All given start values, whatever their quality, of points with measurements."""
-    photos, xyz = survey.photos, np.where(_measured(survey)[:, None], survey.xyz_m, np.nan)
+    photos, xyz = survey.photos, np.where(_measured_points(survey)[:, None], survey.xyz_m, np.nan)
     if photos is None:
-        return Known(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
-    return Known(_piece(xyz, photos.xyz_m, photos.rotation))
+        return KnownPositions(_piece(xyz, np.zeros((0, 3)), np.zeros((0, 3, 3))))
+    return KnownPositions(_piece(xyz, photos.xyz_m, photos.rotation))
 
 
-def _measured(survey):
+def _measured_points(survey):
     """Mask (points,) of points in an image or an observation."""
     mask = np.zeros(len(survey.points), dtype=bool)
     if survey.image_points is not None:

@@ -8,6 +8,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, shortest_path
 
+from tankcal.adjust import Damping, gauss_newton
+
 MOST = 400  # points of a network of distances
 TRIES = 12
 STEPS = 80
@@ -47,7 +49,7 @@ def lay_out_networks(low, high, length, dims, rng):
             continue
         place = np.full(len(points), -1)
         place[nodes] = np.arange(len(nodes))
-        places = _solved(place[a[rows]], place[b[rows]], length[rows], len(nodes), dims, rng)
+        places = _place_network(place[a[rows]], place[b[rows]], length[rows], len(nodes), dims, rng)
         if places is not None:
             firm = _firm(places, place[a[rows]], place[b[rows]], dims)
             yield points[nodes[firm]], places[firm]
@@ -65,7 +67,7 @@ def _well_tied(nodes, a, b, dims):
         nodes = remaining
 
 
-def _solved(a, b, length, n, dims, rng):
+def _place_network(a, b, length, n, dims, rng):
     """Places (n, dims) that fit the distances, or None."""
     graph = coo_array((length, (a, b)), shape=(n, n)).tocsr()
     ways = shortest_path(graph, directed=False)
@@ -78,8 +80,8 @@ def _solved(a, b, length, n, dims, rng):
     start = vectors[:, -dims:] * np.sqrt(np.maximum(values[-dims:], 0.0))
     for trial in range(TRIES):
         shake = 0.0 if not trial else 0.3 * np.median(length)
-        xyz = _adjusted(start + shake * rng.normal(size=start.shape), a, b, length)
-        xyz = _unfolded(xyz, a, b, length)
+        xyz = _fit_places(start + shake * rng.normal(size=start.shape), a, b, length)
+        xyz = _unfold(xyz, a, b, length)
         off = np.abs(np.linalg.norm(xyz[a] - xyz[b], axis=1) - length)
         # 80 % of the distances must fit: blunders may remain.
         keep = np.sort(off / length)[min(len(off) - 1, int(0.8 * len(off)))]
@@ -88,7 +90,7 @@ def _solved(a, b, length, n, dims, rng):
     return None
 
 
-def _unfolded(xyz, a, b, length):
+def _unfold(xyz, a, b, length):
     """Move points on the wrong side to the position that fits their neighbours."""
     for _ in range(UNFOLDING):
         off = np.abs(np.linalg.norm(xyz[a] - xyz[b], axis=1) - length) / length
@@ -104,7 +106,7 @@ def _unfolded(xyz, a, b, length):
         right = np.sum((xyz[near] - middle) ** 2, axis=1) - away**2
         moved = xyz.copy()
         moved[node] = middle + np.linalg.lstsq(rows, right - right.mean(), rcond=None)[0]
-        moved = _adjusted(moved, a, b, length)
+        moved = _fit_places(moved, a, b, length)
         new = np.abs(np.linalg.norm(moved[a] - moved[b], axis=1) - length) / length
         if not new.sum() < off.sum():
             break
@@ -112,10 +114,14 @@ def _unfolded(xyz, a, b, length):
     return xyz
 
 
+def _distances(xyz, a, b):
+    """Distances (n,) between places, above zero for the derivatives."""
+    return np.maximum(np.linalg.norm(xyz[a] - xyz[b], axis=1), 1e-12)
+
+
 def _rows(xyz, a, b):
     """Derivatives (n, points dims) of distances, and the distances (n,)."""
-    d = xyz[a] - xyz[b]
-    s = np.maximum(np.linalg.norm(d, axis=1), 1e-12)
+    d, s = xyz[a] - xyz[b], _distances(xyz, a, b)
     jac = np.zeros((len(a), *xyz.shape))
     rows = np.arange(len(a))
     jac[rows, a] = d / s[:, None]
@@ -123,29 +129,36 @@ def _rows(xyz, a, b):
     return jac.reshape(len(a), -1), s
 
 
-def _adjusted(xyz, a, b, length):
+def _fit_places(xyz, a, b, length):
     """Places after damped Gauss-Newton steps with Cauchy weights beyond the median misfit."""
-    damping = 1e-3
-    for _ in range(STEPS):
-        jac, s = _rows(xyz, a, b)
-        off = s - length
-        scale = max(3 * float(np.median(np.abs(off))), 1e-9 * float(length.max()))
-        cost = float(np.sum(np.log1p((off / scale) ** 2)))
-        weight = 1 / (1 + (off / scale) ** 2)
+
+    def scale_of(off):
+        return max(3 * float(np.median(np.abs(off))), 1e-9 * float(length.max()))
+
+    def step_at(xyz, damping):
+        jac, distance = _rows(xyz, a, b)
+        off = distance - length
+        weight = 1 / (1 + (off / scale_of(off)) ** 2)
         normal = (jac * weight[:, None]).T @ jac
-        step = -np.linalg.solve(
-            normal + damping * np.eye(len(normal)), jac.T @ (weight * off)
-        ).reshape(xyz.shape)
-        new = np.linalg.norm((xyz + step)[a] - (xyz + step)[b], axis=1) - length
-        if float(np.sum(np.log1p((new / scale) ** 2))) < cost:
-            xyz, damping = xyz + step, max(damping / 5, 1e-9)
-            if np.abs(step).max() < 1e-9 * length.max():
-                break
-        else:
-            damping *= 10
-            if damping > 1e6:
-                break
-    return xyz
+        gradient = jac.T @ (weight * off)
+        return -np.linalg.solve(normal + damping * np.eye(len(normal)), gradient)
+
+    def is_better(candidate, xyz):
+        off, new = (_distances(places, a, b) - length for places in (xyz, candidate))
+        # Both costs refer to one scale; otherwise a larger scale would seem to reduce the cost.
+        scale = scale_of(off)
+        old_cost, new_cost = (float(np.sum(np.log1p((v / scale) ** 2))) for v in (off, new))
+        return new_cost < old_cost
+
+    return gauss_newton(
+        step_at,
+        xyz,
+        move=lambda xyz, step: xyz + step.reshape(xyz.shape),
+        is_better=is_better,
+        is_small=lambda step: np.abs(step).max() < 1e-9 * length.max(),
+        most_steps=STEPS,
+        damping=Damping(relax=5.0, most=1e6),
+    )
 
 
 def _rigid(xyz, a, b):

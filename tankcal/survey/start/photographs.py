@@ -134,7 +134,7 @@ def _pose(piece, sights, photo, rng, wall):
     poses = [pose for pose in poses if pose.error < WORST_ERROR]
     if len(points) > 3 and len(poses) < 2:
         return poses[0] if poses else None
-    return _decided(points, poses, piece, sights, photo, wall)
+    return _decide_pose(points, poses, piece, sights, photo, wall)
 
 
 def _three(points, ideal):
@@ -146,7 +146,7 @@ def _three(points, ideal):
     ]
 
 
-def _decided(points, poses, piece, sights, photo, wall):
+def _decide_pose(points, poses, piece, sights, photo, wall):
     """The Pose selected by tie points or the wall among poses that fit the known points, or
     None."""
     if wall is not None:

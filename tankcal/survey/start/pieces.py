@@ -59,7 +59,7 @@ class Piece:
             rotation=self.rotation @ motion.rotation.T,
         )
 
-    def filled_from(self, other):
+    def fill_from(self, other):
         """Add positions known only in another Piece of the same frame."""
         photos = self.oriented
         return replace(
@@ -114,13 +114,16 @@ def joint(piece, onto, rng):
     motions = _motions_of_triples(here, there, rng)
     turns = onto.rotation[photos].transpose(0, 2, 1) @ piece.rotation[photos]
     # A common photo gives the rotation; scale and shift follow from the other places.
-    motions += [_turned(turn, here, there, piece.place_m[photos][i], onto.place_m[photos][i])
-                for i, turn in enumerate(turns)]  # fmt: skip
+    centres, targets = piece.place_m[photos], onto.place_m[photos]
+    motions += [
+        _motion_with_rotation(turn, here, there, centre, target)
+        for turn, centre, target in zip(turns, centres, targets, strict=True)
+    ]
     motions = [motion for motion in motions if motion is not None]
     if not motions:
         return None
     best = min(motions, key=lambda motion: motion.misfit_m)
-    return _polished(best, here, there)
+    return _polish(best, here, there)
 
 
 def similarity(here, there, weight=None):
@@ -175,7 +178,7 @@ def _motions_of_triples(here, there, rng):
     return motions
 
 
-def _turned(turn, here, there, centre, onto):
+def _motion_with_rotation(turn, here, there, centre, onto):
     """The Motion with a known rotation that maps one place onto another; other places give the
     scale."""
     before = np.linalg.norm(here - centre, axis=1)
@@ -188,7 +191,7 @@ def _turned(turn, here, there, centre, onto):
     return _motion_with_misfit(turn, onto - scale * turn @ centre, scale, here, there)
 
 
-def _polished(motion, here, there):
+def _polish(motion, here, there):
     """Refit a Motion to all places with Cauchy weights beyond its misfit."""
     if len(here) < 3:
         return motion

@@ -105,7 +105,7 @@ def look_up(groups, values, wanted):
 
 def plan_of(survey):
     """The Plan of a survey, without rejected observations."""
-    groups = [_used(item) for item in survey.observations]
+    groups = [_remove_rejected(item) for item in survey.observations]
     circles = _Circles(len(survey.sets))
     for item in groups:
         if isinstance(item, Directions):
@@ -120,12 +120,12 @@ def plan_of(survey):
     )
 
 
-def _used(observations):
+def _remove_rejected(observations):
     """Observations without rejected rows."""
     return observations if observations.use is None else observations.taken(observations.use > 0)
 
 
-def _joined(parts, kinds):
+def _join_columns(parts, kinds):
     """Columns (n,) of each kind from tuples of columns."""
     columns = list(zip(*parts, strict=True)) if parts else [()] * len(kinds)
     return [
@@ -145,7 +145,7 @@ def _distances(survey, groups):
             length = (item.value - offset[item.instrument]) / (1 + scale[item.instrument])
             flat = np.full(len(item), item.horizontal)
             parts.append((item.start, item.end, length, flat, _rise(item)))
-    return _joined(parts, (int, int, float, bool, float))
+    return _join_columns(parts, (int, int, float, bool, float))
 
 
 def _slopes(groups):
@@ -157,7 +157,7 @@ def _slopes(groups):
             slope = np.pi / 2 - item.value if item.zenith else item.value
             bend = np.full(len(item), item.bend_per_m)
             parts.append((item.start, item.end, slope, _rise(item), bend))
-    return _joined(parts, (int, int, float, float, float))
+    return _join_columns(parts, (int, int, float, float, float))
 
 
 def _rise(sights):
@@ -196,7 +196,7 @@ class _Circles:
             for first in links:
                 if first in chained:
                     continue
-                chain = _chained(first, links)
+                chain = _chain_angles(first, links)
                 chained |= set(chain)
                 rows = np.array(list(chain)), np.array(list(chain.values()))
                 count = len(chain)
@@ -205,7 +205,7 @@ class _Circles:
                 self.north.append(False)
 
     def rows(self):
-        return _joined(self.parts, (int, int, int, float))
+        return _join_columns(self.parts, (int, int, int, float))
 
     def zeros(self):
         station, _, circle, _ = self.rows()
@@ -214,7 +214,7 @@ class _Circles:
         return np.array(self.north, dtype=bool), at
 
 
-def _chained(first, links):
+def _chain_angles(first, links):
     """Readings {target: rad} from angles between targets, the first target at zero."""
     readings, queue = {first: 0.0}, [first]
     # Breadth-first: each reading is the sum of as few angles as possible.

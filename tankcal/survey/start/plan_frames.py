@@ -55,7 +55,7 @@ def find_plan_positions(plan, xy_m, z_m, rng):
     while True:
         if main.known.any():
             # Lengths would contradict a frame with an arbitrary scale.
-            plain = plan if main.scaled else _without_lengths(plan)
+            plain = plan if main.scaled else _remove_lengths(plan)
             main = replace(main, xy_m=grow_in_plan(plain, main.xy_m, z_m, main.north))
         pieces = _locals(plan, main, z_m, rng)
         if not main.known.any() and pieces:
@@ -64,8 +64,8 @@ def find_plan_positions(plan, xy_m, z_m, rng):
             main = replace(main, mirrored=False)
             continue
         unjoined, before = [], main.known.sum()
-        for piece in _merged(pieces):
-            joined = _joined(piece, main)
+        for piece in _merge_frames(pieces):
+            joined = _join(piece, main)
             if joined is None:
                 unjoined.append(piece)
             else:
@@ -74,7 +74,7 @@ def find_plan_positions(plan, xy_m, z_m, rng):
             return main.xy_m, unjoined
 
 
-def _without_lengths(plan):
+def _remove_lengths(plan):
     """The Plan without distances."""
     none = slice(0, 0)
     return replace(
@@ -130,7 +130,7 @@ def _grown(plan, z_m, first, second, base):
     xy = np.full((plan.points, 2), np.nan)
     xy[first], xy[second] = 0.0, (0.0, 1.0 if np.isnan(base) else base)
     if np.isnan(base):
-        xy = grow_in_plan(_without_lengths(plan), xy, z_m, north=False)
+        xy = grow_in_plan(_remove_lengths(plan), xy, z_m, north=False)
         pair, length = plan.lengths(z_m)
         low, high = np.divmod(pair, plan.points)
         ratio = length / np.linalg.norm(xy[low] - xy[high], axis=1)
@@ -184,7 +184,7 @@ def _size(piece):
     return piece.scaled, piece.known.sum()
 
 
-def _merged(pieces):
+def _merge_frames(pieces):
     """Local frames joined with each other where possible, the largest first."""
     pieces = sorted(pieces, key=_size, reverse=True)
     merged = []
@@ -194,7 +194,7 @@ def _merged(pieces):
         while grown:
             grown, unjoined = False, []
             for piece in rest:
-                joined = None if main.mirrored else _joined(piece, main)
+                joined = None if main.mirrored else _join(piece, main)
                 main, grown = (main, grown) if joined is None else (joined, True)
                 unjoined += [piece] if joined is None else []
             rest = unjoined
@@ -203,7 +203,7 @@ def _merged(pieces):
     return merged
 
 
-def _joined(piece, onto):
+def _join(piece, onto):
     """The Local `onto` extended by another one, or None if too little is common."""
     stiff = piece.scaled and onto.scaled
     common = np.flatnonzero(piece.known & onto.known)

@@ -74,17 +74,17 @@ def orient_circles(plan, xy_m, north=True):
         zeros_of_circle = zero[rows]
         tried = zeros_of_circle[:: max(1, len(zeros_of_circle) // 50)]
         # The sum of absolute differences is a median: blunders are outvoted.
-        off = np.abs(_wrapped(zeros_of_circle[None] - tried[:, None])).sum(axis=1)
-        zeros[circle] = _wrapped(tried[np.argmin(off)])
+        off = np.abs(_wrap_angles(zeros_of_circle[None] - tried[:, None])).sum(axis=1)
+        zeros[circle] = _wrap_angles(tried[np.argmin(off)])
     return np.where(plan.north, 0.0, zeros) if north else zeros
 
 
-def _wrapped(angle):
+def _wrap_angles(angle):
     """Angles reduced to -pi to pi."""
     return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
-def improved_in_plan(plan, xy_m, z_m, held, north=True):
+def improve_plan_positions(plan, xy_m, z_m, held, north=True):
     """Recompute each position in plan from the others, so that blunders are outvoted.
 
     Parameters
@@ -318,7 +318,7 @@ def free_station(targets, readings, lengths, controlled=False):
         return None
     d = targets[None] - poses[:, None, :2]
     away = np.linalg.norm(d, axis=-1)
-    turn = _wrapped(np.arctan2(d[..., 0], d[..., 1]) - readings - poses[:, 2:])
+    turn = _wrap_angles(np.arctan2(d[..., 0], d[..., 1]) - readings - poses[:, 2:])
     # Angular misfits become lengths at the distance of the target, comparable with distances.
     misfit = (away * np.abs(turn)).sum(axis=1) + np.nansum(np.abs(away - lengths), axis=1)
     best = choose_place(poses, misfit, np.median(away), controlled)
@@ -371,7 +371,7 @@ def _pose_from_two(targets, readings, lengths):
 
 def _poses_from_angle(targets, readings, length):
     """Poses (k, 3) from directions to two targets and the length to the first."""
-    angle = _wrapped(readings[1] - readings[0])
+    angle = _wrap_angles(readings[1] - readings[0])
     d = targets[1] - targets[0]
     base = np.hypot(*d)
     if abs(np.sin(angle)) < THIN or base < THIN * length:
@@ -387,5 +387,5 @@ def _poses_from_angle(targets, readings, length):
     first = np.arctan2(*(targets[0] - xy).T)
     second = np.arctan2(*(targets[1] - xy).T)
     # Only one arc of each circle has the measured angle; the other has its supplement.
-    right = np.abs(_wrapped(second - first - angle)) < 0.05
+    right = np.abs(_wrap_angles(second - first - angle)) < 0.05
     return np.column_stack([xy, first - readings[0]])[right]

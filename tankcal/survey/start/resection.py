@@ -12,6 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
+from tankcal.adjust import gauss_newton
 from tankcal.geometry.rotations import apply_small_rotation
 
 TRIPLES = 120  # samples of three points
@@ -90,13 +91,13 @@ def find_poses(xyz_m, ideal, rng, count=TRIPLES):
     poses = []
     for best in order[np.isfinite(errors[order])]:
         pose = refine_pose(xyz_m, ideal, Pose(centres[best], rotations[best], float(errors[best])))
-        if not any(_alike(pose, pose_before, xyz_m) for pose_before in poses):
+        if not any(_are_alike(pose, pose_before, xyz_m) for pose_before in poses):
             poses.append(pose)
     poses.sort(key=lambda pose: pose.error)
     return [item for item in poses if item.error <= RIVAL * poses[0].error + NOISE]
 
 
-def _alike(first, second, xyz_m):
+def _are_alike(first, second, xyz_m):
     """Whether two poses have the same position, relative to the distance of the points."""
     away = np.median(np.linalg.norm(xyz_m - second.xyz_m, axis=1))
     return np.linalg.norm(first.xyz_m - second.xyz_m) < SAME * away
@@ -217,30 +218,35 @@ def _frame(triangle):
 
 def refine_pose(xyz_m, ideal, pose):
     """Refine a Pose by Gauss-Newton with Cauchy weights beyond its error."""
-    centre, rotation = pose.xyz_m, pose.rotation
-    error = float(agreed_error(image_errors(xyz_m, ideal, centre[None], rotation[None]))[0])
-    for _ in range(REFINING_STEPS):
-        w, a = _linearised(xyz_m, ideal, centre, rotation)
+
+    def pose_at(centre, rotation):
+        errors = image_errors(xyz_m, ideal, centre[None], rotation[None])
+        return Pose(centre, rotation, float(agreed_error(errors)[0]))
+
+    def step_at(pose, _):
+        w, a = _linearise(xyz_m, ideal, pose.xyz_m, pose.rotation)
         size = np.linalg.norm(w, axis=1)
         # Few points have no reliable median, so the largest error sets the scale.
         middle = max(float(np.median(size)), float(size.max()) if len(size) < FEW else 1e-12)
         root = 1 / np.sqrt(1 + (size / (2 * middle)) ** 2)
-        step = np.linalg.lstsq(
+        return np.linalg.lstsq(
             (a * root[:, None, None]).reshape(-1, 6), -(w * root[:, None]).ravel(), rcond=None
         )[0]
-        candidate = centre + step[:3], apply_small_rotation(rotation[None], step[None, 3:])[0]
-        new_error = agreed_error(
-            image_errors(xyz_m, ideal, candidate[0][None], candidate[1][None])
-        )[0]
-        if not new_error < error * (1 + 1e-6):
-            break
-        (centre, rotation), error = candidate, float(new_error)
-        if np.abs(step).max() < 1e-9:
-            break
-    return Pose(centre, rotation, error)
+
+    return gauss_newton(
+        step_at,
+        pose_at(pose.xyz_m, pose.rotation),
+        move=lambda pose, step: pose_at(
+            pose.xyz_m + step[:3], apply_small_rotation(pose.rotation[None], step[None, 3:])[0]
+        ),
+        # The margin is rounding: the agreed error need not fall at the minimum of the squares.
+        is_better=lambda candidate, pose: candidate.error < pose.error * (1 + 1e-6),
+        is_small=lambda step: np.abs(step).max() < 1e-9,
+        most_steps=REFINING_STEPS,
+    )
 
 
-def _linearised(xyz_m, ideal, centre, rotation):
+def _linearise(xyz_m, ideal, centre, rotation):
     """Image errors (n, 2) over c, and derivatives (n, 2, 6) by position and rotation."""
     d = xyz_m - centre
     u, v, w = (d @ rotation.T).T

@@ -63,7 +63,7 @@ def position_single_points(survey, plan, xyz_m, sought_already):
     ndarray, shape (points, 3)
     """
     xyz, sought = xyz_m.copy(), 0
-    for point in np.flatnonzero(np.isnan(xyz_m).any(axis=1) & _tied(survey)):
+    for point in np.flatnonzero(np.isnan(xyz_m).any(axis=1) & _tied_points(survey)):
         result = sought_point(survey, plan, xyz, point, sought_already)
         sought += result.rows >= result.unknowns
         new = np.isfinite(result.place_m)
@@ -97,7 +97,7 @@ def sought_point(survey, plan, xyz_m, point, sought_already):
         result = Sought(np.full(3, np.nan), np.zeros((0, 3)), ties.rows, ties.unknowns)
         if ties.rows >= ties.unknowns > 0:
             if ties.key not in sought_already:
-                sought_already[ties.key] = _solved(ties)
+                sought_already[ties.key] = _search_position(ties)
             result = sought_already[ties.key]
         if np.isfinite(result.place_m).any():
             return result
@@ -128,7 +128,7 @@ def misfit_of_places(survey, plan, xyz_m, points):
     return total
 
 
-def _tied(survey):
+def _tied_points(survey):
     """Mask (points,) of points with angles, distances or levels."""
     mask = np.zeros(len(survey.points), dtype=bool)
     for item in survey.observations:
@@ -246,7 +246,7 @@ class _Ties:
                         fixed | {"orientation_rad": turns}, np.zeros((0, 7)))  # fmt: skip
         off, jac = [], []
         for item in self.groups:
-            many = self._copied(item, k)
+            many = self._repeat_observations(item, k)
             computed, derivatives = many.computed(state, True)
             size = self.extent if item.unit == "rad" else 1.0
             rows = np.zeros((len(many), self.unknowns + 1))
@@ -256,7 +256,7 @@ class _Ties:
             jac.append(size * rows[:, :-1].reshape(k, len(item), self.unknowns))
         return np.concatenate(off, axis=1), np.concatenate(jac, axis=1)
 
-    def _copied(self, item, k):
+    def _repeat_observations(self, item, k):
         """The observations k times, each with its own point and circles."""
         which = np.repeat(np.arange(k), len(item))
         many = item.taken(np.tile(np.arange(len(item)), k))
@@ -282,10 +282,10 @@ class _Ties:
         return state
 
 
-def _solved(ties):
+def _search_position(ties):
     """Search for the position of a point with enough observations."""
     with np.errstate(all="ignore"):
-        places = _settled(ties, ties.turned(ties.starts()))
+        places = _refine_positions(ties, ties.turned(ties.starts()))
     off, jac = ties.trial(places)
     misfit = np.abs(off).sum(axis=1)
     axes = len(ties.axes)
@@ -313,7 +313,7 @@ def _solved(ties):
     return Sought(place, rivals, ties.rows, ties.unknowns)
 
 
-def _settled(ties, places):
+def _refine_positions(ties, places):
     """Positions (k, unknowns) after damped Gauss-Newton steps, each independent."""
     off, jac = ties.trial(places)
     cost, damping = np.sum(off**2, axis=1), np.full(len(places), 1e-3)

@@ -12,7 +12,7 @@ The functions use plain arrays and are independent of a job. Source: ISO 4269:20
 from tankcal.tank.liquid.adjustment import Effect, LiquidAdjustment, adjust_steps
 from tankcal.tank.liquid.naming import Alternative, Verdict, name_causes
 from tankcal.tank.liquid.readings import ReadingEffects, reading_effects
-from tankcal.tank.liquid.reduction import Fill, Reduced, fill_of, reduce_steps
+from tankcal.tank.liquid.reduction import Fill, ReducedSteps, fill_of, reduce_steps
 from tankcal.tank.liquid.run_effect import RunEffect, estimate_run_effect
 
 __all__ = [
@@ -21,7 +21,7 @@ __all__ = [
     "Fill",
     "LiquidAdjustment",
     "ReadingEffects",
-    "Reduced",
+    "ReducedSteps",
     "RunEffect",
     "Verdict",
     "adjust_steps",

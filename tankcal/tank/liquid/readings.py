@@ -59,13 +59,13 @@ def reading_effects(metering, fill, reduced, volume_m3, area_m2, growth=None):
         Effect("dip_readings", dips * metering.s_dip_m[fill.dip_row]),
         Effect(
             "liquid_temperatures",
-            metering.u_temperature_c * _by_temperatures(metering, fill, reduced, volume_m3),
+            metering.u_temperature_c * _temperature_columns(metering, fill, reduced, volume_m3),
         ),
     ]
     common = [
-        Effect("meter_factor", -_by_factors(metering, fill, reduced)),
+        Effect("meter_factor", -_factor_columns(metering, fill, reduced)),
         Effect("dip_zero", metering.u_dip_zero_m * dips.sum(axis=1, keepdims=True)),
-        Effect("liquid_expansion", _by_expansion(metering, fill, volume_m3, growth)),
+        Effect("liquid_expansion", _expansion_columns(metering, fill, volume_m3, growth)),
     ]
     run_m3 = -reduced.metered_m3[:, None] * (fill.run[:, None] == np.arange(len(fill.runs)))
     return ReadingEffects(tuple(_nonzero_effects(noise)), tuple(_nonzero_effects(common)), run_m3)
@@ -86,7 +86,7 @@ def batch_sd_m3(metering, fill):
     return np.sqrt(np.sum(np.where(counted, row_sd, 0.0) ** 2, axis=1))
 
 
-def _by_factors(metering, fill, reduced):
+def _factor_columns(metering, fill, reduced):
     """Return the metered volume (n, meters) of each meter times the relative u of its factor."""
     meter_names = np.array(metering.meter)
     columns = [
@@ -96,7 +96,7 @@ def _by_factors(metering, fill, reduced):
     return np.stack(columns, axis=1)
 
 
-def _by_temperatures(metering, fill, reduced, volume_m3):
+def _temperature_columns(metering, fill, reduced, volume_m3):
     """Return the change (n, temperatures) of the misclosures per degree of each reading."""
     b, volume, end, start = metering.expansion_per_k, volume_m3, fill.end, fill.start
     tank = metering.tank_c[fill.dip_row]
@@ -113,7 +113,7 @@ def _by_temperatures(metering, fill, reduced, volume_m3):
     return np.hstack([by_rows[:, np.any(fill.batches, axis=0)], by_dips])
 
 
-def _by_expansion(metering, fill, volume_m3, growth):
+def _expansion_columns(metering, fill, volume_m3, growth):
     """Return the change (n, 1) of the misclosures for the standard uncertainty of the expansion."""
     b, u = metering.expansion_per_k, metering.u_expansion_per_k
     if not u:

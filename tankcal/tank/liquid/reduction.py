@@ -104,7 +104,7 @@ def fill_of(metering):
 
 
 @dataclass(frozen=True)
-class Reduced:
+class ReducedSteps:
     """Steps at the temperature of the table, compared with a geometry; m3, (n,) each.
 
     Attributes
@@ -142,7 +142,7 @@ class Reduced:
 
 
 def reduce_steps(metering, fill, volume_m3, growth=None):
-    """Return the `Reduced` steps of metered rows.
+    """Return the `ReducedSteps` steps of metered rows.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def reduce_steps(metering, fill, volume_m3, growth=None):
 
     Returns
     -------
-    Reduced
+    ReducedSteps
     """
     volume = np.asarray(volume_m3, dtype=float)
     shell_factors = np.ones(len(volume)) if growth is None else np.asarray(growth, dtype=float)
@@ -176,7 +176,7 @@ def reduce_steps(metering, fill, volume_m3, growth=None):
     by_row = in_tank / shell[:, None]
     geometry = volume[fill.end] - previous
     increment = by_row.sum(axis=1) + by_tank
-    return Reduced(
+    return ReducedSteps(
         indicated_m3=indicated.sum(axis=1),
         by_factor_m3=(at_meter - indicated).sum(axis=1),
         by_meter_temperature_m3=(in_tank - at_meter).sum(axis=1),

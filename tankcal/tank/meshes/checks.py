@@ -5,9 +5,9 @@ import scipy.sparse
 import scipy.sparse.csgraph
 
 from tankcal.errors import InputError, Problem
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.messages import message
 from tankcal.tank.meshes.part import Mesh, mesh_part, normals_of
+from tankcal.units import FULL_TURN
 
 SMALLEST_M, LARGEST_M = 0.05, 1000.0  # range of the largest extent: outside, the unit is wrong
 MOST_BODIES = 1000  # largest number of bodies

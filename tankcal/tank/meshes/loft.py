@@ -7,10 +7,10 @@ import numpy as np
 import scipy
 
 from tankcal.geometry.field.estimate import LEVELS
-from tankcal.geometry.outlines import FULL_TURN
 from tankcal.quadrature import height_basis
 from tankcal.tank.courses import gauss_levels
 from tankcal.tank.meshes.checks import closed_mesh
+from tankcal.units import FULL_TURN
 
 
 @dataclass(frozen=True)

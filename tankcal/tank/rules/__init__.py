@@ -2,15 +2,14 @@
 
 from tankcal.tank.rules.deviation import DeviationVerdict, StatedVolume, conformity_probability
 from tankcal.tank.rules.expanded import UncertaintyVerdict
-from tankcal.tank.rules.model import TANKS, DeviationLimit, Rule, UncertaintyLimit
-from tankcal.tank.rules.printed import Printed
+from tankcal.tank.rules.model import TANKS, DeviationLimit, PrintedU, Rule, UncertaintyLimit
 from tankcal.tank.rules.verdict import RuleVerdict, deliveries_to_check, judge
 
 __all__ = [
     "TANKS",
     "DeviationLimit",
     "DeviationVerdict",
-    "Printed",
+    "PrintedU",
     "Rule",
     "RuleVerdict",
     "StatedVolume",

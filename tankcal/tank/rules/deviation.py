@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, stdtr
 
-from tankcal.tank.rules.model import DeviationLimit
-from tankcal.tank.rules.printed import printed_of_table
+from tankcal.tank.rules.model import DeviationLimit, printed_of_table
 
 AT_TOP_M = 1e-3  # a dip within a millimetre of the last row counts as the top
 
@@ -129,7 +128,7 @@ def judge_deviation(limit, table, stated, printed=None):
     limit : DeviationLimit
     table : Capacity
     stated : StatedVolume
-    printed : Printed, optional
+    printed : PrintedU, optional
         Printed uncertainties; None: those of the table.
 
     Returns

@@ -21,8 +21,7 @@ from tankcal.tank.deliveries import (
     ratio_of,
     worst_deliveries,
 )
-from tankcal.tank.rules.model import UncertaintyLimit
-from tankcal.tank.rules.printed import printed_of_table
+from tankcal.tank.rules.model import UncertaintyLimit, printed_of_table
 
 _ROUNDING = 1e-12  # relative tolerance: U equal to the limit meets it
 _SAME_M = 1e-6  # heights of deliveries with a smaller difference are equal
@@ -78,7 +77,7 @@ def judge_uncertainty(limit, table, lowest_m=None, printed=None):
     lowest_m : float, optional
         Dip at the start of the calibrated zone; only rows from there on, and deliveries between
         them, are judged. None: all.
-    printed : Printed, optional
+    printed : PrintedU, optional
         Printed uncertainties; None: those of the table. The search for deliveries uses the U of the
         table; the worst delivery and all simulated deliveries have their printed U.
 

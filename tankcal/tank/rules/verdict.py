@@ -6,8 +6,7 @@ import numpy as np
 
 from tankcal.tank.rules.deviation import DeviationVerdict, judge_deviation
 from tankcal.tank.rules.expanded import UncertaintyVerdict, deliveries_to_judge, judge_uncertainty
-from tankcal.tank.rules.model import TANKS, Rule
-from tankcal.tank.rules.printed import printed_of_table
+from tankcal.tank.rules.model import TANKS, Rule, printed_of_table
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
         Dip at the start of the calibrated zone, see `judge_uncertainty`.
     stated : sequence of StatedVolume, optional
         Stated volumes for the deviations.
-    printed : Printed, optional
+    printed : PrintedU, optional
         Printed uncertainties, such as Monte Carlo's; None: those of the table.
 
     Returns

@@ -7,7 +7,7 @@ import traitlets
 
 from tankcal.errors import InputError, TankcalError
 from tankcal.job.contract.overrulings import DECISIONS
-from tankcal.report.web.wall_map import looked_at, why
+from tankcal.report.web.wall_map import list_inspected, reason_text
 from tankcal.text.words import say
 
 
@@ -27,7 +27,7 @@ class PointsPanel(traitlets.HasTraits):
     def __init__(self, paper, on_overrule):
         super().__init__()
         self.paper, self.on_overrule = paper, on_overrule
-        self.points = {item.name: item for item in looked_at(paper.record)}
+        self.points = {item.name: item for item in list_inspected(paper.record)}
         self.used = _read_deviations(paper.record)
         word = paper.word
         self.list = widgets.Select(
@@ -102,7 +102,7 @@ class PointsPanel(traitlets.HasTraits):
 
     def _line(self, point):
         """Text of a point in the list: name, deviation and reason."""
-        parts = [point.name, self._deviation(point), why(self.paper, point)]
+        parts = [point.name, self._deviation(point), reason_text(self.paper, point)]
         return " · ".join(part for part in parts if part)
 
     def _sentence(self, point):

@@ -6,8 +6,8 @@ by Monte Carlo, this U differs, and the answer states the difference of method.
 
 from dataclasses import dataclass, replace
 
-from tankcal.record.plain_data import to_plain
-from tankcal.record.statements import budget_lines
+from tankcal.record.schema import to_plain
+from tankcal.record.table import budget_lines
 from tankcal.report.numbers import degrees_of_freedom
 from tankcal.report.tables import Column
 from tankcal.report.uncertainty.budget import budget_table

@@ -47,7 +47,7 @@ class SingleReadings:
 
     Attributes
     ----------
-    of : ndarray of int, shape (k,)
+    row : ndarray of int, shape (k,)
         Row (mean) of each reading.
     share : ndarray, shape (k,)
         Share of the weight of each reading in the weight of its row.
@@ -57,14 +57,14 @@ class SingleReadings:
         Leverage of the orientation of the set of each reading, beyond that of the mean.
     """
 
-    of: np.ndarray
+    row: np.ndarray
     share: np.ndarray
     count: np.ndarray
     turn: np.ndarray
 
     def redundancy(self, of_rows):
         """Redundancy numbers (k, m) of the readings, from those of their rows, shape (n, m)."""
-        return 1.0 - self.share[:, None] * (1.0 - of_rows[self.of]) - self.turn[:, None]
+        return 1.0 - self.share[:, None] * (1.0 - of_rows[self.row]) - self.turn[:, None]
 
     def root(self):
         """Factor (k, 1) from the whitened row of the mean to the whitened row of a reading."""
@@ -164,7 +164,7 @@ class GroupReliability:
     per_unit_of: tuple
 
 
-def reliability(plan, predicted, covariance, by_points_m2):
+def assess_reliability(plan, network, covariance, by_points_m2):
     """Return a GroupReliability of each kind and name of readings (alpha 0.001, power 0.80).
 
     Parameters
@@ -181,12 +181,12 @@ def reliability(plan, predicted, covariance, by_points_m2):
     -------
     tuple of GroupReliability
     """
-    adjusted = predicted.adjusted
+    adjusted = network.adjusted
     problem, solution = adjusted.problem, adjusted.solution
     # Q g' is common to all readings; j Q g' is the effect of a whitened unit error.
-    pull = _covariance_with(
-        solution, problem.layout.points[covariance.points].ravel(), by_points_m2
-    )
+    # The last element belongs to fixed unknowns.
+    columns = problem.layout.points[covariance.points].ravel()
+    pull = np.append(covariances(solution.cofactor, columns, by_points_m2[None])[:, 0], 0.0)
     groups = []
     for number, table in enumerate(problem.observations):
         if table.trace is None:
@@ -200,28 +200,20 @@ def reliability(plan, predicted, covariance, by_points_m2):
     return tuple(groups)
 
 
-def _covariance_with(solution, columns, gradient):
-    """Product Q g' of a gradient g, shape (unknowns + 1,).
-
-    The last element (fixed unknowns) is 0.
-    """
-    return np.append(covariances(solution.cofactor, columns, gradient[None])[:, 0], 0.0)
-
-
 def _group_by_name(table, single, redundancy, effect):
     """Yield the GroupReliability of each name in one table of observations.
 
     single: SingleReadings of k readings; redundancy: (k, m) of the readings; effect: (n, m) of the
     rows.
     """
-    trace = table.trace.taken(single.of)
+    trace = table.trace.taken(single.row)
     names = np.array(trace.group, dtype=object)
     controlled = redundancy > UNCONTROLLED
     # delta0 / sqrt(r): smallest detectable blunder in standard deviations
     size = np.where(controlled, noncentrality() / np.sqrt(np.where(controlled, redundancy, 1)), 0)
-    weight = table.using(np.ones(len(table))).weight[single.of] * single.root()
+    weight = table.using(np.ones(len(table))).weight[single.row] * single.root()
     # The weight and the whitened effect of a single reading are sqrt(p) times those of the mean.
-    effect = effect[single.of] * single.root()
+    effect = effect[single.row] * single.root()
     blunder, volume = size / weight, size * effect
     per_unit = np.where(controlled, -1.0, effect * weight)
     for name in dict.fromkeys(names):

@@ -26,7 +26,7 @@ FIRST_ROUND = datetime.datetime(2000, 1, 1)  # arbitrary origin of times; only i
 CONTROL_SIGHT = {"zenith_deg": 88.0, "distance_m": 10.0}
 
 
-class Foreseen:
+class DesignTables:
     """Tables of a design on a tank.
 
     Attributes
@@ -40,7 +40,7 @@ class Foreseen:
         z of the bottom.
     zero_m : float
         Height of the table's zero above the bottom.
-    holds : callable or None
+    volume_at : callable or None
         Function of a dip that returns the approximate volume, m3; None without liquid.
     obstacles : tuple of Box or Pillar
         Sights that they cut are left out.
@@ -49,9 +49,9 @@ class Foreseen:
     """
 
     def __init__(
-        self, design, courses, radius_m, bottom_m, zero_m, holds=None, obstacles=(), bars=None
+        self, design, courses, radius_m, bottom_m, zero_m, volume_at=None, obstacles=(), bars=None
     ):
-        self.design, self.radius_m, self.holds = design, radius_m, holds
+        self.design, self.radius_m, self.volume_at = design, radius_m, volume_at
         self.bars, self.obstacles = bars or {}, obstacles
         self.bottom_m, self.zero_m = bottom_m, zero_m
         self.foot, foot = {}, 0.0
@@ -78,7 +78,7 @@ class Foreseen:
             tables["tangents"] = self._tangents(), MOST_TANGENTS
             tables |= {name: (rows, MOST_TANGENTS) for name, rows in self._traverse().items()}
         if self.design.runs:
-            tables["liquid"] = rows_of_runs(self.design.runs, self.holds), MOST_ROWS
+            tables["liquid"] = rows_of_runs(self.design.runs, self.volume_at), MOST_ROWS
         return {name: _table(name, islice(rows, most + 1)) for name, (rows, most) in tables.items()}
 
     def _height(self, course, percent):
@@ -167,34 +167,34 @@ class Foreseen:
                     for _ in range(lines.readings):
                         yield row
 
-    def _rings(self):
+    def _setups_of_hits(self):
         """Yield (ring, name of set-up, azimuth of set-up) of all set-ups."""
         for number, ring in enumerate(self.design.hits, 1):
-            for k in range(ring.setups):
-                turn = np.radians(ring.start_deg) + 2 * np.pi * k / ring.setups
-                yield ring, f"{number}-{k + 1}", turn
+            for k, turn in enumerate(_azimuths_of_ring(ring.start_deg, ring.setups), 1):
+                yield ring, f"{number}-{k}", turn
 
-    def _place(self, ring, azimuth):
+    def _ground_position(self, ring, azimuth):
+        """Position (2,) in a ring at an azimuth, unrounded."""
         return ring.radius_m * np.array([np.sin(azimuth), np.cos(azimuth)])
 
+    def _instrument_position(self, ring, azimuth):
+        """Position (3,) of the instrument, over the station as rounded in control.csv."""
+        station = self._ground_position(ring, azimuth).round(4)
+        return np.append(station, self.bottom_m + ring.height_m)
+
     def _setups(self):
-        for ring, name, _ in self._rings():
-            yield {
-                "setup": name,
-                "station": f"S{name}",
-                "instrument": ring.instrument,
-                "instrument_height_m": ring.height_m,
-            }
+        for ring, name, _ in self._setups_of_hits():
+            yield _setup_row(name, ring)
 
     def _stations(self):
-        for ring, name, azimuth in self._rings():
-            x, y = self._place(ring, azimuth).round(4)
+        for ring, name, azimuth in self._setups_of_hits():
+            x, y = self._ground_position(ring, azimuth).round(4)
             yield {"point": f"S{name}", "x_m": x, "y_m": y, "z_m": self.bottom_m}
 
     def _hits(self):
-        for ring, name, turn in self._rings():
+        for ring, name, turn in self._setups_of_hits():
             aims = self._azimuths(ring, turn)
-            station = np.append(self._place(ring, turn).round(4), self.bottom_m + ring.height_m)
+            station = self._instrument_position(ring, turn)
             for course in ring.courses:
                 for percent in ring.at_percent:
                     z = self.bottom_m + self._height(course, percent)
@@ -206,7 +206,7 @@ class Foreseen:
     def _control_readings(self):
         """Return the readings of all control targets of a set-up at placeholder positions."""
         control = self.design.control
-        for ring, name, turn in self._rings():
+        for ring, name, turn in self._setups_of_hits():
             for minutes in control.times_min(ring):
                 time = (FIRST_ROUND + datetime.timedelta(minutes=float(minutes))).isoformat()
                 for number in range(control.targets):
@@ -218,30 +218,31 @@ class Foreseen:
         """Azimuths (hits,) about the axis, evenly over the full turn or the visible part of it."""
         inside, spread = ring.radius_m < self.radius_m, ring.spread_deg
         if inside and (spread is None or spread >= 360):
+            # A set-up at a share of the turn starts at that share of a step: the hits interleave.
             step = 2 * np.pi / ring.hits
             return turn + step * (np.arange(ring.hits) + turn / 2 / np.pi)
-        wide = np.radians(spread or 0.0) if spread is not None else 2 * self._in_sight(ring)
+        wide = np.radians(spread) if spread is not None else 2 * self._visible_half(ring)
         if ring.hits == 1:
             return np.array([turn])
         return turn + wide * (np.arange(ring.hits) / (ring.hits - 1) - 0.5)
 
-    def _in_sight(self, ring):
+    def _visible_half(self, ring):
         """Half the range of azimuths visible from an outside set-up under at most STEEPEST."""
+        # Law of sines in the triangle of axis, set-up and point of the wall: the angle at the
+        # set-up has the sine (wall / ring) sin(incidence); the angle at the axis is the rest.
         part = self.radius_m / ring.radius_m
         return STEEPEST - np.arcsin(part * np.sin(STEEPEST))
 
-    def _stands(self):
+    def _traverse_stations(self):
         """Yield (name, instrument position (3,)) of the stations of a traverse."""
         ring = self.design.tangents
-        for k in range(ring.stations):
-            turn = np.radians(ring.start_deg) + 2 * np.pi * k / ring.stations
-            position = self._place(ring, turn).round(4)
-            yield str(k + 1), np.append(position, self.bottom_m + ring.height_m)
+        for k, turn in enumerate(_azimuths_of_ring(ring.start_deg, ring.stations), 1):
+            yield str(k), self._instrument_position(ring, turn)
 
     def _tangents(self):
         """Return readings of both limbs at each level, by station, with repetitions."""
         ring = self.design.tangents
-        for name, station in self._stands():
+        for name, station in self._traverse_stations():
             for course in self.foot:
                 for percent in ring.at_percent:
                     z = self.bottom_m + self._height(course, percent)
@@ -265,48 +266,41 @@ class Foreseen:
         x, y = station[:2] + length * np.array([np.sin(azimuth), np.cos(azimuth)])
         return np.array([x, y, z])
 
-    def stands(self):
+    def instrument_positions(self):
         """Return (name, instrument position (3,)) of set-ups of hits and stations of tangents."""
-        for ring, name, turn in self._rings():
-            yield name, np.append(self._place(ring, turn), self.bottom_m + ring.height_m)
+        for ring, name, turn in self._setups_of_hits():
+            yield name, np.append(self._ground_position(ring, turn), self.bottom_m + ring.height_m)
         if self.design.tangents is not None:
-            yield from self._stands()
+            yield from self._traverse_stations()
 
-    def lines_cut(self):
+    def cut_lines(self):
         """Return pairs of neighbouring traverse stations with an obstacle between them."""
-        stands = [] if self.design.tangents is None else list(self._stands())
-        for k, (name, station) in enumerate(stands):
-            after, beside = stands[(k + 1) % len(stands)]
-            if not self._sees(station, beside):
-                yield name, after
+        stations = [] if self.design.tangents is None else list(self._traverse_stations())
+        for k, (name, station) in enumerate(stations):
+            next_name, next_station = stations[(k + 1) % len(stations)]
+            if not self._sees(station, next_station):
+                yield name, next_name
 
     def _traverse(self):
         """Return {table: rows} of set-ups, their stations, and readings between neighbours."""
-        ring, stands = self.design.tangents, list(self._stands())
+        ring, stations = self.design.tangents, list(self._traverse_stations())
         s_mm, s_arcsec = ring.traverse
         kinds = _kinds_of_sights(s_mm, s_arcsec)
         kinds = kinds if s_mm is not None else kinds[:-1]
         rows = {"setups": [], "control": [], **{table: [] for table, _, _ in kinds}}
         rows |= {} if ring.bar is None else {"stadia": []}
-        for k, (name, station) in enumerate(stands):
-            rows["setups"].append(
-                {
-                    "setup": name,
-                    "station": f"S{name}",
-                    "instrument": ring.instrument,
-                    "instrument_height_m": ring.height_m,
-                }
-            )
+        for k, (name, station) in enumerate(stations):
+            rows["setups"].append(_setup_row(name, ring))
             x, y, _ = station
             rows["control"].append({"point": f"S{name}", "x_m": x, "y_m": y, "z_m": self.bottom_m})
-            for beside in ((k - 1) % len(stands), (k + 1) % len(stands)):
-                read = _sight(station, stands[beside][1])
-                row = {"setup": name, "to": f"S{stands[beside][0]}"}
+            for beside in ((k - 1) % len(stations), (k + 1) % len(stations)):
+                read = _sight(station, stations[beside][1])
+                row = {"setup": name, "to": f"S{stations[beside][0]}"}
                 for table, key, sd in kinds:
                     high = {"target_height_m": ring.height_m}
                     rows[table].append(row | {key: read[key]} | sd | high)
                 if ring.bar is not None:
-                    rows["stadia"].append(row | self._bar_sight(station, stands[beside][1]))
+                    rows["stadia"].append(row | self._bar_sight(station, stations[beside][1]))
         return rows
 
     def _bar_sight(self, station, beside):
@@ -320,19 +314,20 @@ class Foreseen:
         """Return readings of the targets between neighbouring set-ups of a ring."""
         targets, s_mm, s_arcsec = self.design.ties
         rows = {"directions": [], "zenith_angles": [], "slope_distances": []}
-        rings = list(self._rings())
         for number, ring in enumerate(self.design.hits, 1):
-            of_ring = [
-                setup for setup in rings if setup[0] is ring and setup[1].startswith(f"{number}-")
-            ]
-            for k, (_, name, turn) in enumerate(of_ring):
-                station = np.append(self._place(ring, turn).round(4), self.bottom_m + ring.height_m)
-                gaps = dict.fromkeys([k, (k - 1) % len(of_ring)]) if len(of_ring) > 1 else ()
+            turns = _azimuths_of_ring(ring.start_deg, ring.setups)
+            for k, turn in enumerate(turns):
+                station = self._instrument_position(ring, turn)
+                # Each set-up reads the targets in the gap after it and in the gap before it.
+                gaps = (k, (k - 1) % len(turns)) if len(turns) > 1 else ()
                 for gap in gaps:
                     for target in range(targets):
-                        position = self._target(ring, of_ring[gap][2], target)
+                        position = self._target(ring, turns[gap], target)
                         read = _sight(station, position)
-                        row = {"setup": name, "to": f"T{number}-{gap + 1}-{target + 1}"}
+                        row = {
+                            "setup": f"{number}-{k + 1}",
+                            "to": f"T{number}-{gap + 1}-{target + 1}",
+                        }
                         for table, key, sd in _kinds_of_sights(s_mm, s_arcsec):
                             rows[table].append(row | {key: read[key]} | sd)
         return rows
@@ -345,10 +340,29 @@ class Foreseen:
         return np.array([away * np.sin(azimuth), away * np.cos(azimuth), z])
 
 
+def _azimuths_of_ring(start_deg, count):
+    """Azimuths of the evenly distributed stations of a ring, rad."""
+    return [np.radians(start_deg) + 2 * np.pi * k / count for k in range(count)]
+
+
 def tangent_sight(station, z, radius_m, is_right):
     """Return {column: value} of a sight from a station to a limb of a circle about the origin.
 
-    The zero of the horizontal circle is +y; z is the height of the limb.
+    Parameters
+    ----------
+    station : array_like, shape (3,)
+        Position of the instrument, m.
+    z : float
+        Height of the limb, m.
+    radius_m : float
+        Radius of the circle, m.
+    is_right : bool
+        Whether the right limb is sighted.
+
+    Returns
+    -------
+    dict
+        Direction from +y and zenith angle, degrees.
     """
     azimuth, length = limb_of_circle(station[:2], radius_m, is_right=is_right)
     return {
@@ -358,7 +372,20 @@ def tangent_sight(station, z, radius_m, is_right):
 
 
 def limb_of_circle(station_m, radius_m, *, is_right):
-    """Azimuth and length of a sight from a station (2,) to a limb of a circle about the origin."""
+    """Sight from a station to a limb of a circle about the origin.
+
+    Parameters
+    ----------
+    station_m : array_like, shape (2,)
+    radius_m : float
+    is_right : bool
+        Whether the right limb is sighted.
+
+    Returns
+    -------
+    azimuth_rad, length_m : float
+        Azimuth of the sight, clockwise from +y, and its length.
+    """
     away = np.hypot(*station_m)
     turn = np.arcsin(radius_m / away) * (1 if is_right else -1)
     return azimuth_of_axis(station_m) + turn, np.sqrt(away**2 - radius_m**2)
@@ -370,8 +397,18 @@ def azimuth_of_axis(station_m):
     return np.arctan2(-x, -y)
 
 
+def _setup_row(name, ring):
+    """Row of setups.csv of a set-up in a ring of hits or of tangents."""
+    return {
+        "setup": name,
+        "station": f"S{name}",
+        "instrument": ring.instrument,
+        "instrument_height_m": ring.height_m,
+    }
+
+
 def _kinds_of_sights(s_mm, s_arcsec):
-    """Yield (table, column, {sd column: sd}) of readings between stations."""
+    """Return (table, column, {sd column: sd}) of readings between stations."""
     return (
         ("directions", "direction_deg", {"s_arcsec": s_arcsec}),
         ("zenith_angles", "zenith_deg", {"s_arcsec": s_arcsec}),
