@@ -31,8 +31,7 @@ from tankcal.cli import (
     verifying,
     workbench,
 )
-from tankcal.cli.machine import failure, print_json
-from tankcal.cli.showing import complain, say_in_language, speak, words_of_run
+from tankcal.cli.showing import complain, failure, print_json, say_in_language, speak, words_of_run
 from tankcal.cli.stopping import is_out_of_memory, raise_at_signals, signal_status
 from tankcal.errors import Problem, TankcalError, reason_of
 from tankcal.messages import message, printable_lines

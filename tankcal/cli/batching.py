@@ -5,13 +5,14 @@ import sys
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, parse_worker_memory, parse_workers
-from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.reporting import add_letterhead
 from tankcal.cli.showing import (
     Progress,
+    add_json,
     complain,
     language_of_run,
     prepare_for_small_work,
+    print_json,
     print_paths,
     say,
     speak,

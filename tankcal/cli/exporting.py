@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, parse_positive, parse_several
-from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import (
+    add_json,
     language_of_run,
     prepare_for_small_work,
+    print_json,
     say,
     speak,
     speak_of_record,

@@ -7,10 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, parse_positive, refuse_argument
-from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.showing import (
+    add_json,
     complain,
     prepare_for_small_work,
+    print_json,
     say,
     say_in_language,
     speak,

@@ -1,11 +1,12 @@
 """`tankcal inspect`: plumb, roundness, welds and settlement of a tank from its survey."""
 
 from tankcal.cli.arguments import add_language, parse_yield
-from tankcal.cli.machine import add_json, print_saved
 from tankcal.cli.showing import (
     Progress,
+    add_json,
     language_of_run,
     prepare_for_small_work,
+    print_saved,
     say,
     speak,
     warn,

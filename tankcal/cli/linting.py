@@ -1,8 +1,7 @@
 """`tankcal lint`: errors in any capacity table."""
 
 from tankcal.cli.arguments import add_language, parse_positive
-from tankcal.cli.machine import add_json, print_json
-from tankcal.cli.showing import prepare_for_small_work, say, speak
+from tankcal.cli.showing import add_json, prepare_for_small_work, print_json, say, speak
 from tankcal.errors import InputError, Problem, problem_of
 from tankcal.messages import message
 

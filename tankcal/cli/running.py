@@ -4,13 +4,14 @@ from pathlib import Path
 
 import tankcal
 from tankcal.cli.arguments import parse_cluster
-from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.reporting import add_letterhead, letterhead_of
 from tankcal.cli.showing import (
     Progress,
+    add_json,
     marks,
     prepare_for_small_work,
     print_doubts,
+    print_json,
     print_paths,
     read_job,
     say,

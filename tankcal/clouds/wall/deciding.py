@@ -29,8 +29,8 @@ from tankcal.clouds.wall.growing import (
 )
 from tankcal.clouds.wall.screens import FILE, two_surfaces_error
 from tankcal.errors import InputError, Problem
-from tankcal.units import FULL_TURN
 from tankcal.messages import message
+from tankcal.units import FULL_TURN
 
 LEAST_SD_M = 5e-5  # least standard deviation of the mean of a cell, m
 # Distance of cells without common noise along a scan line, m; least number of values for a scatter
