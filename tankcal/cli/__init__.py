@@ -95,10 +95,10 @@ def main(arguments=None):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except BaseException as error:
-        return _status_of(error)
+        return _find_status(error)
 
 
-def _status_of(error):
+def _find_status(error):
     """Return the exit status after a signal or a lack of memory or disk space; print one line.
 
     Any other error is raised again.
@@ -232,11 +232,11 @@ def _translate_argparse(words):
     def translate(text):
         return translations.get(text, text)
 
-    def counted(single, several, count):
+    def translate_plural(single, several, count):
         return translate(single if count == 1 else several)
 
     if translations:
-        argparse._, argparse.ngettext = translate, counted
+        argparse._, argparse.ngettext = translate, translate_plural
     try:
         yield
     finally:

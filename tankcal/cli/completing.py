@@ -70,14 +70,14 @@ def shipped_choices():
     from tankcal.text.languages import LANGUAGES
 
     profiles = tuple(shipped_profiles())
-    of_inspections, of_comparisons = rules.shipped_names(), rule_files.shipped_names()
+    inspection_rules, comparison_rules = rules.shipped_names(), rule_files.shipped_names()
     return {
         ("export", "--profile"): (profiles, True),
-        ("inspect", "--rule"): (of_inspections, True),
-        ("compare", "--rule"): (of_comparisons, True),
+        ("inspect", "--rule"): (inspection_rules, True),
+        ("compare", "--rule"): (comparison_rules, True),
         ("batch", "--profile"): (profiles, True),
-        ("batch", "--inspect-by"): (of_inspections, True),
-        ("batch", "--compare-by"): (of_comparisons, True),
+        ("batch", "--inspect-by"): (inspection_rules, True),
+        ("batch", "--compare-by"): (comparison_rules, True),
         ("report", "--language"): (LANGUAGES, False),
         ("docs", "page"): (page_names(), False),
         ("run", "--cluster"): (("auto", "local"), False),

@@ -146,9 +146,9 @@ def _import(options):
     options.out = options.out or _folder_here()
     speak(options.language or _language_of_folder(Path(options.out)))
     _refuse_workbook(Path(options.out))
-    as_list = _list_of(options)
-    if as_list is not None:
-        return _import_list(as_list, options)
+    foreign_list = _read_foreign_list(options)
+    if foreign_list is not None:
+        return _import_list(foreign_list, options)
     from tankcal.fieldbooks import Choices, import_fieldbooks
 
     choices = Choices(
@@ -206,7 +206,7 @@ def _refuse_workbook(folder):
         raise InputError(Problem(folder.resolve().name, text))
 
 
-def _list_of(options):
+def _read_foreign_list(options):
     """Return the ForeignList of a single file with a list of points or another table, or None."""
     if len(options.names) != 1 or options.profile or options.format:
         return None
@@ -362,8 +362,8 @@ def _say_next(folder, survey):
             job=str(job),
         )
         say(text)
-        of_survey = "" if survey is None else f" --survey {survey}"
-        print(f"  tankcal new {_quote_path(job)}{of_survey}")
+        survey_option = "" if survey is None else f" --survey {survey}"
+        print(f"  tankcal new {_quote_path(job)}{survey_option}")
         print(f"  tankcal import ... --out {_quote_path(job)}")
     say(message("import_next", "then"))
     print(f"  tankcal run {_quote_path(job)}")

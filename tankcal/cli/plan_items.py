@@ -137,7 +137,7 @@ def _wall_item(change):
         "certificate": message(
             "plan_item_certificate", "the calibration of {name}, with half its u", name=name
         ),
-    } | _filling_items(name)
+    } | _run_items(name)
     if change.item == "setup" and isinstance(change.plan, WallPlan):
         return message("plan_item_ring_setup", "a set-up of ring {name}", name=name)
     if change.item == "reading" and name == "offsets":
@@ -153,7 +153,7 @@ def _wall_item(change):
     return items.get(change.item)
 
 
-def _filling_items(name):
+def _run_items(name):
     """Return the items of the runs of a plan."""
     return {
         "step": message("plan_item_step", "a step at the end of run {name}", name=name),

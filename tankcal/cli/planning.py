@@ -399,10 +399,10 @@ def _wall_summary(prediction):
             sd=format_significant(1000 * course.radius_sd_m, 2, marks()),
         )
     if prediction.filling is not None:
-        yield from _filling(prediction.filling)
+        yield from _describe_filling(prediction.filling)
 
 
-def _filling(outlook):
+def _describe_filling(outlook):
     """Yield the effect of runs of liquid on the uncertainty of the geometry."""
     for dip in outlook.dips:
         yield message(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import tankcal
 from tankcal.cli.arguments import parse_cluster
-from tankcal.cli.reporting import add_letterhead, letterhead_of
+from tankcal.cli.reporting import add_letterhead, read_letterhead
 from tankcal.cli.showing import (
     Progress,
     add_json,
@@ -74,9 +74,9 @@ def _add_run(commands):
         help="write no file if the global test of the adjustment fails, or if a rejected "
         "observation may not be the blunder (exit status 3)",
     )
-    of_papers = run.add_mutually_exclusive_group()
-    add_letterhead(of_papers)
-    of_papers.add_argument(
+    papers = run.add_mutually_exclusive_group()
+    add_letterhead(papers)
+    papers.add_argument(
         "--no-papers",
         action="store_true",
         help="write the record and the CSV files only; tankcal report creates workbook and "
@@ -107,7 +107,7 @@ def _run(options):
         only=options.only,
         strict=options.strict,
         cluster=options.cluster,
-        papers=(letterhead_of(options), not options.no_papers),
+        papers=(read_letterhead(options), not options.no_papers),
         tell=_tell_machine if options.machine else _tell,
     )
 
@@ -147,7 +147,7 @@ def _compute(
     from tankcal.report import outputs
 
     outputs.refuse_foreign(out)
-    doubts = _doubts_among(job.warnings)
+    doubts = _find_doubts(job.warnings)
     if doubts and tell is _tell:  # before the computation, which they may slow down
         show.end()
         print_doubts(doubts)
@@ -177,7 +177,7 @@ def _idle_cluster(cluster, clouds=None):
     return (Problem("--cluster", text),)
 
 
-def _doubts_among(warnings):
+def _find_doubts(warnings):
     from tankcal.job.plausibility_table import CODES
 
     return [warning for warning in warnings if getattr(warning.expected, "code", None) in CODES]
@@ -185,7 +185,7 @@ def _doubts_among(warnings):
 
 def _tell(out, paths, warnings, result, adjustment):
     """Print warnings, a summary and the files; print implausible inputs again at the end."""
-    doubts = _doubts_among(warnings)
+    doubts = _find_doubts(warnings)
     warn(warning for warning in warnings if warning not in doubts)
     if adjustment is not None:
         say(_summary(adjustment))
@@ -323,14 +323,14 @@ def _summary(adjustment):
     return message(
         "adjusted",
         "adjustment: {fit}, {set_aside}, {points}{mean}",
-        fit=_fit_of(adjustment),
+        fit=_describe_fit(adjustment),
         set_aside=_count_rejected(removed),
         points=_count_points(len(adjustment.names)),
         mean=mean,
     )
 
 
-def _fit_of(adjustment):
+def _describe_fit(adjustment):
     if adjustment.redundancy <= 0:
         return message(
             "not_tested",

@@ -101,9 +101,9 @@ class ClusterPasses:
         WallCells
         """
         with failures_told():
-            packed = self._reduced(_cells_part, _add_cells, surface, grid, scans)
+            sums = self._reduced(_cells_part, _add_cells, surface, grid, scans)
         cells = WallCells(surface, grid, scans)
-        cells.add_packed(packed)
+        cells.add_packed(sums)
         return cells
 
     def gather(self, taken_of, *sizes):
@@ -183,7 +183,7 @@ def _cells_part(placing, share, topic, number, surface, grid, scans):
     """Packed sums of a share, and its `Tally`."""
     tally = _tally_of(placing, share, topic, number)
     cells = sum_cells(placing.points([share], tally), surface, grid, scans)
-    return cells.packed(), tally
+    return cells.pack_sums(), tally
 
 
 def _taken_part(placing, share, topic, number, taken_of, *sizes):
@@ -213,9 +213,9 @@ def _add_samples(parts, most):
 def _add_cells(parts, surface, grid, scans):
     """Add several packed sums."""
     cells = WallCells(surface, grid, scans)
-    for packed, _ in parts:
-        cells.add_packed(packed)
-    return cells.packed(), Tally.added([tally for _, tally in parts])
+    for sums, _ in parts:
+        cells.add_packed(sums)
+    return cells.pack_sums(), Tally.added([tally for _, tally in parts])
 
 
 def _tally_of(placing, share, topic, number):

@@ -46,10 +46,10 @@ def load_words(language=DEFAULT, groups=None):
 def _load_pickled(path, groups):
     """Return the pickled words of a file: unpickling is 20 times faster and gives a new copy."""
     text = path.read_text(encoding="utf-8")
-    return pickle.dumps(tomllib.loads(text if groups is None else _tables_of(text, groups)))
+    return pickle.dumps(tomllib.loads(text if groups is None else _select_tables(text, groups)))
 
 
-def _tables_of(text, groups):
+def _select_tables(text, groups):
     """Return the tables of these groups in a TOML text; no string in it begins a line with [."""
     heads = list(_TABLE.finditer(text))
     ends = [head.start() for head in heads[1:]] + [len(text)]
@@ -137,7 +137,7 @@ def translate_record(words, record):
     return {
         **record,
         "warnings": [
-            _placed(words, _translate_row(words, row, "text")) for row in record["warnings"]
+            _translate_file(words, _translate_row(words, row, "text")) for row in record["warnings"]
         ],
         "corrections": [_translate_row(words, row, "formula", "formula_") for row in corrections],
         "adjustment": adjustment and _adjustment_in_language(words, adjustment),
@@ -154,7 +154,7 @@ def _adjustment_in_language(words, adjustment):
         translated = {file: _translate_place(words, file) for file in set(files)}
         places["residuals"] = residuals | {"file": [translated[file] for file in files]}
     if held := adjustment.get("held"):
-        places["held"] = [_placed(words, row) for row in held]
+        places["held"] = [_translate_file(words, row) for row in held]
     return {
         **adjustment,
         **places,
@@ -175,7 +175,7 @@ def _translate_row(words, row, key, of=""):
     return {**row, key: message_sentence(words, row[key], code, values)}
 
 
-def _placed(words, row):
+def _translate_file(words, row):
     """Return a row of the record with a translated name of its sheet."""
     return {**row, "file": _translate_place(words, row["file"])}
 
@@ -248,9 +248,9 @@ def input_name(words, row):
 
     Some inputs include the name of their item or instrument.
     """
-    shared = row["input"] == "deadwood" and row["unit"] == "%"
-    name = name_of_input(words, "deadwood_share" if shared else row["input"])
-    if row["input"] in NAMED_INPUTS and row["note"] and not shared:
+    is_share = row["input"] == "deadwood" and row["unit"] == "%"
+    name = name_of_input(words, "deadwood_share" if is_share else row["input"])
+    if row["input"] in NAMED_INPUTS and row["note"] and not is_share:
         name = f"{name}: {row['note']}"
     return words["texts"]["default_input"].format(input=name) if row.get("is_default") else name
 

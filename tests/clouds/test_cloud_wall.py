@@ -135,7 +135,7 @@ def test_grid_begins_rows_at_joints_and_keeps_to_memory():  # property
     small = make_grid(surface, joints, points=1e9, scans=8, memory_bytes=100 << 20)
     for grid in (fine, small):
         assert np.isin(joints, grid.edges_m).all()
-    assert small.bytes_of(8) <= 100 << 20
+    assert small.count_bytes(8) <= 100 << 20
     assert np.diff(fine.edges_m).max() <= 0.05 + 1e-9
 
 

@@ -108,7 +108,7 @@ def test_workers_change_no_byte_of_the_inside(client, placing):  # invariance
     theirs = JobPasses(placing).gather(sum_floor_cells, floor, inside)
     for name in FloorCells.NAMES:
         assert getattr(ours, name).tobytes() == getattr(theirs, name).tobytes(), name
-    assert ours.by_scan.any(axis=(1, 2)).sum() <= 3
+    assert ours.scan_counts.any(axis=(1, 2)).sum() <= 3
     rng = np.random.default_rng(1)
     label = rng.integers(3, size=(floor.across, floor.across, floor.levels))
     cells = ThingCells(floor, label, np.full(label.shape[:2], -1e9), inside)

@@ -61,13 +61,13 @@ def _check_count(file, heading, count):
     """Raise InputError if the number of points differs from the stated count."""
     rows = 0
     # Counting lines is fast; comments are excluded only if the fast count does not match.
-    for count_of in (count_lines, count_rows):
+    for count_function in (count_lines, count_rows):
         with file.path.open("rb") as stream:
             lines = Lines(file, stream)
             lines.take(heading)
             rows = 0
             while (block := lines.take(1 << 20)[0]) and rows <= count:
-                rows += count_of(block)
+                rows += count_function(block)
         if rows == count:
             return
     raise count_mismatch(file, count, rows)

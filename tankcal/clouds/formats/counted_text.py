@@ -61,11 +61,11 @@ def is_pts(lines):
     return len(lines) > 1 and whole_number(lines[0]) is not None and len(lines[1].split()) >= 3
 
 
-def _describe(file, header_of):
+def _describe(file, read_header):
     scans = []
     with file.path.open("rb") as stream:
         lines = Lines(file, stream)
-        while (scan := header_of(file, lines)) is not None:
+        while (scan := read_header(file, lines)) is not None:
             _check_size(file, scan, lines.row)
             lines_read = skip_lines(lines, scan.declared)
             if lines_read < scan.declared:
@@ -115,10 +115,10 @@ def _scan_count_error(file, number, scan, points_read):
     )
 
 
-def _pieces(file, chunk, header_of):
+def _pieces(file, chunk, read_header):
     with file.path.open("rb") as stream:
         lines, number = Lines(file, stream), 0
-        while (scan := header_of(file, lines)) is not None:
+        while (scan := read_header(file, lines)) is not None:
             left = scan.declared
             while left:
                 block, row = lines.take(min(left, chunk))

@@ -251,9 +251,11 @@ def _pose(number, node, problems):
     if pose is None:
         return None
     rotation, translation = pose.find("rotation"), pose.find("translation")
-    w, x, y, z = (rotation.number_of(name) for name in "wxyz") if rotation else (1.0, 0.0, 0.0, 0.0)
+    w, x, y, z = (
+        (rotation.read_number(name) for name in "wxyz") if rotation else (1.0, 0.0, 0.0, 0.0)
+    )
     pose_matrix = np.eye(4)
-    pose_matrix[:3, 3] = [translation.number_of(name) for name in "xyz"] if translation else 0.0
+    pose_matrix[:3, 3] = [translation.read_number(name) for name in "xyz"] if translation else 0.0
     if w == x == y == z == 0 and np.isfinite(pose_matrix).all():
         pose_matrix[:3, :3] = 0.0
         return pose_matrix
@@ -328,7 +330,7 @@ class _Node:
         text = self.attributes.get(attribute)
         return default if text is None else _parse_number(text)
 
-    def number_of(self, name):
+    def read_number(self, name):
         """Number in a child; 0 if it is missing or empty, nan if it is not a number."""
         text = self.child(name).text.strip()
         return _parse_number(text) if text else 0.0

@@ -71,7 +71,7 @@ class Piece:
     read: int
 
 
-def ranges_of(count, each):
+def divide_records(count, each):
     """Divide `count` records into pieces of `each` records; the last may be shorter."""
     return tuple(
         CloudPiece(None, first, min(each, count - first)) for first in range(0, count, each)

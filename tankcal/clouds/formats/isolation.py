@@ -61,7 +61,7 @@ def decode_frames(file, request):
 
 def _next_frame(file, child, watch):
     """Read the next `Frame`, None at the end; raise InputError if the child ended early."""
-    with watch.waiting():
+    with watch.limit_wait():
         head = _read_exactly(child.stdout, HEAD.size)
         data = None
         if head is not None:
@@ -102,7 +102,7 @@ class _Watch:
         threading.Thread(target=self._run, daemon=True).start()
 
     @contextlib.contextmanager
-    def waiting(self):
+    def limit_wait(self):
         """Context in which the parent waits for the child."""
         self.since = time.monotonic()
         try:

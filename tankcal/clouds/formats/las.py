@@ -15,8 +15,8 @@ from tankcal.clouds.formats.files import (
     Piece,
     count_mismatch,
     describe_cut,
+    divide_records,
     no_points,
-    ranges_of,
     require_library,
 )
 from tankcal.clouds.formats.isolation import decode_frames
@@ -76,11 +76,11 @@ def shares(file, points_each):
     """Divide the points into ranges; ranges of LAZ begin at chunks, the only seekable places."""
     header = read_header(file)
     if header.laszip is None:
-        return ranges_of(header.count, points_each)
+        return divide_records(header.count, points_each)
     compressor, size = _read_chunking(header.laszip)
     if compressor == ONE_STREAM or size == VARIABLE:
         return (WHOLE,)
-    return ranges_of(header.count, max(1, points_each // size) * size)
+    return divide_records(header.count, max(1, points_each // size) * size)
 
 
 def pieces(file, chunk, share=WHOLE):

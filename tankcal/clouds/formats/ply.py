@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.clouds.contents import WHOLE, ScanHeader
-from tankcal.clouds.formats.files import Piece, count_mismatch, no_points, ranges_of
+from tankcal.clouds.formats.files import Piece, count_mismatch, divide_records, no_points
 from tankcal.clouds.formats.lines import Layout, Lines, parse_rows, printable_start, skip_lines
 from tankcal.messages import message
 
@@ -81,7 +81,7 @@ def describe(file):
 def shares(file, points_each):
     """Divide binary vertices into ranges; a text file is a single piece."""
     header = read_header(file)
-    return (WHOLE,) if header.order is None else ranges_of(header.vertex.count, points_each)
+    return (WHOLE,) if header.order is None else divide_records(header.vertex.count, points_each)
 
 
 def pieces(file, chunk, share=WHOLE):

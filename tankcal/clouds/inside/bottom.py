@@ -118,7 +118,7 @@ class CloudBottom:
         Share of the cells of the plan that show the bottom.
     pits : tuple of Pit
         Pits in the bottom, the largest first.
-    by_scan : ndarray, shape (across, across, scans)
+    scan_counts : ndarray, shape (across, across, scans)
         Number of points of each scan near the bottom in each cell.
     roof : RoofSeen or None
         Roof over the shell, or None if no roof is seen.
@@ -136,7 +136,7 @@ class CloudBottom:
     scatter_m: float
     seen_share: float
     pits: tuple[Pit, ...]
-    by_scan: np.ndarray
+    scan_counts: np.ndarray
     roof: RoofSeen | None
     cells: FloorCells
 
@@ -180,11 +180,11 @@ def find_bottom_in_cells(cells):
     in_plan = grid.distance_m < radius_m - grid.cell_m / 2
     rim = in_plan & (grid.distance_m > radius_m - EDGE_CELLS * grid.cell_m)
     width = np.full(grid.across, grid.cell_m)
-    grown = grow_wall(counts, column_m=width, row_m=grid.cell_m, bin_m=BIN_M)
-    x, y, z, spread, count = cells.means(grown.wall_bins(grid.bins))
+    surface = grow_wall(counts, column_m=width, row_m=grid.cell_m, bin_m=BIN_M)
+    x, y, z, spread, count = cells.means(surface.wall_bins(grid.bins))
     # Cells that deviate from the trend of their neighbours show objects on the bottom. The slope
     # within a cell is removed first.
-    is_bottom = (grown.why == WALL) & (count >= FEWEST)
+    is_bottom = (surface.why == WALL) & (count >= FEWEST)
     is_bottom &= ~find_off_trend(_reduce_to_centres(x, y, z, is_bottom, grid), spread, is_bottom)
     seen_share = float(np.mean(is_bottom[in_plan]))
     _check_bottom(z, is_bottom, rim, seen_share, grid)
@@ -204,7 +204,7 @@ def find_bottom_in_cells(cells):
         scatter_m=scatter,
         seen_share=seen_share,
         pits=_find_pits(np.where(mirror, np.nan, low), share, level, grid),
-        by_scan=cells.counts_of_scans(grown.low, grown.high),
+        scan_counts=cells.count_by_scan(surface.low, surface.high),
         roof=_find_roof(cells, in_plan),
         cells=cells,
     )
@@ -373,9 +373,9 @@ def bottom_points(bottom, most=400):
         xyz[i, 2] = _height_at(xyz[i], bottom.xyz_m[window][shown[window]])
     # The variance is averaged, not reduced: neighbouring cells share errors.
     variance = np.bincount(place, bottom.sd_m[column, row] ** 2) / cells
-    of_scans = bottom.by_scan[column, row].astype(float)
-    of_scans /= np.maximum(of_scans.sum(axis=1, keepdims=True), 1)
-    share = np.column_stack([np.bincount(place, value) / cells for value in of_scans.T])
+    scan_counts = bottom.scan_counts[column, row].astype(float)
+    scan_counts /= np.maximum(scan_counts.sum(axis=1, keepdims=True), 1)
+    share = np.column_stack([np.bincount(place, value) / cells for value in scan_counts.T])
     return BottomPoints(xyz, np.sqrt(variance), cells, share)
 
 

@@ -137,7 +137,7 @@ class FloorCells:
         Sums of x and y within the cell, in 1/2**16 of its side.
     stack : ndarray of uint32, shape (across**2, levels)
         Counts at the levels up to the top of the shell.
-    by_scan : ndarray of uint32, shape (scans, across**2, classes)
+    scan_counts : ndarray of uint32, shape (scans, across**2, classes)
         Counts of each scan near the bottom, in classes of COARSE bins.
     over : ndarray of uint32, shape (across**2,)
         Counts above the height of OVER_M below the top of the shell.
@@ -149,7 +149,7 @@ class FloorCells:
         The numbers of points `inside` and `wall_below`.
     """
 
-    NAMES = ("sums", "places", "stack", "by_scan", "over", "roof", "under", "tally")
+    NAMES = ("sums", "places", "stack", "scan_counts", "over", "roof", "under", "tally")
 
     def __init__(self, grid, scans=1):
         self.grid, self.scans = grid, scans
@@ -157,7 +157,7 @@ class FloorCells:
         self.sums = np.zeros((cells, grid.bins), dtype=np.int64)
         self.places = np.zeros((2, cells, grid.bins), dtype=np.int64)
         self.stack = np.zeros((cells, grid.levels), dtype=np.uint32)
-        self.by_scan = np.zeros((scans, cells, -(-grid.bins // COARSE)), dtype=np.uint32)
+        self.scan_counts = np.zeros((scans, cells, -(-grid.bins // COARSE)), dtype=np.uint32)
         self.over = np.zeros(cells, dtype=np.uint32)
         self.roof = np.zeros(grid.roof_levels, dtype=np.int64)
         self.under = np.zeros(cells, dtype=np.uint32)
@@ -192,15 +192,15 @@ class FloorCells:
         """Number of points in each bin (across, across, bins); the first axis is along x."""
         return (self.sums >> 32).reshape(self.grid.across, self.grid.across, -1)
 
-    def counts_of_scans(self, low, high):
+    def count_by_scan(self, low, high):
         """Number of points of each scan (across, across, scans) in a range of bins of each cell.
 
         The range from `low` to `high`, each (across, across), is widened to whole classes.
         """
-        class_number = np.arange(self.by_scan.shape[2])
+        class_number = np.arange(self.scan_counts.shape[2])
         first, last = (bins.ravel()[:, None] // COARSE for bins in (low, high))
         within = (class_number >= first) & (class_number <= last)
-        counts = np.einsum("scb,cb->cs", self.by_scan, within)
+        counts = np.einsum("scb,cb->cs", self.scan_counts, within)
         return counts.reshape(self.grid.across, self.grid.across, self.scans)
 
     def means(self, within):
@@ -266,7 +266,7 @@ class FloorCells:
         fine, cell = fine[near], cell[near]
         bin_index = cell * grid.bins + (fine >> FINE_BITS)
         np.add.at(self.sums.ravel(), bin_index, COUNT + (fine & (FINE - 1)))
-        np.add.at(self.by_scan[scan], (cell, (fine >> FINE_BITS) // COARSE), np.uint32(1))
+        np.add.at(self.scan_counts[scan], (cell, (fine >> FINE_BITS) // COARSE), np.uint32(1))
         for sums, part, whole in zip(self.places, (x, y), (column, row), strict=True):
             np.add.at(
                 sums.ravel(), bin_index, ((part[near] - whole[near]) * PLACE).astype(np.int64)

@@ -126,16 +126,16 @@ def decide_wall(cells, joints_m, sides):
     """
     joints_m, column_m = np.asarray(joints_m, dtype=float), _column_widths(cells)
     wall_values = _ScanValues(cells)
-    grown_of = {}
+    side_walls = {}
     for side in dict.fromkeys(sides):
         side_scans = [i for i, item in enumerate(sides) if item == side]
-        grown_of[side] = wall_values.decide(side_scans, joints_m, column_m)
+        side_walls[side] = wall_values.decide(side_scans, joints_m, column_m)
     is_seen = np.any(wall_values.is_wall, axis=0)
     course = np.searchsorted(joints_m[1:-1], cells.grid.middles_m, side="right")
     courses = np.arange(len(joints_m) - 1)
     count = np.where(wall_values.is_wall, wall_values.count, 0)
     best = _weighted_mean(wall_values.radius, wall_values.sd, count)[0]
-    is_one_side = len(grown_of) == 1
+    is_one_side = len(side_walls) == 1
     return CloudWall(
         surface=cells.surface,
         grid=cells.grid,
@@ -147,12 +147,12 @@ def decide_wall(cells, joints_m, sides):
         turn_rad=wall_values.turn,
         along_m=wall_values.along,
         is_wall=wall_values.is_wall,
-        why={side: grown.why for side, grown in grown_of.items()},
+        why={side: side_wall.why for side, side_wall in side_walls.items()},
         scatter_m=wall_values.scatter,
         masked_share=np.array([1 - is_seen[course == item].mean() for item in courses]),
         joints=find_joints(best, cells.grid.middles_m, joints_m) if is_one_side else (),
         welds=find_welds(best, course, column_m) if is_one_side else (),
-        obstructions=find_obstructions(is_seen, list(grown_of.values()), cells, column_m),
+        obstructions=find_obstructions(is_seen, list(side_walls.values()), cells, column_m),
         delivered=cells.delivered,
         outside=cells.outside,
         beyond=cells.beyond,
@@ -173,49 +173,49 @@ class _ScanValues:
         self.are_separate = False
 
     def decide(self, side_scans, joints_m, column_m):
-        """Decide the scans of one side and fill in their means; return `Grown`."""
+        """Decide the scans of one side and fill in their means; return `SideWall`."""
         cells, grid = self.cells, self.cells.grid
         total = sum(cells.counts(i) for i in side_scans)
         row_m = float(np.median(np.diff(grid.edges_m)))
-        grown = grow_wall(
+        side_wall = grow_wall(
             total,
             column_m=column_m,
             row_m=row_m,
             bin_m=grid.bin_m,
             joined_rows=np.searchsorted(grid.edges_m, joints_m[1:-1] - 1e-9),
         )
-        _refuse_no_wall(grown, cells)
+        _refuse_no_wall(side_wall, cells)
         # Scans that do not overlap can show a single wall as two surfaces.
-        second = _find_two_surfaces(grown, total, cells)
+        second = _find_two_surfaces(side_wall, total, cells)
         if second is not None:
-            return self._decide_alone(side_scans, joints_m, column_m, grown, second)
+            return self._decide_alone(side_scans, joints_m, column_m, side_wall, second)
         for i in side_scans:
-            mean, self.sd[i], self.count[i] = _average_distances(cells, i, grown)
+            mean, self.sd[i], self.count[i] = _average_distances(cells, i, side_wall)
             self.radius[i] = cells.surface.radius_m + mean
             self.turn[i], self.along[i] = _average_places(cells, i)
         # The mean over scans has the least noise, so that the trend test is applied to it.
         values, sds = _weighted_mean(
             self.radius[side_scans], self.sd[side_scans], self.count[side_scans]
         )
-        grown.why[find_off_trend(values, sds, grown.why == WALL)] = OFF_TREND
+        side_wall.why[find_off_trend(values, sds, side_wall.why == WALL)] = OFF_TREND
         course = np.searchsorted(joints_m[1:-1], grid.middles_m, side="right")
         width_m = float(np.median(column_m))
         for i in side_scans:
-            self.is_wall[i] = (grown.why == WALL) & (self.count[i] >= 3)
+            self.is_wall[i] = (side_wall.why == WALL) & (self.count[i] >= 3)
             self.radius[i][~self.is_wall[i]] = np.nan
             self.scatter[i] = _scatter_of_cells(self.radius[i], course, row_m, width_m)
             self.sd[i] = np.maximum(self.sd[i], max(LEAST_SD_M, self.scatter[i]))
-        return grown
+        return side_wall
 
-    def _decide_alone(self, side_scans, joints_m, column_m, grown, second):
+    def _decide_alone(self, side_scans, joints_m, column_m, side_wall, second):
         """Decide each scan alone where scans that do not overlap show one wall as two surfaces.
 
         Each scan must show a single surface. Otherwise another surface hides a part of the wall,
-        and `second` is raised. The result is a `Grown`.
+        and `second` is raised. The result is a `SideWall`.
         """
         if len(side_scans) == 1:
             raise second
-        why = grown.why.copy()
+        why = side_wall.why.copy()
         for scan in side_scans:
             try:
                 alone = self.decide([scan], joints_m, column_m)
@@ -223,17 +223,17 @@ class _ScanValues:
                 raise second from None
             why[alone.why == WALL] = WALL
         self.are_separate = True
-        return replace(grown, why=why)
+        return replace(side_wall, why=why)
 
 
-def _refuse_no_wall(grown, cells):
+def _refuse_no_wall(side_wall, cells):
     """Raise InputError if only a small share of the cells with points shows the wall."""
-    has_points = (grown.why.ravel() != EMPTY) | np.any(cells.far >= FEWEST, axis=1)
+    has_points = (side_wall.why.ravel() != EMPTY) | np.any(cells.far >= FEWEST, axis=1)
     seen = max(np.count_nonzero(has_points), 1)
-    share = np.count_nonzero(grown.why == WALL) / seen
+    share = np.count_nonzero(side_wall.why == WALL) / seen
     if share >= LEAST_WALL:
         return
-    if np.count_nonzero(grown.why == FEW) > seen / 2:
+    if np.count_nonzero(side_wall.why == FEW) > seen / 2:
         text = message(
             "cloud_too_sparse",
             "found fewer than {least} points in most cells of the wall ({rows} x {columns}); "
@@ -255,12 +255,12 @@ def _refuse_no_wall(grown, cells):
     raise InputError(Problem(FILE, text))
 
 
-def _find_two_surfaces(grown, counts, cells):
+def _find_two_surfaces(side_wall, counts, cells):
     """Return an InputError if a second surface surrounds the wall or rivals its size, else None.
 
     Parameters
     ----------
-    grown : Grown
+    side_wall : SideWall
         Wall of one side.
     counts : ndarray of int, shape (rows, columns, bins)
         Histograms in which the wall was found.
@@ -271,31 +271,31 @@ def _find_two_surfaces(grown, counts, cells):
     -------
     InputError or None
     """
-    grid, wall = cells.grid, grown.why == WALL
-    seen = max(np.count_nonzero(wall | grown.two_modes | (grown.other >= 0)), 1)
-    second = grown.other >= 0
+    grid, wall = cells.grid, side_wall.why == WALL
+    seen = max(np.count_nonzero(wall | side_wall.two_modes | (side_wall.other >= 0)), 1)
+    second = side_wall.other >= 0
     sector = np.arange(grid.columns) * SECTORS // grid.columns
     parts = np.bincount(sector, second.mean(axis=0), SECTORS) / np.bincount(sector)
     share = np.count_nonzero(second) / seen
     all_round = share >= TWO_SURFACES and np.mean(parts >= TWO_SURFACES) >= SECTORS_WITH
-    if not all_round and not (grown.surfaces and grown.surfaces[0][0] >= RIVAL):
+    if not all_round and not (side_wall.surfaces and side_wall.surfaces[0][0] >= RIVAL):
         return None
-    first, other = _surface_distances(grown, counts, grid)
+    first, other = _surface_distances(side_wall, counts, grid)
     radius_m = cells.surface.radius_m
     return two_surfaces_error(
         radius_m + first, np.count_nonzero(wall) / seen, radius_m + other, share
     )
 
 
-def _surface_distances(grown, counts, grid):
+def _surface_distances(side_wall, counts, grid):
     """Median distances of the wall and of the second surface, m.
 
     If the surfaces have similar numbers of points, the mode taken as wall may change from cell to
     cell. The inner of two modes in a cell is therefore assigned to the inner surface.
     """
-    wall, second = grown.why == WALL, grown.other >= 0
-    first = _mean_distances(counts, grown.low, grown.high, grid)
-    near = grown.other - REFINE_BINS, grown.other + REFINE_BINS
+    wall, second = side_wall.why == WALL, side_wall.other >= 0
+    first = _mean_distances(counts, side_wall.low, side_wall.high, grid)
+    near = side_wall.other - REFINE_BINS, side_wall.other + REFINE_BINS
     other = _mean_distances(counts, *near, grid)
     both = wall & second
     if 2 * np.count_nonzero(both) < np.count_nonzero(second):
@@ -340,7 +340,7 @@ def _column_widths(cells):
     return FULL_TURN * cells.surface.width_m(cells.grid.middles_m) / cells.grid.columns
 
 
-def _average_distances(cells, scan, grown):
+def _average_distances(cells, scan, side_wall):
     """Mean distance of the points of one scan over the bins of the wall.
 
     Returns
@@ -352,7 +352,7 @@ def _average_distances(cells, scan, grown):
     """
     grid = cells.grid
     number = np.arange(grid.bins)
-    within = grown.wall_bins(grid.bins)
+    within = side_wall.wall_bins(grid.bins)
     counts = np.where(within, cells.counts(scan), 0)
     count = counts.sum(axis=2)
     # The sum of whole units is exact; half a unit compensates their truncation.

@@ -174,7 +174,7 @@ def make_grid(
             edges.extend(low + (high - low) * np.arange(1, rows + 1) / rows)
         grid = CellGrid(np.array(edges), columns, band_m, max(8, round(band_m / 0.002)))
         is_coarsest = row_m >= COARSEST_M and columns <= 2 * LEAST_COLUMNS
-        if is_coarsest or grid.bytes_of(scans) <= memory_bytes:
+        if is_coarsest or grid.count_bytes(scans) <= memory_bytes:
             return grid
         if row_m < COARSEST_M and row_m < 2 * around / columns:
             row_m *= 1.25
