@@ -134,18 +134,15 @@ def _time(text):
         ) from None
 
 
-def _language_of_folder(folder):
-    """Return the language of the job in a folder, or None."""
+def _import(options):
     from tankcal.cli.input_language import read_job_language
 
-    return read_job_language(folder) if (folder / SETTINGS_FILE).is_file() else None
-
-
-def _import(options):
     prepare_for_small_work()
     options.out = options.out or _folder_here()
-    speak(options.language or _language_of_folder(Path(options.out)))
-    _refuse_workbook(Path(options.out))
+    folder = Path(options.out)
+    has_job = (folder / SETTINGS_FILE).is_file()
+    speak(options.language or (read_job_language(folder) if has_job else None))
+    _refuse_workbook(folder)
     foreign_list = _read_foreign_list(options)
     if foreign_list is not None:
         return _import_list(foreign_list, options)
@@ -170,19 +167,24 @@ def _import(options):
     )
     result = import_fieldbooks(options.names, options.out, choices, replace_tables=options.replace)
     if options.machine:
-        print_json(
-            exit_status=0,
-            summary=list(map(str, result.summary)),
-            warnings=[problem_of(warning) for warning in result.warnings],
-            files=list(map(str, result.paths)),
-        )
+        _print_machine(result.summary, result.warnings, result.paths)
         return None
     for line in result.summary:
         say(line)
     warn(result.warnings)
     survey = "total-station" if options.no_hits else "wall-hits"
-    _say_written(Path(options.out), result.paths, survey)
+    _say_written(folder, result.paths, survey)
     return None
+
+
+def _print_machine(summary, warnings, paths):
+    """Print the results of an import as one JSON object."""
+    print_json(
+        exit_status=0,
+        summary=list(map(str, summary)),
+        warnings=list(map(problem_of, warnings)),
+        files=list(map(str, paths)),
+    )
 
 
 def _folder_here():
@@ -275,11 +277,7 @@ def _import_list(foreign_list, options):
         return 2
     paths = write_list(foreign_list, folder, replace=options.replace)
     if options.machine:
-        files = [str(path) for path in paths]
-        warnings = [problem_of(warning) for warning in foreign_list.warnings]
-        print_json(
-            exit_status=0, summary=[str(line) for line in lines], warnings=warnings, files=files
-        )
+        _print_machine(lines, foreign_list.warnings, paths)
         return 0
     _say_written(folder, paths, None)
     return 0

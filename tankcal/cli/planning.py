@@ -13,6 +13,7 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
+from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 from tankcal.messages import message
 from tankcal.text.digits import fixed, format_significant, format_with_u
 
@@ -79,8 +80,8 @@ def add(commands):
 def _plan(options):
     prepare_for_small_work()
     from tankcal.cli.input_language import read_plan_language
-    from tankcal.errors import TankcalError
     from tankcal.planning import load_plan, predict
+    from tankcal.planning.improvements import smallest, what_helps
     from tankcal.planning.wall.model import WallPlan
     from tankcal.report import planning as planning_papers
 
@@ -104,7 +105,11 @@ def _plan(options):
         for line in _remedies(plan, error, options, show):
             say(line)
         raise
-    effects, path = _study_changes(plan, prediction, options, show)
+    effects, path = (), None
+    if options.changes:
+        effects = what_helps(plan, progress=show.part, before=prediction)
+    if options.smallest:
+        path = smallest(plan, progress=show.part)
     simulated = _simulate(prediction, options, show)
     written = ()
     if options.out is not None:
@@ -126,8 +131,6 @@ def _plan(options):
 
 def _refuse_idle(options):
     """Raise InputError for options that have no effect."""
-    from tankcal.errors import InputError, Problem
-
     problems = []
     if options.blunders and options.simulate is None:
         expected = message(
@@ -146,8 +149,6 @@ def _refuse_idle(options):
 
 
 def _refuse_simulation(plan, options):
-    from tankcal.errors import InputError, Problem
-
     if options.simulate is not None and plan.design.runs:
         expected = message(
             "plan_runs_not_simulated",
@@ -157,8 +158,6 @@ def _refuse_simulation(plan, options):
 
 
 def _refuse_unlimited(plan):
-    from tankcal.errors import InputError, Problem
-
     if plan.limits.relative_u is None:
         expected = message(
             "plan_no_limit",
@@ -167,17 +166,8 @@ def _refuse_unlimited(plan):
         raise InputError(Problem("plan.toml", expected, None, "limits.relative_u"))
 
 
-def _study_changes(plan, prediction, options, show):
-    """Return the effects of all changes, or (), and the path to the smallest design, or None."""
-    from tankcal.planning.improvements import smallest, what_helps
-
-    effects = what_helps(plan, progress=show.part, before=prediction) if options.changes else ()
-    return effects, smallest(plan, progress=show.part) if options.smallest else None
-
-
 def _remedies(plan, error, options, show):
     """Yield additions that would determine a survey of targets without a solution."""
-    from tankcal.errors import SolutionError
     from tankcal.planning.improvements import what_would_do
     from tankcal.planning.model import Plan
 
