@@ -462,6 +462,10 @@ def _assert_same(one, other, name):
             if part.name not in ("rows", "row", "file", "meters_file", "sheet"):
                 values = (getattr(one, part.name), getattr(other, part.name))
                 _assert_same(*values, f"{name}.{part.name}")
+    elif isinstance(one, dict):
+        assert one.keys() == other.keys(), name
+        for key in one:
+            _assert_same(one[key], other[key], f"{name}[{key!r}]")
     elif isinstance(one, tuple):
         assert len(one) == len(other), name
         for a, b in zip(one, other, strict=True):

@@ -26,7 +26,7 @@ from generated_lines import plumbed_job
 from generated_strapping import PLATE_M, girth_of
 from generated_walls import FULL_TURN, LEAN, Survey, job_of
 
-from tankcal.pipeline.hit_wall import sight_wall
+from tankcal.methods.hits.wall import sight_wall
 from tankcal.survey.measurements import Setup
 from tankcal.survey.strapping import Strap, Strapping, Tape
 

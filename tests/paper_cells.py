@@ -10,15 +10,15 @@ table_of(found, "Capacity at each height")        rows of the table whose captio
 from pathlib import Path
 
 from tankcal import record as records
-from tankcal.report import missing
 from tankcal.report.blocks import MIME
-from tankcal.report.notebook import TEMPLATES, execute, joined
+from tankcal.report.notebook import TEMPLATES, execute, join_templates
+from tankcal.report.papers import parts_without_content
 
 
 def paper_blocks(record_path, templates=TEMPLATES[:2]):
     """The data of every block that the cells show, in order."""
-    lacks = missing(records.load(record_path))
-    return blocks_of_cells(joined(str(record_path), lacks, templates))
+    lacks = parts_without_content(records.load(record_path))
+    return blocks_of_cells(join_templates(str(record_path), lacks, templates))
 
 
 def of_part(found, part):

@@ -10,8 +10,7 @@ from openpyxl.utils import get_column_letter
 
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
-from tankcal.report.workbook.capacity import capacity_sheet
-from tankcal.report.workbook.parts import densities_sheet
+from tankcal.report.workbook.capacity import capacity_sheet, densities_sheet
 from tankcal.text.words import translate_record
 
 FIRST_COLUMN = 6  # of the copies of the calculator: F and on, its own is B

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 import tankcal
 from tankcal.job.model import Sphere
-from tankcal.survey.great_circles import GreatCircles
+from tankcal.methods.great_circles.readings import GreatCircles
 from tankcal.survey.strapping import Strap, Strapping, Tape
 
 AROUND = 6000
@@ -54,7 +54,7 @@ def strapped_job(rng, ball, folder, *, meridians, sd_m=0.001, equator=True, repe
         table=bare,
         survey=warm,
         sphere=Sphere(None, 0.0),
-        great_circles=GreatCircles(Strapping(tuple(straps), (TAPE,)), azimuths),
+        surveys={"great_circles": GreatCircles(Strapping(tuple(straps), (TAPE,)), azimuths)},
         inputs=(),
         tank=replace(job.tank, nominal_diameter_m=None),
     )

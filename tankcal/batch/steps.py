@@ -203,13 +203,13 @@ def _run(task, clock):
 
 def _report(task, clock):
     from tankcal.report import outputs
-    from tankcal.report.saved_rooms import room_of
+    from tankcal.report.saved_documents import find_document
 
     source, options = _record(task), task.job.options
     place, letterhead = _place(task, "report"), _letterhead(options)
-    room, saved = room_of(source)
-    if room is not None:
-        return room.rebuild(saved, place, options.language, None, letterhead)
+    document, saved = find_document(source)
+    if document is not None:
+        return document.rebuild(saved, place, options.language, None, letterhead)
     return outputs.rebuild(source, place, clock.progress, options.language, letterhead)
 
 
@@ -247,7 +247,7 @@ def _export(task, clock):
     record = _record(task)
     language = _language(task, record)
     export = export_record(record, find_profile(task.job.options.profile), language=language)
-    with folders.replaced(_place(task, "export")) as temporary:
+    with folders.replace_folder(_place(task, "export")) as temporary:
         return write_export(export, temporary / default_name(export), language)
 
 

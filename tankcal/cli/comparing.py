@@ -130,7 +130,7 @@ def _verdict(comparison, paper):
         "compare_verdict",
         "verdict: {verdict} ({rule})",
         verdict=paper.word(f"verdicts.{comparison['verdict'] or 'none'}"),
-        rule=paper.found["rule"]["name"],
+        rule=paper.record["rule"]["name"],
     )
 
 

@@ -135,9 +135,9 @@ def _time(text):
 
 
 def _import(options):
+    prepare_for_small_work()
     from tankcal.cli.input_language import read_job_language
 
-    prepare_for_small_work()
     options.out = options.out or _folder_here()
     folder = Path(options.out)
     has_job = (folder / SETTINGS_FILE).is_file()

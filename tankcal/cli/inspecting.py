@@ -110,7 +110,7 @@ def _tell(inspection):
 
     paper = InspectionPaper(inspection, language_of_run())
     warn(paper.warning(warning) for warning in inspection["warnings"][:MOST_WARNINGS])
-    rule = paper.found["rule"]
+    rule = paper.record["rule"]
     say(message("inspect_by", "rule: {rule} ({file})", rule=rule["name"], file=rule["file"]))
     if not rule["verified"]:
         say(

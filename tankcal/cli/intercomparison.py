@@ -167,7 +167,7 @@ def _make(options):
 
     from tankcal.intercomparison.package import make_package, write_files
     from tankcal.record.intercomparison import TRUTH
-    from tankcal.report.folders import replaced
+    from tankcal.report.folders import replace_folder
 
     prepare_for_small_work()
     speak(options.language)
@@ -177,7 +177,7 @@ def _make(options):
     methods = [method for method in METHODS if method in options.methods]
     secret = options.secret or secrets.token_hex(32)
     package = make_package(options.tanks, options.seed, methods, secret=secret, progress=show.part)
-    with replaced(out) as folder:
+    with replace_folder(out) as folder:
         write_files(folder / "package", package.files)
         write_files(folder / "sealed", {TRUTH.file: package.truth})
         if options.practice:
@@ -200,13 +200,13 @@ def _make(options):
 def _template(options):
     from tankcal.intercomparison.answers import make_forms
     from tankcal.intercomparison.package import write_files
-    from tankcal.report.folders import replaced
+    from tankcal.report.folders import replace_folder
 
     speak(options.language)
     _refuse_existing(options.out)
     manifest = _package(options.package)
     files = make_forms(manifest, say_in_language)
-    with replaced(options.out) as folder:
+    with replace_folder(options.out) as folder:
         write_files(folder, files)
     print_paths(options.out, sorted(files))
 
@@ -214,7 +214,7 @@ def _template(options):
 def _answer(options):
     from tankcal.intercomparison.answers import answer_files, answer_package
     from tankcal.intercomparison.package import write_files
-    from tankcal.report.folders import replaced
+    from tankcal.report.folders import replace_folder
 
     prepare_for_small_work()
     speak(options.language)
@@ -225,7 +225,7 @@ def _answer(options):
     show.end()
     warn(warnings)
     files = answer_files(saved)
-    with replaced(options.out) as folder:
+    with replace_folder(options.out) as folder:
         write_files(folder, files)
     print_paths(options.out, sorted(files))
 

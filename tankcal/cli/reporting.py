@@ -59,16 +59,16 @@ def read_letterhead(options):
 
 def _report(options):
     from tankcal.report import outputs
-    from tankcal.report.saved_rooms import room_of
+    from tankcal.report.saved_documents import find_document
 
     show = Progress(options.quiet)
     letterhead = read_letterhead(options)
-    room, saved = room_of(options.record)
-    if room is not None:
+    document, saved = find_document(options.record)
+    if document is not None:
         language = outputs.known_language(options.language)
         speak(language)
         out = Path(options.out) if options.out else saved.parent
-        paths = room.rebuild(saved, out, language, show.step, letterhead)
+        paths = document.rebuild(saved, out, language, show.step, letterhead)
         show.end()
         print_paths(out, paths)
         return

@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
-from tankcal.job.contract.hits import CONTROL_READINGS, WALL_HITS
+from tankcal.job.contract import COLUMNS
 from tankcal.job.contract.observations import (
     CONTROL,
     DIRECTIONS,
@@ -22,8 +22,8 @@ from tankcal.messages import message
 
 CONTRACT = {
     "setups": SETUPS,
-    "wall_hits": WALL_HITS,
-    "control_readings": CONTROL_READINGS,
+    "wall_hits": COLUMNS["wall_hits"],
+    "control_readings": COLUMNS["control_readings"],
     "directions": DIRECTIONS,
     "zenith_angles": ZENITH_ANGLES,
     "slope_distances": SLOPE_DISTANCES,

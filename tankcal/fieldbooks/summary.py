@@ -3,8 +3,8 @@
 from tankcal.errors import Problem
 from tankcal.fieldbooks.detection import NAMES
 from tankcal.fieldbooks.faces import LARGE_DEG, LARGE_M
-from tankcal.job.checks.hits import MOST_HITS
 from tankcal.messages import list_some, message
+from tankcal.survey.wall_hits import MOST_HITS
 from tankcal.units import ARCSEC_PER_DEG
 
 SHOWN = 8

@@ -63,7 +63,7 @@ def find_gaps(result, limits_mm, reading=None, progress=None):
     InputError
         If the file of a cloud cannot be read.
     """
-    job, clouded = result.job, result.clouded
+    job, clouded = result.job, result.sights.get("clouds")
     heights = [course.height_m for course in job.courses]
     given = [course.welds_rad for course in job.courses]
     if clouded is None:

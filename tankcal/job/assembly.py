@@ -26,7 +26,6 @@ from tankcal.job.model import (
     Material,
     Mesh,
     Points,
-    Ring,
     Roof,
     Ship,
     Sphere,
@@ -218,7 +217,6 @@ def make_job(raw, values, tables, attached, measurements, warnings):
         roof=_part(Roof, values["roof"], "mass_kg"),
         top=_part(Top, values["top"], "form"),
         horizontal=_horizontal(values["horizontal"], has_points) if kind == "horizontal" else None,
-        rings=_rings(tables) if kind == "horizontal" else (),
         sphere=structure(Sphere, values["sphere"]) if kind == "sphere" else None,
         circumference_m=values["checks"]["circumference_m"],
         diameter_is=values["checks"]["diameter_is"],
@@ -329,7 +327,7 @@ def _courses(tables):
     return tuple(
         structure(
             Course,
-            cells | _gauged_plate(gauge_means.get(cells["course"])),
+            cells | gauged_plate(gauge_means.get(cells["course"])),
             name=cells["course"],
             welds_rad=tuple(sorted(azimuths.get(cells["course"], ()))) or None,
         )
@@ -337,22 +335,7 @@ def _courses(tables):
     )
 
 
-def _rings(tables):
-    table = tables["rings"]
-    if table is None:
-        return ()
-    gauge_means = gauged(tables["thickness"])
-    return tuple(
-        structure(
-            Ring,
-            cells | _gauged_plate(gauge_means.get(cells["ring"])),
-            name=cells["ring"],
-        )
-        for cells in table.records()
-    )
-
-
-def _gauged_plate(gauge_mean):
+def gauged_plate(gauge_mean):
     """Thickness of plate and paint by the gauge, m, which replaces the declared thickness."""
     if gauge_mean is None:
         return {}

@@ -8,11 +8,8 @@ from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
 from tankcal.job.checks.extent import (
     has_clouds,
-    has_great_circles,
-    has_hits,
     has_radii,
     has_survey,
-    has_tangents,
     is_metered,
     is_sighted,
     is_strapped,
@@ -20,8 +17,6 @@ from tankcal.job.checks.extent import (
 from tankcal.job.checks.lines import has_lines
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
-from tankcal.job.contract.great_circles import BESIDE as BESIDE_CIRCLES
-from tankcal.job.contract.strapping import COLUMNS as OF_TAPES
 from tankcal.job.contract.strapping import IN_PLACE
 from tankcal.job.covariance import OF_RADII, read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
@@ -30,21 +25,18 @@ from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
     CLOUD_TABLES,
     COVARIANCE_FILE,
-    HITS_TABLES,
     LIQUID_TABLES,
     RADII_COVARIANCE_FILE,
     RADII_TABLES,
     REGISTERS,
-    RING_TABLES,
-    SPHERE_TABLES,
     STRAPPING_TABLES,
     SURVEY_TABLES,
     TABLES,
-    TANGENT_TABLES,
     TANK_TABLES,
     missing_sheet,
 )
 from tankcal.messages import message
+from tankcal.methods.base import methods, methods_for
 
 
 def job_of(raw, log, is_whole=True):
@@ -85,7 +77,13 @@ def job_of(raw, log, is_whole=True):
         return replace(frame, overrulings=overrulings)
     job = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
     surveys = _make_surveys(raw, values, tables, registers, attached)
-    return replace(job, overrulings=overrulings, **surveys)
+    by_method = {}
+    for method in methods():
+        if method.is_given(tables):
+            readings = method.read(tables, registers)
+            attributes = by_method if method.attribute is None else surveys
+            attributes[method.attribute or method.name] = readings
+    return replace(job, overrulings=overrulings, surveys=by_method, **surveys)
 
 
 def _make_surveys(raw, values, tables, registers, attached):
@@ -102,14 +100,6 @@ def _make_surveys(raw, values, tables, registers, attached):
         from tankcal.job.lines import make_lines
 
         surveys["lines"] = make_lines(tables, registers)
-    if has_hits(tables):
-        from tankcal.job.hits import make_hits
-
-        surveys["hits"] = make_hits(tables, registers)
-    if has_tangents(tables):
-        from tankcal.job.tangents import make_tangents
-
-        surveys["tangents"] = make_tangents(tables, registers)
     if has_clouds(tables):
         from tankcal.job.clouds import make_clouds
 
@@ -123,10 +113,6 @@ def _make_surveys(raw, values, tables, registers, attached):
 
         radii, change = make_radii(values, tables, attached.radii_covariance_m2)
         surveys |= {"radii": radii, "change": change}
-    if has_great_circles(tables):
-        from tankcal.job.great_circles import make_great_circles
-
-        surveys["great_circles"] = make_great_circles(tables, registers)
     return surveys
 
 
@@ -142,11 +128,9 @@ def _read_tables(raw, registers, is_whole, log):
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
     if kind == "vertical":
-        allowed += STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + RADII_TABLES
-    if kind == "horizontal":
-        allowed += (*RING_TABLES, *OF_TAPES)
-    if kind == "sphere":
-        allowed += SPHERE_TABLES + BESIDE_CIRCLES
+        allowed += STRAPPING_TABLES + RADII_TABLES
+    for method in methods_for(kind):
+        allowed += method.tables + method.shared_tables
     if kind in OF_CLOUDS:
         allowed += CLOUD_TABLES
     tables = {"clouds": _cloud_table(raw, registers, kind, log)}
@@ -224,7 +208,8 @@ def _tell_sights_missing(raw, tables, log):
     has_readings = has_survey(tables) or is_strapped(tables)  # otherwise reported as missing points
     if has_targets or not has_readings or not has_rows(tables["setups"]):
         return
-    sights = [name for name in ("wall_hits", "tangents") if name in raw.tables]
+    of_methods = (method.tables[0] for method in methods() if method.is_sighted)
+    sights = [name for name in of_methods if name in raw.tables]
     for name in sights:
         if raw.tables[name] is not None:
             log.problem(raw.tables[name].file, _IN_PLACE_OF_POINTS[name])
@@ -246,8 +231,7 @@ def _tell_clouds_missing(raw, tables, log):
 
 
 _IN_PLACE_OF_POINTS = {
-    "wall_hits": message("no_rows_of_hits", "no rows; expected a sight to the wall in each"),
-    "tangents": message("no_rows_of_tangents", "no rows; expected a sight to a limb in each"),
+    **{method.tables[0]: method.no_rows() for method in methods() if method.no_rows()},
     "liquid": message(
         "no_rows_of_liquid",
         "no rows; expected the start of each run, and a row for each batch and the dip after it",

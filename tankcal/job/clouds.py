@@ -6,8 +6,8 @@ import tankcal.clouds
 from tankcal.job.checking import has_rows
 from tankcal.job.checks.clouds import has_network, poses_of, scans_of, unit_of
 from tankcal.job.contract.clouds import ASSUMED
+from tankcal.job.contract.ranging import USUAL_INCIDENCE_MM
 from tankcal.job.contract.shorthand import FREE
-from tankcal.job.hits import USUAL_INCIDENCE_MM
 from tankcal.job.model.clouds import CloudFile, Clouds
 from tankcal.survey.scans import KnownTargets, ScanSetup, ScanTarget
 from tankcal.survey.wall_hits import RangingInstrument

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from tankcal.errors import SHEET, InputError, Problem, reason_of, sheet_named
 from tankcal.messages import message
+from tankcal.methods.base import methods, methods_for
 
 TANK_TABLES = (
     *("points", "courses", "welds", "bottom", "deadwood"),
@@ -28,17 +29,15 @@ STRAPPING_TABLES = (
     *("circumferences", "obstructions", "thickness", "tape_checks"),
     *("lines", "offsets"),
 )
-SPHERE_TABLES = ("great_circles",)
-HITS_TABLES = ("wall_hits", "control_readings")
-TANGENT_TABLES = ("tangents",)
 CLOUD_TABLES = ("scan_targets",)
 LIQUID_TABLES = ("liquid",)
 RADII_TABLES = ("radii",)
-RING_TABLES = ("rings",)
 OVERRULING_TABLES = ("overrulings",)
-TABLES = TANK_TABLES + STRAPPING_TABLES + HITS_TABLES + TANGENT_TABLES + CLOUD_TABLES
-TABLES += LIQUID_TABLES + RADII_TABLES + RING_TABLES + SPHERE_TABLES + SURVEY_TABLES
-TABLES += OVERRULING_TABLES
+# The input files of a record are in this order: first the methods for upright tanks.
+_UPRIGHT = tuple(table for method in methods_for("vertical") for table in method.tables)
+_OTHERS = tuple(table for method in methods() for table in method.tables if table not in _UPRIGHT)
+TABLES = TANK_TABLES + STRAPPING_TABLES + _UPRIGHT + CLOUD_TABLES
+TABLES += LIQUID_TABLES + RADII_TABLES + _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
 REGISTERS = {  # name of an entry in each list
     "cameras": "camera",
     "instruments": "instrument",

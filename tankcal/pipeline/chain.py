@@ -96,7 +96,6 @@ def _run(job, progress, part_progress, simulated, cluster):
     original_job = job
     survey_result = find_survey(job, progress, cluster=cluster, part_progress=part_progress)
     job, survey, adjustment = survey_result.job, survey_result.survey, survey_result.adjustment
-    by_kind = _results_by_kind(survey)
     # The table may be that of liquid: the metered runs are adjusted first.
     measured_liquid = None
     if job.liquid is not None:
@@ -128,8 +127,7 @@ def _run(job, progress, part_progress, simulated, cluster):
         ship = ship_tables(job, survey, body, table, progress=part_progress)
     return Result(
         job=job,
-        wall=by_kind.get("wall"),
-        scan=by_kind.get("scan"),
+        surveys=_surveys_by_kind(survey),
         body=body,
         zero_m=zero,
         table=table,
@@ -144,34 +142,24 @@ def _run(job, progress, part_progress, simulated, cluster):
         warnings=_collect_warnings(
             job,
             adjustment,
-            survey_result.sighting or survey_result.touching or survey_result.clouded,
+            survey_result.sighting,
             survey,
             tabulation,
             liquid,
             overruled,
         ),
         adjustment=adjustment,
-        strapped=by_kind.get("strapped"),
-        sighting=survey_result.sighting,
-        touching=survey_result.touching,
-        clouded=survey_result.clouded,
+        sights=survey_result.sights,
         liquid=liquid,
-        nominal=by_kind.get("nominal"),
-        radii=by_kind.get("radii"),
-        rings=by_kind.get("rings"),
         ship=ship,
-        circles=by_kind.get("circles"),
         overrulings=overruled,
     )
 
 
-def _results_by_kind(survey):
-    """Map each kind of survey to its result.
-
-    With declared radii, a survey that checks them is included.
-    """
-    results = (survey, survey.surveyed if is_surveyed_as(survey, "radii") else None)
-    return {result.surveyed_as: result for result in results if result is not None}
+def _surveys_by_kind(survey):
+    """Surveys by `surveyed_as`; with declared radii, a survey that checks them is included."""
+    surveys = (survey, survey.surveyed if is_surveyed_as(survey, "radii") else None)
+    return {found.surveyed_as: found for found in surveys if found is not None}
 
 
 def _collect_warnings(job, adjustment, sighting, survey, tabulation, liquid, overruled):

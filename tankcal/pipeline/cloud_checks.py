@@ -7,7 +7,7 @@ from tankcal.messages import message
 from tankcal.pipeline.cloud_bottom import check_inside
 from tankcal.pipeline.cloud_overlaps import overlap_test, overlaps_of, scans_apart
 from tankcal.pipeline.cloud_wall import FILE, TARGETS
-from tankcal.pipeline.hit_checks import causes_unlike_certificates
+from tankcal.pipeline.ranging_checks import causes_unlike_certificates
 
 HIDDEN = 0.25  # largest share of hidden cells of a course: their form is only interpolated
 LEAST_OF_WALL = 0.01  # smallest share of wall points in a scan

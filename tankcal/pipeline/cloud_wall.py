@@ -18,9 +18,9 @@ from tankcal.pipeline.cloud_cluster import open_passes
 from tankcal.pipeline.cloud_overlaps import normals_of, overlaps_of, scans_apart
 from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
 from tankcal.pipeline.cloud_units import is_unit_defined, refusal_of_units
-from tankcal.pipeline.hit_wall import through_wall
 from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.scan import fit_scan
+from tankcal.pipeline.sighted_points import through_wall
 from tankcal.pipeline.wall import find_wall, joints_of
 from tankcal.survey.beams import BeamPoints, points_of_beams
 from tankcal.survey.registration import Registration, register

@@ -10,6 +10,7 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.job.plausibility import IMPOSSIBLE_MISS, INSIDE, PLATES_TO_INSIDE, unit_guess
 from tankcal.messages import list_some, message
+from tankcal.methods.base import given_methods, method_of
 from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.wall_straps import mean_radii
 
@@ -92,7 +93,7 @@ def inside_radii(job, survey):
     Parameters
     ----------
     job : Job
-    survey : Wall, StrappedWall, RingedWall, RadiiWall, StrappedSphere, Scan, mesh or None
+    survey : Wall, StrappedWall, RingedWall, RadiiWall, Scan, mesh, survey of a method, or None
         Object whose `surveyed_as` names the kind of survey.
 
     Returns
@@ -100,28 +101,28 @@ def inside_radii(job, survey):
     InsideRadii or None
     """
     kind = None if survey is None else survey.surveyed_as
-    if kind in ("wall", "strapped", "radii", "rings"):
-        parts = job.rings if kind == "rings" else job.courses
+    if kind in ("wall", "strapped", "radii"):
+        parts = job.courses
         plates = np.array([part.thickness_m + part.paint_m for part in parts])
         names = tuple(getattr(part, "name", str(i)) for i, part in enumerate(parts, 1))
         if kind == "radii":
             radius = survey.radius_m
-        elif kind == "rings":
-            radius = survey.straps.radius_m - plates
         else:
             radius = mean_radii(survey.field) - plates * (job.survey.side == "outside")
         sd = _sds_of_courses(survey, len(parts)) if kind == "wall" else np.zeros(len(parts))
         return InsideRadii(names, radius, plates, sd)
-    if kind in ("scan", "circles"):
-        solid = job.horizontal or job.sphere
-        plate = solid.thickness_m
-        if kind == "circles":
-            radius = survey.solid(plate).diameter_m / 2
-        else:
-            diameter = dict(zip(survey.names, survey.values, strict=True))["diameter"]
-            radius = diameter / 2 - plate * (job.survey.side == "outside")
-        return InsideRadii(("",), *(np.array([float(value)]) for value in (radius, plate, 0.0)))
-    return None
+    if kind == "scan":
+        plate = (job.horizontal or job.sphere).thickness_m
+        diameter = dict(zip(survey.names, survey.values, strict=True))["diameter"]
+        return single_radius(diameter / 2 - plate * (job.survey.side == "outside"), plate)
+    method = method_of(survey)
+    return None if method is None else method.inside_radii(job, survey)
+
+
+def single_radius(radius_m, plate_m):
+    """`InsideRadii` of a shape with one radius of negligible uncertainty."""
+    values = (np.array([float(value)]) for value in (radius_m, plate_m, 0.0))
+    return InsideRadii(("",), *values)
 
 
 def _sds_of_courses(wall, count):
@@ -194,8 +195,8 @@ def check_size(job, survey):
 
 def _has_own_line(job, survey):
     """Whether another check compares the whole tank of this survey with the drawing."""
-    is_sighted = job.hits is not None or job.tangents is not None
-    return is_sighted or survey.surveyed_as in ("strapped", "rings", "circles")
+    by_method = any(method.compares_size for method in given_methods(job))
+    return by_method or survey.surveyed_as == "strapped"
 
 
 def _unlike_drawing(job, radius_m, miss_m):

@@ -1,7 +1,7 @@
 """Result of a job: the capacity table, the data behind it, and functions that read it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -35,10 +35,8 @@ if TYPE_CHECKING:
     from tankcal.pipeline.nominal_wall import NominalWall
     from tankcal.pipeline.radii_wall import RadiiWall
     from tankcal.pipeline.read_wall import ReadWall
-    from tankcal.pipeline.ringed_wall import RingedWall
     from tankcal.pipeline.scan import Scan
     from tankcal.pipeline.ship import ShipTables
-    from tankcal.pipeline.strapped_sphere import StrappedSphere
     from tankcal.pipeline.strapped_wall import StrappedWall
     from tankcal.pipeline.surveyed_wall import Wall
     from tankcal.pipeline.wall_straps import Straps
@@ -55,30 +53,18 @@ class Result:
     ----------
     job : Job
         The job as computed, with its points if these came from an adjustment.
-    wall : surveyed_wall.Wall or None
-        Wall of a vertical tank surveyed by points; None for other kinds.
-    scan : scan.Scan or None
-        Solid fitted to the points of a horizontal cylinder or a sphere.
-    strapped : strapped_wall.StrappedWall or None
-        Wall of a vertical tank measured by strapping.
-    sighting : sighting.Sighting or None
-        Reflectorless hits of the wall as points, with their set-ups.
-    touching : tangents.Touching or None
-        Tangents as points of the wall, with their set-ups.
-    clouded : cloud_wall.Clouded or None
-        Point clouds as points of the wall: scans, cells and obstructions.
+    surveys : dict
+        {`surveyed_as` of a survey: the survey}: the wall or solid that the measurements determine,
+        and with declared radii also the survey that checks them. The properties `wall`, `scan`,
+        `strapped`, `nominal`, `radii` and `rings` are entries of it. The survey of a method of
+        `tankcal.methods` has the name of the method, such as "great_circles".
+    sights : dict
+        {method: its sights as points of the wall}; the properties `sighting`, `touching` and
+        `clouded` are entries of it.
     liquid : liquid.LiquidResult or None
         Calibration by metered liquid, in addition to the geometry.
-    nominal : nominal_wall.NominalWall or None
-        Wall from the drawing, for an upright tank calibrated by liquid alone.
-    radii : radii_wall.RadiiWall or None
-        Wall of declared radii, with the courses measured again.
-    rings : ringed_wall.RingedWall or None
-        Rings of a horizontal cylinder measured by strapping.
     ship : ship.ShipTables or None
         Corrections of soundings for trim and list of a ship's tank.
-    circles : strapped_sphere.StrappedSphere or None
-        Sphere measured by strapping.
     body : body.Body
         Tank as the sum of its parts, with all enabled corrections.
     zero_m : float
@@ -117,8 +103,7 @@ class Result:
     """
 
     job: Job
-    wall: "Wall | None"
-    scan: "Scan | None"
+    surveys: dict[str, object]
     body: Body
     zero_m: float
     table: Capacity
@@ -132,17 +117,55 @@ class Result:
     rule: RuleVerdict | None
     warnings: tuple[Problem, ...]
     adjustment: "Adjustment | None" = None
-    strapped: "StrappedWall | None" = None
-    sighting: "Sighting | None" = None
-    touching: "Touching | None" = None
-    clouded: "Clouded | None" = None
+    sights: dict[str, object] = field(default_factory=dict)
     liquid: "LiquidResult | None" = None
-    nominal: "NominalWall | None" = None
-    radii: "RadiiWall | None" = None
-    rings: "RingedWall | None" = None
     ship: "ShipTables | None" = None
-    circles: "StrappedSphere | None" = None
     overrulings: Overrulings | None = None
+
+    @property
+    def wall(self) -> "Wall | None":
+        """Wall of a vertical tank surveyed by points; None for other kinds."""
+        return self.surveys.get("wall")
+
+    @property
+    def scan(self) -> "Scan | None":
+        """Solid fitted to the points of a horizontal cylinder or a sphere."""
+        return self.surveys.get("scan")
+
+    @property
+    def strapped(self) -> "StrappedWall | None":
+        """Wall of a vertical tank measured by strapping."""
+        return self.surveys.get("strapped")
+
+    @property
+    def nominal(self) -> "NominalWall | None":
+        """Wall from the drawing, for an upright tank calibrated by liquid alone."""
+        return self.surveys.get("nominal")
+
+    @property
+    def radii(self) -> "RadiiWall | None":
+        """Wall of declared radii, with the courses measured again."""
+        return self.surveys.get("radii")
+
+    @property
+    def rings(self):
+        """Rings of a horizontal cylinder measured by strapping."""
+        return self.surveys.get("rings")
+
+    @property
+    def sighting(self) -> "Sighting | None":
+        """Reflectorless hits of the wall as points, with their set-ups."""
+        return self.sights.get("hits")
+
+    @property
+    def touching(self) -> "Touching | None":
+        """Tangents as points of the wall, with their set-ups."""
+        return self.sights.get("tangents")
+
+    @property
+    def clouded(self) -> "Clouded | None":
+        """Point clouds as points of the wall: scans, cells and obstructions."""
+        return self.sights.get("clouds")
 
     def __str__(self) -> str:
         top_m = self.table.height_m[-1]

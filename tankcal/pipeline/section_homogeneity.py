@@ -19,6 +19,7 @@ from scipy.special import chdtr
 
 from tankcal.geometry.field.section_noise import bartlett
 from tankcal.messages import list_some, message
+from tankcal.methods.base import is_sighted
 from tankcal.pipeline.survey_warnings import SHOWN, noise_is_estimated, of_points
 
 # Keys of the warnings that only measured points, not planned points, can cause.
@@ -99,7 +100,7 @@ def homogeneity_of(job, wall):
         None if points share unknowns of instruments (hits, clouds, tangents) or were averaged in
         cells, because sections then have no separate noise.
     """
-    shares_unknowns = job.hits or job.clouds or job.tangents or job.points.unbound
+    shares_unknowns = job.clouds or is_sighted(job) or job.points.unbound
     if shares_unknowns or wall.points_read != len(wall.accepted):
         return None
     noise = wall.section_noise

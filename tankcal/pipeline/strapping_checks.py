@@ -45,7 +45,7 @@ def check_strapped(job, wall):
     """`Problem`s of a wall determined by straps, with or without reference lines."""
     straps = wall.straps
     return (
-        *check_tapes(job, straps),
+        *check_tapes(job, straps, job.strapping),
         *check_repeats(straps),
         *_check_pairs(job, straps),
         *(_check_courses(job, straps) if job.radii is None else ()),
@@ -59,7 +59,7 @@ def check_straps_beside_points(job, wall):
     """`Problem`s of straps round a `Wall` surveyed by points."""
     straps = wall.straps
     return (
-        *check_tapes(job, straps),
+        *check_tapes(job, straps, job.strapping),
         *check_repeats(straps),
         *_check_contradictions(straps, strapped_together(wall)),
     )

@@ -10,11 +10,19 @@ from scipy.special import ndtri
 BY_CHANCE = 0.01  # share of valid surveys with an apparent movement due to scatter
 
 
-@cache
 def limits_of(survey):
     """Limits of a kind of survey, by the name of its file in limits/."""
-    text = files("tankcal.pipeline").joinpath(f"limits/{survey}.toml").read_text("utf-8")
-    return tomllib.loads(text)
+    return _read_limits("tankcal.pipeline", f"limits/{survey}.toml")
+
+
+def limits_of_method(package):
+    """Limits of a method, from limits.toml in its package."""
+    return _read_limits(package, "limits.toml")
+
+
+@cache
+def _read_limits(package, path):
+    return tomllib.loads(files(package).joinpath(path).read_text("utf-8"))
 
 
 def limit_at(survey, table, figure, circumference_m):

@@ -3,7 +3,7 @@
 The readings may be those of a survey or the predicted readings of a plan.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
+from tankcal.methods.base import given_methods
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.nominal_size import refuse_other_size
 from tankcal.pipeline.overruled_points import refuse_kept_readings, with_decided_readings
@@ -21,10 +22,7 @@ from tankcal.pipeline.survey_warnings import refuse_undetermined
 from tankcal.pipeline.wall import find_wall
 
 if TYPE_CHECKING:
-    from tankcal.pipeline.cloud_wall import Clouded
     from tankcal.survey import Adjustment
-    from tankcal.survey.sighting import Sighting
-    from tankcal.survey.tangents import Touching
 
 # Each kind of survey is imported when needed: most jobs have one kind, and all are slow to load.
 
@@ -42,20 +40,41 @@ class Surveyed:
     survey : Wall, StrappedWall, Scan, mesh or None
         None if the tank is described by declared sizes alone.
     adjustment : Adjustment or None
-    sighting : Sighting or None
-        Wall hits as points of the wall.
-    touching : Touching or None
-        Tangents as points of the wall.
-    clouded : Clouded or None
-        Clouds as points of the wall.
+    sights : dict
+        {method: its sights as points of the wall}: "hits" (`survey.sighting.Sighting`), "tangents"
+        (`survey.tangents.Touching`) or "clouds" (`cloud_wall.Clouded`).
     """
 
     job: Job
     survey: object
     adjustment: "Adjustment | None" = None
-    sighting: "Sighting | None" = None
-    touching: "Touching | None" = None
-    clouded: "Clouded | None" = None
+    sights: dict = field(default_factory=dict)
+
+    @property
+    def sighting(self):
+        """Sights of the only method that has them; None without sights."""
+        return next(iter(self.sights.values()), None)
+
+
+@dataclass(frozen=True)
+class Network:
+    """Adjusted network from which a wall is found.
+
+    Attributes
+    ----------
+    adjustment : Adjustment or None
+        None if the job has no measurements to be adjusted.
+    amplitudes : Amplitudes or None
+        Known amplitudes of the components of an upright wall; None: estimated from the readings.
+    """
+
+    adjustment: "Adjustment | None"
+    amplitudes: object
+
+    @property
+    def dof(self):
+        """Degrees of freedom of the adjustment; infinite without an adjustment."""
+        return np.inf if self.adjustment is None else self.adjustment.dof
 
 
 def is_surveyed_as(survey, kind):
@@ -85,8 +104,9 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     InputError, SolutionError
         As `chain.run`.
     """
-    adjustment = sighting = touching = clouded = None
-    is_sighted = any(table is not None for table in (job.hits, job.tangents, job.clouds))
+    adjustment, sights = None, {}
+    sighted = [method for method in given_methods(job) if method.is_sighted]
+    is_sighted = bool(sighted) or job.clouds is not None
     if job.measurements is not None:
         adjustment = _adjusted(job, progress)
     if not is_sighted and adjustment is not None:
@@ -94,30 +114,21 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
 
         points = wall_points(adjustment, job.measurements, job.survey.side)
         job = replace(job, points=s_transform(points))
-    dof = np.inf if adjustment is None else adjustment.dof
+    network = Network(adjustment, amplitudes)
     try:
-        if job.hits is not None:
-            from tankcal.pipeline.hit_wall import find_hit_wall
-
-            job, sighting, survey = find_hit_wall(
-                job, adjustment, progress, dof, amplitudes=amplitudes
-            )
-        elif job.tangents is not None:
-            from tankcal.pipeline.tangent_wall import find_tangent_wall
-
-            job, touching, survey = find_tangent_wall(
-                job, adjustment, progress, dof, amplitudes=amplitudes
-            )
+        if sighted:
+            found = sighted[0].find(job, progress, network)
+            job, survey, sights = found.job, found.survey, found.sights
         elif job.clouds is not None:
             from tankcal.pipeline.cloud_passes import Reading
             from tankcal.pipeline.cloud_wall import find_wall_in_clouds
 
             reading = Reading(cluster, part_progress)
-            job, clouded, survey = find_wall_in_clouds(
-                job, adjustment, progress, dof, amplitudes=amplitudes, reading=reading
+            job, sights["clouds"], survey = find_wall_in_clouds(
+                job, adjustment, progress, network.dof, amplitudes=amplitudes, reading=reading
             )
         else:
-            survey = _survey(job, progress, dof, amplitudes)
+            survey = _survey(job, progress, network)
     except SolutionError as error:
         if adjustment is None or not adjustment.warnings:
             raise
@@ -133,7 +144,7 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
 
         progress(message("updating_radii", "bringing the former radii up to date"))
         survey = update_by_survey(job, survey)
-    return Surveyed(job, survey, adjustment, sighting, touching, clouded)
+    return Surveyed(job, survey, adjustment, sights)
 
 
 def placed(job, problems):
@@ -175,16 +186,14 @@ def adjust_decided(job, progress):
     return adjustment
 
 
-def _survey(job, progress, dof, amplitudes):
+def _survey(job, progress, network):
     """Survey of the tank: wall of courses, mesh or scan; None for declared sizes alone."""
-    if job.rings:
-        from tankcal.pipeline.ringed_wall import find_ringed_wall
-
-        return find_ringed_wall(job, progress, amplitudes)
+    for method in given_methods(job):
+        return method.find(job, progress, network).survey
     if job.strapping is not None and job.points is None:
         from tankcal.pipeline.strapped_wall import find_strapped_wall
 
-        return find_strapped_wall(job, progress, amplitudes)
+        return find_strapped_wall(job, progress, network.amplitudes)
     if job.radii is not None and job.points is None:
         from tankcal.pipeline.radii_wall import find_radii_wall
 
@@ -194,11 +203,7 @@ def _survey(job, progress, dof, amplitudes):
 
         return find_nominal_wall(job, progress)
     if job.tank.kind == "vertical":
-        return find_wall(job, progress, dof, amplitudes)
-    if job.great_circles is not None:
-        from tankcal.pipeline.strapped_sphere import find_strapped_sphere
-
-        return find_strapped_sphere(job, progress)
+        return find_wall(job, progress, network.dof, network.amplitudes)
     if job.mesh is not None:
         from tankcal.pipeline.ship import check_pipe
         from tankcal.tank.meshes import parse_mesh
@@ -215,5 +220,5 @@ def _survey(job, progress, dof, amplitudes):
                 "fitting_wall", "fitting the wall to {count} points", count=len(job.points.names)
             )
         )
-        return fit_scan(job, dof)
+        return fit_scan(job, network.dof)
     return None

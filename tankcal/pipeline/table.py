@@ -9,6 +9,7 @@ import numpy as np
 
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.messages import message
+from tankcal.methods.base import given_methods, method_of
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.nominal_size import check_size
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
@@ -183,14 +184,9 @@ def _check_sights(job, survey, sighting):
     """Warnings about the sights or clouds of a wall."""
     if sighting is None:
         return ()
-    if job.hits is not None:
-        from tankcal.pipeline.hit_checks import check_hits
-
-        return check_hits(job, survey, sighting)
-    if job.tangents is not None:
-        from tankcal.pipeline.tangent_checks import check_tangents
-
-        return check_tangents(job, survey, sighting)
+    for method in given_methods(job):
+        if method.is_sighted:
+            return method.warnings(job, survey, sighting)
     from tankcal.pipeline.cloud_checks import check_clouds
 
     return check_clouds(job, survey, sighting)
@@ -198,21 +194,15 @@ def _check_sights(job, survey, sighting):
 
 def _check_survey(job, survey, top_m):
     """Warnings about a survey, by its kind."""
-    kind = None if survey is None else survey.surveyed_as
+    method, kind = method_of(survey), None if survey is None else survey.surveyed_as
+    if method is not None:
+        return method.warnings(job, survey)
     if kind == "wall":
         return _check_wall_of_points(job, survey)
     if kind == "strapped":
         from tankcal.pipeline.strapping_checks import check_strapped
 
         return (*check_strapped(job, survey), *_check_reference_lines(job, survey))
-    if kind == "circles":
-        from tankcal.pipeline.great_circle_checks import check_circles
-
-        return check_circles(job, survey)
-    if kind == "rings":
-        from tankcal.pipeline.ring_checks import check_rings
-
-        return check_rings(job, survey)
     if kind == "scan":
         return check_scan(job, survey, top_m)
     return () if survey is None else check_mesh(job, top_m)

@@ -21,14 +21,27 @@ STIFFNESS_N = (1e5, 5e6)  # range of plausible tape stiffnesses: 0.5 to 25 mm2 o
 BY_CHANCE = 0.02  # probability of as many equal repeats below which copying is suspected
 
 
-def check_tapes(job, straps):
-    """`Problem`s of the tapes of a strapping and of their readings, independent of the wall."""
+def check_tapes(job, straps, strapping):
+    """`Problem`s of the tapes of a strapping and of their readings, independent of the wall.
+
+    Parameters
+    ----------
+    job : Job
+    straps : object
+        Readings as `reduced`, and the `tapes` used.
+    strapping : survey.strapping.Strapping
+        Strapping of the job.
+
+    Returns
+    -------
+    tuple of Problem
+    """
     return (
         *_check_temperatures(job, straps),
         *_check_shell_temperature(job, straps),
         *_check_pulls(straps),
         *_check_certificates(straps),
-        *_check_comparisons(job, straps),
+        *_check_comparisons(straps, strapping),
         *_of_copies([reduced_strap.strap for reduced_strap in straps.reduced]),
     )
 
@@ -184,10 +197,9 @@ def _check_whole_correction(tape, straps):
         yield Problem(TAPES, text, column=f"{tape.name}.correction_mm")
 
 
-def _check_comparisons(job, straps):
+def _check_comparisons(straps, strapping):
     """Problem of comparisons with a master that differ beyond their standard deviations."""
     compared_tapes = [tape for tape, _ in straps.tapes if tape.master]
-    strapping = job.strapping if job.great_circles is None else job.great_circles.strapping
     comparisons = [comparison for comparison in strapping.comparisons if comparison.sd_m > 0]
     if not compared_tapes or len(comparisons) < 2:
         return

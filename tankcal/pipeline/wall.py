@@ -15,6 +15,7 @@ from tankcal.geometry.field.sites import Sites, spans_of
 from tankcal.geometry.outlines import polar
 from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
 from tankcal.messages import Message, message
+from tankcal.methods.base import given_methods, is_sighted
 from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
 from tankcal.pipeline.point_covariance import given_covariance, median_sd, radial_sds
 from tankcal.pipeline.section_homogeneity import warn_of_sections
@@ -87,7 +88,7 @@ def find_wall(job, progress, dof=np.inf, amplitudes=None, *, sizes=None):
         )
         decided = decisions_of(job)
         shell = _shell(job, joints_of(job), radial_sds(job.points), decided)
-        if job.hits is not None or job.tangents is not None:
+        if is_sighted(job):
             shell = _clear_of_welds(job, shell, decided)
         most = WIDE_BAND * job.tank.nominal_diameter_m / 2
         refuse_kept(job, shell.residual_m, most, shell.reason)
@@ -168,7 +169,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     is_read = is_read or (
         job.radii is not None and len({group.course for group in groups}) < len(job.courses)
     )
-    if is_read or job.points.unbound or by_inputs or job.tangents is not None:
+    if is_read or job.points.unbound or by_inputs or _is_smooth(job):
         unbound = unbound_of(job.points, by_points, accepted)
         noise = by_points @ (covariance @ by_points.T)  # includes covariances between sections
         noise = noise.toarray() if scipy.sparse.issparse(noise) else noise
@@ -203,8 +204,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
         straps=straps,
         read=read,
         by_inputs=by_inputs,
-        # Hits and clouds have instrument offsets of their own.
-        without_inputs=("offset",) if job.hits or job.clouds else (),
+        without_inputs=("offset",) if _has_own_offsets(job) else (),
         origins_m=np.array([sample.centre_m for sample in samples]),
         told=told,
     )
@@ -216,7 +216,17 @@ def is_smoothed(job):
     Limbs pass over the valleys of a wall. Set-ups tied by the wall alone are fitted to what they
     see.
     """
-    return job.tangents is not None or has_loose_poses(job)
+    return _is_smooth(job) or has_loose_poses(job)
+
+
+def _has_own_offsets(job):
+    """Whether the instruments of the wall have offsets of their own, as of hits and clouds."""
+    return bool(job.clouds) or any(method.has_own_offset for method in given_methods(job))
+
+
+def _is_smooth(job):
+    """Whether a method of the job shows the wall smoother than it is."""
+    return any(method.is_smooth for method in given_methods(job))
 
 
 def has_loose_poses(job):
@@ -341,7 +351,7 @@ def _shell(job, heights, sds, decided):
             decided=decided,
         )
     except SolutionError as error:
-        if job.hits is not None or job.tangents is not None:
+        if is_sighted(job):
             text = error.args[0]
             if not isinstance(text, Message):  # a message of the solver about its unknowns
                 text = message("no_upright_shell", "the sights show no upright shell")

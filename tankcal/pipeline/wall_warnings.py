@@ -6,6 +6,7 @@ import numpy as np
 
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.messages import list_some, message
+from tankcal.methods.base import given_methods
 from tankcal.pipeline.survey_warnings import LARGE_NOISE_M, SHOWN, of_points
 from tankcal.pipeline.undecided_columns import tell_undecided
 
@@ -100,9 +101,10 @@ def _listed(sections):
 
 
 def _shown(job, group):
-    """Name of a section in messages; the level for a section of tangents."""
+    """Name of a section in messages; the level for a section that is named by it."""
     level = group.name.removeprefix(f"{job.courses[group.course].name} ")
-    if job.tangents is None or level == group.name:
+    names_levels = any(method.names_levels for method in given_methods(job))
+    if not names_levels or level == group.name:
         return group.name
     return message("section_at_level", "at {level_m:.3f} m", level_m=float(level))
 

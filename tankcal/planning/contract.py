@@ -1,9 +1,9 @@
 """Keys of plan.toml, and columns of its tables that a job does not have."""
 
 from tankcal.job.contract import columns_of
-from tankcal.job.contract.hits import RANGING
-from tankcal.job.contract.observations import ANGLE_UNITS
+from tankcal.job.contract.ranging import RANGING
 from tankcal.job.fields import Field
+from tankcal.job.shared_columns import ANGLE_UNITS
 from tankcal.messages import message
 
 

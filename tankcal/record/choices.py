@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.adjust import CRITICAL
+from tankcal.methods.base import given_methods
 from tankcal.record.liquid import geometry_beside
 from tankcal.record.schema import Saved, key
 from tankcal.record.table import zero_of
@@ -29,10 +30,11 @@ def choices_of(result):
         **(_strap_choices(job) if result.strapped is not None else {}),
         **_liquid_choices(result),
         **_radii_choices(result),
-        **_ring_choices(result),
+        **_choices_of_methods(result, ("vertical", "horizontal")),
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job, result),
         "temperature": _temperature_choice(job),
+        **_choices_of_methods(result, ("sphere",)),
         **_sphere_choices(job),
         "height_expansion": "yes" if job.table.height_expansion else "no",
         "head": _head_choice(job),
@@ -104,12 +106,10 @@ def _shell_choices(job, result):
 def _survey_choices(job, result):
     """Return the choices on the origin of the points and of their covariance."""
     choices = {"covariance": _covariance_choice(job) if result.adjustment is None else "adjusted"}
-    if job.hits is not None:
-        choices = {"survey": "wall_hits", "covariance": "hits"}
-    elif job.clouds is not None:
+    if job.clouds is not None:
         choices = {"survey": "clouds", "covariance": "clouds"}
-    elif job.tangents is not None:
-        choices = {"survey": "tangents", "covariance": "tangents"}
+    for method in given_methods(job):
+        choices = method.choices(result)
     if result.straps is not None:
         choices["straps"] = "beside_points"
     if job.lines is not None:
@@ -138,27 +138,22 @@ def _area_term_choice(shape_sd_m):
     return "none" if shape_sd_m == 0 else 1000 * shape_sd_m
 
 
-def _ring_choices(result):
-    """Return the choices on the strapped rings of a horizontal tank."""
-    if result.rings is None:
-        return {}
-    shape_mm = 1000 * result.rings.shape_sd_m
-    return {
-        "survey": "strapping_rings",
-        "area_term": shape_mm or "none",
-        "between_sections": "rings",
-        "form": "learned",
-    }
+def _choices_of_methods(result, kinds):
+    """Assumptions of the methods of a job, if its tank is of these kinds.
+
+    A record of a sphere has them at another place than the records of other tanks.
+    """
+    choices = {}
+    for method in given_methods(result.job) if result.job.tank.kind in kinds else ():
+        choices |= method.choices(result)
+    return choices
 
 
 def _sphere_choices(job):
-    """Return the choices on a strapped sphere, and on the pressure of the table."""
-    choices = {}
-    if job.great_circles is not None:
-        choices |= {"survey": "great_circles", "between_sections": "ellipsoid"}
+    """Pressure of the table of a sphere, bar."""
     if job.sphere is not None and job.switches.head and job.table.pressure_pa:
-        choices["pressure"] = job.table.pressure_pa / 1e5
-    return choices
+        return {"pressure": job.table.pressure_pa / 1e5}
+    return {}
 
 
 def _liquid_choices(result):

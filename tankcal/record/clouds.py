@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.record.hits import SharedByHits, shared_of
+from tankcal.record.ranging import SharedByHits, shared_of
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.units import ARCSEC
 

@@ -16,13 +16,12 @@ from tankcal.job.model.settings import (
     TableSpec,
     Tank,
 )
+from tankcal.methods.base import find_method, methods
 from tankcal.pipeline.corrections import Correction
 from tankcal.record import survey, table, tank_parts, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.choices import Choice, adjustment_choices, choices_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
-from tankcal.record.great_circles import GreatCirclesRecord, great_circles_of
-from tankcal.record.hits import HitsRecord, hits_of
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
 from tankcal.record.long_tables import LongTables
@@ -30,7 +29,6 @@ from tankcal.record.radii import RadiiRecord, radii_of
 from tankcal.record.schema import Saved, fill_from, key, to_plain
 from tankcal.record.ship import ShipRecord, ship_of
 from tankcal.record.strapping import StrappingRecord, strapping_of
-from tankcal.record.tangents import TangentsRecord, tangents_of
 from tankcal.record.versions import FORMAT
 from tankcal.record.wall_shape import WallShapeRecord, shape_record
 from tankcal.tank.deliveries import WorstDeliveries
@@ -62,6 +60,12 @@ class JobAsRead(Saved):
         default=None,
         optional=True,
     )
+
+
+def saved_parts_of_methods():
+    """Keys of the methods in a record: {name: (dataclass, description)}."""
+    parts = {method.name: (method.saved_type(), method.saved_note) for method in methods()}
+    return {name: part for name, part in parts.items() if part[0] is not None}
 
 
 class Record(Saved, kw_only=True):
@@ -97,11 +101,8 @@ class Record(Saved, kw_only=True):
     clouds: CloudsRecord | None = key(
         "clouds of the wall; left out if there are none", default=None, optional=True
     )
-    hits: HitsRecord | None = key(
-        "bare wall hits; left out if there are none", default=None, optional=True
-    )
-    tangents: TangentsRecord | None = key(
-        "tangents from outside; left out if there are none", default=None, optional=True
+    surveys: dict = key(
+        "saved part of each method", default_factory=dict, parts=saved_parts_of_methods
     )
     liquid: LiquidRecord | None = key(
         "metered runs; left out if there are none", default=None, optional=True
@@ -111,9 +112,6 @@ class Record(Saved, kw_only=True):
     )
     ship: ShipRecord | None = key(
         "corrections for trim and list; left out if there are none", default=None, optional=True
-    )
-    great_circles: GreatCirclesRecord | None = key(
-        "strapped sphere; left out if there is none", default=None, optional=True
     )
     courses: list[survey.CourseOfShell] = key("from the bottom up", default=())
     wall_shape: WallShapeRecord | None = key(
@@ -150,6 +148,12 @@ class Record(Saved, kw_only=True):
         optional=True,
     )
 
+    def __getattr__(self, name):
+        # The saved part of a method is an attribute, as every other key of the record is.
+        if name not in saved_parts_of_methods():
+            raise AttributeError(f"'Record' object has no attribute {name!r}")
+        return self.surveys.get(name)
+
 
 _HEAD = ("format", "tankcal", "versions", "files", "job")
 _OF_A_SURVEY = ("points", "choices", "warnings", "adjustment")
@@ -169,13 +173,11 @@ def record_of(result):
             homogeneity=survey.homogeneity_record(job, result.wall),
             strapping=strapping_of(result),
             lines=lines_of(result),
-            hits=hits_of(result),
             clouds=clouds_of(result),
-            tangents=tangents_of(result),
             liquid=liquid_of(result),
             radii=radii_of(result),
             ship=ship_of(result),
-            great_circles=great_circles_of(result),
+            surveys=surveys_of(result),
             courses=survey.courses_of(result),
             wall_shape=shape_record(job, result.wall),
             capacity=table.capacity_of(result),
@@ -199,6 +201,13 @@ def record_of(result):
             monte_carlo=table.monte_carlo_of(result),
         )
     )
+
+
+def surveys_of(result):
+    """Saved part of each method whose survey or sights a result contains, by its name."""
+    found = {**result.surveys, **result.sights}
+    saved = [name for name in saved_parts_of_methods() if name in found]
+    return {name: find_method(name).save(result) for name in saved}
 
 
 def record_of_adjustment(job, adjustment):

@@ -47,7 +47,7 @@ class Saved:
         dataclass(frozen=True, kw_only=kw_only)(cls)
 
 
-def key(doc, *, of=None, times=None, named=None, optional=False, **options):
+def key(doc, *, of=None, times=None, named=None, optional=False, parts=None, **options):
     """Declare a field that is saved.
 
     Parameters
@@ -63,10 +63,14 @@ def key(doc, *, of=None, times=None, named=None, optional=False, **options):
         The key, if it is no valid name in Python, such as "from".
     optional : bool, optional
         Whether the key is omitted if the value is None.
+    parts : callable, optional
+        For a field that is a dict: function that returns {key: (type, description)}. The entries
+        of the dict are saved in place of the field; a missing entry is omitted.
     **options
         Further arguments of `dataclasses.field`.
     """
     about = {"doc": doc, "of": of, "times": times, "named": named, "optional": optional}
+    about["parts"] = parts
     return field(metadata=about, **options)
 
 
@@ -114,22 +118,35 @@ class Key:
     type: Any
     doc: str = ""
     required: bool = True
+    is_part: bool = False  # an entry of the dict that is the field
+
+    def value_in(self, instance):
+        """Value of the key in an instance of the dataclass; None for a missing entry."""
+        value = getattr(instance, self.name)
+        return value.get(self.key) if self.is_part else value
 
 
 @cache
 def keys_of(cls):
     """Return the keys of a dataclass in the order of writing (tuple of Key)."""
     hints, attribute_docs = get_type_hints(cls, include_extras=True), _attribute_docs(cls)
-    keys = [
-        Key(
-            declared.metadata.get("named") or declared.name,
-            declared.name,
-            hints[declared.name],
-            declared.metadata.get("doc") or attribute_docs.get(declared.name, ""),
-            not declared.metadata.get("optional", False),
+    keys = []
+    for declared in fields(cls):
+        if declared.metadata.get("parts"):
+            keys += [
+                Key(name, declared.name, kind | None, doc, required=False, is_part=True)
+                for name, (kind, doc) in declared.metadata["parts"]().items()
+            ]
+            continue
+        keys.append(
+            Key(
+                declared.metadata.get("named") or declared.name,
+                declared.name,
+                hints[declared.name],
+                declared.metadata.get("doc") or attribute_docs.get(declared.name, ""),
+                not declared.metadata.get("optional", False),
+            )
         )
-        for declared in fields(cls)
-    ]
     for text in [item for item in keys if item.type is Message]:
         keys.append(Key(f"{text.key}_code", "", str | None, f"code of `{text.key}`"))
         keys.append(Key(f"{text.key}_values", "", dict, f"values of `{text.key}`"))
@@ -433,7 +450,7 @@ def to_plain(value):
 
 def _object_to_plain(value):
     keys = [item for item in keys_of(type(value)) if item.name]
-    values = {item.key: getattr(value, item.name) for item in keys}
+    values = {item.key: item.value_in(value) for item in keys}
     plain = {
         item.key: to_plain(values[item.key])
         for item in keys
@@ -527,6 +544,8 @@ def _convert_object(cls, data):
             text = Message(value)
             text.code, text.values = data[f"{item.key}_code"], data[f"{item.key}_values"]
             values[item.name] = text
+        elif item.is_part:
+            values.setdefault(item.name, {})[item.key] = _convert(item.type, value)
         else:
             values[item.name] = _convert(item.type, value)
     for declared in fields(cls):

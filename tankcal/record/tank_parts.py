@@ -2,6 +2,7 @@
 
 from math import degrees
 
+from tankcal.methods.base import given_methods
 from tankcal.record.schema import Saved, key
 from tankcal.tank.heads import torispherical_radii
 
@@ -88,7 +89,7 @@ def solid_of(result):
         return list_details(
             diameter=(result.body.parts[0].solid.diameter_m, "m"),
             **_scan_details(result),
-            **_ellipsoid_details(result),
+            **_sizes_by_methods(result),
             full_capacity=(result.body.parts[0].capacity_m3, "m3"),
         )
     if job.mesh is not None:
@@ -100,18 +101,12 @@ def solid_of(result):
     return None
 
 
-def _ellipsoid_details(result):
-    """Return the inside semi-axes of a strapped sphere as surveyed; {} for other tanks."""
-    if result.circles is None:
-        return {}
-    job = result.job
-    plate = job.sphere.thickness_m if job.switches.plate else 0.0
-    inside = result.circles.solid(plate)
-    return {
-        "semi_axis_a": (inside.a_m, "m"),
-        "semi_axis_b": (inside.b_m, "m"),
-        "semi_axis_c": (inside.c_m, "m"),
-    }
+def _sizes_by_methods(result):
+    """Sizes as surveyed by the methods of the job: {name: (value, unit)}."""
+    sizes = {}
+    for method in given_methods(result.job):
+        sizes |= method.sizes(result)
+    return sizes
 
 
 def _horizontal_details(result):

@@ -5,6 +5,7 @@ listed as missing.
 """
 
 from tankcal.job.plausibility_table import CODES
+from tankcal.methods.base import methods
 from tankcal.report import blocks
 from tankcal.report.metered_liquid import hidden_errors
 from tankcal.report.tables.facts import (
@@ -14,6 +15,7 @@ from tankcal.report.tables.facts import (
     SURVEY_DATE,
     tank_facts,
 )
+from tankcal.report.tables.strapping import certificates_of_tapes
 
 TO_WRITE_ON = ""  # value that the page style prints as a blank line
 # Entries of [certificate] that other parts of the paper print.
@@ -109,25 +111,21 @@ def instruments_of(record):
     """Return {instrument: certificate or None} of all instruments of a record."""
     adjustment = record["adjustment"]
     strapping, lines = (record.get(key) for key in ("strapping", "lines"))
-    sighted = (record.get("hits"), record.get("tangents"))
     used = {}
     for entry in adjustment["instruments"] if adjustment else ():
         used[entry["instrument"]] = entry["details"].get("certificate")
     for entry in lines["plummets"] if lines else ():
         if entry["plummet"]:  # None: the job does not describe the plummet
             used[entry["plummet"]] = entry["certificate"]
-    for entry in (setup for sights in sighted if sights for setup in sights["setups"]):
-        if entry["instrument"]:
-            used[entry["instrument"]] = entry["certificate"]
+    for method in methods():
+        if record.get(method.name):
+            used |= method.certificates(record[method.name])
     for entry in (record.get("clouds") or {}).get("scanners", ()):
         used[entry["scanner"]] = entry["certificate"]
     for entry in (record.get("liquid") or {}).get("meters", ()):
         used[entry["meter"]] = entry["certificate"]
-    taped = [entry for entry in (strapping, record.get("great_circles")) if entry]
-    for entry in (tape for record_part in taped for tape in record_part["tapes"]):
-        used[entry["tape"]] = entry["certificate"]
-        if entry["master"]:
-            used[entry["master"]] = entry["master_certificate"]
+    if strapping:
+        used |= certificates_of_tapes(strapping["tapes"])
     return used
 
 

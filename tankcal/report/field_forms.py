@@ -3,6 +3,7 @@
 from tankcal.job.contract import columns_of, tables_of_survey
 from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS
 from tankcal.job.starter.texts import split_unit, texts_in
+from tankcal.methods.base import methods
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
 
@@ -10,24 +11,21 @@ FILE = "field-sheets.pdf"
 # Surveys recorded by hand.
 BY_PEN = (*(survey for survey in OF_SHELLS if survey != DECLARED), METERED)
 FORMS = (  # input tables of each form, read together, and the number of rows on a sheet
-    (("rings",), 12),
     (("lines",), 12),
     (("offsets",), 30),
     (("setups",), 9),
     (("stadia",), 6),
     (("directions", "zenith_angles", "slope_distances"), 30),
-    (("tangents",), 30),
-    (("wall_hits",), 30),
-    (("control_readings",), 24),
+    *(form for method in methods() for form in method.field_forms),
     (("circumferences",), 15),
-    (("great_circles",), 15),
     (("obstructions",), 9),
     (("thickness",), 8),
     (("tape_checks",), 4),
     (("liquid",), 26),
 )
 ROWS_BESIDE = {("tangents", "directions"): 20}  # rows if another form is on the same page
-HEIGHTS_OF = ("tangents", "wall-hits")  # surveys with heights of the stations above the bottom
+# Surveys with heights of the stations above the bottom.
+HEIGHTS_OF = tuple(method.starter for method in methods() if method.needs_station_heights)
 ROWS_OF_HEIGHTS = 4  # rows of the form for the heights of stations
 IN_THE_OFFICE = (  # columns that are not filled in on site
     *("use", "s_mm", "s_arcsec", "note", "s_dip_mm", "s_volume_l"),

@@ -79,7 +79,7 @@ def refuse_foreign(directory, known):
 
 
 @contextmanager
-def replaced(directory, language=None):
+def replace_folder(directory, language=None):
     """Context manager of a new folder that replaces `directory` if the block ends without error.
 
     The new folder lies beside `directory`, or beside the target of a link. It receives SHA256SUMS

@@ -16,10 +16,10 @@ from tankcal.job.fields import Field
 from tankcal.job.folder import MAX_SETTINGS_BYTES, read_toml
 from tankcal.job.tables import Log, nearest, read_bytes
 from tankcal.messages import message
-from tankcal.report import LETTERHEAD
 from tankcal.report.logo import logo_problem
 from tankcal.text.decoding import read_json
 
+LETTERHEAD_FILE = "letterhead.json"  # saved beside a notebook whose papers have a letterhead
 PLACE = "place"  # value of a mark that is an empty frame
 LEAST_CONTRAST = 4.5  # smallest contrast of text with white paper: WCAG 2.2, 1.4.3
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
@@ -78,8 +78,8 @@ class Letterhead:
     def save(self, directory):
         """Write the letterhead into the folder of the notebook and return the file name."""
         text = json.dumps(self.data(), ensure_ascii=False, indent=1)
-        (Path(directory) / LETTERHEAD).write_text(text + "\n", encoding="utf-8")
-        return LETTERHEAD
+        (Path(directory) / LETTERHEAD_FILE).write_text(text + "\n", encoding="utf-8")
+        return LETTERHEAD_FILE
 
 
 def load(path):
@@ -101,7 +101,7 @@ def _parsed(path, data, log):
             expected = message(
                 "unknown_section_of_letterhead",
                 "unknown section; expected [laboratory] or [colours]{hint}",
-                hint=_hint(section),
+                hint=nearest(section, _SECTIONS),
             )
             log.problem(path.name, expected, rows.get(section), f"[{section}]")
     sections = {
@@ -121,10 +121,6 @@ def _parsed(path, data, log):
     if mark is None and laboratory["accreditation_place"]:
         mark = PLACE
     return Letterhead(laboratory["name"], laboratory["address"] or (), logo, colours, mark)
-
-
-def _hint(section):
-    return nearest(section, _SECTIONS)
 
 
 def _colour(file, field, values, given, log):

@@ -22,7 +22,7 @@ BY_VALUES = (LookupError, TypeError, ValueError, AttributeError)
 _TEXTS = ("source", "text")  # keys whose texts a notebook file stores as lists of lines
 
 
-def joined(record_name, lacks=(), templates=TEMPLATES, **parameters):
+def join_templates(record_name, lacks=(), templates=TEMPLATES, **parameters):
     """Join the templates into a notebook.
 
     Cells with the tag "parameters" or "setup" are taken from the first template only. A cell with
@@ -95,7 +95,7 @@ def _tags(cell):
 
 
 def execute(notebook, folder, on_cell=None, **objects):
-    """Execute a notebook of `joined` in place.
+    """Execute a notebook of `join_templates` in place.
 
     The templates are part of tankcal and run in this process. The start of a Jupyter kernel would
     take as long as the execution of all cells. A notebook that a user has changed requires Jupyter
@@ -204,7 +204,7 @@ def _language_info():
     }
 
 
-def written(notebook):
+def notebook_text(notebook):
     """Return the file content of a notebook in the format of `nbformat.writes`."""
     cells = [_split_cell(cell) for cell in notebook["cells"]]
     # Texts become lists of lines; the options are the options of nbformat.

@@ -1,6 +1,5 @@
 """Former radii in the papers: source, assumed change, and results."""
 
-from tankcal.report.radii_source import source_text
 from tankcal.report.tables.tank import RADII
 
 
@@ -10,7 +9,7 @@ def facts(paper):
     change = radii["change"] or {}
     return paper.facts(
         [
-            ("radii_source", source_text(paper)),
+            ("radii_source", radii_source_text(paper)),
             ("radii_temperature", paper.number(radii["temperature_c"], "degC", digits=3)),
             ("radii_u_common", _type_b_text(paper, radii["u_common_m"])),
             ("change_common", _type_b_text(paper, change.get("common_m"))),
@@ -27,6 +26,13 @@ def courses(paper):
         return paper.show(RADII)
     limit = paper.number(change["limit_w"], "", decimals=0)
     return paper.show(RADII, on="radii_updated", limit=limit)
+
+
+def radii_source_text(paper):
+    """Return the source of the radii with the note of the job."""
+    radii = paper.record["radii"]
+    text = paper.word(f"radii_sources.{radii['source']}")
+    return f"{text}: {radii['note']}" if radii["note"] else text
 
 
 def _type_b_text(paper, u_m):

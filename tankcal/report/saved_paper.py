@@ -24,15 +24,15 @@ class SavedPaper(PlainPaper):
         Name of the saved file.
     attached : dict
         {name of an embedded file: key of its description}.
-    found : dict
-        Content of the saved file.
+    record : dict
+        Content of the saved file, from which declared tables take their rows.
     letterhead : dict or None
         Letterhead of the laboratory.
     """
 
     kind = file = ""
     attached: ClassVar[dict] = {}
-    found: dict
+    record: dict
     letterhead: dict | None
 
     def head(self, folder=None):
@@ -47,7 +47,7 @@ class SavedPaper(PlainPaper):
                 author=self.letterhead["name"] if self.letterhead else "",
                 date=self.date(),
                 language=self.words["language"]["code"],
-                notice=self.found["notice"],
+                notice=self.record["notice"],
                 running=[title, self.subject()],
                 footer=self._footer(folder),
                 letterhead=self.letterhead,
@@ -58,7 +58,7 @@ class SavedPaper(PlainPaper):
 
     def _footer(self, folder):
         """Return the footer: page numbers and the first digits of the SHA-256 of the file."""
-        footer = f"{self.words['page']['footer']} · tankcal {self.found['tankcal']}"
+        footer = f"{self.words['page']['footer']} · tankcal {self.record['tankcal']}"
         if folder is None:
             return footer
         digest = attachments.sha256((folder / self.file).read_bytes())[:DIGITS_OF_DIGEST]

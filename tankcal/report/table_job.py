@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from tankcal.report.folders import refuse_foreign, replaced
+from tankcal.report.folders import refuse_foreign, replace_folder
 from tankcal.text.languages import DEFAULT
 from tankcal.text.words import load_words, say
 
@@ -41,7 +41,7 @@ def write_job(job, directory, language=DEFAULT):
     """
     has_radii = job.covariance_m2 is not None
     names = [name for name in FILES if name in job.texts or (name == COVARIANCE and has_radii)]
-    with replaced(directory) as folder:
+    with replace_folder(directory) as folder:
         words = load_words(language)
         for name, text in job.texts.items():
             text = _translated(text, job.words, words)

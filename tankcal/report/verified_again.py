@@ -9,7 +9,7 @@ from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.messages import message
 from tankcal.record import long_tables
 from tankcal.record import manifest as manifests
-from tankcal.report import LETTERHEAD
+from tankcal.report.letterhead import LETTERHEAD_FILE, PLACE, Letterhead, Logo, read_saved
 from tankcal.report.paper_content import content_of_paper
 from tankcal.text.languages import LANGUAGES
 
@@ -21,9 +21,7 @@ def letterhead_of(folder):
 
     An invalid file raises InputError.
     """
-    from tankcal.report.letterhead import PLACE, Letterhead, Logo, read_saved
-
-    path = Path(folder) / LETTERHEAD
+    path = Path(folder) / LETTERHEAD_FILE
     if not path.is_file():
         return None
     data = read_saved(path)
@@ -314,7 +312,7 @@ def _compare_covariance(verification, path, adjustment):
         )
 
 
-def saved_folder(verification, folder, callbacks, manifest):
+def verify_saved_folder(verification, folder, callbacks, manifest):
     """Verify a folder with a saved file other than a record; return whether it is such a folder.
 
     The papers of comparisons, inspections and histories are written again from their file. For
@@ -337,14 +335,16 @@ def saved_folder(verification, folder, callbacks, manifest):
     """
     from tankcal.record.camera_versions import CAMERA
     from tankcal.record.plan import PLAN
-    from tankcal.report.saved_rooms import room_of
+    from tankcal.report.saved_documents import find_document
 
-    room, path = room_of(folder)
-    if room is not None:
-        room.load(path)
+    document, path = find_document(folder)
+    if document is not None:
+        document.load(path)
         _take(verification, path)
         if callbacks is not None:
-            make_papers_again(verification, folder, manifest, _rebuild_of(room, path, callbacks[0]))
+            make_papers_again(
+                verification, folder, manifest, _rebuild_of(document, path, callbacks[0])
+            )
         verification.note(_not_computed(path.name))
         return True
     for name in (CAMERA.file, PLAN.file):
@@ -361,9 +361,9 @@ def saved_folder(verification, folder, callbacks, manifest):
     return manifest is not None
 
 
-def _rebuild_of(room, path, step):
+def _rebuild_of(document, path, step):
     def rebuild(place, language, letterhead):
-        room.rebuild(path, place, language, step, letterhead)
+        document.rebuild(path, place, language, step, letterhead)
 
     return rebuild
 

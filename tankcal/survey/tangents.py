@@ -21,12 +21,26 @@ import scipy.linalg
 
 from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.geometry.support import SupportCurve, fit_support
+from tankcal.messages import message
 from tankcal.survey.points import Points
 from tankcal.survey.results import Cause
 from tankcal.survey.sighting import Poses
 
+MOST_TANGENTS = 2500  # largest number of tangents with a full covariance matrix
+FEWEST_SETUPS = 3  # smallest number of set-ups of a level, with two sights each
 LEAST_RISE = 0.05  # smallest sine of the zenith angle: a steeper sight touches no wall
 ROUNDS, FAR_SDS = 30, 2.0  # of the robust circle; residuals, in sds, from which weights fall
+
+
+def too_many_tangents(count):
+    """Message about more tangents than can be used."""
+    return message(
+        "too_many_tangents",
+        "{count} tangents; expected at most {most}, for the covariance of each with each is kept,"
+        " four times as much for twice the tangents: take every second one",
+        count=count,
+        most=MOST_TANGENTS,
+    )
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from tankcal.report import camera as camera_papers
 from tankcal.report.camera import paper as papers
 from tankcal.report.camera.drawings import widen_to_decades
 from tankcal.report.camera.paper import shorten
-from tankcal.report.notebook import joined
+from tankcal.report.notebook import join_templates
 from tankcal.report.numbers import UNITS
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.shipped import shipped_folder
@@ -73,7 +73,7 @@ def texts_of_paper(result, folder, language=None):
     path = folder / "camera.json"
     path.write_text(json.dumps(result), encoding="utf-8")
     others = [kind for kind in KINDS if kind != result["kind"]]
-    notebook = joined(str(path), others, (camera_papers.TEMPLATE,), LANGUAGE=language)
+    notebook = join_templates(str(path), others, (camera_papers.TEMPLATE,), LANGUAGE=language)
     return [text for block in blocks_of_cells(notebook) for text in shown_in(block)]
 
 

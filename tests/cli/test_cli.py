@@ -51,7 +51,7 @@ HEAVY = {  # what a run without papers has no need of, and waits for when it is 
 }
 SURVEYS = {  # of kinds that only some jobs have
     *("tankcal.survey.adjustment", "tankcal.survey.network.results", "tankcal.survey.observations"),
-    *("tankcal.pipeline.strapped_wall", "tankcal.pipeline.hit_wall", "tankcal.pipeline.scan"),
+    *("tankcal.pipeline.strapped_wall", "tankcal.methods.hits.wall", "tankcal.pipeline.scan"),
     *("tankcal.pipeline.liquid", "tankcal.pipeline.radii_wall", "tankcal.clouds.wall"),
     *("tankcal.tank.meshes", "tankcal.tank.ships", "tankcal.job.excel", "tankcal.job.measuring"),
 }
@@ -167,14 +167,13 @@ def test_a_folder_with_foreign_files_is_refused(done, tmp_path, capsys):
 
 @pytest.mark.slow
 def test_a_failing_report_leaves_the_earlier_results(done, monkeypatch, capsys):
-    from tankcal import report
     from tankcal.errors import TankcalError
 
     def fail(*arguments):
         raise TankcalError("the report stopped")
 
     before = (done / "results" / "capacity.csv").read_bytes()
-    monkeypatch.setattr(report, "build", fail)
+    monkeypatch.setattr("tankcal.report.outputs.build", fail)
     assert main(["run", str(done), "--quiet"]) == 1
     assert (done / "results" / "capacity.csv").read_bytes() == before
     assert not list(done.glob(".tankcal-*"))
@@ -250,7 +249,6 @@ def test_a_link_is_followed(done, tmp_path, capsys):
 @pytest.mark.slow
 def test_an_interruption_in_disguise_is_no_traceback(done, monkeypatch, capsys):
     """A library may turn Ctrl-C into an error of its own."""
-    from tankcal import report
 
     def interrupted(*arguments):
         try:
@@ -258,7 +256,7 @@ def test_an_interruption_in_disguise_is_no_traceback(done, monkeypatch, capsys):
         except KeyboardInterrupt:
             raise AssertionError from None
 
-    monkeypatch.setattr(report, "build", interrupted)
+    monkeypatch.setattr("tankcal.report.outputs.build", interrupted)
     assert main(["run", str(done), "--quiet"]) == 130
     assert "stopped; earlier results are unchanged" in capsys.readouterr().err
 

@@ -357,7 +357,7 @@ def test_weld_of_which_a_part_is_hidden(hidden_m, is_told):  # property: half is
 
 def test_survey_without_a_cloud_determines_nothing(tmp_path):  # property
     write_job(tmp_path / "job")
-    result = SimpleNamespace(job=tankcal.load(tmp_path / "job"), clouded=None)
+    result = SimpleNamespace(job=tankcal.load(tmp_path / "job"), sights={})
     found = find_gaps(result, LIMITS)
     assert [one.kind for one in found.gaps] == ["banding"] * 4
     assert [one.remark for one in found.figures] == ["gap_no_weld", "gap_no_cloud"]

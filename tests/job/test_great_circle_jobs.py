@@ -36,7 +36,7 @@ def spoilt(row, column, value):
 
 def test_circles_are_read(tmp_path):
     job = tankcal.load(write_folder(tmp_path / "job", sphere_parts(repeats=2)))
-    found = job.great_circles
+    found = job.surveys["great_circles"]
     assert [one.name for one in found.strapping.straps] == [name for name in FOUR for _ in range(2)]
     assert found.strapping.straps[0].sd_m == 0.0005
     assert np.isnan(found.azimuth_rad["E"])
@@ -155,4 +155,4 @@ def test_settings_without_circles_are_refused(tmp_path):
 def test_the_example_is_read():
     job = tankcal.load(EXAMPLE.parent / "sphere-straps")
     assert job.table.pressure_pa == 6e5
-    assert len(job.great_circles.strapping.straps) == 8
+    assert len(job.surveys["great_circles"].strapping.straps) == 8

@@ -14,7 +14,7 @@ from generated_hits import hit_job
 from generated_walls import make_wall
 from test_coverage_of_walls import judged, least_in_class, study
 
-from tankcal.pipeline.hit_wall import sight_wall
+from tankcal.methods.hits.wall import sight_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall import find_wall, is_smoothed
 

@@ -13,7 +13,7 @@ from job_builder import write_folder
 from ringed_jobs import ringed_parts
 
 import tankcal
-from tankcal.pipeline.ringed_wall import find_ringed_wall
+from tankcal.methods.rings.wall import find_ringed_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.uncertainty import combine
 

@@ -11,7 +11,7 @@ from draws import draws
 from generated_solids import SPHERES, make_sphere
 from strapped_balls import strapped_job
 
-from tankcal.pipeline.strapped_sphere import find_strapped_sphere
+from tankcal.methods.great_circles.sphere import find_strapped_sphere
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.capacity import Capacity
 

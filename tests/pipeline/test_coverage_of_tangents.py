@@ -13,7 +13,7 @@ from generated_tangents import tangent_job
 from generated_walls import make_wall
 from test_coverage_of_walls import judged, least_in_class, study
 
-from tankcal.pipeline.tangent_wall import touch_wall
+from tankcal.methods.tangents.wall import touch_wall
 from tankcal.pipeline.tanks import body_of
 
 STATIONS = {1: 6, 2: 8, 3: 12}

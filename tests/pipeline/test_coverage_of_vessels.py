@@ -15,8 +15,8 @@ from strapped_balls import strapped_job as strapped_ball
 from test_coverage_of_rings import SHARES, base_job  # noqa: F401  (a fixture)
 from test_coverage_of_strapped_spheres import FOLDER
 
-from tankcal.pipeline.ringed_wall import find_ringed_wall
-from tankcal.pipeline.strapped_sphere import find_strapped_sphere
+from tankcal.methods.great_circles.sphere import find_strapped_sphere
+from tankcal.methods.rings.wall import find_ringed_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.capacity import Capacity
 

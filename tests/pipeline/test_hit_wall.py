@@ -23,7 +23,7 @@ from job_builder import hit_parts, write_book, write_folder
 import tankcal
 from tankcal.cli.running import describe_rejected
 from tankcal.pipeline.cause_correlations import told_causes
-from tankcal.pipeline.hit_wall import take_points
+from tankcal.pipeline.sighted_points import take_points
 from tankcal.survey import adjust_survey, wall_points
 from tankcal.survey.sighting import sight
 

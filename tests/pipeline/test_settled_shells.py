@@ -16,8 +16,8 @@ from joined_jobs import outside_job
 
 import tankcal
 from tankcal.errors import InputError
-from tankcal.pipeline.hit_wall import sight_wall
-from tankcal.pipeline.tangent_wall import touch_wall
+from tankcal.methods.hits.wall import sight_wall
+from tankcal.methods.tangents.wall import touch_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.capacity import Capacity
 

@@ -53,7 +53,7 @@ def run(folder, simulated=False, **parts):
 
 
 def simulated(result, pairs=(), **goal):
-    survey = result.wall or result.scan or result.circles
+    survey = result.wall or result.scan or result.surveys.get("great_circles")
     return simulate_table(
         result.job, survey, result.body, result.zero_m, result.table, pairs, goal=Goal(**goal)
     )
@@ -278,7 +278,7 @@ def test_mixed_curvature_is_that_of_the_tank_with_two_inputs_moved(tmp_path):
     rows = [("diameter", 20.0, "mm"), ("length", 50.0, "mm"), ("tilt", 2.0, "mm/m")]
     result = run(tmp_path / "job", kind="horizontal", settings=LYING, uncertainty=rows)
     none = np.zeros((0, len(result.table.height_m)))
-    survey = result.wall or result.scan or result.circles
+    survey = result.wall or result.scan or result.surveys.get("great_circles")
     model = Model(result.job, survey, result.body, result.zero_m, result.table, none)
     u = {one.name: one.u for one in result.body.declared}
     middle = slice(len(model.levels) // 4, 3 * len(model.levels) // 4)

@@ -212,7 +212,7 @@ def test_obstructions_and_masters_are_those_of_strapping(tmp_path):
     parts.tables["obstructions"] = [["circumference", "kind", "excess_mm"], ["E", "measured", 12.0]]
     found = tankcal.run(tankcal.load(write_folder(tmp_path / "a", parts)))
     assert found.body.parts[0].capacity_m3 == pytest.approx(4189.6273, abs=1e-4)
-    assert found.circles.reduced[0].steps_m["rise"] == pytest.approx(-0.012)
+    assert found.surveys["great_circles"].reduced[0].steps_m["rise"] == pytest.approx(-0.012)
 
 
 @pytest.mark.slow

@@ -26,9 +26,9 @@ from tankcal.geometry.field.amplitudes import assumed_amplitudes, likelihood_of
 from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.information import expect_amplitudes
 from tankcal.geometry.field.sites import Sites
+from tankcal.methods.tangents.wall import touch_wall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import compute_table
-from tankcal.pipeline.tangent_wall import touch_wall
 from tankcal.planning import load_plan, predict, smallest, what_helps
 from tankcal.planning.changes import changes_of
 from tankcal.planning.improvements import Effect

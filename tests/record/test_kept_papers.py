@@ -18,7 +18,6 @@ import openpyxl
 import pytest
 from paper_cells import paper_blocks
 
-from tankcal import report
 from tankcal.record import VERSION, load, migrated
 from tankcal.report import outputs
 from tankcal.report.notebook import TEMPLATES
@@ -81,7 +80,7 @@ def expected(path):
     ids=lambda path: f"{path.parent.name}-{path.name}",
 )
 def test_a_kept_record_gives_the_same_files_again(path, tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "build", lambda *_: None)
+    monkeypatch.setattr(outputs, "build", lambda *_: None)
     found = fingerprints(path, tmp_path)
     kept = json.loads(expected(path).read_text(encoding="utf-8"))
     changed = sorted(one for one in kept.keys() | found.keys() if kept.get(one) != found.get(one))
@@ -103,7 +102,7 @@ def test_a_kept_record_of_an_example_is_read(path, tmp_path):
 
 
 if __name__ == "__main__":
-    report.build = lambda *_: None
+    outputs.build = lambda *_: None
     for one in ALL:
         with tempfile.TemporaryDirectory() as place:
             text = json.dumps(fingerprints(one, Path(place)), indent=1, sort_keys=True)

@@ -10,7 +10,6 @@ from paper_cells import paper_blocks
 from schemas import keys_of_schema
 from uncertain_job import as_before
 
-from tankcal import report
 from tankcal.cli import main
 from tankcal.errors import CellError, InputError
 from tankcal.record import FORMAT, VERSION, load, migrated, version_of
@@ -92,7 +91,7 @@ def test_a_kept_record_is_read_as_one_of_this_version(path):
 def test_everything_is_made_of_a_kept_record(path, tmp_path, monkeypatch):
     """`tankcal report`: tables, workbook and all cells of the papers; the pages are not set."""
     blocks = []
-    monkeypatch.setattr(report, "build", lambda source, *_: blocks.extend(paper_blocks(source)))
+    monkeypatch.setattr(outputs, "build", lambda source, *_: blocks.extend(paper_blocks(source)))
     source = tmp_path / "record.json"
     source.write_bytes(gzip.decompress(path.read_bytes()))
     assert main(["report", str(source), "--out", str(tmp_path / "out"), "--quiet"]) == 0

@@ -13,7 +13,6 @@ from kept_releases import JOBS, KEPT, SAVED, compute, kept_records, kept_saved, 
 from paper_cells import paper_blocks
 
 import tankcal
-from tankcal import report
 from tankcal.record import load, migrated
 from tankcal.record.recomputation import compare_records
 from tankcal.report import comparison, history, inspection, outputs
@@ -67,7 +66,7 @@ def test_a_kept_record_is_read(path, tmp_path):
 def test_a_kept_record_gives_its_papers(path, tmp_path, monkeypatch):
     """Tables, workbook, XML, all cells of the papers; the pages are not set."""
     blocks = []
-    monkeypatch.setattr(report, "build", lambda source, *_: blocks.extend(paper_blocks(source)))
+    monkeypatch.setattr(outputs, "build", lambda source, *_: blocks.extend(paper_blocks(source)))
     outputs.rebuild(unpack(path, tmp_path), tmp_path / "out")
     assert {one.suffix for one in (tmp_path / "out").iterdir()} >= {".csv", ".xlsx", ".json"}
     assert len(blocks) > 20

@@ -22,7 +22,6 @@ from networks import by_total_station, photographed
 
 import tankcal
 from tankcal import record as records
-from tankcal import report
 from tankcal.camera.model import PARAMETERS, Form
 from tankcal.cli import main
 from tankcal.job.covariance import read_covariance
@@ -33,9 +32,10 @@ from tankcal.record.adjustment import _group
 from tankcal.record.columns import rows_of
 from tankcal.report import attachments, outputs, workbook
 from tankcal.report.document import blocks_of
-from tankcal.report.notebook import execute, joined
+from tankcal.report.notebook import execute, join_templates
 from tankcal.report.outputs.csv_files import write_csv
 from tankcal.report.paper import Paper
+from tankcal.report.papers import parts_without_content
 from tankcal.report.survey import figures, quality, results
 from tankcal.survey import observations
 from tankcal.survey.results import Adjustment, GroupOfReadings
@@ -143,14 +143,14 @@ def whole(job):
     result = tankcal.run(tankcal.load(job))
 
     def build(record_path, folder, *_):
-        lacks = report.missing(records.load(record_path))
-        notebook = execute(joined(record_path.name, lacks), folder)
+        lacks = parts_without_content(records.load(record_path))
+        notebook = execute(join_templates(record_path.name, lacks), folder)
         for part in ("certificate", "working-papers"):
             text = json.dumps(blocks_of(notebook, part), ensure_ascii=False)
             (folder / f"{part}.pdf").write_text(text, encoding="utf-8")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "build", build)
+        patch.setattr(outputs, "build", build)
         outputs.write(result, job.parent / "whole")
     return result, job.parent / "whole"
 
@@ -547,7 +547,7 @@ def test_the_papers_of_a_tank_begin_with_the_adjustment(whole):
 
 def test_the_chapter_vanishes_without_an_adjustment():
     lacks = [part for part in ("adjustment", "corrections")]
-    sources = "".join(cell["source"] for cell in joined("record.json", lacks)["cells"])
+    sources = "".join(cell["source"] for cell in join_templates("record.json", lacks)["cells"])
     assert "adjusted_groups" not in sources
     assert "capacity_curves" in sources
 

@@ -171,9 +171,9 @@ def test_the_notice_of_a_record_stands_on_every_page():
 def test_a_house_rule_keeps_its_own_texts():
     """Those of a shipped rule are translated; one of a laboratory with its file's name is not."""
     found = plain()
-    assert ComparisonPaper(found, "es").found["rule"]["name"].startswith("Francia")
+    assert ComparisonPaper(found, "es").record["rule"]["name"].startswith("Francia")
     found["rule"]["name"] = "Ours"
-    assert ComparisonPaper(found, "es").found["rule"]["name"] == "Ours"
+    assert ComparisonPaper(found, "es").record["rule"]["name"] == "Ours"
     assert "NOT read" in " ".join(texts_of(verdict(ComparisonPaper(hostile()))))
 
 
@@ -339,7 +339,7 @@ def test_a_damaged_comparison_is_told_in_one_line(tmp_path, change):
 @pytest.mark.parametrize("language", ["pt-BR", "es"])
 def test_clauses_of_a_shipped_rule_are_in_the_language(language):
     paper = ComparisonPaper(plain(), language)
-    said = {one["clause"] for one in (*paper.found["legal"], *paper.found["ages"])}
+    said = {one["clause"] for one in (*paper.record["legal"], *paper.record["ages"])}
     known = paper.words["rule_texts"]["france_2020_recalibration"]["clauses"]
     assert said & set(known.values())
     assert not said & set(known)

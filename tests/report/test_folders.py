@@ -15,7 +15,7 @@ from draws import draws
 
 from tankcal.record import manifest
 from tankcal.report import folders
-from tankcal.report.folders import MADE, PREFIX, recover, replaced
+from tankcal.report.folders import MADE, PREFIX, recover, replace_folder
 
 EVENTS = ("open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.listdir", "os.scandir",
           "os.chmod", "shutil.rmtree", "tankcal.exchange")  # fmt: skip
@@ -39,7 +39,7 @@ def held(folder):
 
 
 def replace(results, files, meanwhile=None):
-    with replaced(results) as folder:
+    with replace_folder(results) as folder:
         write(folder, files)
         write(results, {} if meanwhile is None else meanwhile)
 
@@ -101,7 +101,7 @@ def test_files_of_others_are_kept(results, way):
 
 
 def test_a_name_that_is_taken_is_changed(results, way):
-    with replaced(results) as folder:
+    with replace_folder(results) as folder:
         write(folder, {**NEW, ".notes": "of the new results"})
         write(results, {".notes": "mine"})
     assert held(results) == {**NEW, ".notes": "of the new results", ".notes (2)": "mine"}
@@ -131,7 +131,7 @@ def test_another_failure_of_the_exchange_is_told(results, monkeypatch):
 
 
 def test_a_folder_that_is_being_written_is_left_alone(tmp_path):
-    with replaced(tmp_path / "one") as folder:
+    with replace_folder(tmp_path / "one") as folder:
         write(folder, NEW)
         replace(tmp_path / "two", NEW)
         assert held(folder) == NEW
@@ -168,7 +168,7 @@ def fault(kind, number, results, files, meanwhile):
                     os._exit(9)
                 raise KeyboardInterrupt if kind == "interrupt" else OSError(errno.EIO, "fault")
 
-        with replaced(results) as folder:
+        with replace_folder(results) as folder:
             write(folder, files)
             write(results, meanwhile)
             sys.addaudithook(hook)

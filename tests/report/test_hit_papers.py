@@ -5,8 +5,8 @@ import pytest
 from paper_words import assert_tables_have_words, cells_of_sheet, instruments_said
 
 import tankcal
+from tankcal.methods.hits import tables as hits
 from tankcal.record import record_of
-from tankcal.report.tables import hits
 from tankcal.text.languages import LANGUAGES
 
 SLOW_FIXTURES = {"result", "record"}  # seconds each

@@ -78,7 +78,7 @@ def test_the_table_of_checks_has_the_numbers_of_the_example():
 def test_an_epoch_says_plane_limits_and_verdicts():
     """The published numbers of the example, to the printed digit."""
     paper = InspectionPaper(plain())
-    blocks = settlement_blocks(paper, paper.found["settlements"][1])
+    blocks = settlement_blocks(paper, paper.record["settlements"][1])
     said = " ".join(texts_of(blocks)).replace(SPACE, " ")
     for number in (
         *("17.48 mm", "327.7 °", "1.64 mm/m", "a = 100.21 mm", "14.78 mm", f"{MINUS}9.33 mm"),
@@ -180,7 +180,7 @@ def test_how_many_checks_came_out_how():
 
 def test_a_largest_reading_is_shown_beside_its_estimate():
     paper = InspectionPaper(plain())
-    said = settlement_blocks(paper, paper.found["settlements"][1])
+    said = settlement_blocks(paper, paper.record["settlements"][1])
     rows = {row[0]: row for row in table_of(said, "2026: verdicts")}
     assert rows["Settlement: S, all points"][2:4] == [f"+5.31{SPACE}mm", f"+4.81{SPACE}mm"]
     old = plain()
@@ -208,7 +208,7 @@ def test_a_file_of_version_1_keeps_its_verdicts_and_its_rule(language):
     assert any(rule in text for text in said)
     assert not any(words["decision"].partition("{k}")[2] in text for text in said)
     assert sum(paper.verdict(one) == paper.words["verdicts"]["failed"]
-               for one in paper.found["checks"]) == 2  # fmt: skip
+               for one in paper.record["checks"]) == 2  # fmt: skip
 
 
 def test_how_the_tank_was_built_is_said_unless_an_earlier_epoch_takes_it_out():
@@ -300,10 +300,10 @@ def test_texts_of_shipped_rules_are_known_in_every_language(path):
     assert known == {key: rule[key] for key in ("source", "remark")}
     found = plain()
     found["rule"] |= {key: rule[key] for key in ("name", "source", "remark")} | {"file": path.name}
-    said = InspectionPaper(found, "pt-BR").found["rule"]
+    said = InspectionPaper(found, "pt-BR").record["rule"]
     assert said["remark"] != rule["remark"]
     found["rule"] |= {"remark": "Ours"}
-    assert InspectionPaper(found, "pt-BR").found["rule"]["remark"] == "Ours"
+    assert InspectionPaper(found, "pt-BR").record["rule"]["remark"] == "Ours"
 
 
 @pytest.mark.slow

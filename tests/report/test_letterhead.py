@@ -15,10 +15,11 @@ from nbformat.v4 import new_code_cell, new_notebook, new_output
 from test_report import pages
 
 from tankcal.errors import InputError, TankcalError
-from tankcal.report import LETTERHEAD, blocks, build
+from tankcal.report import blocks
 from tankcal.report.document import blocks_of
-from tankcal.report.letterhead import contrast_with_white, load, read_saved
+from tankcal.report.letterhead import LETTERHEAD_FILE, contrast_with_white, load, read_saved
 from tankcal.report.logo import MAX_LOGO_BYTES, png_problem, svg_problem
+from tankcal.report.papers import build
 from tankcal.report.pdf import pdf
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 30 10">{}</svg>'
@@ -63,8 +64,8 @@ def test_a_letterhead_comes_back_as_it_was_saved(laboratory, tmp_path, kind):
     text = f'[laboratory]\nname = "Lab"\naddress = ["A 1", "B 2"]\nlogo = "logo.{kind}"\n'
     content = SVG.format(CIRCLE).encode() if kind == "svg" else png()
     found = load(laboratory(text + '[colours]\nink = "#0B3D2E"', **{f"logo_{kind}": content}))
-    assert found.save(tmp_path) == LETTERHEAD
-    data = read_saved(tmp_path / LETTERHEAD)
+    assert found.save(tmp_path) == LETTERHEAD_FILE
+    data = read_saved(tmp_path / LETTERHEAD_FILE)
     assert data == found.data()
     assert data["colours"]["ink"] == "#0b3d2e"
     assert data["logo"]["alt"] == "Lab"
@@ -169,10 +170,10 @@ def test_contrast_is_that_of_wcag(colour, contrast):
 
 
 def test_a_saved_letterhead_of_another_make_is_refused(tmp_path):
-    path = tmp_path / LETTERHEAD
+    path = tmp_path / LETTERHEAD_FILE
     for content in ("[]", '{"name": "L"}', "no json"):
         path.write_text(content, encoding="utf-8")
-        with pytest.raises(InputError, match=LETTERHEAD):
+        with pytest.raises(InputError, match=LETTERHEAD_FILE):
             read_saved(path)
 
 
@@ -225,7 +226,7 @@ def test_the_colours_are_those_of_the_letterhead(headed):
     assert found[0]["letterhead"]["colours"]["ink"] == "#7a1f3d"
     plain = [found[0] | {"letterhead": None}, *found[1:4]]
     assert pdf(plain, headed) != pdf(found[:4], headed)
-    assert json.loads((headed / LETTERHEAD).read_text(encoding="utf-8"))["name"] == NAME
+    assert json.loads((headed / LETTERHEAD_FILE).read_text(encoding="utf-8"))["name"] == NAME
 
 
 # ---- the accreditation mark
@@ -248,11 +249,11 @@ def test_mark_is_on_the_certificate_only(laboratory, tmp_path, is_certificate):
     letterhead = load(laboratory(text, m_svg=SVG.format(CIRCLE).encode()))
     letterhead.save(tmp_path)
     part = "certificate" if is_certificate else "working-papers"
-    data = read_saved(tmp_path / LETTERHEAD)
+    data = read_saved(tmp_path / LETTERHEAD_FILE)
     document = blocks.document(title="T", part=part, letterhead=data)
     head = blocks.masthead("T", number_label="No." if is_certificate else "", number="1")
     assert pdf([document.data, head.data])
     assert ("<img" in document._repr_mimebundle_()["text/html"]) is is_certificate
     del data["mark"]
-    (tmp_path / LETTERHEAD).write_text(json.dumps(data), encoding="utf-8")
-    assert read_saved(tmp_path / LETTERHEAD)["mark"] is None
+    (tmp_path / LETTERHEAD_FILE).write_text(json.dumps(data), encoding="utf-8")
+    assert read_saved(tmp_path / LETTERHEAD_FILE)["mark"] is None

@@ -16,8 +16,9 @@ import tankcal
 from tankcal.record import load, record_of, save
 from tankcal.record.making import Record
 from tankcal.record.schema import from_plain, to_plain
-from tankcal.report import build, missing, workbook
 from tankcal.report import liquid as drawn
+from tankcal.report import workbook
+from tankcal.report.papers import build, parts_without_content
 from tankcal.report.plain import PlainPaper
 from tankcal.report.tables import liquid
 from tankcal.report.tables.facts import CERTIFICATE, SURVEY
@@ -189,7 +190,7 @@ def test_the_record_is_read_as_it_was_saved(record, tmp_path):
 
 
 def test_a_record_without_liquid_has_no_chapter():
-    assert "liquid" in missing({})
+    assert "liquid" in parts_without_content({})
 
 
 # ---- words and papers

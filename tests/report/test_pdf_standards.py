@@ -10,10 +10,10 @@ from compared_tables import KINDS
 from conftest import EXAMPLE
 
 from tankcal.planning import load_plan, predict
-from tankcal.report import build
 from tankcal.report import planning as planning_papers
 from tankcal.report.comparison import write_comparison
 from tankcal.report.letterhead import load
+from tankcal.report.papers import build
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 FLAVOURS = ("3a", "ua1")

@@ -12,11 +12,12 @@ from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from tankcal.errors import CellError, TankcalError
-from tankcal.report import FILES, blocks, build
+from tankcal.report import blocks
 from tankcal.report import pdf as pdf_of
 from tankcal.report.document import PARTS, blocks_of, last_cell
 from tankcal.report.latex_math import _FUNCTIONS, _GREEK, _OPERATORS, _SPACES, _SYMBOLS
-from tankcal.report.notebook import execute, joined, written
+from tankcal.report.notebook import execute, join_templates, notebook_text
+from tankcal.report.papers import FILES, build
 from tankcal.report.pdf import pdf
 from tankcal.report.web import page
 from tankcal.text.digits import decimals_of_height, decimals_of_rows, fixed
@@ -309,8 +310,8 @@ def test_cells_share_their_names_and_show_what_jupyter_would(tmp_path):
     assert [shown["data"]["text/plain"] for shown in (one, twenty, last)] == ["1", "20", "21"]
     assert (last["output_type"], last["execution_count"]) == ("execute_result", 1)
     assert [cell["outputs"] for cell in notebook["cells"][1:]] == [[], [], []]
-    read = nbformat.reads(written(notebook), as_version=4)
-    assert nbformat.writes(read) == written(notebook)
+    read = nbformat.reads(notebook_text(notebook), as_version=4)
+    assert nbformat.writes(read) == notebook_text(notebook)
 
 
 @pytest.mark.slow
@@ -397,7 +398,7 @@ def test_a_sign_that_no_font_has_is_an_error_not_a_box():
 
 
 def test_templates_have_no_outputs_and_one_parameters_cell():
-    notebook = joined("record.json")
+    notebook = join_templates("record.json")
     assert all(cell["outputs"] == [] for cell in notebook["cells"])
     assert notebook["cells"][0]["source"] == (
         "RECORD = 'record.json'\nLANGUAGE = None\nLETTERHEAD = None"

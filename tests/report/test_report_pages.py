@@ -8,9 +8,9 @@ import pytest
 import typst
 from paper_pages import filled, lone_headings, pages_of, sparse_pages
 
-from tankcal.report import blocks, build, page_tables
-from tankcal.report.page_tables import prepared
-from tankcal.report.pdf import pdf
+from tankcal.report import blocks
+from tankcal.report.papers import build
+from tankcal.report.pdf import pdf, prepare_table
 from tankcal.text.languages import LANGUAGES
 from tankcal.text.words import load_words
 
@@ -209,16 +209,16 @@ def test_even_rows_stand_where_measured_ones_do(monkeypatch, mark):
     heads = [["Height", "m"], ["Volume", "L"], ""]
     table = blocks.columns_table(heads, rows, "t", ["decimal", "decimal", "left"], across=3)
     made = [blocks.document(title="T").data, *(one.data for one in lines_above(9)), table.data]
-    assert prepared(table.data)["even"]
+    assert prepare_table(table.data)["even"]
     by_height = pdf(made)
-    monkeypatch.setattr(page_tables, "_ON_ONE_LINE", re.compile("none"))
-    assert not prepared(table.data)["even"]
+    monkeypatch.setattr("tankcal.report.pdf._ON_ONE_LINE", re.compile("none"))
+    assert not prepare_table(table.data)["even"]
     assert pdf(made) == by_height
 
 
 def test_rows_of_long_texts_are_not_even():
     table = blocks.columns_table(["a"], [["two words"]], "t", ["left"])
-    assert not prepared(table.data)["even"]
+    assert not prepare_table(table.data)["even"]
 
 
 @pytest.mark.study

@@ -9,29 +9,24 @@ from tankcal.job.checks.bearing import useless_inputs
 from tankcal.job.checks.clouds import check_clouds
 from tankcal.job.checks.extent import (
     Extent,
+    estimate_diameter_m,
     extent_of,
-    has_great_circles,
     has_radii,
     has_survey,
     has_wall_points,
-    height_of_rings,
     is_metered,
     is_sighted,
     is_strapped,
     wall_of,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
-from tankcal.job.checks.great_circles import check_great_circles
-from tankcal.job.checks.hits import check_hits
 from tankcal.job.checks.lines import check_lines
 from tankcal.job.checks.liquid import check_liquid
 from tankcal.job.checks.plausible import check_metering, check_plausible
 from tankcal.job.checks.radii import check_radii
-from tankcal.job.checks.rings import check_rings
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
-from tankcal.job.checks.tangents import check_tangents
 from tankcal.job.checks.tiny_sds import check_tiny_sds
 from tankcal.job.contract.bottom import check_bottom
 from tankcal.job.contract.correlations import check_correlations
@@ -47,6 +42,7 @@ from tankcal.job.contract.top import check_top
 from tankcal.job.contract.uncertainty import check_inputs
 from tankcal.job.contract.welds import check_welds
 from tankcal.job.entries import kind_of
+from tankcal.methods.base import methods_for
 
 __all__ = ["check_all", "check_tank"]
 
@@ -75,12 +71,8 @@ def check_all(values, tables, registers, raw, is_whole, log):
             check_radii(values, tables, raw, log)
             check_strapping(values, tables, registers, raw, log)
             check_lines(values, tables, registers, raw, log)
-            check_hits(values, tables, registers, raw, log)
-            check_tangents(values, tables, registers, raw, log)
-        if kind_of(raw) == "horizontal":
-            check_rings(values, tables, registers, raw, log)
-        if kind_of(raw) == "sphere":
-            check_great_circles(values, tables, registers, raw, log)
+        for method in methods_for(kind_of(raw)):
+            method.check(values, tables, registers, raw, log)
         check_tiny_sds(tables, registers, raw, log)
         check_clouds(values, tables, registers, raw, log)
         check_liquid(values, tables, registers, raw, log)
@@ -137,12 +129,12 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
     elif has_rows(points):
         check_scan(points, values, kind, raw, log)
     if kind == "horizontal":
-        check_horizontal(values, wall_of(tables), raw, log, height_of_rings(tables))
+        check_horizontal(values, wall_of(tables), raw, log, estimate_diameter_m(kind, tables))
     if kind == "sphere":
         check_sphere(
             values,
             has_wall_points(tables),
-            has_great_circles(tables) or raw.tables.get("great_circles", ()) is None,
+            _is_measured(kind, tables, raw),
             loads_sphere(values),
             raw,
             log,
@@ -151,3 +143,11 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
         check_ship(values, tables, raw, log)
     if tables["deadwood"] is not None:
         check_deadwood(tables["deadwood"], extent, log)
+
+
+def _is_measured(kind, tables, raw):
+    """Whether a method for this kind has readings, or a table of readings that is unreadable."""
+    return any(
+        method.is_given(tables) or raw.tables.get(method.tables[0], ()) is None
+        for method in methods_for(kind)
+    )

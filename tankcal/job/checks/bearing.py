@@ -3,13 +3,11 @@
 from tankcal.job.checking import has_rows, loads_sphere
 from tankcal.job.checks.extent import (
     has_clouds,
-    has_great_circles,
-    has_hits,
     has_radii_alone,
     has_wall_points,
     is_metered_alone,
     is_strapped,
-    may_be_hit_from_both_sides,
+    may_be_seen_from_both_sides,
     wall_of,
 )
 from tankcal.job.contract import INPUTS
@@ -17,6 +15,7 @@ from tankcal.job.contract.bottom import SHAPED, bottom_form
 from tankcal.job.contract.lying import RINGS_WITHOUT_TUBE, ROUND_TUBE
 from tankcal.job.contract.ship import is_ship
 from tankcal.messages import message
+from tankcal.methods.base import methods, methods_for
 
 GIVEN = ("dish", "knuckle")
 SIZES_OF_END = ("depth_m", "dish_radius_m", "knuckle_radius_m", "standard")
@@ -143,7 +142,7 @@ def _of_radii():
 def _has_own_offset(tables):
     """Return True if no offset common to all radii affects the measurements of the wall."""
     return (
-        has_hits(tables)
+        any(method.has_own_offset and method.is_given(tables) for method in methods())
         or has_clouds(tables)
         or (is_strapped(tables) and not has_wall_points(tables))
         or is_metered_alone(tables)
@@ -192,7 +191,7 @@ def _of_plates(values, tables, is_loaded, table_name="courses"):
     on both even if the points are inside, and so do hits from outside.
     """
     switches, courses = values["corrections"], tables[table_name]
-    outside_seen = is_strapped(tables) or may_be_hit_from_both_sides(tables)
+    outside_seen = is_strapped(tables) or may_be_seen_from_both_sides(tables)
     inside = (values["survey"]["side"] == "inside" and not outside_seen) or has_radii_alone(tables)
     why = {"plate_thickness": "", "paint": ""}
     if (inside or switches["plate"] is False) and not is_loaded:
@@ -336,10 +335,9 @@ def _of_sphere(values, tables):
         ),
     }
     reasons = {name: why for name, why in rules.items() if isinstance(why, str)}
-    if has_great_circles(tables):
-        reasons["diameter"] = message(
-            "from_circles", "its uncertainty comes from the great circles"
-        )
+    for method in methods_for("sphere"):
+        if method.is_given(tables):
+            reasons |= method.useless_inputs(tables)
     is_subtracted = (values["survey"]["side"] == "outside") and values["corrections"][
         "plate"
     ] is not False

@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.errors import InputError
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, name_twice, tell
-from tankcal.job.checks.extent import has_clouds, has_hits, has_survey, has_tangents, tells_by_tape
+from tankcal.job.checks.extent import has_clouds, has_survey, sights_given, tells_by_tape
 from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.job.contract.clouds import (
     DOCUMENTED,
@@ -89,7 +89,7 @@ def _teller(raw, file, name, log):
 
 def _refuse_beside(tables, log):
     beside = {"points": has_rows(tables["points"]), "targets": has_rows(tables["targets"])}
-    beside |= {"wall_hits": has_hits(tables), "tangents": has_tangents(tables)}
+    beside |= dict.fromkeys(sights_given(tables), True)
     for name, is_there in beside.items():
         if is_there:
             expected = message(

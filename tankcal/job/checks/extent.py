@@ -8,6 +8,7 @@ from tankcal.job.checking import has_rows, zero_z
 from tankcal.job.contract.bottom import OF_CLOUD, rise_of_bottom
 from tankcal.job.contract.observations import READINGS
 from tankcal.job.contract.top import depth_of_top
+from tankcal.methods.base import methods, methods_for
 
 
 def has_survey(tables):
@@ -25,16 +26,6 @@ def tells_by_tape(tables):
     return is_strapped(tables) and any(use != "check" for use in tables["circumferences"].of("use"))
 
 
-def has_hits(tables):
-    """Return True if a total station measured the bare wall."""
-    return has_rows(tables["wall_hits"])
-
-
-def has_tangents(tables):
-    """Return True if the limbs of the tank were sighted from a traverse around it."""
-    return has_rows(tables["tangents"])
-
-
 def has_clouds(tables):
     """Return True if the wall was scanned."""
     return has_rows(tables.get("clouds"))
@@ -43,11 +34,6 @@ def has_clouds(tables):
 def is_metered(tables):
     """Return True if metered liquid was filled or drawn off between dips."""
     return has_rows(tables.get("liquid"))
-
-
-def has_great_circles(tables):
-    """Return True if great circles of a sphere were taped."""
-    return has_rows(tables.get("great_circles"))
 
 
 def has_radii(tables):
@@ -72,12 +58,19 @@ def is_metered_alone(tables):
 
 def is_sighted(tables):
     """Return True if sights without targets, or scans, determine the wall."""
-    return has_hits(tables) or has_tangents(tables) or has_clouds(tables)
+    return has_clouds(tables) or any(sights_given(tables))
 
 
-def may_be_hit_from_both_sides(tables):
-    """Return True if hits from several set-ups may be on both sides of the wall."""
-    return has_hits(tables) and len(set(tables["wall_hits"].of("setup"))) > 1
+def sights_given(tables):
+    """Return the names of the tables of sighting methods that have rows."""
+    sighted = [method for method in methods() if method.is_sighted]
+    return [method.tables[0] for method in sighted if method.is_given(tables)]
+
+
+def may_be_seen_from_both_sides(tables):
+    """Return True if the sights of a method may be on both sides of the wall."""
+    given = [method for method in methods() if method.is_given(tables)]
+    return any(method.may_see_both_sides(tables) for method in given)
 
 
 def has_wall_points(tables):
@@ -89,19 +82,15 @@ def wall_of(tables):
     """Origin of the wall of a lying tank: "points", "straps", or None for its dimensions."""
     if has_wall_points(tables):
         return "points"
-    return "straps" if is_strapped(tables) or has_rows(tables.get("rings")) else None
+    is_measured = any(method.is_given(tables) for method in methods_for("horizontal"))
+    return "straps" if is_strapped(tables) or is_measured else None
 
 
-def height_of_rings(tables):
-    """Approximate inside diameter of strapped rings, m; None if unknown."""
-    if not is_strapped(tables) or not has_rows(tables.get("rings")):
-        return None
-    readings = [value for value in tables["circumferences"].of("reading_m") if value is not None]
-    plates = [value for value in tables["rings"].of("thickness_mm") if value is not None]
-    if not readings:
-        return None
-    # Subtract two plates from the outside diameter, mm to m.
-    return float(np.median(readings) / np.pi - 2e-3 * (np.median(plates) if plates else 0.0))
+def estimate_diameter_m(kind, tables):
+    """Approximate diameter of a tank of one solid from its readings, m; None if unknown."""
+    given = (method for method in methods_for(kind) if method.is_given(tables))
+    diameters = (method.estimate_diameter_m(tables) for method in given)
+    return next((diameter for diameter in diameters if diameter is not None), None)
 
 
 @dataclass(frozen=True)
@@ -132,9 +121,8 @@ def extent_of(values, tables, kind):
         return _of_horizontal(values["horizontal"], values, wall_of(tables) is not None)
     if kind == "sphere":
         diameter = values["sphere"]["diameter_m"] or values["tank"]["nominal_diameter_m"]
-        if diameter is None and has_great_circles(tables):
-            readings = tables["great_circles"].numbers("reading_m")
-            diameter = np.nanmedian(readings) / np.pi if np.any(readings > 0) else None
+        if diameter is None:
+            diameter = estimate_diameter_m(kind, tables)
         area = None if diameter is None else np.pi / 4 * diameter**2
         return _lying(diameter, 0.0, area, values, has_wall_points(tables))
     return Extent()

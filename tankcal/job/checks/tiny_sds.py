@@ -8,10 +8,11 @@ import numpy as np
 
 from tankcal.job.checking import has_rows
 from tankcal.messages import message
+from tankcal.methods.base import methods
 
 LEAST = {"s_mm": 0.02, "s_arcsec": 0.02}  # smallest sd of a scale or circle
 SURE = {"s_mm": 0.002, "s_arcsec": 0.002}  # smaller values are in metres or degrees
-READ = ("circumferences", "great_circles", "offsets", "wall_hits", "tangents", "tape_checks")
+READ = ("circumferences", "offsets")
 
 
 def check_tiny_sds(tables, registers, raw, log):
@@ -23,7 +24,8 @@ def check_tiny_sds(tables, registers, raw, log):
     def tell(column, smallest, *details):
         (log.problem if smallest < SURE[column] else log.warning)(*details)
 
-    for name in READ:
+    of_methods = (name for method in methods() for name in method.tables_with_sds)
+    for name in (*READ, *of_methods, "tape_checks"):
         table = tables.get(name)
         if not has_rows(table):
             continue

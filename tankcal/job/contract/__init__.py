@@ -10,20 +10,16 @@ from tankcal.job.contract import (
     correlations,
     courses,
     deadwood,
-    great_circles,
-    hits,
     lines,
     liquid,
     overrulings,
     points,
     radii,
-    rings,
     roof,
     ship,
     stadia,
     stated,
     strapping,
-    tangents,
     top,
     uncertainty,
     welds,
@@ -36,6 +32,7 @@ from tankcal.job.contract.observations import SURVEYS as ADJUSTED_SURVEYS
 from tankcal.job.contract.parts import KEYS as PART_KEYS
 from tankcal.job.contract.registers import OF_PHOTOS, REGISTER_KEYS, REGISTERS_OF_SURVEY
 from tankcal.job.contract.uncertainty import INPUTS
+from tankcal.methods.base import methods
 from tankcal.text.form_words import NOTES
 
 SECTIONS = (
@@ -48,9 +45,11 @@ SECTIONS = (
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
-COLUMNS |= strapping.COLUMNS | lines.COLUMNS | hits.COLUMNS | tangents.COLUMNS | stadia.COLUMNS
-COLUMNS |= great_circles.COLUMNS | clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
-COLUMNS |= rings.COLUMNS | SURVEY_COLUMNS | overrulings.COLUMNS
+COLUMNS |= strapping.COLUMNS | lines.COLUMNS | stadia.COLUMNS
+for _method in methods():
+    COLUMNS |= _method.columns()
+COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
+COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 KEYS = {section: _KEYS[section] for section in SECTIONS}
@@ -58,18 +57,20 @@ KEYS = {section: _KEYS[section] for section in SECTIONS}
 SURVEYS = ADJUSTED_SURVEYS | {
     "strapping": tuple(strapping.COLUMNS),
     "reference-line": (*lines.COLUMNS, *strapping.COLUMNS),
-    "wall-hits": (*hits.COLUMNS, *hits.BESIDE),
+    "wall-hits": (),  # filled in below, as for each survey of a method
     "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
-    "tangents": (*tangents.COLUMNS, *tangents.BESIDE),
+    "tangents": (),
     "cloud": (*clouds.COLUMNS, *clouds.BESIDE),
     "liquid": tuple(liquid.COLUMNS),
     "radii": tuple(radii.COLUMNS),
 }
 
-SURVEYS_OF_KIND = {  # surveys whose tables for a kind of tank differ from SURVEYS
-    "horizontal": {"strapping": (*strapping.COLUMNS, *rings.COLUMNS)},
-    "sphere": {"strapping": (*great_circles.COLUMNS, *great_circles.BESIDE)},
-}
+SURVEYS_OF_KIND = {}  # surveys whose tables for a kind of tank differ from SURVEYS
+for _method in methods():
+    for _kind in _method.kinds if _method.starter else ():
+        _surveys = SURVEYS if _kind == "vertical" else SURVEYS_OF_KIND.setdefault(_kind, {})
+        _surveys[_method.starter] = _method.starter_tables()
+        REGISTERS_OF_SURVEY.setdefault(_method.starter, ("instruments",))
 
 
 def tables_of_survey(kind, survey):

@@ -3,6 +3,7 @@
 from tankcal.job.contract.kinds import VERTICAL
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.fields import Field
+from tankcal.job.shared_columns import NOTE
 
 JOINT, ALONE, GEOMETRY = TABLES = ("joint", "liquid", "geometry")  # which table is printed
 EXPANSION_SHARE = 0.05  # default relative standard uncertainty of the liquid's expansion
@@ -103,7 +104,7 @@ LIQUID = (
         " valves shut, volume_m3 is 0; blank: adjust",
         ("adjust", "check", "rest"),
     ),
-    Field("note", "text", "remark for the reader"),
+    NOTE,
 )
 COLUMNS = {"liquid": LIQUID}
 TEMPERATURES = ("meter_temperature_c", "tank_temperature_c", "shell_temperature_c")

@@ -3,15 +3,7 @@
 from dataclasses import dataclass
 
 from tankcal.job.fields import Field
-
-ANGLE_UNITS = ("deg", "gon", "dms")
-FULL_CIRCLE = {"deg": 360, "gon": 400, "dms": 360}
-USE = Field(
-    "use",
-    "choice",
-    "check: only compared with the adjusted values; blank: adjust",
-    choices=("adjust", "check"),
-)
+from tankcal.job.shared_columns import FULL_CIRCLE, USE, angle_fields
 
 
 def _name(name, note, required=True):
@@ -35,40 +27,6 @@ def _coordinates(required=False):
             required,
         )
         for axis in "xyz"
-    )
-
-
-def angle_fields(name, note, circles=(0, 1)):
-    """Return the columns of an angle, a column for each unit of ANGLE_UNITS.
-
-    Parameters
-    ----------
-    name : str
-        Name of the columns without the unit.
-    note : str
-        Note of the columns without the unit, which is added before the first semicolon.
-    circles : tuple of float, optional
-        Lower and upper bound, in parts of the full circle.
-
-    Returns
-    -------
-    tuple of Field
-    """
-    quantity, semicolon, condition = note.partition(";")
-    words = {
-        "deg": "degrees",
-        "gon": "gon",
-        "dms": "degrees, minutes and seconds: 123 04 05.6",
-    }
-    return tuple(
-        Field(
-            f"{name}_{unit}",
-            "dms" if unit == "dms" else "number",
-            f"{quantity}, {words[unit]}{semicolon}{condition}",
-            low=circles[0] * FULL_CIRCLE[unit],
-            high=circles[1] * FULL_CIRCLE[unit],
-        )
-        for unit in ANGLE_UNITS
     )
 
 

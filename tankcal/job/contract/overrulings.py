@@ -9,6 +9,7 @@ from tankcal.job.contract.observations import COLUMNS as OF_SURVEYS
 from tankcal.job.contract.shorthand import choice, number
 from tankcal.job.fields import Field
 from tankcal.messages import message
+from tankcal.methods.base import methods
 
 DECISIONS = ("keep", "leave_out")
 _WITHOUT_READINGS = (
@@ -26,8 +27,6 @@ _WALL_WITHOUT_NAMES = (
     "offsets",
     "liquid",
     "radii",
-    "rings",
-    "great_circles",
     "scan_targets",
 )
 MOST = 200  # largest number of decisions; more would replace the outlier test
@@ -168,7 +167,8 @@ def names_of_points(tables):
             if tables[name].skipped:
                 return None
             names += tables[name].of("point")
-    for name in ("wall_hits", "tangents"):
+    of_methods = (method.tables[0] for method in methods() if method.has_named_points)
+    for name in of_methods:
         if has_rows(tables[name]):
             if tables[name].skipped:
                 return None
@@ -176,7 +176,7 @@ def names_of_points(tables):
             names += [f"{setup} {row}" for setup, row in sights]
     if not names and any(has_rows(tables[name]) for name in READINGS):
         return None  # the wall is selected from adjusted points
-    if not names and not any(has_rows(tables[name]) for name in _WALL_WITHOUT_NAMES):
+    if not names and not any(has_rows(tables[name]) for name in _tables_without_names()):
         return None  # missing or unreadable wall, reported elsewhere
     return dict.fromkeys(names)
 
@@ -252,3 +252,9 @@ def _is_correlated(pairs, reading_table, reading_row):
 def _has_problem(table, row, log):
     """Determine whether a problem of that row has already been reported."""
     return any((problem.file, problem.row) == (table.file, row) for problem in log.problems)
+
+
+def _tables_without_names():
+    """Names of tables that determine a wall without points that could be named."""
+    unnamed = [method.tables for method in methods() if not method.has_named_points]
+    return (*_WALL_WITHOUT_NAMES, *(table for tables in unnamed for table in tables))

@@ -3,9 +3,9 @@
 from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
 from tankcal.job.contract.clouds import CLOUD
-from tankcal.job.contract.hits import RANGING
 from tankcal.job.contract.lines import PLUMMET
 from tankcal.job.contract.liquid import METER
+from tankcal.job.contract.ranging import RANGING
 from tankcal.job.contract.shorthand import FREE
 from tankcal.job.contract.stadia import BAR
 from tankcal.job.contract.strapping import TAPE
@@ -275,8 +275,6 @@ REGISTERS_OF_SURVEY = {
     "total-station": ("instruments",),
     "strapping": ("instruments",),
     "reference-line": ("instruments",),
-    "wall-hits": ("instruments",),
-    "tangents": ("instruments",),
     "triangulation": ("instruments",),
     "cloud": ("clouds", "instruments"),
     "liquid": ("meters",),

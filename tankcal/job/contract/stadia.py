@@ -1,7 +1,7 @@
 """Table of stadia readings: horizontal angles between the ends of a bar of known length."""
 
-from tankcal.job.contract.observations import USE, angle_fields
 from tankcal.job.fields import Field
+from tankcal.job.shared_columns import USE, angle_fields
 
 LEAST = 3e-4  # least angle in turns: a bar of 2 m at 1 km, beyond which no distance is determined
 STADIA = (

@@ -1,8 +1,8 @@
 """Tables and keys of strapping: circumferences, obstructions, plate thicknesses and tapes."""
 
 from tankcal.job.contract.kinds import LYING, STRAPPED, VERTICAL
-from tankcal.job.contract.observations import USE
 from tankcal.job.fields import Field
+from tankcal.job.shared_columns import NOTE, USE, readings_by_tape
 from tankcal.survey.strapping import KINDS
 
 NEEDED = {  # columns required for each kind of obstruction
@@ -27,33 +27,6 @@ def _number(name, note, low, high, required=False, above_low=False, kinds=()):
     return Field(name, "number", note, required=required, kinds=kinds, **bounds)
 
 
-def readings_by_tape(reading_note):
-    """Return the columns of a tape reading of a circumference, and of its conditions."""
-    return (
-        _number("reading_m", reading_note, 0.3, 1000, required=True),
-        _number(
-            "s_mm", "standard deviation of one reading, millimetres", 0, 100, required=True,
-            above_low=True,
-        ),
-        _name("instrument", "tape of instruments.toml; blank: the only tape there except"
-                            " masters"),
-        _number(
-            "temperature_c",
-            "temperature of the tape, degrees Celsius; blank: equal to the shell temperature",
-            -60,
-            120,
-        ),
-        _number(
-            "tension_n",
-            "pull at the ends of the tape, newtons; for a tape without friction the mean round"
-            " the tank; blank: tension of the certificate",
-            0,
-            1000,
-            above_low=True,
-        ),
-    )  # fmt: skip
-
-
 _COURSE = _name("course", "course of courses.csv", required=True, kinds=VERTICAL)
 _RING = _name("ring", "horizontal tank, in place of course: ring of rings.csv", True, LYING)
 CIRCUMFERENCES = (
@@ -74,7 +47,7 @@ CIRCUMFERENCES = (
     *readings_by_tape("reading of the tape round the outside of the tank, metres"),
     _number("pulls", "number of pieces in which the tape was pulled round; blank: 1", 1, 50),
     USE,
-    Field("note", "text", "remark for the reader"),
+    NOTE,
 )  # fmt: skip
 OBSTRUCTIONS = (
     _name(

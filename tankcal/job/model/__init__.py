@@ -35,7 +35,6 @@ from tankcal.tank.rules.model import Rule
 
 if TYPE_CHECKING:
     from tankcal.job.model.clouds import Clouds
-    from tankcal.survey.great_circles import GreatCircles
     from tankcal.survey.measurements import Measurements
     from tankcal.survey.reference_line import ReferenceLines
     from tankcal.survey.strapping import Strapping
@@ -147,8 +146,9 @@ class Job:
         a survey of some courses.
     change : Change or None
         Possible change of these radii; in addition to a survey.
-    great_circles : GreatCircles or None
-        Equator and meridians of a sphere by tape, which replace points.
+    surveys : dict
+        {name of a `methods.base.Method`: its readings}, for each method of the job that has no
+        attribute of its own, such as "great_circles".
     overrulings : tuple of Overruling
         Manual decisions against the search for blunders, in the order of the file.
     """
@@ -194,6 +194,6 @@ class Job:
     radii: Radii | None = None
     change: Change | None = None
     rings: tuple[Ring, ...] = ()
-    great_circles: "GreatCircles | None" = None
+    surveys: dict = field(default_factory=dict)
     top: Top | None = None
     overrulings: tuple[Overruling, ...] = ()

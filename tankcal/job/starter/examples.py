@@ -1,5 +1,7 @@
 """Examples shown in grey in an input workbook; they are never read."""
 
+from tankcal.methods.base import methods
+
 EXAMPLES_OF_KEYS = {
     "tank.id": "T-17",
     "tank.nominal_diameter_m": 13.0,
@@ -105,10 +107,6 @@ EXAMPLES_OF_TABLES = {
         {"course": "1", "height_m": 1.9, "thickness_mm": 8.0, "paint_mm": 0.3},
         {"course": "2", "height_m": 1.9, "thickness_mm": 6.3, "paint_mm": 0.3},
     ],
-    "rings": [
-        {"ring": "1", "length_m": 1.9, "thickness_mm": 8.0, "paint_mm": 0.3, "lap": "outer"},
-        {"ring": "2", "length_m": 1.9, "thickness_mm": 8.0, "paint_mm": 0.3, "lap": "inner"},
-    ],
     "welds": [{"course": "1", "azimuth_deg": 34.5}],
     "bottom": [{"x_m": 1.5, "y_m": -2.0, "z_m": 0.048, "s_mm": 2.0}],
     "deadwood": [
@@ -156,16 +154,6 @@ EXAMPLES_OF_TABLES = {
             "s_mm": 0.5,
         },
     ],
-    "great_circles": [
-        {"circle": "equator", "kind": "equator", "reading_m": 62.8512, "s_mm": 0.5},
-        {
-            "circle": "M0",
-            "kind": "meridian",
-            "azimuth_deg": 0,
-            "reading_m": 62.8431,
-            "s_mm": 0.5,
-        },
-    ],
     "obstructions": [
         {
             "circumference": "1-20",
@@ -208,46 +196,7 @@ EXAMPLES_OF_TABLES = {
             "face": 1,
         },
     ],
-    "wall_hits": [
-        {
-            "setup": "S1-1",
-            "course": "1",
-            "direction_deg": 12.3456,
-            "zenith_deg": 91.2345,
-            "distance_m": 6.5123,
-            "surface": "paint",
-        },
-        {
-            "setup": "S1-1",
-            "course": "1",
-            "direction_deg": 27.3401,
-            "zenith_deg": 91.2338,
-            "distance_m": 6.5098,
-            "surface": "paint",
-        },
-    ],
-    "control_readings": [
-        {
-            "setup": "S1-1",
-            "target": "K1",
-            "direction_deg": 10.0012,
-            "zenith_deg": 85.4321,
-            "distance_m": 6.4321,
-            "time": "2026-01-05T14:30",
-        }
-    ],
     "stadia": [{"setup": "S1-1", "to": "S2", "bar": "bar 1", "angle_deg": 10.3942, "s_arcsec": 1}],
-    "tangents": [
-        {
-            "setup": "S1-1",
-            "course": "1",
-            "level_m": 0.45,
-            "side": "left",
-            "direction_deg": 73.2157,
-            "zenith_deg": 94.0216,
-            "s_arcsec": 5,
-        }
-    ],
     "targets": [
         {"point": "P101", "section": "1", "generatrix": "A", "z_m": 0.95, "offset_mm": 0.2}
     ],
@@ -326,3 +275,5 @@ EXAMPLES_OF_TABLES = {
         }
     ],
 }
+for _method in methods():
+    EXAMPLES_OF_TABLES |= _method.examples()

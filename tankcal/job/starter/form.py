@@ -17,13 +17,16 @@ from tankcal.job.contract.keys import STARTS_OF_LIQUID, STARTS_OF_STRAPPING
 from tankcal.job.contract.radii import KEYS as OF_RADII
 from tankcal.job.contract.uncertainty import UNITS
 from tankcal.job.fields import Field
+from tankcal.methods.base import methods_for
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys without an adjustment of points
 METERED = "liquid"  # survey for every kind of tank
 DECLARED = "radii"  # radii of a former table, a record or a declaration
 # Surveys for vertical tanks; for other kinds see SURVEYS_OF_KIND.
-OF_SHELLS = (*STRAPPED, "wall-hits", "tangents", DECLARED)
+OF_SHELLS = (
+    *STRAPPED, *(method.starter for method in methods_for("vertical")), DECLARED,
+)  # fmt: skip
 OF_GREAT_CIRCLES = (("sphere", "ovality_mm"), ("sphere", "form_mm"))
 # Marks of CSV files from spreadsheets in these languages.
 DECIMAL_COMMAS = {"separator": ";", "decimal": ","}
@@ -104,8 +107,10 @@ class Form:
             return self.language
         if section == "csv" and self.language != DEFAULT:
             return DECIMAL_COMMAS[field.name]
-        if self.survey == "tangents" and (section, field.name) == ("survey", "side"):
-            return "outside"
+        for method in methods_for(self.kind):
+            starts = dict(method.starts) if method.starter == self.survey else {}
+            if f"{section}.{field.name}" in starts:
+                return starts[f"{section}.{field.name}"]
         if self.survey in (METERED, DECLARED) and self.kind == "vertical":
             return STARTS_OF_LIQUID.get(f"{section}.{field.name}", field.start)
         if self.survey in STRAPPED and self.kind == "sphere":

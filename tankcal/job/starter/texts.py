@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.job.fields import MAX_TEXT
+from tankcal.methods.base import methods
 from tankcal.text.digits import shortest
 from tankcal.text.form_words import word_of
 from tankcal.text.languages import DEFAULT
@@ -54,7 +55,6 @@ SECTION_NOTES = {
 TABLE_NOTES = {
     "points": "one row for each surveyed point of the wall",
     "courses": "one row for each course (ring of plates), from the bottom up",
-    "rings": "one row for each ring (of plates) of the cylinder, from end A to end B",
     "welds": "one row for each vertical weld of a course whose azimuth is known; may stay empty",
     "bottom": "one row for each surveyed point of the bottom (x_m, y_m, z_m), or for each level"
     " measured with liquid (level_m, volume_m3); leave it empty for other bottoms",
@@ -72,7 +72,6 @@ TABLE_NOTES = {
     "thickness": "one row for each reading of a gauge of plates; may stay empty",
     "tape_checks": "one row for each comparison of the working tape with its master; may stay"
     " empty",
-    "great_circles": "one row for each reading of the tape round the sphere: equator and meridians",
     "targets": "one row for each target of the wall; may stay empty: the wall is then searched",
     "photos": "one row for each photo; orientations may stay blank, they are found",
     "image_points": "one row for each image of a point; a repeated row is a repeated reading",
@@ -93,11 +92,9 @@ TABLE_NOTES = {
     "scan_targets": "one row for each target in each scan; may stay empty",
     "liquid": "one row for the start of each run, and one for each batch with the dip after it",
     "radii": "one row for each course, with its radius as a former table or a record has it",
-    "tangents": "one row for each sight to a limb of the tank, from outside",
-    "wall_hits": "one row for each sight to the bare wall, without a target",
-    "control_readings": "one row for each reading of a control target: at the start, every half"
-    " hour and at the end; may stay empty",
 }
+for _method in methods():
+    TABLE_NOTES |= _method.table_notes()
 REGISTER_NOTES = {
     "cameras": "one section for each camera; put its name, as in photos.csv, in place of NAME",
     "instruments": "one section for each instrument; put its name in place of NAME; may stay empty",

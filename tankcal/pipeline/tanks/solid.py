@@ -1,10 +1,10 @@
 """Tank of one solid: horizontal cylinder, sphere or mesh, from its sizes or its points."""
 
 from dataclasses import replace
-from functools import partial
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.methods.base import method_of
 from tankcal.pipeline.tanks.common import (
     deadwood_part,
     estimates_of,
@@ -12,7 +12,6 @@ from tankcal.pipeline.tanks.common import (
     is_warmed,
     thermal_scale,
 )
-from tankcal.pipeline.tanks.rings import ringed_part
 from tankcal.tank.body import Body, SolidPart
 from tankcal.tank.ellipsoids import Membrane, PressedSphere, Pressure
 from tankcal.tank.meshes import mesh_part
@@ -24,8 +23,12 @@ POISSON = 0.3  # default Poisson's ratio, of steel
 
 def solid_body(job, survey, switches, heel=(0.0, 0.0)):
     """`Body` of a solid; `heel` contains the tangents of trim and list of a ship's tank."""
-    part_of = ringed_part if job.rings else partial(_part, heel=heel)
-    parts, zero = [part_of(job, survey, switches)], solid_zero(job)
+    method, part = method_of(survey), None
+    if method is not None:
+        part = method.part(job, survey, switches)
+    if part is None:
+        part = _part(job, survey, switches, heel)
+    parts, zero = [part], solid_zero(job)
     if switches.deadwood and job.deadwood:
         parts.append(deadwood_part(job.deadwood, zero))
     return Body(
@@ -47,9 +50,10 @@ def _part(job, survey, switches, heel):
     if declared and job.survey.side == "outside" and switches.plate:
         plate = declared.thickness_m
     unused, survey_results = () if plate else ("plate_thickness",), {}
-    if job.great_circles is not None:
-        solid = survey.solid(plate, scale)
-        survey_results, unused = _arguments_of_circles(survey, plate, scale), (*unused, "offset")
+    method = method_of(survey)
+    if method is not None:
+        solid, survey_results, without_effect = method.solid_part(survey, plate, scale)
+        unused = (*unused, *without_effect)
     elif job.sphere is not None:
         solid = Sphere((job.sphere.diameter_m - 2 * plate) * scale)
     elif job.horizontal is not None:
@@ -137,17 +141,6 @@ def _arguments_of_scan(scan, scale):
         replace(factor, columns=scale**3 * factor.columns) for factor in scan.form.factors
     )
     return {"surveyed": scan.names, "form": replace(scan.form, factors=factors)}
-
-
-def _arguments_of_circles(sphere, plate_m, scale):
-    """Results of great circles as arguments of `SolidPart`; volumes are scaled."""
-    form, read_with = sphere.part_of_volumes(plate_m)
-    factors = tuple(replace(factor, columns=scale**3 * factor.columns) for factor in form.factors)
-    return {
-        "surveyed": ("diameter",),
-        "form": replace(form, factors=factors),
-        "read_with": {name: scale**3 * column for name, column in read_with.items()},
-    }
 
 
 def pressure_of(job):

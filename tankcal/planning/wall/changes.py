@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.job.checks.liquid import MOST_ROWS
-from tankcal.job.checks.tangents import FEWEST_SETUPS
 from tankcal.planning.wall.checks import least_ring_m
 from tankcal.planning.wall.filling import LEAST_STEP_M, SAME_M
 from tankcal.planning.wall.model import USUAL_AT, PlannedStrap, even_radius_m
 from tankcal.planning.wall.reading import change_plan, lengths_of_bars
+from tankcal.survey.tangents import FEWEST_SETUPS
 
 OF_FILLING = ("step", "top_of_run", "half_steps", "empty_start", "run")
 SEARCHED = (

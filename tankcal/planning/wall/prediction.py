@@ -206,7 +206,7 @@ def predict_wall_table(job, amplitudes):
         return _wall_table(surveyed, surveyed.survey)
     field = surveyed.survey.field
     expected = expect_amplitudes(field)
-    if surveyed.touching is not None:  # tangents estimate only the excess of the hull
+    if "tangents" in surveyed.sights:  # they estimate only the excess of the hull
         surveyed = find_survey(job, lambda text: None, expected)
         field = surveyed.survey.field
     wall = replace(surveyed.survey, field=replace(field, amplitudes=expected))
@@ -217,7 +217,7 @@ def _wall_table(surveyed, wall):
     """Return the `WallTable` of a `Surveyed` with a wall of the predicted precision."""
     metering = measure_by_liquid(surveyed.job, wall)
     table = compute_table(surveyed.job, wall, body=metering and metering.body)
-    return WallTable(surveyed.job, wall, table, surveyed.sighting or surveyed.touching, metering)
+    return WallTable(surveyed.job, wall, table, surveyed.sighting, metering)
 
 
 def courses_of(result):

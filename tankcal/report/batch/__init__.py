@@ -37,7 +37,7 @@ def summary_files(summary, language, folder):
     -------
     list of str
     """
-    from tankcal.report.batch.documents import CSV_COLUMNS, page_blocks, write_workbook
+    from tankcal.report.batch.documents import CSV_COLUMNS, page_blocks, write_summary
     from tankcal.report.outputs.csv_files import write_table
     from tankcal.report.web import page
 
@@ -47,7 +47,7 @@ def summary_files(summary, language, folder):
     paper = SummaryPaper(json.loads(data), language)
     rows = [paper.plain_row(row) for row in paper.summary["rows"]]
     write_table(CSV_COLUMNS, folder / CSV, rows)
-    write_workbook(paper, folder / WORKBOOK)
+    write_summary(paper, folder / WORKBOOK)
     web_page = page([block.data for block in page_blocks(paper)])
     (folder / PAGE).write_text(web_page, encoding="utf-8", errors="replace")
     return [*FILES]

@@ -6,8 +6,8 @@ from tankcal.report import blocks
 from tankcal.report.batch import STATUSES
 from tankcal.report.saved_paper import bearable
 from tankcal.report.tables import Column, Table
-from tankcal.report.workbook.book import Book, about_saved
-from tankcal.report.workbook.tables import HEAD_ROW, table_sheet
+from tankcal.report.workbook.book import workbook_head
+from tankcal.report.workbook.sections import SheetContent, cell_table, write_workbook
 
 MOST_ROWS = 5000  # of the page; jobs that are not done take precedence
 MOST_GONE = 20  # largest number of names of former jobs
@@ -129,16 +129,18 @@ def _rows(paper):
 # ---- workbook
 
 
-def write_workbook(paper, path):
+def write_summary(paper, path):
     """Write the workbook of a SummaryPaper; equal rows give equal bytes."""
-    rows = paper.summary["rows"]
-    about = about_saved(paper.summary["tankcal"], source=str(len(rows)))
-    with Book(path, about, paper.words, about="batch") as book:
-        book.paper = paper
-        book.subject = paper.word("titles.summary")
-        sheet, columns = table_sheet(book, "jobs", JOBS, _without_empty_columns(rows))
-        look = book.format(bottom=4, align="left", indent=1, underline=1, font_color="blue")
-        for place, row in enumerate(rows[:MOST_LINKS], start=HEAD_ROW + 1):
-            if row["papers"]:
-                address, name = f"external:{row['papers'][0]}", paper.paper_name(row)
-                sheet.write_url(place, len(columns) - 1, address, look, name)
+    head = workbook_head(paper.summary["tankcal"], source=str(len(paper.summary["rows"])))
+    write_workbook(paper, path, "batch", head, _sheets, subject=paper.word("titles.summary"))
+
+
+def _sheets(book):
+    """Yield the only sheet: the table of the jobs, with links to their papers."""
+    paper, rows = book.paper, book.paper.summary["rows"]
+    links = [
+        (f"external:{row['papers'][0]}", paper.paper_name(row)) if row["papers"] else ("", "")
+        for row in rows[:MOST_LINKS]
+    ]
+    table = cell_table(book, JOBS, _without_empty_columns(rows), links=links)
+    yield SheetContent("jobs", [table], tab="result", is_filtered=True)

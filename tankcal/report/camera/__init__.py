@@ -8,13 +8,13 @@ import json
 from importlib import import_module
 from pathlib import Path
 
-from tankcal import report
 from tankcal.messages import message
 from tankcal.record import manifest
 from tankcal.record.camera_versions import KINDS
 from tankcal.report import folders
 from tankcal.report.camera.paper import CameraPaper, describe_origin
 from tankcal.report.outputs.csv_files import write_rows
+from tankcal.report.papers import write_papers
 from tankcal.report.terminal import lines_of
 
 __all__ = ["CameraPaper", "describe_origin", "lines", "refuse_foreign", "write"]
@@ -71,19 +71,21 @@ def write(result, directory, progress=None, language=None):
         If the language has no words.
     """
     refuse_foreign(directory)
-    from tankcal.report.notebook import joined  # the import takes a second
+    from tankcal.report.notebook import (
+        join_templates,  # not for lines in a terminal: it takes a second
+    )
 
     kind = CameraPaper(result, language).result["kind"]
     progress = progress or (lambda text, done, total: None)
-    with folders.replaced(directory, language) as temporary:
+    with folders.replace_folder(directory, language) as temporary:
         text = json.dumps(result, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
         (temporary / RECORD).write_text(text + "\n", encoding="utf-8")
         for name, rows in _load_module(result).tables(result).items():
             if rows:
                 write_rows(rows, temporary / name)
         others = [other for other in KINDS if other != kind]
-        notebook = joined(RECORD, others, (TEMPLATE,), LANGUAGE=language)
-        report.set_papers(
+        notebook = join_templates(RECORD, others, (TEMPLATE,), LANGUAGE=language)
+        write_papers(
             notebook,
             temporary,
             (("report.pdf", ""),),

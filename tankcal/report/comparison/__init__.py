@@ -4,36 +4,31 @@ All values come from comparison.json; no number is computed here.
 """
 
 from collections import defaultdict
-from functools import partial
 from typing import ClassVar
 
 from tankcal.job.rule_files import shipped_names, shipped_rule
 from tankcal.messages import message
-from tankcal.record import manifest, save
 from tankcal.record.comparison import COMPARISON
-from tankcal.record.schema import to_plain
 from tankcal.report.comparison.tables import COURSES, DELIVERIES, ROWS, WATERFALL, unit_symbol
 from tankcal.report.plain import words_with_part
-from tankcal.report.saved_folder import SavedFolder, write_pages
+from tankcal.report.saved_document import SavedDocument
 from tankcal.report.saved_paper import SavedPaper, bearable, iso_day, signed_text
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 from tankcal.text.languages import DEFAULT
 from tankcal.text.words import load_words
 
 __all__ = [
-    *("FILES", "ComparisonPaper", "comparison_file", "rebuild", "refuse_foreign"),
+    *("DOCUMENT", "FILES", "ComparisonPaper", "rebuild", "refuse_foreign"),
     "write_comparison",
 ]
 
 FILE, WORKBOOK = "comparison.json", "comparison.xlsx"
-PDF, PAGE = "comparison.pdf", "comparison.html"
 TABLES = {
     "rows.csv": ROWS,
     "waterfall.csv": WATERFALL,
     "deliveries.csv": DELIVERIES,
     "courses.csv": COURSES,
 }
-FILES = (FILE, *TABLES, WORKBOOK, PDF, PAGE, manifest.FILE)
 UNITS = {"C": "degC", "%": "percent", "mm": "image mm"}  # {unit of the file: unit of the report}
 DECIMALS = {"C": 1, "kg/m3": 1, "mm": 2, "m": 4, "m3": 4, "%": 3}  # by unit of the file
 CODES = {  # {value of a reason: group of its words}
@@ -43,69 +38,6 @@ CODES = {  # {value of a reason: group of its words}
     "limits": "numbers",
     "of": "ages",
 }
-_FOLDER = SavedFolder(
-    COMPARISON,
-    FILES,
-    unreadable=lambda error: message(
-        "comparison_unreadable", "cannot be read as a comparison: {error}", error=error
-    ),
-    without_content=lambda what: message(
-        "no_comparison", "does not have the content of a comparison ({what})", what=what
-    ),
-)
-refuse_foreign, comparison_file, load = _FOLDER.refuse_foreign, _FOLDER.file_of, _FOLDER.load
-
-
-def write_comparison(comparison, folder, language=None, progress=None, letterhead=None):
-    """Write comparison.json, CSV files, workbook, PDF and web page, all or nothing.
-
-    Parameters
-    ----------
-    comparison : ComparisonFile or dict
-        Result of `recalibration.comparison.compare`, or the same as plain data.
-    folder : path
-        Created if missing. An earlier comparison in the folder is replaced.
-    language : str, optional
-        Language of papers and workbook, one of languages.LANGUAGES; None: English.
-    progress : callable, optional
-        progress(text), called at the beginning of each step.
-    letterhead : report.letterhead.Letterhead, optional
-        Letterhead of the laboratory that compares.
-
-    Returns
-    -------
-    list of Path
-
-    Raises
-    ------
-    InputError
-        For a folder with other files, or for data that are not a comparison.
-    """
-    plain = comparison if isinstance(comparison, dict) else to_plain(comparison)
-    paper = ComparisonPaper(plain, language, letterhead)
-    return _FOLDER.write(folder, partial(_write, paper), language, progress)
-
-
-def rebuild(source, folder, language=None, progress=None, letterhead=None):
-    """Write the files from a comparison.json; other arguments as in `write_comparison`."""
-    return _FOLDER.rebuild(
-        source, lambda plain: write_comparison(plain, folder, language, progress, letterhead)
-    )
-
-
-def _write(paper, folder, progress):
-    from tankcal.report.comparison import workbook
-    from tankcal.report.comparison.pages import pages
-    from tankcal.report.outputs.csv_files import write_table
-
-    progress(message("comparison_tables", "writing the tables"))
-    save(paper.saved, folder / FILE)
-    for name, table in TABLES.items():
-        if rows := table.rows(paper.found):
-            write_table(table, folder / name, rows)
-    workbook.write(paper, folder / WORKBOOK)
-    progress(message("comparison_papers", "setting the papers"))
-    write_pages(pages, paper, folder, PDF, PAGE)
 
 
 class ComparisonPaper(SavedPaper):
@@ -133,9 +65,9 @@ class ComparisonPaper(SavedPaper):
         texts = self._texts_of_rule(rule)
         clauses = texts.get("clauses", {})
         of_rule = {key: text for key, text in texts.items() if key != "clauses"}
-        self.found = self.saved | {"rule": rule and rule | of_rule}
+        self.record = self.saved | {"rule": rule and rule | of_rule}
         for key in ("legal", "ages"):
-            self.found[key] = [
+            self.record[key] = [
                 entry | {"clause": clauses.get(entry["clause"], entry["clause"])}
                 for entry in self.saved[key]
             ]
@@ -151,13 +83,13 @@ class ComparisonPaper(SavedPaper):
 
     def subject(self):
         """Return the tank, or the file of the former table if the tank is unknown."""
-        tank = self.found["tank"]
-        subject = f"{self.word('page.tank')} {tank}" if tank else self.found["former"]["name"]
+        tank = self.record["tank"]
+        subject = f"{self.word('page.tank')} {tank}" if tank else self.record["former"]["name"]
         return bearable(subject)
 
     def date(self):
         """Return the ISO date of the new table; "" if it is unknown or no date."""
-        return iso_day(self.found["new"]["date"])
+        return iso_day(self.record["new"]["date"])
 
     # ---- values
 
@@ -220,3 +152,57 @@ def _variant(values):
     if values.get("c_limit") is not None:
         return "_with_limit"
     return "_for_lack" if values.get("lacking") else ""
+
+
+def _load_renderers():
+    from tankcal.report.comparison.pages import pages
+    from tankcal.report.comparison.workbook import write
+
+    return pages, write
+
+
+DOCUMENT = SavedDocument(
+    COMPARISON,
+    ComparisonPaper,
+    _load_renderers,
+    steps=(
+        message("comparison_tables", "writing the tables"),
+        message("comparison_papers", "setting the papers"),
+    ),
+    unreadable=lambda error: message(
+        "comparison_unreadable", "cannot be read as a comparison: {error}", error=error
+    ),
+    without_content=lambda what: message(
+        "no_comparison", "does not have the content of a comparison ({what})", what=what
+    ),
+    tables=TABLES,
+)
+FILES, refuse_foreign, rebuild = DOCUMENT.files, DOCUMENT.refuse_foreign, DOCUMENT.rebuild
+
+
+def write_comparison(comparison, folder, language=None, progress=None, letterhead=None):
+    """Write comparison.json, CSV files, workbook, PDF and web page, all or nothing.
+
+    Parameters
+    ----------
+    comparison : ComparisonFile or dict
+        Result of `recalibration.comparison.compare`, or the same as plain data.
+    folder : path
+        Created if missing. An earlier comparison in the folder is replaced.
+    language : str, optional
+        Language of papers and workbook, one of languages.LANGUAGES; None: English.
+    progress : callable, optional
+        progress(text), called at the beginning of each step.
+    letterhead : report.letterhead.Letterhead, optional
+        Letterhead of the laboratory that compares.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        For a folder with other files, or for data that are not a comparison.
+    """
+    return DOCUMENT.write(comparison, folder, language, progress, letterhead)

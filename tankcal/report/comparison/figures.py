@@ -19,8 +19,8 @@ LEAST_E_N = 1.25  # smallest limit of an axis of E_n, so that the lines at 1 are
 @styled
 def waterfall(paper):
     """Draw bars from the former to the new volume at the highest dip, and their sum."""
-    last = paper.found["waterfall"][-1]
-    codes = [*shown_steps(paper.found), "tank"]
+    last = paper.record["waterfall"][-1]
+    codes = [*shown_steps(paper.record), "tank"]
     sizes = np.array([last[f"{code}_m3"] for code in codes])
     ends = np.concatenate([[0.0], np.cumsum(sizes)])
     names = [paper.word(f"steps.{code}") for code in (*codes, "all")]
@@ -76,7 +76,7 @@ def normalised(paper):
     """Draw E_n at each dip with lines at +-1; rows that are not judged are pale."""
     rows = _rows(paper)
     height_m, e_n = rows["height_m"], rows["E_n"]
-    judged = height_m >= paper.found["judged_from_m"]
+    judged = height_m >= paper.record["judged_from_m"]
     figure, ax = _figure_by_dip(paper, "axes.E_n")
     ax.plot(
         height_m,
@@ -111,7 +111,7 @@ def typeset_E_n(text):
 
 def _rows(paper):
     """Return {column: values of the rows (rows,)}; nan for None."""
-    return {key: np.array(values, dtype=float) for key, values in paper.found["rows"].items()}
+    return {key: np.array(values, dtype=float) for key, values in paper.record["rows"].items()}
 
 
 def _figure_by_dip(paper, name):
@@ -119,7 +119,7 @@ def _figure_by_dip(paper, name):
     ax = figure.subplots()
     ax.set_xlabel(paper.word("axes.dip"))
     ax.set_ylabel(typeset_E_n(paper.word(name)))
-    ax.set_xlim(paper.found["low_m"], paper.found["high_m"])
+    ax.set_xlim(paper.record["low_m"], paper.record["high_m"])
     ax.grid(True)
     set_margins(figure, left=0.65, right=0.12, bottom=0.42, top=0.28)
     return figure, ax

@@ -72,7 +72,7 @@ def pages(paper, folder=None, whole=False):
 
 def verdict(paper):
     """Return the verdict in its box, with its reasons and the rule."""
-    comparison, rule = paper.found, paper.found["rule"]
+    comparison, rule = paper.record, paper.record["rule"]
     code = comparison["verdict"] or "none"
     note = ""
     if rule:
@@ -93,7 +93,7 @@ def _rule(paper, rule):
             ("rule_file", rule["file"]),
             ("rule_source", rule["source"]),
             ("rule_verified", _verified(paper, rule)),
-            ("verdict_verified", _verified(paper, paper.found)),
+            ("verdict_verified", _verified(paper, paper.record)),
             ("rule_remark", rule["remark"]),
             ("rule_asked", paper.word("texts.rule_default") if rule["is_default"] else None),
         ]
@@ -110,7 +110,7 @@ def _legal(paper):
     rows = [*_legal_rows(paper), *_age_rows(paper)]
     if not rows:
         return []
-    entries = [*paper.found["legal"], *paper.found["ages"]]
+    entries = [*paper.record["legal"], *paper.record["ages"]]
     clauses = [f"{entry['clause']} ({_verified(paper, entry)})" for entry in entries]
     return [
         paper.heading("legal"),
@@ -129,7 +129,7 @@ def _legal_rows(paper):
             "limit": f"±\N{NO-BREAK SPACE}{paper.declared_value(entry['limit'], entry['unit'])}",
             "verdict": paper.word(f"limits.{entry['verdict']}"),
         }
-        for entry in paper.found["legal"]
+        for entry in paper.record["legal"]
     ]
 
 
@@ -150,7 +150,7 @@ def _age_rows(paper):
             "limit": paper.word("texts.years", years=paper.plain(entry["years"])),
             "verdict": paper.word(f"limits.{entry['verdict']}"),
         }
-        for entry in paper.found["ages"]
+        for entry in paper.record["ages"]
     ]
 
 
@@ -160,7 +160,7 @@ def _age_rows(paper):
 def _sides(paper):
     """Return the facts of both tables, side by side, and the digests of their files."""
     files = [
-        {"file": shortened(paper.found[side]["name"]), "sha256": paper.found[side]["sha256"]}
+        {"file": shortened(paper.record[side]["name"]), "sha256": paper.record[side]["sha256"]}
         for side in ("former", "new")
     ]
     return [
@@ -172,7 +172,7 @@ def _sides(paper):
 
 def side_rows(paper):
     """Return [{what, former, new}] of the facts that are known of at least one table."""
-    tables = [paper.found[name] for name in ("former", "new")]
+    tables = [paper.record[name] for name in ("former", "new")]
     former, new = (_table_facts(paper, table) for table in tables)
     if not any(table["height_quantum_m"] for table in tables):
         former["quantum_dip"] = new["quantum_dip"] = None
@@ -252,8 +252,8 @@ def _roof(paper, roof):
 
 def _warnings(paper):
     """Return the warnings of the comparison, and the limits of every comparison."""
-    texts = [paper.warning(warning) for warning in paper.found["warnings"]]
-    error_m3 = paper.found["interpolation_m3"]
+    texts = [paper.warning(warning) for warning in paper.record["warnings"]]
+    error_m3 = paper.record["interpolation_m3"]
     if error_m3:
         volume = paper.number(error_m3, "L", digits=2)
         texts.append(paper.word("texts.interpolation", volume=volume))
@@ -266,7 +266,7 @@ def _warnings(paper):
 
 def _basis(paper):
     """Return the steps from the former basis to the new basis, and the waterfall."""
-    comparison = paper.found
+    comparison = paper.record
     table = waterfall_table(comparison)
     material = comparison["material"]
     return [
@@ -298,7 +298,7 @@ def _basis_rows(paper):
             "new": _step_value(paper, step, "new"),
             "source": paper.word(f"sources.{step['source'] or step['state']}"),
         }
-        for step in paper.found["steps"]
+        for step in paper.record["steps"]
     ]
 
 
@@ -314,13 +314,13 @@ def _step_value(paper, step, side):
 
 def _missing_values(paper):
     """Return a paragraph with the keys that omitted steps require."""
-    keys = dict.fromkeys(key for step in paper.found["steps"] for key in step["lacking"])
+    keys = dict.fromkeys(key for step in paper.record["steps"] for key in step["lacking"])
     return [paper.paragraph("lacking", keys=", ".join(keys))] if keys else []
 
 
 def _zero(paper):
     """Return the height of the new zero above the former one, as used and by the volumes."""
-    zero = paper.found["zero"]
+    zero = paper.record["zero"]
     text = paper.word(
         f"texts.zero_{zero['source']}", height=_millimetres(paper, zero["height_m"], zero["u_m"])
     )
@@ -344,7 +344,7 @@ def _millimetres(paper, value_m, u_m):
 
 def _differences(paper):
     """Return the remaining differences with U, the worst row, and E_n with its correlation."""
-    is_E_n_known = any(value is not None for value in paper.found["rows"]["E_n"])
+    is_E_n_known = any(value is not None for value in paper.record["rows"]["E_n"])
     return [
         paper.heading("differences"),
         paper.figure(figures.differences(paper), "differences"),
@@ -357,7 +357,7 @@ def _differences(paper):
 
 
 def _worst_row(paper):
-    row = worst_row(paper.found)
+    row = worst_row(paper.record)
     if row is None:
         return paper.paragraph("no_row_judged")
     values = {
@@ -379,7 +379,7 @@ def _formula(paper):
 
 def correlation(paper):
     """Return sentences on c: its source, E_n for c = 0.5, and the c at which |E_n| is 1."""
-    entry = paper.found["correlation"]
+    entry = paper.record["correlation"]
     if entry["worst_E_n"] is None:
         return paper.word("texts.no_E_n")
     values = {
@@ -398,8 +398,8 @@ def correlation(paper):
 
 
 def _lowest_judged_dip(paper):
-    lowest_m = paper.found["judged_from_m"]
-    if lowest_m <= paper.found["low_m"]:
+    lowest_m = paper.record["judged_from_m"]
+    if lowest_m <= paper.record["low_m"]:
         return []
     return [paper.paragraph("judged_from", dip=paper.height(lowest_m))]
 
@@ -419,7 +419,7 @@ def _deliveries(paper):
 def delivery_rows(paper):
     """Return the worst deliveries; a delivery that is worst by both criteria is one row."""
     rows = {}
-    for delivery in paper.found["deliveries"]:
+    for delivery in paper.record["deliveries"]:
         place = (delivery["minimum_m"], delivery["low_m"], delivery["high_m"])
         rows[place] = delivery | ({"by": "both"} if place in rows else {})
     return list(rows.values())
@@ -427,7 +427,7 @@ def delivery_rows(paper):
 
 def _courses(paper):
     """Return the radii of the courses in both tables."""
-    rows = paper.found["courses"]
+    rows = paper.record["courses"]
     if not rows:
         return [paper.heading("radii"), paper.paragraph("no_radii")]
     return [paper.heading("radii"), paper.show(COURSES, rows), paper.paragraph("radii")]
@@ -438,7 +438,7 @@ def _courses(paper):
 
 def _estimated_values(paper):
     """Return the values estimated from a table because they are not declared."""
-    entries = paper.found["read"]
+    entries = paper.record["read"]
     if not entries:
         return []
     heads = [_head(paper, entry) for entry in entries if entry["code"].startswith("head_")]
@@ -472,7 +472,7 @@ def _read_rows(paper):
             "sure": paper.word(f"sure.{entry['sure']}"),
             "used": paper.words["yes_no"]["yes" if entry["used"] else "no"],
         }
-        for entry in paper.found["read"]
+        for entry in paper.record["read"]
     ]
 
 
@@ -497,11 +497,11 @@ def _rows(paper, whole):
 
     The table has one column of the page, so that the last column never contains only a few rows.
     """
-    rows = ROWS.rows(paper.found)
+    rows = ROWS.rows(paper.record)
     if whole and len(rows) <= MOST_ROWS_OF_PAGE:
         table = paper.table("every_row", rows, ROWS.on_paper(), across=1)
         return [paper.heading("rows"), table]
-    selection = select_rows(paper.found)
+    selection = select_rows(paper.record)
     note = [paper.paragraph("selected_rows", shown=len(selection), all=len(rows))]
     return [
         paper.heading("rows"),

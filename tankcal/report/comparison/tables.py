@@ -109,7 +109,7 @@ def step_rows(paper):
     """Return rows of STEPS; the source of an omitted step is the reason for its omission."""
     return [
         step | {"step": step["code"], "source": step["source"] or step["state"]}
-        for step in paper.found["steps"]
+        for step in paper.record["steps"]
     ]
 
 

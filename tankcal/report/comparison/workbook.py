@@ -11,123 +11,127 @@ from tankcal.report.comparison.tables import (
     unit_symbol,
     waterfall_table,
 )
-from tankcal.report.workbook.book import Book, about_saved
-from tankcal.report.workbook.look import Column as Cells
-from tankcal.report.workbook.tables import (
-    HEAD_ROW,
-    columns_of,
-    set_widths,
-    table_sheet,
-    write_table,
+from tankcal.report.tables import Column, Table
+from tankcal.report.workbook.book import workbook_head
+from tankcal.report.workbook.sections import (
+    FIRST_LINE,
+    Sentences,
+    SheetContent,
+    cell_table,
+    write_workbook,
 )
 
 WIDTHS = (30, 34, 34, 12, 12, 24, 40, 12)
 READ_DECIMALS = 6  # of values estimated from the tables, for units that DECIMALS lacks
 
+SIDES = Table("sides", tuple(Column(key, sheet=True) for key in ("what", "former", "new")))
+LIMITS = Table(  # limits and periods of the rule; each number with its unit
+    "legal",
+    (
+        Column("number", sheet=True),
+        *(
+            Column(key, decimals=lambda row: row["decimals"], sheet=True)
+            for key in ("value", "as_printed", "limit")
+        ),
+        Column("unit", sheet=True),
+        Column("verdict", words="limits", sheet=True),
+        Column("clause", sheet=True),
+        Column("verified", sheet=True),
+    ),
+)
+READ_VALUES = Table(  # values estimated from the tables
+    "read",
+    (
+        Column("table", words="sides_of_comparison", sheet=True),
+        Column("code", words="read", heading="what", sheet=True),
+        *(
+            Column(
+                key,
+                decimals=lambda row: DECIMALS.get(row["unit"], READ_DECIMALS),
+                heading=heading,
+                sheet=True,
+            )
+            for key, heading in (("value", "read_value"), ("u", "u"))
+        ),
+        Column("unit", text=lambda paper, row: unit_symbol(row["unit"]), sheet=True),
+        Column("sure", words="sure", sheet=True),
+        Column("used", sheet=True),
+    ),
+    rows=lambda comparison: comparison["read"],
+)
+
 
 def write(paper, path):
     """Write the workbook of a ComparisonPaper; equal comparisons give equal bytes."""
-    comparison, new = paper.found, paper.found["new"]
-    about = about_saved(
+    comparison, new = paper.record, paper.record["new"]
+    head = workbook_head(
         comparison["tankcal"],
         tank=comparison["tank"] or comparison["former"]["name"],
         date=new["date"],
         notice=comparison["notice"],
         laboratory=new["laboratory"],
     )
-    with Book(path, about, paper.words, about="comparison") as book:
-        book.paper = paper
-        _verdict(book, paper)
-        table_sheet(book, "rows", ROWS, ROWS.rows(comparison))
-        _other_sheets(book, paper)
+    write_workbook(paper, path, "comparison", head, sheets)
 
 
-def _verdict(book, paper):
-    """Write the verdict, its reasons, both tables, the limits of the rule and estimated values."""
-    comparison = paper.found
-    sheet = book.sheet("verdict", landscape=True, tab="result")
-    book.widths(sheet, *WIDTHS)
-    row, bold = HEAD_ROW, {"bold": True, "font_size": 12}
-    code = comparison["verdict"] or "none"
-    texts = [(paper.word(f"verdicts.{code}"), bold), (paper.word(f"texts.verdict_{code}"), {})]
-    texts += [(f"– {paper.reason(reason)}", {}) for reason in comparison["reasons"]]
-    for text, look in texts:
-        book.paragraph(sheet, row, text, WIDTHS, **look)
-        row += 1
-    row, starts = row + 1, []
-    tables = {"sides": _sides(paper), "legal": _legal(paper), "read": _read(paper)}
-    for name, columns in tables.items():
-        if columns[0].cells:
-            starts.append(row)
-            book.heading(sheet, row, paper.word(f"sheet_headings.{name}"), len(columns))
-            widths = list(WIDTHS[: len(columns)])
-            row = book.table(sheet, row + 1, name, columns, widths=widths) + 2
-    book.keep_together(sheet, starts, row, WIDTHS)
+def sheets(book):
+    """Yield the content of each sheet, in order."""
+    paper, comparison = book.paper, book.paper.record
+    yield _verdict_sheet(book, paper)
+    yield SheetContent("rows", [cell_table(book, ROWS)], tab="result", is_filtered=True)
+    waterfall = cell_table(book, waterfall_table(comparison), comparison["waterfall"])
+    yield SheetContent("waterfall", [cell_table(book, STEPS, step_rows(paper)), waterfall])
+    yield SheetContent("deliveries", [cell_table(book, DELIVERIES)])
+    yield SheetContent("courses", [cell_table(book, COURSES)])
 
 
-def _sides(paper):
-    rows = side_rows(paper)
-    return [_column(paper, key, [row[key] for row in rows]) for key in ("what", "former", "new")]
+def _verdict_sheet(book, paper):
+    """Return verdict, its reasons, both tables, the limits of the rule and estimated values."""
+    code = paper.record["verdict"] or "none"
+    reasons = [f"– {paper.reason(reason)}" for reason in paper.record["reasons"]]
+    verdict = (
+        Sentences([paper.word(f"verdicts.{code}")], look=FIRST_LINE),
+        Sentences([paper.word(f"texts.verdict_{code}"), *reasons]),
+    )
+    tables = (
+        cell_table(
+            book,
+            table,
+            rows,
+            title=paper.word(f"sheet_headings.{table.name}"),
+            is_optional=True,
+        )
+        for table, rows in (
+            (SIDES, side_rows(paper)),
+            (LIMITS, _limit_rows(paper)),
+            (READ_VALUES, None),
+        )
+    )
+    return SheetContent(
+        "verdict", [verdict, *tables], tab="result", widths=WIDTHS, keeps_together=True
+    )
 
 
-def _legal(paper):
-    """Return the columns of the limits and periods of the rule; each number with its unit."""
-    limits, ages = paper.found["legal"], paper.found["ages"]
-    digits = [DECIMALS_OF_LIMITS[limit["unit"]] for limit in limits] + [1] * len(ages)
-    names = [paper.word(f"numbers.{limit['code']}") for limit in limits]
-    names += [paper.word(f"ages.{age['of']}") for age in ages]
-    values = [limit["value"] for limit in limits] + [age["age_years"] for age in ages]
-    printed = [limit["as_printed"] for limit in limits] + [None] * len(ages)
-    largest = [limit["limit"] for limit in limits] + [age["years"] for age in ages]
-    units = [unit_symbol(limit["unit"]) for limit in limits]
-    units += [paper.word("texts.unit_years")] * len(ages)
-    entries = [*limits, *ages]
-    return [
-        _column(paper, "number", names),
-        _column(paper, "value", values, digits),
-        _column(paper, "as_printed", printed, digits),
-        _column(paper, "limit", largest, digits),
-        _column(paper, "unit", units),
-        _column(paper, "verdict", [paper.word(f"limits.{entry['verdict']}") for entry in entries]),
-        _column(paper, "clause", [entry["clause"] for entry in entries]),
-        _column(paper, "verified", [entry["verified"] for entry in entries]),
+def _limit_rows(paper):
+    """Return a row for each limit and each period of the rule."""
+    limits = [
+        limit
+        | {
+            "number": paper.word(f"numbers.{limit['code']}"),
+            "unit": unit_symbol(limit["unit"]),
+            "decimals": DECIMALS_OF_LIMITS[limit["unit"]],
+        }
+        for limit in paper.record["legal"]
     ]
-
-
-def _read(paper):
-    """Return the columns of the values estimated from the tables."""
-    entries = paper.found["read"]
-    digits = [DECIMALS.get(entry["unit"], READ_DECIMALS) for entry in entries]
-    sides = [paper.word(f"sides_of_comparison.{entry['table']}") for entry in entries]
-    return [
-        _column(paper, "table", sides),
-        _column(paper, "what", [paper.word(f"read.{entry['code']}") for entry in entries]),
-        _column(paper, "read_value", [entry["value"] for entry in entries], digits),
-        _column(paper, "u", [entry["u"] for entry in entries], digits),
-        _column(paper, "unit", [unit_symbol(entry["unit"]) for entry in entries]),
-        _column(paper, "sure", [paper.word(f"sure.{entry['sure']}") for entry in entries]),
-        _column(paper, "used", [entry["used"] for entry in entries]),
+    periods = [
+        age
+        | {
+            "number": paper.word(f"ages.{age['of']}"),
+            "value": age["age_years"],
+            "limit": age["years"],
+            "unit": paper.word("texts.unit_years"),
+            "decimals": 1,
+        }
+        for age in paper.record["ages"]
     ]
-
-
-def _column(paper, key, cells, digits=None):
-    return Cells(paper.word(f"table_headings.{key}"), cells, digits)
-
-
-def _other_sheets(book, paper):
-    """Write steps and waterfall, worst deliveries and radii, each on its own sheet."""
-    comparison = paper.found
-    sheets = {
-        "waterfall": (
-            (STEPS, step_rows(paper)),
-            (waterfall_table(comparison), comparison["waterfall"]),
-        ),
-        "deliveries": ((DELIVERIES, comparison["deliveries"]),),
-        "courses": ((COURSES, comparison["courses"]),),
-    }
-    for code, tables in sheets.items():
-        sheet, row = book.sheet(code, landscape=True), HEAD_ROW
-        columns = [columns_of(book, table, rows) for table, rows in tables]
-        widths = set_widths(book, sheet, *columns)
-        for (table, _), cells in zip(tables, columns, strict=True):
-            row = write_table(book, sheet, row, table.name, cells, widths=widths) + 2
+    return [*limits, *periods]

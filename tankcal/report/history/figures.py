@@ -19,7 +19,7 @@ DAYS_OF_YEAR = 365.25
 @styled
 def volumes(paper):
     """Draw the volume of each table minus that of the newest at some dips, with U."""
-    history = paper.found
+    history = paper.record
     figure, ax = _figure_over_years(paper, "axes.d_volume")
     days = _certificate_days(history)
     for number, dip in enumerate(history["dips_m"][:MOST_LINES]):
@@ -34,7 +34,7 @@ def volumes(paper):
 @styled
 def radii(paper):
     """Draw the radius of each course minus its mean over the years, with U, mm."""
-    history = paper.found
+    history = paper.record
     figure, ax = _figure_over_years(paper, "axes.d_radius")
     days = _certificate_days(history)
     courses = sorted({row["course"] for row in history["radii"]})
@@ -53,9 +53,9 @@ def radii(paper):
 @styled
 def normalised(paper):
     """Draw E_n of each table against the one before: worst of rows and deliveries, and radii."""
-    changes = paper.found["changes"]
+    changes = paper.record["changes"]
     figure, ax = _figure_over_years(paper, "axes.E_n")
-    days = _certificate_days(paper.found)
+    days = _certificate_days(paper.record)
     worst = [
         (days[change["new"]], change["worst_E_n"])
         for change in changes
@@ -82,7 +82,7 @@ def normalised(paper):
 def checks(paper):
     """Draw the value of each check of the inspections relative to its limit."""
     figure, ax = _figure_over_years(paper, "axes.share_of_limit")
-    for number, (code, rows) in enumerate(limited_checks(paper.found).items()):
+    for number, (code, rows) in enumerate(limited_checks(paper.record).items()):
         days = [_day_number(row["date"]) for row in rows]
         values = [abs(row["value"]) / row["limit"] for row in rows]
         U = [(row["U"] or 0.0) / row["limit"] for row in rows]
@@ -146,7 +146,7 @@ def _figure_over_years(paper, name):
     """Return a figure and its axes over the days of certificates and dated inspections."""
     figure = Figure(figsize=(WIDTH, HEIGHT_IN))
     ax = figure.subplots()
-    history = paper.found
+    history = paper.record
     days = list(_certificate_days(history).values())
     days += [_day_number(entry["date"]) for entry in history["inspections"] if entry["date"]]
     room = 0.06 * (max(days) - min(days)) or DAYS_OF_YEAR

@@ -50,7 +50,7 @@ def pages(paper, folder=None, whole=False):
 
 def _span(paper):
     """Return the number of certificates, and the dates of the first and the last one."""
-    certificates = paper.found["certificates"]
+    certificates = paper.record["certificates"]
     dates = {
         "first": paper.day(certificates[0]["date"]),
         "last": paper.day(certificates[-1]["date"]),
@@ -62,7 +62,7 @@ def _span(paper):
 
 def _summary(paper):
     """Return how many changes exceed their uncertainty."""
-    changes = paper.found["changes"]
+    changes = paper.record["changes"]
     known = [change for change in changes if change["worst_E_n"] is not None]
     if not changes:
         return paper.word("texts.nothing_to_compare")
@@ -74,7 +74,7 @@ def _summary(paper):
 
 def _certificates(paper):
     """Return the certificates and the basis of their tables, without empty columns."""
-    rows = paper.found["certificates"]
+    rows = paper.record["certificates"]
     known = {key for row in rows for key, value in row.items() if value is not None}
     table = CERTIFICATES.only(*known)
     return [
@@ -91,16 +91,16 @@ def _volumes(paper, whole):
         paper.paragraph(
             "volumes",
             date=paper.day(paper.newest["date"]),
-            k=paper.number(paper.found["coverage_k"], decimals=2),
+            k=paper.number(paper.record["coverage_k"], decimals=2),
         ),
         paper.figure(figures.volumes(paper), "volumes"),
-        *_table(paper, VOLUMES, volume_rows(paper.found), whole),
+        *_table(paper, VOLUMES, volume_rows(paper.record), whole),
     ]
 
 
 def _radii(paper, whole):
     """Return the radii of the courses on one basis, and their figure."""
-    rows = radius_rows(paper.found)
+    rows = radius_rows(paper.record)
     if not rows:
         return [paper.heading("radii"), paper.paragraph("no_radii")]
     return [
@@ -113,7 +113,7 @@ def _radii(paper, whole):
 
 def _changes(paper):
     """Return the comparisons of each table with the one before, and their omitted steps."""
-    changes = paper.found["changes"]
+    changes = paper.record["changes"]
     if not changes:
         return []
     omissions = [
@@ -138,10 +138,10 @@ def _changes(paper):
 
 def _inspections(paper):
     """Return the worst result of each check of each inspection."""
-    rows = check_rows(paper.found)
+    rows = check_rows(paper.record)
     if not rows:
         return []
-    has_figure = bool(figures.limited_checks(paper.found))
+    has_figure = bool(figures.limited_checks(paper.record))
     return [
         paper.heading("inspections"),
         paper.paragraph("inspections"),
@@ -152,8 +152,8 @@ def _inspections(paper):
 
 def _limits(paper):
     """Return the files left out, the warnings, and the limits of every history."""
-    left_out = [paper.warning(entry) for entry in paper.found["left_out"]]
-    texts = [paper.warning(entry) for entry in paper.found["warnings"]]
+    left_out = [paper.warning(entry) for entry in paper.record["left_out"]]
+    texts = [paper.warning(entry) for entry in paper.record["warnings"]]
     texts += paper.words["standing_limits"].values()
     return [
         *([paper.heading("left_out"), blocks.listing(left_out)] if left_out else []),
@@ -170,7 +170,7 @@ def _files(paper):
             "file": bearable(entry["file"]),
             "sha256": f"{entry['sha256'][:DIGEST]}…",
         }
-        for entry in paper.found["certificates"]
+        for entry in paper.record["certificates"]
     ]
     return [paper.heading("files"), paper.table("files", rows, FILE_COLUMNS)]
 

@@ -73,6 +73,7 @@ CERTIFICATES = Table(
         _text("file", width=34, on=""),
         _text("sha256", width=66, on=""),
     ),
+    rows=lambda history: history["certificates"],
 )  # fmt: skip
 
 VOLUMES = Table(
@@ -86,6 +87,7 @@ VOLUMES = Table(
         Column("d_m3", "m3", decimals=LITRE_DECIMALS, csv="d_m3", **_SHOWN),
         Column("E_n", decimals=2, csv="E_n", **_SHOWN),
     ),
+    rows=lambda history: volume_rows(history),
 )
 
 RADII = Table(
@@ -102,6 +104,7 @@ RADII = Table(
         Column("U_d_m", "mm", decimals=MM_DECIMALS, csv="U_d_m", **_SHOWN),
         Column("E_n", decimals=2, csv="E_n", **_SHOWN),
     ),
+    rows=lambda history: radius_rows(history),
 )
 
 RADIUS_CHANGES = Table(
@@ -114,6 +117,7 @@ RADIUS_CHANGES = Table(
         Column("U_m", "mm", decimals=MM_DECIMALS, csv="U_m", **_SHOWN),
         Column("E_n", decimals=2, csv="E_n", **_SHOWN),
     ),
+    rows=lambda history: radius_change_rows(history),
 )
 
 CHANGES = Table(
@@ -135,6 +139,7 @@ CHANGES = Table(
         _code("verdict", "verdicts"),
         _text("rule", width=40, on=""),
     ),
+    rows=lambda history: history["changes"],
 )  # fmt: skip
 
 CHECKS = Table(
@@ -151,6 +156,7 @@ CHECKS = Table(
         _text("rule", width=30, on=""),
         _text("sha256", width=66, on=""),
     ),
+    rows=lambda history: check_rows(history),
 )
 
 

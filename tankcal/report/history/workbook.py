@@ -8,12 +8,9 @@ from tankcal.report.history.tables import (
     CHECKS,
     RADII,
     VOLUMES,
-    check_rows,
-    radius_rows,
-    volume_rows,
 )
-from tankcal.report.workbook.book import Book, about_saved
-from tankcal.report.workbook.tables import HEAD_ROW, table_sheet
+from tankcal.report.workbook.book import workbook_head
+from tankcal.report.workbook.sections import Sentences, SheetContent, cell_table, write_workbook
 
 ORIGIN_COLUMNS = ("certificate", "tank", "origin", "tankcal", "method", "file", "sha256")
 CERTIFICATE_COLUMNS = (
@@ -22,42 +19,38 @@ CERTIFICATE_COLUMNS = (
     "nominal_diameter_m", "nominal_height_m", "zero", "sigma0", "global_test_passed",
     "rule_verdict",
 )  # fmt: skip
+SHEETS = {
+    "certificates": CERTIFICATES.only(*CERTIFICATE_COLUMNS),
+    "volumes": VOLUMES,
+    "radii": RADII,
+    "changes": CHANGES,
+    "inspections": CHECKS,
+    "origins": replace(CERTIFICATES.only(*ORIGIN_COLUMNS), name="origins"),
+}
 
 
 def write(paper, path):
     """Write the workbook of a HistoryPaper; equal histories give equal bytes."""
-    history, newest = paper.found, paper.newest
-    about = about_saved(
+    history, newest = paper.record, paper.newest
+    head = workbook_head(
         history["tankcal"],
         tank=history["tank"] or newest["file"],
         date=newest["date"],
         notice=history["notice"],
         laboratory=newest["laboratory"],
     )
-    certificates = history["certificates"]
-    origins = replace(CERTIFICATES.only(*ORIGIN_COLUMNS), name="origins")
-    sheets = {
-        "certificates": (CERTIFICATES.only(*CERTIFICATE_COLUMNS), certificates),
-        "volumes": (VOLUMES, volume_rows(history)),
-        "radii": (RADII, radius_rows(history)),
-        "changes": (CHANGES, history["changes"]),
-        "inspections": (CHECKS, check_rows(history)),
-        "origins": (origins, certificates),
-    }
-    with Book(path, about, paper.words, about="history") as book:
-        book.paper = paper
-        for code, (table, rows) in sheets.items():
-            if rows:
-                table_sheet(book, code, table, rows)
-        _warnings(book, paper)
+    write_workbook(paper, path, "history", head, sheets)
 
 
-def _warnings(book, paper):
-    """Write the files left out, the warnings, and the limits of every history."""
-    sheet, widths = book.sheet("warnings"), (100,)
-    book.widths(sheet, *widths)
-    entries = (*paper.found["left_out"], *paper.found["warnings"])
+def sheets(book):
+    """Yield the content of each sheet, in order; no sheet for a table without rows."""
+    paper, history = book.paper, book.paper.record
+    for code, table in SHEETS.items():
+        if table.rows(history):
+            yield SheetContent(code, [cell_table(book, table)], tab="result", is_filtered=True)
+    # The files left out, the warnings, and the limits of every history.
+    entries = (*history["left_out"], *history["warnings"])
     texts = [paper.warning(entry) for entry in entries]
     texts += paper.words["standing_limits"].values()
-    for row, text in enumerate(texts, HEAD_ROW):
-        book.paragraph(sheet, row, f"– {text}", widths)
+    sentences = Sentences([f"– {text}" for text in texts])
+    yield SheetContent("warnings", [sentences], landscape=False, widths=(100,))

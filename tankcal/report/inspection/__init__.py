@@ -4,33 +4,41 @@ All files are written from inspection.json; no number is computed here. No file 
 capacity certificate.
 """
 
-from functools import partial
-
 from tankcal.messages import message
-from tankcal.record import manifest, save
 from tankcal.record.inspection import INSPECTION
-from tankcal.record.schema import to_plain
-from tankcal.report.inspection.paper import FILE, WORKBOOK, InspectionPaper
-from tankcal.report.saved_folder import SavedFolder, write_pages
+from tankcal.report.inspection.paper import InspectionPaper
+from tankcal.report.saved_document import SavedDocument
 
 __all__ = [
-    *("FILES", "InspectionPaper", "inspection_file", "rebuild", "refuse_foreign"),
+    *("DOCUMENT", "FILES", "InspectionPaper", "rebuild", "refuse_foreign"),
     "write_inspection",
 ]
 
-PDF = "inspection.pdf"
-FILES = (FILE, WORKBOOK, PDF, manifest.FILE)
-_FOLDER = SavedFolder(
+
+def _load_renderers():
+    from tankcal.report.inspection.pages import pages
+    from tankcal.report.inspection.workbook import write
+
+    return pages, write
+
+
+DOCUMENT = SavedDocument(
     INSPECTION,
-    FILES,
+    InspectionPaper,
+    _load_renderers,
+    steps=(
+        message("inspection_tables", "writing the tables of the inspection"),
+        message("inspection_papers", "setting the papers of the inspection"),
+    ),
     unreadable=lambda error: message(
         "inspection_unreadable", "cannot be read as an inspection: {error}", error=error
     ),
     without_content=lambda what: message(
         "no_inspection", "does not have the content of an inspection ({what})", what=what
     ),
+    has_page=False,
 )
-refuse_foreign, inspection_file, load = _FOLDER.refuse_foreign, _FOLDER.file_of, _FOLDER.load
+FILES, refuse_foreign, rebuild = DOCUMENT.files, DOCUMENT.refuse_foreign, DOCUMENT.rebuild
 
 
 def write_inspection(inspection, out, language=None, progress=None, letterhead=None):
@@ -59,25 +67,4 @@ def write_inspection(inspection, out, language=None, progress=None, letterhead=N
     InputError
         If the folder has other files, or if the data are no inspection.
     """
-    plain = inspection if isinstance(inspection, dict) else to_plain(inspection)
-    paper = InspectionPaper(plain, language, letterhead)
-    return _FOLDER.write(out, partial(_write, paper), language, progress)
-
-
-def rebuild(source, out, language=None, progress=None, letterhead=None):
-    """Write the files again from an inspection.json; arguments as in `write_inspection`."""
-    return _FOLDER.rebuild(
-        source, lambda inspection: write_inspection(inspection, out, language, progress, letterhead)
-    )
-
-
-def _write(paper, folder, progress):
-    """Write the files of an InspectionPaper into a folder."""
-    from tankcal.report.inspection import workbook
-    from tankcal.report.inspection.pages import pages
-
-    progress(message("inspection_tables", "writing the tables of the inspection"))
-    save(paper.saved, folder / FILE)
-    workbook.write(paper, folder / WORKBOOK)
-    progress(message("inspection_papers", "setting the papers of the inspection"))
-    write_pages(pages, paper, folder, PDF)
+    return DOCUMENT.write(inspection, out, language, progress, letterhead)

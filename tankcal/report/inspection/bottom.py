@@ -26,12 +26,12 @@ SETTLEMENT = ("settlement_cosine", "settlement_all", "settlement_subset", "settl
 
 def settlements(paper):
     """Blocks on each epoch, then on the differences, after a figure with all epochs."""
-    items = paper.found["settlements"]
+    items = paper.record["settlements"]
     if not items:
         return []
     has_several = len(items) > 1
     # A figure with a reading beside it estimates a true value.
-    has_estimates = any(check["reading"] is not None for check in paper.found["checks"])
+    has_estimates = any(check["reading"] is not None for check in paper.record["checks"])
     return [
         paper.heading("settlement"),
         *([paper.figure(draw_epochs(paper), "epochs")] if has_several else []),
@@ -96,7 +96,7 @@ def _verdicts(paper, item):
     name = epoch_name(item)
     checks = [
         entry
-        for entry in paper.found["checks"]
+        for entry in paper.record["checks"]
         if entry["code"] in SETTLEMENT and entry["epoch"] == name
     ]
     if not checks:
@@ -111,7 +111,7 @@ def _verdicts(paper, item):
 
 def points(paper):
     """Blocks with the points of all epochs and differences; the last section, with long tables."""
-    items = paper.found["settlements"]
+    items = paper.record["settlements"]
     if not items:
         return []
     tables = [
@@ -130,7 +130,7 @@ def _column_count(points):
 
 def edges(paper):
     """Blocks with the profiles of the edge, and the table of their drops."""
-    profiles = paper.found["edges"]
+    profiles = paper.record["edges"]
     if not profiles:
         return []
     return [
@@ -207,7 +207,7 @@ def _draw_curvatures(paper, ax, azimuth, values, points):
 @styled
 def draw_epochs(paper):
     """Draw the residuals U_i of all epochs and differences against the azimuth."""
-    shown = paper.found["settlements"][:MOST_EPOCHS]
+    shown = paper.record["settlements"][:MOST_EPOCHS]
     figure = Figure(figsize=(WIDTH, HIGH))
     ax = figure.subplots()
     for number, item in enumerate(shown):
@@ -228,7 +228,7 @@ def draw_epochs(paper):
 @styled
 def draw_edges(paper):
     """Draw profiles of the edge, the deepest first: readings, break-over point and limit."""
-    shown = _edges_by_depth(paper.found)
+    shown = _edges_by_depth(paper.record)
     across = min(3, len(shown))
     down = ceil(len(shown) / across)
     figure = Figure(figsize=(WIDTH, 1.75 * down + 0.45))

@@ -65,7 +65,7 @@ def result(paper):
 
 def rule_text(paper):
     """Sentence with the rule, and whether it was read in the standard itself."""
-    rule = paper.found["rule"]
+    rule = paper.record["rule"]
     if not rule:
         return paper.word("texts.no_rule")
     verified = paper.word(f"verified.{rule['verified']}")
@@ -74,7 +74,7 @@ def rule_text(paper):
 
 def counts(paper):
     """Text with the number of checks of each verdict: "1 beyond the limit, 8 within it"."""
-    verdicts = [verdict_of(check) for check in paper.found["checks"]]
+    verdicts = [verdict_of(check) for check in paper.record["checks"]]
     counted = [
         paper.word(f"counted.{code}_{'one' if verdicts.count(code) == 1 else 'many'}",
                    count=verdicts.count(code))
@@ -86,7 +86,7 @@ def counts(paper):
 
 def subject(paper):
     """Blocks on the tank, its survey and the rule."""
-    tank, rule = paper.found["tank"], paper.found["rule"]
+    tank, rule = paper.record["tank"], paper.record["rule"]
     files = [{"file": shortened(tank["file"]), "sha256": tank["sha256"]}]
     return [
         paper.heading("subject"),
@@ -140,14 +140,14 @@ def _rule(paper, rule):
 
 def checks(paper):
     """Blocks with the table of checks, the decision rule, and remarks on checks."""
-    entries = paper.found["checks"]
+    entries = paper.record["checks"]
     if not entries:
         return []
     sentences = remarks(paper)
     unread = any(check["limit"] is not None and not check["limit"]["verified"] for check in entries)
     return [
         paper.heading("checks"),
-        paper.show(CHECKS, CHECKS.rows(paper.found)),
+        paper.show(CHECKS, CHECKS.rows(paper.record)),
         *([paper.paragraph("unverified", mark=UNVERIFIED)] if unread else []),
         blocks.paragraph(_decision(paper)),
         *([paper.heading("remarks", 2), blocks.listing(sentences)] if sentences else []),
@@ -157,7 +157,7 @@ def checks(paper):
 def remarks(paper):
     """Sentences with the remarks on checks; equal remarks on several checks are joined."""
     places_by_remark = {}
-    for check in paper.found["checks"]:
+    for check in paper.record["checks"]:
         if check["remark"] is not None:
             remark = (paper.check_name(check["code"]), paper.remark(check))
             places_by_remark.setdefault(remark, []).append(paper.place(check))
@@ -174,9 +174,9 @@ def _place_in_brackets(places):
 
 def _decision(paper):
     """Sentence with the decision rule of this file and its coverage factors."""
-    factors = sorted({round(check["k"], 2) for check in paper.found["checks"] if check["k"]})
+    factors = sorted({round(check["k"], 2) for check in paper.record["checks"] if check["k"]})
     k = "; ".join(paper.number(factor, decimals=2) for factor in factors)
-    decision = paper.found["decision"]
+    decision = paper.record["decision"]
     rule = "" if decision == "guarded" else f"_{decision}"
     return paper.word(f"texts.decision{'' if k else '_without_k'}{rule}", k=k)
 
@@ -189,7 +189,7 @@ def limits(paper):
 
 def reading(paper):
     """Blocks with the limitations of an inspection, and its warnings."""
-    inspection = paper.found
+    inspection = paper.record
     sentences = [
         paper.word("texts.as_built" if inspection["as_built"] else "texts.as_built_unknown")
     ]

@@ -52,7 +52,7 @@ class InspectionPaper(SavedPaper):
         super().__init__(words_with_part(load_words(language or DEFAULT), "inspection"))
         inspection = INSPECTION.migrated(inspection, INSPECTION.file)
         self.saved = inspection
-        self.found = inspection | {"rule": self._rule(inspection["rule"])}
+        self.record = inspection | {"rule": self._rule(inspection["rule"])}
         self.letterhead = letterhead.data() if letterhead else None
 
     def _rule(self, rule):
@@ -66,11 +66,11 @@ class InspectionPaper(SavedPaper):
 
     def subject(self):
         """Name of the tank."""
-        return bearable(f"{self.word('page.tank')} {self.found['tank']['id']}")
+        return bearable(f"{self.word('page.tank')} {self.record['tank']['id']}")
 
     def date(self):
         """Date of the survey, ISO; "" if unknown or no date."""
-        return iso_day(self.found["tank"]["survey_date"])
+        return iso_day(self.record["tank"]["survey_date"])
 
     # ---- texts of a check
 

@@ -207,7 +207,7 @@ def limit_rows(paper):
     """Each limit once, with its check, its clause, and whether it was read there."""
     limits = dict.fromkeys(
         (check["code"], paper.limit(check), check["limit"]["clause"], check["limit"]["verified"])
-        for check in paper.found["checks"]
+        for check in paper.record["checks"]
         if check["limit"] is not None
     )
     return [
@@ -218,7 +218,7 @@ def limit_rows(paper):
 
 def sheet_rows(paper):
     """Checks with numbers as numbers, in the unit of the file."""
-    return [_sheet_row(paper, check) for check in paper.found["checks"]]
+    return [_sheet_row(paper, check) for check in paper.record["checks"]]
 
 
 def _sheet_row(paper, check):

@@ -43,7 +43,7 @@ FARTHEST = 1.36  # half the width of a panel, in radii
 
 def departures(paper):
     """Blocks with the map of deviations along the generatrices and their U."""
-    inspection = paper.found
+    inspection = paper.record
     rows = generatrix_rows(inspection)
     if not rows:
         return []
@@ -71,10 +71,10 @@ def departures(paper):
 
 def levels(paper):
     """Blocks with a figure of some levels about the nominal circle, and the table of all levels."""
-    rows = level_rows(paper.found)
+    rows = level_rows(paper.record)
     if not rows:
         return []
-    factor = paper.number(choose_enlargement(paper.found), decimals=0)
+    factor = paper.number(choose_enlargement(paper.record), decimals=0)
     return [
         paper.heading("levels"),
         paper.figure(draw_levels(paper), "levels", factor=factor),
@@ -85,7 +85,7 @@ def levels(paper):
 
 def courses(paper):
     """Blocks with the table of deviations of each course."""
-    rows = course_rows(paper.found)
+    rows = course_rows(paper.record)
     if all(value is None for row in rows for key, value in row.items() if key != "course"):
         return []
     text = paper.word("texts.courses")
@@ -103,7 +103,7 @@ def welds(paper):
 
     The list is empty if no gap is determined, because the remarks on the checks state the reason.
     """
-    inspection = paper.found
+    inspection = paper.record
     if all(gap["gap_mm"] is None for gap in inspection["gaps"]):
         return []
     rows = [row for kind in KINDS for row in select_largest_gaps(inspection, kind)]
@@ -125,12 +125,12 @@ def welds(paper):
 
 def draw_departures(paper):
     """Draw the unrolled wall with its deviations, and joints at the heights of horizontal welds."""
-    wall = paper.found["generatrices"]
+    wall = paper.record["generatrices"]
     order = np.argsort(np.array(wall["azimuth_deg"]) % 360)
     azimuth = (np.array(wall["azimuth_deg"]) % 360)[order]
     departure = np.array(wall["departure_mm"])[:, order]
     height = np.array(wall["height_m"])
-    joints = sorted({gap["height_m"] for gap in paper.found["gaps"] if gap["kind"] == "banding"})
+    joints = sorted({gap["height_m"] for gap in paper.record["gaps"] if gap["kind"] == "banding"})
     joints = [joint for joint in joints if height[0] < joint < height[-1]]
     places = np.meshgrid(azimuth, height)
     closed = np.concatenate([azimuth[-1:] - 360, azimuth, azimuth[:1] + 360])
@@ -169,7 +169,7 @@ def choose_enlargement(inspection):
 @styled
 def draw_levels(paper):
     """Draw levels about the circle of the nominal radius, enlarged, with U and limits."""
-    inspection = paper.found
+    inspection = paper.record
     shown = select_levels(inspection)
     factor = choose_enlargement(inspection)
     across = min(3, len(shown))
@@ -200,7 +200,7 @@ def _draw_level(paper, ax, level, factor):
     ax.plot(*_polar_curve(circle, 0 * circle), color=FAINT, linewidth=0.6)
     ax.plot(*_polar_curve(turn, departure), color=INK, linewidth=0.9)
     ax.plot(*_polar_curve(turn, departure)[:, :-1], ".", color=INK, markersize=2.4)
-    limit = limit_of_level(paper.found, level)
+    limit = limit_of_level(paper.record, level)
     lines = [
         paper.word("texts.course", course=level["course"]),
         paper.number(level["height_m"], "m", decimals=2),
@@ -230,13 +230,13 @@ def _polar_curve(azimuth, departure):
 @styled
 def draw_welds(paper):
     """Draw profiles of the boards with the largest gaps: a row of panels for each kind of weld."""
-    rows = {kind: select_profiles(paper.found, kind) for kind in ("peaking", "banding")}
+    rows = {kind: select_profiles(paper.record, kind) for kind in ("peaking", "banding")}
     rows = {kind: gaps for kind, gaps in rows.items() if gaps}
     across = max(map(len, rows.values()))
     figure = Figure(figsize=(WIDTH, 1.85 * len(rows) + 0.25))
     axes = figure.subplots(len(rows), across, squeeze=False, sharex=True)
     for number, (kind, gaps) in enumerate(rows.items()):
-        limit = limit_mm(paper.found, kind)
+        limit = limit_mm(paper.record, kind)
         for place, ax in enumerate(axes[number]):
             ax.axis("on" if place < len(gaps) else "off")
             if place < len(gaps):

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tankcal import record as records
-from tankcal import report
 from tankcal.errors import CellError, InputError, Problem, TankcalError, VocabularyError
 from tankcal.job.tables import COVARIANCE_FILE
 from tankcal.memory import without_collection, without_looking_back
@@ -15,7 +14,10 @@ from tankcal.messages import message
 from tankcal.record import long_tables, manifest
 from tankcal.report import dcc, folders
 from tankcal.report.attachments import sha256
+from tankcal.report.letterhead import LETTERHEAD_FILE
 from tankcal.report.outputs import tables
+from tankcal.report.papers import FILES as PAPER_FILES
+from tankcal.report.papers import build
 from tankcal.text.languages import LANGUAGES
 
 if TYPE_CHECKING:
@@ -26,7 +28,7 @@ RECORD = "record.json"
 WORKBOOKS = ("capacity.xlsx", "adjustment.xlsx")
 FILES = (
     *(RECORD, long_tables.FILE, *tables.FILES, *WORKBOOKS, dcc.FILE),
-    *(*report.FILES, report.LETTERHEAD, manifest.FILE),
+    *(*PAPER_FILES, LETTERHEAD_FILE, manifest.FILE),
 )
 
 
@@ -178,7 +180,7 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
     """Write all files; prepare(folder) writes the record into a folder and returns it."""
     refuse_foreign(directory)
     progress = progress or (lambda text, done, total: None)
-    with folders.replaced(directory, language) as temporary:
+    with folders.replace_folder(directory, language) as temporary:
         progress(message("writing_record", "writing the record and the tables"), 0, 1)
         with without_collection():
             record = prepare(temporary)
@@ -191,9 +193,7 @@ def _write(prepare, directory, progress, language=None, letterhead=None, papers=
 
 def _write_papers(record, folder, progress, language, letterhead):
     """Write workbook, digital certificate, notebook, PDFs and web page beside the record."""
-    from tankcal.report import (
-        workbook,  # import takes a second; not needed for record and tables
-    )
+    from tankcal.report import workbook  # takes a second; record and tables do not need it
 
     progress(message("writing_workbook", "writing the workbook"), 0, 1)
     tank_file, survey_file = WORKBOOKS
@@ -203,7 +203,7 @@ def _write_papers(record, folder, progress, language, letterhead):
         workbook.write(record, folder / name, language, digest)
         if record["capacity"]:
             (folder / dcc.FILE).write_bytes(dcc.certificate_xml(record, digest, language))
-    report.build(
+    build(
         folder / RECORD,
         folder,
         lambda done, total: progress(message("writing_report", "writing the report"), done, total),

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.job.covariance import MAX_POINTS
+from tankcal.methods.base import methods
 from tankcal.record.columns import count_rows
 from tankcal.report.outputs.csv_files import write_table
 from tankcal.report.tables import (
@@ -23,7 +24,7 @@ FILES = (
     "points_cov.npz",
     "sections.csv",
     "strapping.csv",
-    "great_circles.csv",
+    *(file for method in methods() for file in method.csv_files),
     "offsets.csv",
     "liquid_steps.csv",
     "capacity.csv",
@@ -43,8 +44,9 @@ def write_tables(record, directory):
     }
     if record.get("strapping"):
         tables["strapping"] = strapping.straps_of(record), None
-    if record.get("great_circles"):
-        tables["great_circles"] = strapping.CIRCLES, None
+    for method in methods():
+        if record.get(method.name):
+            tables |= {name: (table, None) for name, table in method.csv_tables().items()}
     if record.get("lines"):
         tables["offsets"] = lines.OFFSETS, None
     if record.get("liquid"):

@@ -65,7 +65,7 @@ def write(
     """
     refuse_foreign(directory)
     progress = progress or (lambda text: None)
-    with folders.replaced(directory, language) as temporary:
+    with folders.replace_folder(directory, language) as temporary:
         paper_class = _paper_class(prediction)
         paper = paper_class(prediction, language, effects, design, simulated)
         _write(paper, temporary, progress, workbook)

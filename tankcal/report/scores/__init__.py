@@ -51,7 +51,7 @@ def write_scores(scores, out, language=None, progress=None):
     progress = progress or (lambda text: None)
     plain = scores if isinstance(scores, dict) else to_plain(scores)
     paper = ScoresPaper(plain, language)
-    with folders.replaced(out) as temporary:
+    with folders.replace_folder(out) as temporary:
         progress(message("ic_papers", "writing scores, page and workbook"))
         save(paper.saved, temporary / FILE)
         _write_workbook(paper, temporary / WORKBOOK)
@@ -63,20 +63,20 @@ def write_scores(scores, out, language=None, progress=None):
 def _write_workbook(paper, path):
     """Write the workbook of a ScoresPaper; equal scores give equal bytes."""
     from tankcal.report.scores.tables import METHODS_SHEET, PARTICIPANTS, ROWS, TABLES
-    from tankcal.report.workbook.book import Book, about_saved
-    from tankcal.report.workbook.tables import table_sheet
+    from tankcal.report.workbook.book import workbook_head
+    from tankcal.report.workbook.sections import SheetContent, cell_table, write_workbook
 
-    scores = paper.found
-    about = about_saved(
+    def sheets(book):
+        for code, table in (
+            ("scored_methods", METHODS_SHEET),
+            ("scored_tables", TABLES),
+            ("scored_rows", ROWS),
+            ("scored_participants", PARTICIPANTS),
+        ):
+            yield SheetContent(code, [cell_table(book, table)], tab="result", is_filtered=True)
+
+    scores = paper.record
+    head = workbook_head(
         scores["tankcal"], source=paper.subject(), date=paper.date(), notice=scores["notice"]
     )
-    sheets = {
-        "methods": METHODS_SHEET,
-        "tables": TABLES,
-        "rows": ROWS,
-        "participants": PARTICIPANTS,
-    }
-    with Book(path, about, paper.words, about="scores") as book:
-        book.paper = paper
-        for code, table in sheets.items():
-            table_sheet(book, f"scored_{code}", table, table.rows(scores))
+    write_workbook(paper, path, "scores", head, sheets)

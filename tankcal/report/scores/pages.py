@@ -31,7 +31,7 @@ def pages(paper):
 
 def _subject(paper):
     """Blocks on the tanks, methods and participants."""
-    scores = paper.found
+    scores = paper.record
     tanks = {table["tank"] for table in scores["tables"]}
     methods = list_methods(scores)
     return [
@@ -46,7 +46,7 @@ def _subject(paper):
 
 def _scores(paper):
     """Blocks with the scores of participants and methods."""
-    scores = paper.found
+    scores = paper.record
     coverage = paper.percent(scores["coverage_probability"])
     return [
         paper.heading("scores"),
@@ -63,7 +63,7 @@ def _reading(paper):
 
 def _figures(paper):
     """Blocks with a figure of errors for each method, and Youden's plot."""
-    scores = paper.found
+    scores = paper.record
     page_blocks = [paper.heading("figures")]
     for method in list_methods(scores):
         name = paper.method(method)
@@ -80,12 +80,12 @@ def _figures(paper):
 
 def _tables(paper):
     """Blocks with the scores of each table."""
-    return [paper.heading("tables"), paper.show(TABLES, TABLES.rows(paper.found))]
+    return [paper.heading("tables"), paper.show(TABLES, TABLES.rows(paper.record))]
 
 
 def _warnings(paper):
     """Blocks with the warnings about answers."""
-    sentences = [paper.warning(warning) for warning in paper.found["warnings"]]
+    sentences = [paper.warning(warning) for warning in paper.record["warnings"]]
     return [paper.heading("warnings"), blocks.listing(sentences)] if sentences else []
 
 
@@ -100,7 +100,7 @@ def list_methods(scores):
 @styled
 def draw_errors(paper, method):
     """Draw errors, ppm of the capacity, along the height: a panel for each tank."""
-    scores = paper.found
+    scores = paper.record
     tables = [table for table in scores["tables"] if table["method"] == method]
     tanks = list(dict.fromkeys(table["tank"] for table in tables))[:MOST_PANELS]
     down = ceil(len(tanks) / ACROSS)
@@ -138,7 +138,7 @@ def _draw_line(ax, paper, table):
 @styled
 def draw_youden(paper, first, second):
     """Draw errors at the top of two tanks; common errors of both lie on the diagonal."""
-    scores = paper.found
+    scores = paper.record
     tops = {
         (row["participant"], row["method"], row["tank"]): row["top_error_ppm"]
         for row in scores["tables"]

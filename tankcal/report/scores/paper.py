@@ -28,16 +28,17 @@ class ScoresPaper(SavedPaper):
     def __init__(self, scores, language=None):
         super().__init__(words_with_part(load_words(language or DEFAULT), "scores"))
         self.saved = SCORES.migrated(scores, SCORES.file)
-        self.found = {**self.saved, "notice": ""}
+        self.record = {**self.saved, "notice": ""}
 
     def subject(self):
         """Name of the package: the first digits of the SHA-256 of its truth."""
-        return self.word("texts.package", digest=self.found["truth_sha256"][:12])
+        return self.word("texts.package", digest=self.record["truth_sha256"][:12])
 
     def date(self):
         """Latest date of the answers, ISO; "" without a date."""
         return max(
-            (iso_day(participant["date"]) for participant in self.found["participants"]), default=""
+            (iso_day(participant["date"]) for participant in self.record["participants"]),
+            default="",
         )
 
     def participant(self, row):
@@ -45,7 +46,7 @@ class ScoresPaper(SavedPaper):
         names = [
             f"{entry['name']} {entry['version']}" if entry["name"] == entry["software"] else
             f"{entry['name']} ({entry['software']} {entry['version']})"
-            for entry in self.found["participants"]
+            for entry in self.record["participants"]
         ]  # fmt: skip
         name = names[row["participant"]]
         if names.count(name) > 1:

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from tankcal.report.tables import hits
+from tankcal.report.tables import sights
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.digits import LITRE_DECIMALS
 
@@ -99,7 +99,7 @@ SCANNERS = Table(
 )
 
 SHARED = replace(
-    hits.SHARED.but(
+    sights.SHARED.but(
         instrument={"heading": "cloud_scanner", "sheet": True},
         what={"heading": "cloud_what_shared", "sheet": True},
     ),

@@ -7,7 +7,7 @@ the facts.
 
 from tankcal.report.dip_point import dip_point_text
 from tankcal.report.metered_liquid import metered_liquid_text
-from tankcal.report.radii_source import source_text
+from tankcal.report.radii import radii_source_text
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.words import method_line
 
@@ -143,7 +143,7 @@ REFERENCES = Table(
 
 def _radii(paper, row):
     """Return the source of former radii, or None."""
-    return source_text(paper) if paper.record.get("radii") else None
+    return radii_source_text(paper) if paper.record.get("radii") else None
 
 
 def _survey(record):

@@ -6,28 +6,20 @@ The package computes no results. The cells contain values of the record, possibl
 
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
-from tankcal.report.workbook.capacity import capacity_sheet
+from tankcal.report.workbook.capacity import (
+    capacity_sheet,
+    densities_sheet,
+    millimetres_sheet,
+    proportional_parts_sheet,
+)
 from tankcal.report.workbook.certificate import certificate_sheet
 from tankcal.report.workbook.charts import charts_sheets
 from tankcal.report.workbook.papers import (
-    clouds_sheet,
     corrections_sheet,
-    courses_sheet,
-    great_circles_sheet,
-    hits_sheet,
-    lines_sheet,
-    liquid_sheet,
-    provenance_sheet,
-    radii_sheet,
-    ship_sheet,
-    strapping_sheet,
-    tangents_sheet,
-)
-from tankcal.report.workbook.parts import (
-    densities_sheet,
     inside_sheet,
-    millimetres_sheet,
-    proportional_parts_sheet,
+    provenance_sheet,
+    ship_sheet,
+    tables_sheets,
 )
 from tankcal.report.workbook.survey import (
     adjustment_sheet,
@@ -48,17 +40,6 @@ _HIDDEN = (
     *("capacity_mm", "workings", "covariance_factor", "monte_carlo", "points", "adjusted_points"),
     *("observations", "deviations", "liquid_steps"),
 )
-_SHEETS_OF_SURVEYS = {  # sheets of each survey method, by the key of the record
-    "strapping": strapping_sheet,
-    "great_circles": great_circles_sheet,
-    "lines": lines_sheet,
-    "hits": hits_sheet,
-    "tangents": tangents_sheet,
-    "clouds": clouds_sheet,
-    "liquid": liquid_sheet,
-    "radii": radii_sheet,
-    "ship": ship_sheet,
-}
 
 
 def write(record, path, language=None, digest=None):
@@ -104,11 +85,9 @@ def _sheets_of_tank(book, record):
     millimetres_sheet(book, record)
     calculator_sheets(book, record)
     factor_sheet(book, record)
-    if record["courses"]:
-        courses_sheet(book, record)
-    for key, sheet_of in _SHEETS_OF_SURVEYS.items():
-        if record.get(key):
-            sheet_of(book, record)
+    tables_sheets(book, record)
+    if record.get("ship"):
+        ship_sheet(book, record)
     corrections_sheet(book, record)
     inside_sheet(book, record)
     budget_sheet(book, record)

@@ -39,7 +39,7 @@ def header_text(text):
     return " ".join(str(text).split())[:50].replace("&", "&&")
 
 
-def about_saved(version, *, tank=None, source="", date=None, notice="", laboratory=""):
+def workbook_head(version, *, tank=None, source="", date=None, notice="", laboratory=""):
     """Return the part of a record that a Book requires, for a saved file other than a record.
 
     Parameters
@@ -79,7 +79,7 @@ class Book(Writer):
     path : str or Path
         Path of the workbook.
     record : dict
-        Record, or the result of `about_saved`.
+        Record, or the result of `workbook_head`.
     words : dict
         Words of the language.
     about : str, optional
@@ -229,14 +229,13 @@ class Book(Writer):
             else repeat(column.digits, len(column.cells))
             for column in columns
         )
-        looks = cache(lambda shown: tuple(map(self._number_look, shown)))
+        looks = cache(
+            lambda shown: tuple(self.format(num_format=number_format(places)) for places in shown)
+        )
         cells = zip(*(column.cells for column in columns), strict=True)
         rows = zip(cells, map(looks, zip(*digits, strict=True)), strict=True)
         sheet.write_number_rows(1, (NumberRow(*row) for row in rows))
         return sheet
-
-    def _number_look(self, digits):
-        return self.format(num_format=number_format(digits))
 
     def _page(self, code, landscape, tab):
         """Add a protected sheet with page set-up, header and footer."""

@@ -1,5 +1,7 @@
 """The sheet Certificate: tank, main result, and assumptions."""
 
+from functools import partial
+
 from tankcal.report.certificate import doubts_of
 from tankcal.report.numbers import unit
 from tankcal.report.tables import overrulings
@@ -7,6 +9,13 @@ from tankcal.report.tables.facts import REFERENCES, SURVEY, SURVEY_DATE, tank_fa
 from tankcal.report.uncertainty import method, rule
 from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
 from tankcal.report.workbook.look import ACCENT, DATE, LINE_PT, MUTED, lines_of, number_format
+from tankcal.report.workbook.sections import (
+    DrawnPart,
+    Facts,
+    Sentences,
+    SheetContent,
+    write_sheet,
+)
 from tankcal.text.digits import decimals_of, decimals_of_height
 from tankcal.text.words import choice_sentence, sentence
 
@@ -17,30 +26,42 @@ _DATES = ("date", "date_of_issue")  # keys of the job with dates
 
 def certificate_sheet(book, record):
     """Write the first sheet of the workbook."""
-    words = book.words
-    sheet = book.sheet("certificate", tab="result")
-    book.widths(sheet, *_WIDTHS)
-    row = 3
-    if book.notice:
-        look = {"bold": True, "font_size": 14, "align": "center", "valign": "vcenter", "border": 2}
-        book.paragraph(sheet, row, book.notice, _WIDTHS, border_color=ACCENT, **look)
-        sheet.set_row(row, 26)
-        row += 2
-    row = _result(book, sheet, row, record)
-    row = _doubts(book, sheet, row, record)
-    row = _entries(
-        book, sheet, row, sentence(words, "headings", "tank"), _declared(book, tank_facts(record))
-    )
-    row = _entries(book, sheet, row, book.word("headings.certificate"), _certificate(record, words))
-    row = _entries(
-        book, sheet, row, book.word("headings.survey"),
-        _declared(book, SURVEY_DATE, SURVEY, REFERENCES),
-    )  # fmt: skip
-    row = _uncertainty(book, sheet, row, book.paper)
-    row = _corrections(book, sheet, row, record)
-    row = _overrulings(book, sheet, row)
-    row = _choices(book, sheet, row, record)
-    _authorisation(book, sheet, row)
+    words, paper = book.words, book.paper
+    rules = ()
+    if record.get("rule"):
+        facts = _facts(paper, paper.word("headings.rule"), rule.facts)
+        rules = ((facts, Sentences(rule.sentences(paper))),)
+    choices = [choice_sentence(words, choice) for choice in record["choices"]]
+    sections = [
+        *([DrawnPart(_draw_notice)] if book.notice else []),
+        DrawnPart(partial(_draw_result, record), sentence(words, "headings", "result")),
+        Sentences(
+            doubts_of(record["warnings"]),
+            title=words["certificate"]["doubtful"],
+            look={"bold": True, "font_color": ACCENT},
+        ),
+        Facts(
+            _declared(book, tank_facts(record)), sentence(words, "headings", "tank"), longest=_LONG
+        ),
+        Facts(_certificate(record, words), book.word("headings.certificate"), longest=_LONG),
+        Facts(
+            _declared(book, SURVEY_DATE, SURVEY, REFERENCES),
+            book.word("headings.survey"),
+            longest=_LONG,
+        ),
+        Sentences(
+            method.sentences(paper, f'"{paper.word("intervals.monte_carlo")}"'),
+            title=paper.word("headings.uncertainty"),
+        ),
+        _facts(paper, paper.word("headings.inputs"), method.inputs),
+        *rules,
+        DrawnPart(partial(_draw_corrections, record), sentence(words, "headings", "corrections")),
+        Sentences(overrulings.sentences(paper), title=paper.word("headings.overrulings")),
+        Sentences(choices, title=sentence(words, "headings", "choices")),
+        DrawnPart(_draw_authorisation, sentence(words, "headings", "authorisation")),
+    ]
+    content = SheetContent("certificate", sections, landscape=False, tab="result", widths=_WIDTHS)
+    write_sheet(book, content)
 
 
 def _label(words, key):
@@ -77,65 +98,37 @@ def _format(column):
     return None if column.is_text else number_format(column.decimals, unit=unit(column.unit).symbol)
 
 
-def _entries(book, sheet, row, title, lines):
-    """Write a heading and a line for each (label, value, format); return the next row."""
-    if not lines:
-        return row
-    book.heading(sheet, row, title, len(_WIDTHS))
-    for label, value, shown in lines:
-        row += 1
-        if shown == DATE:
-            book.put_date(sheet, row, 1, value, align="left")
-        elif len(str(value)) > _LONG:
-            book.paragraph_in(sheet, row, 1, str(value), _WIDTHS[1:])
-        else:
-            look = {"num_format": shown} if shown else {}
-            book.put(sheet, row, 1, value, align="left", valign="top", **look)
-        book.label(sheet, row, label, _WIDTHS[0])
-    return row + 2
+def _facts(paper, title, facts_of):
+    """Return the `Facts` for the non-empty texts of facts_of(paper)."""
+    lines = [(paper.label(key), text, None) for key, text in facts_of(paper) if text]
+    return Facts(lines, title, longest=_LONG)
 
 
-def _uncertainty(book, sheet, row, paper):
-    """Write method and inputs of U, and the verdict of a decision rule; return the next row."""
-    book.heading(sheet, row, paper.word("headings.uncertainty"), len(_WIDTHS))
-    for text in method.sentences(paper, f'"{paper.word("intervals.monte_carlo")}"'):
-        row += 1
-        book.paragraph(sheet, row, text, _WIDTHS)
-    row = _entries(
-        book, sheet, row + 2, paper.word("headings.inputs"), _facts(paper, method.inputs)
-    )
-    if not paper.record.get("rule"):
-        return row
-    row = _entries(book, sheet, row, paper.word("headings.rule"), _facts(paper, rule.facts)) - 1
-    for text in rule.sentences(paper):
-        book.paragraph(sheet, row, text, _WIDTHS)
-        row += 1
+def _draw_notice(book, sheet, row):
+    """Write the notice of the certificate in a frame; return the next row."""
+    look = {"bold": True, "font_size": 14, "align": "center", "valign": "vcenter", "border": 2}
+    book.paragraph(sheet, row, book.notice, _WIDTHS, border_color=ACCENT, **look)
+    sheet.set_row(row, 26)
     return row + 1
 
 
-def _facts(paper, facts_of):
-    """Return (label, text, None) for the non-empty texts of facts_of(paper)."""
-    return [(paper.label(key), text, None) for key, text in facts_of(paper) if text]
-
-
-def _result(book, sheet, row, record):
+def _draw_result(record, book, sheet, row):
     """Write the capacity at the top of the table with U and k; return the next row."""
     capacity, words = record["capacity"], book.words
     U, k = stated_U_m3(capacity)[-1], k_of_rows(capacity)[-1]
     factor, symbol = book.paper.volume_factor, book.paper.volume_symbol
     volume_format = number_format(decimals_of(factor * U), unit=symbol)
     top = number_format(decimals_of_height(capacity["height_m"][-1]), unit="m")
-    book.heading(sheet, row, sentence(words, "headings", "result"), len(_WIDTHS))
     lines = []
     for column, code in enumerate(("volume", "U", "k", "dip_height"), 1):
         text = book.word(f"labels.{code}")
         look = {"align": "right", "text_wrap": True, "font_color": MUTED}
-        book.put(sheet, row + 1, column, text, **look)
+        book.put(sheet, row, column, text, **look)
         lines.append(lines_of(text, _WIDTHS[column]))
-    book.set_height(sheet, row + 1, LINE_PT * max(lines))
+    book.set_height(sheet, row, LINE_PT * max(lines))
     line = {"bold": True, "font_size": 12}
-    sheet.set_row(row + 2, 20)
-    book.put(sheet, row + 2, 0, book.word("labels.top_of_table"), **line)
+    sheet.set_row(row + 1, 20)
+    book.put(sheet, row + 1, 0, book.word("labels.top_of_table"), **line)
     k = words["intervals"]["monte_carlo"] if k is None else k
     for column, value, shown in (
         (1, factor * capacity["volume_m3"][-1], volume_format),
@@ -143,70 +136,33 @@ def _result(book, sheet, row, record):
         (3, k, '"k = "0.00'),
         (4, capacity["height_m"][-1], top),
     ):
-        book.put(sheet, row + 2, column, value, num_format=shown, align="right", **line)
-    return row + 4
-
-
-def _doubts(book, sheet, row, record):
-    """Write the warnings of implausible input; return the next row."""
-    lines = doubts_of(record["warnings"])
-    if not lines:
-        return row
-    book.heading(sheet, row, book.words["certificate"]["doubtful"], len(_WIDTHS))
-    for text in lines:
-        row += 1
-        book.paragraph(sheet, row, text, _WIDTHS, bold=True, font_color=ACCENT)
+        book.put(sheet, row + 1, column, value, num_format=shown, align="right", **line)
     return row + 2
 
 
-def _corrections(book, sheet, row, record):
+def _draw_corrections(record, book, sheet, row):
     """Write the applied corrections with their sizes; return the next row."""
     words = book.words
-    book.heading(sheet, row, sentence(words, "headings", "corrections"), len(_WIDTHS))
     applied = [correction for correction in record["corrections"] if correction["applied"]]
     factor, symbol = book.paper.volume_factor, book.paper.volume_symbol
     decimals = decimals_of(factor * stated_U_m3(record["capacity"])[-1]) + 1
     volume_format = number_format(decimals, unit=symbol)
     for correction in applied:
-        row += 1
         book.put(sheet, row, 0, sentence(words, "corrections", correction["code"]))
         book.put(sheet, row, 1, factor * correction["size_m3"], num_format=volume_format)
         book.put(sheet, row, 2, correction["size_percent"], num_format='0.0000 "%"')
+        row += 1
     if not applied:
-        row += 1
         book.put(sheet, row, 0, sentence(words, "texts", "no_corrections"))
-    return row + 2
-
-
-def _overrulings(book, sheet, row):
-    """Write the decisions against the outlier test; return the next row."""
-    texts = overrulings.sentences(book.paper)
-    if not texts:
-        return row
-    book.heading(sheet, row, book.paper.word("headings.overrulings"), len(_WIDTHS))
-    for text in texts:
         row += 1
-        book.paragraph(sheet, row, text, _WIDTHS)
-    return row + 2
+    return row
 
 
-def _choices(book, sheet, row, record):
-    """Write the assumptions; return the next row."""
-    words = book.words
-    book.heading(sheet, row, sentence(words, "headings", "choices"), len(_WIDTHS))
-    for choice in record["choices"]:
-        row += 1
-        text = choice_sentence(words, choice)
-        book.paragraph(sheet, row, text, _WIDTHS)
-    return row + 2
-
-
-def _authorisation(book, sheet, row):
-    """Write blank lines for name, signature, place and date."""
-    words = book.words
-    book.heading(sheet, row, sentence(words, "headings", "authorisation"), len(_WIDTHS))
+def _draw_authorisation(book, sheet, row):
+    """Write blank lines for name, signature, place and date; return the next row."""
     line = book.format(bottom=1)
-    for below, key in ((2, "authorised_by"), (4, "signature"), (6, "place_and_date")):
-        book.put(sheet, row + below, 0, _label(words, key))
+    for below, key in ((1, "authorised_by"), (3, "signature"), (5, "place_and_date")):
+        book.put(sheet, row + below, 0, _label(book.words, key))
         for column in (1, 2):
             sheet.write_blank(row + below, column, None, line)
+    return row + 6

@@ -5,9 +5,8 @@ from math import floor, log10
 
 from tankcal.report.tables.tank import DEVIATIONS
 from tankcal.report.workbook.look import ACCENT
-from tankcal.report.workbook.tables import columns_of, set_widths
+from tankcal.report.workbook.sections import HEAD_ROW, SheetContent, cell_table, write_sheet
 
-_HEAD_ROW = 3  # row of the first headings, from 0
 _MOST_POINTS = 20_000  # largest number of points in the sheet Deviations
 _WIDE, _HIGH, _LOW = 640, 415, 300  # pixels; width, heights of two or three charts per page
 _PT = 0.75  # points per pixel
@@ -28,7 +27,7 @@ def charts_sheets(book, record, rows):
         Position of the capacity table.
     """
     sheet = book.sheet("charts", tab="paper")
-    row = _HEAD_ROW
+    row = HEAD_ROW
     for name, axis in (("litres_per_cm", "litres_per_cm"), ("U", "U_m3")):
         row = _insert(book, sheet, row, _curve(book, rows, name, axis), _HIGH)
     points = _points_of_sections(record) or _points_of_solid(record)
@@ -85,16 +84,14 @@ def _deviations_sheet(book, rows):
     every = -(-len(rows) // _MOST_POINTS)
     shown = rows[::every]
     subtitle = book.word("texts.deviations_subtitle", shown=len(shown), all=len(rows))
-    sheet = book.sheet("deviations", subtitle, tab="paper")
-    columns = columns_of(book, DEVIATIONS, shown)
-    set_widths(book, sheet, columns)
-    book.table(sheet, _HEAD_ROW, "radial_deviations", columns)
-    book.freeze(sheet, _HEAD_ROW, 1)
-    name, last = sheet.get_name(), len(columns) - 1
+    table = cell_table(book, DEVIATIONS, shown, name="radial_deviations")
+    sheet, _ = write_sheet(book, SheetContent("deviations", [table], subtitle, landscape=False))
+    book.freeze(sheet, HEAD_ROW, 1)
+    name, last = sheet.get_name(), len(table.columns) - 1
     if "section" not in shown[0]:
         title = book.word("charts.deviations_solid")
-        end = _HEAD_ROW + len(shown)
-        places = [[name, _HEAD_ROW + 1, column, end, column] for column in (last - 1, last)]
+        end = HEAD_ROW + len(shown)
+        places = [[name, HEAD_ROW + 1, column, end, column] for column in (last - 1, last)]
         return [(title, "height", [(title, *places)])]
     return [
         (book.word("charts.deviations", course=course), "azimuth", series)
@@ -130,7 +127,7 @@ def _points_of_solid(record):
 
 def _series_of_courses(book, name, rows, last):
     """Return (course, [(name, x cells, y cells) of each section]) from the bottom up."""
-    row, courses = _HEAD_ROW, {}
+    row, courses = HEAD_ROW, {}
     for (course, section), group in groupby(
         rows, key=lambda point: (point["course"], point["section"])
     ):

@@ -1,154 +1,130 @@
-"""Sheets of the working papers: courses, surveys, corrections, and provenance."""
+"""Sheets of the working papers: courses, surveys, ship, corrections, tank, and provenance."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tankcal.methods.base import methods
+from tankcal.report.numbers import unit
+from tankcal.report.paper import DECIMALS_OF_PARTS
 from tankcal.report.tables import (
     clouds,
-    hits,
     lines,
     liquid,
     ship,
     strapping,
-    tangents,
     tank,
 )
 from tankcal.report.workbook.look import Column, number_format
-from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
+from tankcal.report.workbook.sections import (
+    HEAD_ROW,
+    CellTable,
+    SheetContent,
+    cell_table,
+    write_sheet,
+)
+from tankcal.report.workbook.tables import columns_of
 from tankcal.text.digits import decimals_of
 
-_HEAD_ROW = 3  # row of the first headings, from 0
+_INSIDE_WIDTHS = (50, 16, 16, 16, 16)  # widths of the columns of the sheet inside, letters
 
 
-def courses_sheet(book, record):
-    """Write the courses from the bottom up and their horizontal sections."""
-    sheet = book.sheet("courses", book.word("texts.courses_subtitle"), landscape=True)
-    tables = [(book.word("headings.courses"), "courses", columns_of(book, tank.COURSES))]
-    if record["sections"]:
-        tables += [
-            (book.word("headings.sections"), "sections", columns_of(book, tank.SECTIONS)),
-            *(
-                (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
-                for table in (tank.HOMOGENEITY, tank.SECTION_NOISE)
-                if record.get("homogeneity")
-            ),
-            (book.word("headings.modes"), "modes", columns_of(book, tank.modes_table(record))),
-            (book.word("headings.shell"), "shell", columns_of(book, tank.SHELL)),
+@dataclass(frozen=True)
+class TablesSheet:
+    """Sheet of tables of the record, each under its heading [workbook.headings].<name>.
+
+    Attributes
+    ----------
+    key : str
+        Key of the record whose content the sheet requires.
+    tables : tuple of Table, or callable
+        Tables in order, or tables(record) that returns them.
+    omits_empty : bool
+        True: tables without rows are omitted; False: a text takes their place.
+    """
+
+    key: str
+    tables: tuple | Callable
+    omits_empty: bool = False
+
+
+def _course_tables(record):
+    if not record["sections"]:
+        return (tank.COURSES,)
+    noise = (tank.HOMOGENEITY, tank.SECTION_NOISE) if record.get("homogeneity") else ()
+    return (tank.COURSES, tank.SECTIONS, *noise, tank.modes_table(record), tank.SHELL)
+
+
+def _strapping_tables(record):
+    return (
+        strapping.straps_of(record),
+        strapping.strapped_courses_of(record),
+        strapping.TAPES,
+    )
+
+
+# Sheets by code. The subtitle is the word [workbook.texts].<code>_subtitle.
+TABLES_SHEETS = {
+    "courses": TablesSheet("courses", _course_tables),
+    "strapping": TablesSheet("strapping", _strapping_tables),
+    "lines": TablesSheet("lines", (lines.LEVELS, lines.PLUMMETS, lines.LINES, lines.OFFSETS)),
+    "clouds": TablesSheet("clouds", clouds.TABLES, omits_empty=True),
+    "liquid": TablesSheet(
+        "liquid", (liquid.METERS, liquid.RUNS, liquid.SIZES, liquid.CAUSES), omits_empty=True
+    ),
+    "liquid_steps": TablesSheet(
+        "liquid",
+        lambda record: (liquid.STEPS, liquid.DIPS, liquid.volumes_table(record)),
+        omits_empty=True,
+    ),
+    "radii": TablesSheet("radii", (tank.RADII,)),
+}
+
+
+_BEFORE_METHODS = "lines"  # the sheets of the methods follow this sheet
+
+
+def tables_sheets(book, record):
+    """Write the sheets of TABLES_SHEETS and of the methods whose content the record has."""
+    for code, declared in TABLES_SHEETS.items():
+        if record.get(declared.key):
+            _tables_sheet(book, record, code, declared)
+        if code == _BEFORE_METHODS:
+            for method in methods():
+                if record.get(method.name):
+                    _method_sheets(book, record, method)
+
+
+def _method_sheets(book, record, method):
+    """Write the sheets of a method of `tankcal.methods`."""
+    for code, subtitle, tables in method.sheets(record):
+        sections = [
+            cell_table(book, table, name=name, title=book.word(f"headings.{name}"))
+            for name, table in tables
         ]
-    write_tables(book, sheet, _HEAD_ROW, tables)
+        write_sheet(book, SheetContent(code, sections, book.word(f"texts.{subtitle}")))
 
 
-def strapping_sheet(book, record):
-    """Write the tape readings with their corrections, the tapes, and the courses."""
-    sheet = book.sheet("strapping", book.word("texts.strapping_subtitle"), landscape=True)
-    tables = [
-        (book.word("headings.straps"), "straps", columns_of(book, strapping.straps_of(record))),
-        (book.word("headings.strapped_courses"), "strapped_courses",
-         columns_of(book, strapping.strapped_courses_of(record))),
-        (book.word("headings.tapes"), "tapes", columns_of(book, strapping.TAPES)),
-    ]  # fmt: skip
-    write_tables(book, sheet, _HEAD_ROW, tables)
-
-
-def great_circles_sheet(book, record):
-    """Write the tape readings of a sphere with their corrections, and the tapes."""
-    sheet = book.sheet("great_circles", book.word("texts.circles_subtitle"), landscape=True)
-    tables = [
-        (book.word("headings.great_circles"), "great_circles",
-         columns_of(book, strapping.CIRCLES)),
-        (book.word("headings.tapes"), "tapes", columns_of(book, strapping.TAPES_OF_SPHERE)),
-    ]  # fmt: skip
-    write_tables(book, sheet, _HEAD_ROW, tables)
-
-
-def lines_sheet(book, record):
-    """Write the offsets from reference lines, the lines, the levels and the plummets."""
-    sheet = book.sheet("lines", book.word("texts.lines_subtitle"), landscape=True)
-    tables = [
-        (book.word("headings.levels"), "levels", columns_of(book, lines.LEVELS)),
-        (book.word("headings.plummets"), "plummets", columns_of(book, lines.PLUMMETS)),
-        (book.word("headings.lines"), "lines", columns_of(book, lines.LINES)),
-        (book.word("headings.offsets"), "offsets", columns_of(book, lines.OFFSETS)),
+def _tables_sheet(book, record, code, declared):
+    tables = declared.tables(record) if callable(declared.tables) else declared.tables
+    sections = [
+        cell_table(book, table, title=book.word(f"headings.{table.name}"))
+        for table in tables
+        if not declared.omits_empty or table.rows(record)
     ]
-    write_tables(book, sheet, _HEAD_ROW, tables)
-
-
-def hits_sheet(book, record):
-    """Write set-ups, common errors, rings, control targets and incidence of wall hits."""
-    sheet = book.sheet("hits", book.word("texts.hits_subtitle"), landscape=True)
-    chosen = [
-        table
-        for table in (
-            hits.SETUPS,
-            hits.SHARED,
-            hits.RINGS,
-            hits.CONTROL,
-            hits.DRIFTS,
-            hits.COMPARED,
-            hits.INCIDENCE,
-        )
-        if table.rows(record)
-    ]
-    tables = [
-        (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
-        for table in chosen
-    ]
-    write_tables(book, sheet, _HEAD_ROW, tables)
-
-
-def tangents_sheet(book, record):
-    """Write the set-ups of tangents, the levels with perimeter and area, and all sights."""
-    sheet = book.sheet("tangents", book.word("texts.tangents_subtitle"), landscape=True)
-    tables = [
-        (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
-        for table in (tangents.SETUPS, tangents.LEVELS, tangents.READINGS)
-    ]
-    write_tables(book, sheet, _HEAD_ROW, tables)
-
-
-def clouds_sheet(book, record):
-    """Write files, scans, common errors, targets and obstructions of point clouds."""
-    sheet = book.sheet("clouds", book.word("texts.clouds_subtitle"), landscape=True)
-    tables = [
-        (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
-        for table in clouds.TABLES
-        if table.rows(record)
-    ]
-    write_tables(book, sheet, _HEAD_ROW, tables)
-
-
-def liquid_sheet(book, record):
-    """Write the metered runs: meters, runs, causes, steps, dips, and compared volumes."""
-    tables_by_sheet = {
-        "liquid": (liquid.METERS, liquid.RUNS, liquid.SIZES, liquid.CAUSES),
-        "liquid_steps": (liquid.STEPS, liquid.DIPS, liquid.volumes_table(record)),
-    }
-    for name, declared in tables_by_sheet.items():
-        sheet = book.sheet(name, book.word(f"texts.{name}_subtitle"), landscape=True)
-        tables = [
-            (book.word(f"headings.{table.name}"), table.name, columns_of(book, table))
-            for table in declared
-            if table.rows(record)
-        ]
-        write_tables(book, sheet, _HEAD_ROW, tables)
-
-
-def radii_sheet(book, record):
-    """Write the radii of the courses: former, measured and adopted."""
-    sheet = book.sheet("radii", book.word("texts.radii_subtitle"), landscape=True)
-    heading = book.word("headings.radii")
-    columns = columns_of(book, tank.RADII)
-    write_tables(book, sheet, _HEAD_ROW, [(heading, "radii", columns)])
+    write_sheet(book, SheetContent(code, sections, book.word(f"texts.{code}_subtitle")))
 
 
 def ship_sheet(book, record):
     """Write the corrections for trim and list: range of the pipe, and a table for each list."""
-    sheet = book.sheet("ship", book.word("texts.ship_subtitle"), landscape=True)
-    tables = [(book.word("headings.ship_cells"), "ship_cells", columns_of(book, ship.CELLS))]
+    sections = [cell_table(book, ship.CELLS, title=book.word("headings.ship_cells"))]
     for number, (list_deg, cells) in enumerate(ship.group_by_list(record), 1):
+        columns = _correction_columns(book, record, cells)
         title = book.word("texts.ship_list", list=f"{list_deg:g}")
-        tables.append((title, f"ship_list_{number}", _corrections(book, record, cells)))
-    write_tables(book, sheet, _HEAD_ROW, tables)
+        sections.append(CellTable(f"ship_list_{number}", columns, title))
+    write_sheet(book, SheetContent("ship", sections, book.word("texts.ship_subtitle")))
 
 
-def _corrections(book, record, cells):
+def _correction_columns(book, record, cells):
     """Return the columns soundings, correction (or state) at each trim, and largest U."""
     soundings, words = record["ship"]["sounding_m"], book.words["table_headings"]
     columns = [Column(f"{words['ship_sounding_m']}, m", soundings, 3, 12)]
@@ -166,34 +142,77 @@ def _corrections(book, record, cells):
 
 def corrections_sheet(book, record):
     """Write the corrections with their sizes at the top of the table."""
-    sheet = book.sheet("corrections", book.word("texts.corrections_subtitle"), landscape=True)
     digits = decimals_of(record["capacity"]["u_m3"][-1]) + 1
-    columns = columns_of(book, tank.CORRECTIONS.but(size_m3={"decimals": digits}))
-    set_widths(book, sheet, columns)
-    last = write_table(book, sheet, _HEAD_ROW, "corrections", columns)
-    shown = number_format(digits, unit="m³")
-    gross = record["gross"] and record["gross"]["volume_m3"]
+    table = cell_table(book, tank.CORRECTIONS.but(size_m3={"decimals": digits}))
+    subtitle = book.word("texts.corrections_subtitle")
+    sheet, row = write_sheet(book, SheetContent("corrections", [table], subtitle))
+    gross_m3 = record["gross"] and record["gross"]["volume_m3"]
     for below, label, value in (
-        (2, "gross_volume", gross),
-        (3, "top_row", record["capacity"]["volume_m3"][-1]),
+        (0, "gross_volume", gross_m3),
+        (1, "top_row", record["capacity"]["volume_m3"][-1]),
     ):
-        if value is None:
-            continue
-        book.put(sheet, last + below, 0, book.word(f"labels.{label}"))
-        book.put(sheet, last + below, 2, value, num_format=shown)
+        if value is not None:
+            book.put(sheet, row + below, 0, book.word(f"labels.{label}"))
+            book.put(sheet, row + below, 2, value, num_format=number_format(digits, unit="m³"))
 
 
 def provenance_sheet(book, record):
     """Write choices, warnings, input files and versions of programs."""
-    sheet = book.sheet("provenance", tab="origin")
     declared = (
         ("choices", "choices", tank.CHOICES),
         ("warnings", "warnings", tank.WARNINGS),
         ("files", "input_files", tank.FILES),
         ("programs", "programs", tank.PROGRAMS),
     )
-    tables = [
-        (book.word(f"headings.{title}"), name, columns_of(book, table))
+    sections = [
+        cell_table(book, table, name=name, title=book.word(f"headings.{title}"))
         for title, name, table in declared
     ]
-    write_tables(book, sheet, _HEAD_ROW, tables)
+    write_sheet(book, SheetContent("provenance", sections, landscape=False, tab="origin"))
+
+
+# ---- the tank
+
+
+def inside_sheet(book, record):
+    """Write the dimensions of a solid, and bottom, deadwood, top and roof."""
+    paper, corrections = book.paper, book.words["corrections"]
+    sheet = book.sheet("inside")
+    book.widths(sheet, *_INSIDE_WIDTHS)
+    row = HEAD_ROW
+    if record["solid"]:
+        row = _described(book, sheet, row, book.words["headings"]["dimensions"], record["solid"])
+    for code in ("deadwood", "bottom", "top", "roof"):
+        texts, declared = paper.choices(code), record.get(code)
+        if not (texts or declared):
+            continue
+        title = corrections[code]
+        if declared and code != "deadwood":
+            row = _described(book, sheet, row, title, declared) - 1
+        else:
+            book.heading(sheet, row, title, len(_INSIDE_WIDTHS))
+            row += 1
+        for text in texts:
+            book.paragraph(sheet, row, text, _INSIDE_WIDTHS)
+            row += 1
+        if declared and code == "deadwood":
+            row = book.table(sheet, row + 1, "deadwood", columns_of(book, tank.DEADWOOD)) + 1
+        row += 1
+
+
+def _described(book, sheet, row, title, lines):
+    """Write a heading and a line for each {code, value, unit}; return the next row."""
+    words = book.words
+    book.heading(sheet, row, title, len(_INSIDE_WIDTHS))
+    for line in lines:
+        row += 1
+        value = line["value"]
+        book.put(sheet, row, 0, words["labels"].get(line["code"], line["code"]))
+        if line["unit"] is None:
+            book.put(sheet, row, 1, words["parts"].get(value, value))
+            continue
+        shown, decimals = unit(line["unit"]), DECIMALS_OF_PARTS.get(line["unit"], 0)
+        look = {"num_format": number_format(decimals)}
+        book.put(sheet, row, 1, shown.factor * value, **look)
+        book.put(sheet, row, 2, shown.symbol, indent=1)
+    return row + 2

@@ -15,6 +15,14 @@ from tankcal.report.tables.survey import (
     point_rows,
 )
 from tankcal.report.workbook.look import number_format
+from tankcal.report.workbook.sections import (
+    HEAD_ROW,
+    Facts,
+    Sentences,
+    SheetContent,
+    cell_table,
+    write_sheet,
+)
 from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import decimals_of
 from tankcal.text.words import (
@@ -29,7 +37,6 @@ from tankcal.text.words import (
 MOST_READINGS = MOST_IN_SHEET  # largest number of readings; largest |w| first
 MOST_POINTS = MOST_IN_SHEET  # largest number of points; unused, then least precise points first
 _LEAST = (34, 12)  # smallest widths of the columns of labels and values
-_HEAD_ROW = 3  # row of the first headings, from 0
 _MOST_ASIDE = 50  # largest number of sentences on rejected points
 _MOST_LETTERS = 200  # largest number of letters of a heading with names of photographs
 
@@ -37,29 +44,30 @@ _MOST_LETTERS = 200  # largest number of letters of a heading with names of phot
 def adjustment_sheet(book, record):
     """Write statistics, groups, datum, instruments and check points of the adjustment."""
     adjustment, words = record["adjustment"], book.words
-    tables = [
-        ("adjusted_groups", "groups", columns_of(book, GROUPS)),
-        ("adjusted_instruments", "instruments", columns_of(book, INSTRUMENTS)),
-        ("adjusted_systems", "systems", columns_of(book, SYSTEMS)),
-        ("adjusted_checks", "check_points", columns_of(book, CHECK_POINTS)),
-    ]
-    sheet = book.sheet("adjustment", landscape=True)
-    widths = set_widths(book, sheet, *(columns for _, _, columns in tables), least=_LEAST)
-    row = _facts(book, sheet, _HEAD_ROW, _statistics(adjustment, words), widths)
-    book.heading(sheet, row, words["headings"]["adjusted_datum"], len(widths))
-    row = _sentences(book, sheet, row + 1, datum_sentences(words, adjustment), widths)
+    headings = words["headings"]
     rejections = [make_sentence(entry) for entry in adjustment["aside"][:_MOST_ASIDE]]
-    row = _sentences(book, sheet, row, rejections, widths)
-    for title, name, columns in tables:
-        if columns[0].cells:
-            book.heading(sheet, row, words["headings"][title], len(columns))
-            row = book.table(sheet, row + 1, name, columns, widths=widths) + 2
-        if name == "groups":
-            row = _sentences(book, sheet, row, verdict_sentences(words, adjustment), widths)
+    groups, *tables = (
+        cell_table(book, table, title=headings[title], is_optional=True)
+        for title, table in (
+            ("adjusted_groups", GROUPS),
+            ("adjusted_instruments", INSTRUMENTS),
+            ("adjusted_systems", SYSTEMS),
+            ("adjusted_checks", CHECK_POINTS),
+        )
+    )
+    sections = [
+        Facts(_statistics(adjustment, words)),
+        Sentences(datum_sentences(words, adjustment), title=headings["adjusted_datum"]),
+        Sentences(rejections),
+        groups,
+        Sentences(verdict_sentences(words, adjustment)),
+        *tables,
+    ]
+    write_sheet(book, SheetContent("adjustment", sections, least=_LEAST))
 
 
 def _statistics(adjustment, words):
-    """Return (label key, value, number format or None) of the statistics with values."""
+    """Return (label, value, number format or None) of the statistics with values."""
     precision, checks = adjustment["precision"] or {}, adjustment["check_points"] or {}
     lines = [
         ("adjusted_points", len(adjustment["points"]), "0"),
@@ -80,33 +88,14 @@ def _statistics(adjustment, words):
         _millimetres("largest_difference", checks.get("largest_m")),
         _millimetres("mean_difference", checks.get("mean_m")),
     ]
-    return [line for line in lines if line[1] is not None]
+    labels = words["labels"]
+    return [(labels[key], value, shown) for key, value, shown in lines if value is not None]
 
 
 def _millimetres(label, size_m):
     """Return the line of a size in mm with three digits, as in the working papers."""
     size = None if size_m is None else 1000.0 * size_m
     return label, size, number_format(decimals_of(size, significant=3), unit="mm")
-
-
-def _facts(book, sheet, row, lines, widths):
-    """Write a line for each (label, value, format); return the next row."""
-    for label, value, shown in lines:
-        if shown is None:
-            book.paragraph_in(sheet, row, 1, value, widths[1:])
-        else:
-            book.put(sheet, row, 1, value, num_format=shown, align="left", valign="top")
-        book.label(sheet, row, book.words["labels"][label], widths[0])
-        row += 1
-    return row + 1
-
-
-def _sentences(book, sheet, row, sentences, widths):
-    """Write a paragraph for each sentence; return the next row, after an empty row."""
-    for sentence in sentences:
-        book.paragraph(sheet, row, sentence, widths)
-        row += 1
-    return row + bool(sentences)
 
 
 # ---- points
@@ -126,14 +115,16 @@ def points_sheet(book, record):
     shown = _weakest(points)
     if len(shown) == MOST_POINTS:
         subtitle = book.word("texts.weakest_points", text=subtitle, shown=len(shown))
-    sheet = book.sheet(code, subtitle, landscape=True)
     without_sds = {} if record["adjustment"] else {f"s{axis}_m": {"sheet": None} for axis in "xyz"}
-    columns = columns_of(book, POINTS.but(**without_sds), point_rows(record, shown))
-    set_widths(book, sheet, columns)
     muted = [index for index, row in enumerate(shown) if has_tank and not row["used"]]
-    if shown:
-        book.table(sheet, _HEAD_ROW, "points", columns, muted=muted, autofilter=True)
-    book.freeze(sheet, _HEAD_ROW, 1)
+    points = cell_table(
+        book,
+        POINTS.but(**without_sds),
+        point_rows(record, shown),
+        muted=muted,
+        is_optional=True,
+    )
+    write_sheet(book, SheetContent(code, [points], subtitle, is_filtered=True))
 
 
 def _weakest(points):
@@ -160,12 +151,9 @@ def observations_sheet(book, record):
         subtitle = book.word("texts.worst_subtitle", shown=MOST_READINGS, all=count)
         readings = _worst(readings)
     rows = list(convert_units(readings).rows())
-    sheet = book.sheet("observations", subtitle, landscape=True)
-    columns = columns_of(book, READINGS, rows)
-    set_widths(book, sheet, columns)
     muted = [i for i, row in enumerate(rows) if row["removed"]]
-    book.table(sheet, _HEAD_ROW, "observations", columns, muted=muted, autofilter=True)
-    book.freeze(sheet, _HEAD_ROW, 1)
+    table = cell_table(book, READINGS, rows, name="observations", muted=muted)
+    write_sheet(book, SheetContent("observations", [table], subtitle, is_filtered=True))
 
 
 def _worst(readings):
@@ -191,8 +179,8 @@ def cameras_sheet(book, record):
     ]
     widths = set_widths(book, sheet, photos, *cameras)
     title = book.words["headings"]["adjusted_photos"]
-    book.heading(sheet, _HEAD_ROW, title, len(photos))
-    row = _HEAD_ROW + 1
+    book.heading(sheet, HEAD_ROW, title, len(photos))
+    row = HEAD_ROW + 1
     row = book.table(sheet, row, "photos", photos, autofilter=True, widths=widths) + 2
     for number, (camera, columns) in enumerate(zip(adjustment["cameras"], cameras, strict=True), 1):
         book.heading(sheet, row, _name_of_camera(camera), len(photos))

@@ -1,4 +1,4 @@
-"""Declared tables in sheets: columns of cells, common widths, tables without rows."""
+"""Columns of cells for the declared tables, and their widths."""
 
 from itertools import zip_longest
 
@@ -6,8 +6,6 @@ from tankcal.report import numbers
 from tankcal.report.tables import decimals_of_cells
 from tankcal.report.workbook.look import Column, width_of
 from tankcal.text.digits import NOTHING, decimals_of
-
-HEAD_ROW = 3  # row of the headings of a table with a separate sheet
 
 
 def columns_of(book, table, rows=None):
@@ -94,83 +92,3 @@ def set_widths(book, sheet, *tables, least=()):
     ]
     book.widths(sheet, *widths)
     return widths
-
-
-def table_sheet(book, code, table, rows):
-    """Write a declared table into a separate sheet with fixed headings.
-
-    Parameters
-    ----------
-    book : Book
-        Workbook.
-    code : str
-        Code of the sheet.
-    table : Table
-        Declaration of the table.
-    rows : list of dict
-        Rows of the table.
-
-    Returns
-    -------
-    Sheet
-    list of Column
-    """
-    sheet = book.sheet(code, landscape=True, tab="result")
-    columns = columns_of(book, table, rows)
-    widths = set_widths(book, sheet, columns)
-    write_table(book, sheet, HEAD_ROW, table.name, columns, autofilter=True, widths=widths)
-    book.freeze(sheet, HEAD_ROW, 1)
-    return sheet, columns
-
-
-def write_table(book, sheet, row, name, columns, **more):
-    """Write a table, or the text for a table without rows; return its last row.
-
-    Parameters
-    ----------
-    book : Book
-        Workbook.
-    sheet : Sheet
-        Sheet of the table.
-    row : int
-        First row, from 0.
-    name : str
-        Name of the table.
-    columns : list of Column
-        Columns of the table.
-    **more
-        Further arguments of `Writer.table`.
-
-    Returns
-    -------
-    int
-    """
-    if columns[0].cells:
-        return book.table(sheet, row, name, columns, **more)
-    book.put(sheet, row, 0, book.word("texts.no_rows"))
-    return row
-
-
-def write_tables(book, sheet, row, tables):
-    """Write tables (title, name, columns) below each other; return the next row.
-
-    Parameters
-    ----------
-    book : Book
-        Workbook.
-    sheet : Sheet
-        Sheet of the tables.
-    row : int
-        First row, from 0.
-    tables : list of (str, str, list of Column)
-        Title, name and columns of each table.
-
-    Returns
-    -------
-    int
-    """
-    widths = set_widths(book, sheet, *(columns for _, _, columns in tables))
-    for title, name, columns in tables:
-        book.heading(sheet, row, title, len(columns))
-        row = write_table(book, sheet, row + 1, name, columns, widths=widths) + 2
-    return row

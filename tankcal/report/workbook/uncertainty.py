@@ -4,10 +4,18 @@ from tankcal.report.uncertainty import budget, monte_carlo, rule
 from tankcal.report.uncertainty.method import stated_table
 from tankcal.report.uncertainty.stated import WORST_DELIVERIES, worst_delivery_rows
 from tankcal.report.workbook.look import number_format
-from tankcal.report.workbook.tables import columns_of, set_widths, write_table, write_tables
+from tankcal.report.workbook.sections import (
+    HEAD_ROW,
+    CellTable,
+    Facts,
+    Sentences,
+    SheetContent,
+    cell_table,
+    write_sheet,
+)
+from tankcal.report.workbook.tables import columns_of, set_widths
 from tankcal.text.digits import decimals_of
 
-_HEAD_ROW = 3  # row of the first headings, from 0
 _RULE_FACTS = (40, 16, 16, 16, 16, 16)  # widths of the columns of the facts of a rule
 _FACT = 4  # column of the facts of the simulation, to the right of their labels
 
@@ -23,23 +31,20 @@ def budget_sheet(book, record):
     sheet = book.sheet("budget", book.word("texts.budget_subtitle", height=height), landscape=True)
     columns = _budget_columns(book, record["budget"], top["u_m3"])
     widths = set_widths(book, sheet, columns)
-    row = _budget_table(book, sheet, _HEAD_ROW, "budget", columns, widths)
+    row = _budget_table(book, sheet, HEAD_ROW, "budget", columns, widths)
     row = _totals(book, sheet, row, top)
     starts = []
     for number, stated in enumerate(record.get("budgets", []), 2):
         starts.append(row)
         columns = _budget_columns(book, stated["lines"], stated["u_m3"])
-        book.heading(sheet, row, _title(book, paper, stated), len(columns))
+        high, low = paper.height(stated["high_m"]), paper.height(stated["low_m"])
+        kind = "volume" if low is None else "delivery"
+        title = book.word(f"headings.budget_{kind}", high=high, low=low)
+        book.heading(sheet, row, title, len(columns))
         row = _budget_table(book, sheet, row + 1, f"budget_{number}", columns, widths)
         row = _totals(book, sheet, row, stated)
     book.keep_together(sheet, starts, row, widths)
-    sheet.freeze_panes(_HEAD_ROW + 1, 1)  # not repeated in print, since each budget has headings
-
-
-def _title(book, paper, stated):
-    high, low = paper.height(stated["high_m"]), paper.height(stated["low_m"])
-    return book.word(f"headings.budget_{'volume' if low is None else 'delivery'}", high=high,
-                     low=low)  # fmt: skip
+    sheet.freeze_panes(HEAD_ROW + 1, 1)  # not repeated in print, since each budget has headings
 
 
 def _budget_columns(book, lines, u_m3):
@@ -48,7 +53,7 @@ def _budget_columns(book, lines, u_m3):
 
 def _budget_table(book, sheet, row, name, columns, widths):
     """Write a budget with bars of the shares; return its last row."""
-    last = write_table(book, sheet, row, name, columns, widths=widths)
+    last = CellTable(name, columns).write(book, sheet, row, widths) - 1
     heading = book.word("columns.share")
     share = next(i for i, column in enumerate(columns) if column.heading == heading)
     bar = {"type": "data_bar", "bar_color": "#B8CCE4", "bar_solid": True}
@@ -75,13 +80,12 @@ def _totals(book, sheet, last, values):
 
 def deliveries_sheet(book, record):
     """Write the stated volumes and deliveries, and the worst deliveries."""
-    sheet = book.sheet("deliveries", landscape=True, tab="result")
-    tables = [(book.word("headings.stated"), "stated", columns_of(book, stated_table(record)))]
+    sections = [cell_table(book, stated_table(record), title=book.word("headings.stated"))]
     worst = worst_delivery_rows(book.paper)
     if worst:
         title = book.word("headings.worst_deliveries")
-        tables.append((title, "worst_deliveries", columns_of(book, WORST_DELIVERIES, worst)))
-    write_tables(book, sheet, _HEAD_ROW, tables)
+        sections.append(cell_table(book, WORST_DELIVERIES, worst, title=title))
+    write_sheet(book, SheetContent("deliveries", sections, tab="result"))
 
 
 # ---- Monte Carlo
@@ -92,7 +96,7 @@ def monte_carlo_sheet(book, record):
     paper, sheet = book.paper, book.sheet("monte_carlo")
     columns = columns_of(book, monte_carlo.SIMULATED)
     widths = set_widths(book, sheet, columns)
-    row = _HEAD_ROW - 1
+    row = HEAD_ROW - 1
     for key, text in monte_carlo.facts(paper):
         row += 1
         book.put(sheet, row, 0, paper.label(key))
@@ -108,20 +112,16 @@ def monte_carlo_sheet(book, record):
 def rule_sheet(book, record):
     """Write the rule, its verdict, the limits of U, and the limits of deviations."""
     paper = book.paper
-    sheet = book.sheet("rule", landscape=True, tab="result")
-    row = _HEAD_ROW
-    for key, text in rule.facts(paper):
-        if text:
-            book.paragraph_in(sheet, row, 1, text, _RULE_FACTS[1:])
-            book.label(sheet, row, paper.label(key), _RULE_FACTS[0])
-            row += 1
-    tables = [("limits", rule.LIMITS)]
+    facts = [(paper.label(key), text, None) for key, text in rule.facts(paper) if text]
+    tables = {"limits": rule.LIMITS}
     if record["rule"]["deviation"]:
-        tables += [("deviations", rule.DEVIATIONS), ("acceptance", rule.ACCEPTANCE)]
-    tables = [
-        (book.word(f"headings.{name}"), name, columns_of(book, table)) for name, table in tables
+        tables |= {"deviations": rule.DEVIATIONS, "acceptance": rule.ACCEPTANCE}
+    sections = [
+        Facts(facts, widths=_RULE_FACTS),
+        *(
+            cell_table(book, table, name=name, title=book.word(f"headings.{name}"))
+            for name, table in tables.items()
+        ),
+        Sentences(rule.sentences(paper), widths=(*_RULE_FACTS, *_RULE_FACTS[1:4])),
     ]
-    row = write_tables(book, sheet, row + 1, tables)
-    for text in rule.sentences(paper):
-        book.paragraph(sheet, row, text, (*_RULE_FACTS, *_RULE_FACTS[1:4]))
-        row += 1
+    write_sheet(book, SheetContent("rule", sections, tab="result"))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.job.checking import course_heights, tell
-from tankcal.job.checks.extent import is_strapped, may_be_hit_from_both_sides
+from tankcal.job.checks.extent import is_strapped, may_be_seen_from_both_sides
 from tankcal.job.plausibility import (
     CARBON_STEEL,
     HEAVY,
@@ -26,7 +26,7 @@ def check_plates(values, tables, kind, raw, log):
     courses = tables["courses"]
     if kind == "vertical" and courses is not None:
         _check_courses(values, courses, log)
-        is_outside_seen = is_strapped(tables) or may_be_hit_from_both_sides(tables)
+        is_outside_seen = is_strapped(tables) or may_be_seen_from_both_sides(tables)
         _check_paint(values, courses, is_outside_seen, log)
     elif kind in SOLID_PLATES_MM:
         _check_solid(values, kind, raw, log)

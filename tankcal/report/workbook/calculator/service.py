@@ -14,7 +14,7 @@ from tankcal.report.uncertainty.sources import roof_of
 from tankcal.report.workbook.calculator import products
 from tankcal.report.workbook.calculator.cells import NANOMETRE, Line, if_number, is_no_number
 from tankcal.report.workbook.calculator.products import OWN_FACTOR, PRODUCTS
-from tankcal.report.workbook.parts import name_of_density
+from tankcal.report.workbook.capacity import name_of_density
 from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3, floating_roof
 from tankcal.text.digits import LITRE_DECIMALS, NOTHING
 

@@ -1,0 +1,345 @@
+"""`Method`, the base of all ways of measuring a wall, and the registry of the methods.
+
+A method owns its tables, checks, readings, wall, warnings, saved part and report tables. The
+packages of the main job contain no branch for it: they ask `methods()` or `methods_for(kind)`.
+
+This module imports nothing, and the registry holds names only, because job, pipeline, record and
+report lie below the methods and ask for them at run time. A method imports a module of its own
+within the function that needs it, so that a job loads only the methods that it uses.
+"""
+
+import os
+import sys
+from functools import cache
+from importlib import import_module
+
+GROUP = "tankcal.methods"  # entry points of methods in other distributions
+_BUILT_IN = (
+    "tankcal.methods.hits:HitsMethod",
+    "tankcal.methods.tangents:TangentsMethod",
+    "tankcal.methods.rings:RingsMethod",
+    "tankcal.methods.great_circles:GreatCirclesMethod",
+)
+
+
+class Method:
+    """A way of measuring the wall of a tank; a subclass overrides what differs from the default.
+
+    Attributes
+    ----------
+    name : str
+        Key of the readings in `Job.surveys`, of the survey in `Result.surveys`, of the saved part
+        in the record, and of the sheet in the workbook. A survey that the method finds has this
+        name as its attribute `surveyed_as`.
+    attribute : str or None
+        Attribute of `Job` with the readings, for methods whose attribute is in the documented
+        interface; None: the readings are in `Job.surveys`.
+    kinds : tuple of str
+        Kinds of tank that the method can measure: "vertical", "horizontal", "sphere", "mesh".
+    tables : tuple of str
+        Tables of a job that belong to the method; the first table contains its readings.
+    shared_tables : tuple of str
+        Tables of other methods that the method also reads.
+    starter : str or None
+        Value of `tankcal new --survey` that starts a job with these tables.
+    starts : tuple of (str, str)
+        Initial values of settings in such a job: ("survey.side", "outside").
+    needs_station_heights : bool
+        Whether the field sheets have a form for the heights of the stations.
+    tables_with_sds : tuple of str
+        Tables whose column s_mm or s_arcsec is checked for values below those of any reading.
+    is_sighted : bool
+        Whether the readings are sights that become points of an upright wall. `find` then returns
+        a job with these points, and the sights.
+    is_smooth : bool
+        Whether the readings show the wall smoother than it is.
+    has_own_offset : bool
+        Whether the instruments have offsets of their own, so that the declared input "offset" of
+        all radii has no effect.
+    names_levels : bool
+        Whether a section is named by its course and the sighted level.
+    has_named_points : bool
+        Whether overrulings.csv can name a sight by its set-up and row, as a point of the wall.
+    compares_size : bool
+        Whether `warnings` compares the size of the whole tank with the drawing.
+    field_forms : tuple of (tuple of str, int)
+        Forms of the field sheets: the tables filled in together, and the rows on a sheet.
+    csv_files : tuple of str
+        Output files of `csv_tables`.
+    saved_note : str
+        Description of the saved part in the JSON schema of the record.
+    """
+
+    name = ""
+    attribute = None
+    kinds = ()
+    tables = ()
+    shared_tables = ()
+    starter = None
+    starts = ()
+    needs_station_heights = False
+    tables_with_sds = ()
+    is_sighted = False
+    is_smooth = False
+    has_own_offset = False
+    names_levels = False
+    has_named_points = False
+    compares_size = False
+    field_forms = ()
+    csv_files = ()
+    saved_note = ""
+
+    # ---- job
+
+    def columns(self):
+        """Columns of the tables: {table: tuple of `job.fields.Field`}."""
+        return {}
+
+    def starter_tables(self):
+        """Tables of a starter job, in their order."""
+        return (*self.tables, *self.shared_tables)
+
+    def table_notes(self):
+        """English notes above the tables in a starter: {table: note}."""
+        return {}
+
+    def examples(self):
+        """Example rows for the notes of a starter: {table: list of {column: value}}."""
+        return {}
+
+    def is_given(self, tables):
+        """Whether a job contains readings of this method.
+
+        Parameters
+        ----------
+        tables : dict
+            {table: ColumnValues; None: missing}.
+        """
+        table = tables.get(self.tables[0])
+        return table is not None and bool(table.rows or table.skipped)
+
+    def no_rows(self):
+        """Message about a table of readings without rows, in place of points; None: no message."""
+
+    def check(self, values, tables, registers, raw, log):
+        """Report problems of the tables and settings to `log`; called with or without readings.
+
+        Parameters
+        ----------
+        values : dict or None
+            {section: {key: value}} of the settings; None: unreadable.
+        tables : dict
+            {table: ColumnValues; None: missing}.
+        registers : dict
+            {"cameras", "instruments", "clouds" or "meters": {name: {key: value}}}.
+        raw : RawJob
+            Job as read.
+        log : Log
+            Receives problems and warnings.
+        """
+
+    def may_see_both_sides(self, tables):
+        """Whether the readings of a job may be on both sides of the wall."""
+        return False
+
+    def useless_inputs(self, tables):
+        """Inputs of uncertainty that these readings replace: {input: Message of the reason}."""
+        return {}
+
+    def estimate_diameter_m(self, tables):
+        """Approximate diameter from the readings before any calculation, m; None: unknown."""
+        return
+
+    def read(self, tables, registers):
+        """Readings in SI from tables and registers without problems, for `Job.surveys`."""
+        raise NotImplementedError
+
+    def readings_of(self, job):
+        """Readings of this method in a `Job`; None without readings."""
+        if self.attribute is not None:
+            return getattr(job, self.attribute)
+        return job.surveys.get(self.name)
+
+    # ---- pipeline
+
+    def find(self, job, progress, network):
+        """Survey of the tank from the readings of a job.
+
+        Parameters
+        ----------
+        job : Job
+            Job with readings of this method.
+        progress : callable
+            Called with a message as a step begins.
+        network : pipeline.surveying.Network
+            Adjusted network of the job, and known amplitudes of the wall.
+
+        Returns
+        -------
+        pipeline.surveying.Surveyed
+            Its `survey` has the attribute `surveyed_as` and becomes an entry of `Result.surveys`;
+            its `sights` become `Result.sights`.
+        """
+        raise NotImplementedError
+
+    def inside_radii(self, job, survey):
+        """`InsideRadii` of a survey, to be compared with the drawing; None: no size is known."""
+        return
+
+    def part(self, job, survey, switches):
+        """`tank.body.SolidPart` of a tank of one solid; None: made from `solid_part`."""
+
+    def solid_part(self, survey, plate_m, scale):
+        """Inside of a tank of one solid, with the arguments of its `SolidPart`.
+
+        Parameters
+        ----------
+        survey : object
+            Survey from `find`.
+        plate_m : float
+            Thickness of the plates to be subtracted, m.
+        scale : float
+            Lengths at the reference temperature over those of the survey.
+
+        Returns
+        -------
+        solid : object
+            Solid with volumes and areas by level, with lengths multiplied by `scale`.
+        arguments : dict
+            Further arguments of `tank.body.SolidPart`.
+        unused : tuple of str
+            Declared inputs without effect.
+        """
+        raise NotImplementedError
+
+    def warnings(self, job, survey, sights=None):
+        """`Problem`s of a survey: undetermined quantities, outliers, disagreement.
+
+        Parameters
+        ----------
+        job : Job
+        survey : object
+            Survey that `find` returned; of a method with sights, the wall fitted to their points.
+        sights : object, optional
+            Sights that `find` returned.
+
+        Returns
+        -------
+        iterable of Problem
+        """
+        return ()
+
+    # ---- record
+
+    def saved_type(self):
+        """Dataclass (a `record.schema.Saved`) of the saved part; None: nothing is saved."""
+        return
+
+    def save(self, result):
+        """Saved part of a `Result` whose surveys or sights contain this method."""
+        raise NotImplementedError
+
+    def choices(self, result):
+        """Assumptions of the method: {code: value} of `record.choices.Choice`."""
+        return {}
+
+    def sizes(self, result):
+        """Sizes of a tank of one solid, as surveyed: {name: (value, unit)}."""
+        return {}
+
+    # ---- report
+
+    def report_tables(self):
+        """Module with the `report.tables.Table`s of the method.
+
+        The cells of the report's notebook import it as `from tankcal.report.tables import NAME`.
+        """
+        raise AttributeError(f"the method {self.name} has no tables of the report")
+
+    def csv_tables(self):
+        """Tables that are also written as CSV files: {name of the file without .csv: Table}."""
+        return {}
+
+    def sheets(self, record):
+        """Sheets of the workbook for a record with the saved part of this method.
+
+        Returns
+        -------
+        list of (str, str, list of (str, Table))
+            Name of the sheet, key of its subtitle in `[texts]` of the words, and its tables, each
+            with the key of its heading in `[headings]`, which is also its name in the workbook.
+        """
+        return []
+
+    def certificates(self, saved):
+        """Instruments of the saved part and their certificates: {name: certificate or None}."""
+        return {}
+
+
+@cache
+def methods():
+    """All methods, each once: the methods of tankcal, then those of other distributions."""
+    paths = (*_BUILT_IN, *_installed_paths())
+    return tuple(_load(path) for path in paths)
+
+
+def methods_for(kind):
+    """Methods for a kind of tank; none for an unknown kind."""
+    return tuple(method for method in methods() if kind in method.kinds)
+
+
+def find_method(name):
+    """Method with a name; None if no method has it."""
+    return next((method for method in methods() if method.name == name), None)
+
+
+def method_of(survey):
+    """Method that found a survey; None for another survey, or without a survey."""
+    return find_method(getattr(survey, "surveyed_as", None))
+
+
+def given_methods(job):
+    """Methods whose readings a `Job` contains."""
+    return tuple(method for method in methods() if method.readings_of(job) is not None)
+
+
+def is_sighted(job):
+    """Whether the points of the wall of a `Job` are sights of a method."""
+    return any(method.is_sighted for method in given_methods(job))
+
+
+def _load(path):
+    """Method from "module:class"."""
+    module, _, name = path.partition(":")
+    return getattr(import_module(module), name)()
+
+
+def _installed_paths():
+    """Paths of the entry points of other distributions, sorted by name.
+
+    The files are first searched for the name of the group, because the package
+    `importlib.metadata` loads more slowly than the command line.
+    """
+    if not any(_names_group(folder) for folder in sys.path):
+        return []
+    from importlib.metadata import entry_points
+
+    entries = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
+    return [entry.value for entry in entries]
+
+
+def _names_group(folder):
+    """Whether a distribution in a folder of `sys.path` has entry points of the group."""
+    try:
+        names = os.listdir(folder or ".")
+    except OSError:
+        return False
+    for name in names:
+        if name.endswith((".dist-info", ".egg-info")):
+            try:
+                with open(os.path.join(folder, name, "entry_points.txt"), encoding="utf-8") as file:
+                    if f"[{GROUP}]" in file.read():
+                        return True
+            except OSError:  # a distribution without entry points
+                continue
+    return False

@@ -1,0 +1,116 @@
+"""Strapping of a sphere: equator and meridians by tape, and the ellipsoid that they determine."""
+
+from tankcal.methods.base import Method
+
+
+class GreatCirclesMethod(Method):
+    """Great circles of a sphere, measured by tape."""
+
+    name = "great_circles"
+    kinds = ("sphere",)
+    tables = ("great_circles",)
+    shared_tables = ("obstructions", "tape_checks")
+    starter = "strapping"
+    tables_with_sds = ("great_circles",)
+    compares_size = True
+    field_forms = ((("great_circles",), 15),)
+    csv_files = ("great_circles.csv",)
+    saved_note = "strapped sphere; left out where there is none"
+
+    # ---- job
+
+    def columns(self):
+        from tankcal.methods.great_circles.columns import GREAT_CIRCLES
+
+        return {"great_circles": GREAT_CIRCLES}
+
+    def table_notes(self):
+        note = "one row for each reading of the tape round the sphere: equator and meridians"
+        return {"great_circles": note}
+
+    def examples(self):
+        from tankcal.methods.great_circles.columns import EXAMPLES
+
+        return {"great_circles": list(EXAMPLES)}
+
+    def check(self, values, tables, registers, raw, log):
+        from tankcal.methods.great_circles.checks import check_great_circles
+
+        check_great_circles(values, tables, registers, raw, log, is_given=self.is_given(tables))
+
+    def useless_inputs(self, tables):
+        from tankcal.messages import message
+
+        reason = message("from_circles", "its uncertainty comes from the great circles")
+        return {"diameter": reason}
+
+    def estimate_diameter_m(self, tables):
+        from tankcal.methods.great_circles.readings import estimate_diameter_m
+
+        return estimate_diameter_m(tables["great_circles"])
+
+    def read(self, tables, registers):
+        from tankcal.methods.great_circles.readings import make_great_circles
+
+        return make_great_circles(tables, registers)
+
+    # ---- pipeline
+
+    def find(self, job, progress, network):
+        from tankcal.methods.great_circles.sphere import find_strapped_sphere
+        from tankcal.pipeline.surveying import Surveyed
+
+        return Surveyed(job, find_strapped_sphere(job, progress))
+
+    def inside_radii(self, job, survey):
+        from tankcal.methods.great_circles.sphere import inside_radii
+
+        return inside_radii(job, survey)
+
+    def solid_part(self, survey, plate_m, scale):
+        return survey.solid(plate_m, scale), survey.arguments_of_part(plate_m, scale), ("offset",)
+
+    def warnings(self, job, survey, sights=None):
+        from tankcal.methods.great_circles.warnings import check_circles
+
+        return check_circles(job, survey)
+
+    # ---- record
+
+    def saved_type(self):
+        from tankcal.methods.great_circles.saved import GreatCirclesRecord
+
+        return GreatCirclesRecord
+
+    def save(self, result):
+        from tankcal.methods.great_circles.saved import save_great_circles
+
+        return save_great_circles(result)
+
+    def choices(self, result):
+        return {"survey": "great_circles", "between_sections": "ellipsoid"}
+
+    def sizes(self, result):
+        from tankcal.methods.great_circles.saved import sizes_inside
+
+        return sizes_inside(result)
+
+    # ---- report
+
+    def report_tables(self):
+        from tankcal.methods.great_circles import tables
+
+        return tables
+
+    def csv_tables(self):
+        return {"great_circles": self.report_tables().CIRCLES}
+
+    def sheets(self, record):
+        declared = self.report_tables()
+        tables = [("great_circles", declared.CIRCLES), ("tapes", declared.TAPES_OF_SPHERE)]
+        return [("great_circles", "great_circles_subtitle", tables)]
+
+    def certificates(self, saved):
+        from tankcal.report.tables.strapping import certificates_of_tapes
+
+        return certificates_of_tapes(saved["tapes"])

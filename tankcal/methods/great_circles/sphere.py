@@ -1,0 +1,258 @@
+"""Sphere measured by strapping: an upright ellipsoid with the form that a tape does not show.
+
+A circumference is 2 pi times the mean radius of its great circle. The degree-2 form is the
+ellipsoid fitted to all circles (`geometry.great_ellipses`). The remaining form of a sphere (plates,
+seams, legs) is a random field of assumed size. It changes the mean of each circle slightly, and the
+volumes below a dip more. This field is not estimated; it contributes to the uncertainty only.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from tankcal.geometry.field.places import OnGreatCircles, cap_volumes
+from tankcal.geometry.great_ellipses import (
+    FittedEllipsoid,
+    FormPrior,
+    fit_ellipsoid,
+    great_circle_lengths,
+)
+from tankcal.messages import message
+from tankcal.methods.great_circles.columns import KINDS
+from tankcal.pipeline.nominal_size import single_radius
+from tankcal.pipeline.wall_readings import (
+    WallReading,
+    factors_of_readings,
+    inputs_read_with,
+    noise_of,
+    readings_of_straps,
+)
+from tankcal.pipeline.wall_straps import AreaTerm
+from tankcal.survey.strapping import ReducedStrap, reduce_straps, tapes_used
+from tankcal.tank.ellipsoids import Ellipsoid
+from tankcal.tank.factors import Factor
+from tankcal.tank.surveyed_form import SurveyedForm, node_levels
+from tankcal.uncertainty import factor_of
+from tankcal.units import FULL_TURN
+
+OVALITY_SHARE = 1e-3  # prior degree-2 form over the radius, if neither measured nor declared
+NO_AREA_TERM = AreaTerm(0.0, 0.0)  # included in the field: a reading is a mean of radii
+ROUNDING = 1e-7  # size of a column, relative to the capacity, that counts as zero
+
+
+@dataclass(frozen=True)
+class StrappedSphere:
+    """Sphere determined by great circles, on the painted outside at the temperature of the survey.
+
+    Attributes
+    ----------
+    reduced : tuple of ReducedStrap
+        All readings, in the order of the file.
+    adjusted : ndarray of int, shape (k,)
+        Indices of the adjusted readings; the other readings are checks.
+    azimuth_rad : ndarray, shape (n,)
+        Azimuth of each reading; nan for the equator.
+    readings : tuple of WallReading
+        Adjusted readings, as mean radii.
+    places : OnGreatCircles
+        Positions of the adjusted readings.
+    variances_m2 : ndarray, shape (departures,)
+        Assumed variances of the form beyond degree 2, m2.
+    prior : FormPrior
+    fit : FittedEllipsoid
+    tapes : tuple of (Tape, float)
+        Tapes used, and the standard uncertainties of their scale from a master.
+    """
+
+    reduced: tuple[ReducedStrap, ...]
+    adjusted: np.ndarray
+    azimuth_rad: np.ndarray
+    readings: tuple[WallReading, ...]
+    places: OnGreatCircles
+    variances_m2: np.ndarray
+    prior: FormPrior
+    fit: FittedEllipsoid
+    tapes: tuple
+    surveyed_as = "great_circles"
+
+    def solid(self, plate_m=0.0, scale=1.0):
+        """`Ellipsoid` inside the plates, with lengths multiplied by `scale`."""
+        return Ellipsoid(*(scale * (axis - plate_m) for axis in self.fit.axes_m))
+
+    @cached_property
+    def length_m(self):
+        """Circumferences (n,) of the ellipsoid at the readings, m."""
+        return great_circle_lengths(self.fit.unknowns, self.azimuth_rad)[0]
+
+    @cached_property
+    def w(self):
+        """Normalised discrepancies (k,) of the adjusted lengths from the other readings.
+
+        The value is nan if no other circle controls the reading.
+        """
+        diagonal = np.diag(self.fit.precision)
+        covariance_diagonal = np.diag(np.linalg.inv(self._lengths_m2))
+        # Leave-one-out test: w = P v / sqrt(P_ii), undefined where P_ii vanishes.
+        pull = -self.fit.precision @ self.fit.residuals_m
+        is_determined = diagonal > 1e-6 * covariance_diagonal
+        return np.where(
+            is_determined, pull / np.sqrt(np.where(is_determined, diagonal, 1.0)), np.nan
+        )
+
+    def sd_of_check_m(self, place):
+        """Standard deviation of the difference between a check reading and the ellipsoid, m."""
+        azimuth = self.azimuth_rad[place : place + 1]
+        _, derivative = great_circle_lengths(self.fit.unknowns, azimuth)
+        place_of_check = OnGreatCircles(self.places.radius_m, _normals(azimuth))
+        form = FULL_TURN**2 * _parts(place_of_check, self.variances_m2).sum(axis=0)
+        reading = self.reduced[place]
+        shared = sum(effect.by_m**2 for effect in reading.effects)
+        of_fit = derivative @ self.fit.weights
+        prior = derivative @ self.fit.by_prior
+        # The form at the check, the fitted ellipsoid and its prior are independent contributions.
+        variance = form + of_fit @ self._lengths_m2 @ of_fit.T + prior @ prior.T
+        return float(np.sqrt(variance[0, 0] + reading.sd_m**2 + shared))
+
+    @property
+    def _lengths_m2(self):
+        return FULL_TURN**2 * (noise_of(self.readings) + self._parts.sum(axis=0))
+
+    @cached_property
+    def _parts(self):
+        return _parts(self.places, self.variances_m2)
+
+    def arguments_of_part(self, plate_m, scale):
+        """Arguments of `SolidPart` for the ellipsoid inside the plates; volumes are scaled."""
+        form, read_with = self._part_of_volumes(plate_m)
+        factors = tuple(
+            replace(factor, columns=scale**3 * factor.columns) for factor in form.factors
+        )
+        return {
+            "surveyed": ("diameter",),
+            "form": replace(form, factors=factors),
+            "read_with": {name: scale**3 * column for name, column in read_with.items()},
+        }
+
+    def _part_of_volumes(self, plate_m):
+        """`SurveyedForm` of the ellipsoid inside the plates, and derivatives of its volumes.
+
+        The derivatives are {input: (nodes,)} by the inputs on which the readings depend.
+        """
+        solid = self.solid(plate_m)
+        levels = node_levels(solid.top_m)
+        by_lengths = self._by_unknowns(solid, levels) @ self.fit.weights
+        weights = FULL_TURN * by_lengths  # by mean radii
+        factors = (
+            *factors_of_readings(self.readings, weights),
+            *self._factors_of_form(solid, levels, weights),
+            *self._factors_of_prior(solid, levels),
+        )
+        none = np.zeros(len(levels))
+        form = SurveyedForm.of_volumes(
+            solid.volume_m3(levels), solid.area_m2(levels), solid.top_m, none, 0.0, factors
+        )
+        return form, inputs_read_with(self.readings, weights)
+
+    def _by_unknowns(self, solid, levels):
+        """Derivatives (nodes, 4) of the volumes by m, A, B, c."""
+        mean, cos, sin = self.fit.unknowns[:3]
+        mean = mean - (self.fit.axes_m[0] - solid.a_m)  # inside
+        by_product = solid.volume_m3(levels) / (solid.a_m * solid.b_m)
+        of_c = solid.by_axes(levels)[:, 2]
+        return np.column_stack(
+            [*(by_product * 2 * coefficient for coefficient in (mean, -cos, -sin)), of_c]
+        )
+
+    def _factors_of_form(self, solid, levels, weights):
+        """`Factor` of each kind of deviation beyond degree 2."""
+        volumes = cap_volumes(levels, solid.area_m2(levels), solid.top_m / 2)
+        for kind in dict.fromkeys(departure.kind for departure in self.places.departures):
+            covariance = 0.0
+            for size, part, departure in zip(
+                self.variances_m2, self._parts, self.places.departures, strict=True
+            ):
+                if departure.kind == kind:
+                    cross_covariance = size * self.places.across(departure, volumes) @ weights.T
+                    variance = size * self.places.within(departure, volumes)
+                    covariance = (
+                        covariance
+                        + variance
+                        - cross_covariance
+                        - cross_covariance.T
+                        + weights @ part @ weights.T
+                    )
+            if np.any(covariance):
+                yield Factor(kind, factor_of(covariance), type="B", note="assumed")
+
+    def _factors_of_prior(self, solid, levels):
+        """`Factor` of the part of degree 2 that the straps do not determine."""
+        columns = self._by_unknowns(solid, levels) @ self.fit.by_prior
+        is_negligible = np.abs(columns).max(axis=0) < ROUNDING * solid.capacity_m3
+        if not np.all(is_negligible):
+            yield Factor("oblateness", columns[:, ~is_negligible], type="B", note="assumed")
+
+
+def find_strapped_sphere(job, progress):
+    """`StrappedSphere` of a job with great circles."""
+    circles = job.surveys["great_circles"]
+    progress(
+        message(
+            "strapping_sphere",
+            "fitting an ellipsoid to {count} readings of great circles",
+            count=len(circles.strapping.straps),
+        )
+    )
+    radius = float(np.median([strap.reading_m for strap in circles.strapping.straps])) / FULL_TURN
+    reduced = reduce_straps(circles.strapping, job.survey.shell_temperature_c, 2 * radius)
+    azimuth = circles.azimuths([reduced_strap.strap for reduced_strap in reduced])
+    adjusted = np.array(
+        [i for i, reduced_strap in enumerate(reduced) if not reduced_strap.strap.check]
+    )
+    readings = tuple(readings_of_straps([reduced[i] for i in adjusted], KINDS, NO_AREA_TERM))
+    places = OnGreatCircles(radius, _normals(azimuth[adjusted]))
+    variances = _assumed_variances(places.departures, job.sphere.form_m)
+    size = job.sphere.ovality_m or OVALITY_SHARE * radius
+    prior = FormPrior(size, size)
+    lengths = FULL_TURN * np.array([reading.radius_m for reading in readings])
+    covariance = FULL_TURN**2 * (noise_of(readings) + _parts(places, variances).sum(axis=0))
+    fit = fit_ellipsoid(azimuth[adjusted], lengths, covariance, prior)
+    return StrappedSphere(
+        reduced=reduced,
+        adjusted=adjusted,
+        azimuth_rad=azimuth,
+        readings=readings,
+        places=places,
+        variances_m2=variances,
+        prior=prior,
+        fit=fit,
+        tapes=tapes_used(circles.strapping),
+    )
+
+
+def inside_radii(job, sphere):
+    """`InsideRadii` of a `StrappedSphere`: half its mean diameter inside the plates."""
+    plate = job.sphere.thickness_m
+    return single_radius(sphere.solid(plate).diameter_m / 2, plate)
+
+
+def _normals(azimuth):
+    """Unit normals (n, 3) of the planes: vertical for the equator, horizontal for meridians."""
+    equator = np.isnan(azimuth)
+    angle = np.where(equator, 0.0, azimuth)
+    level = np.column_stack([np.cos(angle), -np.sin(angle), np.zeros(len(angle))])
+    return np.where(equator[:, None], [0.0, 0.0, 1.0], level)
+
+
+def _assumed_variances(departures, form_m):
+    """Assumed variances (departures,), from medians or scaled to a declared size, m2."""
+    sizes = np.array([departure.median_m for departure in departures]) ** 2
+    if form_m is not None:
+        return sizes * form_m**2 / sizes.sum()
+    return sizes
+
+
+def _parts(places, variances):
+    """(departures, k, k) their covariances of the mean radii."""
+    pairs = zip(variances, places.departures, strict=True)
+    return np.array([size * places.covariance(departure) for size, departure in pairs])

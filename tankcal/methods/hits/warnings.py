@@ -1,0 +1,287 @@
+"""Warnings of bare wall hits: findings that are rare in a valid survey."""
+
+import numpy as np
+
+from tankcal.errors import Problem
+from tankcal.geometry.shell import course_of
+from tankcal.messages import list_some, message
+from tankcal.methods.hits.lost_setups import check_lost_setups
+from tankcal.pipeline.cause_correlations import noise_of_wall
+from tankcal.pipeline.level_checks import (
+    check_nominal,
+    check_size_told,
+    courses_with_few,
+    girth_m,
+    levels_with_few,
+)
+from tankcal.pipeline.moved_setups import (
+    critical_of_ranging,
+    moved_or_ranged,
+    worst_setup,
+)
+from tankcal.pipeline.ranging_checks import causes_unlike_certificates
+from tankcal.pipeline.survey_limits import limit_at, limits_of, repeat_factor
+from tankcal.pipeline.wall import joints_of
+from tankcal.survey.control_drift import repeats_of
+from tankcal.survey.sighting import NETWORK, WALL
+from tankcal.units import GON
+
+RULES, CONTROL = "wall_hits", "control_readings.csv"
+OVER_JOINT_M = 0.02  # largest distance of a hit beyond the joints of its course
+SUSPECT = 3.0  # test quantity of the worst set-up from which it is tested against all others
+WAVE_M = 3e-3  # standard deviation of each long wave of the wall in the test of a set-up
+# Distances explain a set-up as well as a movement from this share of the test quantity of the
+# movement.
+MOSTLY = 0.9
+MOVED_M = 4e-3  # smallest reported movement; less cannot be separated from the form of the wall
+SHOWN = 5  # largest number of names in a message
+
+
+def least_hits(job):
+    """Return the recommended number of hits in a section of the tank, by its circumference."""
+    return limit_at(RULES, "hits", "least", girth_m(job))
+
+
+def check_hits(job, wall, sighting):
+    """Return the warnings of the hits of a wall.
+
+    Parameters
+    ----------
+    job : Job
+    wall : Wall
+    sighting : Sighting
+
+    Returns
+    -------
+    tuple of Problem
+    """
+    return (
+        *_check_control(job),
+        *_check_assumed_places(job, wall, sighting.poses),
+        *_check_levels(job, wall),
+        *_check_courses(job, sighting),
+        *_check_incidence(sighting),
+        *check_lost_setups(job, wall, sighting),
+        *_check_setups(job, wall, sighting),
+        *check_nominal(job, wall, job.hits.file),
+        *(() if wall.by_inputs else check_size_told(job, [*job.hits.instruments])),
+        *causes_unlike_certificates(wall, sighting.told, taken_off_m=sighting.told_m),
+    )
+
+
+def _check_control(job):
+    """Warn of missing or deviating control readings."""
+    limits = limits_of(RULES)
+    if not job.hits.control:
+        text = message(
+            "no_control_readings",
+            "no control target was read again: a tripod or an instrument that moved would not show",
+        )
+        yield Problem(CONTROL, text)
+        return
+    targets = repeats_of(job.hits.control)
+    factor = repeat_factor(sum(3 * len(target.rows) for target in targets))
+    for target in targets:
+        distance_spread, angle_spread = (
+            factor * sd for sd in _standard_deviations(job.hits, target.setup)
+        )
+        # Below the spread due to the declared standard deviations, chance would exceed the limit.
+        angle = max(limits["control_angle_gon"] * GON, angle_spread)
+        distance = max(limits["control_distance_mm"] / 1000, distance_spread)
+        for name, values, limit, scale, unit in (
+            ("direction", target.direction_rad, angle, GON / 1000, "mgon"),
+            ("zenith", target.zenith_rad, angle, GON / 1000, "mgon"),
+            ("distance_m", target.distance_m, distance, 1e-3, "mm"),
+        ):
+            size = np.nan_to_num(np.abs(values))
+            worst = int(np.argmax(size))
+            if size[worst] > limit * (1 + 1e-6):
+                text = message(
+                    "control_moved",
+                    "set-up {setup!r} reads target {target!r} {apart:+.1f} {unit} from its first"
+                    " reading, over the limit of {limit:.3g} {unit}: did the instrument move?",
+                    setup=target.setup,
+                    target=target.target,
+                    apart=values[worst] / scale,
+                    limit=limit / scale,
+                    unit=unit,
+                )
+                yield Problem(CONTROL, text, target.rows[worst], name)
+
+
+def _check_assumed_places(job, wall, poses):
+    """Warn of set-ups that were assumed to be evenly spaced and determine the radius of the tank.
+
+    A radius from the curvature of arcs depends on the places of these arcs; a strap makes it
+    independent of them.
+    """
+    stations, setups = job.hits.stations, job.hits.setups
+    unknown = np.full(3, np.nan)
+    names = [
+        name
+        for (name, _), tie in zip(poses.keys, poses.ties, strict=True)
+        if tie == WALL and np.isnan(stations.get(setups[name].station, unknown)[:2]).any()
+    ]
+    if names and wall.told is not None and job.strapping is None:
+        text = message(
+            "places_assumed",
+            "the stations of set-ups {setups} are blank and were assumed to be evenly spaced; the"
+            " radius depends on them: give x_m and y_m to 0.3 m in control.csv, or strap a course",
+            setups=list_some(dict.fromkeys(names), SHOWN),
+        )
+        yield Problem("control.csv", text, column="x_m")
+
+
+def _standard_deviations(hits, setup):
+    """Standard deviations of a distance (m) and of an angle (rad) of a set-up; 0 without hits."""
+    is_of_setup = np.array(hits.setup) == setup
+    return [
+        np.median(values[is_of_setup]) if is_of_setup.any() else 0.0
+        for values in (hits.sd_m, hits.sd_rad)
+    ]
+
+
+def _check_levels(job, wall):
+    """Warn of sections with few hits and of courses with few levels."""
+    least = least_hits(job)
+    sections = levels_with_few(wall, least)
+    if sections:
+        text = message(
+            "few_hits",
+            "sections {sections} have fewer than {least} hits, as many as a circumference of"
+            " {girth_m:.0f} m asks for",
+            sections=sections,
+            least=least,
+            girth_m=girth_m(job),
+        )
+        yield Problem(job.hits.file, text)
+    least = limits_of(RULES)["sets_a_course"]
+    courses = courses_with_few(job, wall, least, slopes_count=True)
+    if courses:
+        text = message(
+            "few_levels_of_hits",
+            "courses {courses} were hit at fewer than {least} levels: nothing shows a taper there",
+            courses=courses,
+            least=least,
+        )
+        yield Problem(job.hits.file, text)
+
+
+def _check_courses(job, sighting):
+    """Warn of hits whose declared course differs from the course at their height."""
+    names = [course.name for course in job.courses]
+    joints = job.datum.bottom_z_m + joints_of(job)
+    z = sighting.points.xyz_m[:, 2]
+    misplaced = {}
+    for hit, name in enumerate(job.hits.course):
+        if name is None:
+            continue
+        index = names.index(name)
+        if not joints[index] - OVER_JOINT_M <= z[hit] <= joints[index + 1] + OVER_JOINT_M:
+            course_there = names[int(course_of(z[hit], joints))]
+            # No course lies beyond the bottom or the top.
+            course_there = "" if course_there == name else course_there
+            misplaced.setdefault((name, course_there), []).append(hit)
+    for (name, course_there), places in misplaced.items():
+        text = (
+            message(
+                "hits_beyond_ends",
+                "hits that are said to be of course {course!r} ({count}) lie beyond the end of the"
+                " shell: is bottom_z_m right, and the height of the instrument?",
+                count=len(places),
+                course=name,
+            )
+            if not course_there
+            else message(
+                "hits_of_other_course",
+                "hits that are said to be of course {course!r} ({count}) lie at the height of"
+                " course {there!r}: is the name wrong, or bottom_z_m, or the height of the"
+                " instrument?",
+                count=len(places),
+                course=name,
+                there=course_there,
+            )
+        )
+        yield Problem(job.hits.file, text, job.hits.rows[places[0]], "course")
+
+
+def _check_incidence(sighting):
+    """Warn of hits at large angles of incidence."""
+    most = limits_of(RULES)["most_incidence_deg"]
+    oblique = np.flatnonzero(np.degrees(sighting.incidence_rad) > most)
+    if len(oblique):
+        text = message(
+            "hits_too_flat",
+            "{count} hits meet the wall at more than {most:g} degrees from its normal: what such"
+            " ranging is worth nobody knows",
+            count=len(oblique),
+            most=most,
+        )
+        yield Problem(sighting.points.file, text, sighting.points.rows[oblique[0]])
+
+
+def _check_setups(job, wall, sighting):
+    """Warn of the set-up of a network whose hits or distances contradict all others most.
+
+    If only the wall ties the set-ups, no test can detect a moved set-up.
+    """
+    names = np.array(job.hits.setup)[~job.hits.check]
+    if len(set(names.tolist())) < 2 or any(tie != NETWORK for tie in sighting.poses.ties):
+        return
+    order = np.concatenate([section.group.members for section in wall.sections])
+    point = wall.accepted[order]  # number of the point of each reading of the field
+    if len(wall.field.radius_m) - len(wall.readings) != len(point):  # several points in a cell
+        return
+    hits = point < len(names)  # the points list targets after hits
+    if not hits.all():
+        return
+    covariance_m2 = wall.field.covariance_m2 + noise_of_wall(wall) - wall.field.noise_m2
+    used = np.flatnonzero(~job.hits.check)[point]
+    sight = (sighting.points.xyz_m - sighting.poses.xyz_m[sighting.pose])[used]
+    away, normal = sight[:, :2], sighting.normal[used]
+    # Derivatives of the distance from the wall: by a rotation of the set-up about the vertical, by
+    # its shift along the normal, and by a longer distance.
+    turn = normal[:, 0] * away[:, 1] - normal[:, 1] * away[:, 0]
+    along = np.sum(normal * sight, axis=1) / np.linalg.norm(sight, axis=1)
+    columns = np.column_stack([turn, normal[:, :2]])
+    moved, ranged = moved_or_ranged(
+        wall.field, covariance_m2, names[point], columns, along, SUSPECT, wave_m=WAVE_M
+    )
+    setup = max(ranged, key=lambda name: ranged[name][0])
+    (w, longer), most = ranged[setup], max(test[0] for test in moved.values())
+    if w > max(critical_of_ranging(len(ranged)), MOSTLY * most) and abs(longer) > MOVED_M:
+        text = message(
+            "hits_ranged_otherwise",
+            "the distances from set-up {setup!r} contradict all others (w = {w:.1f}), as if they"
+            " were {too_long}: was the constant of a reflector set, or another instrument or mode"
+            " used?",
+            setup=setup,
+            w=w,
+            too_long=_length_in_words(1000 * longer),
+        )
+        yield Problem("setups.csv", text, job.hits.setups[setup].row, "instrument")
+        return
+    worst = worst_setup(moved)
+    if worst is None:
+        return
+    _, turned, shift = moved[worst["setup"]]
+    # The movement of the hits: by the shift of the station, or by the rotation at the median
+    # distance.
+    moved_m = max(float(np.hypot(*shift)), abs(turned) * float(np.median(np.hypot(*away.T))))
+    if moved_m > MOVED_M:
+        text = message(
+            "hits_of_moved_setup",
+            "the hits from set-up {setup!r} contradict all others (w = {w:.1f}), as if its circle"
+            " were turned by {turn_arcsec:+.0f} seconds of arc, or its station moved by"
+            " {shift_mm:.1f} mm: was it disturbed, has it another zero, or are its hits those of"
+            " another set-up?",
+            **worst,
+        )
+        yield Problem("setups.csv", text, job.hits.setups[worst["setup"]].row, "setup")
+
+
+def _length_in_words(by_mm):
+    """Difference of a distance in words."""
+    if by_mm < 0:
+        return message("mm_too_short", "{by_mm:.1f} mm too short", by_mm=-by_mm)
+    return message("mm_too_long", "{by_mm:.1f} mm too long", by_mm=by_mm)

@@ -1,0 +1,235 @@
+"""Rings of a horizontal cylinder measured by strapping: radii and their uncertainty.
+
+A ring is a cylinder with the mean radius of its straps. Its form between the straps (taper, bulge)
+and the distance of its bottom at the dip from the mean are uncertain. Their prior sizes are those
+of the wall components (`geometry.field`). A tape does not show the deviation of a ring from a
+circle, so its size is declared. Each wave cos(k a) of this deviation changes the rows of the table
+directly, and through the bottom from which dips count. A horizontal tank flattens under its own
+weight. Half of the variance is assigned to this, as wave 2 common to all rings. The other half is
+distributed like the components of walls.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tankcal.geometry.field.components import COMPONENTS, OVALITY_MODES, mode_shares
+from tankcal.geometry.field.estimate import LEVELS, gauss_heights
+from tankcal.geometry.girth import perimeter_excess
+from tankcal.messages import message
+from tankcal.pipeline.nominal_size import InsideRadii
+from tankcal.pipeline.strapped_wall import TapedWall, adjust_readings
+from tankcal.pipeline.tanks.common import factor_of_unseen
+from tankcal.pipeline.wall_readings import names_of, readings_of_straps
+from tankcal.pipeline.wall_straps import AreaTerm, gauged_plates
+from tankcal.quadrature import panels
+from tankcal.survey.strapping import reduce_straps, tapes_used
+from tankcal.tank.factors import Factor
+from tankcal.tank.rings import WAVES
+
+UPRIGHT_M = 7.5  # radius of the measured shell; bulges scale with the square root of the radius
+FLATTENED = 0.5  # share of the variance round a ring due to its weight on saddles
+KIND_OF_WAVES = {"oval": "ovality", "seam": "seams"}
+
+
+@dataclass(frozen=True)
+class RingedWall(TapedWall):
+    """Strapped rings of a horizontal tank; levels are positions along the axis from end A."""
+
+    surveyed_as = "rings"
+
+    def radius_sd_m(self, factors):
+        """Standard deviations (rings,) of the mean radii from the factors of `RingFeatures`, m."""
+        rings = len(self.joints_m) - 1
+        return np.sqrt(sum(np.sum(factor.columns[:rings] ** 2, axis=1) for factor in factors))
+
+    def features_at(self, dip_from_a_m):
+        """`RingFeatures` of a tank dipped at a distance from end A."""
+        return RingFeatures(self, dip_from_a_m)
+
+
+class RingFeatures:
+    """Features of rings: mean radii, the bottom at the dip, and the waves of each ring.
+
+    The rows of its columns match the derivatives of `RingedTank` by ring_radii, dip_radius and
+    ring_waves.
+
+    Parameters
+    ----------
+    wall : RingedWall
+    dip_from_a_m : float
+        Distance of the dip from end A, m.
+    """
+
+    def __init__(self, wall, dip_from_a_m):
+        self._wall, self._rings = wall, len(wall.joints_m) - 1
+        self._zero = min(
+            max(int(np.searchsorted(wall.joints_m, dip_from_a_m, side="right")) - 1, 0),
+            self._rings - 1,
+        )
+        low, high = wall.joints_m[self._zero], wall.joints_m[self._zero + 1]
+        self._means = wall.field.means
+        self._of_levels = self._weights_of_levels(2 * (dip_from_a_m - low) / (high - low) - 1)
+
+    def factors(self, job):
+        """`Factor`s of the uncertainty that the tape leaves in the features."""
+        factors_of_tape = self._wall.factors(job, self._of_levels @ self._means.weights)
+        return (
+            *map(self._padded, factors_of_tape),
+            *self._factors_of_bulges(),
+            *self._factors_of_waves(),
+        )
+
+    def read_with(self):
+        """Derivatives (features,) by inputs, such as the temperature of the shell and tape."""
+        by_inputs = self._wall.read_with(self._of_levels @ self._means.weights)
+        return {name: self._with_waves(column) for name, column in by_inputs.items()}
+
+    def _weights_of_levels(self, zeta):
+        """Weights (rings + 1, rings * LEVELS) of radii at the Gauss heights.
+
+        The first rows give the mean radius of each ring. The last row gives the difference between
+        the wall at height zeta of the dipped ring and its mean.
+        """
+        share, nodes = panels([0.0, 1.0], LEVELS)[1], gauss_heights()
+        weights = np.kron(np.vstack([np.eye(self._rings), np.zeros(self._rings)]), share)
+        nodes_without_j = [np.delete(nodes, j) for j in range(LEVELS)]
+        # Lagrange polynomials through the Gauss heights, evaluated at zeta.
+        interpolation = [
+            np.prod((zeta - other_nodes) / (node - other_nodes))
+            for node, other_nodes in zip(nodes, nodes_without_j, strict=True)
+        ]
+        columns = slice(self._zero * LEVELS, (self._zero + 1) * LEVELS)
+        weights[-1, columns] = interpolation - share
+        return weights
+
+    def _with_waves(self, rows):
+        """Append zero rows for the waves, which a tape does not show."""
+        padding = ((0, self._rings * len(WAVES)), *((0, 0),) * (np.ndim(rows) - 1))
+        return np.pad(rows, padding)
+
+    def _padded(self, factor):
+        """A `Factor` of radii and the bottom, with zero rows for the waves."""
+        return factor.mapped(self._with_waves)
+
+    def _factors_of_bulges(self):
+        """`Factor` of the variation of the mean radius along rings between the straps."""
+        assumed = self._wall.field.amplitudes.assumed_share()
+        indices = [i for i, component in enumerate(COMPONENTS) if component.shape == "mean"]
+        weights = self._of_levels
+        parts = [weights @ self._means.unseen(i) @ weights.T for i in indices]
+        factor = factor_of_unseen(
+            "bulge", parts, [np.trace(part) for part in parts], assumed[indices]
+        )
+        return (self._padded(factor),) if factor.columns.shape[1] else ()
+
+    def _factors_of_waves(self):
+        """`Factor`s of the deviations from a circle, of declared size."""
+        shape = self._wall.shape_sd_m
+        if not shape:
+            return
+        shares = {
+            key: (1 - FLATTENED) * size * shape**2 for key, size in _shares_of_waves().items()
+        }
+        radius = float(np.mean(self._wall.radius_m))
+        orders = np.arange(2.0, OVALITY_MODES[-1] + 1)
+        for name, kind in KIND_OF_WAVES.items():
+            # `FLATTENED` of the variance is wave 2 of all rings; the rest has the spectrum of the
+            # components.
+            spectrum = mode_shares(orders, radius)[name]
+            columns = [
+                *self._waves(np.sqrt(shares[name, True] * spectrum), common=True),
+                *self._waves(np.sqrt(shares[name, False] * spectrum), common=False),
+            ]
+            if name == "oval":  # the amplitude of cos 2a is sqrt(2) times the sd of the radius
+                columns += self._waves(np.sqrt([2 * FLATTENED * shape**2]), common=True)
+            yield Factor(kind, np.column_stack(columns), type="B", note="assumed")
+
+    def _waves(self, sds_m, *, common):
+        """Columns of waves with the given standard deviations, common to all rings or one per ring.
+
+        Waves shorter than those in `WAVES` change only the bottom at the dip.
+        """
+        count = self._rings + 1 + self._rings * len(WAVES)
+        for k, sd in enumerate(sds_m[: len(WAVES)]):
+            places = self._rings + 1 + np.arange(self._rings) * len(WAVES) + k
+            for rows in [places] if common else places[:, None]:
+                column = np.zeros(count)
+                column[rows] = sd
+                yield column
+        if len(sds_m) > len(WAVES):
+            column = np.zeros(count)
+            # Shorter waves are independent, so their variances add at the bottom of the dip.
+            column[self._rings] = np.sqrt(np.sum(sds_m[len(WAVES) :] ** 2))
+            yield column
+
+
+def _shares_of_waves():
+    """{(shape, common): share of the variance round a wall}, from the medians of the components."""
+    sizes = {(shape, common): 0.0 for shape in KIND_OF_WAVES for common in (True, False)}
+    for component in COMPONENTS:
+        if component.shape in KIND_OF_WAVES:
+            sizes[component.shape, component.common] += component.median_m**2
+    total = sum(sizes.values())
+    return {key: size / total for key, size in sizes.items()}
+
+
+def find_ringed_wall(job, progress, amplitudes=None):
+    """`RingedWall` of a job with strapped rings.
+
+    Parameters
+    ----------
+    job : Job
+    progress : callable
+        Called with a line of text when the step begins.
+    amplitudes : Amplitudes, optional
+        Known amplitudes of the wall components; None: estimated from the readings.
+
+    Returns
+    -------
+    RingedWall
+    """
+    straps = job.strapping
+    progress(
+        message(
+            "strapping_rings",
+            "reducing {count} readings of the tape to {rings} rings",
+            count=len(straps.straps),
+            rings=len(job.rings),
+        )
+    )
+    readings_m = [strap.reading_m for strap in straps.straps]
+    nominal = float(np.median(readings_m)) / (2 * np.pi)
+    reduced = reduce_straps(straps, job.survey.shell_temperature_c, 2 * nominal)
+    places = [i for i, reduced_strap in enumerate(reduced) if not reduced_strap.strap.check]
+    term = AreaTerm(*perimeter_excess(straps.shape_sd_m, nominal))
+    readings = readings_of_straps([reduced[i] for i in places], names_of(job.rings), term)
+    joints = np.concatenate([[0.0], np.cumsum([ring.length_m for ring in job.rings])])
+    readings, tested, field = adjust_readings(
+        readings,
+        (joints, 0.0, nominal),
+        amplitudes,
+        snooping=job.snooping,
+        bulge_scale=min(np.sqrt(nominal / UPRIGHT_M), 1.0),
+    )
+    return RingedWall(
+        joints_m=joints,
+        zero_m=0.0,
+        readings=tuple(readings),
+        places=np.array(places),
+        tested=tested,
+        field=field,
+        reduced=reduced,
+        area_term=term,
+        plate_sd_m=gauged_plates(job),
+        tapes=tapes_used(straps),
+        shape_sd_m=straps.shape_sd_m,
+    )
+
+
+def inside_radii(job, wall):
+    """`InsideRadii` of a `RingedWall`."""
+    plates = np.array([ring.thickness_m + ring.paint_m for ring in job.rings])
+    return InsideRadii(
+        tuple(names_of(job.rings)), wall.straps.radius_m - plates, plates, np.zeros(len(plates))
+    )

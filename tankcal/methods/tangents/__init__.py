@@ -1,0 +1,106 @@
+"""Tangents: sights to both limbs of an upright tank, from a traverse round it."""
+
+from tankcal.methods.base import Method
+
+
+class TangentsMethod(Method):
+    """Sights to the limbs of a tank, which become points of its wall."""
+
+    name = "tangents"
+    attribute = "tangents"
+    kinds = ("vertical",)
+    tables = ("tangents",)
+    shared_tables = (
+        *("setups", "control", "directions", "zenith_angles", "slope_distances"),
+        *("stadia", "circumferences", "obstructions"),
+    )
+    starter = "tangents"
+    starts = (("survey.side", "outside"),)
+    needs_station_heights = True
+    tables_with_sds = ("tangents",)
+    is_sighted = True
+    names_levels = True
+    is_smooth = True
+    has_named_points = True
+    compares_size = True
+    field_forms = ((("tangents",), 30),)
+    saved_note = "tangents from outside; left out where there are none"
+
+    # ---- job
+
+    def columns(self):
+        from tankcal.methods.tangents.columns import TANGENTS
+
+        return {"tangents": TANGENTS}
+
+    def table_notes(self):
+        return {"tangents": "one row for each sight to a limb of the tank, from outside"}
+
+    def examples(self):
+        from tankcal.methods.tangents.columns import EXAMPLES
+
+        return {"tangents": list(EXAMPLES)}
+
+    def no_rows(self):
+        from tankcal.messages import message
+
+        return message("no_rows_of_tangents", "no rows; expected a sight to a limb in each")
+
+    def check(self, values, tables, registers, raw, log):
+        if self.is_given(tables):
+            from tankcal.methods.tangents.checks import check_tangents
+
+            check_tangents(values, tables, registers, raw, log)
+
+    def read(self, tables, registers):
+        from tankcal.methods.tangents.readings import make_tangents
+
+        return make_tangents(tables, registers)
+
+    # ---- pipeline
+
+    def find(self, job, progress, network):
+        from tankcal.methods.tangents.wall import find_tangent_wall
+        from tankcal.pipeline.surveying import Surveyed
+
+        job_of_points, touching, wall = find_tangent_wall(
+            job, network.adjustment, progress, network.dof, amplitudes=network.amplitudes
+        )
+        return Surveyed(job_of_points, wall, sights={"tangents": touching})
+
+    def warnings(self, job, survey, sights=None):
+        from tankcal.methods.tangents.warnings import check_tangents
+
+        return check_tangents(job, survey, sights)
+
+    # ---- record
+
+    def saved_type(self):
+        from tankcal.methods.tangents.saved import TangentsRecord
+
+        return TangentsRecord
+
+    def save(self, result):
+        from tankcal.methods.tangents.saved import save_tangents
+
+        return save_tangents(result)
+
+    def choices(self, result):
+        return {"survey": "tangents", "covariance": "tangents"}
+
+    # ---- report
+
+    def report_tables(self):
+        from tankcal.methods.tangents import tables
+
+        return tables
+
+    def sheets(self, record):
+        declared = self.report_tables()
+        tables = (declared.SETUPS, declared.LEVELS, declared.READINGS)
+        return [("tangents", "tangents_subtitle", [(table.name, table) for table in tables])]
+
+    def certificates(self, saved):
+        from tankcal.report.tables.sights import certificates_of_setups
+
+        return certificates_of_setups(saved["setups"])

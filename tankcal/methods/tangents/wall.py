@@ -1,0 +1,214 @@
+"""Tangents to a wall as its points, from the stations of an adjusted traverse.
+
+A tangent touches the convex hull. The mean excess of the hull over the wall follows from the
+amplitudes of the wall (`geometry.girth`) and is subtracted; its uncertainty is an input of U.
+The amplitudes follow from the tangents in turn, so both are iterated until they agree.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem, SolutionError
+from tankcal.geometry.field.sites import free_design
+from tankcal.geometry.girth import support_of, tangent_excess
+from tankcal.geometry.shell import course_of
+from tankcal.messages import message
+from tankcal.methods.tangents.misread import refuse_limbs, refuse_misread, refuse_misread_zeniths
+from tankcal.pipeline.point_covariance import s_transform
+from tankcal.pipeline.sighted_points import take_points
+from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall_straps import rings_of
+from tankcal.survey.poses import poses_in_network
+from tankcal.survey.sighting import WALL
+from tankcal.survey.tangents import Hull, halfway, round_hull, touch
+from tankcal.units import FULL_TURN
+
+ROUNDS = 6  # rounds of wall and excess; two suffice unless the hull dominates the form
+# Largest change of the mean excess at the end: a length, and a share of its uncertainty.
+SETTLED_M, SETTLED_PART = 2e-5, 0.25
+# Bound of the deviations of a wall: a multiple of those of the limbs, but at least a length.
+ROUGHER, LEAST_ROUGH_M = 3.0, 0.010
+
+
+def find_tangent_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
+    """Job with its tangents as points, their `Touching`, and the `Wall` fitted to them.
+
+    Parameters
+    ----------
+    job : Job
+    adjustment : Adjustment
+        Adjusted network of the set-ups.
+    progress : callable
+        Called with a line of text as each step begins.
+    dof, amplitudes
+        As in `find_wall`.
+
+    Returns
+    -------
+    job : Job
+    touching : Touching
+    wall : Wall
+    """
+    progress(
+        message(
+            "touching",
+            "computing {count} tangents of the wall from {setups} set-ups",
+            count=len(job.tangents),
+            setups=len(set(job.tangents.setup)),
+        )
+    )
+    poses, tools = poses_in_network(job.tangents, adjustment)
+    _refuse_untied(job.tangents, poses)
+    return touch_wall(job, poses, tools, progress, dof, amplitudes)
+
+
+def touch_wall(job, poses, tools, progress, dof=np.inf, amplitudes=None):
+    """Fit a wall to tangents as in `find_tangent_wall`, from known poses.
+
+    Parameters
+    ----------
+    job : Job
+    poses : Poses
+        Positions and orientations of the set-ups.
+    tools
+        As in `tangents.touch`.
+    progress, dof, amplitudes
+        As in `find_tangent_wall`.
+
+    Returns
+    -------
+    job : Job
+    touching : Touching
+    wall : Wall
+
+    Raises
+    ------
+    SolutionError
+        If wall and excess do not settle within the uncertainty of the excess.
+    """
+    radius = job.tank.nominal_diameter_m / 2
+    arguments = {
+        "zero_z_m": job.datum.bottom_z_m + job.datum.plate_level_m,
+        "nominal_m": radius,
+        "tools": tools,
+    }
+    refuse_misread(job.tangents, poses, radius)
+    touching = touch(job.tangents, poses, **arguments)
+    refuse_limbs(job.tangents, touching)
+    refuse_misread_zeniths(job.tangents, poses, touching, arguments["zero_z_m"])
+    hull = round_hull(len(job.tangents))
+    for number in range(ROUNDS + 1):
+        touching = touch(job.tangents, poses, **arguments, hull=hull)
+        job_of_points = _with_points(job, touching)
+        wall = find_wall(job_of_points, progress, dof, amplitudes)
+        former_hull, hull = hull, _hull_of(job, touching, wall)
+        if number and _is_settled(former_hull, hull):
+            return job_of_points, touching, wall
+        if number:  # damps an oscillation by a tangent rejected in every second round
+            hull = halfway(former_hull, hull)
+        progress = _be_silent  # do not report the same steps again
+    if abs(_mean_change(former_hull, hull)) > former_hull.common_sd_m.mean():
+        raise SolutionError(_not_settled(former_hull, hull))
+    return job_of_points, touching, wall  # oscillates within the uncertainty of the excess
+
+
+def _is_settled(before, after):
+    """Whether the last round changed the excess little, on average and at each tangent."""
+    change_m = np.abs(after.excess_m - before.excess_m)
+    of_mean = max(SETTLED_M, SETTLED_PART * before.common_sd_m.mean())
+    of_each = np.maximum(SETTLED_M, np.hypot(before.common_sd_m, before.own_sd_m))
+    return abs(_mean_change(before, after)) <= of_mean and bool(np.all(change_m <= of_each))
+
+
+def _mean_change(before, after):
+    return float(np.mean(after.excess_m - before.excess_m))
+
+
+def _hull_of(job, touching, wall):
+    """`Hull` of a wall at the tangents from which the wall was fitted.
+
+    The excess at a tangent has two parts: the excess of the estimated outline at its azimuth, and
+    the mean excess of the form that the tangents do not show.
+    """
+    field, joints = wall.field, wall.joints_m
+    heights = touching.points.xyz_m[:, 2] - job.datum.bottom_z_m
+    relative_height = np.clip(heights / joints[-1], 0.0, 1.0)
+    most_m = max(ROUGHER * _departure_of_limbs(field), LEAST_ROUGH_M)
+    unseen_excess = tangent_excess(
+        field.amplitudes, field.nominal_m, relative_height, rings_of(field), most_m
+    )
+    excess_m, slope_m = np.zeros(len(heights)), np.zeros(len(heights))
+    place, levels = job.tangents.levels
+    for number in range(len(levels)):
+        is_of_level = place == number
+        height = np.median(heights[is_of_level])
+        course = int(course_of(height, joints))
+        low, high = joints[course : course + 2]
+        outline = field.outlines_at([2 * (height - low) / (high - low) - 1])[course, 0]
+        outline = _remove_shift(outline)
+        support = support_of(outline)
+        step = FULL_TURN / len(outline)
+        index = np.rint(touching.normal_rad[is_of_level] / step).astype(int) % len(outline)
+        # The support function is the distance of the tangent from the centre; its excess is over
+        # the radius.
+        excess_m[is_of_level] = (support - outline)[index]
+        # Central difference of the support function with respect to azimuth.
+        slope_m[is_of_level] = (np.roll(support, -1) - np.roll(support, 1))[index] / (2 * step)
+    return Hull(excess_m + unseen_excess[:, 0], unseen_excess[:, 1], unseen_excess[:, 2], slope_m)
+
+
+def _remove_shift(radii_m):
+    """Radii at equally spaced azimuths without their first harmonic, about their own centre."""
+    waves = np.fft.rfft(radii_m)
+    waves[1] = 0.0
+    return np.fft.irfft(waves, len(radii_m))
+
+
+def _departure_of_limbs(field):
+    """Standard deviation of the radii about the circles of their levels, m."""
+    design = free_design(field.sites)[0]
+    residuals = field.radius_m - design @ np.linalg.lstsq(design, field.radius_m, rcond=None)[0]
+    return float(
+        np.sqrt(np.sum(residuals**2) / max(len(residuals) - np.linalg.matrix_rank(design), 1))
+    )
+
+
+def _not_settled(former, latter):
+    """Message that wall and excess do not settle."""
+    return message(
+        "excess_not_settled",
+        "no capacity: the convex hull that the tangents touch stands {before_mm:.1f} mm outside the"
+        " wall in one pass and {after_mm:.1f} mm in the next, so the tangents do not determine the"
+        " form of this wall; sight more limbs (stations at other distances), strap a course"
+        " (circumferences.csv), or measure points of the wall",
+        before_mm=1000 * float(former.excess_m.max()),
+        after_mm=1000 * float(latter.excess_m.max()),
+    )
+
+
+def _be_silent(text):
+    """Progress callback that does nothing."""
+
+
+def _with_points(job, touching):
+    """Job with its adjusted tangents as points."""
+    points = take_points(touching.points, np.flatnonzero(~job.tangents.check))
+    return replace(job, points=s_transform(points))
+
+
+def _refuse_untied(tangents, poses):
+    """Raise InputError for set-ups whose position or orientation the network does not determine."""
+    names = [name for (name, _), tie in zip(poses.keys, poses.ties, strict=True) if tie == WALL]
+    if names:
+        text = message(
+            "untied_tangents",
+            "the network does not have the place of its station and the zero of its circle;"
+            " expected directions to other stations in directions.csv",
+        )
+        raise InputError(
+            [
+                Problem("setups.csv", text, tangents.setups[name].row, "setup")
+                for name in dict.fromkeys(names)
+            ]
+        )

@@ -1,0 +1,152 @@
+"""Document of a saved file other than a record, such as comparison.json.
+
+A `SavedDocument` declares what a product writes: the saved file, its tables as CSV files, a
+workbook, a PDF and a web page. All of them are derived from the saved file, so that `tankcal
+report` can write them again (docs/house.md, "How a document is declared").
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tankcal.errors import InputError, Problem, TankcalError, VocabularyError, reason_of
+from tankcal.messages import Message
+from tankcal.record import manifest, save
+from tankcal.record.saved_formats import SavedFormat
+from tankcal.record.schema import to_plain
+from tankcal.report import folders
+from tankcal.text.decoding import read_json
+
+
+@dataclass(frozen=True)
+class SavedDocument:
+    """Declaration of a document; its files have the name of the saved file.
+
+    Attributes
+    ----------
+    saved_format : SavedFormat
+        Format of the saved file.
+    paper_of : callable
+        paper_of(plain, language, letterhead) returns the `SavedPaper` of plain data.
+    renderers : callable
+        renderers() returns two functions, which are imported when they are needed:
+        pages(paper, folder=None, whole=False) returns the blocks of the PDF, or with `whole` those
+        of the web page; write_workbook(paper, path) writes the workbook.
+    steps : (Message, Message)
+        Messages at the beginning of the tables and of the papers.
+    unreadable : callable
+        unreadable(error) returns the Message for a file that is no JSON.
+    without_content : callable
+        without_content(what) returns the Message for a file with unexpected content.
+    tables : Mapping of str to Table
+        {name of the CSV file: its table}. A table without rows has no file.
+    has_page : bool
+        Whether the document has a web page.
+    """
+
+    saved_format: SavedFormat
+    paper_of: Callable
+    renderers: Callable
+    steps: tuple[Message, Message]
+    unreadable: Callable[[str], Message]
+    without_content: Callable[[str], Message]
+    tables: Mapping = field(default_factory=dict)
+    has_page: bool = True
+
+    @property
+    def files(self):
+        """Names of all possible files, the saved file first (tuple of str)."""
+        page = (self._file(".html"),) if self.has_page else ()
+        workbook, pdf = self._file(".xlsx"), self._file(".pdf")
+        return (self.saved_format.file, *self.tables, workbook, pdf, *page, manifest.FILE)
+
+    def _file(self, suffix):
+        return Path(self.saved_format.file).with_suffix(suffix).name
+
+    def refuse_foreign(self, folder):
+        """Raise InputError if a folder exists and contains any other file."""
+        folders.refuse_foreign(folder, self.files)
+
+    def find_file(self, path):
+        """Return the saved file at a path, which is the file or its folder; None if absent."""
+        path, name = Path(path), self.saved_format.file
+        if path.is_dir():
+            path = path / name
+            return path if path.is_file() else None
+        return path if path.name == name else None
+
+    def load(self, path):
+        """Read the saved file; raise InputError if it is invalid."""
+        name = Path(path).name
+        try:
+            data = read_json(path)
+        except (OSError, ValueError, RecursionError) as error:
+            raise InputError(Problem(name, self.unreadable(reason_of(error)))) from error
+        return self.saved_format.migrated(data, name)
+
+    def write(self, result, folder, language=None, progress=None, letterhead=None):
+        """Write all files, all or none; an earlier document in the folder is replaced.
+
+        Parameters
+        ----------
+        result : dataclass or dict
+            Content of the saved file, or the same as plain data.
+        folder : str or Path
+            Folder of the results; it is created if it does not exist.
+        language : str, optional
+            Language of papers and workbook, one of languages.LANGUAGES; None: English.
+        progress : callable, optional
+            Called as progress(message) at the beginning of each step.
+        letterhead : report.letterhead.Letterhead, optional
+            Letterhead of the laboratory.
+
+        Returns
+        -------
+        list of Path
+            Written files.
+
+        Raises
+        ------
+        InputError
+            For a folder with other files, and for data without the content of the format.
+        """
+        plain = result if isinstance(result, dict) else to_plain(result)
+        paper = self.paper_of(plain, language, letterhead)
+        self.refuse_foreign(folder)
+        with folders.replace_folder(folder, language) as temporary:
+            self._write_files(paper, temporary, progress or (lambda text: None))
+        return [path for path in (Path(folder) / name for name in self.files) if path.exists()]
+
+    def _write_files(self, paper, folder, progress):
+        from tankcal.report.outputs.csv_files import write_table
+        from tankcal.report.pdf import pdf
+        from tankcal.report.web import page
+
+        pages, write_workbook = self.renderers()
+        writing_tables, setting_papers = self.steps
+        progress(writing_tables)
+        save(paper.saved, folder / self.saved_format.file)
+        for name, table in self.tables.items():
+            if rows := table.rows(paper.record):
+                write_table(table, folder / name, rows)
+        write_workbook(paper, folder / self._file(".xlsx"))
+        progress(setting_papers)
+        # The PDF embeds the files that were written before it.
+        blocks = [block.data for block in pages(paper, folder)]
+        (folder / self._file(".pdf")).write_bytes(pdf(blocks, folder))
+        if self.has_page:
+            blocks = [block.data for block in pages(paper, whole=True)]
+            (folder / self._file(".html")).write_text(page(blocks), encoding="utf-8")
+
+    def rebuild(self, source, folder, language=None, progress=None, letterhead=None):
+        """Write all files from a saved file; other arguments and errors as in `write`."""
+        data = self.load(source)
+        try:
+            return self.write(data, folder, language, progress, letterhead)
+        except VocabularyError as error:
+            what = str(error)
+        except TankcalError:
+            raise
+        except (LookupError, TypeError, ValueError, AttributeError) as error:
+            what = f"{type(error).__name__}: {error}"
+        raise InputError(Problem(Path(source).name, self.without_content(what)))
