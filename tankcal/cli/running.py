@@ -122,24 +122,9 @@ def _demo(options):
 def _compute(
     source, out, *, quiet, tell, only=None, strict=False, cluster=None, papers=(None, True)
 ):
-    """Compute a job, or adjust its survey only; write the results and print a summary.
+    """Compute a job, or with only="adjustment" its survey; write and print the results.
 
-    Parameters
-    ----------
-    source, out : Path
-        The job, and the folder of its results.
-    quiet : bool
-        Whether to print no progress.
-    tell : callable
-        Prints the results: `_tell` or `_tell_machine`.
-    only : str, optional
-        "adjustment": stop after the adjustment of the survey.
-    strict : bool, optional
-        Whether to refuse a doubtful adjustment.
-    cluster : str or int, optional
-        Workers for point clouds, as in `tankcal.run`.
-    papers : tuple, optional
-        Letterhead or None, and whether to write the reports.
+    `papers` is (letterhead or None, whether to write the reports); `tell` prints the results.
     """
     prepare_for_small_work()
     show = Progress(quiet)
@@ -253,27 +238,27 @@ def _capacity(result):
             accepted=accepted,
             rejected=len(result.job.points.names) - accepted,
         )
+    values = {
+        "tank": result.job.tank.id,
+        "unit": unit,
+        "height": fixed(top_m, decimals_of_height(top_m), marks()),
+        "points": points,
+    }
     if not stated.U_m3[-1] > 0:
         return message(
             "holds_without_u",
             "{tank}: {volume} {unit} at {height} m, no uncertainty stated, because no input has "
             "a declared uncertainty{points}",
-            tank=result.job.tank.id,
             volume=fixed(factor * top.value_m3, decimals, marks()),
-            unit=unit,
-            height=fixed(top_m, decimals_of_height(top_m), marks()),
-            points=points,
+            **values,
         )
     return message(
         "holds",
         "{tank}: {volume} {unit} at {height} m, U = {uncertainty} {unit} ({how}){points}",
-        unit=unit,
-        tank=result.job.tank.id,
         volume=volume.value,
-        height=fixed(top_m, decimals_of_height(top_m), marks()),
         uncertainty=fixed(U, decimals_of(U, least=None), marks()),
         how=how,
-        points=points,
+        **values,
     )
 
 

@@ -234,32 +234,32 @@ class _Check:
             bad = ~(np.abs(piece.xyz - first) <= EXTENT_LIMIT).all(axis=1)
         i = int(np.flatnonzero(bad)[0]) if bad.any() else 0
         x, y, z = (f"{value:g}" for value in piece.xyz[i])
-        is_exact = len(piece.xyz) == piece.read
-        numbers = [before + i + 1] if is_exact else [before + 1, before + piece.read]
-        if np.isfinite(piece.xyz[i]).all():
-            return self.file.refusal(
-                message(
-                    "cloud_file_far",
-                    "point {number} is ({x}, {y}, {z}), {most:g} or more from the first: damaged, "
-                    "or to be cleaned before",
-                    number=_place(numbers),
-                    x=x,
-                    y=y,
-                    z=z,
-                    most=EXTENT_LIMIT,
-                )
+        # Only a range is known if records without a return were omitted.
+        number = str(before + i + 1)
+        if len(piece.xyz) != piece.read:
+            number = message(
+                "cloud_file_between",
+                "between {first} and {last}",
+                first=before + 1,
+                last=before + piece.read,
             )
-        return self.file.refusal(
-            message(
+        values = {"number": number, "x": x, "y": y, "z": z}
+        if np.isfinite(piece.xyz[i]).all():
+            text = message(
+                "cloud_file_far",
+                "point {number} is ({x}, {y}, {z}), {most:g} or more from the first: damaged, "
+                "or to be cleaned before",
+                **values,
+                most=EXTENT_LIMIT,
+            )
+        else:
+            text = message(
                 "cloud_file_not_finite",
                 "point {number} is ({x}, {y}, {z}); expected finite numbers: export it without "
                 "points that have no return",
-                number=_place(numbers),
-                x=x,
-                y=y,
-                z=z,
+                **values,
             )
-        )
+        return self.file.refusal(text)
 
     def _check_spacing(self, largest):
         # The resolution of float32 is proportional to the coordinate.
@@ -274,11 +274,3 @@ class _Check:
                     spacing_mm=1000 * spacing,
                 )
             )
-
-
-def _place(numbers):
-    """Number of a point, or its range if records without a return were omitted."""
-    if len(numbers) == 1:
-        return str(numbers[0])
-    first, last = numbers
-    return message("cloud_file_between", "between {first} and {last}", first=first, last=last)
