@@ -26,6 +26,7 @@ from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import Log
 from tankcal.messages import message
 from tankcal.pipeline.cloud_passes import Reading
+from tankcal.record import content_error
 from tankcal.record.inspection import InspectedTank, InspectionFile, InspectionRule
 from tankcal.record.texts import WarningRecord, warnings_of
 
@@ -104,7 +105,12 @@ def inspect_files(asked, progress=None, part_progress=None) -> InspectionFile:
     bottom = inspect_bottom(*files, strength, rule.sections, log)
     log.stop_if_problems()
     welds = _welds(basis, rule, part_progress, progress)
-    inspection = assemble_inspection(basis, rule, bottom, welds, nominal=asked.nominal)
+    try:
+        inspection = assemble_inspection(basis, rule, bottom, welds, nominal=asked.nominal)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        if basis.survey is not None:
+            raise
+        raise content_error(basis.file, error) from error
     older = [_older_warning(basis)] if basis.is_older else []
     return replace(
         inspection, warnings=[*inspection.warnings, *warnings_of([*log.warnings, *older])]

@@ -304,11 +304,11 @@ def _roundness(code, shape, sizes, rule):
     is_measured = level["centre_x_m"] is not None or not is_low
     mean = 1000 * (np.mean(level["radius_m"]) - (sizes.nominal_radius_m or 0.0))
     remark = {}
-    if not is_measured:
-        nearest = min((item["height_m"] for item in shape["levels"] if not item["is_low"]),
-                      key=lambda height: abs(height - level["height_m"]))  # fmt: skip
+    higher = [item["height_m"] for item in shape["levels"] if not item["is_low"]]
+    if not is_measured and higher:
+        nearest = min(higher, key=lambda height: abs(height - level["height_m"]))
         remark = {"remark": "low_level_estimated", "remark_values": {"nearest_m": nearest}}
-    elif sizes.nominal_radius_m is not None:
+    elif is_measured and sizes.nominal_radius_m is not None:
         remark = {"remark": "mean_departure", "remark_values": {"mean_mm": float(mean)}}
     return Figure(
         code=code,

@@ -15,7 +15,7 @@ from tankcal.record.versions import FORMAT, VERSION, migrated, version_of
 from tankcal.text.decoding import read_json
 
 __all__ = [
-    "FORMAT", "VERSION", "copy_record", "load", "migrated", "read", "record_of",
+    "FORMAT", "VERSION", "content_error", "copy_record", "load", "migrated", "read", "record_of",
     "record_of_adjustment", "save", "version_of", "whole",
 ]  # fmt: skip
 
@@ -130,6 +130,29 @@ def load(path, *, is_checked=True):
         _refuse_altered(Path(path))
         _refuse_impossible(record, name)
     return record
+
+
+def content_error(file, error):
+    """Return the InputError for a record whose parts contradict one another.
+
+    Parameters
+    ----------
+    file : str
+        Name of the record.
+    error : Exception
+        LookupError, TypeError, ValueError or AttributeError raised by the content.
+
+    Returns
+    -------
+    InputError
+    """
+    expected = message(
+        "no_record",
+        "does not have the content of a record ({name}: {error})",
+        name=type(error).__name__,
+        error=str(error),
+    )
+    return InputError(Problem(file, expected))
 
 
 def _refuse_altered(path):

@@ -223,3 +223,15 @@ def test_settlement_is_refused_whole(tmp_path):
         inspect_files(Asked(EXAMPLE, settlement=tmp_path / "a.csv", edges=tmp_path / "b.csv"))
     files = {one.file for one in refusal.value.problems}
     assert files == {"a.csv", "b.csv"}
+
+
+def test_record_whose_levels_do_not_fit_is_refused(example_record, tmp_path):
+    """Found by mutated inputs: a height of a level that no other part of the record has."""
+    record = json.loads(example_record.read_text(encoding="utf-8"))
+    record["wall_shape"]["levels"][-1]["height_m"] += 0.125
+    for level in record["wall_shape"]["levels"][1:]:
+        level["is_low"] = True
+    path = tmp_path / "record.json"
+    path.write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(InputError, match="does not have the content of a record"):
+        inspect_files(Asked(path))

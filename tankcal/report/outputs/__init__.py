@@ -149,13 +149,7 @@ def rebuild(record_path, directory, progress=None, language=None, letterhead=Non
     except TankcalError:
         raise
     except (LookupError, TypeError, ValueError, AttributeError) as error:
-        problem = message(
-            "no_record",
-            "does not have the content of a record ({name}: {error})",
-            name=type(error).__name__,
-            error=str(error),
-        )
-        raise InputError(Problem(source.name, problem)) from error
+        raise records.content_error(source.name, error) from error
 
 
 def known_language(language):
