@@ -13,7 +13,7 @@ import time
 import numpy as np
 from measured import ROUNDS, Row, digits_of, interleaved, peer_module, tell
 
-from tankcal.clouds.wall import cells_of
+from tankcal.clouds.wall import sum_cells
 from tankcal.clouds.wall.cells import CellGrid
 from tankcal.clouds.wall.surfaces import CylinderSurface
 
@@ -35,7 +35,7 @@ def main(points, rings):
     pieces = [(0, xyz[i : i + PIECE]) for i in range(0, points, PIECE)]
 
     def ours():
-        return cells_of(pieces, surface, grid, 1)
+        return sum_cells(pieces, surface, grid, 1)
 
     def sort():
         order = np.argsort(xyz[:, 2])

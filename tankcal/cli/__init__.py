@@ -1,8 +1,13 @@
-"""Command line: arguments, progress and exit status, without computation."""
+"""Command line: arguments, progress and exit status, without computation.
+
+The English help is in the definitions of the arguments. Its translations are in the words of each
+language under [help], by command and name of the argument.
+"""
 
 import argparse
 import os
 import sys
+from contextlib import contextmanager
 
 import tankcal
 from tankcal.cli import (
@@ -26,10 +31,8 @@ from tankcal.cli import (
     verifying,
     workbench,
 )
-from tankcal.cli.help_words import argparse_in, put_in_words
-from tankcal.cli.machine import failure, print_json
-from tankcal.cli.showing import complain, say_in_language, speak, words_of_run
-from tankcal.cli.stopping import ended_by_signals, is_of_memory, stopped_status
+from tankcal.cli.showing import complain, failure, print_json, say_in_language, speak, words_of_run
+from tankcal.cli.stopping import is_out_of_memory, raise_at_signals, signal_status
 from tankcal.errors import Problem, TankcalError, reason_of
 from tankcal.messages import message, printable_lines
 
@@ -73,13 +76,13 @@ def main(arguments=None):
     """Run the command line and return the exit status."""
     _print_in_any_encoding()
     speak()
-    with argparse_in(words_of_run()):
+    with _translate_argparse(words_of_run()):
         options = _options(arguments)
         if options.command is None:
             options.shown.print_help()
             return 0
     try:
-        with ended_by_signals():
+        with raise_at_signals():
             return options.command(options) or 0
     except TankcalError as error:
         if getattr(options, "machine", False):
@@ -92,21 +95,21 @@ def main(arguments=None):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except BaseException as error:
-        return _status_of(error)
+        return _find_status(error)
 
 
-def _status_of(error):
+def _find_status(error):
     """Return the exit status after a signal or a lack of memory or disk space; print one line.
 
     Any other error is raised again.
     """
-    status = stopped_status(error)
+    status = signal_status(error)
     if status is not None:
         complain(
             message("stopped", "stopped; earlier results are unchanged, or completely replaced")
         )
         return status
-    if is_of_memory(error):
+    if is_out_of_memory(error):
         complain(
             message(
                 "out_of_memory",
@@ -200,4 +203,53 @@ def _parser_in_english():
 def _translate(parser):
     """Translate a parser to the current language."""
     if words_of_run():
-        put_in_words(parser, words_of_run())
+        translate_parser(parser, words_of_run())
+
+
+def translate_parser(parser, words):
+    """Replace the texts of a parser and of its commands by the texts of [help]."""
+    known = words["help"]
+    texts = known[_name(parser)]
+    parser.description = texts.get("about", parser.description)
+    parser.epilog = texts.get("ending", parser.epilog)
+    for action in parser._actions:
+        if isinstance(action.metavar, str):
+            action.metavar = known["metavars"].get(action.metavar, action.metavar)
+        if isinstance(action, argparse._SubParsersAction):
+            _put_in_list(action, known)
+            for command_parser in action.choices.values():
+                translate_parser(command_parser, words)
+        elif action.help is not None and action.dest != "help":
+            action.help = texts.get(action.dest) or known["shared"][action.dest]
+
+
+@contextmanager
+def _translate_argparse(words):
+    """Translate the messages of argparse within the block; {}: English."""
+    translations = words.get("help", {}).get("argparse", {})
+    before = argparse._, argparse.ngettext
+
+    def translate(text):
+        return translations.get(text, text)
+
+    def translate_plural(single, several, count):
+        return translate(single if count == 1 else several)
+
+    if translations:
+        argparse._, argparse.ngettext = translate, translate_plural
+    try:
+        yield
+    finally:
+        argparse._, argparse.ngettext = before
+
+
+def _put_in_list(action, known):
+    """Replace the one-line help of each command in a list."""
+    names = {name: _name(command_parser) for name, command_parser in action.choices.items()}
+    for line in action._choices_actions:
+        line.help = known[names[line.dest]]["line"]
+
+
+def _name(parser):
+    """Return the command of a parser: "tankcal", "run", "camera read"."""
+    return parser.prog.removeprefix("tankcal ")

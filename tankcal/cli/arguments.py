@@ -22,7 +22,7 @@ def add_language(parser):
     )
 
 
-def positive(text):
+def parse_positive(text):
     """Return a positive number."""
     value = _number(text)
     if not 0 < value < float("inf"):
@@ -32,11 +32,11 @@ def positive(text):
     return value
 
 
-def yield_mpa(text):
+def parse_yield(text):
     """Return a yield strength in megapascals, at most MOST_YIELD_MPA."""
     from tankcal.job.plausibility import MOST_YIELD_MPA
 
-    value = positive(text)
+    value = parse_positive(text)
     if value > MOST_YIELD_MPA:
         raise refuse_argument(
             message(
@@ -49,7 +49,7 @@ def yield_mpa(text):
     return value
 
 
-def share(text):
+def parse_share(text):
     """Return a number between 0 and 1."""
     value = _number(text)
     if not 0 < value < 1:
@@ -59,7 +59,7 @@ def share(text):
     return value
 
 
-def parse_list(text):
+def parse_several(text):
     """Return a whole number from 2 to 1000000."""
     value = _number(text)
     if not (2 <= value <= 1e6 and value == int(value)):
@@ -99,7 +99,7 @@ def parse_workers(text):
 
 def parse_worker_memory(text):
     """Return the memory of a worker in gigabytes."""
-    value = positive(text)
+    value = parse_positive(text)
     if value < LEAST_WORKER_GB:
         raise refuse_argument(
             message(

@@ -5,18 +5,19 @@ import sys
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, parse_worker_memory, parse_workers
-from tankcal.cli.machine import add_json, print_json
 from tankcal.cli.reporting import add_letterhead
 from tankcal.cli.showing import (
     Progress,
+    add_json,
     complain,
     language_of_run,
     prepare_for_small_work,
+    print_json,
     print_paths,
     say,
     speak,
 )
-from tankcal.cli.stopping import stopped_status
+from tankcal.cli.stopping import signal_status
 from tankcal.errors import TankcalError, problem_from
 from tankcal.messages import message
 
@@ -136,7 +137,7 @@ def _batch(options):
                 command=_command(),
             )
         )
-        return stopped_status(stop)
+        return signal_status(stop)
     except TankcalError:
         progress.show.end()
         raise

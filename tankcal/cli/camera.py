@@ -1,7 +1,13 @@
 """`tankcal camera`: parameters, calibrations, targets and file formats of cameras."""
 
 from tankcal.cli import camera_runs as runs
-from tankcal.cli.arguments import add_language, parse_count, positive, refuse_argument, share
+from tankcal.cli.arguments import (
+    add_language,
+    parse_count,
+    parse_positive,
+    parse_share,
+    refuse_argument,
+)
 from tankcal.messages import message
 
 
@@ -31,7 +37,7 @@ def _parameters(kinds):
     parser.add_argument("--camera", metavar="NAME", help="this camera only (default: all)")
     parser.add_argument("--photo", metavar="NAME", help="the parameters of this photo only")
     parser.add_argument(
-        "--alpha", type=share, default=0.05, help="level of the tests (default 0.05)"
+        "--alpha", type=parse_share, default=0.05, help="level of the tests (default 0.05)"
     )
     parser.add_argument(
         "--matrix",
@@ -42,11 +48,11 @@ def _parameters(kinds):
     parser.add_argument(
         "--limit-px",
         metavar="PX",
-        type=positive,
+        type=parse_positive,
         help="image accuracy for the assessment of effects (default: from the residuals)",
     )
     parser.add_argument(
-        "--limit-um", metavar="UM", type=positive, help="image accuracy in micrometres"
+        "--limit-um", metavar="UM", type=parse_positive, help="image accuracy in micrometres"
     )
     parser.add_argument(
         "--no-trials",
@@ -85,7 +91,7 @@ def _compare(kinds):
         "--terrain", metavar="I|II|LOW,RANGE", help="for spr: heights in m (default: I)"
     )
     parser.add_argument(
-        "--pixel-um", type=positive, help="for film: pixel size for differences in pixels"
+        "--pixel-um", type=parse_positive, help="for film: pixel size for differences in pixels"
     )
     parser.add_argument(
         "--seed", type=parse_count, default=1, help="seed of the terrain (default 1)"
@@ -93,7 +99,7 @@ def _compare(kinds):
     parser.add_argument(
         "--threshold",
         metavar="PX",
-        type=positive,
+        type=parse_positive,
         default=0.5,
         help="largest difference between calibrations that agree (default 0.5; 0.33 is usual)",
     )
@@ -154,10 +160,10 @@ def _check(kinds):
     )
     parser.add_argument("--limits", metavar="FILE.toml", help="another table of limits")
     parser.add_argument(
-        "--scale", metavar="N", type=positive, help="this scale only, 1:N (default: all)"
+        "--scale", metavar="N", type=parse_positive, help="this scale only, 1:N (default: all)"
     )
     parser.add_argument(
-        "--alpha", type=share, default=0.05, help="level of the tests (default 0.05)"
+        "--alpha", type=parse_share, default=0.05, help="level of the tests (default 0.05)"
     )
     _add_outputs(parser)
     parser.set_defaults(command=runs.check)
@@ -186,7 +192,7 @@ def _convert(kinds):
     )
     parser.add_argument(
         "--pixel-um",
-        type=positive,
+        type=parse_positive,
         help="height of a pixel, if the file does not contain it and a form in pixels is read or "
         "written",
     )
@@ -198,7 +204,10 @@ def _convert(kinds):
         help="image size, if the file does not contain it",
     )
     parser.add_argument(
-        "--radius-mm", type=positive, default=0.0, help="R0 of the balanced form aicon (default 0)"
+        "--radius-mm",
+        type=parse_positive,
+        default=0.0,
+        help="R0 of the balanced form aicon (default 0)",
     )
     parser.add_argument("--name", help="this camera of the file only")
     parser.add_argument(
@@ -246,7 +255,9 @@ def _read(kinds):
         ("smallest-px", None, "smallest side or diameter (default: 2.5 px per cell; 6 px)"),
         ("largest-px", None, "for circles: largest diameter (default: a tenth of the photo)"),
     ):
-        parser.add_argument(f"--{name}", metavar="PX", type=positive, default=value, help=text)
+        parser.add_argument(
+            f"--{name}", metavar="PX", type=parse_positive, default=value, help=text
+        )
     parser.add_argument(
         "--bit-errors",
         type=parse_count,

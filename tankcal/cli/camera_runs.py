@@ -331,9 +331,9 @@ def _start(options):
 
 def _load_job(source, show, language):
     """Return the job, with its tank if it has one."""
-    from tankcal.cli.asked_language import asked_language
+    from tankcal.cli.input_language import read_job_language
 
-    language = language or asked_language(source)
+    language = language or read_job_language(source)
     if language is not None:
         speak(language)
     show.step(message("camera_reading", "reading {source}", source=str(source)))

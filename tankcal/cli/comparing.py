@@ -1,12 +1,13 @@
 """`tankcal compare`: comparison of a former and a new table of one tank."""
 
 from tankcal.cli.arguments import add_language
-from tankcal.cli.machine import add_json, print_saved
 from tankcal.cli.showing import (
     Progress,
+    add_json,
     language_of_run,
     marks,
     prepare_for_small_work,
+    print_saved,
     say,
     speak_of_record,
     warn,

@@ -36,10 +36,12 @@ def add(commands, make_parser):
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
-    parser.set_defaults(command=lambda options: print(script_for(options.shell, make_parser)))
+    parser.set_defaults(
+        command=lambda options: print(completion_script(options.shell, make_parser))
+    )
 
 
-def script_for(shell, make_parser):
+def completion_script(shell, make_parser):
     """Return the completion script for a shell.
 
     Parameters
@@ -52,13 +54,13 @@ def script_for(shell, make_parser):
     import shtab
 
     parser, translate = make_parser()
-    mark(parser, names_that_ship())
+    _set_completions(parser, shipped_choices())
     translate(parser)
-    _describe_by_their_lines(parser)
+    _describe_commands(parser)
     return shtab.complete(parser, shell)
 
 
-def names_that_ship():
+def shipped_choices():
     """Return {(command, option or argument): (names, whether a TOML file is also valid)}."""
     from tankcal.camera.formats.writing import KINDS
     from tankcal.cli.pages import page_names
@@ -68,14 +70,14 @@ def names_that_ship():
     from tankcal.text.languages import LANGUAGES
 
     profiles = tuple(shipped_profiles())
-    of_inspections, of_comparisons = rules.shipped_names(), rule_files.shipped_names()
+    inspection_rules, comparison_rules = rules.shipped_names(), rule_files.shipped_names()
     return {
         ("export", "--profile"): (profiles, True),
-        ("inspect", "--rule"): (of_inspections, True),
-        ("compare", "--rule"): (of_comparisons, True),
+        ("inspect", "--rule"): (inspection_rules, True),
+        ("compare", "--rule"): (comparison_rules, True),
         ("batch", "--profile"): (profiles, True),
-        ("batch", "--inspect-by"): (of_inspections, True),
-        ("batch", "--compare-by"): (of_comparisons, True),
+        ("batch", "--inspect-by"): (inspection_rules, True),
+        ("batch", "--compare-by"): (comparison_rules, True),
         ("report", "--language"): (LANGUAGES, False),
         ("docs", "page"): (page_names(), False),
         ("run", "--cluster"): (("auto", "local"), False),
@@ -84,34 +86,34 @@ def names_that_ship():
     }
 
 
-def mark(parser, named):
+def _set_completions(parser, choices):
     """Set the completion of each argument of a parser and of its commands."""
     command = parser.prog.removeprefix("tankcal").strip()
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for command_parser in action.choices.values():
-                mark(command_parser, named)
+                _set_completions(command_parser, choices)
             continue
         for option in action.option_strings or (action.dest,):
-            if (command, option) in named:
-                action.complete = _names_or_toml(*named[command, option])
+            if (command, option) in choices:
+                action.complete = _complete_choice(*choices[command, option])
         if action.nargs != 0 and action.choices is None and not hasattr(action, "complete"):
-            files = _files_of(action)
+            files = _complete_file(action)
             if files is not None:
                 action.complete = files
 
 
-def _describe_by_their_lines(parser):
+def _describe_commands(parser):
     """Describe each command in a list by its one-line help."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for line in action._choices_actions:
                 action.choices[line.dest].description = line.help
             for command_parser in action.choices.values():
-                _describe_by_their_lines(command_parser)
+                _describe_commands(command_parser)
 
 
-def _files_of(action):
+def _complete_file(action):
     """Return the completion of an argument that may be a file, or None."""
     import shtab
 
@@ -124,7 +126,7 @@ def _files_of(action):
     return shtab.glob("*.toml") if action.metavar.endswith(".toml") else shtab.FILE
 
 
-def _names_or_toml(names, or_file):
+def _complete_choice(names, or_file):
     """Return the completion of names, and of TOML files if `or_file`."""
     words = " ".join(map(shlex.quote, names))
     name = f"_tankcal_names_{sum(ord(c) * k for k, c in enumerate(words, 1))}"

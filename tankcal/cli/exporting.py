@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, parse_list, positive
-from tankcal.cli.machine import add_json, print_json
+from tankcal.cli.arguments import add_language, parse_positive, parse_several
 from tankcal.cli.showing import (
+    add_json,
     language_of_run,
     prepare_for_small_work,
+    print_json,
     say,
     speak,
     speak_of_record,
@@ -39,13 +40,13 @@ def add(commands):
     most.add_argument(
         "--points",
         metavar="K",
-        type=parse_list,
+        type=parse_several,
         help="largest number of rows; the rows with the smallest error are selected",
     )
     most.add_argument(
         "--max-error-l",
         metavar="LITRES",
-        type=positive,
+        type=parse_positive,
         help="write the fewest rows with at most this error, in litres",
     )
     parser.add_argument(

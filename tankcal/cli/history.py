@@ -1,12 +1,13 @@
 """`tankcal history`: tables of one tank over the years."""
 
 from tankcal.cli.arguments import add_language, parse_dips
-from tankcal.cli.machine import add_json, print_saved
 from tankcal.cli.showing import (
     Progress,
+    add_json,
     language_of_run,
     marks,
     prepare_for_small_work,
+    print_saved,
     say,
     speak_of_record,
     warn,

@@ -2,16 +2,27 @@
 
 import datetime
 import shlex
+import sys
+from dataclasses import replace
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, positive, refuse_argument
-from tankcal.cli.machine import add_json, print_json
-from tankcal.cli.showing import prepare_for_small_work, say, speak, warn
+from tankcal.cli.arguments import add_language, parse_positive, refuse_argument
+from tankcal.cli.showing import (
+    add_json,
+    complain,
+    prepare_for_small_work,
+    print_json,
+    say,
+    say_in_language,
+    speak,
+    warn,
+)
 from tankcal.errors import InputError, Problem, problem_of
 from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE
 from tankcal.messages import message, printable
 
 LISTS = (".csv", ".txt", ".tsv")
+NO = ("n", "no", "nao", "não")
 
 
 def add(commands):
@@ -77,7 +88,7 @@ def add(commands):
         parser.add_argument(
             f"--targets-{name}",
             metavar=name.upper(),
-            type=positive,
+            type=parse_positive,
             help=f"standard deviation of {what} to targets that tie set-ups",
         )
     for name, what in (("begin", "first"), ("end", "last")):
@@ -123,23 +134,18 @@ def _time(text):
         ) from None
 
 
-def _language_of_folder(folder):
-    """Return the language of the job in a folder, or None."""
-    from tankcal.cli.asked_language import asked_language
-
-    return asked_language(folder) if (folder / SETTINGS_FILE).is_file() else None
-
-
 def _import(options):
     prepare_for_small_work()
-    options.out = options.out or _folder_here()
-    speak(options.language or _language_of_folder(Path(options.out)))
-    _refuse_workbook(Path(options.out))
-    as_list = _list_of(options)
-    if as_list is not None:
-        from tankcal.cli.list_import import import_list
+    from tankcal.cli.input_language import read_job_language
 
-        return import_list(as_list, options)
+    options.out = options.out or _folder_here()
+    folder = Path(options.out)
+    has_job = (folder / SETTINGS_FILE).is_file()
+    speak(options.language or (read_job_language(folder) if has_job else None))
+    _refuse_workbook(folder)
+    foreign_list = _read_foreign_list(options)
+    if foreign_list is not None:
+        return _import_list(foreign_list, options)
     from tankcal.fieldbooks import Choices, import_fieldbooks
 
     choices = Choices(
@@ -161,19 +167,24 @@ def _import(options):
     )
     result = import_fieldbooks(options.names, options.out, choices, replace_tables=options.replace)
     if options.machine:
-        print_json(
-            exit_status=0,
-            summary=list(map(str, result.summary)),
-            warnings=[problem_of(warning) for warning in result.warnings],
-            files=list(map(str, result.paths)),
-        )
+        _print_machine(result.summary, result.warnings, result.paths)
         return None
     for line in result.summary:
         say(line)
     warn(result.warnings)
     survey = "total-station" if options.no_hits else "wall-hits"
-    say_written(Path(options.out), result.paths, survey)
+    _say_written(folder, result.paths, survey)
     return None
+
+
+def _print_machine(summary, warnings, paths):
+    """Print the results of an import as one JSON object."""
+    print_json(
+        exit_status=0,
+        summary=list(map(str, summary)),
+        warnings=list(map(problem_of, warnings)),
+        files=list(map(str, paths)),
+    )
 
 
 def _folder_here():
@@ -197,7 +208,7 @@ def _refuse_workbook(folder):
         raise InputError(Problem(folder.resolve().name, text))
 
 
-def _list_of(options):
+def _read_foreign_list(options):
     """Return the ForeignList of a single file with a list of points or another table, or None."""
     if len(options.names) != 1 or options.profile or options.format:
         return None
@@ -240,7 +251,95 @@ def _column(text):
     return heading.strip(), column.strip()
 
 
-def say_written(folder, paths, survey):
+def _import_list(foreign_list, options):
+    """Confirm the headings of a ForeignList, write it, and return the exit status."""
+    from tankcal.fieldbooks.lists import refuse_missing, write_list
+
+    is_asked = sys.stdin.isatty() and sys.stdout.isatty() and not (options.yes or options.machine)
+    folder = Path(options.out)
+    if is_asked:
+        foreign_list = _ask_missing(foreign_list)
+    lines = _list_meanings(foreign_list, folder)
+    if not options.machine:
+        for line in lines:
+            say(line)
+        warn(foreign_list.warnings)
+    refuse_missing(foreign_list)
+    prompt = say_in_language(message("list_confirm", "write it? [Y/n] "))
+    if is_asked and _answer(prompt).lower() in NO:
+        complain(
+            message(
+                "list_not_written",
+                "no file was written; --column 'HEADING=COLUMN' assigns another meaning to a "
+                "heading",
+            )
+        )
+        return 2
+    paths = write_list(foreign_list, folder, replace=options.replace)
+    if options.machine:
+        _print_machine(lines, foreign_list.warnings, paths)
+        return 0
+    _say_written(folder, paths, None)
+    return 0
+
+
+def _list_meanings(foreign_list, folder):
+    """Return the lines that show the meaning of each heading."""
+    first = message(
+        "list_becomes",
+        "{file} becomes {table}.csv of {folder}:",
+        file=foreign_list.table.file,
+        table=foreign_list.name,
+        folder=str(folder),
+    )
+    lines = [first]
+    for heading in foreign_list.table.headings:
+        meaning = foreign_list.meanings.get(heading)
+        named = {"heading": heading}
+        if meaning is None:
+            line = message("list_unused", "  {heading}: not used", **named)
+        elif meaning.factor == 1:
+            line = message("list_means", "  {heading} = {column}", column=meaning.column, **named)
+        else:
+            line = message(
+                "list_means_converted",
+                "  {heading} = {column}, converted from {unit}",
+                column=meaning.column,
+                unit=meaning.unit,
+                **named,
+            )
+        lines.append(line)
+    return lines
+
+
+def _ask_missing(foreign_list):
+    """Return the ForeignList with headings chosen by the user for missing columns."""
+    from tankcal.job.headings import stated_meaning
+
+    meanings = dict(foreign_list.meanings)
+    for field in foreign_list.missing:
+        free = [title for title in foreign_list.table.headings if title not in meanings]
+        if not free:
+            break
+        say(message("list_ask", "which heading is {column}?", column=field.name))
+        for number, heading in enumerate(free, 1):
+            print(f"  {number} {printable(heading)}")
+        answer = _answer("> ")
+        if answer.isdecimal() and 1 <= int(answer) <= len(free):
+            heading = free[int(answer) - 1]
+            meanings[heading] = stated_meaning(heading, field)
+    return replace(foreign_list, meanings=meanings)
+
+
+def _answer(prompt):
+    """Return one line of the terminal; its end counts as no."""
+    try:
+        return input(prompt).strip()
+    except EOFError:
+        return "no"
+
+
+def _say_written(folder, paths, survey):
     """Print the written files and the next command."""
     say(message("import_wrote", "wrote into {folder}:", folder=str(folder)))
     for path in paths:
@@ -261,8 +360,8 @@ def _say_next(folder, survey):
             job=str(job),
         )
         say(text)
-        of_survey = "" if survey is None else f" --survey {survey}"
-        print(f"  tankcal new {_quote_path(job)}{of_survey}")
+        survey_option = "" if survey is None else f" --survey {survey}"
+        print(f"  tankcal new {_quote_path(job)}{survey_option}")
         print(f"  tankcal import ... --out {_quote_path(job)}")
     say(message("import_next", "then"))
     print(f"  tankcal run {_quote_path(job)}")

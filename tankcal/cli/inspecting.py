@@ -1,11 +1,12 @@
 """`tankcal inspect`: plumb, roundness, welds and settlement of a tank from its survey."""
 
-from tankcal.cli.arguments import add_language, yield_mpa
-from tankcal.cli.machine import add_json, print_saved
+from tankcal.cli.arguments import add_language, parse_yield
 from tankcal.cli.showing import (
     Progress,
+    add_json,
     language_of_run,
     prepare_for_small_work,
+    print_saved,
     say,
     speak,
     warn,
@@ -54,7 +55,7 @@ def add(commands):
     inspect.add_argument(
         "--yield-mpa",
         metavar="MPA",
-        type=yield_mpa,
+        type=parse_yield,
         help="yield strength of the steel, for the limits of settlement (default: value of the "
         "job)",
     )
@@ -70,10 +71,14 @@ def add(commands):
 
 
 def _inspect(options):
-    from tankcal.cli.asked_language import asked_language, asked_of_record
+    from tankcal.cli.input_language import read_job_language, read_record_language
 
     prepare_for_small_work()
-    speak(options.language or asked_of_record(options.source) or asked_language(options.source))
+    speak(
+        options.language
+        or read_record_language(options.source)
+        or read_job_language(options.source)
+    )
     from tankcal.inspection.inspecting import Asked, inspect_files
     from tankcal.record.schema import to_plain
 

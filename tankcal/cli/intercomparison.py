@@ -3,13 +3,14 @@
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language, parse_count, refuse_argument
-from tankcal.cli.machine import add_json, print_saved
 from tankcal.cli.showing import (
     Progress,
+    add_json,
     language_of_run,
     marks,
     prepare_for_small_work,
     print_paths,
+    print_saved,
     say,
     say_in_language,
     speak,

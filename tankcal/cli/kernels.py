@@ -13,7 +13,7 @@ import numpy as np
 
 from tankcal.messages import message
 
-ROWS = 3000  # of the table: from here on a walk over its chords is compiled
+ROWS = 3000  # rows of a table whose breakpoints are searched by compiled loops
 
 
 def main():
@@ -28,7 +28,7 @@ def main():
         print(text, file=sys.stderr)
         return 1
     adjusted = adjust(small_survey())
-    adjusted.residuals  # noqa: B018 (what it computes needs loops of its own)
+    adjusted.residuals  # noqa: B018 (its computation needs further loops)
     adjusted.point_covariances_m2  # noqa: B018
     adjusted.covariance_m2()
     height_m = np.linspace(0.0, 10.0, ROWS)

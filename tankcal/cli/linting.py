@@ -1,8 +1,7 @@
 """`tankcal lint`: errors in any capacity table."""
 
-from tankcal.cli.arguments import add_language, positive
-from tankcal.cli.machine import add_json, print_json
-from tankcal.cli.showing import prepare_for_small_work, say, speak
+from tankcal.cli.arguments import add_language, parse_positive
+from tankcal.cli.showing import add_json, prepare_for_small_work, print_json, say, speak
 from tankcal.errors import InputError, Problem, problem_of
 from tankcal.messages import message
 
@@ -40,7 +39,7 @@ def add(commands):
         ("diameter", "M", "inside diameter of a vertical tank, m; requires --nominal-height"),
         ("height", "M", "nominal height of the last row, m"),
     ):
-        lint.add_argument(f"--nominal-{name}", metavar=unit, type=positive, help=what)
+        lint.add_argument(f"--nominal-{name}", metavar=unit, type=parse_positive, help=what)
     add_language(lint)
     add_json(lint)
     lint.set_defaults(command=_lint)

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, parse_count, parse_list, share
-from tankcal.cli.planned_counts import plan_holds
+from tankcal.cli.arguments import add_language, parse_count, parse_several, parse_share
+from tankcal.cli.plan_items import describe_change, describe_items
 from tankcal.cli.showing import (
     Progress,
     marks,
@@ -13,11 +13,12 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
-from tankcal.cli.wall_plans import wall_item, wall_scatter, wall_summary
+from tankcal.errors import InputError, Problem, SolutionError, TankcalError
 from tankcal.messages import message
 from tankcal.text.digits import fixed, format_significant, format_with_u
 
 SHOWN = 12  # changes in the terminal
+SCALES = ("meter_factor", "scale", "instrument_scale")  # parameters that metered liquid determines
 
 
 def add(commands):
@@ -56,14 +57,14 @@ def add(commands):
     plan.add_argument(
         "--simulate",
         metavar="N",
-        type=parse_list,
+        type=parse_several,
         help="simulate the readings of N surveys, compute each survey, and compare the scatter "
         "with the prediction",
     )
     plan.add_argument(
         "--blunders",
         metavar="SHARE",
-        type=share,
+        type=parse_share,
         default=0.0,
         help="share of the simulated readings with a blunder of 20 standard deviations, such as "
         "0.01 (default: none)",
@@ -78,13 +79,13 @@ def add(commands):
 
 def _plan(options):
     prepare_for_small_work()
-    from tankcal.cli.asked_language import asked_of_plan
-    from tankcal.errors import TankcalError
+    from tankcal.cli.input_language import read_plan_language
     from tankcal.planning import load_plan, predict
+    from tankcal.planning.improvements import smallest, what_helps
     from tankcal.planning.wall.model import WallPlan
     from tankcal.report import planning as planning_papers
 
-    speak(options.language or asked_of_plan(options.plan))
+    speak(options.language or read_plan_language(options.plan))
     _refuse_idle(options)
     show = Progress(options.quiet)
     show.step(message("plan_reading", "reading {plan}", plan=options.plan))
@@ -104,8 +105,12 @@ def _plan(options):
         for line in _remedies(plan, error, options, show):
             say(line)
         raise
-    effects, path = _study_changes(plan, prediction, options, show)
-    simulated = _simulated(prediction, options, show)
+    effects, path = (), None
+    if options.changes:
+        effects = what_helps(plan, progress=show.part, before=prediction)
+    if options.smallest:
+        path = smallest(plan, progress=show.part)
+    simulated = _simulate(prediction, options, show)
     written = ()
     if options.out is not None:
         written = planning_papers.write(
@@ -115,8 +120,8 @@ def _plan(options):
         )  # fmt: skip
     show.end()
     warn(prediction.warnings)
-    summary = wall_summary(prediction) if is_wall else _summary(prediction)
-    scatter = wall_scatter(simulated) if is_wall else _scatter(simulated)
+    summary = _wall_summary(prediction) if is_wall else _network_summary(prediction)
+    scatter = _wall_scatter(simulated) if is_wall else _network_scatter(simulated)
     lines = (*summary, *_verdict(prediction), *_changes(effects), *_design(path), *scatter)
     for line in lines:
         say(line)
@@ -126,8 +131,6 @@ def _plan(options):
 
 def _refuse_idle(options):
     """Raise InputError for options that have no effect."""
-    from tankcal.errors import InputError, Problem
-
     problems = []
     if options.blunders and options.simulate is None:
         expected = message(
@@ -146,8 +149,6 @@ def _refuse_idle(options):
 
 
 def _refuse_simulation(plan, options):
-    from tankcal.errors import InputError, Problem
-
     if options.simulate is not None and plan.design.runs:
         expected = message(
             "plan_runs_not_simulated",
@@ -157,8 +158,6 @@ def _refuse_simulation(plan, options):
 
 
 def _refuse_unlimited(plan):
-    from tankcal.errors import InputError, Problem
-
     if plan.limits.relative_u is None:
         expected = message(
             "plan_no_limit",
@@ -167,17 +166,8 @@ def _refuse_unlimited(plan):
         raise InputError(Problem("plan.toml", expected, None, "limits.relative_u"))
 
 
-def _study_changes(plan, prediction, options, show):
-    """Return the effects of all changes, or (), and the path to the smallest design, or None."""
-    from tankcal.planning.improvements import smallest, what_helps
-
-    effects = what_helps(plan, progress=show.part, before=prediction) if options.changes else ()
-    return effects, smallest(plan, progress=show.part) if options.smallest else None
-
-
 def _remedies(plan, error, options, show):
     """Yield additions that would determine a survey of targets without a solution."""
-    from tankcal.errors import SolutionError
     from tankcal.planning.improvements import what_would_do
     from tankcal.planning.model import Plan
 
@@ -196,7 +186,7 @@ def _remedies(plan, error, options, show):
         )
 
 
-def _simulated(prediction, options, show):
+def _simulate(prediction, options, show):
     if options.simulate is None:
         return None
     from tankcal.planning.simulations import simulate
@@ -207,7 +197,7 @@ def _simulated(prediction, options, show):
     return draw(prediction, options.simulate, options.seed, options.blunders, show.part)
 
 
-def _summary(prediction):
+def _network_summary(prediction):
     """Yield the items of the plan and the predicted quality of its points."""
     from tankcal.planning.bases import group_by_ends
 
@@ -221,7 +211,7 @@ def _summary(prediction):
         "control": len(plan.known),
         "targets": len(plan.targets.names),
     }
-    yield plan_holds(plan, counts)
+    yield describe_items(plan, counts)
     yield message(
         "plan_network",
         "network: {rows} observations, {unknowns} unknowns, redundancy {dof}; mean standard "
@@ -327,40 +317,6 @@ def _effect(effect):
     )
 
 
-def describe_change(change):
-    """Return the action and the item of a change in words."""
-    item = wall_item(change) or _item(change.item, change.name)
-    if change.action == "add":
-        return message("plan_add", "add {item}", item=item)
-    if change.action == "drop":
-        return message("plan_drop", "drop {item}", item=item)
-    return message("plan_repeat", "repeat {item}", item=item)
-
-
-def _item(item, name):
-    """Return an item of a plan (`planning.changes.ITEMS`) in words."""
-    from tankcal.planning.changes import IMAGES, OF_COURSE, ROW
-
-    if item == "photo_station":
-        return message("plan_photo_station", "photo station {name}", name=name)
-    if item == "setup":
-        return message("plan_setup", "setup {name}", name=name)
-    if item == "tape":
-        return message("plan_tape", "tape {name}", name=name)
-    if item == "base":
-        return message("plan_base", "base {name}", name=name)
-    if item == "control_point":
-        return message("plan_control_point", "control point {name}", name=name)
-    if item == "target_row" and name.startswith(OF_COURSE):
-        course = name.removeprefix(OF_COURSE)
-        return message("plan_row_of_course", "target row in course {course}", course=course)
-    if item == "target_row":
-        return message("plan_row", "target row {section}", section=name.removeprefix(ROW))
-    if name == IMAGES:
-        return message("plan_all_images", "measurement of all image points")
-    return message("plan_all_sets", "measurement of all sets of the total station")
-
-
 def _design(path):
     if path is None:
         return
@@ -394,7 +350,7 @@ def _design(path):
         yield message("plan_none_meets", "  no evaluated plan meets the limit")
 
 
-def _scatter(scatter):
+def _network_scatter(scatter):
     if scatter is None:
         return
     yield message(
@@ -413,3 +369,81 @@ def _scatter(scatter):
 
 def _percent(share):
     return f"{format_significant(100 * float(share), 3, marks())} %"
+
+
+def _wall_summary(prediction):
+    """Yield the items of the plan and the predicted u of the course radii."""
+    from tankcal.record.plan import survey_of
+
+    plan = prediction.plan
+    has = survey_of(plan)
+    counts = {"straps": has.strap_readings}
+    for kind in ("lines", "offsets", "setups", "hits", "tangents", "runs", "batches"):
+        counts[kind] = getattr(has, kind)
+    yield describe_items(plan, counts)
+    for course in prediction.courses:
+        yield message(
+            "plan_course_radius",
+            "course {course}: u of the mean radius {sd} mm",
+            course=course.name,
+            sd=format_significant(1000 * course.radius_sd_m, 2, marks()),
+        )
+    if prediction.filling is not None:
+        yield from _describe_filling(prediction.filling)
+
+
+def _describe_filling(outlook):
+    """Yield the effect of runs of liquid on the uncertainty of the geometry."""
+    for dip in outlook.dips:
+        yield message(
+            "plan_dip_beside",
+            "V({dip} m): U = {uncertainty} m3; from geometry alone {before} m3",
+            dip=fixed(dip.dip_m, 3, marks()),
+            uncertainty=format_significant(dip.U_m3, 2, marks()),
+            before=format_significant(dip.U_geometry_m3, 2, marks()),
+        )
+    for cause in outlook.causes:
+        if cause.kind in SCALES:
+            yield message(
+                "plan_told_by_liquid",
+                "{name}: u {before} {unit} without the liquid, {after} {unit} with it",
+                name=cause.name or message("plan_scale_of_all", "scale"),
+                unit=cause.unit,
+                before=format_significant(cause.u_before, 3, marks()),
+                after=format_significant(cause.u_after, 3, marks()),
+            )
+    if outlook.detectable_radius_m is not None:
+        yield message(
+            "plan_radius_shown",
+            "smallest detectable offset of all radii of the geometry: {radius} mm",
+            radius=format_significant(1000 * outlook.detectable_radius_m, 2, marks()),
+        )
+
+
+def _wall_scatter(scatter):
+    """Yield the result of simulated surveys of random walls; nothing for None."""
+    if scatter is None:
+        return
+    low, median, high = scatter.U_ratios
+    yield message(
+        "plan_wall_scatter",
+        "{runs} simulated surveys of random walls: ratio of volume error to prediction "
+        "{ratio:.3f} (standard deviation {ratio_sd:.2g}); ratio of U to prediction "
+        "{median:.2f} ({low:.2f} to {high:.2f}); true volume within U in {covered} of full "
+        "tanks, {rows} of all rows; {aside:.1f} readings rejected on average, without a "
+        "solution: {failed}",
+        runs=scatter.runs,
+        ratio=scatter.volume_ratio,
+        ratio_sd=scatter.volume_ratio_sd,
+        median=median,
+        low=low,
+        high=high,
+        covered=_share(scatter.covered),
+        rows=_share(scatter.within.mean()),
+        aside=scatter.set_aside.mean(),
+        failed=len(scatter.failed),
+    )
+
+
+def _share(number):
+    return f"{fixed(100 * float(number), 1, marks())} %"

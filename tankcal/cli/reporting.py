@@ -48,7 +48,7 @@ def add_letterhead(parser):
     )
 
 
-def letterhead_of(options):
+def read_letterhead(options):
     """Return the checked letterhead of the options, or None."""
     if options.letterhead is None:
         return None
@@ -62,7 +62,7 @@ def _report(options):
     from tankcal.report.saved_documents import find_document
 
     show = Progress(options.quiet)
-    letterhead = letterhead_of(options)
+    letterhead = read_letterhead(options)
     document, saved = find_document(options.record)
     if document is not None:
         language = outputs.known_language(options.language)

@@ -1,18 +1,17 @@
 """`tankcal run` and `tankcal demo`: computation of a job and output of its results."""
 
-from functools import partial
 from pathlib import Path
 
 import tankcal
 from tankcal.cli.arguments import parse_cluster
-from tankcal.cli.machine import add_json, print_json
-from tankcal.cli.reporting import add_letterhead, letterhead_of
-from tankcal.cli.set_aside import lines_set_aside
+from tankcal.cli.reporting import add_letterhead, read_letterhead
 from tankcal.cli.showing import (
     Progress,
+    add_json,
     marks,
     prepare_for_small_work,
     print_doubts,
+    print_json,
     print_paths,
     read_job,
     say,
@@ -27,6 +26,8 @@ from tankcal.text.digits import (
     format_significant,
     format_with_u,
 )
+
+MOST_NAMES = 5  # of rejected observations of a kind
 
 
 def add(commands):
@@ -73,9 +74,9 @@ def _add_run(commands):
         help="write no file if the global test of the adjustment fails, or if a rejected "
         "observation may not be the blunder (exit status 3)",
     )
-    of_papers = run.add_mutually_exclusive_group()
-    add_letterhead(of_papers)
-    of_papers.add_argument(
+    papers = run.add_mutually_exclusive_group()
+    add_letterhead(papers)
+    papers.add_argument(
         "--no-papers",
         action="store_true",
         help="write the record and the CSV files only; tankcal report creates workbook and "
@@ -96,32 +97,72 @@ def _add_run(commands):
 
 
 def _run(options):
-    source = Path(options.job)
     from tankcal.report.folders import default_folder
 
-    out = Path(options.out) if options.out else default_folder(source)
-    compute = partial(_adjust if options.only == "adjustment" else _compute, options.cluster)
-    tell = _tell_machine if options.machine else _tell
-    quiet = options.quiet or options.machine
-    papers = letterhead_of(options), not options.no_papers
-    compute(source, out, quiet, options.strict, papers, tell)
+    source = Path(options.job)
+    _compute(
+        source,
+        Path(options.out) if options.out else default_folder(source),
+        quiet=options.quiet or options.machine,
+        only=options.only,
+        strict=options.strict,
+        cluster=options.cluster,
+        papers=(read_letterhead(options), not options.no_papers),
+        tell=_tell_machine if options.machine else _tell,
+    )
 
 
 def _demo(options):
     from tankcal.text.shipped import shipped_folder
 
-    _compute(None, shipped_folder("examples") / "silva-1995", Path(options.out), options.quiet)
+    job = shipped_folder("examples") / "silva-1995"
+    _compute(job, Path(options.out), quiet=options.quiet, tell=_tell)
 
 
-def _print_doubts_of_job(job, show, tell):
-    """Print implausible inputs before the computation, which they may slow down."""
-    doubts = _doubts_among(job.warnings)
-    if doubts and tell is _tell:
+def _compute(
+    source, out, *, quiet, tell, only=None, strict=False, cluster=None, papers=(None, True)
+):
+    """Compute a job, or with only="adjustment" its survey; write and print the results.
+
+    `papers` is (letterhead or None, whether to write the reports); `tell` prints the results.
+    """
+    prepare_for_small_work()
+    show = Progress(quiet)
+    job = read_job(source, show, only=only)
+    from tankcal.report import outputs
+
+    outputs.refuse_foreign(out)
+    doubts = _find_doubts(job.warnings)
+    if doubts and tell is _tell:  # before the computation, which they may slow down
         show.end()
         print_doubts(doubts)
+    result = None
+    if only == "adjustment":
+        adjustment = tankcal.adjust_job(job, show.step)
+    else:
+        result = tankcal.run(job, show.step, part_progress=show.part, cluster=cluster)
+        adjustment = result.adjustment
+    if strict:
+        _refuse_failed(adjustment)
+    if result is None:
+        paths = outputs.write_adjustment(job, adjustment, out, show.part, *papers)
+        warnings = dict.fromkeys((*job.warnings, *adjustment.warnings, *_idle_cluster(cluster)))
+    else:
+        paths = outputs.write(result, out, show.part, *papers)
+        warnings = (*result.warnings, *_idle_cluster(cluster, result.job.clouds))
+    show.end()
+    tell(out, paths, warnings, result, adjustment)
 
 
-def _doubts_among(warnings):
+def _idle_cluster(cluster, clouds=None):
+    """Return a warning for requested workers if there are no clouds to read."""
+    if cluster in (None, "auto", 0) or clouds is not None:
+        return ()
+    text = message("cluster_idle", "without effect: the job has no point cloud")
+    return (Problem("--cluster", text),)
+
+
+def _find_doubts(warnings):
     from tankcal.job.plausibility_table import CODES
 
     return [warning for warning in warnings if getattr(warning.expected, "code", None) in CODES]
@@ -129,13 +170,13 @@ def _doubts_among(warnings):
 
 def _tell(out, paths, warnings, result, adjustment):
     """Print warnings, a summary and the files; print implausible inputs again at the end."""
-    doubts = _doubts_among(warnings)
+    doubts = _find_doubts(warnings)
     warn(warning for warning in warnings if warning not in doubts)
     if adjustment is not None:
         say(_summary(adjustment))
     if result is not None:
         say(_capacity(result))
-    for line in lines_set_aside(result, adjustment):
+    for line in describe_rejected(result, adjustment):
         say(line)
     print_paths(out, paths)
     print_doubts(doubts)
@@ -178,32 +219,6 @@ def _fit(adjustment):
     }
 
 
-def _compute(cluster, source, out, quiet, strict=False, papers=(), tell=_tell):
-    prepare_for_small_work()
-    show = Progress(quiet)
-    job = read_job(source, show)
-    from tankcal.report import outputs
-
-    outputs.refuse_foreign(out)
-    _print_doubts_of_job(job, show, tell)
-    result = tankcal.run(job, show.step, part_progress=show.part, cluster=cluster)
-    adjustment = result.adjustment
-    if strict:
-        _refuse_failed(adjustment)
-    paths = outputs.write(result, out, show.part, *papers)
-    show.end()
-    warnings = (*result.warnings, *_idle_cluster(cluster, result.job.clouds))
-    tell(out, paths, warnings, result, adjustment)
-
-
-def _idle_cluster(cluster, clouds):
-    """Return a warning for requested workers if there are no clouds to read."""
-    if cluster in (None, "auto", 0) or clouds is not None:
-        return ()
-    text = message("cluster_idle", "without effect: the job has no point cloud")
-    return (Problem("--cluster", text),)
-
-
 def _capacity(result):
     """Return one line with the capacity, rounded to the digits of U, and the number of points."""
     top_m = result.table.height_m[-1]
@@ -223,27 +238,27 @@ def _capacity(result):
             accepted=accepted,
             rejected=len(result.job.points.names) - accepted,
         )
+    values = {
+        "tank": result.job.tank.id,
+        "unit": unit,
+        "height": fixed(top_m, decimals_of_height(top_m), marks()),
+        "points": points,
+    }
     if not stated.U_m3[-1] > 0:
         return message(
             "holds_without_u",
             "{tank}: {volume} {unit} at {height} m, no uncertainty stated, because no input has "
             "a declared uncertainty{points}",
-            tank=result.job.tank.id,
             volume=fixed(factor * top.value_m3, decimals, marks()),
-            unit=unit,
-            height=fixed(top_m, decimals_of_height(top_m), marks()),
-            points=points,
+            **values,
         )
     return message(
         "holds",
         "{tank}: {volume} {unit} at {height} m, U = {uncertainty} {unit} ({how}){points}",
-        unit=unit,
-        tank=result.job.tank.id,
         volume=volume.value,
-        height=fixed(top_m, decimals_of_height(top_m), marks()),
         uncertainty=fixed(U, decimals_of(U, least=None), marks()),
         how=how,
-        points=points,
+        **values,
     )
 
 
@@ -253,23 +268,6 @@ def _volume_unit(name):
 
     shown = message("cubic_metres", "m3") if name == "m3" else name
     return shown, float(1 / VOLUME_UNITS_M3[name]), TABLE_DECIMALS[name]
-
-
-def _adjust(cluster, source, out, quiet, strict, papers, tell=_tell):
-    prepare_for_small_work()
-    show = Progress(quiet)
-    job = read_job(source, show, only="adjustment")
-    from tankcal.report import outputs
-
-    outputs.refuse_foreign(out)
-    _print_doubts_of_job(job, show, tell)
-    adjustment = tankcal.adjust_job(job, show.step)
-    if strict:
-        _refuse_failed(adjustment)
-    paths = outputs.write_adjustment(job, adjustment, out, show.part, *papers)
-    show.end()
-    warnings = (*job.warnings, *adjustment.warnings, *_idle_cluster(cluster, None))
-    tell(out, paths, dict.fromkeys(warnings), None, adjustment)
 
 
 def _refuse_failed(adjustment):
@@ -310,14 +308,14 @@ def _summary(adjustment):
     return message(
         "adjusted",
         "adjustment: {fit}, {set_aside}, {points}{mean}",
-        fit=_fit_of(adjustment),
-        set_aside=_set_aside(removed),
-        points=_points(len(adjustment.names)),
+        fit=_describe_fit(adjustment),
+        set_aside=_count_rejected(removed),
+        points=_count_points(len(adjustment.names)),
         mean=mean,
     )
 
 
-def _fit_of(adjustment):
+def _describe_fit(adjustment):
     if adjustment.redundancy <= 0:
         return message(
             "not_tested",
@@ -336,7 +334,7 @@ def _fit_of(adjustment):
     )
 
 
-def _set_aside(count):
+def _count_rejected(count):
     if count == 0:
         return message("none_set_aside", "no observations rejected")
     if count == 1:
@@ -344,7 +342,82 @@ def _set_aside(count):
     return message("some_set_aside", "{count} observations rejected", count=count)
 
 
-def _points(count):
+def _count_points(count):
     if count == 1:
         return message("one_point", "1 point")
     return message("some_points", "{count} points", count=count)
+
+
+def describe_rejected(result, adjustment):
+    """Yield a line (Message) with the first names for each kind of rejected observations.
+
+    Parameters
+    ----------
+    result : Result or None
+        None: only the survey was adjusted.
+    adjustment : NetworkAdjustment or None
+    """
+    kinds = []
+    if result is not None:
+        kinds = [
+            (message("set_aside_points", "points rejected"), _rejected_points(result)),
+            (message("set_aside_straps", "circumferences rejected"), _rejected_straps(result)),
+            (message("set_aside_offsets", "offsets rejected"), _rejected_offsets(result)),
+        ]
+    readings = message("set_aside_readings", "readings rejected")
+    for kind, all_names in (*kinds, (readings, _rejected_readings(adjustment))):
+        names = list(dict.fromkeys(all_names))
+        if len(names) > MOST_NAMES:
+            yield message(
+                "set_aside_and_more",
+                "  {what}: {names} and {more} more (see the working papers)",
+                what=kind,
+                names=names[:MOST_NAMES],
+                more=len(names) - MOST_NAMES,
+            )
+        elif names:
+            yield message("set_aside_named", "  {what}: {names}", what=kind, names=names)
+
+
+def _rejected_points(result):
+    """Yield the names of the rejected points of the wall."""
+    if result.accepted is not None:
+        kept = {int(i) for i in result.accepted}
+        yield from (name for i, name in enumerate(result.job.points.names) if i not in kept)
+
+
+def _rejected_straps(result):
+    """Yield the names and rows of the rejected circumferences."""
+    straps = result.straps
+    for i in () if straps is None else straps.adjusted[~straps.accepted]:
+        strap = straps.reduced[i].strap
+        yield message("named_in_row", "{name} (row {row})", name=strap.name, row=str(strap.row))
+
+
+def _rejected_offsets(result):
+    """Yield the lines, levels and rows of the rejected offsets."""
+    read, lines = result.read, result.job.lines
+    if read is None or lines is None:
+        return
+    for i in read.places[read.are("offsets")][~read.tests_of("offsets")[2]]:
+        offset = lines.offsets[i]
+        yield message(
+            "named_at_level",
+            "line {line} at {level_m:g} m (row {row})",
+            line=offset.line,
+            level_m=offset.level_m,
+            row=str(offset.row),
+        )
+
+
+def _rejected_readings(adjustment):
+    """Yield the ends, file and row of the rejected readings, largest test statistic first."""
+    removed = () if adjustment is None else adjustment.removed
+    for reading in sorted(removed, key=lambda reading: -abs(reading.w)):
+        yield message(
+            "named_in_file",
+            "{ends} ({file}, row {row})",
+            ends="-".join(map(str, reading.ids)),
+            file=reading.file,
+            row="-" if reading.row is None else str(reading.row),
+        )

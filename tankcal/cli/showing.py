@@ -1,6 +1,11 @@
-"""Terminal output in the language of the job: progress, warnings, lists of files."""
+"""Terminal output in the language of the job: progress, warnings, lists of files; JSON output.
 
+With `--json` a command prints one JSON object on standard output, for other programs.
+"""
+
+import codecs
 import gc
+import json
 import os
 import shutil
 import sys
@@ -8,15 +13,14 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from tankcal.errors import InputError
+from tankcal.errors import InputError, problem_of
 from tankcal.messages import Message, message, printable, printable_lines
 from tankcal.text.languages import DEFAULT, nearest_language
-from tankcal.text.time_left import how_far
+from tankcal.text.time_left import describe_progress
 
 RECORD = "record.json"
-OBJECTS_AT_ONCE = (
-    10_000  # allocations between garbage collections: objects of modules are permanent
-)
+# Allocations between garbage collections; many, because objects of modules are permanent
+OBJECTS_AT_ONCE = 10_000
 _LOCALE = ("LC_ALL", "LC_MESSAGES", "LANG")  # in order of priority
 TO_THE_END = "\x1b[K"  # control sequence: clear the rest of the line
 _spoken = {}  # words of the current language; empty: the English of the messages
@@ -29,7 +33,7 @@ def speak(language=None):
         setting = next((os.environ[name] for name in _LOCALE if os.environ.get(name)), "")
         language = nearest_language(setting) or DEFAULT
     if language != DEFAULT:
-        from tankcal.text.word_files import load_words
+        from tankcal.text.words import load_words
 
         _spoken.update(load_words(language))
 
@@ -88,9 +92,9 @@ def complain(text):
 
 def read_job(source, show, **options):
     """Return the checked Job of a folder or workbook; set its language."""
-    from tankcal.cli.asked_language import asked_language
+    from tankcal.cli.input_language import read_job_language
 
-    language = asked_language(source)
+    language = read_job_language(source)
     if language is not None:
         speak(language)
     show.step(message("reading_job", "reading {file}", file=str(source)))
@@ -132,6 +136,53 @@ def print_paths(out, paths):
         print(f"  {printable(path)}")
 
 
+def add_json(parser):
+    """Add the option `--json` to a command."""
+    parser.add_argument(
+        "--json",
+        dest="machine",
+        action="store_true",
+        help="print one JSON object in place of lines of text, also for errors; implies --quiet",
+    )
+
+
+def print_json(**values):
+    """Print one object, in ASCII if the output is not UTF-8; missing numbers are null."""
+    in_ascii = codecs.lookup(sys.stdout.encoding or "ascii").name != "utf-8"
+    json.dump(values, sys.stdout, ensure_ascii=in_ascii, allow_nan=False, indent=1)
+    print()
+
+
+def print_saved(options, results, tell, written):
+    """Print the results of a command, by tell(results) in lines of text, and its written files.
+
+    Parameters
+    ----------
+    options : Namespace
+    results : dict
+        With `--json`, one object with these values is printed.
+    tell : callable
+    written : sequence of Path
+        Paths below options.out.
+    """
+    if options.machine:
+        print_json(exit_status=0, **results)
+        return
+    tell(results)
+    if written:
+        print_paths(Path(options.out), [path.name for path in written])
+
+
+def failure(error):
+    """Return the output for a `TankcalError`: its problems and the exit status."""
+    problems = error.problems if isinstance(error, InputError) else ()
+    return {
+        "exit_status": error.exit_status,
+        "problems": [problem_of(problem) for problem in problems],
+        "error": None if problems else str(error),
+    }
+
+
 class Progress:
     """Progress on standard error: one line per step, updated on a terminal."""
 
@@ -156,7 +207,9 @@ class Progress:
             self._line, self.began = line, (time.monotonic(), done)
         if self.live and total:
             began, first = self.began
-            so_far = say_in_language(how_far(done, total, done - first, time.monotonic() - began))
+            so_far = say_in_language(
+                describe_progress(done, total, done - first, time.monotonic() - began)
+            )
             width = shutil.get_terminal_size().columns - 1
             if self._line and len(self._line) + 1 + len(so_far) > width:
                 print(file=sys.stderr)  # a wrapped line cannot be overwritten

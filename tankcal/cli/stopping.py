@@ -8,7 +8,7 @@ _OF_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start ne
 ENDING = ("SIGTERM", "SIGHUP")  # beside SIGINT, which Python turns into KeyboardInterrupt
 
 
-class Ended(KeyboardInterrupt):
+class EndingSignal(KeyboardInterrupt):
     """A signal ended the command; unfinished work is undone, as after Ctrl-C.
 
     number  number of the signal
@@ -20,26 +20,26 @@ class Ended(KeyboardInterrupt):
 
 
 @contextmanager
-def ended_by_signals():
-    """Raise `Ended` in the block for a signal of ENDING; ignored signals remain ignored."""
-    ours = []
+def raise_at_signals():
+    """Raise `EndingSignal` in the block for a signal of ENDING; ignored signals remain ignored."""
+    handled = []
     if threading.current_thread() is threading.main_thread():
         numbers = [getattr(signal, name) for name in ENDING if hasattr(signal, name)]
-        ours = [number for number in numbers if signal.getsignal(number) == signal.SIG_DFL]
-    for number in ours:
+        handled = [number for number in numbers if signal.getsignal(number) == signal.SIG_DFL]
+    for number in handled:
         signal.signal(number, _end)
     try:
         yield
     finally:
-        for number in ours:
+        for number in handled:
             signal.signal(number, signal.SIG_DFL)
 
 
 def _end(number, _):
-    raise Ended(number)
+    raise EndingSignal(number)
 
 
-def stopped_status(error):
+def signal_status(error):
     """Return the exit status of a command ended by a signal (128 + signal), or None.
 
     Also if a library raised another error while handling the signal.
@@ -49,7 +49,7 @@ def stopped_status(error):
     return None if error is None else 128 + getattr(error, "number", signal.SIGINT)
 
 
-def is_of_memory(error):
+def is_out_of_memory(error):
     """Return whether a command failed for lack of memory.
 
     Python raises other errors for libraries that cannot be loaded and threads that cannot start.

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, positive
+from tankcal.cli.arguments import add_language, parse_positive
 from tankcal.cli.showing import (
     language_of_run,
     marks,
@@ -53,11 +53,11 @@ def add(commands):
     )
     parser.add_argument("--out", metavar="DIR", help="write a job to this folder, all or nothing")
     parser.add_argument(
-        "--e-gpa", metavar="GPA", type=positive, default=206.0,
+        "--e-gpa", metavar="GPA", type=parse_positive, default=206.0,
         help="Young's modulus of the shell (default 206)",
     )  # fmt: skip
     parser.add_argument(
-        "--bottom", metavar="M", type=positive,
+        "--bottom", metavar="M", type=parse_positive,
         help="dip of the highest point of the bottom, m (default: estimated)",
     )  # fmt: skip
     add_language(parser)

@@ -3,8 +3,15 @@
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language
-from tankcal.cli.machine import add_json, print_json
-from tankcal.cli.showing import marks, prepare_for_small_work, say, speak_of_record, warn
+from tankcal.cli.showing import (
+    add_json,
+    marks,
+    prepare_for_small_work,
+    print_json,
+    say,
+    speak_of_record,
+    warn,
+)
 from tankcal.errors import InputError, Problem, problem_of
 from tankcal.messages import message, printable
 from tankcal.text.digits import fixed, format_with_u

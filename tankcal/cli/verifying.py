@@ -3,8 +3,14 @@
 from dataclasses import asdict
 
 from tankcal.cli.arguments import add_language
-from tankcal.cli.machine import add_json, print_json
-from tankcal.cli.showing import Progress, prepare_for_small_work, say, speak_of_record
+from tankcal.cli.showing import (
+    Progress,
+    add_json,
+    prepare_for_small_work,
+    print_json,
+    say,
+    speak_of_record,
+)
 from tankcal.errors import problem_of
 from tankcal.messages import message, printable
 

@@ -68,11 +68,11 @@ def _port(text):
 
 def _write_notebook(options, out):
     """Return the path of the notebook of a job, after writing it or keeping manual changes."""
-    from tankcal.cli.asked_language import asked_language
+    from tankcal.cli.input_language import read_job_language
     from tankcal.workbench.draft import Draft, source_of
     from tankcal.workbench.notebook_file import notebook_path, write_notebook
 
-    language = options.language or asked_language(options.job)
+    language = options.language or read_job_language(options.job)
     if language is not None:
         speak(language)
     source = source_of(options.job)

@@ -6,15 +6,15 @@ its own frame. `pieces_of` divides a file into pieces that processes can read in
 """
 
 from tankcal.clouds.contents import CloudChunk, CloudHeader, CloudPiece, ScanHeader
-from tankcal.clouds.reading import count_about, describe_cloud, pieces_of, read_cloud
+from tankcal.clouds.reading import describe_cloud, estimate_count, pieces_of, read_cloud
 
 __all__ = [
     "CloudChunk",
     "CloudHeader",
     "CloudPiece",
     "ScanHeader",
-    "count_about",
     "describe_cloud",
+    "estimate_count",
     "pieces_of",
     "read_cloud",
 ]

@@ -5,8 +5,8 @@ import time
 import numpy as np
 
 from tankcal.clouds.contents import WHOLE, CloudChunk, CloudHeader
-from tankcal.clouds.formats import describe_file, read_pieces, share_out
-from tankcal.clouds.formats.columns import rows_about
+from tankcal.clouds.formats import describe_file, divide_file, read_pieces
+from tankcal.clouds.formats.columns import estimate_rows
 from tankcal.clouds.formats.files import EXTENT_LIMIT, count_mismatch, open_cloud
 from tankcal.errors import reason_of
 from tankcal.messages import message
@@ -42,7 +42,7 @@ def describe_cloud(path):
     'xyz'
     """
     file = open_cloud(path)
-    kind, scans = _guarded(file, lambda: describe_file(file))
+    kind, scans = _run_guarded(file, lambda: describe_file(file))
     return CloudHeader(file.path, kind, file.bytes, scans)
 
 
@@ -72,17 +72,17 @@ def pieces_of(header, points_each):
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "wall.xyz"
     >>> _ = path.write_text("6.5 0 1\\n0 6.5 1\\n0 6.5 2\\n")
     >>> header = describe_cloud(path)
-    >>> [one.first for one in pieces_of(header, 1)]
+    >>> [piece.first for piece in pieces_of(header, 1)]
     [0, 16]
     """
-    file = _unchanged(header)
-    return _guarded(file, lambda: share_out(file, points_each))
+    file = _open_unchanged(header)
+    return _run_guarded(file, lambda: divide_file(file, points_each))
 
 
-def count_about(header):
+def estimate_count(header):
     """Number of points of a file, declared or estimated from the first lines of a text file."""
     declared = [scan.declared for scan in header.scans]
-    return rows_about(open_cloud(header.path)) if None in declared else sum(declared)
+    return estimate_rows(open_cloud(header.path)) if None in declared else sum(declared)
 
 
 def read_cloud(header, *, piece=WHOLE, unit_m=1.0, chunk=1 << 18, progress=None):
@@ -123,19 +123,19 @@ def read_cloud(header, *, piece=WHOLE, unit_m=1.0, chunk=1 << 18, progress=None)
     ...     print(part.scan, part.xyz_m)
     0 [[6.5005 0.     1.    ]]
     """
-    file = _unchanged(header)
+    file = _open_unchanged(header)
     count = _Count(file, header, piece, progress)
     check = _Check(file, unit_m, piece)
     chunks = iter(read_pieces(file, chunk, piece))
-    while (records := _guarded(file, lambda: next(chunks, None))) is not None:
+    while (records := _run_guarded(file, lambda: next(chunks, None))) is not None:
         count.add(records)
-        xyz = check.metres(records)
+        xyz = check.to_metres(records)
         if len(xyz):
             yield CloudChunk(records.scan, xyz)
     count.finish()
 
 
-def _unchanged(header):
+def _open_unchanged(header):
     """Open the file of a header; raise InputError if its size has changed."""
     file = open_cloud(header.path)
     if file.bytes != header.bytes:
@@ -150,7 +150,7 @@ def _unchanged(header):
     return file
 
 
-def _guarded(file, task):
+def _run_guarded(file, task):
     """Run a task and convert an OSError into an InputError of the file."""
     try:
         return task()
@@ -176,13 +176,13 @@ class _Count:
         elif piece.count is not None and self.declared[0] is not None:
             self.first, self.declared = piece.first, [piece.count]
         self.total = None if None in self.declared else sum(self.declared)
-        self.told = time.monotonic()
+        self.reported_s = time.monotonic()
 
     def add(self, piece):
         """Add the records of a piece; raise InputError above the declared count."""
         self.read[piece.scan] += piece.read
         self._compare(piece.scan, is_done=False)
-        if self.progress and time.monotonic() - self.told >= PROGRESS_PERIOD_S:
+        if self.progress and time.monotonic() - self.reported_s >= PROGRESS_PERIOD_S:
             self._report()
 
     def finish(self):
@@ -193,7 +193,7 @@ class _Count:
             self._report()
 
     def _report(self):
-        self.told = time.monotonic()
+        self.reported_s = time.monotonic()
         self.progress(sum(self.read), self.total, self.file.name)
 
     def _compare(self, scan, is_done):
@@ -209,8 +209,8 @@ class _Check:
         self.file, self.unit_m = file, unit_m
         self.done, self.first = piece.first, None
 
-    def metres(self, piece):
-        """Coordinates in metres, float64 (n, 3); raise InputError for invalid coordinates."""
+    def to_metres(self, piece):
+        """Check and convert coordinates to metres, float64 (n, 3); raise InputError if invalid."""
         xyz, before = piece.xyz, self.done
         self.done += piece.read
         if not len(xyz):
@@ -222,44 +222,44 @@ class _Check:
         with np.errstate(invalid="ignore", over="ignore"):
             is_near = (low >= self.first - EXTENT_LIMIT) & (high <= self.first + EXTENT_LIMIT)
         if not (is_near.all() and np.isfinite(far).all()):
-            raise self._far(piece, before)
+            raise self._invalid_point_error(piece, before)
         if xyz.dtype == np.float32:
             self._check_spacing(max(np.abs(low).max(), np.abs(high).max()))
         xyz = xyz.astype(np.float64, copy=False)
         return xyz if self.unit_m == 1.0 else xyz * self.unit_m
 
-    def _far(self, piece, before):
+    def _invalid_point_error(self, piece, before):
         first = np.where(np.isfinite(self.first), self.first, 0.0)
         with np.errstate(invalid="ignore", over="ignore"):
             bad = ~(np.abs(piece.xyz - first) <= EXTENT_LIMIT).all(axis=1)
         i = int(np.flatnonzero(bad)[0]) if bad.any() else 0
         x, y, z = (f"{value:g}" for value in piece.xyz[i])
-        is_exact = len(piece.xyz) == piece.read
-        numbers = [before + i + 1] if is_exact else [before + 1, before + piece.read]
-        if np.isfinite(piece.xyz[i]).all():
-            return self.file.refusal(
-                message(
-                    "cloud_file_far",
-                    "point {number} is ({x}, {y}, {z}), {most:g} or more from the first: damaged, "
-                    "or to be cleaned before",
-                    number=_place(numbers),
-                    x=x,
-                    y=y,
-                    z=z,
-                    most=EXTENT_LIMIT,
-                )
+        # Only a range is known if records without a return were omitted.
+        number = str(before + i + 1)
+        if len(piece.xyz) != piece.read:
+            number = message(
+                "cloud_file_between",
+                "between {first} and {last}",
+                first=before + 1,
+                last=before + piece.read,
             )
-        return self.file.refusal(
-            message(
+        values = {"number": number, "x": x, "y": y, "z": z}
+        if np.isfinite(piece.xyz[i]).all():
+            text = message(
+                "cloud_file_far",
+                "point {number} is ({x}, {y}, {z}), {most:g} or more from the first: damaged, "
+                "or to be cleaned before",
+                **values,
+                most=EXTENT_LIMIT,
+            )
+        else:
+            text = message(
                 "cloud_file_not_finite",
                 "point {number} is ({x}, {y}, {z}); expected finite numbers: export it without "
                 "points that have no return",
-                number=_place(numbers),
-                x=x,
-                y=y,
-                z=z,
+                **values,
             )
-        )
+        return self.file.refusal(text)
 
     def _check_spacing(self, largest):
         # The resolution of float32 is proportional to the coordinate.
@@ -274,11 +274,3 @@ class _Check:
                     spacing_mm=1000 * spacing,
                 )
             )
-
-
-def _place(numbers):
-    """Number of a point, or its range if records without a return were omitted."""
-    if len(numbers) == 1:
-        return str(numbers[0])
-    first, last = numbers
-    return message("cloud_file_between", "between {first} and {last}", first=first, last=last)

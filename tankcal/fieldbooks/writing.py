@@ -15,7 +15,7 @@ from tankcal.job.contract import COLUMNS
 from tankcal.job.folder import csv_marks, read_toml
 from tankcal.job.tables import SETTINGS_FILE, Log, read_bytes
 from tankcal.messages import message
-from tankcal.text.spreadsheets import write_guarded
+from tankcal.text.delimited import write_guarded
 
 
 def write_tables(folder, tables, *, replace):

@@ -155,7 +155,7 @@ class WeldCells:
             for grid, counts in zip(self.grids, self.counts, strict=True):
                 _count(grid, counts[scan], scan, u, turn, distance)
 
-    def merged(self, other):
+    def merge(self, other):
         """New `WeldCells` with the sums of both histograms."""
         merged = WeldCells(self.surface, self.grids)
         for sums, first, second in zip(merged.counts, self.counts, other.counts, strict=True):
@@ -330,7 +330,7 @@ def _course_of(wall, u):
 
 def _rows_of_courses(wall):
     """Indices of the coarse rows of each course."""
-    course = _course_of(wall, (wall.grid.edges_m[:-1] + wall.grid.edges_m[1:]) / 2)
+    course = _course_of(wall, wall.grid.middles_m)
     return [np.flatnonzero(course == index) for index in np.unique(course)]
 
 

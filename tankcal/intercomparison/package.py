@@ -35,8 +35,8 @@ from tankcal.record.intercomparison import (
     TruthFile,
 )
 from tankcal.record.schema import to_plain
+from tankcal.text.delimited import write_guarded
 from tankcal.text.shipped import shipped_folder
-from tankcal.text.spreadsheets import write_guarded
 from tankcal.version import find_version
 
 LICENCE = "CC0-1.0"  # SPDX identifier

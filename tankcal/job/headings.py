@@ -11,8 +11,8 @@ from fractions import Fraction
 
 from tankcal.messages import message
 from tankcal.text.languages import LANGUAGES
-from tankcal.text.unit_endings import parted
-from tankcal.text.word_files import load_words
+from tankcal.text.unit_endings import split_unit
+from tankcal.text.words import load_words
 
 USUAL = {  # usual headings, by the name of the column without its unit
     "point": (
@@ -102,7 +102,7 @@ def stated_meaning(heading, field):
     """`Meaning` of a heading assigned to a column by the user; a unit in brackets is converted."""
     parts = _BRACKETED.fullmatch(heading)
     unit = _unit_of(parts[2]) if parts else ""
-    field_unit = parted(field.name)[1]
+    field_unit = split_unit(field.name)[1]
     if unit in LENGTHS and field_unit in LENGTHS:
         return Meaning(field.name, LENGTHS[unit] / LENGTHS[field_unit], unit)
     return Meaning(field.name, Fraction(1), unit)
@@ -169,14 +169,14 @@ def rename_headings(table, fields, log):
 
 def _names_of(field):
     """Normalised names of a column, without its unit."""
-    stem, _ = parted(field.name)
+    stem, _ = split_unit(field.name)
     labels = [load_words(name)["input"]["labels"].get(stem, stem) for name in LANGUAGES]
     return {_plain(name) for name in (stem, *labels, *USUAL.get(stem, ()))}
 
 
 def _meaning(heading, field, names):
     """List with the `Meaning` of the heading for this column; empty if it does not match."""
-    _, field_unit = parted(field.name)
+    _, field_unit = split_unit(field.name)
     if _plain(heading) in names:
         return [Meaning(field.name, Fraction(1))]
     for pattern in (_BRACKETED, _LAST_WORD):

@@ -12,9 +12,9 @@ import time
 import uuid
 from functools import cache
 
-from tankcal.clouds import count_about
+from tankcal.clouds import estimate_count
 from tankcal.clouds.wall.cells import WallCells
-from tankcal.clouds.wall.passes import cells_of, sample_of
+from tankcal.clouds.wall.passes import sample_points, sum_cells
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.pipeline.cloud_passes import JobPasses, Tally
@@ -64,7 +64,7 @@ def _workers_for(placing, cluster):
     if cluster == "auto":
         if cores < FEWEST_CORES or not is_installed():
             return 0
-        points = sum(count_about(file.header) for file in placing.files)
+        points = sum(estimate_count(file.header) for file in placing.files)
         return cores if points >= PAYS else 0
     return {None: 0, "local": cores}.get(cluster, cluster)
 
@@ -101,15 +101,15 @@ class ClusterPasses:
         WallCells
         """
         with failures_told():
-            packed = self._reduced(_cells_part, _add_cells, surface, grid, scans)
+            sums = self._reduced(_cells_part, _add_cells, surface, grid, scans)
         cells = WallCells(surface, grid, scans)
-        cells.add_packed(packed)
+        cells.add_packed(sums)
         return cells
 
     def gather(self, taken_of, *sizes):
         """Return taken_of(points, *sizes) for all points.
 
-        Results of different shares are combined by their method `merged`.
+        Results of different shares are combined by their method `merge`.
         """
         with failures_told():
             return self._reduced(_taken_part, _add_taken, taken_of, *sizes)
@@ -157,7 +157,7 @@ class ClusterPasses:
         """Number of points per share, from the number of points and workers."""
         if self.points_each:
             return self.points_each
-        points = sum(count_about(file.header) for file in self.placing.files)
+        points = sum(estimate_count(file.header) for file in self.placing.files)
         workers = max(len(self.client.scheduler_info(n_workers=-1)["workers"]), 1)
         return int(min(max(points / workers / SHARES_OF_WORKER, FEWEST_EACH), MOST_EACH))
 
@@ -174,7 +174,7 @@ class ClusterPasses:
 def _sample_part(placing, share, topic, number, most):
     """`PointSample` of a share, and its `Tally`."""
     tally = _tally_of(placing, share, topic, number)
-    sample = sample_of(placing.points([share], tally), most)
+    sample = sample_points(placing.points([share], tally), most)
     sample.reduce()
     return sample, tally
 
@@ -182,8 +182,8 @@ def _sample_part(placing, share, topic, number, most):
 def _cells_part(placing, share, topic, number, surface, grid, scans):
     """Packed sums of a share, and its `Tally`."""
     tally = _tally_of(placing, share, topic, number)
-    cells = cells_of(placing.points([share], tally), surface, grid, scans)
-    return cells.packed(), tally
+    cells = sum_cells(placing.points([share], tally), surface, grid, scans)
+    return cells.pack_sums(), tally
 
 
 def _taken_part(placing, share, topic, number, taken_of, *sizes):
@@ -196,7 +196,7 @@ def _add_taken(parts, *_):
     """Merge the results of several shares."""
     (taken, _), *others = parts
     for other, _ in others:
-        taken = taken.merged(other)
+        taken = taken.merge(other)
     return taken, Tally.added([tally for _, tally in parts])
 
 
@@ -205,7 +205,7 @@ def _add_samples(parts, most):
     (sample, _), *others = parts
     tally = Tally.added([part_tally for _, part_tally in parts])
     for other, _ in others:
-        sample = sample.merged(other)
+        sample = sample.merge(other)
         sample.reduce()
     return sample, tally
 
@@ -213,9 +213,9 @@ def _add_samples(parts, most):
 def _add_cells(parts, surface, grid, scans):
     """Add several packed sums."""
     cells = WallCells(surface, grid, scans)
-    for packed, _ in parts:
-        cells.add_packed(packed)
-    return cells.packed(), Tally.added([tally for _, tally in parts])
+    for sums, _ in parts:
+        cells.add_packed(sums)
+    return cells.pack_sums(), Tally.added([tally for _, tally in parts])
 
 
 def _tally_of(placing, share, topic, number):

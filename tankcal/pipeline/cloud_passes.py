@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.clouds import CloudPiece, count_about, pieces_of, read_cloud
+from tankcal.clouds import CloudPiece, estimate_count, pieces_of, read_cloud
 from tankcal.clouds.contents import WHOLE
 from tankcal.clouds.formats.files import count_mismatch, open_cloud
-from tankcal.clouds.wall import cells_of, sample_of
+from tankcal.clouds.wall import sample_points, sum_cells
 from tankcal.messages import message
 from tankcal.survey.readings import certified_distance_m
 
@@ -78,7 +78,7 @@ class Placing:
         shares = []
         for number, file in enumerate(self.files):
             pieces = pieces_of(file.header, points_each) if points_each else (WHOLE,)
-            points = count_about(file.header)
+            points = estimate_count(file.header)
             for piece in pieces:
                 shares.append(Share(number, piece, _points_in(file.header, piece, points)))
         return tuple(shares)
@@ -204,7 +204,7 @@ class JobPasses:
 
     def sample(self, most):
         """Return a `PointSample` of at most `most` points."""
-        return self.gather(sample_of, most)
+        return self.gather(sample_points, most)
 
     def cells(self, surface, grid, scans):
         """Return the `WallCells` of all points.
@@ -218,7 +218,7 @@ class JobPasses:
         -------
         WallCells
         """
-        return self.gather(cells_of, surface, grid, scans)
+        return self.gather(sum_cells, surface, grid, scans)
 
     def gather(self, taken_of, *sizes):
         """Return taken_of(points, *sizes) for all points."""

@@ -4,8 +4,8 @@ import itertools
 
 import numpy as np
 
-from tankcal.clouds.wall.sampling import PointSample
-from tankcal.clouds.wall.start import shows_wall
+from tankcal.clouds.wall.passes import PointSample
+from tankcal.clouds.wall.start import has_wall
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract.clouds import UNITS_M
 from tankcal.messages import message
@@ -96,6 +96,6 @@ def _unit_that_fits(xyz_m, place_m, declared_m, units, sizes):
         # The pose from targets is independent of the unit of the file; the pose from the file is
         # not.
         for origin in (place_m, np.zeros(3)):
-            if shows_wall((xyz_m - origin) * factor + origin, **sizes):
+            if has_wall((xyz_m - origin) * factor + origin, **sizes):
                 return unit
     return None

@@ -271,7 +271,7 @@ def _refuse_scans_apart(job, cells, registration):
     the registration is wrong or a scan shows another surface, and the table could belong to either
     wall.
     """
-    if cells.are_apart:
+    if cells.are_separate:
         overlaps = [
             overlap for overlap in overlaps_of(job, cells, registration) if overlap.is_apart
         ]
@@ -282,7 +282,7 @@ def _refuse_scans_apart(job, cells, registration):
 def _refuse_empty_courses(job, cloud_wall, readings):
     """Raise InputError for courses with too few mean points, with the reason."""
     means = np.bincount(readings.course, minlength=len(job.courses))
-    middle = (cloud_wall.grid.edges_m[:-1] + cloud_wall.grid.edges_m[1:]) / 2
+    middle = cloud_wall.grid.middles_m
     problems = []
     for number, course in enumerate(job.courses):
         if means[number] >= FEWEST_MEANS:

@@ -2,7 +2,7 @@
 
 from tankcal.job.contract import columns_of, tables_of_survey
 from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS
-from tankcal.job.starter.texts import parted, texts_in
+from tankcal.job.starter.texts import split_unit, texts_in
 from tankcal.methods.base import methods
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
@@ -184,7 +184,7 @@ def _is_angle(field):
 
 def _column(texts, field):
     """Return (heading, unit, relative width) of a column."""
-    heading, (_, unit) = texts.heading(field), parted(field.name)
+    heading, (_, unit) = texts.heading(field), split_unit(field.name)
     if _is_angle(field):
         return heading, UNITS_OF_CIRCLES, WIDE["name"]
     return heading, unit, WIDE.get(field.kind, 1.0)

@@ -12,14 +12,11 @@ from decimal import ROUND_HALF_UP, ROUND_UP, Context, Decimal
 from math import inf, isfinite
 
 NOTHING = "–"
-LITRE_DECIMALS = (
-    3  # rows of a table in m3 show litres, because deliveries have a smaller uncertainty
-)
+# Rows of a table in m3 show litres, because deliveries have a smaller uncertainty.
+LITRE_DECIMALS = 3
 UNKNOWN_DECIMALS = 6  # decimals of a value without uncertainty
-WITH_U = range(
-    -12, 15
-)  # powers of ten of the first digit without separate power, for values with uncertainty
-WITHOUT_U = range(-4, 6)  # the same for values without uncertainty
+# Powers of ten of the first digit that need no separate power, with and without uncertainty
+WITH_U, WITHOUT_U = range(-12, 15), range(-4, 6)
 _LARGEST_LOSS = Decimal("0.05")
 SIGNIFICANT = 2  # digits of u (JCGM 100:2008 7.2.6)
 _WIDE = Context(prec=400)

@@ -2,13 +2,11 @@
 
 from tankcal.messages import message
 
-JUDGED_S, MILLION = (
-    2.0,
-    1_000_000,
-)  # seconds before the remaining time is estimated; limit for counts in millions
+LEAST_S = 2.0  # time before the remaining time is estimated, s
+MILLION = 1_000_000  # from here on counts are shown in millions
 
 
-def how_far(done, total, fresh, seconds):
+def describe_progress(done, total, fresh, seconds):
     """Return the progress and the remaining time of a long step; for millions also the rate.
 
     Parameters
@@ -19,7 +17,7 @@ def how_far(done, total, fresh, seconds):
     seconds : float
     """
     left = ""
-    if seconds >= JUDGED_S and fresh > 0 and done < total:
+    if seconds >= LEAST_S and fresh > 0 and done < total:
         rest = (total - done) * seconds / fresh
         if rest < 100:
             left = message("part_seconds_left", ", about {count:.0f} s left", count=rest)

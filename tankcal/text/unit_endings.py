@@ -28,7 +28,7 @@ _UNITS = {
 }
 
 
-def parted(name):
+def split_unit(name):
     """Split a name into (name, unit): ("height", "m") for height_m, ("K1", "mm⁻²") for K1_mm-2."""
     stem, power = name.rpartition("_mm-")[::2]
     if stem:

@@ -5,7 +5,7 @@ import time
 
 from tankcal.errors import TankcalError
 from tankcal.messages import message
-from tankcal.text.time_left import how_far
+from tankcal.text.time_left import describe_progress
 
 
 class Refusal(TankcalError):
@@ -104,6 +104,6 @@ class Run:
         share = done / total if total else None
         if total > 1:
             began, first = self._began
-            left = how_far(done, total, done - first, time.monotonic() - began)
+            left = describe_progress(done, total, done - first, time.monotonic() - began)
             text = message("step_and_part", "{step} {part}", step=text, part=left)
         self._on_progress(text, share)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from tankcal.errors import SHEET
 from tankcal.job.contract import KEYS, REGISTER_KEYS, SECTIONS
-from tankcal.job.starter.texts import Texts, parted, texts_in
+from tankcal.job.starter.texts import Texts, split_unit, texts_in
 from tankcal.text.words import marks_of, say
 from tankcal.workbench.decimals import text_for_display, text_for_file
 from tankcal.workbench.findings import BAD
@@ -151,8 +151,8 @@ class Reader:
             return ShownColumn(heading, heading or "?")
         note = self.texts.notes["columns"].get(f"{name}.{field.name}", field.note)
         expected = self._expectation(field)
-        label = self.words["input"]["labels"].get(parted(field.name)[0], field.name)
-        unit = parted(field.name)[1]
+        label = self.words["input"]["labels"].get(split_unit(field.name)[0], field.name)
+        unit = split_unit(field.name)[1]
         return ShownColumn(
             heading, label, unit, f"{note} · {expected}", True, field.kind == "number"
         )
@@ -207,7 +207,7 @@ class Reader:
         if name != SETTINGS:
             group, place = "entries", f"{name}.{field.name}"
         note = self.texts.notes[group].get(place, field.note)
-        return parted(field.name)[1], f"{note} · {self._expectation(field)}"
+        return split_unit(field.name)[1], f"{note} · {self._expectation(field)}"
 
     def _marks(self, check, name, find_place):
         """Marks {(row, column): (level, text)}; several marks of a cell share the worst level.

@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass, replace
 
 from tankcal.job.folder import is_row, separator_of_text
-from tankcal.text.spreadsheets import guard_formula, unguard_formula
+from tankcal.text.delimited import guard_formula, unguard_formula
 from tankcal.workbench.decimals import AmbiguousNumber
 
 _ENDING = re.compile("\r\n|\r|\n")

@@ -9,7 +9,7 @@ import subprocess
 import pytest
 
 from tankcal.cli import _parser_in_english
-from tankcal.cli.completing import SHELLS, script_for
+from tankcal.cli.completing import SHELLS, completion_script
 from tankcal.cli.showing import speak
 
 pytest.importorskip("shtab")
@@ -76,7 +76,7 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture(scope="module")
 def scripts():
     speak("en")
-    return {shell: script_for(shell, _parser_in_english) for shell in SHELLS}
+    return {shell: completion_script(shell, _parser_in_english) for shell in SHELLS}
 
 
 def completed(shell, program, folder, script):
@@ -149,6 +149,6 @@ def test_every_command_and_option_is_in_the_script(shell, scripts):
 def test_a_script_speaks_the_language_of_the_user():
     speak("es")
     try:
-        assert "calcular un servicio" in script_for("fish", _parser_in_english)
+        assert "calcular un servicio" in completion_script("fish", _parser_in_english)
     finally:
         speak("en")

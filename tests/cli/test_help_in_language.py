@@ -8,11 +8,10 @@ import sys
 
 import pytest
 
-from tankcal.cli import _parser, main
-from tankcal.cli.help_words import put_in_words
+from tankcal.cli import _parser, main, translate_parser
 from tankcal.cli.showing import speak
 from tankcal.text.languages import DEFAULT, LANGUAGES
-from tankcal.text.word_files import load_words
+from tankcal.text.words import load_words
 
 OTHERS = [one for one in LANGUAGES if one != DEFAULT]
 ENGLISH = re.compile(r"\b(the|where|write|with|default|found|expected|arguments|show)\b")
@@ -67,7 +66,7 @@ def test_help_texts_and_their_words_match(english, language):
 def test_no_english_is_left_in_any_help(language):
     speak("en")
     parser = _parser()
-    put_in_words(parser, load_words(language))
+    translate_parser(parser, load_words(language))
     texts = [
         text
         for one in parsers_of(parser)

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from tankcal.cli.showing import Progress
-from tankcal.text.time_left import how_far
+from tankcal.text.time_left import describe_progress
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ from tankcal.text.time_left import how_far
     ],
 )
 def test_rate_and_time_left(given, shown):  # by hand
-    assert how_far(*given) == shown
+    assert describe_progress(*given) == shown
 
 
 @pytest.mark.parametrize(("columns", "lines"), [("100", 1), ("50", 2)])

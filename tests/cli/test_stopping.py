@@ -15,7 +15,7 @@ from draws import draws
 from job_builder import write_job
 
 from tankcal.cli import main
-from tankcal.cli.stopping import Ended, ended_by_signals, stopped_status
+from tankcal.cli.stopping import EndingSignal, raise_at_signals, signal_status
 from tankcal.record import manifest
 from tankcal.report.folders import PREFIX
 
@@ -43,7 +43,7 @@ def test_a_signal_that_is_ignored_remains_so():
     """As `nohup` asks for."""
     usual = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with ended_by_signals():
+        with raise_at_signals():
             os.kill(os.getpid(), signal.SIGHUP)
         assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
     finally:
@@ -51,19 +51,19 @@ def test_a_signal_that_is_ignored_remains_so():
 
 
 def test_status_of_an_ending():
-    assert stopped_status(ValueError()) is None
-    assert stopped_status(KeyboardInterrupt()) == 130
-    assert stopped_status(Ended(15)) == 143
+    assert signal_status(ValueError()) is None
+    assert signal_status(KeyboardInterrupt()) == 130
+    assert signal_status(EndingSignal(15)) == 143
     with pytest.raises(AssertionError) as dressed:
         dress()
-    assert stopped_status(dressed.value) == 143
+    assert signal_status(dressed.value) == 143
 
 
 def dress():
     """As a library may do."""
     try:
-        raise Ended(15)
-    except Ended:
+        raise EndingSignal(15)
+    except EndingSignal:
         raise AssertionError from None
 
 

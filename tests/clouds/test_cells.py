@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tankcal.clouds.wall.cells import CellGrid, WallCells
-from tankcal.clouds.wall.sampling import PointSample
+from tankcal.clouds.wall.passes import PointSample
 from tankcal.clouds.wall.surfaces import CylinderSurface, SphereSurface
 
 UPRIGHT = CylinderSurface(np.array([500.0, -20.0, 3.0]), 5.0, (0.004, -0.002))
@@ -52,7 +52,7 @@ def test_merged_sums_are_those_of_all():  # property
     whole = _sums([(0, xyz), (1, xyz[:100])])
     first, second = _sums([(0, xyz[:3000])]), _sums([(0, xyz[3000:]), (1, xyz[:100])])
     _assert_same_bytes(first + second, whole)
-    _assert_same_bytes(second.merged(first), whole)
+    _assert_same_bytes(second.merge(first), whole)
 
 
 def test_every_point_is_counted_once():  # property
@@ -107,7 +107,7 @@ def test_sample_hangs_on_the_points_alone():  # property
         samples[1].add(xyz[::-1][i : i + 777], 0)
     samples[2].add(xyz[:5000], 0)
     samples[3].add(xyz[5000:], 0)
-    both = samples[3].merged(samples[2])
+    both = samples[3].merge(samples[2])
     assert both.delivered == {0: 20_000}
     assert_array_equal(samples[1].points(), samples[0].points())
     assert_array_equal(both.points(), samples[0].points())

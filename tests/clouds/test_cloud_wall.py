@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tankcal.clouds.wall import find_cloud_wall, readings_of
 from tankcal.clouds.wall.cells import WallCells
-from tankcal.clouds.wall.finding import make_grid, wall_of_cells
-from tankcal.clouds.wall.growing import OBSTRUCTED, grow_wall, off_trend
+from tankcal.clouds.wall.finding import decide_wall, make_grid
+from tankcal.clouds.wall.growing import OBSTRUCTED, find_off_trend, grow_wall
 from tankcal.clouds.wall.growing import WALL as IS_WALL
 from tankcal.clouds.wall.surfaces import CylinderSurface
 from tankcal.errors import InputError
@@ -78,7 +78,7 @@ def test_off_trend_finds_a_single_cell():  # closed form
     values = np.add.outer(0.001 * np.arange(20.0), 0.01 * np.cos(np.arange(90) / 90 * FULL_TURN))
     values += np.random.default_rng(1).normal(0, 1e-4, values.shape)
     values[7, 30] += 0.004
-    off = off_trend(values, np.full(values.shape, 1e-4), np.ones(values.shape, dtype=bool))
+    off = find_off_trend(values, np.full(values.shape, 1e-4), np.ones(values.shape, dtype=bool))
     assert_array_equal(np.argwhere(off), [[7, 30]])
 
 
@@ -135,7 +135,7 @@ def test_grid_begins_rows_at_joints_and_keeps_to_memory():  # property
     small = make_grid(surface, joints, points=1e9, scans=8, memory_bytes=100 << 20)
     for grid in (fine, small):
         assert np.isin(joints, grid.edges_m).all()
-    assert small.bytes_of(8) <= 100 << 20
+    assert small.count_bytes(8) <= 100 << 20
     assert np.diff(fine.edges_m).max() <= 0.05 + 1e-9
 
 
@@ -242,7 +242,7 @@ def test_clutter_moves_no_radius(name, figure):  # simulation: rays, not the mod
     for number, (xyz, kind) in enumerate(scans):
         sound.add(xyz[kind == WALL], number)
         every.add(xyz, number)
-    by_hand = wall_of_cells(sound, wall.joints_m, wall.sides)
+    by_hand = decide_wall(sound, wall.joints_m, wall.sides)
     counts = [sum(one.counts(i).sum(axis=2) for i in range(len(scans))) for one in (sound, every)]
     is_truly = (counts[0] >= 8) & (counts[0] >= counts[1] / 2)
     kept = wall.is_wall.any(axis=0)[is_truly].mean()
@@ -458,7 +458,7 @@ def test_buckle_is_no_weld(size):  # simulation: rays; seams of this scene are t
 def test_scans_that_do_not_meet_are_decided_one_by_one():  # closed form: one is 60 mm off
     moved = _cylinder(160_000, seed=2) + [0.06, 0.0, 0.0]
     wall = _find(_cylinder(160_000), moved, sides=("inside", "inside"))
-    assert wall.are_apart
+    assert wall.are_separate
     for scan, middle in enumerate(([10.0, 20.0], [10.06, 20.0])):
         kept = wall.is_wall[scan]
         off = wall.radius_m[scan][kept] - wall.surface.radius_m

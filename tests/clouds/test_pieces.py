@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from written_clouds import UNMOVED, some_wall, write_cloud, write_e57, write_las, write_ptx
 
-from tankcal.clouds import CloudPiece, count_about, describe_cloud, pieces_of, read_cloud
+from tankcal.clouds import CloudPiece, describe_cloud, estimate_count, pieces_of, read_cloud
 from tankcal.errors import InputError
 
 SOUGHT = ("las", "ply", "xyz", "csv")  # formats that are cut between any two points
@@ -97,6 +97,6 @@ def test_a_point_outside_is_told_with_its_number_in_the_file(tmp_path):
 
 def test_rows_of_text_are_told_from_its_start(tmp_path):
     header = describe_cloud(write_cloud(tmp_path / "wall.xyz", some_wall(20_000)))
-    assert abs(count_about(header) / 20_000 - 1) < 0.02
+    assert abs(estimate_count(header) / 20_000 - 1) < 0.02
     write_ptx(tmp_path / "wall.ptx", [(some_wall(50), UNMOVED)])
-    assert count_about(describe_cloud(tmp_path / "wall.ptx")) == 50
+    assert estimate_count(describe_cloud(tmp_path / "wall.ptx")) == 50

@@ -8,7 +8,7 @@ from survey_builder import survey_parts
 
 import tankcal
 from tankcal.cli import main
-from tankcal.cli.asked_language import asked_language
+from tankcal.cli.input_language import read_job_language
 from tankcal.cli.showing import say_in_language, speak
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract import KEYS
@@ -42,7 +42,7 @@ def test_an_empty_form_is_refused_in_its_language(tmp_path, capsys, language, ki
     sheet = {"pt-BR": "aba", "es": "hoja"}[language]
     book = write_input_workbook(tmp_path / "book" / "job.xlsx", kind, None, language)
     for source in (book, tmp_path / "job"):
-        assert asked_language(source) == language
+        assert read_job_language(source) == language
         assert main(["run", str(source), "--out", str(tmp_path / "out")]) == 2
         lines = [line.partition(": ")[2] for line in capsys.readouterr().err.splitlines()[1:]]
         assert len(lines) > 3
@@ -89,7 +89,7 @@ def test_warnings_of_a_workbook_name_it_and_its_words_are_read(tmp_path):
     result = tankcal.run(job)
     (told,) = (one for one in result.warnings if "nominal_volume" in str(one.column))
     assert str(told).startswith("tanque.xlsx, sheet job, tank.nominal_volume_m3: ")
-    assert asked_language(path) == "pt-BR"
+    assert read_job_language(path) == "pt-BR"
     record = translate_record(load_words("pt-BR"), record_of(result))
     assert {one["file"] for one in record["warnings"]} <= {"aba job", "aba uncertainty"}
     speak("pt-BR")

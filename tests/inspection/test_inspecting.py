@@ -8,7 +8,7 @@ from conftest import EXAMPLE
 from job_builder import write_job
 
 from tankcal.cli import main
-from tankcal.cli.asked_language import asked_of_record
+from tankcal.cli.input_language import read_record_language
 from tankcal.cli.showing import speak
 from tankcal.errors import InputError
 from tankcal.inspection.inspecting import Asked, inspect_files
@@ -197,11 +197,13 @@ def test_it_speaks_the_language_of_its_job_or_record(tmp_path, capsys):
     assert "Verticalidad, eje" in out
     assert "Verticalidade, eixo" in out
     (tmp_path / "record.json").write_text('{"job": {"table": {"language": "pt-BR"}}}')
-    assert asked_of_record(tmp_path) == asked_of_record(tmp_path / "record.json") == "pt-BR"
+    assert (
+        read_record_language(tmp_path) == read_record_language(tmp_path / "record.json") == "pt-BR"
+    )
     for text in ("{", "[1]", '{"job": 1}', "[" * 100_000):
         (tmp_path / "record.json").write_text(text)
-        assert asked_of_record(tmp_path) is None
-    assert asked_of_record(tmp_path / "none") is None
+        assert read_record_language(tmp_path) is None
+    assert read_record_language(tmp_path / "none") is None
 
 
 @pytest.mark.parametrize("strength", ["250e6", "36000", "-1", "nan"])

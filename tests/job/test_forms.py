@@ -9,7 +9,7 @@ import tankcal
 from tankcal.batch.finding import find_jobs
 from tankcal.batch.options import Options
 from tankcal.cli import main
-from tankcal.cli.asked_language import asked_language
+from tankcal.cli.input_language import read_job_language
 from tankcal.cli.showing import speak
 from tankcal.errors import InputError
 from tankcal.job.contract import COLUMNS
@@ -205,7 +205,7 @@ def test_new_follows_the_language_of_the_environment(tmp_path, monkeypatch, caps
     for name, more in (("text", []), ("book", ["--workbook"])):
         folder = tmp_path / name
         assert main(["new", str(folder), *more]) == 0
-        assert (asked_language(folder) or DEFAULT) == language
+        assert (read_job_language(folder) or DEFAULT) == language
         capsys.readouterr()
         (folder / "mine.txt").write_text("mine")
         assert main(["new", str(folder), *more]) == 2

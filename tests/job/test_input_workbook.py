@@ -34,7 +34,7 @@ from tankcal.job.sheets import is_read
 from tankcal.job.starter import write_input_workbook
 from tankcal.job.starter.examples import EXAMPLES_OF_KEYS, EXAMPLES_OF_TABLES
 from tankcal.job.starter.form import STRAPPED, Form
-from tankcal.job.starter.texts import TABLE_NOTES, english_notes, parted, texts_in
+from tankcal.job.starter.texts import TABLE_NOTES, english_notes, split_unit, texts_in
 from tankcal.job.starter.validation import LONGEST_LIST, LONGEST_MESSAGE, LONGEST_TITLE, rule_of
 from tankcal.record import record_of
 from tankcal.text.languages import LANGUAGES
@@ -137,7 +137,7 @@ def test_an_example_of_a_table_may_be_typed_as_it_is(table):
     ],
 )
 def test_the_unit_of_a_name(name, stem, unit):
-    assert parted(name) == (stem, unit)
+    assert split_unit(name) == (stem, unit)
 
 
 # ---- the sheets

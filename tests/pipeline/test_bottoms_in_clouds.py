@@ -17,7 +17,7 @@ from test_walls_in_clouds import scene_parts
 
 import tankcal
 from tankcal.clouds.inside import bottom_points
-from tankcal.clouds.inside.bottom import bottom_of_cells
+from tankcal.clouds.inside.bottom import find_bottom_in_cells
 from tankcal.clouds.inside.floor_cells import FloorCells, floor_grid
 from tankcal.clouds.wall.surfaces import CylinderSurface
 from tankcal.job.model.parts import Bottom
@@ -161,7 +161,7 @@ def test_volumes_scatter_as_their_shared_columns_say(figure):
         cells = FloorCells(grid, 3)
         for i, (shift, turned) in enumerate(motions):
             cells.add((whole[seen[i]] - stood[i]) @ turned.T + stood[i] + shift, i)
-        bottom = bottom_of_cells(cells)
+        bottom = find_bottom_in_cells(cells)
         points = bottom_points(bottom, 150)
         part = surveyed_bottom(foot, points.xyz_m, points.sd_m)
         return part.volume_m3([0.5])[0], CloudInside(bottom, points, ())

@@ -22,8 +22,8 @@ from written_clouds import UNMOVED, some_wall, write_cloud, write_ptx
 
 import tankcal
 from tankcal.clouds import describe_cloud
-from tankcal.clouds.inside.floor_cells import FloorCells, floor_cells_of, floor_grid
-from tankcal.clouds.inside.things import ThingCells, things_of
+from tankcal.clouds.inside.floor_cells import FloorCells, floor_grid, sum_floor_cells
+from tankcal.clouds.inside.things import ThingCells, sample_things
 from tankcal.clouds.wall.cells import SUMMED, CellGrid
 from tankcal.clouds.wall.surfaces import CylinderSurface
 from tankcal.errors import InputError, Problem
@@ -104,16 +104,16 @@ def test_workers_and_pieces_change_no_byte(client, placing, each):  # invariance
 def test_workers_change_no_byte_of_the_inside(client, placing):  # invariance
     floor = floor_grid(SURFACE, 0.0, 4.0)
     inside = (True, True, False, True)
-    ours = passes_by(client, placing).gather(floor_cells_of, floor, inside)
-    theirs = JobPasses(placing).gather(floor_cells_of, floor, inside)
+    ours = passes_by(client, placing).gather(sum_floor_cells, floor, inside)
+    theirs = JobPasses(placing).gather(sum_floor_cells, floor, inside)
     for name in FloorCells.NAMES:
         assert getattr(ours, name).tobytes() == getattr(theirs, name).tobytes(), name
-    assert ours.by_scan.any(axis=(1, 2)).sum() <= 3
+    assert ours.scan_counts.any(axis=(1, 2)).sum() <= 3
     rng = np.random.default_rng(1)
     label = rng.integers(3, size=(floor.across, floor.across, floor.levels))
     cells = ThingCells(floor, label, np.full(label.shape[:2], -1e9), inside)
-    ours = passes_by(client, placing).gather(things_of, cells).samples
-    theirs = JobPasses(placing).gather(things_of, cells).samples
+    ours = passes_by(client, placing).gather(sample_things, cells).samples
+    theirs = JobPasses(placing).gather(sample_things, cells).samples
     assert [one.points().tobytes() for one in ours] == [one.points().tobytes() for one in theirs]
     assert sum(len(one.points()) for one in ours) > 0
 

@@ -21,7 +21,7 @@ from generated_hits import (
 from job_builder import hit_parts, write_book, write_folder
 
 import tankcal
-from tankcal.cli.set_aside import lines_set_aside
+from tankcal.cli.running import describe_rejected
 from tankcal.pipeline.cause_correlations import told_causes
 from tankcal.pipeline.sighted_points import take_points
 from tankcal.survey import adjust_survey, wall_points
@@ -758,7 +758,7 @@ def test_a_wrong_strap_is_set_aside(tmp_path):
     assert ("circumferences.csv", "reading_m") in codes_of(result)
     name, row = parts.tables["circumferences"][2][0], result.straps.reduced[1].strap.row
     line = f"  circumferences rejected: {name} (row {row})"
-    assert line in [str(one) for one in lines_set_aside(result, None)]
+    assert line in [str(one) for one in describe_rejected(result, None)]
 
 
 @pytest.mark.slow

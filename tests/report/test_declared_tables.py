@@ -22,7 +22,7 @@ from tankcal.report.web import page
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.tables import columns_of
 from tankcal.text.digits import decimals_of
-from tankcal.text.word_files import load_words
+from tankcal.text.words import load_words
 
 ADDED = Column("half_m", "m", decimals=3, heading="tolerance_m3", sheet=True, csv="half_m")
 WORDS = load_words("en")

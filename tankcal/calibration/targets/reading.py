@@ -27,7 +27,7 @@ from tankcal.errors import InputError, Problem, reason_of
 from tankcal.job.fields import Refused as InvalidName
 from tankcal.job.tables import Log, shown
 from tankcal.messages import join_with_or, message
-from tankcal.text.spreadsheets import write_guarded
+from tankcal.text.delimited import write_guarded
 
 WHAT = ("corners", "centres", "circles")
 HEADINGS = ("photo", "point", "column_px", "line_px", "s_px")

@@ -34,7 +34,7 @@ def read_pieces(file, chunk, share=WHOLE):
     return read(file, chunk) if share == WHOLE else read(file, chunk, share)
 
 
-def share_out(file, points_each):
+def divide_file(file, points_each):
     """Divide a `CloudFile` into `CloudPiece` objects of about `points_each` points.
 
     Each record belongs to exactly one piece. A format that cannot be divided gives one piece.

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from tankcal.clouds.contents import WHOLE, CloudPiece, ScanHeader
-from tankcal.clouds.formats.counted_text import looks_as_pts, looks_as_ptx
+from tankcal.clouds.formats.counted_text import is_pts, is_ptx
 from tankcal.clouds.formats.files import Piece, count_mismatch, no_points
 from tankcal.clouds.formats.lines import (
     BLOCK,
@@ -17,13 +17,13 @@ from tankcal.clouds.formats.lines import (
     count_lines,
     count_rows,
     parse_rows,
-    shown,
+    printable_start,
     whole_number,
 )
 from tankcal.errors import InputError
 from tankcal.messages import message
 
-JUDGED = 50  # rows that determine separator and columns
+LAYOUT_ROWS = 50  # rows that determine separator and columns
 NAMES = {
     "x": "x", "east": "x", "easting": "x", "y": "y", "north": "y", "northing": "y",
     "z": "z", "height": "z", "elevation": "z",
@@ -35,7 +35,7 @@ WITH_COMMA = re.compile(rb"[+-]?\d*,\d+([eE][+-]?\d+)?")
 def find_kind(file):
     """Return "ptx", "pts" or "xyz"; raise InputError for a .ptx file of another format."""
     lines = [line for line in _first_lines(file) if line]
-    if looks_as_ptx(lines):
+    if is_ptx(lines):
         return "ptx"
     if file.ending == ".ptx":
         raise file.refusal(
@@ -45,7 +45,7 @@ def find_kind(file):
                 "of 4",
             )
         )
-    is_counted = looks_as_pts(lines) and _begins_with_number(lines[1])
+    is_counted = is_pts(lines) and _begins_with_number(lines[1])
     return "pts" if is_counted else "xyz"
 
 
@@ -61,19 +61,19 @@ def _check_count(file, heading, count):
     """Raise InputError if the number of points differs from the stated count."""
     rows = 0
     # Counting lines is fast; comments are excluded only if the fast count does not match.
-    for count_of in (count_lines, count_rows):
+    for count_function in (count_lines, count_rows):
         with file.path.open("rb") as stream:
             lines = Lines(file, stream)
             lines.take(heading)
             rows = 0
             while (block := lines.take(1 << 20)[0]) and rows <= count:
-                rows += count_of(block)
+                rows += count_function(block)
         if rows == count:
             return
     raise count_mismatch(file, count, rows)
 
 
-def rows_about(file):
+def estimate_rows(file):
     """Estimate the number of rows of a text file from its first lines."""
     return file.bytes * max(file.start.count(b"\n"), 1) / len(file.start)
 
@@ -81,7 +81,7 @@ def rows_about(file):
 def shares(file, points_each):
     """Divide a file into byte ranges of whole lines; the first range contains the heading."""
     _, heading, _ = _find_layout(file)
-    each = max(1, round(points_each * file.bytes / rows_about(file)))
+    each = max(1, round(points_each * file.bytes / estimate_rows(file)))
     edges = [0]
     with file.path.open("rb") as stream:
         for _ in range(heading):
@@ -166,13 +166,13 @@ def _find_layout(file):
             if count is None and _is_count(line, [*filter(None, lines[first + 1 :])], heading):
                 count = whole_number(line)
                 continue
-            return _check_layout(file, rows[:JUDGED], heading, first), first, count
+            return _check_layout(file, rows[:LAYOUT_ROWS], heading, first), first, count
         if line:
             new_heading = _read_heading(
                 line.lstrip(b"#/% ") if is_comment else line, first, is_comment
             )
             if new_heading is None and not is_comment:
-                raise _bad_heading(file, line, first)
+                raise _heading_error(file, line, first)
             heading = new_heading or heading
     raise no_points(file)
 
@@ -187,13 +187,13 @@ def _is_count(line, below, heading):
     return len(re.split(rb"[\s;,]+", row)) >= 3
 
 
-def _bad_heading(file, line, at):
+def _heading_error(file, line, at):
     return file.refusal(
         message(
             "cloud_file_heading",
             "found {found!r}; expected a heading that names x, y and z, a name for each column, or "
             "rows of numbers",
-            found=shown(line),
+            found=printable_start(line),
         ),
         row=at + 1,
     )
@@ -235,18 +235,18 @@ def _read_heading(line, at, is_comment):
 
 def _check_layout(file, rows, heading, first):
     """Return the `Layout` of rows of numbers, checked against the heading."""
-    layout = _separated(file, rows, heading, first)
+    layout = _guess_layout(file, rows, heading, first)
     count = len(layout.cells(rows[0]))
     if heading is not None and count != heading.names:
         if not heading.is_comment:
-            raise _bad_heading(file, heading.line, heading.at)
+            raise _heading_error(file, heading.line, heading.at)
         heading, layout = None, replace(layout, columns=(0, 1, 2))
     if count <= max(layout.columns):
         raise file.refusal(
             message("cloud_file_columns", "{found} columns; expected x, y and z", found=count),
             row=first + 1,
         )
-    if heading is None and count > 3 and _counts_rows([layout.cells(row)[0] for row in rows]):
+    if heading is None and count > 3 and _are_row_numbers([layout.cells(row)[0] for row in rows]):
         raise file.refusal(
             message(
                 "cloud_file_numbered",
@@ -258,7 +258,7 @@ def _check_layout(file, rows, heading, first):
     return layout
 
 
-def _counts_rows(cells):
+def _are_row_numbers(cells):
     """Whether the cells of a column are n, n + 1, n + 2 ..."""
     if len(cells) <= 10 or not all(re.fullmatch(rb"\d{1,18}", cell) for cell in cells):
         return False
@@ -266,32 +266,30 @@ def _counts_rows(cells):
     return numbers == [*range(numbers[0], numbers[0] + len(numbers))]
 
 
-def _separated(file, rows, heading, first):
+def _guess_layout(file, rows, heading, first):
+    """Return the `Layout` of rows, from the marks that occur in them."""
     columns = heading.columns if heading else (0, 1, 2)
     text = b"\n".join(rows)
     has_comma, has_point = b"," in text, b"." in text
-    if b";" in text:
+    has_tabs = heading is not None and heading.is_of_tabs and b"\t" in rows[0]
+    if b";" in text or has_tabs:
         if has_comma and has_point:
-            raise _mixed(file, first)
-        return Layout(";", "," if has_comma else ".", columns)
-    if heading is not None and heading.is_of_tabs and b"\t" in rows[0]:
-        if has_comma and has_point:
-            raise _mixed(file, first)
-        return Layout("tab", "," if has_comma else ".", columns)
+            raise _comma_error(file, first)
+        return Layout(";" if b";" in text else "tab", "," if has_comma else ".", columns)
     if not has_comma:
         return Layout("blank", ".", columns)
     cells = [cell for row in rows for cell in row.split()]
     if len(rows[0].split()) >= 3 and not any(cell.endswith(b",") for cell in cells):
         are_decimals = all(WITH_COMMA.fullmatch(cell) for cell in cells if b"," in cell)
         if not are_decimals or has_point:
-            raise _mixed(file, first)
+            raise _comma_error(file, first)
         return Layout("blank", ",", columns)
     if not has_point and heading is None and len(rows[0].split(b",")) >= 6:
-        raise _mixed(file, first)  # "1,5,2,5,3,5" may be three numbers or six
+        raise _comma_error(file, first)  # "1,5,2,5,3,5" may be three numbers or six
     return Layout(",", ".", columns)
 
 
-def _mixed(file, first):
+def _comma_error(file, first):
     return file.refusal(
         message(
             "cloud_file_comma",

@@ -14,7 +14,7 @@ from tankcal.clouds.formats.lines import (
     Layout,
     Lines,
     parse_rows,
-    shown,
+    printable_start,
     skip_lines,
     whole_number,
 )
@@ -49,27 +49,27 @@ def pts_pieces(file, chunk):
     return _pieces(file, chunk, _pts_header)
 
 
-def looks_as_ptx(lines):
+def is_ptx(lines):
     """Whether the first lines that are not blank are the header of a PTX scan."""
     counts = [whole_number(line) for line in lines[:2]]
     cells = [len(line.split()) for line in lines[2:10]]
     return None not in counts and cells == [3, 3, 3, 3, 4, 4, 4, 4]
 
 
-def looks_as_pts(lines):
+def is_pts(lines):
     """Whether the first lines that are not blank are a count and a row of points."""
     return len(lines) > 1 and whole_number(lines[0]) is not None and len(lines[1].split()) >= 3
 
 
-def _describe(file, header_of):
+def _describe(file, read_header):
     scans = []
     with file.path.open("rb") as stream:
         lines = Lines(file, stream)
-        while (scan := header_of(file, lines)) is not None:
+        while (scan := read_header(file, lines)) is not None:
             _check_size(file, scan, lines.row)
             lines_read = skip_lines(lines, scan.declared)
             if lines_read < scan.declared:
-                raise _scan_mismatch(file, len(scans), scan, lines_read)
+                raise _scan_count_error(file, len(scans), scan, lines_read)
             scans.append(scan)
             if len(scans) > MOST_SCANS:
                 raise file.refusal(
@@ -98,7 +98,7 @@ def _check_size(file, scan, row):
         )
 
 
-def _scan_mismatch(file, number, scan, points_read):
+def _scan_count_error(file, number, scan, points_read):
     return (
         count_mismatch(file, scan.declared, points_read)
         if number == 0
@@ -115,15 +115,15 @@ def _scan_mismatch(file, number, scan, points_read):
     )
 
 
-def _pieces(file, chunk, header_of):
+def _pieces(file, chunk, read_header):
     with file.path.open("rb") as stream:
         lines, number = Lines(file, stream), 0
-        while (scan := header_of(file, lines)) is not None:
+        while (scan := read_header(file, lines)) is not None:
             left = scan.declared
             while left:
                 block, row = lines.take(min(left, chunk))
                 if not block:
-                    raise _scan_mismatch(file, number, scan, scan.declared - left)
+                    raise _scan_count_error(file, number, scan, scan.declared - left)
                 xyz = parse_rows(file, block, row, LAYOUT)
                 left -= len(xyz)
                 yield Piece(number, xyz, len(xyz))
@@ -142,7 +142,7 @@ def _ptx_header(file, lines):
                 "cloud_file_ptx_size",
                 "found {found!r}; expected the numbers of columns and of rows of a scan, each in a "
                 "line of its own",
-                found=shown(columns),
+                found=printable_start(columns),
             ),
             row=row,
         )
@@ -187,7 +187,7 @@ def _pts_header(file, lines):
                 "cloud_file_pts_count",
                 "found {found!r}; expected the number of points that follow, alone in its line, or "
                 "the end of the file",
-                found=shown(line),
+                found=printable_start(line),
             ),
             row=lines.row,
         )

@@ -71,7 +71,7 @@ class Piece:
     read: int
 
 
-def ranges_of(count, each):
+def divide_records(count, each):
     """Divide `count` records into pieces of `each` records; the last may be shorter."""
     return tuple(
         CloudPiece(None, first, min(each, count - first)) for first in range(0, count, each)
@@ -147,7 +147,7 @@ def count_mismatch(file, declared, found):
     )
 
 
-def cut_short(file, what, needed, there):
+def describe_cut(file, what, needed, there):
     """Create the message for a part of the file that ends beyond the end of the file."""
     return message(
         "cloud_file_short",

@@ -37,7 +37,7 @@ class Frame:
     data: np.ndarray
 
 
-def decoded_frames(file, request):
+def decode_frames(file, request):
     """Yield the frames of a file from a child; raise InputError if the child fails or hangs."""
     request = {**request, "sys_path": sys.path}
     child = subprocess.Popen(
@@ -47,7 +47,7 @@ def decoded_frames(file, request):
         stderr=subprocess.DEVNULL,
         bufsize=0,
     )
-    _widen(child.stdout)
+    _widen_pipe(child.stdout)
     watch = _Watch(child)
     try:
         while (frame := _next_frame(file, child, watch)) is not None:
@@ -61,16 +61,16 @@ def decoded_frames(file, request):
 
 def _next_frame(file, child, watch):
     """Read the next `Frame`, None at the end; raise InputError if the child ended early."""
-    with watch.waiting():
+    with watch.limit_wait():
         head = _read_exactly(child.stdout, HEAD.size)
         data = None
         if head is not None:
             kind, scan, read, size = HEAD.unpack(head)
             data = _read_exactly(child.stdout, size)
     if data is None:
-        raise _death(file, child, watch)
+        raise _exit_error(file, child, watch)
     if kind == FAILURE:
-        raise _failure(file, data.tobytes().decode("utf-8", errors="replace"))
+        raise _failure_error(file, data.tobytes().decode("utf-8", errors="replace"))
     return None if kind == DONE else Frame(scan, read, data)
 
 
@@ -86,7 +86,7 @@ def _read_exactly(stream, size):
     return data
 
 
-def _widen(stream):
+def _widen_pipe(stream):
     with contextlib.suppress(ImportError, OSError, AttributeError):
         import fcntl
 
@@ -97,12 +97,12 @@ class _Watch:
     """Thread that ends a child if it sends nothing for SILENT_S while the parent waits."""
 
     def __init__(self, child):
-        self.child, self.since, self.ended_it = child, None, False
+        self.child, self.since, self.has_ended_child = child, None, False
         self._over = threading.Event()
         threading.Thread(target=self._run, daemon=True).start()
 
     @contextlib.contextmanager
-    def waiting(self):
+    def limit_wait(self):
         """Context in which the parent waits for the child."""
         self.since = time.monotonic()
         try:
@@ -118,15 +118,15 @@ class _Watch:
         while not self._over.wait(1.0):
             since = self.since
             if since is not None and time.monotonic() - since > SILENT_S:
-                self.ended_it = True
+                self.has_ended_child = True
                 self.child.kill()
                 return
 
 
-def _death(file, child, watch):
+def _exit_error(file, child, watch):
     """Create the InputError for a child that ended without a failure frame."""
     status = child.wait()
-    if watch.ended_it or -status in OUT_OF_TIME:
+    if watch.has_ended_child or -status in OUT_OF_TIME:
         text = message(
             "cloud_file_hang", "its reader came to no end with it and was stopped: is it damaged?"
         )
@@ -145,7 +145,7 @@ def _death(file, child, watch):
     return file.refusal(text)
 
 
-def _failure(file, reason):
+def _failure_error(file, reason):
     """Create the InputError for a failure that the child reported."""
     if reason == MEMORY:
         return file.refusal(

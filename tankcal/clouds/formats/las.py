@@ -14,12 +14,12 @@ from tankcal.clouds.formats.files import (
     EXTENT_LIMIT,
     Piece,
     count_mismatch,
-    cut_short,
+    describe_cut,
+    divide_records,
     no_points,
-    ranges_of,
     require_library,
 )
-from tankcal.clouds.formats.isolation import decoded_frames
+from tankcal.clouds.formats.isolation import decode_frames
 from tankcal.messages import message
 
 LEAST_HEADER = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375}  # least size in bytes, by minor version
@@ -76,11 +76,11 @@ def shares(file, points_each):
     """Divide the points into ranges; ranges of LAZ begin at chunks, the only seekable places."""
     header = read_header(file)
     if header.laszip is None:
-        return ranges_of(header.count, points_each)
-    compressor, size = _chunks_in(header.laszip)
+        return divide_records(header.count, points_each)
+    compressor, size = _read_chunking(header.laszip)
     if compressor == ONE_STREAM or size == VARIABLE:
         return (WHOLE,)
-    return ranges_of(header.count, max(1, points_each // size) * size)
+    return divide_records(header.count, max(1, points_each // size) * size)
 
 
 def pieces(file, chunk, share=WHOLE):
@@ -115,7 +115,7 @@ def read_header(file):
         )
     if len(start) < least:
         header = message("cloud_file_las_header", "the header")
-        raise file.refusal(cut_short(file, header, least, file.bytes))
+        raise file.refusal(describe_cut(file, header, least, file.bytes))
     parts = _Parts(start, minor)
     problems = [*_layout_problems(file, parts, least), *_number_problems(parts)]
     if problems:
@@ -126,7 +126,7 @@ def read_header(file):
     else:
         require_library(file, "lazrs")
         _check_laszip(file, parts, laszip)
-        laszip = _with_chunk_size(laszip, parts.count)
+        laszip = _set_chunk_size(laszip, parts.count)
         _check_chunk_table(file, parts, laszip)
     return LasHeader(
         parts.count,
@@ -226,13 +226,13 @@ def _number_problems(parts):
         yield message(
             "cloud_file_las_scale",
             "scale factors {found}; expected three numbers above 0, at most 1",
-            found=_written(parts.scale),
+            found=_format_numbers(parts.scale),
         )
     if not np.all(np.abs(parts.offset) <= FARTHEST):
         yield message(
             "cloud_file_las_offset",
             "offsets {found}; expected three finite numbers, at most {most:g}",
-            found=_written(parts.offset),
+            found=_format_numbers(parts.offset),
             most=FARTHEST,
         )
     with np.errstate(invalid="ignore", over="ignore"):
@@ -242,13 +242,13 @@ def _number_problems(parts):
             "cloud_file_las_box",
             "coordinates from {low} to {high}; expected the largest not below the smallest, and "
             "less than {most:g} between them",
-            low=_written(parts.low),
-            high=_written(parts.high),
+            low=_format_numbers(parts.low),
+            high=_format_numbers(parts.high),
             most=EXTENT_LIMIT,
         )
 
 
-def _written(numbers):
+def _format_numbers(numbers):
     return [f"{number:g}" for number in numbers]
 
 
@@ -291,8 +291,8 @@ def _laszip_record(file, parts):
 
 def _check_laszip(file, parts, data):
     """Raise InputError if the LASzip record does not describe a point or has no chunk size."""
-    is_sound = len(data) >= 34
-    if is_sound:
+    is_valid = len(data) >= 34
+    if is_valid:
         compressor, coder, major, minor = struct.unpack_from("<HHBB", data)
         chunk, items = struct.unpack_from("<I", data, 12)[0], struct.unpack_from("<H", data, 32)[0]
         if compressor not in (ONE_STREAM, 2, 3) or coder != 0:
@@ -307,12 +307,12 @@ def _check_laszip(file, parts, data):
                     coder=coder,
                 )
             )
-        is_sound = chunk > 0 or compressor == ONE_STREAM
-        is_sound = is_sound and items > 0 and len(data) >= 34 + 6 * items
-    if is_sound:
+        is_valid = chunk > 0 or compressor == ONE_STREAM
+        is_valid = is_valid and items > 0 and len(data) >= 34 + 6 * items
+    if is_valid:
         sizes = [struct.unpack_from("<H", data, 36 + 6 * i)[0] for i in range(items)]
-        is_sound = sum(sizes) == parts.record
-    if not is_sound:
+        is_valid = sum(sizes) == parts.record
+    if not is_valid:
         raise file.refusal(
             message(
                 "cloud_file_laz_record",
@@ -322,25 +322,25 @@ def _check_laszip(file, parts, data):
         )
 
 
-def _with_chunk_size(data, count):
+def _set_chunk_size(data, count):
     """Set a chunk size that lazrs accepts in the LASzip record of a single stream.
 
     A single stream of LASzip 1 has no chunk size. LASzip 1.2 writes 0 or the value for variable
     sizes, both of which lazrs refuses. lazrs accepts any other number.
     """
-    if _chunks_in(data)[0] != ONE_STREAM:
+    if _read_chunking(data)[0] != ONE_STREAM:
         return data
     return data[:12] + struct.pack("<I", min(max(count, 1), VARIABLE - 1)) + data[16:]
 
 
-def _chunks_in(data):
+def _read_chunking(data):
     """Return the compressor of a LASzip record and the number of points in a chunk."""
     return struct.unpack_from("<H", data)[0], struct.unpack_from("<I", data, 12)[0]
 
 
 def _check_chunk_table(file, parts, data):
     """Raise InputError if the chunk table is outside the file or its size is implausible."""
-    compressor, size = _chunks_in(data)
+    compressor, size = _read_chunking(data)
     if compressor == ONE_STREAM:
         return
     with file.path.open("rb") as stream:
@@ -361,7 +361,9 @@ def _check_chunk_table(file, parts, data):
             )
         )
     room = (place - parts.first - 8) // parts.record  # each chunk begins with an uncompressed point
-    least, most = (0, min(parts.count, room)) if size == VARIABLE else _chunks_of(parts.count, size)
+    least, most = (
+        (0, min(parts.count, room)) if size == VARIABLE else _chunk_bounds(parts.count, size)
+    )
     if version != 0 or not least <= chunks <= min(most, room, file.bytes - place - 8 + least):
         raise file.refusal(
             message(
@@ -376,7 +378,7 @@ def _check_chunk_table(file, parts, data):
         raise no_points(file)
 
 
-def _chunks_of(count, size):
+def _chunk_bounds(count, size):
     """Least and largest number of chunks of one size; some programs add an empty last chunk."""
     full = -(-count // size)
     return full, full + 1
@@ -410,7 +412,7 @@ class _Box:
                     "point {number} is ({x}, {y}, {z}), outside of the box that the header gives: "
                     "damaged, or its header was not brought up to date",
                     number=self.done + i + 1,
-                    **dict(zip("xyz", _written(xyz[i]), strict=True)),
+                    **dict(zip("xyz", _format_numbers(xyz[i]), strict=True)),
                 )
             )
         self.done += len(xyz)
@@ -441,5 +443,5 @@ def _laz_blocks(file, header, chunk, first, count):
         "laszip": header.laszip.hex(),
         "chunk": chunk,
     }
-    for frame in decoded_frames(file, request):
+    for frame in decode_frames(file, request):
         yield frame.data.view("<i4").reshape(-1, 3)

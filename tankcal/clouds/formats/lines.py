@@ -176,7 +176,7 @@ def parse_rows(file, block, first_row, layout):
                 numbers = None
         if numbers is not None:
             return numbers
-    raise _bad_row(file, block, first_row, layout)
+    raise _row_error(file, block, first_row, layout)
 
 
 def _is_blank_or_comment(line):
@@ -212,7 +212,7 @@ def _parse(block, layout):
     return numbers if np.isfinite(numbers.sum()) and np.isfinite(numbers).all() else None
 
 
-def _bad_row(file, block, first_row, layout):
+def _row_error(file, block, first_row, layout):
     """Create the InputError that names the first row without three numbers."""
     for i, line in enumerate(block.split(b"\n")):
         if _is_blank_or_comment(line):
@@ -226,7 +226,7 @@ def _bad_row(file, block, first_row, layout):
                         "cloud_file_number",
                         "{name}: found {found!r}; expected a number",
                         name=name,
-                        found=shown(cell),
+                        found=printable_start(cell),
                     ),
                     row=first_row + i,
                 )
@@ -235,7 +235,7 @@ def _bad_row(file, block, first_row, layout):
     )
 
 
-def shown(cell):
+def printable_start(cell):
     """First printable letters of a cell, for a message."""
     text = cell[:40].decode("utf-8", errors="replace")
     return "".join(c if c.isprintable() else "?" for c in text)

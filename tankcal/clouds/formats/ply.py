@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.clouds.contents import WHOLE, ScanHeader
-from tankcal.clouds.formats.files import Piece, count_mismatch, no_points, ranges_of
-from tankcal.clouds.formats.lines import Layout, Lines, parse_rows, shown, skip_lines
+from tankcal.clouds.formats.files import Piece, count_mismatch, divide_records, no_points
+from tankcal.clouds.formats.lines import Layout, Lines, parse_rows, printable_start, skip_lines
 from tankcal.messages import message
 
 TYPES = {
@@ -81,7 +81,7 @@ def describe(file):
 def shares(file, points_each):
     """Divide binary vertices into ranges; a text file is a single piece."""
     header = read_header(file)
-    return (WHOLE,) if header.order is None else ranges_of(header.vertex.count, points_each)
+    return (WHOLE,) if header.order is None else divide_records(header.vertex.count, points_each)
 
 
 def pieces(file, chunk, share=WHOLE):
@@ -131,16 +131,16 @@ def _parse_header(file, text):
                 elements.append(_Element(name, int(count), (), ()))
                 continue
             case ["property", kind, name] if kind in TYPES and elements:
-                elements[-1] = _with_property(elements[-1], name, TYPES[kind])
+                elements[-1] = _add_property(elements[-1], name, TYPES[kind])
                 continue
             case ["property", "list", size, kind, name] if elements and {size, kind} <= {*TYPES}:
-                elements[-1] = _with_property(elements[-1], name, "")
+                elements[-1] = _add_property(elements[-1], name, "")
                 continue
         raise file.refusal(
             message(
                 "cloud_file_ply_row",
                 "found {found!r} in the header; expected a format, an element or a property of PLY",
-                found=shown(line),
+                found=printable_start(line),
             ),
             row=row,
         )
@@ -151,7 +151,7 @@ def _parse_header(file, text):
     return order, tuple(elements)
 
 
-def _with_property(element, name, kind):
+def _add_property(element, name, kind):
     return _Element(element.name, element.count, (*element.names, name), (*element.types, kind))
 
 

@@ -16,15 +16,15 @@ from tankcal.clouds.inside.floor_cells import (
     OVER_M,
     STACK_M,
     FloorCells,
-    floor_cells_of,
     floor_grid,
+    sum_floor_cells,
 )
 from tankcal.clouds.wall.growing import (
     FEWEST,
     WALL,
+    estimate_spread,
+    find_off_trend,
     grow_wall,
-    off_trend,
-    spread_between,
 )
 from tankcal.clouds.wall.passes import Passes
 from tankcal.clouds.wall.screens import FILE
@@ -118,7 +118,7 @@ class CloudBottom:
         Share of the cells of the plan that show the bottom.
     pits : tuple of Pit
         Pits in the bottom, the largest first.
-    by_scan : ndarray, shape (across, across, scans)
+    scan_counts : ndarray, shape (across, across, scans)
         Number of points of each scan near the bottom in each cell.
     roof : RoofSeen or None
         Roof over the shell, or None if no roof is seen.
@@ -136,7 +136,7 @@ class CloudBottom:
     scatter_m: float
     seen_share: float
     pits: tuple[Pit, ...]
-    by_scan: np.ndarray
+    scan_counts: np.ndarray
     roof: RoofSeen | None
     cells: FloorCells
 
@@ -169,29 +169,28 @@ def find_cloud_bottom(passes, cloud_wall, sides=None, *, below_m=None, above_m=N
     grid = floor_grid(cloud_wall.surface, joints[0], joints[-1], **sizes)
     inside = [side != "outside" for side in sides or cloud_wall.sides]
     passes = Passes(passes) if callable(passes) else passes
-    return bottom_of_cells(passes.gather(floor_cells_of, grid, inside))
+    return find_bottom_in_cells(passes.gather(sum_floor_cells, grid, inside))
 
 
-def bottom_of_cells(cells):
+def find_bottom_in_cells(cells):
     """Find the bottom in the sums of `FloorCells`; return a `CloudBottom`."""
     # The largest surface that connects from cell to cell is the candidate for the bottom.
     grid, counts = cells.grid, cells.counts()
-    in_plan, rim = _plan(grid)
+    radius_m = grid.surface.radius_m
+    in_plan = grid.distance_m < radius_m - grid.cell_m / 2
+    rim = in_plan & (grid.distance_m > radius_m - EDGE_CELLS * grid.cell_m)
     width = np.full(grid.across, grid.cell_m)
-    grown = grow_wall(counts, column_m=width, row_m=grid.cell_m, bin_m=BIN_M)
-    bin_number = np.arange(grid.bins)
-    within = (bin_number >= grown.low[..., None]) & (bin_number <= grown.high[..., None])
-    within &= (grown.why == WALL)[..., None]
-    x, y, z, spread, count = cells.means(within)
+    surface = grow_wall(counts, column_m=width, row_m=grid.cell_m, bin_m=BIN_M)
+    x, y, z, spread, count = cells.means(surface.wall_bins(grid.bins))
     # Cells that deviate from the trend of their neighbours show objects on the bottom. The slope
     # within a cell is removed first.
-    is_bottom = (grown.why == WALL) & (count >= FEWEST)
-    is_bottom &= ~off_trend(_reduce_to_centres(x, y, z, is_bottom, grid), spread, is_bottom)
+    is_bottom = (surface.why == WALL) & (count >= FEWEST)
+    is_bottom &= ~find_off_trend(_reduce_to_centres(x, y, z, is_bottom, grid), spread, is_bottom)
     seen_share = float(np.mean(is_bottom[in_plan]))
     _check_bottom(z, is_bottom, rim, seen_share, grid)
     even = np.where(is_bottom, _reduce_to_centres(x, y, z, is_bottom, grid), np.nan)
     scatter = max(_scatter(even), LEAST_SD_M)
-    level = level_everywhere(z, is_bottom)
+    level = extend_level(z, is_bottom)
     mirror, low, share, mirrored = _find_mirror_images(counts, level, grid)
     mirror |= cells.under.reshape(mirror.shape) >= FEWEST
     return CloudBottom(
@@ -205,7 +204,7 @@ def bottom_of_cells(cells):
         scatter_m=scatter,
         seen_share=seen_share,
         pits=_find_pits(np.where(mirror, np.nan, low), share, level, grid),
-        by_scan=cells.counts_of_scans(grown.low, grown.high),
+        scan_counts=cells.count_by_scan(surface.low, surface.high),
         roof=_find_roof(cells, in_plan),
         cells=cells,
     )
@@ -219,14 +218,6 @@ def _find_roof(cells, in_plan):
     level = np.searchsorted(np.cumsum(cells.roof), np.array([0.05, 0.95]) * cells.roof.sum())
     low, high = cells.grid.top_m - OVER_M + (level + 0.5) * STACK_M
     return RoofSeen(share, float(low), float(high))
-
-
-def _plan(grid):
-    """Return cells whose centre lies in the shell, and the ring of these cells at its foot."""
-    middle = (np.arange(grid.across) + 0.5 - grid.across / 2) * grid.cell_m
-    distance = np.hypot(middle[:, None], middle[None, :])
-    in_plan = distance < grid.surface.radius_m - grid.cell_m / 2
-    return in_plan, in_plan & (distance > grid.surface.radius_m - EDGE_CELLS * grid.cell_m)
 
 
 def _reduce_to_centres(x, y, z, known, grid):
@@ -246,10 +237,10 @@ def _scatter(values):
     """Standard deviation of a cell from second differences, the larger of both directions."""
     differences = [values[1:-1] - (values[:-2] + values[2:]) / 2]
     differences.append(values[:, 1:-1] - (values[:, :-2] + values[:, 2:]) / 2)
-    return max(spread_between(values_of_direction) for values_of_direction in differences)
+    return max(estimate_spread(values_of_direction) for values_of_direction in differences)
 
 
-def level_everywhere(z, is_bottom):
+def extend_level(z, is_bottom):
     """Height of the bottom in each cell (across, across), from the nearest cell that shows it."""
     nearest = scipy.ndimage.distance_transform_edt(~is_bottom, return_indices=True)[1]
     return np.where(is_bottom, z, np.nan)[tuple(nearest)]
@@ -382,9 +373,9 @@ def bottom_points(bottom, most=400):
         xyz[i, 2] = _height_at(xyz[i], bottom.xyz_m[window][shown[window]])
     # The variance is averaged, not reduced: neighbouring cells share errors.
     variance = np.bincount(place, bottom.sd_m[column, row] ** 2) / cells
-    of_scans = bottom.by_scan[column, row].astype(float)
-    of_scans /= np.maximum(of_scans.sum(axis=1, keepdims=True), 1)
-    share = np.column_stack([np.bincount(place, value) / cells for value in of_scans.T])
+    scan_counts = bottom.scan_counts[column, row].astype(float)
+    scan_counts /= np.maximum(scan_counts.sum(axis=1, keepdims=True), 1)
+    share = np.column_stack([np.bincount(place, value) / cells for value in scan_counts.T])
     return BottomPoints(xyz, np.sqrt(variance), cells, share)
 
 

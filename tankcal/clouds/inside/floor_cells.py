@@ -58,6 +58,12 @@ class FloorGrid:
         return 2 * int(np.ceil(self.surface.radius_m / self.cell_m)) + 2
 
     @property
+    def distance_m(self):
+        """Distance (across, across) of the centre of each cell from the axis, m."""
+        middle = (np.arange(self.across) + 0.5 - self.across / 2) * self.cell_m
+        return np.hypot(middle[:, None], middle[None, :])
+
+    @property
     def bins(self):
         """Number of bins of height near the bottom."""
         return int(np.ceil((self.below_m + self.above_m) / BIN_M - 1e-9))
@@ -84,13 +90,8 @@ class FloorGrid:
         axis = s.centre_m[:2] + np.array(s.slope) * (self.bottom_m - s.centre_m[2])
         return axis - self.across * self.cell_m / 2
 
-    @property
-    def bytes_needed(self):
-        """Memory of the sums, bytes."""
-        return self.across**2 * (3 * 8 * self.bins + 4 * self.levels)
 
-
-def reach_of_floor(radius_m):
+def floor_reach(radius_m):
     """Depth below the shell in which the bottom is searched, m, for a radius in m."""
     return max(LEAST_REACH_M, REACH * radius_m)
 
@@ -114,7 +115,7 @@ def floor_grid(surface, bottom_m, top_m, *, below_m=None, above_m=None, cell_m=N
     -------
     FloorGrid
     """
-    reach = reach_of_floor(surface.radius_m)
+    reach = floor_reach(surface.radius_m)
     return FloorGrid(
         surface,
         float(bottom_m),
@@ -136,7 +137,7 @@ class FloorCells:
         Sums of x and y within the cell, in 1/2**16 of its side.
     stack : ndarray of uint32, shape (across**2, levels)
         Counts at the levels up to the top of the shell.
-    by_scan : ndarray of uint32, shape (scans, across**2, classes)
+    scan_counts : ndarray of uint32, shape (scans, across**2, classes)
         Counts of each scan near the bottom, in classes of COARSE bins.
     over : ndarray of uint32, shape (across**2,)
         Counts above the height of OVER_M below the top of the shell.
@@ -144,13 +145,11 @@ class FloorCells:
         The counts of `over` in all cells together, by height.
     under : ndarray of uint32, shape (across**2,)
         Counts below the lowest bin.
-    delivered, inside : int
-        Number of points received; number of points inside the shell, SKIN_M from its mean radius.
-    wall_below : int
-        Number of points on the surface of the wall, but below the shell.
+    tally : ndarray of int64, shape (2,)
+        The numbers of points `inside` and `wall_below`.
     """
 
-    NAMES = ("sums", "places", "stack", "by_scan", "over", "roof", "under", "tally")
+    NAMES = ("sums", "places", "stack", "scan_counts", "over", "roof", "under", "tally")
 
     def __init__(self, grid, scans=1):
         self.grid, self.scans = grid, scans
@@ -158,56 +157,50 @@ class FloorCells:
         self.sums = np.zeros((cells, grid.bins), dtype=np.int64)
         self.places = np.zeros((2, cells, grid.bins), dtype=np.int64)
         self.stack = np.zeros((cells, grid.levels), dtype=np.uint32)
-        self.by_scan = np.zeros((scans, cells, -(-grid.bins // COARSE)), dtype=np.uint32)
+        self.scan_counts = np.zeros((scans, cells, -(-grid.bins // COARSE)), dtype=np.uint32)
         self.over = np.zeros(cells, dtype=np.uint32)
         self.roof = np.zeros(grid.roof_levels, dtype=np.int64)
         self.under = np.zeros(cells, dtype=np.uint32)
-        self.tally = np.zeros(3, dtype=np.int64)
+        self.tally = np.zeros(2, dtype=np.int64)
         self._corner = grid.corner_m
-
-    @property
-    def delivered(self):
-        """Number of points received."""
-        return int(self.tally[0])
 
     @property
     def inside(self):
         """Number of points inside the shell, SKIN_M from its mean radius."""
-        return int(self.tally[1])
+        return int(self.tally[0])
 
     @property
     def wall_below(self):
         """Number of points on the surface of the wall, but below the shell."""
-        return int(self.tally[2])
+        return int(self.tally[1])
 
     def add(self, xyz_m, scan=0):
         """Add points (n, 3) of one scan."""
-        self.tally[0] += len(xyz_m)
         for start in range(0, len(xyz_m), PIECE):
             self._add(np.asarray(xyz_m[start : start + PIECE], dtype=float), scan)
 
-    def merged(self, other):
+    def merge(self, other):
         """Return the sums of both sets of points, in the same grid."""
         both = FloorCells(self.grid, self.scans)
         for name in self.NAMES:
             np.add(getattr(self, name), getattr(other, name), out=getattr(both, name))
         return both
 
-    __add__ = merged
+    __add__ = merge
 
     def counts(self):
         """Number of points in each bin (across, across, bins); the first axis is along x."""
         return (self.sums >> 32).reshape(self.grid.across, self.grid.across, -1)
 
-    def counts_of_scans(self, low, high):
+    def count_by_scan(self, low, high):
         """Number of points of each scan (across, across, scans) in a range of bins of each cell.
 
         The range from `low` to `high`, each (across, across), is widened to whole classes.
         """
-        class_number = np.arange(self.by_scan.shape[2])
+        class_number = np.arange(self.scan_counts.shape[2])
         first, last = (bins.ravel()[:, None] // COARSE for bins in (low, high))
         within = (class_number >= first) & (class_number <= last)
-        counts = np.einsum("scb,cb->cs", self.by_scan, within)
+        counts = np.einsum("scb,cb->cs", self.scan_counts, within)
         return counts.reshape(self.grid.across, self.grid.across, self.scans)
 
     def means(self, within):
@@ -250,9 +243,9 @@ class FloorCells:
         grid = self.grid
         distance = grid.surface.places(xyz_m)[2]
         at_wall = np.abs(distance) <= SKIN_M
-        self.tally[2] += np.count_nonzero(at_wall & (xyz_m[:, 2] < grid.bottom_m - FOOT_M))
+        self.tally[1] += np.count_nonzero(at_wall & (xyz_m[:, 2] < grid.bottom_m - FOOT_M))
         is_inside = distance < -SKIN_M
-        self.tally[1] += np.count_nonzero(is_inside)
+        self.tally[0] += np.count_nonzero(is_inside)
         x, y, z = xyz_m[is_inside].T
         x, y = (x - self._corner[0]) / grid.cell_m, (y - self._corner[1]) / grid.cell_m
         column, row = x.astype(np.int64), y.astype(np.int64)
@@ -273,7 +266,7 @@ class FloorCells:
         fine, cell = fine[near], cell[near]
         bin_index = cell * grid.bins + (fine >> FINE_BITS)
         np.add.at(self.sums.ravel(), bin_index, COUNT + (fine & (FINE - 1)))
-        np.add.at(self.by_scan[scan], (cell, (fine >> FINE_BITS) // COARSE), np.uint32(1))
+        np.add.at(self.scan_counts[scan], (cell, (fine >> FINE_BITS) // COARSE), np.uint32(1))
         for sums, part, whole in zip(self.places, (x, y), (column, row), strict=True):
             np.add.at(
                 sums.ravel(), bin_index, ((part[near] - whole[near]) * PLACE).astype(np.int64)
@@ -286,7 +279,7 @@ class FloorCells:
         np.add.at(self.roof, level[over].astype(np.int64), 1)
 
 
-def floor_cells_of(points, grid, from_inside):
+def sum_floor_cells(points, grid, from_inside):
     """Sum an iterator of (scan, points) in `FloorCells`.
 
     Only the scans for which `from_inside` (sequence of bool) is true are included.

@@ -11,10 +11,9 @@ import numpy as np
 import scipy.sparse
 
 from tankcal.adjust import SD_OVER_MEDIAN
-from tankcal.clouds.inside.bottom import level_everywhere
+from tankcal.clouds.inside.bottom import extend_level
 from tankcal.clouds.inside.floor_cells import STACK_M
-from tankcal.clouds.wall.passes import Passes
-from tankcal.clouds.wall.sampling import PointSample
+from tankcal.clouds.wall.passes import Passes, PointSample
 from tankcal.errors import SolutionError
 from tankcal.geometry.circles import fit_circle
 
@@ -108,17 +107,17 @@ class ThingSamples:
     def __init__(self, count):
         self.samples = [PointSample(SAMPLE) for _ in range(count)]
 
-    def merged(self, other):
+    def merge(self, other):
         """Return the samples of both sets of points."""
         both = ThingSamples(0)
         pairs = zip(self.samples, other.samples, strict=True)
-        both.samples = [sample.merged(other_sample) for sample, other_sample in pairs]
+        both.samples = [sample.merge(other_sample) for sample, other_sample in pairs]
         for sample in both.samples:
             sample.reduce()
         return both
 
 
-def things_of(points, cells):
+def sample_things(points, cells):
     """Sample the points of each object of `ThingCells` from an iterator of (scan, points)."""
     samples, label = ThingSamples(cells.count), cells.label
     for scan, xyz in points:
@@ -152,7 +151,7 @@ def find_things(passes, bottom, sides=None):
         The tallest object first.
     """
     grid = bottom.grid
-    level = level_everywhere(bottom.xyz_m[..., 2], bottom.is_bottom)
+    level = extend_level(bottom.xyz_m[..., 2], bottom.is_bottom)
     label, standing = _label_objects(bottom, level)
     inside = tuple(number != "outside" for number in sides or ["inside"] * bottom.cells.scans)
     passes = Passes(passes) if callable(passes) else passes
@@ -160,11 +159,11 @@ def find_things(passes, bottom, sides=None):
     if not cells.count:
         return ()
     things = []
-    for number, sample in enumerate(passes.gather(things_of, cells).samples, start=1):
+    for number, sample in enumerate(passes.gather(sample_things, cells).samples, start=1):
         xyz = sample.points()
         if len(xyz) >= FEWEST:
-            column = _as_column(xyz, level, grid) if number <= standing else None
-            things.append(column or _as_box(xyz, label == number, level, bottom))
+            column = _fit_column(xyz, level, grid) if number <= standing else None
+            things.append(column or _make_box(xyz, label == number, level, bottom))
     return tuple(sorted(things, key=lambda thing: thing.low_m[2] - thing.high_m[2]))
 
 
@@ -190,9 +189,7 @@ def _label_objects(bottom, level):
     # Only cells clear of bottom, roof and wall can belong to an object.
     edge = grid.low_m + np.arange(grid.levels) * STACK_M
     is_free = (edge > (level + CLEAR_M)[..., None]) & (edge < grid.top_m - ROOF_M - STACK_M)
-    middle = (np.arange(grid.across) + 0.5 - grid.across / 2) * grid.cell_m
-    distance = np.hypot(middle[:, None], middle[None, :])
-    is_free &= (distance < grid.surface.radius_m - WALL_M)[..., None]
+    is_free &= (grid.distance_m < grid.surface.radius_m - WALL_M)[..., None]
     occupied = is_free & (bottom.cells.stack.reshape(shape) >= LEAST_POINTS)
     tall = occupied.sum(axis=2) > STANDING * is_free.sum(axis=2).max(initial=1)
     # A column includes the cells around it, which may show its edges.
@@ -212,7 +209,7 @@ def _label_objects(bottom, level):
     return label + number[parts], standing
 
 
-def _as_box(xyz, where, level, bottom):
+def _make_box(xyz, where, level, bottom):
     """Create a `Thing` of unknown volume: the box around its points, without stray points.
 
     The box extends to the bottom if the lowest points lie just above the bottom.
@@ -235,7 +232,7 @@ def _as_box(xyz, where, level, bottom):
     )
 
 
-def _as_column(xyz, level, grid):
+def _fit_column(xyz, level, grid):
     """Create a `Thing` that is round in most of its slabs, or return None."""
     slab = np.floor((xyz[:, 2] - grid.low_m) / SLAB_M).astype(np.int64)
     fits = []

@@ -2,15 +2,15 @@
 
 from tankcal.clouds.wall.deciding import CloudWall
 from tankcal.clouds.wall.finding import find_cloud_wall
-from tankcal.clouds.wall.passes import Passes, cells_of, sample_of
+from tankcal.clouds.wall.passes import Passes, sample_points, sum_cells
 from tankcal.clouds.wall.readings import CloudReadings, readings_of
 
 __all__ = [
     "CloudReadings",
     "CloudWall",
     "Passes",
-    "cells_of",
     "find_cloud_wall",
     "readings_of",
-    "sample_of",
+    "sample_points",
+    "sum_cells",
 ]

@@ -51,6 +51,11 @@ class CellGrid:
         return len(self.edges_m) - 1
 
     @property
+    def middles_m(self):
+        """Coordinate u of the centres of the rows, m."""
+        return (self.edges_m[:-1] + self.edges_m[1:]) / 2
+
+    @property
     def unit_m(self):
         """Unit of the sums of distances, m."""
         return 2 * self.band_m / self.bins / FINE
@@ -60,7 +65,7 @@ class CellGrid:
         """Width of a bin, m."""
         return 2 * self.band_m / self.bins
 
-    def bytes_of(self, scans):
+    def count_bytes(self, scans):
         """Memory of the sums of `scans` scans, bytes."""
         cells = self.rows * self.columns
         return cells * (scans * (self.bins + 2) * 8 + FAR_BINS * 4)
@@ -117,7 +122,7 @@ class WallCells:
         for start in range(0, len(xyz_m), PIECE):
             self._add(xyz_m[start : start + PIECE], scan)
 
-    def packed(self):
+    def pack_sums(self):
         """Sums in sparse form, {name: (indices, values)}; a piece of a file fills few bins."""
         packed = {}
         for name in SUMMED:
@@ -130,18 +135,18 @@ class WallCells:
         return packed
 
     def add_packed(self, packed):
-        """Add sums in the form of `packed`, of the same surface, grid and number of scans."""
+        """Add sums in the form of `pack_sums`, of the same surface, grid and number of scans."""
         for name, (indices, values) in packed.items():
             getattr(self, name).reshape(-1)[indices] += values
 
-    def merged(self, other):
+    def merge(self, other):
         """Return the sums of both sets of points, of the same surface, grid and number of scans."""
         both = WallCells(self.surface, self.grid, self.scans)
         for name in SUMMED:
             np.add(getattr(self, name), getattr(other, name), out=getattr(both, name))
         return both
 
-    __add__ = merged
+    __add__ = merge
 
     def counts(self, scan):
         """Number of points of one scan in each bin, shape (rows, columns, bins)."""

@@ -17,14 +17,30 @@ from tankcal.clouds.wall.features import (
     find_obstructions,
     find_welds,
 )
-from tankcal.clouds.wall.growing import OFF_TREND, WALL, grow_wall, off_trend
-from tankcal.clouds.wall.refusals import refuse_no_wall, two_surfaces_in
-from tankcal.errors import InputError
+from tankcal.clouds.wall.growing import (
+    EMPTY,
+    FEW,
+    FEWEST,
+    OFF_TREND,
+    REFINE_BINS,
+    WALL,
+    find_off_trend,
+    grow_wall,
+)
+from tankcal.clouds.wall.screens import FILE, two_surfaces_error
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 from tankcal.units import FULL_TURN
 
 LEAST_SD_M = 5e-5  # least standard deviation of the mean of a cell, m
 # Distance of cells without common noise along a scan line, m; least number of values for a scatter
 APART_M, FEWEST_DIFFERENCES = 0.4, 20
+# Share of cells with a second mode that shows a second surface; number of sectors; least share of
+# the sectors in which this surface is seen
+TWO_SURFACES, SECTORS, SECTORS_WITH = 0.10, 36, 0.6
+RIVAL = 0.15  # share of the cells from which a connected second surface is refused
+LEAST_TURN = 0.15  # least share of the columns for the estimation of an axis
+LEAST_WALL = 0.25  # least share of the wall in the cells with points
 
 
 @dataclass(frozen=True)
@@ -65,7 +81,7 @@ class CloudWall:
     delivered, outside, beyond, of_wall : ndarray of int, shape (scans,)
         Number of points received; outside the shell; near the shell but outside the band; in the
         means of cells of the wall.
-    are_apart : bool
+    are_separate : bool
         Whether the scans show the wall at such different distances that each was decided alone.
     """
 
@@ -89,10 +105,10 @@ class CloudWall:
     outside: np.ndarray
     beyond: np.ndarray
     of_wall: np.ndarray
-    are_apart: bool = False
+    are_separate: bool = False
 
 
-def wall_of_cells(cells, joints_m, sides):
+def decide_wall(cells, joints_m, sides):
     """Decide which cells show the wall, and determine its distance for each scan.
 
     Parameters
@@ -110,16 +126,16 @@ def wall_of_cells(cells, joints_m, sides):
     """
     joints_m, column_m = np.asarray(joints_m, dtype=float), _column_widths(cells)
     wall_values = _ScanValues(cells)
-    grown_of = {}
+    side_walls = {}
     for side in dict.fromkeys(sides):
         side_scans = [i for i, item in enumerate(sides) if item == side]
-        grown_of[side] = wall_values.decide(side_scans, joints_m, column_m)
+        side_walls[side] = wall_values.decide(side_scans, joints_m, column_m)
     is_seen = np.any(wall_values.is_wall, axis=0)
-    course = np.searchsorted(joints_m[1:-1], _row_centres(cells.grid), side="right")
+    course = np.searchsorted(joints_m[1:-1], cells.grid.middles_m, side="right")
     courses = np.arange(len(joints_m) - 1)
     count = np.where(wall_values.is_wall, wall_values.count, 0)
     best = _weighted_mean(wall_values.radius, wall_values.sd, count)[0]
-    is_one_side = len(grown_of) == 1
+    is_one_side = len(side_walls) == 1
     return CloudWall(
         surface=cells.surface,
         grid=cells.grid,
@@ -131,17 +147,17 @@ def wall_of_cells(cells, joints_m, sides):
         turn_rad=wall_values.turn,
         along_m=wall_values.along,
         is_wall=wall_values.is_wall,
-        why={side: grown.why for side, grown in grown_of.items()},
+        why={side: side_wall.why for side, side_wall in side_walls.items()},
         scatter_m=wall_values.scatter,
         masked_share=np.array([1 - is_seen[course == item].mean() for item in courses]),
-        joints=find_joints(best, _row_centres(cells.grid), joints_m) if is_one_side else (),
+        joints=find_joints(best, cells.grid.middles_m, joints_m) if is_one_side else (),
         welds=find_welds(best, course, column_m) if is_one_side else (),
-        obstructions=find_obstructions(is_seen, list(grown_of.values()), cells, column_m),
+        obstructions=find_obstructions(is_seen, list(side_walls.values()), cells, column_m),
         delivered=cells.delivered,
         outside=cells.outside,
         beyond=cells.beyond,
         of_wall=count.sum(axis=(1, 2)),
-        are_apart=wall_values.are_apart,
+        are_separate=wall_values.are_separate,
     )
 
 
@@ -154,72 +170,177 @@ class _ScanValues:
         self.radius, self.sd, self.turn, self.along = np.full((4, *shape), np.nan)
         self.count, self.is_wall = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=bool)
         self.scatter = np.full(cells.scans, np.nan)
-        self.are_apart = False
+        self.are_separate = False
 
     def decide(self, side_scans, joints_m, column_m):
-        """Decide the scans of one side and fill in their means; return `Grown`."""
+        """Decide the scans of one side and fill in their means; return `SideWall`."""
         cells, grid = self.cells, self.cells.grid
         total = sum(cells.counts(i) for i in side_scans)
-        grown = grow_wall(
+        row_m = float(np.median(np.diff(grid.edges_m)))
+        side_wall = grow_wall(
             total,
             column_m=column_m,
-            row_m=float(np.median(np.diff(grid.edges_m))),
+            row_m=row_m,
             bin_m=grid.bin_m,
             joined_rows=np.searchsorted(grid.edges_m, joints_m[1:-1] - 1e-9),
         )
-        refuse_no_wall(grown, cells)
+        _refuse_no_wall(side_wall, cells)
         # Scans that do not overlap can show a single wall as two surfaces.
-        second = two_surfaces_in(grown, total, cells)
+        second = _find_two_surfaces(side_wall, total, cells)
         if second is not None:
-            return self._apart(side_scans, joints_m, column_m, grown, second)
+            return self._decide_alone(side_scans, joints_m, column_m, side_wall, second)
         for i in side_scans:
-            mean, self.sd[i], self.count[i] = _means(cells, i, grown)
+            mean, self.sd[i], self.count[i] = _average_distances(cells, i, side_wall)
             self.radius[i] = cells.surface.radius_m + mean
-            self.turn[i], self.along[i] = _mean_places(cells, i)
+            self.turn[i], self.along[i] = _average_places(cells, i)
         # The mean over scans has the least noise, so that the trend test is applied to it.
         values, sds = _weighted_mean(
             self.radius[side_scans], self.sd[side_scans], self.count[side_scans]
         )
-        grown.why[off_trend(values, sds, grown.why == WALL)] = OFF_TREND
+        side_wall.why[find_off_trend(values, sds, side_wall.why == WALL)] = OFF_TREND
+        course = np.searchsorted(joints_m[1:-1], grid.middles_m, side="right")
+        width_m = float(np.median(column_m))
         for i in side_scans:
-            self.is_wall[i] = (grown.why == WALL) & (self.count[i] >= 3)
+            self.is_wall[i] = (side_wall.why == WALL) & (self.count[i] >= 3)
             self.radius[i][~self.is_wall[i]] = np.nan
-            course = np.searchsorted(joints_m[1:-1], _row_centres(grid), side="right")
-            width, row_m = float(np.median(column_m)), float(np.median(np.diff(grid.edges_m)))
-            self.scatter[i] = _scatter_of_cells(self.radius[i], course, row_m, width)
-            least = max(LEAST_SD_M, self.scatter[i])
-            self.sd[i] = np.maximum(self.sd[i], least)
-        return grown
+            self.scatter[i] = _scatter_of_cells(self.radius[i], course, row_m, width_m)
+            self.sd[i] = np.maximum(self.sd[i], max(LEAST_SD_M, self.scatter[i]))
+        return side_wall
 
-    def _apart(self, side_scans, joints_m, column_m, grown, second):
+    def _decide_alone(self, side_scans, joints_m, column_m, side_wall, second):
         """Decide each scan alone where scans that do not overlap show one wall as two surfaces.
 
         Each scan must show a single surface. Otherwise another surface hides a part of the wall,
-        and `second` is raised. The result is a `Grown`.
+        and `second` is raised. The result is a `SideWall`.
         """
         if len(side_scans) == 1:
             raise second
-        why = grown.why.copy()
+        why = side_wall.why.copy()
         for scan in side_scans:
             try:
                 alone = self.decide([scan], joints_m, column_m)
             except InputError:
                 raise second from None
             why[alone.why == WALL] = WALL
-        self.are_apart = True
-        return replace(grown, why=why)
+        self.are_separate = True
+        return replace(side_wall, why=why)
 
 
-def _row_centres(grid):
-    return (grid.edges_m[:-1] + grid.edges_m[1:]) / 2
+def _refuse_no_wall(side_wall, cells):
+    """Raise InputError if only a small share of the cells with points shows the wall."""
+    has_points = (side_wall.why.ravel() != EMPTY) | np.any(cells.far >= FEWEST, axis=1)
+    seen = max(np.count_nonzero(has_points), 1)
+    share = np.count_nonzero(side_wall.why == WALL) / seen
+    if share >= LEAST_WALL:
+        return
+    if np.count_nonzero(side_wall.why == FEW) > seen / 2:
+        text = message(
+            "cloud_too_sparse",
+            "found fewer than {least} points in most cells of the wall ({rows} x {columns}); "
+            "expected a denser cloud: bring its points as points.csv",
+            least=FEWEST,
+            rows=cells.grid.rows,
+            columns=cells.grid.columns,
+        )
+    else:
+        text = message(
+            "cloud_wall_too_small",
+            "only {share:.1f} % of the cells in which anything is seen show a wall near the radius "
+            "{radius_m:.3f} m; expected {least:.0f} % at least: check tank.kind, the unit, the "
+            "frame and what stands before the wall",
+            share=100 * share,
+            radius_m=cells.surface.radius_m,
+            least=100 * LEAST_WALL,
+        )
+    raise InputError(Problem(FILE, text))
+
+
+def _find_two_surfaces(side_wall, counts, cells):
+    """Return an InputError if a second surface surrounds the wall or rivals its size, else None.
+
+    Parameters
+    ----------
+    side_wall : SideWall
+        Wall of one side.
+    counts : ndarray of int, shape (rows, columns, bins)
+        Histograms in which the wall was found.
+    cells : WallCells
+        Sums over the points in cells.
+
+    Returns
+    -------
+    InputError or None
+    """
+    grid, wall = cells.grid, side_wall.why == WALL
+    seen = max(np.count_nonzero(wall | side_wall.two_modes | (side_wall.other >= 0)), 1)
+    second = side_wall.other >= 0
+    sector = np.arange(grid.columns) * SECTORS // grid.columns
+    parts = np.bincount(sector, second.mean(axis=0), SECTORS) / np.bincount(sector)
+    share = np.count_nonzero(second) / seen
+    all_round = share >= TWO_SURFACES and np.mean(parts >= TWO_SURFACES) >= SECTORS_WITH
+    if not all_round and not (side_wall.surfaces and side_wall.surfaces[0][0] >= RIVAL):
+        return None
+    first, other = _surface_distances(side_wall, counts, grid)
+    radius_m = cells.surface.radius_m
+    return two_surfaces_error(
+        radius_m + first, np.count_nonzero(wall) / seen, radius_m + other, share
+    )
+
+
+def _surface_distances(side_wall, counts, grid):
+    """Median distances of the wall and of the second surface, m.
+
+    If the surfaces have similar numbers of points, the mode taken as wall may change from cell to
+    cell. The inner of two modes in a cell is therefore assigned to the inner surface.
+    """
+    wall, second = side_wall.why == WALL, side_wall.other >= 0
+    first = _mean_distances(counts, side_wall.low, side_wall.high, grid)
+    near = side_wall.other - REFINE_BINS, side_wall.other + REFINE_BINS
+    other = _mean_distances(counts, *near, grid)
+    both = wall & second
+    if 2 * np.count_nonzero(both) < np.count_nonzero(second):
+        return _median_about_own_axis(first, wall), _median_about_own_axis(other, second)
+    inner = np.nanmedian(np.fmin(first, other)[both])
+    outer = np.nanmedian(np.fmax(first, other)[both])
+    return (inner, outer) if np.median((first - other)[both]) < 0 else (outer, inner)
+
+
+def _median_about_own_axis(distance_m, chosen):
+    """Median distance of some cells from the axis of their own surface, m.
+
+    The axis of one surface may differ from the common axis of both. Its offset is estimated from
+    the first harmonic of the distances, without outliers.
+    """
+    columns = distance_m.shape[1]
+    chosen = chosen & np.isfinite(distance_m)
+    values, column = distance_m[chosen], np.nonzero(chosen)[1]
+    if len(np.unique(column)) < columns * LEAST_TURN:
+        return np.median(values)
+    # A shift of the axis changes the distance by a sin t + b cos t.
+    turn = column * (FULL_TURN / columns)
+    design = np.column_stack([np.sin(turn), np.cos(turn), np.ones(len(turn))])
+    near = np.ones(len(values), dtype=bool)
+    for _ in range(3):
+        solution = np.linalg.lstsq(design[near], values[near], rcond=None)[0]
+        deviation = np.abs(values - design @ solution)
+        near = deviation <= 4 * np.median(deviation) + 1e-6
+    return np.median(values - design[:, :2] @ solution[:2])
+
+
+def _mean_distances(counts, low, high, grid):
+    """Mean distance (rows, columns) of the points between two bins of each cell, m."""
+    number = np.arange(grid.bins)
+    part = np.where((number >= low[..., None]) & (number <= high[..., None]), counts, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return (part @ number / part.sum(axis=2) + 0.5) * grid.bin_m - grid.band_m
 
 
 def _column_widths(cells):
     """Width of a cell in each row (rows,), m."""
-    return FULL_TURN * cells.surface.width_m(_row_centres(cells.grid)) / cells.grid.columns
+    return FULL_TURN * cells.surface.width_m(cells.grid.middles_m) / cells.grid.columns
 
 
-def _means(cells, scan, grown):
+def _average_distances(cells, scan, side_wall):
     """Mean distance of the points of one scan over the bins of the wall.
 
     Returns
@@ -231,8 +352,7 @@ def _means(cells, scan, grown):
     """
     grid = cells.grid
     number = np.arange(grid.bins)
-    within = (number >= grown.low[..., None]) & (number <= grown.high[..., None])
-    within &= (grown.why == WALL)[..., None]
+    within = side_wall.wall_bins(grid.bins)
     counts = np.where(within, cells.counts(scan), 0)
     count = counts.sum(axis=2)
     # The sum of whole units is exact; half a unit compensates their truncation.
@@ -245,7 +365,7 @@ def _means(cells, scan, grown):
     return mean, spread, count
 
 
-def _mean_places(cells, scan):
+def _average_places(cells, scan):
     """Mean azimuth (rad) and u (m), each (rows, columns), of the points of one scan in the band."""
     grid = cells.grid
     shape = grid.rows, grid.columns

@@ -10,7 +10,7 @@ import scipy
 
 from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.clouds.wall.cells import FAR_BINS, FAR_M
-from tankcal.clouds.wall.growing import EMPTY, WALL, spread_between
+from tankcal.clouds.wall.growing import EMPTY, WALL, estimate_spread
 from tankcal.units import FULL_TURN
 
 # Rows on each side of a step; least step, m, and as a multiple of the scatter
@@ -119,7 +119,7 @@ def find_joints(radius_m, middle_m, joints_m):
     if rows < 2 * JOINT_ROWS + 1:
         return ()
     between = _medians(steps)  # steps within a column are independent of the form along the row
-    scatter = max(spread_between(between[1:-1] - (between[:-2] + between[2:]) / 2), 1e-5)
+    scatter = max(estimate_spread(between[1:-1] - (between[:-2] + between[2:]) / 2), 1e-5)
     height, inner = np.diff(middle_m), joints_m[1:-1]
     joints = []
     for i in np.argsort(-np.nan_to_num(np.abs(between)), kind="stable"):
@@ -205,14 +205,14 @@ def _extends_to(depth, i, whole):
     return not np.isfinite(near).any() or np.nanmax(near) > RUNS_ON
 
 
-def find_obstructions(seen, grown, cells, column_m):
+def find_obstructions(seen, side_walls, cells, column_m):
     """Find obstructions as connected cells in which no scan shows the wall.
 
     Parameters
     ----------
     seen : ndarray of bool, shape (rows, columns)
         Cells in which a scan shows the wall.
-    grown : list of Grown
+    side_walls : list of SideWall
         Decision of each side.
     cells : WallCells
         Sums over the points in cells.
@@ -239,7 +239,7 @@ def find_obstructions(seen, grown, cells, column_m):
         members = number == item
         obstructions.append(
             _describe_obstruction(
-                row[members], _unwrap_columns(column[members], columns), grown, cells, column_m
+                row[members], _unwrap_columns(column[members], columns), side_walls, cells, column_m
             )
         )
     return tuple(sorted(obstructions, key=lambda item: -item.cells))
@@ -266,13 +266,13 @@ def _unwrap_columns(column, columns):
     return begin + (column - begin) % columns
 
 
-def _describe_obstruction(row, column, grown, cells, column_m):
+def _describe_obstruction(row, column, side_walls, cells, column_m):
     grid = cells.grid
     turn = FULL_TURN / grid.columns
     index = row * grid.columns + column % grid.columns
     azimuth = column.min() * turn, min((column.max() + 1) * turn, column.min() * turn + FULL_TURN)
     height = float(grid.edges_m[row.min()]), float(grid.edges_m[row.max() + 1])
-    distances = _distances_of_others(row, column % grid.columns, index, grown, cells)
+    distances = _distances_of_others(row, column % grid.columns, index, side_walls, cells)
     wide = float((azimuth[1] - azimuth[0]) / turn * np.median(column_m[row]))
     guess = _guess_kind(row, column, azimuth, height, distances, wide)
     reach = np.percentile(distances, [5, 95]) if len(distances) else (np.nan, np.nan)
@@ -285,16 +285,16 @@ def _describe_obstruction(row, column, grown, cells, column_m):
     )
 
 
-def _distances_of_others(row, column, index, grown, cells):
+def _distances_of_others(row, column, index, side_walls, cells):
     """Distances of other surfaces in some cells, from second modes and from distant points, m."""
     grid = cells.grid
     parts = []
-    for side_grown in grown:
-        other = side_grown.other[row, column]
+    for side_wall in side_walls:
+        other = side_wall.other[row, column]
         known = (
             (other >= 0)
-            & (side_grown.why[row, column] != WALL)
-            & (side_grown.why[row, column] != EMPTY)
+            & (side_wall.why[row, column] != WALL)
+            & (side_wall.why[row, column] != EMPTY)
         )
         parts.append((other[known] + 0.5) * grid.bin_m - grid.band_m)
     _, far = np.nonzero(cells.far[index] >= LEAST_FAR)

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.clouds.wall.cells import CellGrid
-from tankcal.clouds.wall.deciding import wall_of_cells
+from tankcal.clouds.wall.deciding import decide_wall
 from tankcal.clouds.wall.passes import Passes
 from tankcal.clouds.wall.start import find_surface
 from tankcal.messages import message
@@ -21,10 +21,8 @@ SAMPLE = 500_000  # points of the sample
 ROW_M, COLUMN_M, FEWEST_COLUMNS = 0.05, 0.15, 360
 MEMORY_BYTES = 256 << 20  # memory of the sums of all scans, bytes
 POINTS_OF_CELL = 40  # desired number of points in a cell, for points spread evenly over the wall
-LEAST_COLUMNS, WIDEST_M = (
-    90,
-    0.3,
-)  # least number of columns, largest width of a cell, for few points
+# Least number of columns, and largest width of a cell, m, for few points
+LEAST_COLUMNS, WIDEST_M = 90, 0.3
 # Largest height of a row, m, and as a share of a course, because a course bulges between joints
 COARSEST_M, TALLEST = 0.2, 0.1
 
@@ -119,7 +117,7 @@ def find_cloud_wall(
         )
     )
     cells = passes.cells(surface, grid, scans)
-    return wall_of_cells(cells, joints, tuple(sides or ["one"] * scans))
+    return decide_wall(cells, joints, tuple(sides or ["one"] * scans))
 
 
 def _viewing_directions(sample, sides):
@@ -176,7 +174,7 @@ def make_grid(
             edges.extend(low + (high - low) * np.arange(1, rows + 1) / rows)
         grid = CellGrid(np.array(edges), columns, band_m, max(8, round(band_m / 0.002)))
         is_coarsest = row_m >= COARSEST_M and columns <= 2 * LEAST_COLUMNS
-        if is_coarsest or grid.bytes_of(scans) <= memory_bytes:
+        if is_coarsest or grid.count_bytes(scans) <= memory_bytes:
             return grid
         if row_m < COARSEST_M and row_m < 2 * around / columns:
             row_m *= 1.25

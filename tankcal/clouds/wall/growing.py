@@ -32,7 +32,7 @@ REFINE_BINS = 2  # least number of bins beside a mode that its mean includes
 
 
 @dataclass(frozen=True)
-class Grown:
+class SideWall:
     """Wall in the cells of one side.
 
     Attributes
@@ -57,6 +57,12 @@ class Grown:
     surfaces: tuple
     two_modes: np.ndarray
 
+    def wall_bins(self, bins):
+        """Whether each bin (rows, columns, bins) belongs to the mean distance of the wall."""
+        number = np.arange(bins)
+        within = (number >= self.low[..., None]) & (number <= self.high[..., None])
+        return within & (self.why == WALL)[..., None]
+
 
 def grow_wall(counts, *, column_m, row_m, bin_m, joined_rows=()):
     """Find the wall in the histograms of cells.
@@ -74,7 +80,7 @@ def grow_wall(counts, *, column_m, row_m, bin_m, joined_rows=()):
 
     Returns
     -------
-    Grown
+    SideWall
     """
     occupied = _occupied_bins(counts)
     runs = _Runs(counts, occupied)
@@ -102,7 +108,7 @@ def grow_wall(counts, *, column_m, row_m, bin_m, joined_rows=()):
     low[has_wall] = np.maximum(runs.low[run] - reach, 0)
     high[has_wall] = np.minimum(runs.high[run] + reach, counts.shape[2] - 1)
     other, has_two = _find_second_modes(runs, is_valid, chosen, has_wall, total.size)
-    return Grown(
+    return SideWall(
         why.reshape(shape),
         low.reshape(shape),
         high.reshape(shape),
@@ -112,7 +118,7 @@ def grow_wall(counts, *, column_m, row_m, bin_m, joined_rows=()):
     )
 
 
-def off_trend(values, sds, wall):
+def find_off_trend(values, sds, wall):
     """Cells of a wall that deviate from the trend of their neighbours.
 
     A trend is the mean of two opposite neighbours, or the straight line through two neighbours on
@@ -141,7 +147,7 @@ def off_trend(values, sds, wall):
             deviation = np.fmin(deviation, np.abs(values - trend))
         if axis == 0:
             second_difference = values - trends[0]
-    scatter = spread_between(second_difference)
+    scatter = estimate_spread(second_difference)
     limit = np.maximum(TREND * np.hypot(scatter, np.nan_to_num(sds)), LEAST_TREND_M)
     return wall & ~(deviation <= limit)
 
@@ -149,7 +155,7 @@ def off_trend(values, sds, wall):
 _LINES = tuple((sign * k, sign * 2 * k, 2) for sign in (-1, 1) for k in (1, 2))
 
 
-def spread_between(second_differences):
+def estimate_spread(second_differences):
     """Standard deviation of a value, from the median of absolute second differences.
 
     A second difference is the deviation from the mean of two neighbours; its variance is 1.5 s2.
@@ -246,14 +252,13 @@ def _join_patches(runs, label, shape, column_m, row_m, bin_m):
     size[0] = 0
     wall = (label == np.argmax(size)) & (label > 0)
     # A joined patch extends the wall, so that further patches can join in the next iteration.
-    waiting = [patch for patch in np.argsort(-size, kind="stable") if size[patch] >= LEAST_PATCH][
-        1:
-    ]
+    candidates = np.argsort(-size, kind="stable")[1:]
+    candidates = [patch for patch in candidates if size[patch] >= LEAST_PATCH]
     row, column = np.divmod(runs.cell, shape[1])
     for _ in range(10):
         step, gap = _distance_from_wall(runs, wall, row, column, shape, column_m, row_m)
         joined = []
-        for patch in waiting:
+        for patch in candidates:
             members = label == patch
             is_known = members & np.isfinite(step)
             if np.count_nonzero(is_known) < LEAST_PATCH / 2:
@@ -269,7 +274,7 @@ def _join_patches(runs, label, shape, column_m, row_m, bin_m):
         if not joined:
             break
         wall |= np.isin(label, joined)
-        waiting = [patch for patch in waiting if patch not in joined]
+        candidates = [patch for patch in candidates if patch not in joined]
     return wall
 
 

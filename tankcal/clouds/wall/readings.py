@@ -77,8 +77,7 @@ def readings_of(cloud_wall, most=1200):
 
 def _assign_levels(cloud_wall):
     """Level of each row (rows,), -1 for none, and course of each level (levels,)."""
-    edges, joints = cloud_wall.grid.edges_m, np.array(cloud_wall.joints_m)
-    middle = (edges[:-1] + edges[1:]) / 2
+    middle, joints = cloud_wall.grid.middles_m, np.array(cloud_wall.joints_m)
     level, course = np.full(len(middle), -1), []
     count_per_course = (
         LEVELS if len(joints) > 2 or cloud_wall.grid.rows < LEVELS_OF_BODY else LEVELS_OF_BODY

@@ -110,13 +110,13 @@ class CoarseCells:
         crosses = (np.abs(rows) < BAND_M) != (np.abs(after) < BAND_M)
         return float(np.mean(np.any(crosses & (np.abs(after - rows) < STEP_M), axis=1)))
 
-    def near_rear(self):
+    def find_near_rear(self):
         """Whether each point (n,) is near the cylinder that fits most rearmost distances."""
         row, column = np.divmod(self.cell, AROUND * self.levels)
         turn = (column + 0.5) * (FULL_TURN / (AROUND * self.levels))
         design = _design(turn, (row + 0.5) / self.levels)
         band_m = min(BAND_OF_RADIUS * self.radius_m + LEAST_BAND_M, BAND_M)
-        model = _consensus(design, self.distance_m, self.side, band_m)
+        model = _fit_consensus(design, self.distance_m, self.side, band_m)
         height = (self.u - self.ends_m[0]) / (self.ends_m[1] - self.ends_m[0])
         deviation = self.distance - _design(self.turn, height) @ model
         return (height > 0) & (height < 1) & (np.abs(deviation) < BAND_M)
@@ -129,7 +129,7 @@ def _design(turn, height):
     return np.column_stack([np.ones(len(turn)), sine, cosine, h * sine, h * cosine])
 
 
-def _consensus(design, distance_m, side, band_m):
+def _fit_consensus(design, distance_m, side, band_m):
     """Fit a cylinder to many of the distances, with few of them behind it.
 
     Returns the changes (5,) of radius, shift (2) and inclination (2), m.
@@ -153,7 +153,7 @@ def _consensus(design, distance_m, side, band_m):
     return model
 
 
-def two_surfaces(first_m, first, second_m, second):
+def two_surfaces_error(first_m, first, second_m, second):
     """Create the InputError for two surfaces, from their radii (m) and shares of the cells."""
     text = message(
         "cloud_two_surfaces",
@@ -168,7 +168,7 @@ def two_surfaces(first_m, first, second_m, second):
     return InputError(Problem(FILE, text))
 
 
-def undecided(cells):
+def hidden_wall_error(cells):
     """Create the InputError for a wall that cannot be distinguished from a screen."""
     low, high = np.percentile(cells.distance_m, [5, 95])
     text = message(

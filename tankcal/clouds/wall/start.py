@@ -13,7 +13,7 @@ from tankcal.clouds.wall.screens import (
     FILE,
     LEAST_WALL_SHARE,
     CoarseCells,
-    undecided,
+    hidden_wall_error,
 )
 from tankcal.clouds.wall.surfaces import CylinderSurface, SphereSurface
 from tankcal.errors import InputError, Problem, SolutionError
@@ -74,7 +74,7 @@ def find_surface(
     """
     xyz_m = np.asarray(xyz_m, dtype=float)
     if len(xyz_m) < FEWEST:
-        raise _problem(
+        raise _cloud_error(
             message(
                 "cloud_too_few",
                 "found {count} points; a wall needs {least} at least",
@@ -91,7 +91,7 @@ def find_surface(
     except SolutionError as error:
         units = {} if is_unit_defined else UNITS
         cause = _likely_cause(xyz_m[:DIAGNOSED], kind, ends_m, radius_m, azimuth_rad, units)
-        raise _problem(cause or error.args[0]) from None
+        raise _cloud_error(cause or error.args[0]) from None
 
 
 def _fit_surface(xyz_m, kind, ends_m, radius_m, azimuth_rad):
@@ -166,13 +166,13 @@ def _choose_surface(first, ends_m, xyz_m, outwards, radius_m):
             return second
     if is_clear:
         return first
-    raise undecided(worst)
+    raise hidden_wall_error(worst)
 
 
 def _fit_rear_cylinder(first, ends_m, cells, radius_m):
     """Fit a `CylinderSurface` to the rearmost distances of coarse cells; None if this fails."""
     middle = np.array([*(first.frame @ first.centre_m)[:2], (ends_m[0] + ends_m[1]) / 2])
-    near = cells.xyz_m[cells.near_rear()] @ first.frame.T - middle
+    near = cells.xyz_m[cells.find_near_rear()] @ first.frame.T - middle
     joints = np.array(ends_m) - middle[2]
     try:
         sampled = _sample_evenly(near, 0.0, 0.0, joints)
@@ -309,7 +309,7 @@ def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad, units):
     for unit, factor in units.items():
         for origin in (np.zeros(3), middle):
             scaled = (xyz_m - origin) / factor + origin
-            if shows_wall(scaled, kind, ends_m, radius_m, azimuth_rad):
+            if has_wall(scaled, kind, ends_m, radius_m, azimuth_rad):
                 return message(
                     "cloud_in_other_unit",
                     "no wall near the nominal radius {nominal_m:.3f} m, but one if the "
@@ -332,7 +332,7 @@ def _likely_cause(xyz_m, kind, ends_m, radius_m, azimuth_rad, units):
                     radius_m=sphere.radius_m,
                 )
     for trial, turns, code in _alternative_kinds(kind, azimuth_rad):
-        if any(shows_wall(xyz_m, trial, None, radius_m, turn) for turn in turns):
+        if any(has_wall(xyz_m, trial, None, radius_m, turn) for turn in turns):
             return code
     for factor in np.geomspace(0.4, 2.5, 33):
         trial = radius_m * factor
@@ -359,7 +359,7 @@ def _alternative_kinds(kind, azimuth_rad):
     return []
 
 
-def shows_wall(xyz_m, kind, ends_m, radius_m, azimuth_rad=0.0):
+def has_wall(xyz_m, kind, ends_m, radius_m, azimuth_rad=0.0):
     """Whether points (n, 3) show a wall, with the parameters of `find_surface`."""
     if len(xyz_m) < FEWEST:
         return False
@@ -370,5 +370,5 @@ def shows_wall(xyz_m, kind, ends_m, radius_m, azimuth_rad=0.0):
     return True
 
 
-def _problem(text):
+def _cloud_error(text):
     return InputError(Problem(FILE, text))

@@ -46,8 +46,7 @@ def unroll_wall(cells, most=MOST_CELLS):
     UnrolledWall
     """
     grid = cells.grid
-    middle_m = (grid.edges_m[:-1] + grid.edges_m[1:]) / 2
-    course = np.searchsorted(np.array(cells.joints_m)[1:-1], middle_m, side="right")
+    course = np.searchsorted(np.array(cells.joints_m)[1:-1], grid.middles_m, side="right")
     departure_m = _average_scans(cells, course)
     is_wall = np.isfinite(departure_m)
     row_edges, column_edges = _block_edges(course, grid.columns, most)

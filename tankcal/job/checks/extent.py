@@ -140,10 +140,10 @@ def _of_vertical(values, bottom):
         lowest += [z - zero for z in bottom.of("z_m") if z is not None]
         lowest += [level for level in bottom.of("level_m") if level is not None]
     if values["bottom"]["form"] == OF_CLOUD and diameter is not None:
-        from tankcal.clouds.inside.floor_cells import reach_of_floor
+        from tankcal.clouds.inside.floor_cells import floor_reach
 
         lowest.append(
-            shell_z - zero - reach_of_floor(diameter / 2)
+            shell_z - zero - floor_reach(diameter / 2)
         )  # depth to which scans are searched for the bottom
     depth = depth_of_top(values)
     top = None if None in (height, depth) else shell_z + height + depth - zero

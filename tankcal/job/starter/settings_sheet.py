@@ -9,7 +9,7 @@ from tankcal.job.fields import Field
 from tankcal.job.sheets import KEY, VALUE
 from tankcal.job.starter.look import LINE_PT, lines_of, print_on_a4, type_of_cell
 from tankcal.job.starter.table_sheet import MARK
-from tankcal.job.starter.texts import is_number, parted
+from tankcal.job.starter.texts import is_number, split_unit
 from tankcal.job.starter.validation import rule_of
 
 TITLE, NOTE, RULE, LABELS, CODES = range(5)
@@ -90,7 +90,7 @@ def _write_title(sheet, row, title, look):
 def _write_entry(sheet, row, owner, entry, texts, look):
     field = entry.field
     sheet.write_string(row, _NOTE, entry.note, look.key_note)
-    sheet.write_string(row, _UNIT, parted(field.name)[1], look.unit)
+    sheet.write_string(row, _UNIT, split_unit(field.name)[1], look.unit)
     sheet.write_string(row, _OWNER, owner, look.code)
     sheet.write_string(row, _KEY, field.name, look.code)
     cell = look.cell(type_of_cell(field), entry.is_to_fill_in)

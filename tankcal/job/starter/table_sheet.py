@@ -5,7 +5,7 @@ from xlsxwriter.utility import xl_rowcol_to_cell
 from tankcal.job.contract import columns_of
 from tankcal.job.starter.examples import EXAMPLES_OF_TABLES
 from tankcal.job.starter.look import LINE_PT, YELLOW, lines_of, opened, print_on_a4, type_of_cell
-from tankcal.job.starter.texts import is_number, parted
+from tankcal.job.starter.texts import is_number, split_unit
 from tankcal.job.starter.validation import rule_of
 
 MARK = "#"  # in the first cell of a row that is not read
@@ -81,7 +81,7 @@ def _write_heading(sheet, column, table, field, texts, look):
     heading = look.required if is_needed else look.optional
     sheet.write_string(NOTES, column, texts.note("columns", table, field), look.note)
     sheet.write_string(LABELS, column, texts.heading(field), heading)
-    sheet.write_string(UNITS, column, parted(field.name)[1], look.unit)
+    sheet.write_string(UNITS, column, split_unit(field.name)[1], look.unit)
     sheet.write_string(CODES, column, field.name, look.code_heading)
 
 

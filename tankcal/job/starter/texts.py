@@ -14,7 +14,7 @@ from tankcal.text.form_words import word_of
 from tankcal.text.languages import DEFAULT
 from tankcal.text.naming import MAX_NAME
 from tankcal.text.numerals import NUMBER
-from tankcal.text.unit_endings import parted
+from tankcal.text.unit_endings import split_unit
 from tankcal.text.words import load_words, marks_of
 
 
@@ -138,7 +138,7 @@ class Texts:
 
     def heading(self, field):
         """Short heading of a column."""
-        stem, _ = parted(field.name)
+        stem, _ = split_unit(field.name)
         return self.words["input"]["labels"][stem]
 
     def expectation(self, field):
@@ -205,5 +205,5 @@ def is_wide(field):
 
 
 def _bracketed(field):
-    _, unit = parted(field.name)
+    _, unit = split_unit(field.name)
     return f" ({unit})" if unit else ""

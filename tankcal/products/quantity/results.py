@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.products.quantity.chain import QUANTITIES, values_of
-from tankcal.text.spreadsheets import write_guarded
+from tankcal.text.delimited import write_guarded
 
 
 @dataclass(frozen=True)

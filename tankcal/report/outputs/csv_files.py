@@ -8,7 +8,7 @@ import numpy as np
 
 from tankcal.record.columns import ArrayColumns, Texts, values_of
 from tankcal.report import numbers
-from tankcal.text.spreadsheets import guard_formula
+from tankcal.text.delimited import guard_formula
 
 BLOCK = 10_000  # number of rows that are formatted at a time
 _YES = {True: "yes", False: "no"}

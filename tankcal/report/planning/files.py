@@ -3,7 +3,7 @@
 from tankcal.record import save
 from tankcal.record.plan import plain_of, plain_of_wall
 from tankcal.report.planning.rows import place_of_change
-from tankcal.text.spreadsheets import write_guarded
+from tankcal.text.delimited import write_guarded
 
 PLACE = ("arc_m", "off_m", "height_m")  # position of an added item
 

@@ -5,7 +5,7 @@ from plan_folders import PLAN
 from wall_plan_folders import HITS, plan_of
 
 from tankcal.cli import main
-from tankcal.cli.planned_counts import KINDS, counted
+from tankcal.cli.plan_items import KINDS, describe_count
 from tankcal.cli.showing import speak
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words, message_sentence
@@ -23,7 +23,7 @@ def english_afterwards():
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_is_told_otherwise_than_two(language, kind):
     def said(count):
-        one = counted(kind, count)
+        one = describe_count(kind, count)
         if language == DEFAULT:
             return str(one)
         return message_sentence(load_words(language), str(one), one.code, one.values)

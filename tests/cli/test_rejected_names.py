@@ -8,7 +8,7 @@ from conftest import EXAMPLE
 
 import tankcal
 from tankcal.cli import main
-from tankcal.cli.set_aside import lines_set_aside
+from tankcal.cli.running import describe_rejected
 
 PLANTED = [  # example, table, column, how much more, row, the line that names it
     (
@@ -36,7 +36,7 @@ def planted(folder, example, table, column, more, rows):
 
 def told(folder):
     result = tankcal.run(tankcal.load(folder))
-    return [str(one) for one in lines_set_aside(result, result.adjustment)]
+    return [str(one) for one in describe_rejected(result, result.adjustment)]
 
 
 @pytest.mark.slow
@@ -59,4 +59,4 @@ def test_five_are_named_and_the_others_counted(tmp_path, capsys):
 
 
 def test_nothing_is_said_where_nothing_was_set_aside():
-    assert list(lines_set_aside(None, None)) == []
+    assert list(describe_rejected(None, None)) == []

@@ -15,7 +15,7 @@ from tankcal.text.languages import DEFAULT, LANGUAGES, nearest_language
 from tankcal.text.words import load_words
 
 
-def asked_language(path):
+def read_job_language(path):
     """Return the language of a job for `load`, or None if it cannot be read.
 
     No problem is reported here; `load` reports the problems of the job.
@@ -33,7 +33,7 @@ def asked_language(path):
     return nearest_language(code)
 
 
-def asked_of_plan(path):
+def read_plan_language(path):
     """Return the language of a plan for `load_plan`, or None."""
     from tankcal.planning.entries import PLAN_FILE
 
@@ -44,7 +44,7 @@ def asked_of_plan(path):
         return None
 
 
-def asked_of_record(path):
+def read_record_language(path):
     """Return the language of the job of a record, or of the record in a folder of results."""
     from tankcal.inspection.basis import RECORD
 
