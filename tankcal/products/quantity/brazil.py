@@ -117,7 +117,9 @@ class Brazil:
             raise OutsideRangeError("density_kg_m3", is_unknown, lambda _: expected)
         # The density is rounded to the nearest even third decimal. The unrounded factor gives the
         # derivatives, which a rounded factor does not have.
-        even = 0.002 * np.round(np.real(relative) / 0.002)
+        # A density halfway between two of them goes to the multiple of 0.004; rounding to 1e-9
+        # first keeps the error of the division from deciding this.
+        even = 0.002 * np.round(np.round(np.real(relative) / 0.002, 9))
         factor = np.real(self._fit(even, temperature_c))
         rounded = np.where(is_light, np.round(factor, 3), np.round(factor, 4))
         unrounded = self._fit(relative, temperature_c)
