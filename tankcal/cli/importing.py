@@ -191,9 +191,8 @@ def _folder_here():
     """Return the current folder if it is a job."""
     if Path(SETTINGS_FILE).is_file():
         return "."
-    raise refuse_argument(
-        message("import_without_out", "expected --out DIR, the folder of the job")
-    )
+    text = message("import_without_out", "expected --out DIR, the folder of the job")
+    raise InputError(Problem("--out", text))
 
 
 def _refuse_workbook(folder):
@@ -221,9 +220,10 @@ def _read_foreign_list(options):
         return None
     name = options.table or (path.stem if lists.is_table(path.stem) else "points")
     if not lists.is_table(name):
-        raise refuse_argument(
-            message("list_no_table", "found --table {name}; expected a table of a job", name=name)
+        text = message(
+            "list_no_table", "found --table {name}; expected a table of a job", name=name
         )
+        raise InputError(Problem("--table", text))
     if not is_named and (path.stat().st_size > lists.MAX_BYTES or is_field_book(path.read_bytes())):
         return None
     try:
@@ -241,13 +241,12 @@ def _read_foreign_list(options):
 def _column(text):
     heading, mark, column = text.rpartition("=")
     if not (mark and heading.strip() and column.strip()):
-        raise refuse_argument(
-            message(
-                "list_bad_column",
-                "found --column {text!r}; expected HEADING=COLUMN, such as 'Este (m)=x_m'",
-                text=text,
-            )
+        expected = message(
+            "list_bad_column",
+            "found --column {text!r}; expected HEADING=COLUMN, such as 'Este (m)=x_m'",
+            text=text,
         )
+        raise InputError(Problem("--column", expected))
     return heading.strip(), column.strip()
 
 

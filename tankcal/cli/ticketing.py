@@ -1,5 +1,6 @@
 """`tankcal ticket`: quantities of a transfer or of a stock, with their uncertainty."""
 
+from math import isfinite
 from pathlib import Path
 
 from tankcal.cli.arguments import add_language
@@ -12,11 +13,12 @@ from tankcal.cli.showing import (
     speak_of_record,
     warn,
 )
-from tankcal.errors import InputError, Problem, problem_of
+from tankcal.errors import problem_of
 from tankcal.messages import message, printable
 from tankcal.text.digits import fixed, format_with_u
 
 SHOWN = 8  # inputs of the budget in the terminal
+SHOWN_TICKETS = 20  # of a CSV file
 
 
 def add(commands):
@@ -49,16 +51,17 @@ def _ticket(options):
     prepare_for_small_work()
     speak_of_record(options.language, options.record)
     from tankcal.products.quantity.reading import read_tickets
-    from tankcal.products.quantity.results import rows_of, write_rows
+    from tankcal.products.quantity.results import check_output, rows_of, write_rows
     from tankcal.products.quantity.table import read_table
     from tankcal.report.outputs import record_file
 
+    if options.out is not None:  # before the calculation, which may take a while
+        check_output(Path(options.out))
     table = read_table(record_file(options.record))
     tickets = read_tickets(table, options.ticket, options.tickets)
     quantities, steps = tickets.transfer.quantities(), tickets.transfer.steps()
     rows = rows_of(tickets, quantities, steps)
     if options.out is not None:
-        _refuse_ending(options.out)
         write_rows(Path(options.out), rows)
     if options.machine:
         print_json(exit_status=0, tank=table.tank, record=table.digest,
@@ -71,24 +74,23 @@ def _ticket(options):
             say(line)
     else:
         say(message("ticket_count", "{count} tickets computed", count=len(rows)))
+        for line in _ticket_lines(tickets, quantities):
+            say(line)
     if options.out is not None:
         print(f"  {printable(options.out)}")
     return 0
 
 
-def _refuse_ending(out):
-    if Path(out).suffix.lower() != ".csv":
-        text = message("ticket_out", "expected the name of a .csv file")
-        raise InputError(Problem("--out", text))
-
-
 def _lines(tickets, quantities, steps):
     """Yield the lines of a single ticket: steps, quantities, budget, comparison."""
     transfer = tickets.transfer
+    product = tickets.sections["product"]["name"]
     yield message(
         "ticket_head",
-        "tank {tank}, volume correction {correction}",
+        "ticket {number}, tank {tank}{product}, volume correction {correction}",
+        number=tickets.names[0],
         tank=transfer.table.tank,
+        product="" if product is None else f", {product}",
         correction=transfer.product.correction.name,
     )
     for state, result in steps.items():
@@ -149,6 +151,29 @@ def _quantity_lines(state, result):
         )
 
 
+def _ticket_lines(tickets, quantities):
+    """Yield the net standard volume of each of the first tickets."""
+    from tankcal.products.quantity.chain import QUANTITIES
+
+    place = QUANTITIES.index("nsv_m3")
+    state = "moved" if "moved" in quantities else "closing"
+    result = quantities[state]
+    for row, name in enumerate(tickets.names[:SHOWN_TICKETS]):
+        written = format_with_u(result.value[row, place], result.U[row, place], marks())
+        yield message(
+            "ticket_line",
+            "  {name}: {state}, {quantity} {value} m3, U = {U} m3",
+            name=name,
+            state=_STATES[state],
+            quantity=_QUANTITIES["nsv_m3"][0],
+            value=written.value,
+            U=written.uncertainty,
+        )
+    if len(tickets.names) > SHOWN_TICKETS:
+        yield message("ticket_more", "  ... and {count} more; --out FILE.csv writes all of them",
+                      count=len(tickets.names) - SHOWN_TICKETS)  # fmt: skip
+
+
 def _budget_lines(quantities):
     """Yield the largest contributions to u of the net standard volume."""
     from tankcal.products.quantity.chain import QUANTITIES
@@ -156,6 +181,8 @@ def _budget_lines(quantities):
     place = QUANTITIES.index("nsv_m3")
     state = "moved" if "moved" in quantities else "closing"
     result = quantities[state]
+    if not result.u[0, place] > 0:
+        return
     parts = sorted(
         ((abs(part[0, place]), name) for name, part in result.contributions.items()), reverse=True
     )
@@ -195,18 +222,19 @@ def _comparison_lines(tickets, quantities):
     from tankcal.products.quantity.results import compare
 
     comparison = compare(tickets, quantities)
-    if comparison is None:
+    if comparison is None or not isfinite(comparison.difference[0]):
         return
     name, unit = _QUANTITIES[comparison.quantity]
     difference = fixed(comparison.difference[0], 2, marks())
-    if comparison.e_n is None:
+    source = comparison.source or message("ticket_other_party", "the other party")
+    if comparison.e_n is None or not isfinite(comparison.e_n[0]):
         yield message("ticket_difference", "{quantity} less that of {source}: {difference} {unit}",
-                      quantity=name, source=comparison.source or "?", difference=difference,
+                      quantity=name, source=source, difference=difference,
                       unit=unit)  # fmt: skip
         return
     yield message(
         "ticket_e_n",
         "{quantity} less that of {source}: {difference} {unit}, E_n = {e_n} (agreement: at most 1)",
-        quantity=name, source=comparison.source or "?", difference=difference, unit=unit,
+        quantity=name, source=source, difference=difference, unit=unit,
         e_n=fixed(comparison.e_n[0], 2, marks()),
     )  # fmt: skip

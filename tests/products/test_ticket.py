@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import plain_quantity
@@ -11,8 +12,9 @@ from draws import draws
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, follow_chain
-from tankcal.products.quantity.petroleum import Petroleum
+from tankcal.products.quantity.petroleum import Petroleum, glass_correction
 from tankcal.products.quantity.reading import read_tickets
+from tankcal.products.quantity.results import check_output, rows_of
 from tankcal.products.quantity.table import TankTable, read_table
 from tankcal.products.quantity.transfer import UNCERTAINTIES, Transfer
 from tankcal.tank.fittings import floating_roof
@@ -233,6 +235,23 @@ def test_ullage_gives_the_quantities_of_the_dip(settings):
         (("sw_percent", 'hydrometer = "glass 20C"\nsw_percent'), "product.hydrometer", "base"),
         (("[closing]", "[closng]"), "[closng]", "closing"),
         (("D1250-04", "D1250"), "product.correction", "D1250-80"),
+        # A gauging without its temperature was left out: the whole stock became the transfer.
+        (("temperature_c = 28.0", ""), "opening.temperature_c", "missing"),
+        (
+            ("dip_m = 2.0\nwater_dip_m = 0.015\ntemperature_c = 28.0", ""),
+            "opening.dip_m",
+            "missing",
+        ),
+        # Keys without effect.
+        (("sw_percent", "alpha_per_k = 0.001\nsw_percent"), "product.alpha_per_k", "not used"),
+        (
+            ('"D1250-04"\ngroup = "products"\nbase = "20C"', '"OIML-R22"\nbase = "15C"'),
+            "product.base",
+            "20 degC",
+        ),
+        (("sw_percent", "weights_kg_m3 = 1.2\nsw_percent"), "product.weights_kg_m3", "1000"),
+        (('quantity = "nsv_m3"', ""), "compared.quantity", "missing"),
+        (("value = 905.0", ""), "compared.value", "missing"),
     ],
 )
 def test_bad_tickets_are_refused_in_one_line(settings, change, place, text):
@@ -248,6 +267,60 @@ def test_dip_in_the_critical_zone_is_refused(settings):
         read_tickets(_cylinder(with_roof=True), settings(("dip_m = 2.0", "dip_m = 1.4")))
 
 
+def _write_correction(write, correction, density, celsius, more=""):
+    observed = f'"observed"\ndensity_temperature_c = {celsius}\n{more}'
+    return write(
+        ('"D1250-04"\ngroup = "products"\nbase = "20C"', f'"{correction}"'),
+        ("842.0", f"{density}"),
+        ('"base"', observed),
+    )
+
+
+@pytest.mark.parametrize(
+    ("correction", "density", "celsius", "text"),
+    [
+        ("GPA-TP27", 301.0, 200.0, "gives no density"),
+        ("GPA-TP27", 301.0, 20.0, "at the base temperature: found 317.29"),
+        ("CNP-6-70", 700.0, 25.0, "number of decimals"),
+        ("OIML-R22", 700.0, 25.0, "density_kg_m3: found 700; expected 78"),
+    ],
+)
+def test_density_outside_the_correction_is_one_line(settings, correction, density, celsius, text):
+    path = _write_correction(settings, correction, density, celsius)
+    with pytest.raises(InputError) as refused:
+        read_tickets(_cylinder(), path)
+    (line,) = refused.value.texts
+    assert "ticket.toml, row" in line
+    assert text in line
+
+
+def test_each_density_outside_the_range_is_named_with_its_value(settings, tmp_path):
+    rows = tmp_path / "tickets.csv"
+    rows.write_text("ticket,density_kg_m3\nA,550\nB,842\nC,560\n", encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        read_tickets(_cylinder(), settings(), rows)
+    first, second = refused.value.texts
+    assert "row 2" in first
+    assert "found 550" in first
+    assert "row 4" in second
+    assert "found 560" in second
+
+
+def test_glass_of_the_brazilian_table_is_corrected_once(settings):
+    """The table is entered with the reading; a vibrating tube gives the corrected reading."""
+    reading, celsius = 835.2, 27.5
+    true = reading * glass_correction(celsius, "20C")
+    by_glass, by_tube = (
+        read_tickets(
+            _cylinder(), _write_correction(settings, "CNP-6-70-unrounded", density, celsius, more)
+        ).transfer.steps()["closing"].base_density[0]
+        for density, more in ((reading, 'hydrometer = "glass 20C"'), (true, ""))
+    )  # fmt: skip
+    assert by_glass == pytest.approx(by_tube, rel=1e-12)
+    # From the equations of the table alone.
+    assert by_glass == pytest.approx(840.1905, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
@@ -258,6 +331,93 @@ def test_dip_in_the_critical_zone_is_refused(settings):
 def test_slips_are_warned_of(settings, change, text):
     warnings = read_tickets(_cylinder(), settings(change)).warnings
     assert any(text in str(warning.text) for warning in warnings)
+
+
+def test_water_below_a_table_that_begins_with_a_volume_is_warned_of(settings):
+    full = _cylinder()
+    table = replace(full, **{name: getattr(full, name)[50:] for name in (
+        "height_m", "volume_m3", "factor_m3", "dof")})  # fmt: skip
+    tickets = read_tickets(table, settings())
+    assert [str(w.text).count("first row of the table") for w in tickets.warnings] == [1, 1]
+    assert tickets.transfer.steps()["closing"].fw_m3[0] == 0
+
+
+def test_water_at_the_roof_is_refused(settings):
+    path = settings(("water_dip_m = 0.015", "water_dip_m = 1.2"))
+    with pytest.raises(InputError, match=r"subtracts the roof from 1\.0000 m"):
+        read_tickets(_cylinder(with_roof=True), path)
+
+
+def test_roof_of_a_record_corrects_the_volume(tmp_path, example_record):
+    """The displacement by Archimedes, in a table with the roof and in a table without it."""
+    record = json.loads(example_record.read_text(encoding="utf-8"))
+    values = {
+        "roof_mass": 42_000.0, "roof_weighing": "vacuum", "roof_reference_density": 850.0,
+        "roof_displacement": 42_000 / 850, "roof_critical_bottom": 1.0, "roof_critical_top": 1.5,
+    }  # fmt: skip
+    record["roof"] = [{"code": code, "value": v, "unit": None} for code, v in values.items()]
+    path = tmp_path / "record.json"
+    for choice, expected in (("vacuum", 42_000 / 850), ("off", 0.0)):
+        others = [other for other in record["choices"] if other["code"] != "roof"]
+        record["choices"] = [*others, {"code": "roof", "value": choice}]
+        path.write_text(json.dumps(record), encoding="utf-8")
+        table = read_table(path)
+        assert table.is_critical(np.array([1.4, 1.6])).tolist() == [True, False]
+        correction = table.roof_correction_m3(np.array([740.0]))[0]
+        assert correction == pytest.approx(expected - 42_000 / 740, rel=1e-12)
+
+
+def test_comparison_of_a_row_may_be_missing(settings, tmp_path):
+    """A blank cell has the value of the file; without it the difference does not exist."""
+    rows = tmp_path / "tickets.csv"
+    rows.write_text("ticket,compared_value\nA,\nB,800\n", encoding="utf-8")
+    for change, is_missing in (
+        (("value = 905.0", "value = 905.0"), False),
+        (("value = 905.0", ""), True),
+    ):
+        tickets = read_tickets(_cylinder(), settings(change), rows)
+        transfer = tickets.transfer
+        first, second = rows_of(tickets, transfer.quantities(), transfer.steps())
+        assert (first["difference_nsv_m3"] is None) == is_missing
+        assert second["difference_nsv_m3"] is not None
+        assert json.dumps([first, second], allow_nan=False)
+
+
+def test_columns_of_an_opening_make_a_transfer(settings, tmp_path):
+    """An opening without its temperature was left out."""
+    begin, end = SETTINGS.index("[opening]"), SETTINGS.index("[closing]")
+    stock = settings(text=SETTINGS[:begin] + SETTINGS[end:])
+    rows = tmp_path / "tickets.csv"
+    rows.write_text("ticket;opening_dip_m\nA;2,0\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"opening\.temperature_c: missing"):
+        read_tickets(_cylinder(), stock, rows)
+    rows.write_text("ticket;opening_dip_m\nA;\n", encoding="utf-8")
+    assert list(read_tickets(_cylinder(), stock, rows).transfer.gaugings) == ["closing"]
+
+
+def test_tickets_have_different_names(settings, tmp_path):
+    rows = tmp_path / "tickets.csv"
+    rows.write_text("ticket;closing_dip_m\nA;8,5\nA;9,0\n", encoding="utf-8")
+    with pytest.raises(InputError, match="row 3, ticket"):
+        read_tickets(_cylinder(), settings(), rows)
+
+
+def test_decimal_mark_can_be_declared(settings, tmp_path):
+    rows = tmp_path / "tickets.csv"
+    rows.write_text("ticket;closing_dip_m\nA;8,123\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"\[csv\] decimal"):
+        read_tickets(_cylinder(), settings(), rows)
+    path = settings(("[closing]", "[csv]\nseparator = ';'\ndecimal = ','\n[closing]"))
+    tickets = read_tickets(_cylinder(), path, rows)
+    assert tickets.transfer.gaugings["closing"].level_m.tolist() == [8.123]
+
+
+def test_uncertainty_of_the_correction_grows_without_end():
+    """At 150 degC the rule is extended by its last slope, 0.1 % in 27.8 K."""
+    hot = _transfer(_cylinder(), _gauging(2.0, np.nan, 150.0), _gauging(9.0, np.nan, 150.0),
+                    _product(960.0))  # fmt: skip
+    share = hot._vcf_scale(np.array([150.0]))[0]
+    assert share == pytest.approx((0.35 + 0.1 * (130 - 105.6) / 27.8) / 100 / 1.96, rel=1e-12)
 
 
 def test_rows_replace_keys(settings, tmp_path):
@@ -306,3 +466,77 @@ def test_command_speaks_the_language(settings, example_record, language, capsys)
     text = capsys.readouterr().out
     assert "net standard volume" not in text
     assert "{" not in text
+
+
+def test_output_replaces_only_a_file_of_the_command(settings, example_record, tmp_path, capsys):
+    path = settings(("dip_m = 9.0", "dip_m = 8.5"), ('"T-1"', '"=T-1"'))
+    out = tmp_path / "out.csv"
+    arguments = ["ticket", str(example_record), str(path), "--out", str(out)]
+    for _ in range(2):  # a file of the command is replaced
+        assert main(arguments) == 0
+    assert out.read_text(encoding="utf-8").splitlines()[1].startswith("'=T-1,")
+    rows = "ticket;closing_dip_m\nA;8,5\n"
+    out.write_text(rows, encoding="utf-8")
+    assert main([*arguments, "--tickets", str(out)]) == 2
+    assert out.read_text(encoding="utf-8") == rows
+    assert "did not write" in capsys.readouterr().err
+    (tmp_path / "folder.csv").mkdir()
+    with pytest.raises(IsADirectoryError):
+        check_output(tmp_path / "folder.csv")
+    with pytest.raises(InputError, match=r"\.csv"):
+        check_output(tmp_path / "record.json")
+
+
+def test_failed_output_leaves_the_former_file(settings, example_record, tmp_path, monkeypatch):
+    path = settings(("dip_m = 9.0", "dip_m = 8.5"))
+    out = tmp_path / "out.csv"
+    arguments = ["ticket", str(example_record), str(path), "--out", str(out)]
+    assert main(arguments) == 0
+    before = out.read_bytes()
+
+    def fail(stream, rows):
+        stream.write("ticket")
+        raise OSError(28, "No space left on device", "temporary")
+
+    monkeypatch.setattr("tankcal.products.quantity.results.write_guarded", fail)
+    assert main(arguments) == 2
+    assert out.read_bytes() == before
+    assert sorted(p.name for p in tmp_path.iterdir() if p.suffix != ".toml") == ["out.csv"]
+
+
+@pytest.mark.parametrize("language", ["pt-BR", "es"])
+@pytest.mark.parametrize("correction", ["CNP-6-70", "OIML-R22", "GPA-TP27"])
+def test_correction_is_named_in_the_language(
+    settings, example_record, language, correction, capsys
+):
+    density = {"GPA-TP27": 540.0}.get(correction, 842.0)
+    path = settings(
+        ("dip_m = 9.0", "dip_m = 8.5"),
+        ('"D1250-04"\ngroup = "products"\nbase = "20C"', f'"{correction}"'),
+        ("842.0", f"{density}"),
+    )
+    assert main(["ticket", str(example_record), str(path), "--language", language]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert "T-1" in first
+    assert not any(word in first for word in ("rounded", "ethanol", "liquefied", "base 20 degC"))
+
+
+@pytest.mark.parametrize("language", ["pt-BR", "es"])
+def test_missing_keys_are_explained_in_the_language(settings, example_record, language, capsys):
+    path = settings(('density_is = "base"', ""), ('correction = "D1250-04"', ""))
+    assert main(["ticket", str(example_record), str(path), "--language", language]) == 2
+    text = capsys.readouterr().err
+    assert "volume correction" not in text
+    assert "temperature;" not in text
+
+
+def test_tickets_of_rows_are_listed(settings, example_record, tmp_path, capsys):
+    rows = tmp_path / "tickets.csv"
+    lines = "".join(f"T{number};{5 + number / 100}\n" for number in range(23))
+    rows.write_text(f"ticket;closing_dip_m\n{lines}", encoding="utf-8")
+    arguments = ["ticket", str(example_record), str(settings()), "--tickets", str(rows)]
+    assert main([*arguments, "--language", "en"]) == 0
+    count, first, *_, last = capsys.readouterr().out.splitlines()
+    assert count == "23 tickets computed"
+    assert first.startswith("  T0: closing less opening, net standard volume")
+    assert "3 more" in last

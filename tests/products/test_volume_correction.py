@@ -282,3 +282,11 @@ def test_derivatives_by_complex_steps(correction):
     assert by_t == pytest.approx((high - low) / 2e-3, rel=1e-5)
     low, high = (correction.base_density(density + sign * 1e-2, celsius) for sign in (-1, 1))
     assert by_rho == pytest.approx((high - low) / 2e-2, rel=1e-5)
+
+
+def test_halves_of_the_brazilian_table_go_to_one_side():
+    """Odd thousandths of g/cm3, of which 815 and 941 are not halves after the division."""
+    rounded = Brazil(is_rounded=True)
+    odd = np.arange(751.0, 999.0, 2.0)
+    nearest = 4 * np.round(odd / 4)
+    np.testing.assert_array_equal(rounded.factor(odd, 35.0), rounded.factor(nearest, 35.0))

@@ -9,10 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.products.quantity.petroleum import glass_correction
-from tankcal.products.quantity.ranges import refuse_outside
+from tankcal.products.quantity.ranges import (
+    OutsideRangeError,
+    refuse_not_converged,
+    refuse_outside,
+)
 
 BASE_C = 20.0
 WATER = 0.999042  # g/cm3, of the fit
@@ -64,12 +67,16 @@ class Brazil:
 
     is_rounded: bool
     base_c = BASE_C
+    glass_scale = "20C"  # `base_density` corrects the glass of a hydrometer with this scale
 
     @property
     def name(self):
         """Name of the correction, for reports."""
-        kind = "rounded as its tables" if self.is_rounded else "unrounded"
-        return f"Resolução CNP 6/70, {kind}, base 20C"
+        if self.is_rounded:
+            return message(
+                "correction_cnp_rounded", "Resolução CNP 6/70, rounded as its tables, base 20C"
+            )
+        return message("correction_cnp_unrounded", "Resolução CNP 6/70, unrounded, base 20C")
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
         """Volume correction factor to 20 degC.
@@ -98,7 +105,8 @@ class Brazil:
         if not self.is_rounded:
             return self._fit(relative, temperature_c)
         is_light = np.real(relative) <= THREE_DECIMALS_TO
-        if np.any(~is_light & (np.real(relative) < FOUR_DECIMALS_FROM)):
+        is_unknown = ~is_light & (np.real(relative) < FOUR_DECIMALS_FROM)
+        if np.any(is_unknown):
             expected = message(
                 "brazil_decimals_unknown",
                 "found a density between {low:g} and {high:g} kg/m3, where the number of decimals "
@@ -106,10 +114,12 @@ class Brazil:
                 low=1000 * THREE_DECIMALS_TO,
                 high=1000 * FOUR_DECIMALS_FROM,
             )
-            raise InputError(Problem("density_kg_m3", expected))
+            raise OutsideRangeError("density_kg_m3", is_unknown, lambda _: expected)
         # The density is rounded to the nearest even third decimal. The unrounded factor gives the
         # derivatives, which a rounded factor does not have.
-        even = 0.002 * np.round(np.real(relative) / 0.002)
+        # A density halfway between two of them goes to the multiple of 0.004; rounding to 1e-9
+        # first keeps the error of the division from deciding this.
+        even = 0.002 * np.round(np.round(np.real(relative) / 0.002, 9))
         factor = np.real(self._fit(even, temperature_c))
         rounded = np.where(is_light, np.round(factor, 3), np.round(factor, 4))
         unrounded = self._fit(relative, temperature_c)
@@ -130,10 +140,12 @@ class Brazil:
             base = glass * (observed - p1 * step - p3 * step**2) / (1 + p2 * step + p4 * step**2)
             if rounds == ROUNDS_OF_CLASSES:
                 bound = np.real(base)
-            if np.all(np.abs(base - before) <= CONVERGED * np.abs(base)):
-                self._refuse_outside(1000.0 * base, temperature_c, pressure_kpa)
-                return 1000.0 * base
-        raise SolutionError(f"the density at 20 degC of {density} kg/m3 did not converge")
+            is_converged = np.abs(base - before) <= CONVERGED * np.abs(base)
+            if np.all(is_converged):
+                break
+        refuse_not_converged(is_converged, self.name)
+        self._refuse_outside(1000.0 * base, temperature_c, pressure_kpa)
+        return 1000.0 * base
 
     def _fit(self, relative, temperature_c):
         """FCV = 1 + p2 x + p4 x^2 + (p1 x + p3 x^2) / D20, x = t - 20 degC."""

@@ -145,8 +145,7 @@ def follow_chain(table, gauging, product, vcf_error=0.0):
     vcf = product.correction.factor(base, gauging.temperature_c, gauging.pressure_kpa)
     vcf = vcf * (1 + vcf_error)
     observed = base * vcf
-    # The table contains the roof at its reference density; a lighter liquid lets it sink deeper.
-    fra = 0.0 * tov if table.roof is None else table.roof.density_correction_m3(observed)
+    fra = table.roof_correction_m3(observed) + 0.0 * tov
     # The water has the temperature of the shell as well, so it is subtracted before CTSh.
     gov = (tov - fw) * ctsh + fra
     gsv = gov * vcf

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tankcal.messages import message
 from tankcal.products.quantity.alcohol import Ethanol
 from tankcal.products.quantity.brazil import Brazil
 from tankcal.products.quantity.gases import LiquefiedGas
@@ -35,7 +36,8 @@ class Constant:
     @property
     def name(self):
         """Name of the correction, for reports."""
-        return f"alpha = {self.alpha_per_k:g}/K, base {self.base}"
+        return message("correction_coefficient", "alpha = {alpha:g}/K, base {base}",
+                       alpha=self.alpha_per_k, base=self.base)  # fmt: skip
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
         """Volume correction factor, as `Petroleum.factor`; it does not depend on the density."""

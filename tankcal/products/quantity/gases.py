@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.errors import SolutionError
-from tankcal.products.quantity.ranges import refuse_outside
+from tankcal.messages import message
+from tankcal.products.quantity.ranges import refuse_not_converged, refuse_outside
 
 WATER_60F = 999.016  # kg/m3, of the relative density 60/60
 BASE_C, BASE_K = (60.0 - 32.0) / 1.8, 519.67 / 1.8
@@ -68,7 +68,7 @@ class LiquefiedGas:
     """Volume correction of liquefied petroleum gas to 60 degF by GPA TP-27."""
 
     base_c = BASE_C
-    name = "GPA TP-27, liquefied petroleum gas, base 60F"
+    name = message("correction_tp27", "GPA TP-27, liquefied petroleum gas, base 60F")
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
         """Volume correction factor of the saturated liquid.
@@ -101,11 +101,14 @@ class LiquefiedGas:
             before = base
             relative = np.clip(np.real(before) / WATER_60F, LEAST_DENSITY, MOST_DENSITY)
             inside = before - np.real(before) + relative * WATER_60F
-            base = density / self._factor(inside, temperature_c)
-            if np.all(np.abs(base - before) <= CONVERGED * np.abs(base)):
-                self._refuse_outside(base, temperature_c, pressure_kpa)
-                return base
-        raise SolutionError(f"the density at 60 degF of {density} kg/m3 did not converge")
+            with np.errstate(all="ignore"):  # far outside the range; refused below
+                base = density / self._factor(inside, temperature_c)
+                is_converged = np.abs(base - before) <= CONVERGED * np.abs(base)
+            if np.all(is_converged):
+                break
+        refuse_not_converged(is_converged, self.name)
+        self._refuse_outside(base, temperature_c, pressure_kpa)
+        return base
 
     def _factor(self, density, temperature_c):
         relative = density / WATER_60F

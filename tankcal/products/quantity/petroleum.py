@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.errors import SolutionError
-from tankcal.products.quantity.ranges import refuse_outside
+from tankcal.messages import message
+from tankcal.products.quantity.ranges import refuse_not_converged, refuse_outside
 
 EDITIONS, GROUPS = (1980, 2004), ("crude", "products", "lubricants")
 BASES_C = {"15C": 15.0, "20C": 20.0, "60F": (60.0 - 32.0) / 1.8}
@@ -87,6 +87,11 @@ _GROUPS_2004 = {
     ),
     "lubricants": (800.9, (1163.5, 0.0, 0.34878, 0.0)),
 }
+_GROUP_NAMES = {
+    "crude": message("group_crude", "crude"),
+    "products": message("group_products", "products"),
+    "lubricants": message("group_lubricants", "lubricants"),
+}
 _ALPHA_1980_PER_F, _ALPHA_2004_PER_F = (270e-6, 930e-6), (230e-6, 930e-6)
 
 # Temperatures of the 1980 tables: lowest, and highest for light, middle and heavy products, degF,
@@ -136,8 +141,12 @@ class Petroleum:
     @property
     def name(self):
         """Name of the edition and the group, for reports."""
-        group = self.group or f"alpha = {self.alpha_per_k:g}/K"
-        return f"ASTM D1250-{self.edition % 100:02d}, {group}, base {self.base}"
+        if self.group is None:
+            group = message("group_coefficient", "alpha = {alpha:g}/K", alpha=self.alpha_per_k)
+        else:
+            group = _GROUP_NAMES[self.group]
+        return message("correction_d1250", "ASTM D1250-{edition}, {of}, base {base}",
+                       edition=f"{self.edition % 100:02d}", of=group, base=self.base)  # fmt: skip
 
     def factor(self, density, temperature_c, pressure_kpa=0.0):
         """Volume correction factor from a temperature and gauge pressure to the base.
@@ -182,9 +191,8 @@ class Petroleum:
         Raises
         ------
         InputError
-            If the density at the base or another value is outside the range.
-        SolutionError
-            If the iteration does not converge.
+            If the density at the base or another value is outside the range, or if the iteration
+            does not converge.
         """
         base = self._iterate(
             density, lambda rho, bound: self._factor(rho, temperature_c, pressure_kpa, bound)
@@ -258,12 +266,15 @@ class Petroleum:
         base, bound = density + 0.0 * density, None
         for rounds in range(MOST_ROUNDS):
             before = base
-            base = density / factor(before, bound)
+            with np.errstate(all="ignore"):  # far outside the range; refused below
+                base = density / factor(before, bound)
+                is_converged = np.abs(base - before) <= CONVERGED * np.abs(base)
             if rounds == ROUNDS_OF_GROUPS:
                 bound = np.real(base)
-            if np.all(np.abs(base - before) <= CONVERGED * np.abs(base)):
-                return base
-        raise SolutionError(f"the density at {self.base} of {density} did not converge")
+            if np.all(is_converged):
+                break
+        refuse_not_converged(is_converged, self.name)
+        return base
 
     def _refuse_outside(self, density, temperature_c, pressure_kpa):
         if self.edition == 1980:

@@ -5,6 +5,8 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
+DEGREES = message("unit_degc", "degC")
+
 
 class OutsideRangeError(InputError):
     """A value outside the range of a volume correction.
@@ -15,13 +17,17 @@ class OutsideRangeError(InputError):
         Name of the input, such as "temperature_c".
     is_outside : ndarray of bool
         Values outside the range.
-    expected : Message
-        Text for the first of them.
+    expected_at : callable
+        Text for a place of `is_outside`.
     """
 
-    def __init__(self, quantity, is_outside, expected):
-        super().__init__(Problem(quantity, expected))
-        self.quantity, self.is_outside, self.expected = quantity, is_outside, expected
+    def __init__(self, quantity, is_outside, expected_at):
+        first = np.argwhere(is_outside)[0]
+        super().__init__(Problem(quantity, expected_at(tuple(first))))
+        self.quantity, self.is_outside, self.expected_at = quantity, is_outside, expected_at
+
+    def __reduce__(self):  # the text of each place is a function, which cannot be pickled
+        return InputError, (self.problems,)
 
 
 def refuse_outside(quantity, value, low, high, unit, source):
@@ -48,14 +54,43 @@ def refuse_outside(quantity, value, low, high, unit, source):
     is_outside = ~((values >= lows) & (values <= highs))
     if not np.any(is_outside):
         return
-    place = tuple(np.argwhere(is_outside)[0])
-    expected = message(
-        "outside_volume_correction",
-        "found {value:g}; expected {low:g} to {high:g} {unit}, the range of {source}",
-        value=float(values[place]),
-        low=float(lows[place]),
-        high=float(highs[place]),
-        unit=unit,
-        source=source,
-    )
-    raise OutsideRangeError(quantity, is_outside, expected)
+
+    def expected_at(place):
+        return message(
+            "outside_volume_correction",
+            "found {value:g}; expected {low:g} to {high:g} {unit}, the range of {source}",
+            value=float(values[place]),
+            low=float(lows[place]),
+            high=float(highs[place]),
+            unit=DEGREES if unit == "degC" else unit,
+            source=source,
+        )
+
+    raise OutsideRangeError(quantity, is_outside, expected_at)
+
+
+def refuse_not_converged(is_converged, source):
+    """Raise OutsideRangeError if no density at the base was determined for an observed density.
+
+    Parameters
+    ----------
+    is_converged : ndarray of bool
+    source : str
+        Volume correction.
+
+    Raises
+    ------
+    OutsideRangeError
+    """
+    if np.all(is_converged):
+        return
+
+    def expected_at(_):
+        return message(
+            "no_density_at_base",
+            "{source} gives no density at the base temperature for this observed density; expected "
+            "another density or temperature of the sample",
+            source=source,
+        )
+
+    raise OutsideRangeError("density_kg_m3", ~is_converged, expected_at)

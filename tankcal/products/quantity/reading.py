@@ -5,17 +5,19 @@ from pathlib import Path
 
 import numpy as np
 
-from tankcal.job.checking import missing_beside
+from tankcal.job.checking import missing_beside, refuse_repeated
+from tankcal.job.contract.keys import CSV
 from tankcal.job.contract.shorthand import choice, number, positive
 from tankcal.job.entries import read_columns, read_section, unknown_section
 from tankcal.job.fields import Field
-from tankcal.job.folder import MAX_SETTINGS_BYTES, read_csv, read_toml
-from tankcal.job.tables import NOT_KNOWN, Log, read_bytes
+from tankcal.job.folder import MAX_SETTINGS_BYTES, declared_marks, read_csv, read_toml
+from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import message
+from tankcal.products.quantity.alcohol import Ethanol
 from tankcal.products.quantity.chain import Gauging, Product
 from tankcal.products.quantity.corrections import CORRECTIONS
 from tankcal.products.quantity.petroleum import BASES_C, GROUPS, glass_correction
-from tankcal.products.quantity.ranges import OutsideRangeError
+from tankcal.products.quantity.ranges import DEGREES, OutsideRangeError
 from tankcal.products.quantity.transfer import STATES, UNCERTAINTIES, Transfer
 
 MOST_TICKETS = 100_000
@@ -27,25 +29,32 @@ TICKET = (
     Field("number", "text", "number of the ticket"),
     Field("date", "date", "day of the transfer, year-month-day"),
     Field("by", "text", "person who gauged the tank"),
-    Field("note", "text", "remark; printed"),
+    Field("note", "text", "remark"),
     number("coverage_probability", "coverage probability; blank: 0.95", 0.5, 0.9999),
 )
 PRODUCT = (
     Field("name", "text", "name of the product"),
-    choice("correction", "volume correction by this standard", (*CORRECTIONS,), required=True),
+    choice(
+        "correction", message("ticket_note_correction", "standard of the volume correction"),
+        (*CORRECTIONS,), required=True,
+    ),
     choice("group", "group of the product in D1250", (*GROUPS, COEFFICIENT)),
     choice("base", "base temperature", (*BASES_C,)),
-    positive("alpha_per_k", "coefficient of expansion of the liquid at the base, 1/K", 0.01),
+    positive("alpha_per_k", "coefficient of cubic expansion of the liquid, 1/K", 0.01),
     positive("density_kg_m3", "density, kg/m3", 2000),
     choice(
-        "density_is", "base: at the base temperature; observed: at density_temperature_c",
+        "density_is",
+        message(
+            "ticket_note_density_is",
+            "base: at the base temperature; observed: at density_temperature_c",
+        ),
         ("base", "observed"), required=True,
     ),
     number("density_temperature_c", "temperature of the sample, degrees Celsius", -60, 200),
     choice("hydrometer", "glass hydrometer by its scale; blank: none", (*GLASS,)),
     number("sw_percent", "suspended sediment and water, percent of the volume; blank: 0", 0, 20),
     positive("air_kg_m3", "density of the air for the weight in air, kg/m3; blank: 1.2", 2),
-    positive("weights_kg_m3", "density of the weights, kg/m3; blank: 8000", 20_000),
+    number("weights_kg_m3", "density of the weights, kg/m3; blank: 8000", 1000, 20_000),
 )  # fmt: skip
 SHELL = (
     Field("insulated", "flag", "the shell is insulated; blank: no"),
@@ -77,12 +86,13 @@ SECTIONS = {
     **dict.fromkeys(STATES, GAUGING),
     "compared": COMPARISON,
     "uncertainty": UNCERTAINTY,
+    "csv": CSV,
 }
 # Columns of a CSV file replace the keys of the TOML file for each ticket.
 _PRODUCT_KEYS = tuple(field.name for field in PRODUCT)
 _OF_PRODUCT = ("density_kg_m3", "density_temperature_c", "sw_percent")
 ROWS = (
-    Field("ticket", "name", "number of the ticket", required=True),
+    Field("ticket", "name", message("ticket_note_ticket", "number of the ticket"), required=True),
     *(
         Field(f"{state}_{field.name}", field.kind, field.note, low=field.low, high=field.high)
         for state in STATES
@@ -143,18 +153,23 @@ def read_tickets(table, settings, rows=None):
         With every problem of the files.
     """
     log = Log()
-    sections, places = _read_settings(Path(settings), log)
-    columns = None if rows is None else _read_rows(Path(rows), log)
+    settings = Path(settings).absolute()  # "." has a name for messages
+    sections, places, marks = _read_settings(settings, log)
+    if rows is not None:
+        rows = Path(rows).absolute()
+    columns = None if rows is None else _read_rows(rows, marks, settings.name, log)
     log.stop_if_problems()
-    source = _Source(Path(settings).name, sections, places, columns, log)
+    source = _Source(settings.name, sections, places, columns, log)
     correction = _correction(source)
     names = ("1",) if columns is None else tuple(columns.of("ticket"))
     if columns is None:
         names = (sections["ticket"]["number"] or "1",)
-    states = [state for state in STATES if source.has(f"{state}.temperature_c")]
+    # A gauging with a single value is part of the ticket: its missing values are reported below.
+    states = [state for state in STATES if source.has_any(state)]
     if "closing" not in states:
-        source.tell("closing.temperature_c", message("ticket_no_closing", "missing; expected the "
+        source.tell("closing.dip_m", message("ticket_no_closing", "missing; expected the "
                     "gauging after the transfer, or of the stock"))  # fmt: skip
+    compared = _compared(source)
     log.stop_if_problems()
     gaugings, taped = {}, {}
     for state in states:
@@ -176,11 +191,11 @@ def read_tickets(table, settings, rows=None):
     transfer = Transfer(table, gaugings, taped, product, u, probability)
     _refuse_negative(source, transfer)
     log.stop_if_problems()
-    return Tickets(names, sections, transfer, _compared(source, states), tuple(log.warnings))
+    return Tickets(names, sections, transfer, compared, tuple(log.warnings))
 
 
 def _read_settings(path, log):
-    """({section: {key: value}}, {"section.key": row}) of ticket.toml."""
+    """({section: {key: value}}, {"section.key": row}, marks of CSV files) of ticket.toml."""
     data = read_bytes(path, log, MAX_SETTINGS_BYTES)
     settings, rows = (None, {}) if data is None else read_toml(path.name, data, log)
     log.stop_if_problems()
@@ -188,21 +203,24 @@ def _read_settings(path, log):
         if section not in SECTIONS:
             log.problem(path.name, unknown_section(section, SECTIONS), rows.get(section),
                         f"[{section}]")  # fmt: skip
-    values, places = {}, {}
+    marks = declared_marks(path.name, settings, log)
+    values, places = {}, {section: rows.get(section) for section in SECTIONS if section in settings}
     for section, fields in SECTIONS.items():
         entries = settings.get(section, {})
         values[section] = read_section(path.name, section, fields, entries, rows.get(section), log)
         places |= {f"{section}.{key}": entry.row for key, entry in entries.items()}
-    return values, places
+    return values, places, marks
 
 
-def _read_rows(path, log):
+def _read_rows(path, marks, settings_file, log):
     """`ColumnValues` of a CSV file of tickets; None after a problem."""
-    data = read_bytes(path, log)
-    raw = None if data is None else read_csv(path.name, data, ",", NOT_KNOWN, log)
+    data = None if marks is None else read_bytes(path, log)
+    raw = None if data is None else read_csv(path.name, data, *marks, log, settings_file)
     if raw is None:
         return None
     columns = read_columns(None, raw, log, ROWS)
+    if columns.columns["ticket"] is not None:
+        refuse_repeated(columns, "ticket", log)
     if columns.is_empty:
         log.problem(path.name, message("ticket_no_rows", "no rows; expected a ticket in each row"))
     if len(columns.rows) > MOST_TICKETS:
@@ -232,6 +250,13 @@ class _Source:
         section, _, name = key.partition(".")
         return self.column(key) is not None or self.sections[section][name] is not None
 
+    def has_any(self, state):
+        """Whether the TOML file has a section of the state, or a column of it has a value."""
+        return state in self.places or any(
+            self.column(key) is not None and np.isfinite(self.numbers(key)).any()
+            for key in (f"{state}.{field.name}" for field in GAUGING)
+        )
+
     def numbers(self, key, default=np.nan):
         """Values (n,) of a key; blank: the default."""
         section, _, name = key.partition(".")
@@ -246,9 +271,10 @@ class _Source:
     def tell(self, key, expected, ticket=0, *, is_warning=False):
         """Report on a key of a ticket, in the row of the file that contains it."""
         report = self.log.warning if is_warning else self.log.problem
+        section, _, _ = key.partition(".")
         column = self.column(key)
         if column is None:
-            report(self.file, expected, self.places.get(key), key)
+            report(self.file, expected, self.places.get(key, self.places.get(section)), key)
         else:
             report(self.columns.file, expected, self.columns.rows[ticket], column)
 
@@ -271,11 +297,36 @@ def _correction(source):
         given |= {"group": None, "alpha_per_k": product["alpha_per_k"]}
         needed = (*needed, "alpha_per_k")
     is_complete = True
+    for key in ("group", "base", "alpha_per_k"):
+        if product[key] is not None and key not in needed:
+            _refuse_without_use(source, key, product, make)
     for key in needed:
         if product[key] is None:
             source.tell(f"product.{key}", missing_beside(f"correction = {product['correction']}"))
             is_complete = False
     return make(**given) if is_complete else None
+
+
+def _refuse_without_use(source, key, product, make):
+    """Refuse a key that the volume correction does not use; the base may repeat its own base."""
+    if key == "base":
+        base_c = make().base_c
+        if abs(BASES_C[product["base"]] - base_c) < 1e-9:
+            return
+        text = message(
+            "ticket_other_base",
+            "found {base}, but the base of this volume correction is {own:.4g} {unit}; expected no "
+            "base, or another correction", base=product["base"], own=base_c, unit=DEGREES,
+        )  # fmt: skip
+    else:
+        text = message(
+            "ticket_without_use",
+            "not used by correction = {correction}{group}; expected no such key",
+            correction=product["correction"],
+            group=f", group = {product['group']}" if key == "alpha_per_k" and product["group"]
+            else "",
+        )  # fmt: skip
+    source.tell(f"product.{key}", text)
 
 
 def _gauging(source, state, table):
@@ -304,7 +355,15 @@ def _gauging(source, state, table):
                        "the shell is not insulated")  # fmt: skip
         source.tell_each(f"{state}.ambient_c", np.isnan(ambient), lambda _: text)
     water = source.numbers(f"{state}.water_dip_m")
-    water = np.where(water > table.height_m[0], water, np.nan)  # none above the lowest row
+    lowest, dead_m3 = table.height_m[0], table.volume_m3[0]
+    text = message(
+        "ticket_water_below",
+        "below the first row of the table, {low:.4f} m, at which the volume is {volume:.3f} m3: no "
+        "free water is subtracted", low=lowest, volume=dead_m3,
+    )  # fmt: skip
+    is_below = (water > 0) & (water < lowest) & (dead_m3 > 0)
+    source.tell_each(f"{state}.water_dip_m", is_below, lambda _: text, is_warning=True)
+    water = np.where((water > 0) & (water >= lowest), water, np.nan)
     gauging = Gauging(
         level, water, temperature, ambient, source.numbers(f"{state}.pressure_kpa", 0)
     )
@@ -341,6 +400,15 @@ def _refuse_levels(source, state, table, level, by_ullage):
         "ticket_water_above", "above the liquid; expected a dip below the dip of the liquid"
     )
     source.tell_each(f"{state}.water_dip_m", water >= level, lambda _: text)
+    if table.roof is not None and table.is_roof_in_table:
+        bottom = table.roof.critical_bottom_m
+        text = message(
+            "ticket_water_at_roof",
+            "the table subtracts the roof from {bottom:.4f} m upwards; expected a dip of the free "
+            "water below", bottom=bottom,
+        )  # fmt: skip
+        is_high = (water > bottom) & (water < level)
+        source.tell_each(f"{state}.water_dip_m", is_high, lambda _: text)
 
 
 def _product(source, correction, table):
@@ -359,6 +427,9 @@ def _product(source, correction, table):
         source.tell_each("product.density_temperature_c", np.isnan(sample), lambda _: text)
         if given["hydrometer"] is not None:
             glass = glass_correction(sample, GLASS[given["hydrometer"]])
+        contained = getattr(correction, "glass_scale", None)
+        if contained is not None:  # the correction expects a reading of a glass hydrometer
+            glass = glass / glass_correction(sample, contained)
     elif given["hydrometer"] is not None or source.has("product.density_temperature_c"):
         text = message("ticket_density_at_base", "given with a density at the base; expected "
                        "density_is = observed, or no temperature of a sample and no hydrometer"
@@ -387,6 +458,9 @@ def _warn_of_slips(source, gaugings, product):
                        "degrees Fahrenheit?", limit=HOTTEST_C)  # fmt: skip
         source.tell_each(f"{state}.temperature_c", is_hot, lambda _, text=text: text,
                          is_warning=True)  # fmt: skip
+    if product.sample_c is not None:
+        is_hot = (product.sample_c > HOTTEST_C) & (product.density < COLDEST_HEAVY)
+        source.tell_each("product.density_temperature_c", is_hot, lambda _: text, is_warning=True)
     share = 100 * product.water_share
     text = message("ticket_sw_fraction", "less than {limit:g} %: is it a fraction?",
                    limit=LEAST_SW_PERCENT)  # fmt: skip
@@ -400,18 +474,34 @@ def _refuse_outside_correction(source, gaugings, product):
         base = product.base_density()
     except OutsideRangeError as error:
         key = "density_temperature_c" if error.quantity == "temperature_c" else error.quantity
-        expected = error.expected
-        source.tell_each(f"product.{key}", error.is_outside, lambda _: expected)
+        _tell_outside(source, f"product.{key}", error, product)
         return
     for state, gauging in gaugings.items():
         try:
             product.correction.factor(base, gauging.temperature_c, gauging.pressure_kpa)
         except OutsideRangeError as error:
             owner = "product" if error.quantity in _PRODUCT_KEYS else state
-            expected = error.expected
-            source.tell_each(
-                f"{owner}.{error.quantity}", error.is_outside, lambda _, text=expected: text
-            )
+            _tell_outside(source, f"{owner}.{error.quantity}", error, product)
+            if owner == "product":  # common to both states
+                return
+
+
+def _tell_outside(source, key, error, product):
+    """Report each ticket with a value outside the range of the volume correction."""
+    # The range of ethanol is checked at the temperature of the sample, others at the base.
+    is_derived = (
+        error.quantity == "density_kg_m3"
+        and product.sample_c is not None
+        and not isinstance(product.correction, Ethanol)
+    )
+
+    def expected(ticket):
+        text = error.expected_at(() if np.ndim(error.is_outside) == 0 else (ticket,))
+        if is_derived and text.code != "no_density_at_base":  # the user wrote another density
+            text = message("ticket_at_base", "at the base temperature: {text}", text=text)
+        return text
+
+    source.tell_each(key, error.is_outside, expected)
 
 
 def _refuse_negative(source, transfer):
@@ -422,13 +512,19 @@ def _refuse_negative(source, transfer):
         source.tell_each(f"{state}.dip_m", ~(steps.gov_m3 > 0), lambda _: text)
 
 
-def _compared(source, states):
+def _compared(source):
     """(quantity, values (n,), U or None, source) of the other party, or None."""
     given = source.sections["compared"]
     column = None if source.columns is None else source.columns.columns.get("compared_value")
-    if given["quantity"] is None or (given["value"] is None and column is None):
+    if column is None and all(given[field.name] is None for field in COMPARISON):
         return None
+    if given["quantity"] is None:
+        other = "compared.value" if column is None else "compared_value"
+        source.tell("compared.quantity", missing_beside(other))
+    if given["value"] is None and column is None:
+        source.tell("compared.value", missing_beside("compared.quantity"))
     values = np.full(source.count, np.nan if given["value"] is None else given["value"])
-    if column is not None:
-        values = source.columns.numbers("compared_value")
+    if column is not None:  # a blank cell has the value of the TOML file, as in other columns
+        in_rows = source.columns.numbers("compared_value")
+        values = np.where(np.isnan(in_rows), values, in_rows)
     return given["quantity"], values, given["U"], given["source"] or ""

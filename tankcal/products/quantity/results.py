@@ -1,11 +1,19 @@
 """Results of tickets: one row for each ticket, and the comparison with the other party."""
 
+import os
+from contextlib import suppress
 from dataclasses import dataclass
+from errno import EISDIR
 
 import numpy as np
 
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
 from tankcal.products.quantity.chain import QUANTITIES, values_of
 from tankcal.text.delimited import write_guarded
+
+# First columns of `rows_of`, which identify a file that may be replaced.
+_BEGINNINGS = (b"ticket,opening_tov_m3,", b"ticket,closing_tov_m3,")
 
 
 @dataclass(frozen=True)
@@ -16,7 +24,8 @@ class Comparison:
     ----------
     quantity, source : str
     difference : ndarray, shape (n,)
-        Quantity of the ticket, without its sign, less that of the other party; m3 or kg.
+        Quantity of the ticket, without its sign, less that of the other party; m3 or kg. nan: no
+        quantity of the other party.
     e_n : ndarray, shape (n,), or None
         Difference over the root of the sum of both squared U; None if the other U is not known.
     """
@@ -34,12 +43,18 @@ def compare(tickets, quantities):
     quantity, values, other_u, source = tickets.compared
     result, place = quantities.get("moved", quantities["closing"]), QUANTITIES.index(quantity)
     difference = np.abs(result.value[:, place]) - values
-    e_n = None if other_u is None else difference / np.hypot(result.U[:, place], other_u)
+    e_n = None
+    if other_u is not None:
+        both_u = np.hypot(result.U[:, place], other_u)
+        e_n = np.where(both_u > 0, difference, np.nan) / np.where(both_u > 0, both_u, 1.0)
     return Comparison(quantity, source, difference, e_n)
 
 
 def rows_of(tickets, quantities, steps):
-    """{column: value} of each ticket: steps, quantities, u and U, and the comparison."""
+    """{column: value} of each ticket: steps, quantities, u and U, and the comparison.
+
+    A number that does not exist, such as a difference without a quantity to compare with, is None.
+    """
     columns = {"ticket": list(tickets.names)}
     for state, result in steps.items():
         for name, values in values_of(result).items():
@@ -51,13 +66,61 @@ def rows_of(tickets, quantities, steps):
             columns[f"{state}_U_{name}"] = result.U[:, place].tolist()
     comparison = compare(tickets, quantities)
     if comparison is not None:
-        columns[f"difference_{comparison.quantity}"] = comparison.difference.tolist()
+        columns[f"difference_{comparison.quantity}"] = _numbers(comparison.difference)
         if comparison.e_n is not None:
-            columns["e_n"] = comparison.e_n.tolist()
+            columns["e_n"] = _numbers(comparison.e_n)
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
+def _numbers(values):
+    """Values as a list, with None for a value that is not finite."""
+    return [value if np.isfinite(value) else None for value in values.tolist()]
+
+
+def check_output(path):
+    """Refuse a file that `write_rows` must not replace.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        For a name that does not end in .csv, and for an existing file with other contents.
+    IsADirectoryError
+    """
+    if path.suffix.lower() != ".csv":
+        raise InputError(
+            Problem("--out", message("ticket_out", "expected the name of a .csv file"))
+        )
+    if path.is_dir():
+        raise IsADirectoryError(EISDIR, os.strerror(EISDIR), str(path))
+    if not path.exists():
+        return
+    # A regular file is needed first: reading another one, such as a pipe, may never end.
+    if path.is_file():
+        with path.open("rb") as stream:
+            start = stream.read(max(map(len, _BEGINNINGS)))
+        if not start or start.startswith(_BEGINNINGS):
+            return
+    expected = message(
+        "ticket_out_exists",
+        "found a file that tankcal ticket did not write; expected a new name, or such a file",
+    )
+    raise InputError(Problem(str(path), expected))
+
+
 def write_rows(path, rows):
-    """Write the rows of `rows_of` to a CSV file."""
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        write_guarded(stream, [[*rows[0]], *(row.values() for row in rows)])
+    """Write the rows of `rows_of` to a CSV file, as a whole or not."""
+    check_output(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with temporary.open("w", encoding="utf-8", newline="") as stream:
+            write_guarded(stream, [[*rows[0]], *(row.values() for row in rows)])
+        temporary.replace(path)
+    except OSError as error:  # names the file of the user instead of the temporary file
+        raise type(error)(error.errno, error.strerror, str(path)) from error
+    finally:
+        with suppress(OSError):  # replaced, or never created
+            temporary.unlink()

@@ -36,7 +36,9 @@ class TankTable:
     zero_m : float
         Height of the zero of the dips above the bottom of the tank.
     roof : FloatingRoof or None
-        Floating roof whose displacement is subtracted in the table.
+        Floating roof of the tank.
+    is_roof_in_table : bool
+        The table contains the displacement of the roof at its reference density.
     reference_height_m : float or None
         Height of the reference point above the zero of the dips, for ullages.
     number, digest : str
@@ -57,6 +59,7 @@ class TankTable:
     reference_height_m: float | None = None
     number: str = ""
     digest: str = ""
+    is_roof_in_table: bool = True
 
     def volume(self, level_m):
         """Volume at each dip, m3, linear between two rows; (n,) real or complex dips."""
@@ -85,6 +88,16 @@ class TankTable:
         if self.roof is None:
             return np.zeros(np.shape(level_m), dtype=bool)
         return level_m < self.roof.critical_top_m
+
+    def roof_correction_m3(self, observed_kg_m3):
+        """Correction FRA of a volume of the table for the roof, m3, at (n,) observed densities."""
+        if self.roof is None:
+            return 0.0 * observed_kg_m3
+        if self.is_roof_in_table:
+            # The table contains the roof at its reference density; in a lighter liquid the roof
+            # sinks deeper.
+            return self.roof.density_correction_m3(observed_kg_m3)
+        return -self.roof.displacement_m3(observed_kg_m3)
 
     def _place(self, level_m):
         """Row below each dip, and position between this row and the next one, 0 to 1."""
@@ -120,7 +133,6 @@ def read_table(path):
             "ticket_no_table", "the record of a survey without a tank; expected one with a table"
         )
         raise InputError(Problem(path.name, expected))
-    roof = job.get("roof")
     interpolation = record.get("interpolation")
     return TankTable(
         tank=job["tank"]["id"],
@@ -133,16 +145,25 @@ def read_table(path):
         temperature_c=job["table"]["reference_temperature_c"],
         expansion_per_k=job["material"]["expansion_per_k"],
         zero_m=capacity["zero_m"],
-        roof=None
-        if roof is None
-        else floating_roof(
-            roof["mass_kg"],
-            roof["critical_bottom_m"],
-            roof["critical_top_m"],
-            roof["reference_density_kg_m3"],
-            roof["weighing"],
+        roof=_read_roof(record),
+        is_roof_in_table=all(
+            choice["value"] != "off" for choice in record["choices"] if choice["code"] == "roof"
         ),
         reference_height_m=job["datum"]["reference_height_m"],
         number=str(job["certificate"].get("number") or ""),
         digest=hashlib.sha256(path.read_bytes()).hexdigest(),
+    )
+
+
+def _read_roof(record):
+    """`FloatingRoof` of a record; None without one."""
+    details = {detail["code"]: detail["value"] for detail in record["roof"] or ()}
+    if not details:
+        return None
+    return floating_roof(
+        details["roof_mass"],
+        details["roof_critical_bottom"],
+        details["roof_critical_top"],
+        details["roof_reference_density"],
+        details["roof_weighing"],
     )

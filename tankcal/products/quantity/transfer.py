@@ -98,7 +98,7 @@ class Transfer:
         for name, u in inputs:
             for state in self.gaugings:
                 contributions[state][name] = slopes[name][state] * np.reshape(u, (-1, 1))
-        by_table = self._table_columns(slopes)
+        table_parts = {state: [part] for state, part in self._table_parts(slopes).items()}
         dof = {
             state: self.table.dof_at(gauging.level_m) for state, gauging in self.gaugings.items()
         }
@@ -109,11 +109,16 @@ class Transfer:
                 name: contributions[closing][name] - contributions[opening][name]
                 for name, _ in inputs
             }
-            by_table["moved"] = by_table[closing] - by_table[opening]
+            (slope, factor), *_ = table_parts[opening]
+            table_parts["moved"] = [*table_parts[closing], (-slope, factor)]
             dof["moved"] = np.minimum(dof[opening], dof[closing])
         return {
             state: _combine(
-                results[state], contributions[state], by_table[state], dof[state], self.probability
+                results[state],
+                contributions[state],
+                _table_variance(table_parts[state]),
+                dof[state],
+                self.probability,
             )
             for state in results
         }
@@ -149,8 +154,11 @@ class Transfer:
         if self.u["u_vcf_percent"] is not None:
             return self.u["u_vcf_percent"] / 100
         distance = np.abs(temperature_c - self.product.correction.base_c)
+        # Beyond the last point the last slope goes on, so that U does not stop growing.
+        beyond = np.maximum(distance - _VCF_AT_K[-1], 0.0)
+        slope = (_VCF_PERCENT[-1] - _VCF_PERCENT[-2]) / (_VCF_AT_K[-1] - _VCF_AT_K[-2])
+        percent = np.interp(distance, _VCF_AT_K, _VCF_PERCENT) + slope * beyond
         # The model error has the sign of the distance from the base.
-        percent = np.interp(distance, _VCF_AT_K, _VCF_PERCENT)
         return np.sign(temperature_c - self.product.correction.base_c) * percent / 100 / 1.96
 
     def _standard_uncertainties(self, steps):
@@ -178,19 +186,20 @@ class Transfer:
         steps = self._evaluate({name: STEP * 1j})
         return {state: _values(steps[state], np.imag) / STEP for state in steps}
 
-    def _table_columns(self, slopes):
-        """{state: contribution of each input of the table}, shape (n, quantities, inputs)."""
-        columns = {}
+    def _table_parts(self, slopes):
+        """{state: (derivatives of the quantities by a volume, factor of the volumes)}.
+
+        The derivatives have the shape (n, quantities), the factor (n, inputs).
+        """
+        parts = {}
         for state, gauging in self.gaugings.items():
             # An error of the table acts like one of interpolation, at the liquid and at the water.
             factor = self.table.factor(gauging.level_m)
             has_water = np.isfinite(gauging.water_m)
             water_m = np.where(has_water, gauging.water_m, self.table.height_m[0])
             factor = factor - has_water[:, None] * self.table.factor(water_m)
-            columns[state] = (
-                slopes[f"interpolation {state}"][state][:, :, None] * factor[:, None, :]
-            )
-        return columns
+            parts[state] = slopes[f"interpolation {state}"][state], factor
+        return parts
 
 
 @dataclass(frozen=True)
@@ -220,9 +229,18 @@ def _values(steps: Steps, part=np.real):
     return np.column_stack([part(getattr(steps, name)) for name in QUANTITIES])
 
 
-def _combine(value, contributions, by_table, dof_of_table, probability):
+def _table_variance(parts):
+    """Variance (n, quantities) by the table, from (derivatives, factor) of one state or of two."""
+    variance = np.zeros(parts[0][0].shape)
+    # One quantity at a time: all of them together need gigabytes for 100 000 tickets.
+    for place in range(variance.shape[1]):
+        by_input = sum(slope[:, place, None] * factor for slope, factor in parts)
+        variance[:, place] = np.sum(by_input**2, axis=1)
+    return variance
+
+
+def _combine(value, contributions, table_variance, dof_of_table, probability):
     """`Quantities` from the contributions of independent inputs and of the table."""
-    table_variance = np.sum(by_table**2, axis=2)
     variance = table_variance + sum(part**2 for part in contributions.values())
     # Only the table has finite degrees of freedom; all other u are of type B.
     fourths = table_variance**2 / dof_of_table[:, None]
