@@ -189,3 +189,25 @@ def test_headings_mean_columns(table, heading, column):
 
 def test_two_headings_of_one_column_are_not_chosen_between():
     assert meanings_of(["Este", "X"], columns_of("points", "vertical")) == {}
+
+
+@pytest.mark.parametrize(
+    ("options", "place"),
+    [(["--table", "nothing"], "--table"), (["--column", "without a mark"], "--column")],
+)
+def test_bad_options_are_refused_in_one_line(tmp_path, capsys, options, place):
+    """A traceback before: such options were refused as if argparse were still reading them."""
+    source = tmp_path / "list.csv"
+    source.write_text("point,x_m,y_m,z_m\nP1,1,2,3\n", encoding="utf-8")
+    assert main(["import", str(source), "--out", str(tmp_path), *options]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert place in lines[0]
+
+
+def test_import_outside_a_job_needs_a_folder(tmp_path, capsys, monkeypatch):
+    source = tmp_path / "list.csv"
+    source.write_text("point,x_m,y_m,z_m\nP1,1,2,3\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert main(["import", str(source)]) == 2
+    assert "--out" in capsys.readouterr().err
