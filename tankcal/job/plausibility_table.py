@@ -436,7 +436,7 @@ TABLE = (
     Plausible(
         "tank.nominal_diameter_m with lines.csv",
         "8 m or more",
-        "a tank on which the same errors of offsets are a larger part of the radius",
+        "a tank whose radius is small compared with the errors of offsets",
         "",
         ("too_small_for_lines",),
         verified=False,
