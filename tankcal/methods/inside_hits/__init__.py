@@ -37,9 +37,9 @@ class InsideHitsMethod(Method):
         check_inside_hits(values, tables, registers, raw, log)
 
     def read(self, tables, registers):
-        from tankcal.methods.hits.readings import make_hits
+        from tankcal.methods.inside_hits.readings import make_inside_hits
 
-        return make_hits(tables, registers)
+        return make_inside_hits(tables, registers)
 
     # ---- pipeline
 

@@ -19,6 +19,7 @@ def check_inside_hits(values, tables, registers, raw, log):
         _check_count(hits, values["tank"]["kind"], log)
         _refuse_outside(values, raw, log)
     _refuse_targets(tables, log)
+    _refuse_declared_offset(tables["uncertainty"], log)
     _refuse_untied_setups(tables, log)
 
 
@@ -77,6 +78,20 @@ def _refuse_targets(tables, log):
             " its targets only tie the set-ups",
         )
         log.problem(targets.file, expected)
+
+
+def _refuse_declared_offset(inputs, log):
+    """Refuse an offset of all radii beside the offsets of the instruments."""
+    if not has_rows(inputs):
+        return
+    for row, name in zip(inputs.rows, inputs.of("input"), strict=True):
+        if name == "offset":
+            expected = message(
+                "inside_offset_twice",
+                "found offset; expected it only as u_offset_mm in instruments.toml, because the"
+                " offset of the instrument is the offset of all radii",
+            )
+            log.problem(inputs.file, expected, row, "input")
 
 
 def _refuse_untied_setups(tables, log):
