@@ -85,7 +85,7 @@ def parts_of(solid, stations, rng, *, hits=120, tool=Tool(), declared=None, nois
     wall, lying = wall_of(solid), isinstance(solid, LyingShell)
     axes = np.atleast_2d(np.asarray(stations, dtype=float))
     random = rng if noisy else None
-    rows, readings = [COLUMNS], {}
+    rows, readings = [list(COLUMNS)], {}
     targets, names = wall.aims(4, rng), ("K1", "K2", "K3", "K4")
     for number, axis in enumerate(axes, 1):
         zero = 0.0 if number == 1 else rng.uniform(0, FULL_TURN)

@@ -24,20 +24,20 @@ class InsideHitsRecord(Saved):
 
 def save_inside_hits(result):
     """Return the `InsideHitsRecord` of a result."""
+    from tankcal.methods.inside_hits.solid import is_accepted
+
     hits = result.job.surveys["inside_hits"]
     sighting = result.sights["inside_hits"]
     return InsideHitsRecord(
-        setups=_setups(hits, sighting.poses, result.scan.accepted),
+        setups=_setups(hits, sighting.poses, is_accepted(result.job, result.scan, sighting)),
         incidence=_incidence_classes(sighting.incidence_rad),
         compared=_compare_hits(hits, sighting.points.xyz_m, result.scan.fit),
     )
 
 
-def _setups(hits, poses, accepted):
-    """`HitSetupUsed` of each set-up; `accepted` are indices among the adjusted hits."""
+def _setups(hits, poses, is_used):
+    """`HitSetupUsed` of each set-up; `is_used` (n,) is the mask of the accepted hits."""
     setup = np.array(hits.setup)
-    is_used = np.zeros(len(setup), dtype=bool)
-    is_used[np.flatnonzero(~hits.check)[accepted]] = True
     first = {}
     for index, (name, _) in enumerate(poses.keys):
         first.setdefault(name, index)

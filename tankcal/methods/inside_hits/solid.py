@@ -5,10 +5,12 @@ angles, positions of the set-ups, and the errors that the hits of an instrument 
 incidence acts along the sight and depends on the angle to the normal of the solid, which is not
 known before the fit. Therefore the hits are sighted again after each fit, until the fit settles:
 
-    points, C(perpendicular) -> fit -> normals -> C(incidence) -> fit -> ...
+    points -> fit with equal weights -> normals -> C(incidence) -> fit -> normals -> ...
 
 The expectation of the bias is 0, so that only the covariance of the points changes, and with it the
-fitted solid.
+fitted solid. The first fit has equal weights because hits on ends and fittings are gross errors:
+through the common causes of a full covariance they would displace the fit of all other hits. The
+hits that it shows to be off the wall do not become points.
 """
 
 from dataclasses import replace
@@ -21,7 +23,8 @@ from tankcal.geometry.cylinders import FittedCylinder
 from tankcal.messages import message
 from tankcal.methods.inside_hits.checks import offset_undeclared, untied_setup
 from tankcal.pipeline.point_covariance import s_transform
-from tankcal.pipeline.scan import fit_scan
+from tankcal.pipeline.overruled_points import decisions_of
+from tankcal.pipeline.scan import NEVER_M, NEVER_PART, fit_scan
 from tankcal.pipeline.scanned_wall import offsets
 from tankcal.pipeline.sighted_points import take_points
 from tankcal.survey.poses import poses_in_network, poses_of
@@ -71,19 +74,35 @@ def find_hit_solid(job, adjustment, progress, dof=np.inf):
     poses = _tied_poses(hits, adjustment)
     sighting = sight(hits, poses, incidence=perpendicular)
     _refuse_unknown_offset(sighting)
-    job_of_points = _with_points(job, sighting, hits)
-    scan = fit_scan(job_of_points, dof)
+    fit, used_hits = _first_fit(job, sighting, np.flatnonzero(~hits.check))
     for _ in range(ROUNDS):
-        earlier_m = scan.residuals_m
-        sighting = sight(hits, poses, incidence=partial(incidence_on, scan.fit))
-        job_of_points = _with_points(job, sighting, hits)
+        sighting = sight(hits, poses, incidence=partial(incidence_on, fit))
+        job_of_points = _with_points(job, sighting, used_hits)
         scan = fit_scan(job_of_points, dof)
-        if np.max(np.abs(scan.residuals_m - earlier_m)) < SETTLED_M:
+        change_m = scan.residuals_m - offsets(fit, job_of_points.points.xyz_m)
+        fit = scan.fit
+        if np.max(np.abs(change_m)) < SETTLED_M:
             break
     _refuse_outside(hits, poses, scan)
     # The covariance may take half a gigabyte; the points of the job contain its adjusted part.
     points = replace(sighting.points, covariance_m2=None)
     return job_of_points, replace(sighting, points=points, by_poses=None), scan
+
+
+def is_accepted(job, scan, sighting):
+    """Mask (n,) of the hits that the fit accepted.
+
+    Parameters
+    ----------
+    job : Job
+        Job with the hits on the wall as points.
+    scan : Scan
+        Solid fitted to these points.
+    sighting : Sighting
+        Of all n hits.
+    """
+    accepted = {job.points.names[place] for place in scan.accepted}
+    return np.array([name in accepted for name in sighting.points.names], dtype=bool)
 
 
 def perpendicular(xyz, station, ray):
@@ -139,10 +158,33 @@ def _tied_poses(hits, adjustment):
     return poses_of(hits, adjustment, nominal_m=np.nan, is_inside=True)
 
 
-def _with_points(job, sighting, hits):
-    """The job with its adjusted hits as points."""
-    points = take_points(sighting.points, np.flatnonzero(~hits.check))
-    return replace(job, points=s_transform(points))
+def _first_fit(job, sighting, adjusted):
+    """Fit the solid to all adjusted hits with equal weights.
+
+    Parameters
+    ----------
+    job : Job
+    sighting : Sighting
+    adjusted : ndarray of int, shape (m,)
+        Indices of the hits that are not only compared.
+
+    Returns
+    -------
+    fit : FittedCylinder or FittedSphere
+    used_hits : ndarray of int, shape (k,)
+        Indices of the hits on the wall, and of the hits with a manual decision.
+    """
+    points = take_points(sighting.points, adjusted)
+    job = replace(job, points=replace(points, covariance_m2=None, causes=(), unbound=()))
+    fit = fit_scan(job).fit
+    # The bound of `fit_scan` for a point of the wall: a deep dent, but no fitting.
+    is_near = np.abs(offsets(fit, points.xyz_m)) <= NEVER_PART * fit.radius_m + NEVER_M
+    return fit, adjusted[is_near | (decisions_of(job) != 0)]
+
+
+def _with_points(job, sighting, used_hits):
+    """The job with selected hits as points, without their common motion in the covariance."""
+    return replace(job, points=s_transform(take_points(sighting.points, used_hits)))
 
 
 def _refuse_unknown_offset(sighting):

@@ -3,10 +3,13 @@
 import numpy as np
 
 from tankcal.errors import Problem
-from tankcal.messages import message
+from tankcal.messages import list_some, message
 from tankcal.methods.hits.warnings import check_control, check_incidence
+from tankcal.methods.inside_hits.solid import is_accepted
 from tankcal.pipeline.survey_limits import limits_of_method
 from tankcal.units import FULL_TURN
+
+SHOWN = 8  # largest number of rows in a message
 
 
 def check_hits_inside(job, scan, sighting):
@@ -28,18 +31,34 @@ def check_hits_inside(job, scan, sighting):
     return (
         *check_control(hits),
         *check_incidence(sighting),
-        *_check_rejected(hits, scan, limits),
+        *_check_off_wall(job, hits, sighting),
+        *_check_rejected(job, hits, scan, sighting, limits),
         *(_check_cylinder(job, hits, scan, limits) if job.horizontal is not None else ()),
     )
 
 
-def _check_rejected(hits, scan, limits):
+def _check_off_wall(job, hits, sighting):
+    """Warn of hits so far from the solid that they did not become points."""
+    of_wall = set(job.points.names)
+    is_off = np.array([name not in of_wall for name in sighting.points.names]) & ~hits.check
+    if is_off.any():
+        places = np.flatnonzero(is_off)
+        text = message(
+            "inside_hits_off",
+            "{count} hits are not on the fitted solid and were rejected (rows {rows}): are they on"
+            " the ends or on fittings?",
+            count=len(places),
+            rows=list_some([str(hits.rows[place]) for place in places], SHOWN),
+        )
+        yield Problem(hits.file, text, hits.rows[places[0]])
+
+
+def _check_rejected(job, hits, scan, sighting, limits):
     """Warn of set-ups with many rejected hits: on ends, fittings, or by another set-up's zero."""
-    setups = np.array(hits.setup)[~hits.check]
-    is_accepted = np.isin(np.arange(len(setups)), scan.accepted)
-    for name in dict.fromkeys(setups.tolist()):
-        is_here = setups == name
-        rejected, count = int(np.sum(is_here & ~is_accepted)), int(np.sum(is_here))
+    setups, is_used = np.array(hits.setup), is_accepted(job, scan, sighting)
+    for name in dict.fromkeys(hits.setup):
+        is_here = (setups == name) & ~hits.check
+        rejected, count = int(np.sum(is_here & ~is_used)), int(np.sum(is_here))
         if rejected > limits["most_rejected_share"] * count:
             text = message(
                 "inside_hits_rejected",
