@@ -15,6 +15,7 @@ from generated_solids import FULL_TURN, Ball, LyingShell
 from job_builder import OF_KIND, SETTINGS, VERTICAL_ONLY, Parts
 
 HEIGHT_M = 1.1  # of the instrument above its station
+PERFECT = Tool()
 COLUMNS = ["setup", "direction_deg", "zenith_deg", "distance_m", "use"]
 
 
@@ -77,7 +78,7 @@ def wall_of(solid):
     return LyingWall(solid) if isinstance(solid, LyingShell) else BallWall(solid)
 
 
-def parts_of(solid, stations, rng, *, hits=120, tool=Tool(), declared=None, noisy=True):
+def parts_of(solid, stations, rng, *, hits=120, tool=PERFECT, declared=None, noisy=True):
     """`Parts` of a job; several stations (n, 3) are known, and tied by four targets on the wall.
 
     declared  {key: value} of the instrument, in place of what is usual

@@ -205,7 +205,8 @@ def test_an_offset_that_is_not_declared_is_refused(kind, setups, tmp_path):
     if setups == 2:  # else its distances determine the offset
         del parts.tables["slope_distances"]
     (line,) = refused(tmp_path, parts)
-    assert line.startswith("instruments.toml") and "TS.u_offset_mm: not given; expected" in line
+    assert line.startswith("instruments.toml")
+    assert "TS.u_offset_mm: not given; expected" in line
     assert "tape" not in line
 
 
@@ -250,7 +251,8 @@ def test_a_course_is_no_column_of_a_lying_tank(tmp_path):
     parts = exact_parts("horizontal")
     parts.tables["wall_hits"][0][-1] = "course"
     (line,) = refused(tmp_path, parts)
-    assert line.startswith("wall_hits.csv, row 1") and "course" in line
+    assert line.startswith("wall_hits.csv, row 1")
+    assert "course" in line
 
 
 def test_bad_cells_are_named_by_row_and_column(tmp_path):
@@ -290,4 +292,5 @@ def test_a_record_and_its_sheet(kind, tmp_path):
     assert {"code": "survey", "value": "wall_hits"} in record["choices"]
     method = tankcal.methods.base.find_method("inside_hits")
     ((sheet, _, tables),) = method.sheets(record)
-    assert sheet == "hits" and [name for name, _ in tables][-1] == "inside_hits_compared"
+    assert sheet == "hits"
+    assert [name for name, _ in tables][-1] == "inside_hits_compared"

@@ -22,7 +22,9 @@ class InsideHitsMethod(Method):
     is_sighted = True
     has_own_offset = True
     has_named_points = True
-    saved_note = "bare wall hits inside a horizontal tank or a sphere; left out where there are none"
+    saved_note = (
+        "bare wall hits inside a horizontal tank or a sphere; left out where there are none"
+    )
 
     # ---- job
 

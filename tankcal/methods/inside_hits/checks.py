@@ -97,14 +97,14 @@ def _refuse_declared_offset(inputs, log):
 def _refuse_untied_setups(tables, log):
     """Refuse set-ups without readings of a network, if there are several set-ups."""
     hits, setups = tables["wall_hits"], tables["setups"]
-    names = list(dict.fromkeys(name for name in hits.of("setup") if name is not None))
-    if setups is None or len(names) < 2:
+    if setups is None:
         return
-    tied = {
-        name for table in TIES if has_rows(tables[table]) for name in tables[table].of("setup")
-    }
     rows = dict(zip(setups.of("setup"), setups.rows, strict=True))
+    names = [name for name in dict.fromkeys(hits.of("setup")) if name in rows]
+    if len(names) < 2:
+        return
+    tied = {name for table in TIES if has_rows(tables[table]) for name in tables[table].of("setup")}
     # One line is sufficient: with one set-up tied, the first set-up without ties is reported.
-    untied = [name for name in names if name not in tied and name in rows]
+    untied = [name for name in names if name not in tied]
     if untied:
         log.problem(setups.file, untied_setup(untied[0]), rows[untied[0]], "setup")
