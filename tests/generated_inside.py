@@ -96,7 +96,8 @@ def parts_of(solid, stations, rng, *, hits=120, tool=PERFECT, declared=None, noi
             [f"I{number}", float(direction), float(zenith), float(distance), None]
             for (direction, zenith), distance in zip(angles, read[:, 2], strict=True)
         ]
-        aimed = Tool(sd_m=5e-4 * noisy, sd_rad=1e-5 * noisy)
+        # The instrument has one offset and one scale, for targets and for the wall.
+        aimed = Tool(tool.offset_m, tool.scale, sd_m=5e-4 * noisy, sd_rad=1e-5 * noisy)
         readings[f"I{number}"] = (names, observe(axis, targets, aimed, random, zero))
     kind = "horizontal" if lying else "sphere"
     settings = {key: value for key, value in SETTINGS.items() if key not in VERTICAL_ONLY}
