@@ -235,6 +235,12 @@ def test_a_set_up_that_no_network_reads_is_refused(tmp_path):
     assert line.startswith("setups.csv, row 3, setup: found 'I2', which is tied")
 
 
+def test_a_set_up_outside_the_wall_is_refused(tmp_path):
+    rng = np.random.default_rng(5)
+    (line,) = refused(tmp_path, parts_of(Ball(5.0), [(8.0, 0.0, 0.0)], rng, noisy=False))
+    assert line.startswith("setups.csv, row 2, setup: found 'I1', which is 3.000 m outside")
+
+
 def test_settings_and_tables_without_sense_are_refused(tmp_path):
     parts = exact_parts("horizontal")
     parts.settings |= {"survey.side": "outside", "horizontal.thickness_mm": 8.0}
