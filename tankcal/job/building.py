@@ -78,7 +78,7 @@ def job_of(raw, log, is_whole=True):
     job = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
     surveys = _make_surveys(raw, values, tables, registers, attached)
     by_method = {}
-    for method in methods():
+    for method in methods_for(kind_of(raw)):  # two methods may share a table
         if method.is_given(tables):
             readings = method.read(tables, registers)
             attributes = by_method if method.attribute is None else surveys

@@ -19,6 +19,7 @@ _BUILT_IN = (
     "tankcal.methods.tangents:TangentsMethod",
     "tankcal.methods.rings:RingsMethod",
     "tankcal.methods.great_circles:GreatCirclesMethod",
+    "tankcal.methods.inside_hits:InsideHitsMethod",
 )
 
 

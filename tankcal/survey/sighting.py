@@ -133,11 +133,12 @@ class Sighting:
     pose : ndarray of int, shape (n,)
         Index of the pose of each hit.
     incidence_rad : ndarray, shape (n,)
-        Angle between the sight and the normal of the circle through all hits in plan.
+        Angle between the sight and the normal of the wall: the circle through all hits in plan, or
+        another solid.
     is_inside : ndarray of bool, shape (n,)
-        Whether the set-up is within that circle.
+        Whether the set-up is within that wall.
     normal : ndarray, shape (n, 3)
-        Outward normal of that circle.
+        Outward normal of that wall.
     told_m : dict
         {instrument: offset estimated from the wall and already subtracted, m}.
     told : tuple of ToldCause
@@ -160,7 +161,7 @@ class Sighting:
     beside: "Beside | None" = None
 
 
-def sight(hits, poses, told_m=None):
+def sight(hits, poses, told_m=None, incidence=None):
     """Compute the points of hits from known poses.
 
     Parameters
@@ -169,6 +170,9 @@ def sight(hits, poses, told_m=None):
     poses : Poses
     told_m : dict, optional
         {instrument: offset estimated from the wall, m}.
+    incidence : callable, optional
+        Function with the parameters and results of `incidence_in_plan`, for a wall that is not an
+        upright cylinder; None: `incidence_in_plan`.
 
     Returns
     -------
@@ -185,7 +189,8 @@ def sight(hits, poses, told_m=None):
     azimuth = poses.orientation_rad[pose] + hits.direction_rad
     ray, by_azimuth, by_zenith = rays(azimuth, hits.zenith_rad)
     xyz = poses.xyz_m[pose] + distance[:, None] * ray
-    cosine, inside, normal = incidence_in_plan(xyz, poses.xyz_m[pose], ray)
+    incidence = incidence or incidence_in_plan
+    cosine, inside, normal = incidence(xyz, poses.xyz_m[pose], ray)
     # Derivatives by x, y, z, orientation of each pose, then by scale and offset of each instrument.
     n, p, k = len(hits), len(poses.keys), len(poses.instruments)
     jacobian = np.zeros((n, 3, 4 * p + 2 * k))

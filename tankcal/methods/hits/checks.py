@@ -16,8 +16,13 @@ from tankcal.survey.wall_hits import FEWEST_HITS, MOST_HITS, too_many_hits
 RANGES = ("slope_distances", "distances")  # tables by which a network determines an offset
 
 
-def check_hits(values, tables, registers, raw, log):
-    """Check hits, their set-ups and the accuracy of the instruments; as for `Method.check`."""
+def check_hits(values, tables, registers, raw, log, *, undeclared_offset=None):
+    """Check hits, their set-ups and the accuracy of the instruments; as for `Method.check`.
+
+    undeclared_offset : Message, optional
+        Message about an offset that is neither declared nor determined by a network, for tanks
+        where neither a tape nor the other side of the wall determines it; None: these may do so.
+    """
     hits, control = tables["wall_hits"], tables["control_readings"]
     if not has_rows(hits):
         if has_rows(control):
@@ -63,7 +68,7 @@ def check_hits(values, tables, registers, raw, log):
         refuse_undefined(
             files, tables["setups"], "instrument", registers["instruments"], "instruments"
         )
-    _check_instruments(files, hits)
+    _check_instruments(files, hits, undeclared_offset)
 
 
 def _check_readings(files, table, *, is_needed):
@@ -75,7 +80,7 @@ def _check_readings(files, table, *, is_needed):
     warn_copies(files, table, are_sights=True)
 
 
-def _check_instruments(files, hits):
+def _check_instruments(files, hits, undeclared_offset):
     tables, log, raw = files.tables, files.log, files.raw
     setups, ranging = tables["setups"], ranging_of(files.registers)
     if setups is None or raw.registers.get("instruments", 0) is None:
@@ -102,12 +107,13 @@ def _check_instruments(files, hits):
         if used.get(name) in ranging:
             places.setdefault(used[name], []).append(place)
     for name, hits_of_instrument in places.items():
-        _check_instrument(files, hits, name, ranging[name], np.array(hits_of_instrument))
+        places_of_hits = np.array(hits_of_instrument)
+        _check_instrument(files, hits, name, ranging[name], places_of_hits, undeclared_offset)
         if not has_survey(tables):  # otherwise the check of the survey includes all instruments
             check_correction(files, name, ranging[name])
 
 
-def _check_instrument(files, hits, name, given, places):
+def _check_instrument(files, hits, name, given, places, undeclared_offset):
     for key in ("s_mm", "s_arcsec"):
         blank = np.isnan(hits.numbers(key)[places])
         if given[key] is None and blank.any():
@@ -124,12 +130,14 @@ def _check_instrument(files, hits, name, given, places):
         files.tell_key(files.log.problem, "instruments", name, "u_scale_ppm", expected)
     offset = given["u_offset_mm"]
     is_known = offset is not None and (offset != FREE or _told_by_network(files, name))
-    is_determined = (
-        tells_by_tape(files.tables) or len(set(hits.of("setup"))) > 1
-    )  # perhaps from both sides
-    is_determined = is_determined or files.is_unreadable("circumferences")
+    is_determined = undeclared_offset is None and (
+        tells_by_tape(files.tables)
+        or len(set(hits.of("setup"))) > 1  # perhaps from both sides
+        or files.is_unreadable("circumferences")
+    )
     if not is_known and not is_determined:
-        files.tell_key(files.log.problem, "instruments", name, "u_offset_mm", offset_unknown())
+        expected = undeclared_offset or offset_unknown()
+        files.tell_key(files.log.problem, "instruments", name, "u_offset_mm", expected)
 
 
 def offset_unknown():

@@ -20,7 +20,10 @@ _ZENITH = angle_fields("zenith", "zenith angle, from the zenith downwards", (0, 
 WALL_HITS = (
     _SETUP,
     Field(
-        "course", "name", "course of courses.csv that was hit; blank: determined from the height"
+        "course",
+        "name",
+        "course of courses.csv that was hit; blank: determined from the height",
+        kinds=("vertical",),
     ),
     Field(
         "set",

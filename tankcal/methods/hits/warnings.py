@@ -56,11 +56,11 @@ def check_hits(job, wall, sighting):
     tuple of Problem
     """
     return (
-        *_check_control(job),
+        *check_control(job.hits),
         *_check_assumed_places(job, wall, sighting.poses),
         *_check_levels(job, wall),
         *_check_courses(job, sighting),
-        *_check_incidence(sighting),
+        *check_incidence(sighting),
         *check_lost_setups(job, wall, sighting),
         *_check_setups(job, wall, sighting),
         *check_nominal(job, wall, job.hits.file),
@@ -69,21 +69,21 @@ def check_hits(job, wall, sighting):
     )
 
 
-def _check_control(job):
-    """Warn of missing or deviating control readings."""
+def check_control(hits):
+    """Return warnings of missing or deviating control readings of `WallHits`."""
     limits = limits_of(RULES)
-    if not job.hits.control:
+    if not hits.control:
         text = message(
             "no_control_readings",
             "no control target was read again: a tripod or an instrument that moved would not show",
         )
         yield Problem(CONTROL, text)
         return
-    targets = repeats_of(job.hits.control)
+    targets = repeats_of(hits.control)
     factor = repeat_factor(sum(3 * len(target.rows) for target in targets))
     for target in targets:
         distance_spread, angle_spread = (
-            factor * sd for sd in _standard_deviations(job.hits, target.setup)
+            factor * sd for sd in _standard_deviations(hits, target.setup)
         )
         # Below the spread due to the declared standard deviations, chance would exceed the limit.
         angle = max(limits["control_angle_gon"] * GON, angle_spread)
@@ -205,8 +205,8 @@ def _check_courses(job, sighting):
         yield Problem(job.hits.file, text, job.hits.rows[places[0]], "course")
 
 
-def _check_incidence(sighting):
-    """Warn of hits at large angles of incidence."""
+def check_incidence(sighting):
+    """Return warnings of hits at large angles of incidence."""
     most = limits_of(RULES)["most_incidence_deg"]
     oblique = np.flatnonzero(np.degrees(sighting.incidence_rad) > most)
     if len(oblique):

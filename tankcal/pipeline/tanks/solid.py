@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.methods.base import method_of
+from tankcal.methods.base import given_methods, method_of
 from tankcal.pipeline.tanks.common import (
     deadwood_part,
     estimates_of,
@@ -62,6 +62,9 @@ def _part(job, survey, switches, heel):
         solid = _part_of_mesh(job, survey, scale, heel)
     if job.points is not None:
         survey_results = _arguments_of_scan(survey, scale)
+        # Offsets of instruments are among the factors of the points.
+        if any(method.has_own_offset for method in given_methods(job)):
+            unused = (*unused, "offset")
     pressure = pressure_of(job)
     if (
         switches.head and pressure.is_there and job.sphere.thickness_m

@@ -1,0 +1,93 @@
+"""Wall hits inside horizontal tanks and spheres: distances of a total station to the bare wall."""
+
+from tankcal.methods.base import Method
+
+
+class InsideHitsMethod(Method):
+    """Reflectorless sights from set-ups inside a horizontal tank or a sphere.
+
+    The tables and readings are those of the upright method `hits`. The hits become points, to which
+    the cylinder or sphere is fitted as to any other surveyed points.
+    """
+
+    name = "inside_hits"
+    kinds = ("horizontal", "sphere")
+    tables = ("wall_hits", "control_readings")
+    shared_tables = (  # tables that connect set-ups or determine an offset
+        *("setups", "control", "directions", "zenith_angles", "slope_distances"),
+    )
+    starter = "wall-hits"
+    starts = (("survey.side", "inside"),)
+    needs_station_heights = True
+    is_sighted = True
+    has_own_offset = True
+    has_named_points = True
+    saved_note = (
+        "bare wall hits inside a horizontal tank or a sphere; left out where there are none"
+    )
+
+    # ---- job
+
+    def columns(self):
+        from tankcal.methods.hits.columns import COLUMNS
+
+        return COLUMNS
+
+    def check(self, values, tables, registers, raw, log):
+        from tankcal.methods.inside_hits.checks import check_inside_hits
+
+        check_inside_hits(values, tables, registers, raw, log)
+
+    def read(self, tables, registers):
+        from tankcal.methods.inside_hits.readings import make_inside_hits
+
+        return make_inside_hits(tables, registers)
+
+    # ---- pipeline
+
+    def find(self, job, progress, network):
+        from tankcal.methods.inside_hits.solid import find_hit_solid
+        from tankcal.pipeline.surveying import Surveyed
+
+        job_of_points, sighting, scan = find_hit_solid(
+            job, network.adjustment, progress, network.dof
+        )
+        return Surveyed(job_of_points, scan, sights={self.name: sighting})
+
+    def warnings(self, job, survey, sights=None):
+        from tankcal.methods.inside_hits.warnings import check_hits_inside
+
+        return check_hits_inside(job, survey, sights)
+
+    # ---- record
+
+    def saved_type(self):
+        from tankcal.methods.inside_hits.saved import InsideHitsRecord
+
+        return InsideHitsRecord
+
+    def save(self, result):
+        from tankcal.methods.inside_hits.saved import save_inside_hits
+
+        return save_inside_hits(result)
+
+    def choices(self, result):
+        return {"survey": "wall_hits", "covariance": "hits"}
+
+    # ---- report
+
+    def report_tables(self):
+        from tankcal.methods.inside_hits import tables
+
+        return tables
+
+    def sheets(self, record):
+        declared = self.report_tables()
+        tables = (declared.SETUPS, declared.INCIDENCE, declared.COMPARED)
+        shown = [(table.name, table) for table in tables if table.rows(record)]
+        return [("hits", "inside_hits_subtitle", shown)]
+
+    def certificates(self, saved):
+        from tankcal.report.tables.sights import certificates_of_setups
+
+        return certificates_of_setups(saved["setups"])
