@@ -145,7 +145,7 @@ def test_points_in_parts_give_the_same(shell, scanned):  # property: whole numbe
     cloud = _cloud(shell)[:50_000]
     whole = fill_weld_cells([(0, cloud)], wall.surface, grids)
     parts = [fill_weld_cells([(0, one)], wall.surface, grids) for one in np.array_split(cloud, 3)]
-    both = parts[2].merged(parts[0]).merged(parts[1])
+    both = parts[2].merge(parts[0]).merge(parts[1])
     for one, other in zip(whole.counts, both.counts, strict=True):
         assert one.sum() > 10_000
         assert np.array_equal(one, other)

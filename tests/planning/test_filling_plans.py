@@ -146,7 +146,7 @@ def test_the_prediction_is_that_of_the_dense_model(tmp_path):
     """Second method: U at the dips of the plan, of deliveries, of scale and meter after."""
     found = predict(load_plan(plan_of(tmp_path / "plan", FILLING, *EXACT)))
     metering, made = found.plan.job.liquid, found.result.computed_table
-    body = found.result.measured.joint.known.geometry.body()
+    body = found.result.metering.joint.known.geometry.body()
     dips = metering.dip_m[np.isfinite(metering.dip_m)]
     rows = np.array([one.dip_m for one in found.filling.dips])
 
