@@ -9,6 +9,7 @@ import os
 import queue
 import uuid
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 from tankcal.batch.finding import find_former_or_none, find_jobs
@@ -234,10 +235,12 @@ class _WorkerRuns:
 
         task = self._running.pop(future)
         with failures_told():
-            error = future.exception()
+            error, result = future.exception(), None
             if error is not None and not isinstance(error, KilledWorker):
                 raise error
-            result = None if error else future.result()
+            if error is None:
+                with suppress(KilledWorker):  # the worker may die before its result is fetched
+                    result = future.result()
             future.release()
         if result is not None:
             self._report_ended(task, *result)
