@@ -6,7 +6,7 @@ import pytest
 
 from tankcal.products.quantity.alcohol import Ethanol, mixture_density
 from tankcal.products.quantity.brazil import Brazil
-from tankcal.products.quantity.corrections import Constant, FactorTable
+from tankcal.products.quantity.corrections import Constant
 from tankcal.products.quantity.gases import WATER_60F, LiquefiedGas
 from tankcal.products.quantity.petroleum import (
     KPA_PER_PSI,
@@ -232,12 +232,11 @@ def test_liquefied_gas_inverts():
         np.testing.assert_allclose(gas.base_density(observed, celsius), density, rtol=1e-10)
 
 
-def test_constant_coefficient_and_table():
-    assert Constant(0.0008, "15C").factor(850.0, 25.0) == pytest.approx(1 / 1.008)
-    table = FactorTable(np.array([0.0, 20.0, 40.0]), np.array([1.02, 1.0, 0.98]), 20.0, "f.csv")
-    assert table.factor(850.0, 25.0) == pytest.approx(0.995)
-    with pytest.raises(OutsideRangeError, match="0 to 40 degC"):
-        table.factor(850.0, 41.0)
+def test_constant_coefficient():
+    correction = Constant(0.0008, "15C")
+    assert correction.factor(850.0, 25.0) == pytest.approx(1 / 1.008)
+    with pytest.raises(OutsideRangeError, match="-60 to 200 degC"):
+        correction.factor(850.0, 201.0)
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from tankcal.messages import message
 from tankcal.products.quantity.alcohol import Ethanol
 from tankcal.products.quantity.brazil import Brazil
@@ -44,44 +42,6 @@ class Constant:
         refuse_outside("temperature_c", temperature_c, LEAST_C, MOST_C, "degC", self.name)
         refuse_outside("pressure_kpa", pressure_kpa, 0.0, 0.0, "kPa", self.name)
         return 1 / (1 + self.alpha_per_k * (temperature_c - self.base_c)) + 0.0 * density
-
-    def base_density(self, density, temperature_c, pressure_kpa=0.0):
-        """Density at the base, kg/m3, of a density at another temperature."""
-        return density / self.factor(density, temperature_c, pressure_kpa)
-
-
-@dataclass(frozen=True)
-class FactorTable:
-    """Volume correction by a table of factors at temperatures, linear between them.
-
-    Attributes
-    ----------
-    temperature_c, vcf : ndarray, shape (k,)
-        Temperatures, ascending, and factors to the base.
-    base_c : float
-        Temperature at which the factor is 1.
-    file : str
-    """
-
-    temperature_c: np.ndarray
-    vcf: np.ndarray
-    base_c: float
-    file: str
-
-    @property
-    def name(self):
-        """Name of the correction, for reports."""
-        return self.file
-
-    def factor(self, density, temperature_c, pressure_kpa=0.0):
-        """Volume correction factor, as `Petroleum.factor`; it does not depend on the density."""
-        low, high = self.temperature_c[0], self.temperature_c[-1]
-        refuse_outside("temperature_c", temperature_c, low, high, "degC", self.name)
-        refuse_outside("pressure_kpa", pressure_kpa, 0.0, 0.0, "kPa", self.name)
-        row = np.searchsorted(self.temperature_c, np.real(temperature_c), side="right") - 1
-        row = np.clip(row, 0, len(self.vcf) - 2)
-        slope = np.diff(self.vcf)[row] / np.diff(self.temperature_c)[row]
-        return self.vcf[row] + slope * (temperature_c - self.temperature_c[row]) + 0.0 * density
 
     def base_density(self, density, temperature_c, pressure_kpa=0.0):
         """Density at the base, kg/m3, of a density at another temperature."""

@@ -22,7 +22,6 @@ EDITIONS, GROUPS = (1980, 2004), ("crude", "products", "lubricants")
 BASES_C = {"15C": 15.0, "20C": 20.0, "60F": (60.0 - 32.0) / 1.8}
 WATER_1980, WATER_2004 = 999.012, 999.016  # kg/m3 at 60 degF, of the API gravity
 KPA_PER_PSI = 6.894757
-KPA_PER_BAR = 100.0
 
 MOST_ROUNDS = 200  # of the fixed-point iteration for a density at the base
 ROUNDS_OF_GROUPS = 30  # later rounds keep the group of products, so that it cannot alternate

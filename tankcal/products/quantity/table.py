@@ -41,8 +41,8 @@ class TankTable:
         The table contains the displacement of the roof at its reference density.
     reference_height_m : float or None
         Height of the reference point above the zero of the dips, for ullages.
-    number, digest : str
-        Number of the certificate ("" if none) and SHA-256 of the record.
+    digest : str
+        SHA-256 of the record.
     """
 
     tank: str
@@ -57,7 +57,6 @@ class TankTable:
     zero_m: float = 0.0
     roof: FloatingRoof | None = None
     reference_height_m: float | None = None
-    number: str = ""
     digest: str = ""
     is_roof_in_table: bool = True
 
@@ -150,7 +149,6 @@ def read_table(path):
             choice["value"] != "off" for choice in record["choices"] if choice["code"] == "roof"
         ),
         reference_height_m=job["datum"]["reference_height_m"],
-        number=str(job["certificate"].get("number") or ""),
         digest=hashlib.sha256(path.read_bytes()).hexdigest(),
     )
 
