@@ -59,7 +59,7 @@ def _ticket(options):
         check_output(Path(options.out))
     table = read_table(record_file(options.record))
     tickets = read_tickets(table, options.ticket, options.tickets)
-    quantities, steps = tickets.transfer.quantities(), tickets.transfer.steps()
+    quantities, steps = tickets.transfer.quantities(), tickets.transfer.steps
     rows = rows_of(tickets, quantities, steps)
     if options.out is not None:
         write_rows(Path(options.out), rows)

@@ -79,7 +79,7 @@ def test_chain_against_a_plain_implementation():
 
 
 def _transfer(table, opening, closing, product, **u):
-    declared = {name: assumed.value for name, assumed in UNCERTAINTIES.items()} | u
+    declared = UNCERTAINTIES | u
     gaugings = {"opening": opening, "closing": closing}
     taped = {state: gauging.level_m for state, gauging in gaugings.items()}
     return Transfer(table, gaugings, taped, product, declared)
@@ -313,7 +313,7 @@ def test_glass_of_the_brazilian_table_is_corrected_once(settings):
     by_glass, by_tube = (
         read_tickets(
             _cylinder(), _write_correction(settings, "CNP-6-70-unrounded", density, celsius, more)
-        ).transfer.steps()["closing"].base_density[0]
+        ).transfer.steps["closing"].base_density[0]
         for density, more in ((reading, 'hydrometer = "glass 20C"'), (true, ""))
     )  # fmt: skip
     assert by_glass == pytest.approx(by_tube, rel=1e-12)
@@ -339,7 +339,7 @@ def test_water_below_a_table_that_begins_with_a_volume_is_warned_of(settings):
         "height_m", "volume_m3", "factor_m3", "dof")})  # fmt: skip
     tickets = read_tickets(table, settings())
     assert [str(w.text).count("first row of the table") for w in tickets.warnings] == [1, 1]
-    assert tickets.transfer.steps()["closing"].fw_m3[0] == 0
+    assert tickets.transfer.steps["closing"].fw_m3[0] == 0
 
 
 def test_water_at_the_roof_is_refused(settings):
@@ -377,7 +377,7 @@ def test_comparison_of_a_row_may_be_missing(settings, tmp_path):
     ):
         tickets = read_tickets(_cylinder(), settings(change), rows)
         transfer = tickets.transfer
-        first, second = rows_of(tickets, transfer.quantities(), transfer.steps())
+        first, second = rows_of(tickets, transfer.quantities(), transfer.steps)
         assert (first["difference_nsv_m3"] is None) == is_missing
         assert second["difference_nsv_m3"] is not None
         assert json.dumps([first, second], allow_nan=False)

@@ -181,7 +181,7 @@ def read_tickets(table, settings, rows=None):
     log.stop_if_problems()
     given = sections["uncertainty"]
     u = {
-        name: assumed.value if given[name] is None else given[name]
+        name: assumed if given[name] is None else given[name]
         for name, assumed in UNCERTAINTIES.items()
     }
     if given["u_sw_percent"] is None:  # without a measurement, no sediment is part of the ticket
@@ -508,7 +508,7 @@ def _refuse_negative(source, transfer):
     """Refuse dips at which water and roof leave no volume of the product."""
     text = message("ticket_negative", "the volume without water is not above 0; expected a dip "
                    "further above the water and the roof")  # fmt: skip
-    for state, steps in transfer.steps().items():
+    for state, steps in transfer.steps.items():
         source.tell_each(f"{state}.dip_m", ~(steps.gov_m3 > 0), lambda _: text)
 
 

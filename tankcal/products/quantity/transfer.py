@@ -6,6 +6,7 @@ exactly. Sensitivities are complex steps through the whole chain.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,35 +18,21 @@ STEP = 1e-30  # of complex steps; far below rounding, so that derivatives are ex
 STATES = ("opening", "closing")
 
 
-@dataclass(frozen=True)
-class Assumed:
-    """Standard uncertainty of one input of a ticket, if the ticket does not declare it.
-
-    Attributes
-    ----------
-    value : float or None
-        None: by a rule, or no uncertainty.
-    source : str
-        Code of the source, printed in the reports.
-    """
-
-    value: float | None
-    source: str
-
-
-# From memory: practice of manual gauging, class II tapes, ISO 4268 thermometers, reproducibility of
-# hydrometers and of the centrifuge. None of these texts was read. "assumed": our own choice.
+# {name: standard uncertainty if the ticket does not declare it}; None: by the rule below. Values
+# with "memory" are from memory: practice of manual gauging, class II tapes, ISO 4268 thermometers,
+# reproducibility of hydrometers and of the centrifuge. None of these texts was read. "assumed": our
+# own choice.
 UNCERTAINTIES = {
-    "u_dip_mm": Assumed(1.0, "memory"),
-    "u_tape_ppm": Assumed(115.0, "memory"),
-    "u_water_dip_mm": Assumed(1.5, "assumed"),
-    "u_temperature_k": Assumed(0.25, "assumed"),
-    "u_thermometer_k": Assumed(0.15, "memory"),
-    "u_ambient_k": Assumed(3.0, "assumed"),
-    "u_density_kg_m3": Assumed(0.5, "memory"),
-    "u_sw_percent": Assumed(0.1, "memory"),
-    "u_vcf_percent": Assumed(None, "memory"),
-    "u_expansion_per_k": Assumed(1e-6, "assumed"),
+    "u_dip_mm": 1.0,  # memory
+    "u_tape_ppm": 115.0,  # memory
+    "u_water_dip_mm": 1.5,  # assumed
+    "u_temperature_k": 0.25,  # assumed
+    "u_thermometer_k": 0.15,  # memory
+    "u_ambient_k": 3.0,  # assumed
+    "u_density_kg_m3": 0.5,  # memory
+    "u_sw_percent": 0.1,  # memory
+    "u_vcf_percent": None,  # memory
+    "u_expansion_per_k": 1e-6,  # assumed
 }
 # Expanded uncertainty (95 %) of the volume correction at temperatures, percent of the volume; from
 # memory of the 1980 edition, for 60 degF. Below the first point it grows in proportion to the
@@ -79,6 +66,7 @@ class Transfer:
     u: dict
     probability: float = 0.95
 
+    @cached_property
     def steps(self):
         """{state: Steps} without errors."""
         return self._evaluate({})
@@ -90,9 +78,8 @@ class Transfer:
         -------
         dict of {str: Quantities}
         """
-        steps = self.steps()
-        results = {state: _values(steps[state]) for state in self.gaugings}
-        inputs = list(self._standard_uncertainties(steps))
+        results = {state: _values(self.steps[state]) for state in self.gaugings}
+        inputs = list(self._standard_uncertainties())
         slopes = {name: self._slopes(name) for name, _ in inputs}
         contributions = {state: {} for state in self.gaugings}
         for name, u in inputs:
@@ -161,7 +148,7 @@ class Transfer:
         # The model error has the sign of the distance from the base.
         return np.sign(temperature_c - self.product.correction.base_c) * percent / 100 / 1.96
 
-    def _standard_uncertainties(self, steps):
+    def _standard_uncertainties(self):
         """Yield (name, standard uncertainty (n,)) of each input."""
         u = self.u
         for state, gauging in self.gaugings.items():
