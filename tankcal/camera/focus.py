@@ -81,7 +81,7 @@ class Lens:
         f, s = self.focal_length_mm, np.asarray(distance_mm, dtype=float)
         near, far = np.sort(self.distances_mm)
         if near == far:
-            raise ValueError("two calibrations at the same distance say nothing of another one")
+            raise ValueError("calibrations at equal distances do not determine another distance")
         first, second = self.radial[np.argsort(self.distances_mm)]
         at_infinity = [
             coefficients / (1 - f / distance) ** _ODD

@@ -151,13 +151,17 @@ def _quantity_lines(state, result):
         )
 
 
-def _ticket_lines(tickets, quantities):
-    """Yield the net standard volume of each of the first tickets."""
+def _net_volume(quantities):
+    """(state, its `Quantities`, column of the net standard volume) of the transfer or the stock."""
     from tankcal.products.quantity.chain import QUANTITIES
 
-    place = QUANTITIES.index("nsv_m3")
     state = "moved" if "moved" in quantities else "closing"
-    result = quantities[state]
+    return state, quantities[state], QUANTITIES.index("nsv_m3")
+
+
+def _ticket_lines(tickets, quantities):
+    """Yield the net standard volume of each of the first tickets."""
+    state, result, place = _net_volume(quantities)
     for row, name in enumerate(tickets.names[:SHOWN_TICKETS]):
         written = format_with_u(result.value[row, place], result.U[row, place], marks())
         yield message(
@@ -176,11 +180,7 @@ def _ticket_lines(tickets, quantities):
 
 def _budget_lines(quantities):
     """Yield the largest contributions to u of the net standard volume."""
-    from tankcal.products.quantity.chain import QUANTITIES
-
-    place = QUANTITIES.index("nsv_m3")
-    state = "moved" if "moved" in quantities else "closing"
-    result = quantities[state]
+    _, result, place = _net_volume(quantities)
     if not result.u[0, place] > 0:
         return
     parts = sorted(

@@ -57,7 +57,7 @@ def test_the_second_distance_may_be_infinite():
 
 
 def test_two_calibrations_at_one_distance_are_refused():
-    with pytest.raises(ValueError, match="same distance"):
+    with pytest.raises(ValueError, match="equal distances"):
         radial_at(5000.0, [NEAR, NEAR], RADIAL)
 
 

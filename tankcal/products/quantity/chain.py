@@ -128,10 +128,6 @@ def follow_chain(table, gauging, product, vcf_error=0.0):
     Returns
     -------
     Steps
-
-    Examples
-    --------
-    See docs/ticket.md.
     """
     tov = table.volume(gauging.level_m) + gauging.table_error_m3
     has_water = np.isfinite(np.real(gauging.water_m))

@@ -452,20 +452,20 @@ def _product(source, correction, table):
 
 def _warn_of_slips(source, gaugings, product):
     """Warn of inputs that are probably in another unit or of another kind."""
-    for state, gauging in gaugings.items():
-        is_hot = (gauging.temperature_c > HOTTEST_C) & (product.density < COLDEST_HEAVY)
-        text = message("ticket_hot", "more than {limit:g} degC for a light product: is it in "
-                       "degrees Fahrenheit?", limit=HOTTEST_C)  # fmt: skip
-        source.tell_each(f"{state}.temperature_c", is_hot, lambda _, text=text: text,
-                         is_warning=True)  # fmt: skip
+    text = message("ticket_hot", "more than {limit:g} degC for a light product: is it in degrees "
+                   "Fahrenheit?", limit=HOTTEST_C)  # fmt: skip
+    measured = {f"{state}.temperature_c": gauging.temperature_c
+                for state, gauging in gaugings.items()}  # fmt: skip
     if product.sample_c is not None:
-        is_hot = (product.sample_c > HOTTEST_C) & (product.density < COLDEST_HEAVY)
-        source.tell_each("product.density_temperature_c", is_hot, lambda _: text, is_warning=True)
+        measured["product.density_temperature_c"] = product.sample_c
+    for key, celsius in measured.items():
+        is_hot = (celsius > HOTTEST_C) & (product.density < COLDEST_HEAVY)
+        source.tell_each(key, is_hot, lambda _: text, is_warning=True)
     share = 100 * product.water_share
-    text = message("ticket_sw_fraction", "less than {limit:g} %: is it a fraction?",
-                   limit=LEAST_SW_PERCENT)  # fmt: skip
-    source.tell_each("product.sw_percent", (share > 0) & (share < LEAST_SW_PERCENT), lambda _: text,
-                     is_warning=True)  # fmt: skip
+    fraction = message("ticket_sw_fraction", "less than {limit:g} %: is it a fraction?",
+                       limit=LEAST_SW_PERCENT)  # fmt: skip
+    source.tell_each("product.sw_percent", (share > 0) & (share < LEAST_SW_PERCENT),
+                     lambda _: fraction, is_warning=True)  # fmt: skip
 
 
 def _refuse_outside_correction(source, gaugings, product):
