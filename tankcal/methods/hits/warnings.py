@@ -212,8 +212,8 @@ def check_incidence(sighting):
     if len(oblique):
         text = message(
             "hits_too_flat",
-            "{count} hits meet the wall at more than {most:g} degrees from its normal: what such"
-            " ranging is worth nobody knows",
+            "{count} hits meet the wall at more than {most:g} degrees from its normal: the"
+            " uncertainty of a distance at such an angle is not known",
             count=len(oblique),
             most=most,
         )
