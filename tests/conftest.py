@@ -16,6 +16,7 @@ from hypothesis import settings
 
 import tankcal
 from tankcal.cli import main
+from tankcal.cli.showing import speak
 from tankcal.pipeline.chain import adjust_job
 from tankcal.record import record_of, record_of_adjustment, save
 
@@ -27,6 +28,15 @@ PHOTOS = EXAMPLE.parent / "silva-1995-photos"
 settings.register_profile("house", deadline=None, derandomize=True)
 settings.register_profile("search", deadline=None, print_blob=True)
 settings.load_profile("house")
+
+
+@pytest.fixture(autouse=True)
+def reset_language(monkeypatch):
+    """Run each test in English, whatever the environment and the tests before it chose."""
+    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
+        monkeypatch.delenv(name, raising=False)
+    yield
+    speak("en")
 
 
 @pytest.fixture(scope="session")

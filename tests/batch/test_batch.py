@@ -19,17 +19,8 @@ from tankcal.batch import journal, running, steps
 from tankcal.batch.options import Options
 from tankcal.batch.summary import find_changes
 from tankcal.cli import main
-from tankcal.cli.showing import speak
 
 pytestmark = pytest.mark.slow  # seconds of runs and papers
-
-
-@pytest.fixture(autouse=True)
-def plain_terminal(monkeypatch):
-    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
-        monkeypatch.delenv(name, raising=False)
-    yield
-    speak("en")
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ from exported_records import lying, record_with, rows
 
 import tankcal
 from tankcal.cli import main
-from tankcal.cli.showing import speak
 from tankcal.record import save
 
 OTHERS = ("pt-BR", "es")
@@ -20,14 +19,6 @@ ENGLISH = re.compile(
 )
 # names of the files that are read, and what stands in them
 OF_FILES = r"'[^']*'|tankcal|sensor width|#Focal Length mm assuming a sensor width of"
-
-
-@pytest.fixture(autouse=True)
-def plain_terminal(monkeypatch):
-    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
-        monkeypatch.delenv(name, raising=False)
-    yield
-    speak("en")
 
 
 def told(capsys):

@@ -8,16 +8,7 @@ import pytest
 from tables_of_s1 import former_s1, new_s1
 
 from tankcal.cli import main
-from tankcal.cli.showing import speak
 from tankcal.record.comparison import COMPARISON
-
-
-@pytest.fixture(autouse=True)
-def in_english(monkeypatch):
-    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
-        monkeypatch.delenv(name, raising=False)
-    yield
-    speak("en")
 
 
 @pytest.fixture

@@ -20,10 +20,7 @@ LOCALES = {"pt-BR": "pt_BR.UTF-8", "es": "es_MX.UTF-8"}
 
 @pytest.fixture
 def in_language(monkeypatch):
-    for name in ("LC_ALL", "LC_MESSAGES"):
-        monkeypatch.delenv(name, raising=False)
-    yield lambda language: monkeypatch.setenv("LANG", LOCALES[language])
-    speak("en")
+    return lambda language: monkeypatch.setenv("LANG", LOCALES[language])
 
 
 def parsers_of(parser):

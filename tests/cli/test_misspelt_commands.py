@@ -16,14 +16,6 @@ from tankcal.version import install_command
 OTHERS = ("pt-BR", "es")
 
 
-@pytest.fixture(autouse=True)
-def plain_terminal(monkeypatch):
-    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
-        monkeypatch.delenv(name, raising=False)
-    yield
-    speak("en")
-
-
 @pytest.mark.parametrize(("typed", "meant"), [("rn", "run"), ("exprot", "export"), ("nwe", "new")])
 def test_a_misspelt_command_is_named(typed, meant, capsys):
     with pytest.raises(SystemExit) as stopped:

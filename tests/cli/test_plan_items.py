@@ -6,16 +6,8 @@ from wall_plan_folders import HITS, plan_of
 
 from tankcal.cli import main
 from tankcal.cli.plan_items import KINDS, describe_count
-from tankcal.cli.showing import speak
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words, message_sentence
-
-
-@pytest.fixture(autouse=True)
-def english_afterwards():
-    """Other tests read the terminal in English."""
-    yield
-    speak("en")
 
 
 @pytest.mark.slow(after=27)

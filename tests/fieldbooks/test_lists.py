@@ -7,7 +7,6 @@ import pytest
 from job_builder import assert_same_job, job_parts, write_folder
 
 from tankcal.cli import main
-from tankcal.cli.showing import speak
 from tankcal.errors import InputError
 from tankcal.job import load
 from tankcal.job.contract import columns_of
@@ -18,14 +17,6 @@ HEADINGS = {
     "es": ("Punto", "Coord. X", "Coord. Y", "Altura"),
     "en": ("Point ID", "Easting [m]", "Northing [m]", "Elevation [m]"),
 }
-
-
-@pytest.fixture(autouse=True)
-def plain_terminal(monkeypatch):
-    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
-        monkeypatch.delenv(name, raising=False)
-    yield
-    speak("en")
 
 
 @pytest.fixture

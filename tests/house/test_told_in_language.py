@@ -26,14 +26,6 @@ OTHERS = ("pt-BR", "es")
 ENGLISH = re.compile(r"\b(the|expected|found|missing|blank|row|sheet|with|number|is|of)\b")
 
 
-@pytest.fixture(autouse=True)
-def plain_terminal(monkeypatch):
-    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
-        monkeypatch.delenv(name, raising=False)
-    yield
-    speak("en")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("language", OTHERS)
 @pytest.mark.parametrize("kind", ["vertical", "horizontal", "sphere", "mesh"])

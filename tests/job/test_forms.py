@@ -10,7 +10,6 @@ from tankcal.batch.finding import find_jobs
 from tankcal.batch.options import Options
 from tankcal.cli import main
 from tankcal.cli.input_language import read_job_language
-from tankcal.cli.showing import speak
 from tankcal.errors import InputError
 from tankcal.job.contract import COLUMNS
 from tankcal.job.starter import write_form, write_input_workbook, write_starter
@@ -22,14 +21,6 @@ BLANKS = [
     *("tank.id", "tank.nominal_diameter_m", "tank.nominal_height_m", "survey.date"),
     *("survey.side", "datum.bottom_z_m", "table.reference_temperature_c"),
 ]
-
-
-@pytest.fixture(autouse=True)
-def plain_terminal(monkeypatch):
-    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
-        monkeypatch.delenv(name, raising=False)
-    yield
-    speak("en")
 
 
 @pytest.fixture

@@ -11,21 +11,12 @@ import pytest
 from tables_of_s1 import former_s1
 
 from tankcal.cli import main
-from tankcal.cli.showing import speak
 from tankcal.errors import InputError
 from tankcal.recalibration.history_inputs import _worst_checks, find_files, history_of_files
 from tankcal.record.history import HISTORY
 
 RECORDS = Path(__file__).parents[1] / "records" / "1"
 EXAMPLE = Path(__file__).parents[2] / "examples" / "inspection"
-
-
-@pytest.fixture(autouse=True)
-def in_english(monkeypatch):
-    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
-        monkeypatch.delenv(name, raising=False)
-    yield
-    speak("en")
 
 
 def keep(folder, date="2024-05-31", kind="cluttered", factor=1.0, **tank):
