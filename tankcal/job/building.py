@@ -80,7 +80,7 @@ def job_of(raw, log, is_whole=True):
     by_method = {}
     for method in methods_for(kind_of(raw)):  # two methods may share a table
         if method.is_given(tables):
-            readings = method.read(tables, registers)
+            readings = method.read(values, tables, registers, raw)
             attributes = by_method if method.attribute is None else surveys
             attributes[method.attribute or method.name] = readings
     return replace(job, overrulings=overrulings, surveys=by_method, **surveys)

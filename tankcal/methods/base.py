@@ -45,6 +45,8 @@ class Method:
         Value of `tankcal new --survey` that starts a job with these tables.
     starts : tuple of (str, str)
         Initial values of settings in such a job: ("survey.side", "outside").
+    starter_registers : tuple of str
+        Lists in such a job.
     needs_station_heights : bool
         Whether the field sheets have a form for the heights of the stations.
     tables_with_sds : tuple of str
@@ -78,6 +80,7 @@ class Method:
     shared_tables = ()
     starter = None
     starts = ()
+    starter_registers = ("instruments",)
     needs_station_heights = False
     tables_with_sds = ()
     is_sighted = False
@@ -94,6 +97,14 @@ class Method:
 
     def columns(self):
         """Columns of the tables: {table: tuple of `job.fields.Field`}."""
+        return {}
+
+    def settings(self):
+        """Sections of job.toml: {section: tuple of `job.fields.Field`}."""
+        return {}
+
+    def register_fields(self):
+        """Fields of an entry in lists of the method: {list: tuple of `job.fields.Field`}."""
         return {}
 
     def starter_tables(self):
@@ -151,8 +162,8 @@ class Method:
         """Approximate diameter from the readings before any calculation, m; None: unknown."""
         return
 
-    def read(self, tables, registers):
-        """Readings in SI from tables and registers without problems, for `Job.surveys`."""
+    def read(self, values, tables, registers, raw):
+        """Readings in SI from a job without problems, for `Job.surveys`; parameters as `check`."""
         raise NotImplementedError
 
     def readings_of(self, job):

@@ -25,7 +25,7 @@ class CalipersMethod(Method):
     def useless_inputs(self, tables):
         return {"diameter": "its uncertainty comes from the calipers"}
 
-    def read(self, tables, registers):
+    def read(self, values, tables, registers, raw):
         table = tables["calipers"]
         return table.numbers("diameter_m"), table.numbers("s_mm") / 1000
 

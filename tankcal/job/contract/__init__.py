@@ -48,10 +48,13 @@ COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES
 COLUMNS |= strapping.COLUMNS | lines.COLUMNS | stadia.COLUMNS
 for _method in methods():
     COLUMNS |= _method.columns()
+    REGISTER_KEYS |= _method.register_fields()
 COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
 COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
+for _method in methods():
+    _KEYS |= _method.settings()
 KEYS = {section: _KEYS[section] for section in SECTIONS}
 
 SURVEYS = ADJUSTED_SURVEYS | {
@@ -70,7 +73,7 @@ for _method in methods():
     for _kind in _method.kinds if _method.starter else ():
         _surveys = SURVEYS if _kind == "vertical" else SURVEYS_OF_KIND.setdefault(_kind, {})
         _surveys[_method.starter] = _method.starter_tables()
-        REGISTERS_OF_SURVEY.setdefault(_method.starter, ("instruments",))
+        REGISTERS_OF_SURVEY[_method.starter] = _method.starter_registers
 
 
 def tables_of_survey(kind, survey):

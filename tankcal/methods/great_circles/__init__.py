@@ -49,7 +49,7 @@ class GreatCirclesMethod(Method):
 
         return estimate_diameter_m(tables["great_circles"])
 
-    def read(self, tables, registers):
+    def read(self, values, tables, registers, raw):
         from tankcal.methods.great_circles.readings import make_great_circles
 
         return make_great_circles(tables, registers)

@@ -56,7 +56,7 @@ class HitsMethod(Method):
     def may_see_both_sides(self, tables):
         return len(set(tables["wall_hits"].of("setup"))) > 1
 
-    def read(self, tables, registers):
+    def read(self, values, tables, registers, raw):
         from tankcal.methods.hits.readings import make_hits
 
         return make_hits(tables, registers)

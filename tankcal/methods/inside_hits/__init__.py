@@ -38,7 +38,7 @@ class InsideHitsMethod(Method):
 
         check_inside_hits(values, tables, registers, raw, log)
 
-    def read(self, tables, registers):
+    def read(self, values, tables, registers, raw):
         from tankcal.methods.inside_hits.readings import make_inside_hits
 
         return make_inside_hits(tables, registers)

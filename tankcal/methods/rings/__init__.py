@@ -43,7 +43,7 @@ class RingsMethod(Method):
 
         return estimate_diameter_m(tables)
 
-    def read(self, tables, registers):
+    def read(self, values, tables, registers, raw):
         from tankcal.methods.rings.readings import make_rings
 
         return make_rings(tables)

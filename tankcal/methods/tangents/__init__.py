@@ -52,7 +52,7 @@ class TangentsMethod(Method):
 
             check_tangents(values, tables, registers, raw, log)
 
-    def read(self, tables, registers):
+    def read(self, values, tables, registers, raw):
         from tankcal.methods.tangents.readings import make_tangents
 
         return make_tangents(tables, registers)
