@@ -12,12 +12,13 @@ from draws import draws
 from tankcal.cli import main
 from tankcal.errors import InputError
 from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, follow_chain
-from tankcal.products.quantity.petroleum import Petroleum, glass_correction
 from tankcal.products.quantity.reading import read_tickets
 from tankcal.products.quantity.results import check_output, rows_of
 from tankcal.products.quantity.table import TankTable, read_table
-from tankcal.products.quantity.transfer import UNCERTAINTIES, Transfer
+from tankcal.products.quantity.transfer import Transfer
 from tankcal.tank.fittings import floating_roof
+from tankcal.tank.gauging import UNCERTAINTIES
+from tankcal.tank.volume_correction.petroleum import Petroleum, glass_correction
 
 NSV = QUANTITIES.index("nsv_m3")
 M3_PER_M = 131.0  # of the cylinder

@@ -4,11 +4,11 @@ import numpy as np
 import plain_quantity
 import pytest
 
-from tankcal.products.quantity.alcohol import Ethanol, mixture_density
-from tankcal.products.quantity.brazil import Brazil
-from tankcal.products.quantity.corrections import Constant
-from tankcal.products.quantity.gases import WATER_60F, LiquefiedGas
-from tankcal.products.quantity.petroleum import (
+from tankcal.tank.volume_correction.alcohol import Ethanol, mixture_density
+from tankcal.tank.volume_correction.brazil import Brazil
+from tankcal.tank.volume_correction.corrections import Constant
+from tankcal.tank.volume_correction.gases import WATER_60F, LiquefiedGas
+from tankcal.tank.volume_correction.petroleum import (
     KPA_PER_PSI,
     WATER_1980,
     WATER_2004,
@@ -16,7 +16,7 @@ from tankcal.products.quantity.petroleum import (
     density_of_gravity,
     glass_correction,
 )
-from tankcal.products.quantity.ranges import OutsideRangeError
+from tankcal.tank.volume_correction.ranges import OutsideRangeError
 
 
 def _celsius(fahrenheit):

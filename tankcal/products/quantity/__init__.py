@@ -1,8 +1,1 @@
-"""From a dip to the quantity of product: volumes at the base temperature, mass, and their U.
-
-petroleum    volume correction of crude oil, products and lubricating oils (ASTM D1250)
-alcohol      ethanol-water mixtures (OIML R 22)
-gases        liquefied petroleum gas (GPA TP-27)
-brazil       the tables of Brazil, Resolução CNP 6/70
-corrections  choice of one of them by name
-"""
+"""From a dip to the quantity of product: volumes at the base temperature, mass, and their U."""

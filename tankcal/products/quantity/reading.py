@@ -13,12 +13,13 @@ from tankcal.job.fields import Field
 from tankcal.job.folder import MAX_SETTINGS_BYTES, declared_marks, read_csv, read_toml
 from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import message
-from tankcal.products.quantity.alcohol import Ethanol
 from tankcal.products.quantity.chain import Gauging, Product
-from tankcal.products.quantity.corrections import CORRECTIONS
-from tankcal.products.quantity.petroleum import BASES_C, GROUPS, glass_correction
-from tankcal.products.quantity.ranges import DEGREES, OutsideRangeError
-from tankcal.products.quantity.transfer import STATES, UNCERTAINTIES, Transfer
+from tankcal.products.quantity.transfer import STATES, Transfer
+from tankcal.tank.gauging import UNCERTAINTIES
+from tankcal.tank.volume_correction.alcohol import Ethanol
+from tankcal.tank.volume_correction.corrections import CORRECTIONS
+from tankcal.tank.volume_correction.petroleum import BASES_C, GROUPS, glass_correction
+from tankcal.tank.volume_correction.ranges import DEGREES, OutsideRangeError
 
 MOST_TICKETS = 100_000
 GLASS = {"glass 15C": "15C", "glass 20C": "20C", "glass 60F": "60F"}

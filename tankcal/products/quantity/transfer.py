@@ -13,32 +13,10 @@ import numpy as np
 from tankcal.gum.coverage import coverage_factor, dof_of
 from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product, Steps, follow_chain
 from tankcal.products.quantity.table import TankTable
+from tankcal.tank.gauging import VCF_AT_K, VCF_PERCENT
 
 STEP = 1e-30  # of complex steps; far below rounding, so that derivatives are exact
 STATES = ("opening", "closing")
-
-
-# {name: standard uncertainty if the ticket does not declare it}; None: by the rule below. Values
-# with "memory" are from memory: practice of manual gauging, class II tapes, ISO 4268 thermometers,
-# reproducibility of hydrometers and of the centrifuge. None of these texts was read. "assumed": our
-# own choice.
-UNCERTAINTIES = {
-    "u_dip_mm": 1.0,  # memory
-    "u_tape_ppm": 115.0,  # memory
-    "u_water_dip_mm": 1.5,  # assumed
-    "u_temperature_k": 0.25,  # assumed
-    "u_thermometer_k": 0.15,  # memory
-    "u_ambient_k": 3.0,  # assumed
-    "u_density_kg_m3": 0.5,  # memory
-    "u_sw_percent": 0.1,  # memory
-    "u_vcf_percent": None,  # memory
-    "u_expansion_per_k": 1e-6,  # assumed
-}
-# Expanded uncertainty (95 %) of the volume correction at temperatures, percent of the volume; from
-# memory of the 1980 edition, for 60 degF. Below the first point it grows in proportion to the
-# distance from the base, which is our own rule.
-_VCF_AT_K = np.array([0.0, 22.2, 50.0, 77.8, 105.6])
-_VCF_PERCENT = np.array([0.0, 0.05, 0.15, 0.25, 0.35])
 
 
 @dataclass(frozen=True)
@@ -142,9 +120,9 @@ class Transfer:
             return self.u["u_vcf_percent"] / 100
         distance = np.abs(temperature_c - self.product.correction.base_c)
         # Beyond the last point the last slope goes on, so that U does not stop growing.
-        beyond = np.maximum(distance - _VCF_AT_K[-1], 0.0)
-        slope = (_VCF_PERCENT[-1] - _VCF_PERCENT[-2]) / (_VCF_AT_K[-1] - _VCF_AT_K[-2])
-        percent = np.interp(distance, _VCF_AT_K, _VCF_PERCENT) + slope * beyond
+        beyond = np.maximum(distance - VCF_AT_K[-1], 0.0)
+        slope = (VCF_PERCENT[-1] - VCF_PERCENT[-2]) / (VCF_AT_K[-1] - VCF_AT_K[-2])
+        percent = np.interp(distance, VCF_AT_K, VCF_PERCENT) + slope * beyond
         # The model error has the sign of the distance from the base.
         return np.sign(temperature_c - self.product.correction.base_c) * percent / 100 / 1.96
 

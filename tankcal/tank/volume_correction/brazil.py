@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.products.quantity.petroleum import glass_correction
-from tankcal.products.quantity.ranges import (
+from tankcal.tank.volume_correction.petroleum import glass_correction
+from tankcal.tank.volume_correction.ranges import (
     OutsideRangeError,
     refuse_not_converged,
     refuse_outside,
@@ -28,7 +28,7 @@ LOWEST_C, HIGHEST_C = 0.0, 60.0  # temperatures of the check values, with a marg
 THREE_DECIMALS_TO, FOUR_DECIMALS_FROM = 0.626, 0.742
 
 # Highest density at 20 degC of each class, g/cm3, and a1, a2, b1, b2 of the fit.
-_CLASSES = np.array(
+CLASSES = np.array(
     [
         (0.498, -0.002462, 0.003215, -1.014e-5, 1.738e-5),
         (0.518, -0.002391, 0.003074, -8.41e-6, 1.398e-5),
@@ -136,7 +136,7 @@ class Brazil:
         base, bound = observed + 0.0 * observed, None
         for rounds in range(MOST_ROUNDS):
             before = base
-            p1, p2, p3, p4 = _coefficients(before if bound is None else bound)
+            p1, p2, p3, p4 = coefficients_of_class(before if bound is None else bound)
             base = glass * (observed - p1 * step - p3 * step**2) / (1 + p2 * step + p4 * step**2)
             if rounds == ROUNDS_OF_CLASSES:
                 bound = np.real(base)
@@ -149,7 +149,7 @@ class Brazil:
 
     def _fit(self, relative, temperature_c):
         """FCV = 1 + p2 x + p4 x^2 + (p1 x + p3 x^2) / D20, x = t - 20 degC."""
-        p1, p2, p3, p4 = _coefficients(relative)
+        p1, p2, p3, p4 = coefficients_of_class(relative)
         step = temperature_c - BASE_C
         return 1 + p2 * step + p4 * step**2 + (p1 * step + p3 * step**2) / relative
 
@@ -159,9 +159,9 @@ class Brazil:
         refuse_outside("pressure_kpa", pressure_kpa, 0.0, 0.0, "kPa", self.name)
 
 
-def _coefficients(relative):
+def coefficients_of_class(relative):
     """p1 to p4 of the class of a density at 20 degC, g/cm3."""
-    a1, a2, b1, b2 = _CLASSES[np.searchsorted(_CLASSES[:, 0], np.real(relative))].T[1:]
+    a1, a2, b1, b2 = CLASSES[np.searchsorted(CLASSES[:, 0], np.real(relative))].T[1:]
     q = 1 + 8 * a2 + 64 * b2
     # 9/5 and 81/25 convert the steps of the fit, in degF, to degC.
     p1 = 9 / 5 * WATER * (a1 + 16 * b1 - (8 * a1 + 64 * b1) * (a2 + 16 * b2) / q)

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 from tankcal.messages import message
-from tankcal.products.quantity.alcohol import Ethanol
-from tankcal.products.quantity.brazil import Brazil
-from tankcal.products.quantity.gases import LiquefiedGas
-from tankcal.products.quantity.petroleum import BASES_C, Petroleum
-from tankcal.products.quantity.ranges import refuse_outside
+from tankcal.tank.volume_correction.alcohol import Ethanol
+from tankcal.tank.volume_correction.brazil import Brazil
+from tankcal.tank.volume_correction.gases import LiquefiedGas
+from tankcal.tank.volume_correction.petroleum import BASES_C, Petroleum
+from tankcal.tank.volume_correction.ranges import refuse_outside
 
 LEAST_C, MOST_C = -60.0, 200.0  # temperatures taken with a constant coefficient
 

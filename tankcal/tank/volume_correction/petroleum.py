@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.products.quantity.ranges import refuse_not_converged, refuse_outside
+from tankcal.tank.volume_correction.ranges import refuse_not_converged, refuse_outside
 
 EDITIONS, GROUPS = (1980, 2004), ("crude", "products", "lubricants")
 BASES_C = {"15C": 15.0, "20C": 20.0, "60F": (60.0 - 32.0) / 1.8}
@@ -53,7 +53,7 @@ def density_of_gravity(api, water=WATER_1980):
 # Ranges of the density at the base, kg/m3, and coefficients K0, K1, K2 of the expansion
 # a = K0 / rho^2 + K1 / rho + K2, per degree of the base. A product between two groups belongs to
 # the group whose bound is nearer; the bounds of 1980 are half a step of the tables, 0.25 kg/m3.
-_GROUPS_15C = {
+GROUPS_15C = {
     "crude": (610.5, (1075.0, 613.9723, 0.0, 0.0)),
     "products": (
         653.0,
@@ -64,7 +64,7 @@ _GROUPS_15C = {
     ),
     "lubricants": (800.0, (1164.0, 0.0, 0.6278, 0.0)),
 }
-_GROUPS_60F = {
+GROUPS_60F = {
     "crude": (density_of_gravity(100.0), (density_of_gravity(0.0), 341.0957, 0.0, 0.0)),
     "products": (
         density_of_gravity(85.0),
@@ -75,7 +75,7 @@ _GROUPS_60F = {
     ),
     "lubricants": (800.0, (1164.0, 0.0, 0.34878, 0.0)),
 }
-_GROUPS_2004 = {
+GROUPS_2004 = {
     "crude": (610.6, (1163.5, 341.0957, 0.0, 0.0)),
     "products": (
         610.6,
@@ -91,18 +91,18 @@ _GROUP_NAMES = {
     "products": message("group_products", "products"),
     "lubricants": message("group_lubricants", "lubricants"),
 }
-_ALPHA_1980_PER_F, _ALPHA_2004_PER_F = (270e-6, 930e-6), (230e-6, 930e-6)
+ALPHA_1980_PER_F, ALPHA_2004_PER_F = (270e-6, 930e-6), (230e-6, 930e-6)
 
 # Temperatures of the 1980 tables: lowest, and highest for light, middle and heavy products, degF,
 # with the gravities between them. From memory, not read in the tables.
-_LOWEST_F, _HIGHEST_F = 0.0, (200.0, 250.0, 300.0)
-_LIGHT_KG_M3, _MIDDLE_KG_M3 = density_of_gravity(50.0), density_of_gravity(40.0)
-_LIMITS_2004_C, _MOST_PSI = (-50.0, 150.0), 1500.0
+LOWEST_F, HIGHEST_F = 0.0, (200.0, 250.0, 300.0)
+LIGHT_KG_M3, MIDDLE_KG_M3 = density_of_gravity(50.0), density_of_gravity(40.0)
+LIMITS_2004_C, _MOST_PSI = (-50.0, 150.0), 1500.0
 
 # 2004: polynomial of the difference between the scales ITS-90 and IPTS-68, and the temperature
 # 60 degF (ITS-90) in IPTS-68.
-_SCALES = (-0.148759, -0.267408, 1.080760, 1.269056, -4.089591, -1.871251, 7.438081, -3.536296)
-_DELTA_60, _ZERO_68_F = 0.01374979547, 60.0068749
+SCALES = (-0.148759, -0.267408, 1.080760, 1.269056, -4.089591, -1.871251, 7.438081, -3.536296)
+DELTA_60, ZERO_68_F = 0.01374979547, 60.0068749
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ class Petroleum:
         if self.group is None:
             alpha = self.alpha_per_k / (1.8 if is_fahrenheit else 1.0)
         else:
-            groups = _GROUPS_60F if is_fahrenheit else _GROUPS_15C
+            groups = GROUPS_60F if is_fahrenheit else GROUPS_15C
             alpha, _ = _expansion(groups[self.group], density, bound)
         # VCF = exp(-a dt (1 + 0.8 a dt)).
         return np.exp(-alpha * step * (1 + 0.8 * alpha * step))
@@ -235,22 +235,22 @@ class Petroleum:
         # Step 1: ITS-90 to IPTS-68, the scale of the measurements behind the constants.
         tau = temperature_c / 630.0
         shift = 0.0
-        for coefficient in reversed(_SCALES):
+        for coefficient in reversed(SCALES):
             shift = tau * (coefficient + shift)
         scaled = 1.8 * (temperature_c - shift) + 32.0
         # Steps 2 and 3: alpha at the density of 60 degF on that scale.
         if self.group is None:
             alpha = self.alpha_per_k / 1.8
-            shifted = density * np.exp(0.5 * alpha * _DELTA_60 * (1 + 0.4 * alpha * _DELTA_60))
+            shifted = density * np.exp(0.5 * alpha * DELTA_60 * (1 + 0.4 * alpha * DELTA_60))
         else:
-            alpha, (k0, k1, k2) = _expansion(_GROUPS_2004[self.group], density, bound)
-            a = _DELTA_60 / 2 * alpha
+            alpha, (k0, k1, k2) = _expansion(GROUPS_2004[self.group], density, bound)
+            a = DELTA_60 / 2 * alpha
             b = (2 * k0 + k1 * density) / (k0 + (k1 + k2 * density) * density)
             shifted = density * (1 + np.expm1(a * (1 + 0.8 * a)) / (1 + a * (1 + 1.6 * a) * b))
             alpha = (k0 / shifted + k1) / shifted + k2
         # Step 4: CTL.
-        step = scaled - _ZERO_68_F
-        ctl = np.exp(-alpha * step * (1 + 0.8 * alpha * (step + _DELTA_60)))
+        step = scaled - ZERO_68_F
+        ctl = np.exp(-alpha * step * (1 + 0.8 * alpha * (step + DELTA_60)))
         # Step 5: compressibility F, 1e-5 per psi, and CPL.
         compressibility = np.exp(
             -1.9947 + 0.00013427 * scaled + (793920.0 + 2326.0 * scaled) / shifted**2
@@ -278,19 +278,19 @@ class Petroleum:
     def _refuse_outside(self, density, temperature_c, pressure_kpa):
         if self.edition == 1980:
             high = np.select(
-                [np.real(density) < _LIGHT_KG_M3, np.real(density) < _MIDDLE_KG_M3],
-                _HIGHEST_F[:2],
-                _HIGHEST_F[2],
+                [np.real(density) < LIGHT_KG_M3, np.real(density) < MIDDLE_KG_M3],
+                HIGHEST_F[:2],
+                HIGHEST_F[2],
             )
-            limits = (_LOWEST_F - 32) / 1.8, (high - 32) / 1.8
-            groups = _GROUPS_60F if self.base == "60F" else _GROUPS_15C
+            limits = (LOWEST_F - 32) / 1.8, (high - 32) / 1.8
+            groups = GROUPS_60F if self.base == "60F" else GROUPS_15C
             most_kpa = 0.0
         else:
-            limits, groups, most_kpa = _LIMITS_2004_C, _GROUPS_2004, _MOST_PSI * KPA_PER_PSI
+            limits, groups, most_kpa = LIMITS_2004_C, GROUPS_2004, _MOST_PSI * KPA_PER_PSI
         refuse_outside("temperature_c", temperature_c, *limits, "degC", self.name)
         refuse_outside("pressure_kpa", pressure_kpa, 0.0, most_kpa, "kPa", self.name)
         if self.group is None:
-            per_f = _ALPHA_1980_PER_F if self.edition == 1980 else _ALPHA_2004_PER_F
+            per_f = ALPHA_1980_PER_F if self.edition == 1980 else ALPHA_2004_PER_F
             low, high = (1.8 * limit for limit in per_f)
             refuse_outside("alpha_per_k", self.alpha_per_k, low, high, "1/K", self.name)
             return

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.products.quantity.ranges import refuse_not_converged, refuse_outside
+from tankcal.tank.volume_correction.ranges import refuse_not_converged, refuse_outside
 
 WATER_60F = 999.016  # kg/m3, of the relative density 60/60
 BASE_C, BASE_K = (60.0 - 32.0) / 1.8, 519.67 / 1.8

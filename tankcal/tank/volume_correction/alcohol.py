@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.messages import message
-from tankcal.products.quantity.ranges import refuse_outside
+from tankcal.tank.volume_correction.ranges import refuse_outside
 
 BASE_C = 20.0
 LOWEST_C, HIGHEST_C = -20.0, 40.0  # range of the equation

@@ -1,0 +1,25 @@
+"""Assumed uncertainties of a gauging, for tickets that do not declare their own."""
+
+import numpy as np
+
+# {name: standard uncertainty if the ticket does not declare it}; None: by the rule below. Values
+# with "memory" are from memory: practice of manual gauging, class II tapes, ISO 4268 thermometers,
+# reproducibility of hydrometers and of the centrifuge. None of these texts was read. "assumed": our
+# own choice.
+UNCERTAINTIES = {
+    "u_dip_mm": 1.0,  # memory
+    "u_tape_ppm": 115.0,  # memory
+    "u_water_dip_mm": 1.5,  # assumed
+    "u_temperature_k": 0.25,  # assumed
+    "u_thermometer_k": 0.15,  # memory
+    "u_ambient_k": 3.0,  # assumed
+    "u_density_kg_m3": 0.5,  # memory
+    "u_sw_percent": 0.1,  # memory
+    "u_vcf_percent": None,  # memory
+    "u_expansion_per_k": 1e-6,  # assumed
+}
+# Expanded uncertainty (95 %) of the volume correction at temperatures, percent of the volume; from
+# memory of the 1980 edition, for 60 degF. Below the first point it grows in proportion to the
+# distance from the base, which is our own rule.
+VCF_AT_K = np.array([0.0, 22.2, 50.0, 77.8, 105.6])
+VCF_PERCENT = np.array([0.0, 0.05, 0.15, 0.25, 0.35])
