@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 from background import heed_ctrl_c
@@ -60,8 +61,9 @@ def site(tmp_path_factory):
 def helpers():
     """The environment in which workers find what they do in these tests."""
     before = os.environ.get("PYTHONPATH")
-    tests = os.path.dirname(os.path.dirname(__file__))
-    os.environ["PYTHONPATH"] = os.pathsep.join([tests, *([before] if before else [])])
+    tests = Path(__file__).parents[1]
+    paths = [str(tests), str(tests / "support"), *([before] if before else [])]
+    os.environ["PYTHONPATH"] = os.pathsep.join(paths)
     yield
     os.environ.pop("PYTHONPATH")
     if before:

@@ -49,7 +49,8 @@ print(sum(len(one.cache_hits) for one in stats), sum(len(one.cache_misses) for o
 def test_an_installation_that_may_not_be_written_to_compiles_nothing(tmp_path):
     copy = tmp_path / "tankcal"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    paths = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[1])])
+    tests = Path(__file__).parents[1]
+    paths = os.pathsep.join(map(str, (tmp_path, tests, tests / "support")))
     env = os.environ | {"PYTHONPATH": paths, "TANKCAL_COMPILED": "1"}
     env.pop("NUMBA_CACHE_DIR", None)
     subprocess.run([sys.executable, "-m", "tankcal.cli.kernels"], env=env, cwd=tmp_path, check=True)

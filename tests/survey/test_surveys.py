@@ -318,6 +318,7 @@ def test_a_posteriori_scale_is_that_of_sigma0(photos, adjustment):
     assert found.full_covariance_m2(["P3"]) == pytest.approx(
         found.covariance_m2[found.names.index("P3")], rel=1e-6
     )
+    assert found.full_covariance_m2([]).shape == (0, 0)  # no target of a scan was surveyed
     assert found.causes[0].column_m == pytest.approx(
         adjustment.sigma0 * adjustment.causes[0].column_m
     )

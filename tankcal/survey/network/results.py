@@ -183,7 +183,9 @@ class Adjusted:
     def covariance_m2(self, points=None):
         """Covariance (3k, 3k) of points by number, of all when None; 0 for fixed coordinates."""
         columns = self.problem.layout.points
-        return self._cofactors((columns if points is None else columns[np.asarray(points)]).ravel())
+        return self._cofactors(
+            (columns if points is None else columns[np.asarray(points, int)]).ravel()
+        )
 
     def joint_covariance(self, points, **nuisances):
         """Covariance of points and of shared unknowns; 0 for fixed ones.

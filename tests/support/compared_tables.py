@@ -4,7 +4,9 @@ import copy
 import json
 from pathlib import Path
 
-SAVED = json.loads((Path(__file__).parent / "recalibration" / "comparison.json").read_text("utf-8"))
+SAVED = json.loads(
+    (Path(__file__).parents[1] / "recalibration" / "comparison.json").read_text("utf-8")
+)
 HOSTILE = '=HYPERLINK("http://x.example","y") <script>alert(1)</script>'
 NAME = f"{HOSTILE} {'very_long_name_of_a_file_' * 4}.csv"
 OF_E_N = ("c", "worst_E_n", "worst_E_n_at_half", "c_limit", "coverage_k")

@@ -1,6 +1,6 @@
 """Pages whose commands are run in an empty folder, what they print held against the page.
 
-    python tests/page_sessions.py docs/tutorial-es.md    writes anew what the commands print
+    python tests/support/page_sessions.py docs/tutorial-es.md    writes anew what the commands print
 
 A line that ends in **`path`**: names the file that the next block is; where it begins with words
 of APPEND the block goes to the end of that file. A block `console` has commands behind `$ ` and
@@ -17,7 +17,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"^(?P<words>.*)\*\*`(?P<path>[^`]+)`\*\*:\n\n$", re.MULTILINE)
 APPEND = ("No fim de", "Al final de", "At the end of")

@@ -11,7 +11,7 @@ import numpy as np
 from tankcal.record import migrated, save
 from tankcal.tank.dips import interpolation_errors
 
-_KEPT = Path(__file__).with_name("records") / "1" / "cluttered.json.gz"
+_KEPT = Path(__file__).parents[1] / "records" / "1" / "cluttered.json.gz"
 
 
 @cache
