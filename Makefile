@@ -37,12 +37,13 @@ test-rest: $(VENV)/full ## what make test leaves out, in one run that shares its
 study-full: export TANKCAL_STUDIES := full
 study-full: study ## the same with as many draws as the figures in docs/ were measured with (an hour)
 
-check: $(VENV)/full ## style, layers, words and names to avoid, notebooks without outputs
+check: $(VENV)/full ## style, layers, words and names to avoid, structure, notebooks without outputs
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
 	$(BIN)/python notebooks/stripped.py notebooks report_templates
 	$(BIN)/python tests/house/prose_counts.py
+	$(BIN)/python tests/house/structure_counts.py
 
 format: $(VENV)/full ## bring the code to the house style
 	$(BIN)/ruff format .

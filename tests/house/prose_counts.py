@@ -114,6 +114,22 @@ def list_files():
     return sorted(pages) + sorted((ROOT / "tankcal").rglob("*.py"))
 
 
+def compare_with_limits(counts, path, is_lowering, remedy):
+    """Print counts above their limits in a TOML file; 1 if there are any, else 0.
+
+    With is_lowering, and no count above its limit, the counts become the limits.
+    """
+    limits = tomllib.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    above = {name: n for name, n in counts.items() if n > limits.get(name, sys.maxsize)}
+    for name, count in sorted(above.items()):
+        print(f"{name}: {count}, limit {limits[name]}; {remedy} (CONTRIBUTING.md)")
+    if is_lowering and not above:
+        lines = [f'"{name}" = {count}\n' for name, count in sorted(counts.items())]
+        heading = "# Written with --lower by the script of this name: counts may only fall\n"
+        path.write_text(heading + "".join(lines), encoding="utf-8")
+    return 1 if above else 0
+
+
 def main(arguments=None):
     """Compare with the limits; exit status 1 if a count is above its limit."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -130,15 +146,7 @@ def main(arguments=None):
     counts = Counter()
     for file_counts in by_file.values():
         counts.update(file_counts)  # unlike +, keeps the words that are no longer used
-    limits = tomllib.loads(LIMITS.read_text(encoding="utf-8")) if LIMITS.exists() else {}
-    above = {name: n for name, n in counts.items() if n > limits.get(name, sys.maxsize)}
-    for name, count in sorted(above.items()):
-        print(f"{name}: {count}, limit {limits[name]}; write it in other words (CONTRIBUTING.md)")
-    if options.lower and not above:
-        lines = [f'"{name}" = {count}\n' for name, count in sorted(counts.items())]
-        heading = "# Written by prose_counts.py --lower: a count may fall, never rise\n"
-        LIMITS.write_text(heading + "".join(lines), encoding="utf-8")
-    return 1 if above else 0
+    return compare_with_limits(counts, LIMITS, options.lower, "write it in other words")
 
 
 if __name__ == "__main__":
