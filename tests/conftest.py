@@ -16,9 +16,9 @@ from hypothesis import settings
 
 import tankcal
 from tankcal.cli import main
-from tankcal.cli.showing import speak
 from tankcal.pipeline.chain import adjust_job
 from tankcal.record import record_of, record_of_adjustment, save
+from tankcal.terminal.showing import speak
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLE = ROOT / "examples" / "silva-1995"

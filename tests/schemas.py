@@ -6,45 +6,10 @@ make schemas   writes both, from the dataclasses
 import json
 from pathlib import Path
 
-from tankcal.record.camera_influence import InfluenceFile
-from tankcal.record.camera_parameters import ParametersFile
-from tankcal.record.camera_product import ProductFile
-from tankcal.record.camera_stability import StabilityFile
-from tankcal.record.camera_versions import CAMERA
-from tankcal.record.comparison import COMPARISON, ComparisonFile
-from tankcal.record.history import HISTORY, HistoryFile
-from tankcal.record.inspection import INSPECTION, InspectionFile
-from tankcal.record.intercomparison import (
-    ANSWERS,
-    PACKAGE,
-    SCORES,
-    TRUTH,
-    AnswersFile,
-    PackageFile,
-    ScoresFile,
-    TruthFile,
-)
-from tankcal.record.making import Record
-from tankcal.record.plan import PLAN, WALL_PLAN, PlanFile, WallPlanFile
+from tankcal.products.base import products
 from tankcal.record.schema import json_schema
-from tankcal.record.versions import RECORD
 
-SAVED = (
-    (RECORD, None, Record),
-    (CAMERA, "stability", StabilityFile),
-    (CAMERA, "parameters", ParametersFile),
-    (CAMERA, "influence", InfluenceFile),
-    (CAMERA, "product", ProductFile),
-    (PLAN, None, PlanFile),
-    (WALL_PLAN, None, WallPlanFile),
-    (COMPARISON, None, ComparisonFile),
-    (INSPECTION, None, InspectionFile),
-    (HISTORY, None, HistoryFile),
-    (PACKAGE, None, PackageFile),
-    (TRUTH, None, TruthFile),
-    (ANSWERS, None, AnswersFile),
-    (SCORES, None, ScoresFile),
-)
+SAVED = tuple(saved for product in products() for saved in product.saved_types())
 
 
 def schema_text(saved_format, kind, cls):

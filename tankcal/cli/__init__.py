@@ -8,33 +8,22 @@ import argparse
 import os
 import sys
 from contextlib import contextmanager
+from importlib import import_module
 
 import tankcal
-from tankcal.cli import (
-    batching,
-    camera,
-    comparing,
-    completing,
-    exporting,
-    history,
-    importing,
-    inspecting,
-    intercomparison,
-    linting,
-    pages,
-    planning,
-    reporting,
-    running,
-    starting,
-    table_reading,
-    ticketing,
-    verifying,
-    workbench,
-)
-from tankcal.cli.showing import complain, failure, print_json, say_in_language, speak, words_of_run
-from tankcal.cli.stopping import is_out_of_memory, raise_at_signals, signal_status
 from tankcal.errors import Problem, TankcalError, reason_of
 from tankcal.messages import message, printable_lines
+from tankcal.products.base import find_module, products, refusals
+from tankcal.terminal.showing import (
+    complain,
+    failure,
+    language_of_run,
+    print_json,
+    say_in_language,
+    speak,
+    words_of_run,
+)
+from tankcal.terminal.stopping import is_out_of_memory, raise_at_signals, signal_status
 
 DESCRIPTION = """\
 tankcal calibrates storage tanks: from a survey of the wall to the capacity table with
@@ -133,13 +122,35 @@ def _print_in_any_encoding():
 
 def _options(arguments):
     """Return the parsed arguments; names after options are also names."""
-    parser = _parser()
+    arguments = sys.argv[1:] if arguments is None else arguments
+    parser = _parser_of(arguments[0] if arguments else None)
     options, rest = parser.parse_known_args(arguments)
     if rest and (not hasattr(options, "names") or any(word.startswith("-") for word in rest)):
         parser.error(argparse._("unrecognized arguments: %s") % " ".join(rest))
     if rest:
         options.names = [*options.names, *rest]
     return options
+
+
+def _parser_of(command):
+    """Return the parser of a command of tankcal alone; of all commands for any other word."""
+    module = find_module(command)
+    if module is None:
+        for name, reason in refusals().items():
+            complain(
+                message(
+                    "product_rejected",
+                    "the product {name} of another package is not available: {reason}",
+                    name=name,
+                    reason=reason,
+                )
+            )
+        return _parser()
+    parser, commands = _empty_parser()
+    import_module(module).add(commands)
+    if words_of_run():
+        translate_parser(parser, words_of_run()["help"])
+    return parser
 
 
 class _Parser(argparse.ArgumentParser):
@@ -179,6 +190,15 @@ def _parser():
 
 def _parser_in_english():
     """Return (the complete parser, a function that translates it to the current language)."""
+    parser, commands = _empty_parser()
+    modules = (module for product in products() for _, module in product.commands)
+    for module in dict.fromkeys(modules):  # a module may have several commands
+        import_module(module).add(commands)
+    return parser, _translate
+
+
+def _empty_parser():
+    """Return (parser without commands, its subparsers), in English."""
     parser = _Parser(
         prog="tankcal",
         description=DESCRIPTION,
@@ -188,28 +208,27 @@ def _parser_in_english():
     parser.add_argument("--version", action=_Version, nargs=0, default=argparse.SUPPRESS,
                         help="show program's version number and exit")  # fmt: skip
     parser.set_defaults(command=None, shown=parser)
-    commands = parser.add_subparsers(metavar="COMMAND")
-
-    main_job = (running, batching, reporting, starting, workbench, importing, planning)
-    tables = (linting, table_reading, comparing, history, exporting, inspecting, verifying)
-    quantity = (ticketing,)
-    for room in (*main_job, *tables, *quantity, camera, intercomparison):
-        room.add(commands)
-    pages.add(commands)
-    completing.add(commands, _parser_in_english)
-    return parser, _translate
+    return parser, parser.add_subparsers(metavar="COMMAND")
 
 
 def _translate(parser):
-    """Translate a parser to the current language."""
-    if words_of_run():
-        translate_parser(parser, words_of_run())
+    """Translate a parser to the current language; its commands may be of other distributions."""
+    if not words_of_run():
+        return
+    known = dict(words_of_run()["help"])
+    for product in products():
+        texts = dict(product.help_words(language_of_run()))
+        known["metavars"] = known["metavars"] | texts.pop("metavars", {})
+        known |= texts
+    translate_parser(parser, known)
 
 
-def translate_parser(parser, words):
-    """Replace the texts of a parser and of its commands by the texts of [help]."""
-    known = words["help"]
-    texts = known[_name(parser)]
+def translate_parser(parser, known):
+    """Replace the texts of a parser and of its commands by the texts of [help].
+
+    A text without translation remains: a product of another distribution may have none.
+    """
+    texts = known.get(_name(parser), {})
     parser.description = texts.get("about", parser.description)
     parser.epilog = texts.get("ending", parser.epilog)
     for action in parser._actions:
@@ -218,9 +237,9 @@ def translate_parser(parser, words):
         if isinstance(action, argparse._SubParsersAction):
             _put_in_list(action, known)
             for command_parser in action.choices.values():
-                translate_parser(command_parser, words)
+                translate_parser(command_parser, known)
         elif action.help is not None and action.dest != "help":
-            action.help = texts.get(action.dest) or known["shared"][action.dest]
+            action.help = texts.get(action.dest) or known["shared"].get(action.dest, action.help)
 
 
 @contextmanager
@@ -247,7 +266,7 @@ def _put_in_list(action, known):
     """Replace the one-line help of each command in a list."""
     names = {name: _name(command_parser) for name, command_parser in action.choices.items()}
     for line in action._choices_actions:
-        line.help = known[names[line.dest]]["line"]
+        line.help = known.get(names[line.dest], {}).get("line", line.help)
 
 
 def _name(parser):

@@ -4,9 +4,15 @@ import shlex
 import sys
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, parse_worker_memory, parse_workers
-from tankcal.cli.reporting import add_letterhead
-from tankcal.cli.showing import (
+from tankcal.errors import TankcalError, problem_from
+from tankcal.messages import message
+from tankcal.terminal.arguments import (
+    add_language,
+    add_letterhead,
+    parse_worker_memory,
+    parse_workers,
+)
+from tankcal.terminal.showing import (
     Progress,
     add_json,
     complain,
@@ -17,9 +23,7 @@ from tankcal.cli.showing import (
     say,
     speak,
 )
-from tankcal.cli.stopping import signal_status
-from tankcal.errors import TankcalError, problem_from
-from tankcal.messages import message
+from tankcal.terminal.stopping import signal_status
 
 GIGABYTE = 1 << 30
 

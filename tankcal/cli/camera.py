@@ -1,14 +1,14 @@
 """`tankcal camera`: parameters, calibrations, targets and file formats of cameras."""
 
 from tankcal.cli import camera_runs as runs
-from tankcal.cli.arguments import (
+from tankcal.messages import message
+from tankcal.terminal.arguments import (
     add_language,
     parse_count,
     parse_positive,
     parse_share,
     refuse_argument,
 )
-from tankcal.messages import message
 
 
 def add(commands):

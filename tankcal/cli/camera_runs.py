@@ -5,7 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import tankcal
-from tankcal.cli.showing import (
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message, printable
+from tankcal.terminal.showing import (
     Progress,
     language_of_run,
     prepare_for_small_work,
@@ -14,8 +16,6 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
-from tankcal.errors import InputError, Problem
-from tankcal.messages import message, printable
 
 HEAD_BYTES = 200  # start of a file that identifies a record
 
@@ -331,7 +331,7 @@ def _start(options):
 
 def _load_job(source, show, language):
     """Return the job, with its tank if it has one."""
-    from tankcal.cli.input_language import read_job_language
+    from tankcal.terminal.input_language import read_job_language
 
     language = language or read_job_language(source)
     if language is not None:

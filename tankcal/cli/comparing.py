@@ -1,7 +1,8 @@
 """`tankcal compare`: comparison of a former and a new table of one tank."""
 
-from tankcal.cli.arguments import add_language
-from tankcal.cli.showing import (
+from tankcal.messages import message
+from tankcal.terminal.arguments import add_language
+from tankcal.terminal.showing import (
     Progress,
     add_json,
     language_of_run,
@@ -12,7 +13,6 @@ from tankcal.cli.showing import (
     speak_of_record,
     warn,
 )
-from tankcal.messages import message
 from tankcal.text.digits import fixed
 
 MOST_WARNINGS = 10  # that are shown

@@ -22,11 +22,8 @@ for good:
   fish  tankcal completion fish > ~/.config/fish/completions/tankcal.fish"""
 
 
-def add(commands, make_parser):
-    """Add the parser of `tankcal completion`.
-
-    make_parser  returns (the complete parser in English, a function that translates it)
-    """
+def add(commands):
+    """Add the parser of `tankcal completion`."""
     parser = commands.add_parser(
         "completion",
         help="write the script for command completion in a shell",
@@ -36,9 +33,13 @@ def add(commands, make_parser):
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
-    parser.set_defaults(
-        command=lambda options: print(completion_script(options.shell, make_parser))
-    )
+    parser.set_defaults(command=_complete)
+
+
+def _complete(options):
+    from tankcal.cli import _parser_in_english
+
+    print(completion_script(options.shell, _parser_in_english))
 
 
 def completion_script(shell, make_parser):
@@ -62,28 +63,12 @@ def completion_script(shell, make_parser):
 
 def shipped_choices():
     """Return {(command, option or argument): (names, whether a TOML file is also valid)}."""
-    from tankcal.camera.formats.writing import KINDS
-    from tankcal.cli.pages import page_names
-    from tankcal.exports.profiles import shipped_profiles
-    from tankcal.inspection import rules
-    from tankcal.job import rule_files
-    from tankcal.text.languages import LANGUAGES
+    from tankcal.products.base import products
 
-    profiles = tuple(shipped_profiles())
-    inspection_rules, comparison_rules = rules.shipped_names(), rule_files.shipped_names()
-    return {
-        ("export", "--profile"): (profiles, True),
-        ("inspect", "--rule"): (inspection_rules, True),
-        ("compare", "--rule"): (comparison_rules, True),
-        ("batch", "--profile"): (profiles, True),
-        ("batch", "--inspect-by"): (inspection_rules, True),
-        ("batch", "--compare-by"): (comparison_rules, True),
-        ("report", "--language"): (LANGUAGES, False),
-        ("docs", "page"): (page_names(), False),
-        ("run", "--cluster"): (("auto", "local"), False),
-        ("camera convert", "--to"): (KINDS, False),
-        ("camera convert", "--from"): (KINDS, False),
-    }
+    choices = {}
+    for product in products():
+        choices |= product.completions()
+    return choices
 
 
 def _set_completions(parser, choices):

@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, parse_positive, parse_several
-from tankcal.cli.showing import (
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message, printable
+from tankcal.terminal.arguments import add_language, parse_positive, parse_several
+from tankcal.terminal.showing import (
     add_json,
     language_of_run,
     prepare_for_small_work,
@@ -12,8 +14,6 @@ from tankcal.cli.showing import (
     speak,
     speak_of_record,
 )
-from tankcal.errors import InputError, Problem
-from tankcal.messages import message, printable
 
 
 def add(commands):

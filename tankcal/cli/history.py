@@ -1,7 +1,8 @@
 """`tankcal history`: tables of one tank over the years."""
 
-from tankcal.cli.arguments import add_language, parse_dips
-from tankcal.cli.showing import (
+from tankcal.messages import message
+from tankcal.terminal.arguments import add_language, parse_dips
+from tankcal.terminal.showing import (
     Progress,
     add_json,
     language_of_run,
@@ -12,7 +13,6 @@ from tankcal.cli.showing import (
     speak_of_record,
     warn,
 )
-from tankcal.messages import message
 from tankcal.text.digits import NOTHING, decimals_of_height, fixed
 
 MOST_SHOWN = 20  # warnings, and files that are left out

@@ -6,8 +6,11 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, parse_positive, refuse_argument
-from tankcal.cli.showing import (
+from tankcal.errors import InputError, Problem, problem_of
+from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE
+from tankcal.messages import message, printable
+from tankcal.terminal.arguments import add_language, parse_positive, refuse_argument
+from tankcal.terminal.showing import (
     add_json,
     complain,
     prepare_for_small_work,
@@ -17,9 +20,6 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
-from tankcal.errors import InputError, Problem, problem_of
-from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE
-from tankcal.messages import message, printable
 
 LISTS = (".csv", ".txt", ".tsv")
 NO = ("n", "no", "nao", "não")
@@ -136,7 +136,7 @@ def _time(text):
 
 def _import(options):
     prepare_for_small_work()
-    from tankcal.cli.input_language import read_job_language
+    from tankcal.terminal.input_language import read_job_language
 
     options.out = options.out or _folder_here()
     folder = Path(options.out)

@@ -1,7 +1,8 @@
 """`tankcal inspect`: plumb, roundness, welds and settlement of a tank from its survey."""
 
-from tankcal.cli.arguments import add_language, parse_yield
-from tankcal.cli.showing import (
+from tankcal.messages import message
+from tankcal.terminal.arguments import add_language, parse_yield
+from tankcal.terminal.showing import (
     Progress,
     add_json,
     language_of_run,
@@ -11,7 +12,6 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
-from tankcal.messages import message
 
 MOST_WARNINGS = 10  # that are shown
 NOMINALS = ("drawing", "mean")
@@ -71,7 +71,7 @@ def add(commands):
 
 
 def _inspect(options):
-    from tankcal.cli.input_language import read_job_language, read_record_language
+    from tankcal.terminal.input_language import read_job_language, read_record_language
 
     prepare_for_small_work()
     speak(

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, parse_count, refuse_argument
-from tankcal.cli.showing import (
+from tankcal.messages import message
+from tankcal.terminal.arguments import add_language, parse_count, refuse_argument
+from tankcal.terminal.showing import (
     Progress,
     add_json,
     language_of_run,
@@ -16,7 +17,6 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
-from tankcal.messages import message
 from tankcal.text.digits import NOTHING, fixed
 
 METHODS = (

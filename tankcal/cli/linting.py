@@ -1,9 +1,9 @@
 """`tankcal lint`: errors in any capacity table."""
 
-from tankcal.cli.arguments import add_language, parse_positive
-from tankcal.cli.showing import add_json, prepare_for_small_work, print_json, say, speak
 from tankcal.errors import InputError, Problem, problem_of
 from tankcal.messages import message
+from tankcal.terminal.arguments import add_language, parse_positive
+from tankcal.terminal.showing import add_json, prepare_for_small_work, print_json, say, speak
 
 MOST_FINDINGS = 50  # that are shown at once
 

@@ -3,8 +3,6 @@
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 
-FOLDER = "docs"
-
 
 def add(commands):
     """Add the parser of `tankcal docs`."""
@@ -20,17 +18,10 @@ def add(commands):
     parser.set_defaults(command=_docs)
 
 
-def page_names():
-    """Return the names of the pages in alphabetical order."""
-    from tankcal.text.shipped import shipped_folder
-
-    return tuple(sorted(path.stem for path in shipped_folder(FOLDER).glob("*.md")))
-
-
 def _docs(options):
-    from tankcal.text.shipped import shipped_folder
+    from tankcal.text.shipped import page_names, shipped_folder
 
-    names, folder = page_names(), shipped_folder(FOLDER)
+    names, folder = page_names(), shipped_folder("docs")
     if options.page is None:
         for name in names:
             print(f"{name:24}{_title(folder / f'{name}.md')}".rstrip())

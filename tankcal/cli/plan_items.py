@@ -1,7 +1,7 @@
 """Items and changes of a plan in words."""
 
-from tankcal.cli.showing import marks
 from tankcal.messages import message
+from tankcal.terminal.showing import marks
 
 KINDS = (
     *("photographs", "setups", "ties", "bases", "control", "targets"),

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, parse_count, parse_several, parse_share
 from tankcal.cli.plan_items import describe_change, describe_items
-from tankcal.cli.showing import (
+from tankcal.errors import InputError, Problem, SolutionError, TankcalError
+from tankcal.messages import message
+from tankcal.terminal.arguments import add_language, parse_count, parse_several, parse_share
+from tankcal.terminal.showing import (
     Progress,
     marks,
     prepare_for_small_work,
@@ -13,8 +15,6 @@ from tankcal.cli.showing import (
     speak,
     warn,
 )
-from tankcal.errors import InputError, Problem, SolutionError, TankcalError
-from tankcal.messages import message
 from tankcal.text.digits import fixed, format_significant, format_with_u
 
 SHOWN = 12  # changes in the terminal
@@ -79,11 +79,11 @@ def add(commands):
 
 def _plan(options):
     prepare_for_small_work()
-    from tankcal.cli.input_language import read_plan_language
     from tankcal.planning import load_plan, predict
     from tankcal.planning.improvements import smallest, what_helps
     from tankcal.planning.wall.model import WallPlan
     from tankcal.report import planning as planning_papers
+    from tankcal.terminal.input_language import read_plan_language
 
     speak(options.language or read_plan_language(options.plan))
     _refuse_idle(options)

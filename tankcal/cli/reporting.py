@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from tankcal.cli.showing import Progress, print_paths, speak
+from tankcal.terminal.arguments import add_letterhead, read_letterhead
+from tankcal.terminal.showing import Progress, print_paths, speak
 from tankcal.text.languages import LANGUAGES
 
 
@@ -37,24 +38,6 @@ def add(commands):
     add_letterhead(report)
     report.add_argument("--quiet", action="store_true", help="no progress, only problems")
     report.set_defaults(command=_report)
-
-
-def add_letterhead(parser):
-    """Add the option --letterhead."""
-    parser.add_argument(
-        "--letterhead",
-        metavar="FILE",
-        help="TOML file with name, address, logo and colours of the laboratory (docs/report.md)",
-    )
-
-
-def read_letterhead(options):
-    """Return the checked letterhead of the options, or None."""
-    if options.letterhead is None:
-        return None
-    from tankcal.report.letterhead import load
-
-    return load(options.letterhead)
 
 
 def _report(options):

@@ -3,9 +3,10 @@
 from pathlib import Path
 
 import tankcal
-from tankcal.cli.arguments import parse_cluster
-from tankcal.cli.reporting import add_letterhead, read_letterhead
-from tankcal.cli.showing import (
+from tankcal.errors import Problem, SolutionError, problem_of
+from tankcal.messages import message
+from tankcal.terminal.arguments import add_letterhead, parse_cluster, read_letterhead
+from tankcal.terminal.showing import (
     Progress,
     add_json,
     marks,
@@ -17,8 +18,6 @@ from tankcal.cli.showing import (
     say,
     warn,
 )
-from tankcal.errors import Problem, SolutionError, problem_of
-from tankcal.messages import message
 from tankcal.text.digits import (
     decimals_of,
     decimals_of_height,

@@ -3,9 +3,9 @@
 import shlex
 from pathlib import Path
 
-from tankcal.cli.showing import language_of_run, say, speak
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message, printable
+from tankcal.terminal.showing import language_of_run, say, speak
 from tankcal.text.languages import LANGUAGES
 
 USUAL_KIND = "vertical"

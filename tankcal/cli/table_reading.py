@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language, parse_positive
-from tankcal.cli.showing import (
+from tankcal.messages import message
+from tankcal.terminal.arguments import add_language, parse_positive
+from tankcal.terminal.showing import (
     language_of_run,
     marks,
     prepare_for_small_work,
@@ -12,7 +13,6 @@ from tankcal.cli.showing import (
     speak_of_record,
     warn,
 )
-from tankcal.messages import message
 from tankcal.text.digits import fixed, format_with_u
 
 MOST_SHOWN = 30  # courses

@@ -2,8 +2,10 @@
 
 from dataclasses import asdict
 
-from tankcal.cli.arguments import add_language
-from tankcal.cli.showing import (
+from tankcal.errors import problem_of
+from tankcal.messages import message, printable
+from tankcal.terminal.arguments import add_language
+from tankcal.terminal.showing import (
     Progress,
     add_json,
     prepare_for_small_work,
@@ -11,8 +13,6 @@ from tankcal.cli.showing import (
     say,
     speak_of_record,
 )
-from tankcal.errors import problem_of
-from tankcal.messages import message, printable
 
 
 def add(commands):

@@ -3,9 +3,9 @@
 import argparse
 from pathlib import Path
 
-from tankcal.cli.showing import complain, prepare_for_small_work, say, speak
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.terminal.showing import complain, prepare_for_small_work, say, speak
 from tankcal.text.languages import LANGUAGES
 from tankcal.version import install_command
 
@@ -68,7 +68,7 @@ def _port(text):
 
 def _write_notebook(options, out):
     """Return the path of the notebook of a job, after writing it or keeping manual changes."""
-    from tankcal.cli.input_language import read_job_language
+    from tankcal.terminal.input_language import read_job_language
     from tankcal.workbench.draft import Draft, source_of
     from tankcal.workbench.notebook_file import notebook_path, write_notebook
 

@@ -3,15 +3,15 @@
 A method owns its tables, checks, readings, wall, warnings, saved part and report tables. The
 packages of the main job contain no branch for it: they ask `methods()` or `methods_for(kind)`.
 
-This module imports nothing, and the registry holds names only, because job, pipeline, record and
-report lie below the methods and ask for them at run time. A method imports a module of its own
-within the function that needs it, so that a job loads only the methods that it uses.
+This module imports no package of tankcal, and the registry holds names only, because job, pipeline,
+record and report lie below the methods and ask for them at run time. A method imports a module of
+its own within the function that needs it, so that a job loads only the methods that it uses.
 """
 
-import os
-import sys
 from functools import cache
 from importlib import import_module
+
+from tankcal.entry_points import find_entry_points
 
 GROUP = "tankcal.methods"  # entry points of methods in other distributions
 _BUILT_IN = (
@@ -291,7 +291,7 @@ class Method:
 @cache
 def methods():
     """All methods, each once: the methods of tankcal, then those of other distributions."""
-    paths = (*_BUILT_IN, *_installed_paths())
+    paths = (*_BUILT_IN, *find_entry_points(GROUP).values())
     return tuple(_load(path) for path in paths)
 
 
@@ -324,34 +324,3 @@ def _load(path):
     """Method from "module:class"."""
     module, _, name = path.partition(":")
     return getattr(import_module(module), name)()
-
-
-def _installed_paths():
-    """Paths of the entry points of other distributions, sorted by name.
-
-    The files are first searched for the name of the group, because the package
-    `importlib.metadata` loads more slowly than the command line.
-    """
-    if not any(_names_group(folder) for folder in sys.path):
-        return []
-    from importlib.metadata import entry_points
-
-    entries = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
-    return [entry.value for entry in entries]
-
-
-def _names_group(folder):
-    """Whether a distribution in a folder of `sys.path` has entry points of the group."""
-    try:
-        names = os.listdir(folder or ".")
-    except OSError:
-        return False
-    for name in names:
-        if name.endswith((".dist-info", ".egg-info")):
-            try:
-                with open(os.path.join(folder, name, "entry_points.txt"), encoding="utf-8") as file:
-                    if f"[{GROUP}]" in file.read():
-                        return True
-            except OSError:  # a distribution without entry points
-                continue
-    return False

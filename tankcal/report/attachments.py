@@ -15,19 +15,12 @@ from threading import Lock
 from tankcal.errors import TankcalError
 from tankcal.report.pdf_objects import objects_of
 
-_WORKBOOK = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
-KINDS = {  # name of the file: MIME type, relationship to the paper (PDF 2.0, 7.11.3)
-    "record.json": ("application/json", "source"),
-    "record_tables.npz": ("application/zip", "source"),
-    "capacity.xlsx": (_WORKBOOK, "data"),
-    "adjustment.xlsx": (_WORKBOOK, "data"),
-    "certificate.xml": ("text/xml", "alternative"),
-    "comparison.json": ("application/json", "source"),
-    "comparison.xlsx": (_WORKBOOK, "data"),
-    "inspection.json": ("application/json", "source"),
-    "inspection.xlsx": (_WORKBOOK, "data"),
-    "history.json": ("application/json", "source"),
-    "history.xlsx": (_WORKBOOK, "data"),
+KINDS = {  # suffix of the file: MIME type, relationship to the paper (PDF 2.0, 7.11.3)
+    ".json": ("application/json", "source"),
+    ".npz": ("application/zip", "source"),
+    ".xlsx": ("application/vnd.openxmlformats-officedocument.spreadsheetml.sheet", "data"),
+    ".csv": ("text/csv", "data"),
+    ".xml": ("text/xml", "alternative"),
 }
 OF_RECORD = (
     *("record.json", "record_tables.npz"),
@@ -77,7 +70,7 @@ def beside(folder, described):
     """
     paths = [Path(folder) / name for name in described]
     return [
-        Attachment(path.name, *KINDS[path.name], described[path.name], sha256(path.read_bytes()))
+        Attachment(path.name, *KINDS[path.suffix], described[path.name], sha256(path.read_bytes()))
         for path in paths
         if path.is_file() and path.stat().st_size <= _largest(path)
     ]

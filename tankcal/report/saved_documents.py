@@ -1,5 +1,7 @@
 """The documents of saved files other than records."""
 
+from tankcal.products.base import products
+
 
 def find_document(path):
     """Return the document of a saved file.
@@ -23,10 +25,9 @@ def find_document(path):
     >>> document.saved_format.name, file.name
     ('tankcal-comparison', 'comparison.json')
     """
-    from tankcal.report import comparison, history, inspection
-
-    for document in (comparison.DOCUMENT, inspection.DOCUMENT, history.DOCUMENT):
-        file = document.find_file(path)
-        if file is not None:
-            return document, file
+    for product in products():
+        for document in product.documents():
+            file = document.find_file(path)
+            if file is not None:
+                return document, file
     return None, None

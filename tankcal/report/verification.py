@@ -18,7 +18,7 @@ from tankcal.record.long_tables import problems_of_tables
 from tankcal.record.manifest import digest_of, files_below, read_manifest
 from tankcal.record.recomputation import Recomputation, input_folder
 from tankcal.report import dcc, outputs
-from tankcal.report.attachments import KINDS, sha256
+from tankcal.report.attachments import sha256
 from tankcal.report.outputs import RECORD, WORKBOOKS
 from tankcal.report.verified_again import (
     compute_numbers_again,
@@ -169,10 +169,9 @@ def _results(verification, folder, job, callbacks, manifest):
     verification.compared.append(RECORD)
     table_problems = problems_of_tables(record)
     verification.problems += table_problems
-    beside = {name: folder / name for name in KINDS}
     for name in PDFS:
         if (folder / name).is_file():
-            compare_pdf(verification, name, (folder / name).read_bytes(), beside)
+            compare_pdf(verification, folder / name)
     for name in WORKBOOKS:
         if (folder / name).is_file():
             compare_workbook(verification, name, (folder / name).read_bytes())
@@ -251,9 +250,7 @@ def _is_listed(path, digest):
 
 def _file(verification, path, job, callbacks):
     """Verify a PDF by its embedded record; compare the embedded files with the files beside it."""
-    embedded = compare_pdf(
-        verification, path.name, path.read_bytes(), {n: path.with_name(n) for n in KINDS}
-    )
+    embedded = compare_pdf(verification, path)
     if RECORD not in embedded:
         if not verification.problems:
             text = message(

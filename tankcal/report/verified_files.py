@@ -29,19 +29,15 @@ def content_of(path):
     return path.read_bytes() if path.is_file() else None
 
 
-def compare_pdf(verification, name, content, beside):
+def compare_pdf(verification, path):
     """Compare the hash in a PDF and its embedded files.
 
     Parameters
     ----------
     verification : Verification
         Receives the discrepancies.
-    name : str
-        Name of the PDF.
-    content : bytes
-        The PDF.
-    beside : dict
-        {name: Path} of the files beside the PDF.
+    path : Path
+        The PDF. Its embedded files are compared with the files beside it.
 
     Returns
     -------
@@ -52,9 +48,10 @@ def compare_pdf(verification, name, content, beside):
 
     import pypdf
 
+    name = path.name
     logging.getLogger("pypdf").setLevel(logging.CRITICAL)  # suppress its messages
     try:
-        reader = pypdf.PdfReader(io.BytesIO(content))
+        reader = pypdf.PdfReader(io.BytesIO(path.read_bytes()))
         keywords = str((reader.metadata or {}).get("/Keywords", ""))
         embedded = {file: bytes(parts[-1]) for file, parts in reader.attachments.items()}
     except Exception as error:  # a broken file can raise any exception
@@ -72,8 +69,8 @@ def compare_pdf(verification, name, content, beside):
     verification.compared.append(name)
     _same_record(verification, name, keywords)
     for file, embedded_bytes in embedded.items():
-        place = beside.get(file)
-        bytes_beside = content_of(place) if place else None
+        is_name = Path(file).name == file
+        bytes_beside = content_of(path.with_name(file)) if is_name else None
         if bytes_beside is not None and bytes_beside != embedded_bytes:
             verification.tell(
                 name,

@@ -19,3 +19,8 @@ def shipped_folder(name):
         if place.is_dir():
             return place
     raise TankcalError(f"this installation of tankcal lacks its folder {name!r}: install it again")
+
+
+def page_names():
+    """Return the names of the pages of documentation in alphabetical order."""
+    return tuple(sorted(path.stem for path in shipped_folder("docs").glob("*.md")))

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from tankcal.cli import _parser, main, translate_parser
-from tankcal.cli.showing import speak
+from tankcal.terminal.showing import speak
 from tankcal.text.languages import DEFAULT, LANGUAGES
 from tankcal.text.words import load_words
 
@@ -63,7 +63,7 @@ def test_help_texts_and_their_words_match(english, language):
 def test_no_english_is_left_in_any_help(language):
     speak("en")
     parser = _parser()
-    translate_parser(parser, load_words(language))
+    translate_parser(parser, load_words(language)["help"])
     texts = [
         text
         for one in parsers_of(parser)

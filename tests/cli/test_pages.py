@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tankcal.cli import main
-from tankcal.cli.pages import page_names
+from tankcal.text.shipped import page_names
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from tankcal.cli.showing import Progress
+from tankcal.terminal.showing import Progress
 from tankcal.text.time_left import describe_progress
 
 

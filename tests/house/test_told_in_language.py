@@ -8,8 +8,6 @@ from survey_builder import survey_parts
 
 import tankcal
 from tankcal.cli import main
-from tankcal.cli.input_language import read_job_language
-from tankcal.cli.showing import say_in_language, speak
 from tankcal.errors import InputError, Problem
 from tankcal.job.contract import KEYS
 from tankcal.job.field_values import read_value
@@ -18,6 +16,8 @@ from tankcal.job.starter import write_input_workbook, write_starter
 from tankcal.job.tables import in_book
 from tankcal.messages import Message
 from tankcal.record import record_of
+from tankcal.terminal.input_language import read_job_language
+from tankcal.terminal.showing import say_in_language, speak
 from tankcal.text.form_words import meant, word_of
 from tankcal.text.languages import nearest_language
 from tankcal.text.words import load_words, translate_record

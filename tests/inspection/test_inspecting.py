@@ -8,7 +8,6 @@ from conftest import EXAMPLE
 from job_builder import write_job
 
 from tankcal.cli import main
-from tankcal.cli.input_language import read_record_language
 from tankcal.errors import InputError
 from tankcal.inspection.inspecting import Asked, inspect_files
 from tankcal.inspection.rules import find_rule, parse_rule
@@ -16,6 +15,7 @@ from tankcal.job.tables import Log
 from tankcal.record import record_of, save
 from tankcal.record.inspection import CHECKS
 from tankcal.record.schema import to_plain
+from tankcal.terminal.input_language import read_record_language
 
 LEVELLED = EXAMPLE.parent / "inspection"
 OF_WALL = CHECKS[:5]

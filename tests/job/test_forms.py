@@ -9,12 +9,12 @@ import tankcal
 from tankcal.batch.finding import find_jobs
 from tankcal.batch.options import Options
 from tankcal.cli import main
-from tankcal.cli.input_language import read_job_language
 from tankcal.errors import InputError
 from tankcal.job.contract import COLUMNS
 from tankcal.job.starter import write_form, write_input_workbook, write_starter
 from tankcal.job.starter.form import Form
 from tankcal.report.folders import default_folder
+from tankcal.terminal.input_language import read_job_language
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 BLANKS = [

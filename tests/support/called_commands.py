@@ -19,11 +19,9 @@ import signal
 import time
 import traceback
 from dataclasses import dataclass, field, replace
-from functools import cache
 from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
-from unittest.mock import patch
 
 from conftest import EXAMPLE
 from exported_records import lying, written_record
@@ -38,7 +36,6 @@ from written_pdfs import write_pdf
 from tankcal import cli
 
 EXAMPLES = EXAMPLE.parent
-_PARSER = cache(cli._parser)  # made in 20 ms, as long as many refusals take
 MOST_S = 20  # of processor time for one small input
 COARSE = {"table.step_m": 0.5}
 _STEPS = (
@@ -142,7 +139,6 @@ def call_main(arguments, folder):
             contextlib.chdir(folder),
             contextlib.redirect_stdout(out),
             contextlib.redirect_stderr(err),
-            patch.object(cli, "_parser", _PARSER),
         ):
             status = cli.main(arguments)
     except SystemExit as stop:

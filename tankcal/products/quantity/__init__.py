@@ -1,1 +1,10 @@
 """From a dip to the quantity of product: volumes at the base temperature, mass, and their U."""
+
+from tankcal.products.base import Product
+
+
+class Quantity(Product):
+    """Quantity of a transfer or of a stock."""
+
+    name = "quantity"
+    commands = (("ticket", "tankcal.products.quantity.command"),)

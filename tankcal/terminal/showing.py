@@ -92,7 +92,7 @@ def complain(text):
 
 def read_job(source, show, **options):
     """Return the checked Job of a folder or workbook; set its language."""
-    from tankcal.cli.input_language import read_job_language
+    from tankcal.terminal.input_language import read_job_language
 
     language = read_job_language(source)
     if language is not None:

@@ -2,8 +2,8 @@
 
 import argparse
 
-from tankcal.cli.showing import say_in_language
 from tankcal.messages import message
+from tankcal.terminal.showing import say_in_language
 from tankcal.text.languages import LANGUAGES
 from tankcal.text.numerals import NUMBER, WHOLE_NUMBER
 
@@ -20,6 +20,24 @@ def add_language(parser):
         help=f"language of all output: {', '.join(LANGUAGES)} (default: language of the input, "
         "else of the environment)",
     )
+
+
+def add_letterhead(parser):
+    """Add the option --letterhead."""
+    parser.add_argument(
+        "--letterhead",
+        metavar="FILE",
+        help="TOML file with name, address, logo and colours of the laboratory (docs/report.md)",
+    )
+
+
+def read_letterhead(options):
+    """Return the checked letterhead of the options, or None."""
+    if options.letterhead is None:
+        return None
+    from tankcal.report.letterhead import load
+
+    return load(options.letterhead)
 
 
 def parse_positive(text):

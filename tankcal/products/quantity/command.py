@@ -3,8 +3,10 @@
 from math import isfinite
 from pathlib import Path
 
-from tankcal.cli.arguments import add_language
-from tankcal.cli.showing import (
+from tankcal.errors import problem_of
+from tankcal.messages import message, printable
+from tankcal.terminal.arguments import add_language
+from tankcal.terminal.showing import (
     add_json,
     marks,
     prepare_for_small_work,
@@ -13,8 +15,6 @@ from tankcal.cli.showing import (
     speak_of_record,
     warn,
 )
-from tankcal.errors import problem_of
-from tankcal.messages import message, printable
 from tankcal.text.digits import fixed, format_with_u
 
 SHOWN = 8  # inputs of the budget in the terminal

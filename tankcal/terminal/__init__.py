@@ -1,0 +1,1 @@
+"""Tools of all commands: language and output of the terminal, arguments, signals."""
