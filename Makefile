@@ -1,4 +1,4 @@
-# One door for developers, the same in CI. Each target does its own set-up.
+# The commands of developers and of CI. Each target does its own set-up.
 VENV := .venv
 BIN := $(VENV)/bin
 PEERS := $(VENV)/peers# what is compared with, on top of $(VENV)
@@ -45,7 +45,7 @@ check: $(VENV)/full ## style, layers, words and names to avoid, structure, noteb
 	$(BIN)/python tests/house/prose_counts.py
 	$(BIN)/python tests/house/structure_counts.py
 
-format: $(VENV)/full ## bring the code to the house style
+format: $(VENV)/full ## format the code and mend what ruff can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 

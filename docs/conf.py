@@ -16,7 +16,7 @@ myst_enable_extensions = []
 myst_heading_anchors = 4
 suppress_warnings = [
     "misc.highlighting_failure",  # a shell's session that is no program
-    "ref.python",  # a name of several rooms
+    "ref.python",  # a name of several packages
 ]
 templates_path = []
 

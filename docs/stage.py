@@ -29,7 +29,7 @@ PAGES = (
     "CONTRIBUTING.md",
     "examples/*/README.md",
 )
-DOORS = {  # rooms of the reference, in the order in which a job goes through them
+REFERENCE = {  # {title: modules of a page of the reference}, in the order of the calculation
     "tankcal": ("tankcal", "tankcal.errors"),
     "The core": ("tankcal.adjust", "tankcal.sections", "tankcal.quadrature", "tankcal.uncertainty"),
     "Solver": ("tankcal.solver",),
@@ -104,8 +104,8 @@ def main(target, executed):
             with_links(page, path.parent, staged),
         )
     put(target / "gallery.md", gallery(notebooks))
-    for title, rooms in DOORS.items():
-        put(target / f"api/{slug(title)}.rst", api_page(title, rooms))
+    for title, modules in REFERENCE.items():
+        put(target / f"api/{slug(title)}.rst", api_page(title, modules))
 
 
 def put(path, text):
@@ -267,16 +267,16 @@ def names(notebooks):
     return [path.relative_to(ROOT).with_suffix("") for path in notebooks]
 
 
-def api_page(title, rooms):
-    """A page of the reference: what each room hands out."""
+def api_page(title, modules):
+    """Page of the reference with the public names of modules."""
     lines = [title, "=" * len(title), ""]
-    for room in rooms:
-        if len(rooms) > 1 or room != title:
-            lines += [f"``{room}``", "-" * (len(room) + 4), ""]
-        lines += [f".. automodule:: {room}", "   :members:"]
-        lines += ["   :imported-members:"] if hasattr(import_module(room), "__all__") else []
-        lines += [f"   :exclude-members: {TWICE[room]}"] if room in TWICE else []
-        lines += ["   :undoc-members:"] if room == "tankcal" else []
+    for module in modules:
+        if len(modules) > 1 or module != title:
+            lines += [f"``{module}``", "-" * (len(module) + 4), ""]
+        lines += [f".. automodule:: {module}", "   :members:"]
+        lines += ["   :imported-members:"] if hasattr(import_module(module), "__all__") else []
+        lines += [f"   :exclude-members: {TWICE[module]}"] if module in TWICE else []
+        lines += ["   :undoc-members:"] if module == "tankcal" else []
         lines += [""]
     return "\n".join(lines)
 
