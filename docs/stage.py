@@ -153,7 +153,7 @@ def with_contents(text, notebooks):
         names = [goal for _, _, goal in LINK.findall(body) if goal.endswith(".md")]
         parts.append(contents(heading, names))
     parts.append(contents("Gallery", ["../gallery.md"]))
-    parts.append(contents("API reference", [f"../api/{slug(title)}.rst" for title in DOORS]))
+    parts.append(contents("API reference", [f"../api/{slug(title)}.rst" for title in REFERENCE]))
     examples = [f"../{p.relative_to(ROOT)}" for p in sorted(ROOT.glob("examples/*/README.md"))]
     parts.append(contents("Examples", examples))
     return text + "\n" + "\n".join(parts)

@@ -26,12 +26,14 @@ WITH_EXAMPLES = sorted(
 )
 
 
-def test_rooms_of_the_reference_are_there():
+def test_modules_of_the_reference_are_there():
     """`docs/stage.py` names them; the site fails without one, and is made last of all."""
-    named = re.search(r"^DOORS = .*?^}", (ROOT / "docs/stage.py").read_text(), re.M | re.S).group()
-    rooms = {}
-    exec(named, rooms)
-    assert [one for group in rooms["DOORS"].values() for one in group if not is_there(one)] == []
+    named = re.search(
+        r"^REFERENCE = .*?^}", (ROOT / "docs/stage.py").read_text(), re.M | re.S
+    ).group()
+    names = {}
+    exec(named, names)
+    assert [m for group in names["REFERENCE"].values() for m in group if not is_there(m)] == []
 
 
 def anchors(page):
@@ -99,17 +101,17 @@ def test_examples_of_docstrings_print_as_shown(module, monkeypatch):
     assert found.failed == 0
 
 
-def test_every_floor_is_on_the_walk():
-    """docs/house.md names each room of the contract, in its order."""
+def test_the_page_of_the_structure_lists_every_layer():
+    """docs/house.md names each package of the contract, in its order."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
-    text = (ROOT / "docs/house.md").read_text(encoding="utf-8").split("## Floors")[1]
+    text = (ROOT / "docs/house.md").read_text(encoding="utf-8").split("## Layers")[1]
     rows = [line for line in text.splitlines() if line.startswith("| ") and "`" in line]
-    floors = [set(re.findall(r"`(\w+)(?:/|\.py)", line.split("|")[2])) for line in rows]
+    listed = [set(re.findall(r"`(\w+)(?:/|\.py)", line.split("|")[2])) for line in rows]
     named = [set(re.findall(r"\w+", layer)) for layer in layers if layer != "__main__"]
-    assert [room for floor in named for room in floor if not any(room in f for f in floors)] == []
-    of = {room: index for index, floor in enumerate(floors) for room in floor}
-    order = [max(of[room] for room in floor) for floor in named]
+    row_of = {package: row for row, packages in enumerate(listed) for package in packages}
+    assert set().union(*named) <= row_of.keys()
+    order = [max(row_of[package] for package in layer) for layer in named]
     assert order == sorted(order)
 
 

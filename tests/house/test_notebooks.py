@@ -10,7 +10,7 @@ FOLDER = Path(__file__).parents[2] / "notebooks"
 TUTORIALS = sorted(FOLDER.glob("*.ipynb"))
 ALL = [*TUTORIALS, *sorted((FOLDER / "studies").glob("*.ipynb"))]
 MOST_LINES = 150
-DOORS = (
+PUBLIC = (
     *("tankcal.report", "tankcal.report.planning", "tankcal.report.comparison"),
     *("tankcal.report.inspection", "tankcal.report.history", "tankcal.report.verification"),
 )
@@ -53,11 +53,11 @@ def test_a_tutorial_is_short(path):
 
 @pytest.mark.parametrize("path", TUTORIALS, ids=lambda path: path.stem)
 def test_a_tutorial_calls_public_names_only(path):
-    """No underscore, and of the rooms that make the papers their doors alone."""
+    """No underscore, and only the public modules of the packages that make reports."""
     for cell in code_of(path):
         for node in ast.walk(ast.parse(text_of(cell))):
             if isinstance(node, ast.ImportFrom) and node.module.startswith("tankcal"):
-                written = node.module in DOORS
+                written = node.module in PUBLIC
                 assert written or not node.module.startswith(("tankcal.report", "tankcal.record"))
                 assert not any(one.name.startswith("_") for one in node.names)
             if isinstance(node, ast.Attribute):
