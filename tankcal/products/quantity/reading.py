@@ -8,13 +8,14 @@ import numpy as np
 from tankcal.job.checking import missing_beside, refuse_repeated
 from tankcal.job.contract.keys import CSV
 from tankcal.job.contract.shorthand import choice, number, positive
-from tankcal.job.entries import read_columns, read_section, unknown_section
+from tankcal.job.entries import read_columns
 from tankcal.job.fields import Field
-from tankcal.job.folder import MAX_SETTINGS_BYTES, declared_marks, read_csv, read_toml
+from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import message
 from tankcal.products.quantity.chain import Gauging, Product
 from tankcal.products.quantity.transfer import STATES, Transfer
+from tankcal.products.settings import read_sections
 from tankcal.tank.gauging import UNCERTAINTIES
 from tankcal.tank.volume_correction.alcohol import Ethanol
 from tankcal.tank.volume_correction.corrections import CORRECTIONS
@@ -155,7 +156,7 @@ def read_tickets(table, settings, rows=None):
     """
     log = Log()
     settings = Path(settings).absolute()  # "." has a name for messages
-    sections, places, marks = _read_settings(settings, log)
+    sections, places, marks = read_sections(settings, SECTIONS, log)
     if rows is not None:
         rows = Path(rows).absolute()
     columns = None if rows is None else _read_rows(rows, marks, settings.name, log)
@@ -193,24 +194,6 @@ def read_tickets(table, settings, rows=None):
     _refuse_negative(source, transfer)
     log.stop_if_problems()
     return Tickets(names, sections, transfer, compared, tuple(log.warnings))
-
-
-def _read_settings(path, log):
-    """({section: {key: value}}, {"section.key": row}, marks of CSV files) of ticket.toml."""
-    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
-    settings, rows = (None, {}) if data is None else read_toml(path.name, data, log)
-    log.stop_if_problems()
-    for section in settings:
-        if section not in SECTIONS:
-            log.problem(path.name, unknown_section(section, SECTIONS), rows.get(section),
-                        f"[{section}]")  # fmt: skip
-    marks = declared_marks(path.name, settings, log)
-    values, places = {}, {section: rows.get(section) for section in SECTIONS if section in settings}
-    for section, fields in SECTIONS.items():
-        entries = settings.get(section, {})
-        values[section] = read_section(path.name, section, fields, entries, rows.get(section), log)
-        places |= {f"{section}.{key}": entry.row for key, entry in entries.items()}
-    return values, places, marks
 
 
 def _read_rows(path, marks, settings_file, log):

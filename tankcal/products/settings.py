@@ -1,0 +1,40 @@
+"""Settings of a product: a TOML file with sections of declared keys."""
+
+from tankcal.job.entries import read_section, unknown_section
+from tankcal.job.folder import MAX_SETTINGS_BYTES, declared_marks, read_toml
+from tankcal.job.tables import read_bytes
+
+
+def read_sections(path, sections, log):
+    """Read a TOML file; problems are added to `log`, and stop the reading if it is no TOML.
+
+    Parameters
+    ----------
+    path : Path
+    sections : dict
+        {section: tuple of Field}.
+    log : Log
+
+    Returns
+    -------
+    values : dict
+        {section: {key: value or None}}, every section and key.
+    places : dict
+        {"section.key": row}, and {section: row} of the sections in the file.
+    marks : tuple or None
+        Separator and decimal mark of CSV files; None after a problem.
+    """
+    data = read_bytes(path, log, MAX_SETTINGS_BYTES)
+    settings, rows = (None, {}) if data is None else read_toml(path.name, data, log)
+    log.stop_if_problems()
+    for section in settings:
+        if section not in sections:
+            log.problem(path.name, unknown_section(section, sections), rows.get(section),
+                        f"[{section}]")  # fmt: skip
+    marks = declared_marks(path.name, settings, log)
+    values, places = {}, {section: rows.get(section) for section in sections if section in settings}
+    for section, fields in sections.items():
+        entries = settings.get(section, {})
+        values[section] = read_section(path.name, section, fields, entries, rows.get(section), log)
+        places |= {f"{section}.{key}": entry.row for key, entry in entries.items()}
+    return values, places, marks
