@@ -60,14 +60,11 @@ class Attached:
     rule : tuple or None
         (Rule, (name, SHA-256, size in bytes)); None in place of the second: the rule ships with
         tankcal; None in place of the pair: no rule given.
-    radii_covariance_m2 : ndarray, shape (n, n), or None
-        Covariance matrix of the n radii, m2; None: not given.
     """
 
     covariance_m2: np.ndarray | None
     mesh: tuple | None
     rule: tuple[Rule, tuple | None] | None
-    radii_covariance_m2: np.ndarray | None = None
 
     @property
     def files(self):

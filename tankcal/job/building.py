@@ -8,7 +8,7 @@ from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
 from tankcal.job.checks.extent import (
     has_clouds,
-    has_radii,
+    has_shape,
     has_survey,
     is_metered,
     is_sighted,
@@ -18,7 +18,7 @@ from tankcal.job.checks.lines import has_lines
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
 from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
 from tankcal.job.contract.strapping import IN_PLACE
-from tankcal.job.covariance import OF_RADII, read_covariance
+from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.overrulings import make_overrulings
 from tankcal.job.rule_files import find_rule
@@ -26,8 +26,6 @@ from tankcal.job.tables import (
     CLOUD_TABLES,
     COVARIANCE_FILE,
     LIQUID_TABLES,
-    RADII_COVARIANCE_FILE,
-    RADII_TABLES,
     REGISTERS,
     STRAPPING_TABLES,
     SURVEY_TABLES,
@@ -76,7 +74,7 @@ def job_of(raw, log, is_whole=True):
         frame = make_frame(raw, values, tables, measurements, tuple(log.warnings))
         return replace(frame, overrulings=overrulings)
     job = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
-    surveys = _make_surveys(raw, values, tables, registers, attached)
+    surveys = _make_surveys(raw, values, tables, registers)
     by_method = {}
     for method in methods_for(kind_of(raw)):  # two methods may share a table
         if method.is_given(tables):
@@ -86,7 +84,7 @@ def job_of(raw, log, is_whole=True):
     return replace(job, overrulings=overrulings, surveys=by_method, **surveys)
 
 
-def _make_surveys(raw, values, tables, registers, attached):
+def _make_surveys(raw, values, tables, registers):
     """Measurements other than points, by the attributes of `Job`.
 
     The modules are imported only if the job has the tables, because they load slowly.
@@ -108,11 +106,6 @@ def _make_surveys(raw, values, tables, registers, attached):
         from tankcal.job.liquid import make_metering
 
         surveys["liquid"] = make_metering(values, tables, registers, raw)
-    if has_radii(tables):
-        from tankcal.job.radii import make_radii
-
-        radii, change = make_radii(values, tables, attached.radii_covariance_m2)
-        surveys |= {"radii": radii, "change": change}
     return surveys
 
 
@@ -128,7 +121,7 @@ def _read_tables(raw, registers, is_whole, log):
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
     if kind == "vertical":
-        allowed += STRAPPING_TABLES + RADII_TABLES
+        allowed += STRAPPING_TABLES
     for method in methods_for(kind):
         allowed += method.tables + method.shared_tables
     if kind in OF_CLOUDS:
@@ -186,9 +179,7 @@ def _tell_missing_tables(raw, tables, kind, log):
         _tell_clouds_missing(raw, tables, log)
     # Any measurement of the shape of the wall replaces the points.
     for name in REQUIRED_TABLES.get(kind, ()):
-        has_readings = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
-        has_shape = has_readings or is_metered(tables) or has_radii(tables)
-        is_replaced = name == "points" and (has_shape or has_lines(tables))
+        is_replaced = name == "points" and (has_shape(tables) or has_lines(tables))
         if name in raw.tables or is_replaced:
             continue
         if name == "points" and "clouds" in raw.registers:
@@ -236,7 +227,6 @@ _IN_PLACE_OF_POINTS = {
         "no_rows_of_liquid",
         "no rows; expected the start of each run, and a row for each batch and the dip after it",
     ),
-    "radii": message("no_rows_of_radii", "no rows; expected the radius of each course"),
     "circumferences": message(
         "no_circumferences", "no rows; expected a reading of the tape on each course at least"
     ),
@@ -273,13 +263,13 @@ def _attached(raw, values, tables, log):
         _covariance(raw, tables["points"], log),
         None if mesh is None else read_mesh_file(raw.folder, mesh, log),
         None if rule is None else find_rule(raw, rule, log),
-        _covariance_of_radii(raw, tables["radii"], log),
     )
 
 
 def _covariance(raw, points, log):
     """Covariance matrix of the points, m2; None if not given or not usable."""
-    if raw.covariance is None:
+    data = raw.archives.get(COVARIANCE_FILE)
+    if data is None:
         return None
     if points is None:
         is_unreadable = "points" in raw.tables and raw.tables["points"] is None
@@ -296,25 +286,4 @@ def _covariance(raw, points, log):
             "given together with sx_mm, sy_mm, sz_mm of the points; expected only one of them",
         )
         log.problem(COVARIANCE_FILE, expected)
-    return read_covariance(raw.covariance, points.of("point"), log)
-
-
-def _covariance_of_radii(raw, radii, log):
-    """Covariance matrix of the radii, m2; None if not given or not usable."""
-    if raw.radii_covariance is None:
-        return None
-    if radii is None:
-        if "radii" not in raw.tables or raw.tables["radii"] is not None:  # else reported already
-            expected = message(
-                "covariance_without_radii",
-                "given without its radii; expected radii.csv beside it",
-            )
-            log.problem(RADII_COVARIANCE_FILE, expected)
-        return None
-    if radii.columns["u_mm"] is not None:
-        expected = message(
-            "covariance_beside_u",
-            "given together with u_mm of the radii; expected only one of them",
-        )
-        log.problem(RADII_COVARIANCE_FILE, expected)
-    return read_covariance(raw.radii_covariance, radii.of("course"), log, OF_RADII)
+    return read_covariance(data, points.of("point"), log)

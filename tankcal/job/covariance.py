@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.job.tables import COVARIANCE_FILE, RADII_COVARIANCE_FILE, shown
+from tankcal.job.tables import COVARIANCE_FILE, shown
 from tankcal.messages import message
 
 MAX_POINTS = 2500  # largest number of points; the matrix has 450 MB
@@ -43,7 +43,6 @@ class Archive:
 
 
 OF_POINTS = Archive(COVARIANCE_FILE, "points", "points.csv", 3)
-OF_RADII = Archive(RADII_COVARIANCE_FILE, "courses", "radii.csv", 1)
 
 
 def read_covariance(data, names, log, archive=OF_POINTS):
@@ -58,7 +57,7 @@ def read_covariance(data, names, log, archive=OF_POINTS):
     log : Log
         Receives the problems.
     archive : Archive, optional
-        OF_POINTS or OF_RADII.
+        Format of the file.
 
     Returns
     -------
@@ -103,7 +102,7 @@ def _other_shape(matrix, size, archive):
         "value": str((size, size)),
         "count": size // archive.each,
     }
-    if archive is OF_RADII:
+    if archive.each == 1:
         return message(
             "covariance_shape_of_radii",
             "found {name} of shape {shape}; expected floating-point numbers of shape {value}: the"

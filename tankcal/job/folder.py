@@ -6,12 +6,11 @@ import tomllib
 
 from tankcal.errors import reason_of
 from tankcal.job.tables import (
-    COVARIANCE_FILE,
+    ARCHIVES,
     MAX_FILE_BYTES,
     MAX_LINES,
     MAX_PROBLEMS_PER_FILE,
     NOT_KNOWN,
-    RADII_COVARIANCE_FILE,
     REFUSED_FILE,
     REGISTERS,
     SEPARATORS,
@@ -126,10 +125,7 @@ def read_folder(folder, log, edited=None):
             if is_readable and settings is None:  # the declared separator is not known
                 is_readable = _has_plain_heading(data)
             tables[table] = read_csv(name, data, *marks, log) if is_readable else None
-    covariance, of_radii = (
-        content(name) if name in names else None
-        for name in (COVARIANCE_FILE, RADII_COVARIANCE_FILE)
-    )
+    archives = {name: content(name) for name in ARCHIVES if name in names}
     registers = {}
     for register in REGISTERS:
         name = f"{register}.toml"
@@ -143,10 +139,9 @@ def read_folder(folder, log, edited=None):
         settings,
         sections,
         tables,
-        covariance,
+        archives,
         tuple(files),
         registers,
-        of_radii,
     )
 
 

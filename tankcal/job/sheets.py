@@ -4,8 +4,7 @@ from tankcal.errors import sheet_named
 from tankcal.job.excel import MAX_FILE_BYTES, Unreadable, read_sheets
 from tankcal.job.grids import placed_columns, table_rows
 from tankcal.job.tables import (
-    COVARIANCE_FILE,
-    RADII_COVARIANCE_FILE,
+    ARCHIVES,
     REGISTERS,
     SETTINGS_SHEET,
     TABLES,
@@ -70,7 +69,7 @@ def read_workbook(path, log, edited=None):
         if name in tables
     }
     return RawJob(
-        path.name, path.parent, place, settings, sections, tables_of_job, None, files, registers
+        path.name, path.parent, place, settings, sections, tables_of_job, {}, files, registers
     )
 
 
@@ -94,7 +93,7 @@ def _known_sheets(file, sheets_of_book, log):
             )
         elif name in known:
             sheets[name] = sheet
-        elif f"{name}.npz" in (COVARIANCE_FILE, RADII_COVARIANCE_FILE):
+        elif f"{name}.npz" in ARCHIVES:
             log.problem(
                 sheet_named(name),
                 message("covariance_in_workbook", "a full covariance needs the job as a folder"),

@@ -31,13 +31,12 @@ STRAPPING_TABLES = (
 )
 CLOUD_TABLES = ("scan_targets",)
 LIQUID_TABLES = ("liquid",)
-RADII_TABLES = ("radii",)
 OVERRULING_TABLES = ("overrulings",)
 # The input files of a record are in this order: first the methods for upright tanks.
 _UPRIGHT = tuple(table for method in methods_for("vertical") for table in method.tables)
 _OTHERS = tuple(table for method in methods() for table in method.tables if table not in _UPRIGHT)
-TABLES = TANK_TABLES + STRAPPING_TABLES + _UPRIGHT + CLOUD_TABLES
-TABLES += LIQUID_TABLES + RADII_TABLES + _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
+TABLES = TANK_TABLES + STRAPPING_TABLES + CLOUD_TABLES + _UPRIGHT
+TABLES += LIQUID_TABLES + _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
 REGISTERS = {  # name of an entry in each list
     "cameras": "camera",
     "instruments": "instrument",
@@ -49,7 +48,7 @@ SETTINGS_SHEET = "job"
 WORKBOOK_FILE = "job.xlsx"  # workbook in a job folder
 REFUSED_FILE = "image_points_refused.csv"  # written beside image_points.csv, never read
 COVARIANCE_FILE = "points_cov.npz"
-RADII_COVARIANCE_FILE = "radii_cov.npz"
+ARCHIVES = (COVARIANCE_FILE, *(file for method in methods() for file in method.archives))
 
 MAX_FILE_BYTES = 200_000_000  # largest file of a job
 MAX_LINES, MAX_COLUMNS = 500_000, 100  # largest text table
@@ -265,14 +264,12 @@ class RawJob:
         {section: row}.
     tables : dict of {str: Table or None}
         Tables by name.
-    covariance : bytes or None
-        Content of points_cov.npz.
+    archives : dict of {str: bytes}
+        Content of the files in ARCHIVES that the job has.
     files : tuple
         (name, SHA-256, size in bytes) of each file read.
     registers : dict
         {"cameras", "instruments", "clouds" or "meters": Register or None}.
-    radii_covariance : bytes or None
-        Content of radii_cov.npz.
     is_planned : bool
         True: the survey lies in the future.
     """
@@ -283,10 +280,9 @@ class RawJob:
     settings: dict | None
     sections: dict
     tables: dict
-    covariance: bytes | None = None
+    archives: dict = field(default_factory=dict)
     files: tuple = field(default=())
     registers: dict = field(default_factory=dict)
-    radii_covariance: bytes | None = None
     is_planned: bool = False
 
     def file_of(self, table):

@@ -17,6 +17,7 @@ GROUP = "tankcal.methods"  # entry points of methods in other distributions
 _BUILT_IN = (
     "tankcal.methods.hits:HitsMethod",
     "tankcal.methods.tangents:TangentsMethod",
+    "tankcal.methods.radii:RadiiMethod",
     "tankcal.methods.rings:RingsMethod",
     "tankcal.methods.great_circles:GreatCirclesMethod",
     "tankcal.methods.inside_hits:InsideHitsMethod",
@@ -41,12 +42,16 @@ class Method:
         Tables of a job that belong to the method; the first table contains its readings.
     shared_tables : tuple of str
         Tables of other methods that the method also reads.
+    archives : tuple of str
+        Files of arrays that belong to these tables; `RawJob.archives` has their content.
     starter : str or None
         Value of `tankcal new --survey` that starts a job with these tables.
     starts : tuple of (str, str)
         Initial values of settings in such a job: ("survey.side", "outside").
     starter_registers : tuple of str
         Lists in such a job.
+    starter_has_network : bool
+        Whether such a job has the settings of an adjustment.
     needs_station_heights : bool
         Whether the field sheets have a form for the heights of the stations.
     tables_with_sds : tuple of str
@@ -54,6 +59,12 @@ class Method:
     is_sighted : bool
         Whether the readings are sights that become points of an upright wall. `find` then returns
         a job with these points, and the sights.
+    replaces_points : bool
+        Whether a job with these readings needs no points of the wall.
+    completes_survey : bool
+        Whether the readings supply the courses that a survey of the wall does not measure.
+    is_inside : bool
+        Whether the readings, without a survey, are sizes of the inside.
     is_smooth : bool
         Whether the readings show the wall smoother than it is.
     has_own_offset : bool
@@ -78,12 +89,17 @@ class Method:
     kinds = ()
     tables = ()
     shared_tables = ()
+    archives = ()
     starter = None
     starts = ()
     starter_registers = ("instruments",)
+    starter_has_network = True
     needs_station_heights = False
     tables_with_sds = ()
     is_sighted = False
+    replaces_points = False
+    completes_survey = False
+    is_inside = False
     is_smooth = False
     has_own_offset = False
     names_levels = False
@@ -154,8 +170,19 @@ class Method:
         """Whether the readings of a job may be on both sides of the wall."""
         return False
 
-    def useless_inputs(self, tables):
-        """Inputs of uncertainty that these readings replace: {input: Message of the reason}."""
+    def useless_inputs(self, values, tables):
+        """Inputs of uncertainty without effect beside these readings.
+
+        Parameters
+        ----------
+        values, tables : dict
+            As for `check`.
+
+        Returns
+        -------
+        dict of {str: Message or ""}
+            Reason for each input; "": the input has an effect.
+        """
         return {}
 
     def estimate_diameter_m(self, tables):
@@ -173,6 +200,10 @@ class Method:
         return job.surveys.get(self.name)
 
     # ---- pipeline
+
+    def finds(self, job):
+        """Whether `find` determines the survey of a `Job` with readings of this method."""
+        return True
 
     def find(self, job, progress, network):
         """Survey of the tank from the readings of a job.
@@ -193,6 +224,33 @@ class Method:
             its `sights` become `Result.sights`.
         """
         raise NotImplementedError
+
+    def complete(self, job, survey, progress):
+        """Survey of a tank from the survey of another method, completed by these readings.
+
+        Parameters
+        ----------
+        job : Job
+            Job with readings of this method.
+        survey : object
+            Survey that another method found.
+        progress : callable
+            As for `find`.
+
+        Returns
+        -------
+        object
+            Its attribute `surveyed` is the survey of the other method.
+        """
+        raise NotImplementedError
+
+    def former_radii_m(self, job):
+        """Radii of all courses, m, shape (courses,), for a method that completes a survey."""
+        raise NotImplementedError
+
+    def job_as_surveyed(self, job):
+        """`Job` in the state of the surveyed wall: its side, temperature and liquid level."""
+        return job
 
     def inside_radii(self, job, survey):
         """`InsideRadii` of a survey, to be compared with the drawing; None: no size is known."""
@@ -318,6 +376,11 @@ def given_methods(job):
 def is_sighted(job):
     """Whether the points of the wall of a `Job` are sights of a method."""
     return any(method.is_sighted for method in given_methods(job))
+
+
+def completing_method(job):
+    """Method that supplies the courses of a `Job` that its survey does not measure; or None."""
+    return next((method for method in given_methods(job) if method.completes_survey), None)
 
 
 def _load(path):

@@ -18,7 +18,7 @@ from tankcal.pipeline.simulation import gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
 from tankcal.pipeline.statements import pairs_to_simulate, statements, verdict_of
 from tankcal.pipeline.survey_warnings import incomplete_certificate, open_questions
-from tankcal.pipeline.surveying import adjust_decided, find_survey, is_surveyed_as, placed
+from tankcal.pipeline.surveying import adjust_decided, find_survey, placed
 from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.dips import proportional_parts
@@ -157,8 +157,8 @@ def _run(job, progress, part_progress, simulated, cluster):
 
 
 def _surveys_by_kind(survey):
-    """Surveys by `surveyed_as`; with declared radii, a survey that checks them is included."""
-    surveys = (survey, survey.surveyed if is_surveyed_as(survey, "radii") else None)
+    """Surveys by `surveyed_as`: the survey, and the survey of some courses that it completes."""
+    surveys = (survey, getattr(survey, "surveyed", None))
     return {found.surveyed_as: found for found in surveys if found is not None}
 
 

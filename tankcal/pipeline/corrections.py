@@ -6,7 +6,7 @@ import numpy as np
 
 from tankcal.job import Switches
 from tankcal.messages import Message, message
-from tankcal.pipeline.tanks import as_declared, body_of, thermal_scale
+from tankcal.pipeline.tanks import as_surveyed, body_of, thermal_scale
 from tankcal.units import STANDARD_GRAVITY
 
 # Cited by title and edition only: the texts of paid standards were not read, so no clause is cited.
@@ -62,7 +62,7 @@ def corrections_of(job, survey, over_m=0.0):
     -------
     tuple of Correction
     """
-    job = as_declared(job)
+    job = as_surveyed(job, survey)
     switches, volume = NONE, _volume_at_top(job, survey, NONE, over_m)
     corrections = []
     reference = volume

@@ -3,7 +3,7 @@
 An offset, a scale or a unit that is wrong in all readings of a survey affects only the size.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,12 +32,15 @@ class InsideRadii:
     sd_m : ndarray, shape (n,)
         Standard uncertainties of the radii, m; 0 where negligible beside the allowance of a
         drawing.
+    has_single_checks : bool
+        Whether single courses are compared if the whole tank agrees with the drawing.
     """
 
     names: tuple[str, ...]
     radius_m: np.ndarray
     plate_m: np.ndarray
     sd_m: np.ndarray
+    has_single_checks: bool = False
 
 
 def allowed_departure_m(job, sd_m=0.0):
@@ -101,22 +104,26 @@ def inside_radii(job, survey):
     InsideRadii or None
     """
     kind = None if survey is None else survey.surveyed_as
-    if kind in ("wall", "strapped", "radii"):
-        parts = job.courses
-        plates = np.array([part.thickness_m + part.paint_m for part in parts])
-        names = tuple(getattr(part, "name", str(i)) for i, part in enumerate(parts, 1))
-        if kind == "radii":
-            radius = survey.radius_m
-        else:
-            radius = mean_radii(survey.field) - plates * (job.survey.side == "outside")
-        sd = _sds_of_courses(survey, len(parts)) if kind == "wall" else np.zeros(len(parts))
-        return InsideRadii(names, radius, plates, sd)
+    if kind in ("wall", "strapped"):
+        plates = np.array([course.thickness_m + course.paint_m for course in job.courses])
+        radius = mean_radii(survey.field) - plates * (job.survey.side == "outside")
+        if kind == "wall":
+            return radii_of_courses(job, radius, _sds_of_courses(survey, len(radius)))
+        return replace(radii_of_courses(job, radius), has_single_checks=False)
     if kind == "scan":
         plate = (job.horizontal or job.sphere).thickness_m
         diameter = dict(zip(survey.names, survey.values, strict=True))["diameter"]
         return single_radius(diameter / 2 - plate * (job.survey.side == "outside"), plate)
     method = method_of(survey)
     return None if method is None else method.inside_radii(job, survey)
+
+
+def radii_of_courses(job, radius_m, sd_m=0.0):
+    """`InsideRadii` of the courses of a job, with radii (courses,) and their uncertainties, m."""
+    plates = np.array([course.thickness_m + course.paint_m for course in job.courses])
+    names = tuple(course.name for course in job.courses)
+    sds = np.broadcast_to(sd_m, plates.shape)
+    return InsideRadii(names, radius_m, plates, sds, has_single_checks=True)
 
 
 def single_radius(radius_m, plate_m):
@@ -182,7 +189,7 @@ def check_size(job, survey):
         if not _has_own_line(job, survey):
             yield _unlike_drawing(job, median_m, miss)
         return
-    if survey.surveyed_as not in ("wall", "radii") or len(surveyed.names) == 1:
+    if not surveyed.has_single_checks or len(surveyed.names) == 1:
         return
     radii_and_sds = zip(surveyed.radius_m, surveyed.sd_m, strict=True)
     # Single courses are compared only when the tank as a whole agrees with the drawing.

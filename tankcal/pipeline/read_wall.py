@@ -40,6 +40,7 @@ class ReadWall:
     field: WallField
     # Plate thickness, not in the field.
     inner_m: np.ndarray | float = field(default=0.0, kw_only=True)
+    has_applied_inputs = False
     surveyed_as = "read"  # in addition to points; subclasses state their own kind
 
     def radius_at(self, course, level_m):

@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from tankcal.methods.radii.wall import RadiiWall
     from tankcal.pipeline.cloud_wall import Clouded
     from tankcal.pipeline.liquid_result import LiquidResult
     from tankcal.pipeline.nominal_wall import NominalWall
-    from tankcal.pipeline.radii_wall import RadiiWall
     from tankcal.pipeline.read_wall import ReadWall
     from tankcal.pipeline.scan import Scan
     from tankcal.pipeline.ship import ShipTables
@@ -247,8 +247,8 @@ class Result:
     @property
     def gross(self) -> ShellVolume | None:
         """Surveyed shell without corrections (`volumes.ShellVolume`), or None for other tanks."""
-        wall = self.radii or self.wall or self.strapped or self.nominal
-        return None if wall is None else shell_volume(wall)
+        is_upright = self.job.tank.kind == "vertical"
+        return shell_volume(next(iter(self.surveys.values()))) if is_upright else None
 
     @property
     def straps(self) -> "Straps | None":

@@ -9,6 +9,7 @@ import numpy as np
 from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.methods.base import completing_method
 from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
 from tankcal.pipeline.cross_checks import check_side, is_size_declared
 from tankcal.pipeline.moved_setups import tested
@@ -48,7 +49,7 @@ def check_strapped(job, wall):
         *check_tapes(job, straps, job.strapping),
         *check_repeats(straps),
         *_check_pairs(job, straps),
-        *(_check_courses(job, straps) if job.radii is None else ()),
+        *(_check_courses(job, straps) if completing_method(job) is None else ()),
         *_check_first_course(job, straps),
         *_check_single_course(job, straps),
         *_check_uncontrolled(job, wall),
@@ -370,7 +371,8 @@ def _check_single_course(job, straps):
     The other courses are determined relative to this course by reference lines.
     """
     strapped = {reduced_strap.strap.course for reduced_strap in straps.reduced}
-    if job.lines is None or job.radii is not None or len(strapped) > 1 or is_size_declared(job):
+    is_completed = completing_method(job) is not None
+    if job.lines is None or is_completed or len(strapped) > 1 or is_size_declared(job):
         return
     text = message(
         "size_told_by_one_course",

@@ -79,6 +79,7 @@ class Wall:
     origins_m: np.ndarray | None = None
     told: ToldUnknowns | None = None
     surveyed_as = "wall"
+    has_applied_inputs = False
 
     def lowest_outline(self, azimuth_rad):
         """Position (x, y) of the axis at the bottom and radii (n,) of the lowest section, m."""

@@ -13,7 +13,7 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
-from tankcal.methods.base import given_methods
+from tankcal.methods.base import completing_method, given_methods
 from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
 from tankcal.pipeline.nominal_size import refuse_other_size
 from tankcal.pipeline.overruled_points import refuse_kept_readings, with_decided_readings
@@ -139,11 +139,9 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     elif adjustment is not None and not is_sighted and is_surveyed_as(survey, "scan"):
         refuse_other_side(job, survey.is_within, adjustment)
     refuse_other_size(job, survey)
-    if job.radii is not None and not is_surveyed_as(survey, "radii"):
-        from tankcal.pipeline.partial_survey import update_by_survey
-
-        progress(message("updating_radii", "bringing the former radii up to date"))
-        survey = update_by_survey(job, survey)
+    completing = completing_method(job)
+    if completing is not None and not is_surveyed_as(survey, completing.name):
+        survey = completing.complete(job, survey, progress)
     return Surveyed(job, survey, adjustment, sights)
 
 
@@ -189,15 +187,12 @@ def adjust_decided(job, progress):
 def _survey(job, progress, network):
     """Survey of the tank: wall of courses, mesh or scan; None for declared sizes alone."""
     for method in given_methods(job):
-        return method.find(job, progress, network).survey
+        if method.finds(job):
+            return method.find(job, progress, network).survey
     if job.strapping is not None and job.points is None:
         from tankcal.pipeline.strapped_wall import find_strapped_wall
 
         return find_strapped_wall(job, progress, network.amplitudes)
-    if job.radii is not None and job.points is None:
-        from tankcal.pipeline.radii_wall import find_radii_wall
-
-        return find_radii_wall(job, progress)
     if job.tank.kind == "vertical" and job.points is None and job.liquid is not None:
         from tankcal.pipeline.nominal_wall import find_nominal_wall
 

@@ -13,7 +13,6 @@ from tankcal.methods.base import given_methods, method_of
 from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.nominal_size import check_size
 from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
-from tankcal.pipeline.surveying import is_surveyed_as
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.solver.threads import threads_for
 from tankcal.tank.body import Body
@@ -159,8 +158,7 @@ def check_table(job, survey, computed, sighting=None):
     tuple of Problem
     """
     of_size = check_size(job, survey)
-    if is_surveyed_as(survey, "radii"):
-        survey = survey.surveyed
+    survey = getattr(survey, "surveyed", None) or survey  # warnings about what was measured
     return (
         *of_size,
         *_check_survey(job, survey, computed.top_m),

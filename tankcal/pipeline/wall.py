@@ -15,7 +15,7 @@ from tankcal.geometry.field.sites import Sites, spans_of
 from tankcal.geometry.outlines import polar
 from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
 from tankcal.messages import Message, message
-from tankcal.methods.base import given_methods, is_sighted
+from tankcal.methods.base import completing_method, given_methods, is_sighted
 from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
 from tankcal.pipeline.point_covariance import given_covariance, median_sd, radial_sds
 from tankcal.pipeline.section_homogeneity import warn_of_sections
@@ -166,9 +166,7 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     by_points = means @ _radii_by_points(sections, len(accepted))
     by_inputs = _derivatives_by_inputs(job.points, by_points, accepted)
     is_read = job.strapping is not None or job.lines is not None
-    is_read = is_read or (
-        job.radii is not None and len({group.course for group in groups}) < len(job.courses)
-    )
+    is_read = is_read or len({group.course for group in groups}) < len(job.courses)
     if is_read or job.points.unbound or by_inputs or _is_smooth(job):
         unbound = unbound_of(job.points, by_points, accepted)
         noise = by_points @ (covariance @ by_points.T)  # includes covariances between sections
@@ -434,6 +432,7 @@ def _refuse_weak(job, groups, height):
                 )
             )
     measured = told_courses(job, {group.course for group in groups})
+    is_completed = completing_method(job) is not None
     problems += [
         message(
             "course_without_section",
@@ -442,7 +441,7 @@ def _refuse_weak(job, groups, height):
             fewest=FEWEST_POINTS,
         )
         for index, course in enumerate(courses)
-        if index not in measured and job.radii is None
+        if index not in measured and not is_completed
     ]
     if problems:
         raise InputError([Problem(origin_of(job.points), text) for text in problems])

@@ -11,6 +11,7 @@ import numpy as np
 
 from tankcal.geometry.field.blunders import MOST_ROUNDS, restricted_precision, snoop_wall
 from tankcal.geometry.field.sites import Sites, free_design, spans_of
+from tankcal.methods.base import completing_method
 from tankcal.survey.reference_line import level_names
 from tankcal.tank.factors import Factor
 
@@ -171,9 +172,10 @@ def readings_of_untold(job, measured, joints_m, zero_m):
     -------
     list of WallReading
     """
-    if job.radii is None:
+    method = completing_method(job)
+    if method is None:
         return []
-    former_m = np.where(job.radii.is_known, job.radii.radius_m, job.tank.nominal_diameter_m / 2)
+    former_m = method.former_radii_m(job)
     return [
         WallReading(
             FORMER, i, (joints_m[i] + joints_m[i + 1]) / 2 - zero_m, float(former_m[i]), FORMER_SD_M

@@ -15,6 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from tankcal.methods.base import completing_method
 from tankcal.pipeline.shape_figures import Figures, Level, ShapeBase
 from tankcal.pipeline.surveyed_wall import Wall
 from tankcal.units import FOOT_M, FULL_TURN
@@ -106,7 +107,7 @@ class WallShape:
 
 def wall_shape_of(job, wall):
     """`WallShape` of a job's wall; None unless the wall was surveyed by points."""
-    if not isinstance(wall, Wall) or job.radii is not None:
+    if not isinstance(wall, Wall) or completing_method(job) is not None:
         return None
     levels = _levels(job, wall)
     plumbed = [i for i, level in enumerate(levels) if level.ring >= 0]

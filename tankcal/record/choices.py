@@ -4,6 +4,7 @@ import numpy as np
 
 from tankcal.adjust import CRITICAL
 from tankcal.methods.base import given_methods
+from tankcal.pipeline.tanks import as_surveyed
 from tankcal.record.liquid import geometry_beside
 from tankcal.record.schema import Saved, key
 from tankcal.record.table import zero_of
@@ -12,6 +13,7 @@ SIGHTS = {  # kinds of readings of instruments; a tape used with photographs is 
     "direction", "horizontal angle", "vertical angle", "zenith angle", "azimuth",
     "height difference", "slope distance",
 }  # fmt: skip
+_OF_EVERY_TANK = ("thickness", "temperature")
 
 
 class Choice(Saved):
@@ -23,28 +25,30 @@ class Choice(Saved):
 
 def choices_of(result):
     """Return the `Choice`s of a result: all its assumptions."""
-    job = result.job
+    job, survey = result.job, next(iter(result.surveys.values()), None)
+    of_methods = _choices_of_methods(result, ("vertical", "horizontal"))
+    # A record states these choices after those on the wall.
+    later = {code: of_methods.pop(code) for code in _OF_EVERY_TANK if code in of_methods}
     values = {
         "zero": zero_of(result),
         **(_shell_choices(job, result) if result.wall is not None else {}),
         **(_strap_choices(job) if result.strapped is not None else {}),
         **_liquid_choices(result),
-        **_radii_choices(result),
-        **_choices_of_methods(result, ("vertical", "horizontal")),
+        **of_methods,
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job, result),
         "temperature": _temperature_choice(job),
         **_choices_of_methods(result, ("sphere",)),
         **_sphere_choices(job),
         "height_expansion": "yes" if job.table.height_expansion else "no",
-        "head": _head_choice(job),
+        "head": _head_choice(as_surveyed(job, survey)),
         "deadwood": _switch_choice(job.switches.deadwood, job.deadwood),
         "interpolation": "linear",
         "coverage": job.table.coverage_probability,
         "k": "normal" if np.all(np.isinf(result.table.dof)) else "student",
         "expansion": "given" if job.material.expansion_given else "default",
         "not_in_budget": _undeclared_inputs(result),
-    }
+    } | later
     if result.adjustment is not None:
         adjustment = _adjustment_values(result.adjustment, getattr(job, "measurements", None))
         values = adjustment | values
@@ -88,15 +92,15 @@ def _shell_choices(job, result):
     """Return the choices on a shell with surveyed points, and on the use of its points."""
     wall = result.wall
     return {
-        "bottom": _bottom_choice(job),
+        "bottom": bottom_choice(job),
         **_survey_choices(job, result),
         "course_of_points": "section" if any(job.points.section) else "height",
         "shape": "smoothed",
         "between_sections": "field",
         "tilt": _tilt_choice(job, wall.shell),
         "course_heights": "along_axis",
-        **_top_choice(job),
-        "roof": _roof_choice(job),
+        **top_choice(job),
+        "roof": roof_choice(job),
         "snooping": CRITICAL if job.snooping else "off",
         "form": "learned",
         "covariance_sd_mm": 1000 * np.sqrt(np.median(wall.covariance_m2.diagonal())),
@@ -109,7 +113,7 @@ def _survey_choices(job, result):
     if job.clouds is not None:
         choices = {"survey": "clouds", "covariance": "clouds"}
     for method in given_methods(job):
-        choices = method.choices(result)
+        choices = method.choices(result) if method.is_sighted else choices
     if result.straps is not None:
         choices["straps"] = "beside_points"
     if job.lines is not None:
@@ -120,14 +124,14 @@ def _survey_choices(job, result):
 def _strap_choices(job):
     """Return the choices on a strapped shell, also with offsets from reference lines."""
     return {
-        "bottom": _bottom_choice(job),
+        "bottom": bottom_choice(job),
         "survey": "strapping" if job.lines is None else "reference_line",
         "area_term": _area_term_choice(job.strapping.shape_sd_m),
-        **_top_choice(job),
+        **top_choice(job),
         "between_sections": "cylinders" if job.lines is None else "revolution",
         "tilt": "not_measured" if job.lines is None else "not_applied",
         "course_heights": "along_axis",
-        "roof": _roof_choice(job),
+        "roof": roof_choice(job),
         "form": "learned",
     }
 
@@ -164,45 +168,30 @@ def _liquid_choices(result):
     choices = {"liquid": result.liquid.certified, "liquid_beside": geometry}
     if geometry == "drawing":
         choices |= {
-            "bottom": _bottom_choice(job),
-            **_top_choice(job),
+            "bottom": bottom_choice(job),
+            **top_choice(job),
             "tilt": "not_measured",
             "course_heights": "along_axis",
-            "roof": _roof_choice(job),
+            "roof": roof_choice(job),
         }
     return choices
-
-
-def _radii_choices(result):
-    """Return the choices on former radii of the courses, and on their origin."""
-    if result.radii is None:
-        return {}
-    job = result.job
-    return {
-        "bottom": _bottom_choice(job),
-        **_top_choice(job),
-        "radii": job.radii.source,
-        "radii_beside": "none" if result.radii.updated is None else "survey",
-        "between_sections": "radii",
-        "tilt": "not_known",
-        "course_heights": "along_axis",
-        "roof": _roof_choice(job),
-    }
 
 
 # ---- single choices
 
 
-def _bottom_choice(job):
+def bottom_choice(job):
+    """Form of the bottom of an upright tank; "off" if it is not corrected."""
     return job.bottom.form if job.switches.bottom else "off"
 
 
-def _top_choice(job):
+def top_choice(job):
     """Return the choice on the head on top; {} without head."""
     return {} if job.top is None else {"top": job.top.form if job.switches.top else "off"}
 
 
-def _roof_choice(job):
+def roof_choice(job):
+    """Weighing of a floating roof; "off" or "none" without a correction."""
     weighing = job.roof and job.roof.weighing
     return _switch_choice(job.switches.roof, weighing, weighing)
 
@@ -214,10 +203,6 @@ def _tilt_choice(job, shell):
 
 
 def _temperature_choice(job):
-    if job.radii is not None:
-        if job.radii.temperature_c == job.table.reference_temperature_c:
-            return "radii_as_they_are"
-        return "radii_applied" if job.switches.temperature else "off"
     if job.survey.shell_temperature_c is None:
         return "not_applied"
     return "applied" if job.switches.temperature else "off"
@@ -229,8 +214,7 @@ def _head_choice(job):
         return "off"
     if job.table.liquid_density_kg_m3:
         return job.table.liquid_density_kg_m3
-    loaded = job.survey.liquid_density_kg_m3 and job.radii is None
-    return "unloaded" if loaded else "none"
+    return "unloaded" if job.survey.liquid_density_kg_m3 else "none"
 
 
 def _switch_choice(is_on, declared, value="declared"):
@@ -250,8 +234,6 @@ def _covariance_choice(job):
 def _thickness_choice(job, result):
     if result.liquid is not None and geometry_beside(result) == "drawing":
         return "drawing"
-    if result.radii is not None:
-        return "radii"
     if job.survey.side == "inside":
         return "inside"
     solid = job.horizontal or job.sphere

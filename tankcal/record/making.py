@@ -25,7 +25,6 @@ from tankcal.record.clouds import CloudsRecord, clouds_of
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.liquid import LiquidRecord, liquid_of
 from tankcal.record.long_tables import LongTables
-from tankcal.record.radii import RadiiRecord, radii_of
 from tankcal.record.schema import Saved, fill_from, key, to_plain
 from tankcal.record.ship import ShipRecord, ship_of
 from tankcal.record.strapping import StrappingRecord, strapping_of
@@ -107,9 +106,6 @@ class Record(Saved, kw_only=True):
     liquid: LiquidRecord | None = key(
         "metered runs; left out if there are none", default=None, optional=True
     )
-    radii: RadiiRecord | None = key(
-        "radii of a former table; left out if there are none", default=None, optional=True
-    )
     ship: ShipRecord | None = key(
         "corrections for trim and list; left out if there are none", default=None, optional=True
     )
@@ -175,7 +171,6 @@ def record_of(result):
             lines=lines_of(result),
             clouds=clouds_of(result),
             liquid=liquid_of(result),
-            radii=radii_of(result),
             ship=ship_of(result),
             surveys=surveys_of(result),
             courses=survey.courses_of(result),

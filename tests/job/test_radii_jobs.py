@@ -34,12 +34,16 @@ def test_what_is_read(tmp_path):
     assert_allclose(job.radii.radius_m, RADII_M)
     assert_allclose(job.radii.covariance_m2, 9e-8 * np.eye(5))
     assert (job.radii.u_common_m, job.radii.temperature_c) == (0.7e-3, 15.0)
-    assert (job.radii.source, job.radii.note, job.change) == ("table", "certificate 7", None)
+    assert (job.radii.source, job.radii.note, job.radii.change) == ("table", "certificate 7", None)
 
 
 def test_change_beside_a_survey(tmp_path):
     job = tankcal.load(write_folder(tmp_path / "job", partial_parts(change__shared_mm=0.1)))
-    assert (job.change.common_m, job.change.own_m, job.change.shared_m) == (0.8e-3, 0.3e-3, 1e-4)
+    assert (job.radii.change.common_m, job.radii.change.own_m, job.radii.change.shared_m) == (
+        0.8e-3,
+        0.3e-3,
+        1e-4,
+    )
 
 
 @pytest.mark.slow

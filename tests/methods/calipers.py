@@ -22,7 +22,7 @@ class CalipersMethod(Method):
         sd = positive("s_mm", "standard deviation of the reading, millimetres", 100, required=True)
         return {"calipers": (diameter, sd)}
 
-    def useless_inputs(self, tables):
+    def useless_inputs(self, values, tables):
         return {"diameter": "its uncertainty comes from the calipers"}
 
     def read(self, values, tables, registers, raw):

@@ -16,7 +16,7 @@ from generated_walls import make_wall
 from test_coverage_of_walls import judged, study
 
 from tankcal.errors import SolutionError
-from tankcal.job.model import Change, Radii
+from tankcal.methods.radii.readings import Change, Radii
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.tanks import body_of
 
@@ -44,8 +44,7 @@ def partial_job(rng, wall, straps, folder):
     return replace(
         job,
         strapping=replace(job.strapping, straps=first),
-        radii=radii,
-        change=Change(COMMON_M, OWN_M),
+        radii=replace(radii, change=Change(COMMON_M, OWN_M)),
     )
 
 

@@ -16,7 +16,7 @@ from radii_jobs import HEIGHTS_M, RADII_M, closed_volume_m3, partial_parts, radi
 
 import tankcal
 from tankcal.errors import SolutionError
-from tankcal.pipeline.radii_update import update_radii
+from tankcal.methods.radii.update import update_radii
 from tankcal.record.strapping import strapping_of
 
 EXAMPLES_AT = Path(__file__).resolve().parents[2] / "examples"
@@ -234,7 +234,7 @@ def test_intervals_hold_in_the_declared_model_study(tmp_path, figure):
 
 
 def test_radii_alone_need_no_change(tmp_path):
-    assert tankcal.load(write_folder(tmp_path / "job", radii_parts())).change is None
+    assert tankcal.load(write_folder(tmp_path / "job", radii_parts())).radii.change is None
 
 
 @pytest.mark.slow

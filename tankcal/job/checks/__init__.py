@@ -11,19 +11,15 @@ from tankcal.job.checks.extent import (
     Extent,
     estimate_diameter_m,
     extent_of,
-    has_radii,
-    has_survey,
+    has_shape,
     has_wall_points,
     is_metered,
-    is_sighted,
-    is_strapped,
     wall_of,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
 from tankcal.job.checks.lines import check_lines
 from tankcal.job.checks.liquid import check_liquid
 from tankcal.job.checks.plausible import check_metering, check_plausible
-from tankcal.job.checks.radii import check_radii
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
@@ -68,7 +64,6 @@ def check_all(values, tables, registers, raw, is_whole, log):
     if is_whole:
         check_tank(values, tables, raw, log)
         if kind_of(raw) == "vertical":
-            check_radii(values, tables, raw, log)
             check_strapping(values, tables, registers, raw, log)
             check_lines(values, tables, registers, raw, log)
         for method in methods_for(kind_of(raw)):
@@ -92,10 +87,8 @@ def check_tank(values, tables, raw, log):
         check_steps(values["table"], extent, raw, log)
         check_settings(values, tables, extent, kind, raw, log)
         check_plausible(values, tables, extent, kind, raw, log)
-    has_readings = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
-    has_shape = has_readings or is_metered(tables) or has_radii(tables)
     # Any measurement of the shape of the wall replaces the points.
-    needs_points = kind == "vertical" and not has_shape
+    needs_points = kind == "vertical" and not has_shape(tables)
     if points is not None and (needs_points or has_rows(points)):
         check_points(points, log)
     if values is not None:

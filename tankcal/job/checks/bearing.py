@@ -3,7 +3,7 @@
 from tankcal.job.checking import has_rows, loads_sphere
 from tankcal.job.checks.extent import (
     has_clouds,
-    has_radii_alone,
+    has_inside_sizes,
     has_wall_points,
     is_metered_alone,
     is_strapped,
@@ -53,17 +53,21 @@ def useless_inputs(values, tables, kind):
         for name, known in INPUTS.items()
         if kind not in known.kinds
     }
-    rules = _of_temperature(values, tables) | {"deadwood": _of_deadwood(values, tables["deadwood"])}
+    rules = of_temperature(values, values["survey"]["shell_temperature_c"]) | {
+        "deadwood": _of_deadwood(values, tables["deadwood"])
+    }
     if kind == "vertical":
         rules |= _of_vertical(values, tables)
-        rules |= _of_radii() if has_radii_alone(tables) else {}
     elif kind == "horizontal":
         rules |= _of_horizontal(values, tables)
     elif kind == "sphere":
         rules |= _of_wall(values["sphere"], values, has_wall_points(tables))
-        rules |= _of_sphere(values, tables)
+        rules |= _of_sphere(values)
     elif kind == "mesh":
         rules |= _of_ship(values)
+    for method in methods_for(kind):
+        if method.is_given(tables):
+            rules |= method.useless_inputs(values, tables)
     return others | {name: why for name, why in rules.items() if why}
 
 
@@ -71,15 +75,12 @@ def _switched_off(correction):
     return message("switched_off", "corrections.{correction} is false", correction=correction)
 
 
-def _of_temperature(values, tables):
+def of_temperature(values, shell_temperature_c):
     """{input: reason}, with "" for an input that has an effect.
 
     All functions below return this form.
     """
-    given = values["survey"]["shell_temperature_c"] is not None
-    if has_radii_alone(tables):
-        given = values["radii"]["reference_temperature_c"] is not None
-    expands = given and values["corrections"]["temperature"] is not False
+    expands = shell_temperature_c is not None and values["corrections"]["temperature"] is not False
     why = (
         ""
         if expands
@@ -126,17 +127,6 @@ def _of_vertical(values, tables):
         else "",
         "tilt": _switched_off("tilt") if switches["tilt"] is False else "",
     }
-
-
-def _of_radii():
-    """Reasons for inputs of a survey, beside declared radii."""
-    why = message(
-        "radii_are_inside",
-        "expected only with a survey: the radii are those of the empty shell, inside, with their"
-        " own uncertainty",
-    )
-    of_survey = ("scale", "offset", "tilt", "paint", "shell_temperature", "survey_level")
-    return dict.fromkeys((*of_survey, "survey_density"), why)
 
 
 def _has_own_offset(tables):
@@ -192,7 +182,7 @@ def _of_plates(values, tables, is_loaded, table_name="courses"):
     """
     switches, courses = values["corrections"], tables[table_name]
     outside_seen = is_strapped(tables) or may_be_seen_from_both_sides(tables)
-    inside = (values["survey"]["side"] == "inside" and not outside_seen) or has_radii_alone(tables)
+    inside = (values["survey"]["side"] == "inside" and not outside_seen) or has_inside_sizes(tables)
     why = {"plate_thickness": "", "paint": ""}
     if (inside or switches["plate"] is False) and not is_loaded:
         why["plate_thickness"] = NOT_SUBTRACTED
@@ -317,8 +307,8 @@ def _of_wall(given, values, has_points):
     }
 
 
-def _of_sphere(values, tables):
-    """Reasons for inputs of great circles and of the expansion of a sphere under load."""
+def _of_sphere(values):
+    """Reasons for inputs of the expansion of a sphere under load."""
     table, survey = values["table"], values["survey"]
     is_off = values["corrections"]["head"] is False
     liquid = (survey["liquid_density_kg_m3"] or 0) * (survey["liquid_level_m"] or 0)
@@ -335,9 +325,6 @@ def _of_sphere(values, tables):
         ),
     }
     reasons = {name: why for name, why in rules.items() if isinstance(why, str)}
-    for method in methods_for("sphere"):
-        if method.is_given(tables):
-            reasons |= method.useless_inputs(tables)
     is_subtracted = (values["survey"]["side"] == "outside") and values["corrections"][
         "plate"
     ] is not False

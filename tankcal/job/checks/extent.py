@@ -36,19 +36,34 @@ def is_metered(tables):
     return has_rows(tables.get("liquid"))
 
 
-def has_radii(tables):
-    """Return True if radii of a former table, a record or a declaration are given."""
-    return has_rows(tables.get("radii"))
-
-
 def is_surveyed(tables):
     """Return True if the wall of a vertical tank, or some of its courses, was measured."""
     return has_wall_points(tables) or is_strapped(tables)
 
 
-def has_radii_alone(tables):
-    """Return True if declared radii are the only data of the wall."""
-    return has_radii(tables) and not is_surveyed(tables)
+def has_shape(tables):
+    """Return True if measurements other than points.csv determine the wall of a vertical tank."""
+    has_readings = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
+    return (
+        has_readings
+        or is_metered(tables)
+        or any(method.replaces_points for method in _given(tables))
+    )
+
+
+def is_completed(tables):
+    """Return True if a method supplies the courses that a survey does not measure."""
+    return any(method.completes_survey for method in _given(tables))
+
+
+def has_inside_sizes(tables):
+    """Return True if the only data of the wall are sizes of the inside."""
+    return any(method.is_inside for method in _given(tables)) and not is_surveyed(tables)
+
+
+def _given(tables):
+    """Methods for vertical tanks that have readings in a job."""
+    return [method for method in methods_for("vertical") if method.is_given(tables)]
 
 
 def is_metered_alone(tables):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.job.checking import UNIT_FACTOR, course_heights, places_of, tell
-from tankcal.job.checks.extent import has_radii
+from tankcal.job.checks.extent import is_completed
 from tankcal.messages import message
 from tankcal.survey.reference_line import courses_with_radius
 
@@ -171,7 +171,7 @@ def _check_points_in_courses(z, unplaced, edges, tables, raw, log):
     determined = courses_with_radius(
         with_points, _courses_of(tables["circumferences"]), _courses_of(tables["offsets"])
     )
-    known = has_radii(tables)  # radii of courses that were not measured again
+    known = is_completed(tables)  # radii of courses that were not measured again
     for row, name, count in zip(courses.rows, courses.of("course"), counts, strict=True):
         if (name in determined - with_points or known) and not count:
             continue

@@ -10,7 +10,7 @@ from tankcal.job.checking import (
     tell_missing,
     temperature_missing,
 )
-from tankcal.job.checks.extent import has_radii, has_wall_points, is_strapped
+from tankcal.job.checks.extent import has_wall_points, is_completed, is_strapped
 from tankcal.job.checks.obstructions import check_obstructions
 from tankcal.job.checks.spans import check_spans
 from tankcal.job.contract.observations import READINGS
@@ -104,7 +104,7 @@ def _tell_each_course(tables, raw):
     has_others = any(has_rows(tables.get(name)) for name in others)
     has_complete_lines = has_rows(tables["lines"]) and has_rows(tables["offsets"])
     has_declared_radii = not is_not_given(raw, "radii", "source")
-    return not (is_unreadable or has_declared_radii or has_radii(tables)) and (
+    return not (is_unreadable or has_declared_radii or is_completed(tables)) and (
         has_complete_lines or not has_others
     )
 

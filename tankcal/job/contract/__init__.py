@@ -14,7 +14,6 @@ from tankcal.job.contract import (
     liquid,
     overrulings,
     points,
-    radii,
     roof,
     ship,
     stadia,
@@ -49,9 +48,9 @@ COLUMNS |= strapping.COLUMNS | lines.COLUMNS | stadia.COLUMNS
 for _method in methods():
     COLUMNS |= _method.columns()
     REGISTER_KEYS |= _method.register_fields()
-COLUMNS |= clouds.COLUMNS | liquid.COLUMNS | radii.COLUMNS
+COLUMNS |= clouds.COLUMNS | liquid.COLUMNS
 COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
-_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS | radii.KEYS
+_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 for _method in methods():
     _KEYS |= _method.settings()
@@ -65,7 +64,7 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "tangents": (),
     "cloud": (*clouds.COLUMNS, *clouds.BESIDE),
     "liquid": tuple(liquid.COLUMNS),
-    "radii": tuple(radii.COLUMNS),
+    "radii": (),
 }
 
 SURVEYS_OF_KIND = {}  # surveys whose tables for a kind of tank differ from SURVEYS

@@ -26,7 +26,6 @@ _WALL_WITHOUT_NAMES = (
     "circumferences",
     "offsets",
     "liquid",
-    "radii",
     "scan_targets",
 )
 MOST = 200  # largest number of decisions; more would replace the outlier test

@@ -18,7 +18,6 @@ from tankcal.job.model.parts import (
     Sphere,
     Top,
 )
-from tankcal.job.model.radii import Change, Radii
 from tankcal.job.model.settings import (
     Datum,
     DeclaredInput,
@@ -35,6 +34,7 @@ from tankcal.tank.rules.model import Rule
 
 if TYPE_CHECKING:
     from tankcal.job.model.clouds import Clouds
+    from tankcal.methods.radii.readings import Radii
     from tankcal.survey.measurements import Measurements
     from tankcal.survey.reference_line import ReferenceLines
     from tankcal.survey.strapping import Strapping
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Bottom",
-    "Change",
     "Course",
     "Datum",
     "Deadwood",
@@ -59,7 +58,6 @@ __all__ = [
     "Metering",
     "Overruling",
     "Points",
-    "Radii",
     "Ring",
     "Roof",
     "Ship",
@@ -144,8 +142,6 @@ class Job:
     radii : Radii or None
         Radii of the courses by a former table, a record or a declaration; alone, or in addition to
         a survey of some courses.
-    change : Change or None
-        Possible change of these radii; in addition to a survey.
     surveys : dict
         {name of a `methods.base.Method`: its readings}, for each method of the job that has no
         attribute of its own, such as "great_circles".
@@ -191,8 +187,7 @@ class Job:
     tangents: "Tangents | None" = None
     clouds: "Clouds | None" = None
     liquid: Metering | None = None
-    radii: Radii | None = None
-    change: Change | None = None
+    radii: "Radii | None" = None
     rings: tuple[Ring, ...] = ()
     surveys: dict = field(default_factory=dict)
     top: Top | None = None

@@ -234,10 +234,6 @@ EXAMPLES_OF_TABLES = {
             "time": "2026-05-04T08:35",
         },
     ],
-    "radii": [
-        {"course": "1", "radius_m": 6.5012, "u_mm": 0.3},
-        {"course": "2", "radius_m": 6.5004, "u_mm": 0.3},
-    ],
     "check": [{"point": "C1", "x_m": 6.5, "y_m": 0.02, "z_m": 2.85}],
     "setups": [{"setup": "S1-1", "station": "S1", "instrument": "TS", "instrument_height_m": 1.55}],
     "distances": [

@@ -14,18 +14,16 @@ from tankcal.job.contract import (
     tables_of_survey,
 )
 from tankcal.job.contract.keys import STARTS_OF_LIQUID, STARTS_OF_STRAPPING
-from tankcal.job.contract.radii import KEYS as OF_RADII
 from tankcal.job.contract.uncertainty import UNITS
 from tankcal.job.fields import Field
-from tankcal.methods.base import methods_for
+from tankcal.methods.base import methods, methods_for
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys without an adjustment of points
 METERED = "liquid"  # survey for every kind of tank
-DECLARED = "radii"  # radii of a former table, a record or a declaration
 # Surveys for vertical tanks; for other kinds see SURVEYS_OF_KIND.
 OF_SHELLS = (
-    *STRAPPED, *(method.starter for method in methods_for("vertical")), DECLARED,
+    *STRAPPED, *(method.starter for method in methods_for("vertical")),
 )  # fmt: skip
 OF_GREAT_CIRCLES = (("sphere", "ovality_mm"), ("sphere", "form_mm"))
 # Marks of CSV files from spreadsheets in these languages.
@@ -111,7 +109,7 @@ class Form:
             starts = dict(method.starts) if method.starter == self.survey else {}
             if f"{section}.{field.name}" in starts:
                 return starts[f"{section}.{field.name}"]
-        if self.survey in (METERED, DECLARED) and self.kind == "vertical":
+        if self.survey == METERED and self.kind == "vertical":
             return STARTS_OF_LIQUID.get(f"{section}.{field.name}", field.start)
         if self.survey in STRAPPED and self.kind == "sphere":
             return field.start if (section, field.name) != ("survey", "side") else "outside"
@@ -153,11 +151,17 @@ class Form:
             return False
         if (section, field.name) in OF_GREAT_CIRCLES and self.survey not in STRAPPED:
             return False
-        if section.startswith("adjustment") and self.survey in (*STRAPPED, METERED, DECLARED):
+        if section.startswith("adjustment") and self.survey in (*STRAPPED, METERED):
             return False
         if section == METERED and self.survey != METERED:
             return False
-        if section in OF_RADII and self.survey != DECLARED:
+        if any(section in method.settings() and self.survey != method.starter
+               for method in methods()):  # fmt: skip
+            return False
+        starting = (method for method in methods() if method.starter == self.survey)
+        if section.startswith("adjustment") and not all(
+            method.starter_has_network for method in starting
+        ):
             return False
         of_photos = section == "adjustment.camera" or field.name in OF_PHOTOS
         return field.suits(self.kind) and (self.survey == "photos" or not of_photos)

@@ -91,7 +91,6 @@ TABLE_NOTES = {
     "stadia": "one row for each reading of a stadia bar from a set-up; may stay empty",
     "scan_targets": "one row for each target in each scan; may stay empty",
     "liquid": "one row for the start of each run, and one for each batch with the dip after it",
-    "radii": "one row for each course, with its radius as a former table or a record has it",
 }
 for _method in methods():
     TABLE_NOTES |= _method.table_notes()

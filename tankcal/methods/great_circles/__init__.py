@@ -38,7 +38,7 @@ class GreatCirclesMethod(Method):
 
         check_great_circles(values, tables, registers, raw, log, is_given=self.is_given(tables))
 
-    def useless_inputs(self, tables):
+    def useless_inputs(self, values, tables):
         from tankcal.messages import message
 
         reason = message("from_circles", "its uncertainty comes from the great circles")

@@ -1,6 +1,6 @@
 """From a checked job to the body of its tank: all parts, with the enabled corrections."""
 
-from tankcal.pipeline.tanks.common import as_declared, thermal_scale
+from tankcal.pipeline.tanks.common import as_surveyed, thermal_scale
 from tankcal.pipeline.tanks.vertical import (
     critical_zone,
     insets_of,
@@ -10,7 +10,7 @@ from tankcal.pipeline.tanks.vertical import (
 )
 
 __all__ = [
-    "as_declared",
+    "as_surveyed",
     "body_of",
     "critical_zone",
     "heeled_body",

@@ -1,9 +1,8 @@
 """Parts common to all kinds of tank: unseen form, input values, deadwood and temperature."""
 
-from dataclasses import replace
-
 import numpy as np
 
+from tankcal.methods.base import method_of
 from tankcal.tank.factors import Factor
 from tankcal.tank.fittings import deadwood
 from tankcal.tank.heads import End, standard_end
@@ -147,25 +146,10 @@ def deadwood_part(items, zero_m):
     )
 
 
-def as_declared(job):
-    """Job whose survey has the conditions of its declared radii: inside, empty, their temperature.
-
-    A job without radii is returned unchanged. A survey of some courses is already included in the
-    radii.
-    """
-    if job.radii is None:
-        return job
-    temperature = job.radii.temperature_c
-    if temperature == job.table.reference_temperature_c:
-        temperature = None
-    survey = replace(
-        job.survey,
-        side="inside",
-        shell_temperature_c=temperature,
-        liquid_level_m=None,
-        liquid_density_kg_m3=None,
-    )
-    return replace(job, survey=survey)
+def as_surveyed(job, survey):
+    """Job in the state of its surveyed wall (`Method.job_as_surveyed`)."""
+    method = method_of(survey)
+    return job if method is None else method.job_as_surveyed(job)
 
 
 def thermal_scale(job, switches):

@@ -9,7 +9,7 @@ from tankcal.geometry.field.estimate import gauss_heights
 from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.job.plausibility import INSIDE, PLATES_TO_INSIDE
 from tankcal.pipeline.tanks.common import (
-    as_declared,
+    as_surveyed,
     deadwood_part,
     estimates_of,
     factor_of_unseen,
@@ -200,7 +200,7 @@ def vertical_body(job, wall, switches, uncertain):
     -------
     Body
     """
-    job = as_declared(job)
+    job = as_surveyed(job, wall)
     shell = _shell(job, wall, switches, uncertain)
     zero = shell_zero(job, wall)
     top_part = shell
@@ -342,7 +342,7 @@ def _shell(job, wall, switches, uncertain):
     features = _functionals(wall, volume) if uncertain else None
     bearing = bearing_inputs(job, switches)
     read_with = wall.read_with(features.weights) if uncertain else {}
-    if job.radii is None:  # otherwise the radii include these inputs
+    if not wall.has_applied_inputs:
         read_with = {name: column for name, column in read_with.items() if name in bearing}
     return ShellPart(
         volume,

@@ -7,7 +7,6 @@ the facts.
 
 from tankcal.report.dip_point import dip_point_text
 from tankcal.report.metered_liquid import metered_liquid_text
-from tankcal.report.radii import radii_source_text
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.words import method_line
 
@@ -141,9 +140,13 @@ REFERENCES = Table(
 )  # fmt: skip
 
 
-def _radii(paper, row):
-    """Return the source of former radii, or None."""
-    return radii_source_text(paper) if paper.record.get("radii") else None
+def radii_source_text(paper, row=None):
+    """Return the source of former radii with the note of the job; None without them."""
+    radii = paper.record.get("radii")
+    if not radii:
+        return None
+    text = paper.word(f"radii_sources.{radii['source']}")
+    return f"{text}: {radii['note']}" if radii["note"] else text
 
 
 def _survey(record):
@@ -171,7 +174,7 @@ SURVEY = Table(
     "survey",
     (
         Column("survey_method", text=_method, sheet=True),
-        Column("radii_source", text=_radii, sheet=True),
+        Column("radii_source", text=radii_source_text, sheet=True),
         Column("scanned", text=_scanned, sheet=True),
         Column("metered", text=_metered, sheet=True),
         Column("metered_liquid", text=_metered_liquid, sheet=True),

@@ -76,11 +76,10 @@ TABLES_SHEETS = {
         lambda record: (liquid.STEPS, liquid.DIPS, liquid.volumes_table(record)),
         omits_empty=True,
     ),
-    "radii": TablesSheet("radii", (tank.RADII,)),
 }
 
 
-_BEFORE_METHODS = "lines"  # the sheets of the methods follow this sheet
+_BEFORE_METHODS = "clouds"  # the sheets of the methods follow this sheet
 
 
 def tables_sheets(book, record):

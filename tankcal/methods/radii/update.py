@@ -1,8 +1,20 @@
-"""Upright tank with former radii, some of whose courses were measured again (see `radii_update`).
+"""Best linear unbiased update of former radii by a survey of some courses.
 
 The new and the former radius of a course are compared under one definition: radius of the mean area
 from joint to joint, inside, shell empty, at the temperature of the former radii. The survey gives
 this radius from a tank of its own, with all its causes of uncertainty.
+
+The radii r of n courses were determined once with an error and may have changed since. The former
+radii are r_f = r + p, with p of covariance P. A new survey measures some of them, y = H r + q, with
+q of covariance R. Both errors share causes such as the scale of a tape, with C = cov(p, q). Then
+
+    misclosure  v = y - H r_f,  S = H P H' + R - H C - C' H',
+    G = (P H' - C) S^-1,        r = r_f + G v,
+    error of r  (I - G H) p + G q,
+
+so each cause of p and of q propagates under its own name. Source: Robinson 1991 (best linear
+unbiased prediction). For one course and C = 0 this is recalibration by conditioning on one
+observation.
 """
 
 from dataclasses import dataclass, replace
@@ -13,8 +25,7 @@ from tankcal.errors import SolutionError
 from tankcal.geometry.field.components import KINDS
 from tankcal.job.model import Bottom
 from tankcal.messages import message
-from tankcal.pipeline.radii_update import LARGEST_W, update_radii
-from tankcal.pipeline.radii_wall import COMMON, Updated, causes_of, wall_of_radii
+from tankcal.methods.radii.wall import COMMON, causes_of, wall_of_radii
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import told_courses
@@ -25,7 +36,67 @@ FORM = "measured_form"  # form of the measured courses between their readings
 LEAST = 1e-9  # relative size below which a cause counts as rounding
 # These inputs move the joints together with the courses, so mean radii do not depend on them.
 NO_MEANING = ("datum", "course_heights")
+LARGEST_W = 3.0  # |w| of a course above which its former radius is rejected
 UNKNOWN_M = 1.0  # prior standard uncertainty of a radius that was not known
+
+
+@dataclass(frozen=True)
+class RadiiUpdate:
+    """Update of former radii by a survey of some courses.
+
+    Attributes
+    ----------
+    measured : ndarray of int, shape (k,)
+        Indices of the courses measured again.
+    misclosure_m, sd_m : ndarray, shape (k,)
+        New minus former radius, m, and its prior standard deviation, m.
+    gain : ndarray, shape (courses, k)
+        Gain matrix G.
+    """
+
+    measured: np.ndarray
+    misclosure_m: np.ndarray
+    sd_m: np.ndarray
+    gain: np.ndarray
+
+    @property
+    def w(self):
+        """Misclosures divided by their standard deviations, shape (k,)."""
+        return self.misclosure_m / self.sd_m
+
+    @property
+    def change_m(self):
+        """Change G v of the former radii, m, shape (courses,)."""
+        return self.gain @ self.misclosure_m
+
+    @property
+    def kept(self):
+        """Derivative I - G H of the updated radii by the former radii, shape (courses, courses)."""
+        derivative = np.eye(len(self.gain))
+        derivative[:, self.measured] -= self.gain
+        return derivative
+
+
+@dataclass(frozen=True)
+class Updated:
+    """Survey that updated former radii.
+
+    Attributes
+    ----------
+    surveyed : Wall or StrappedWall
+        Wall from the survey of some courses.
+    update : RadiiUpdate
+    found_m, u_found_m : ndarray, shape (k,)
+        Radii of the measured courses by the survey alone, and their standard uncertainties, m.
+    u_before_m : ndarray, shape (courses,)
+        Standard uncertainties of the former radii, with the declared change, m.
+    """
+
+    surveyed: object
+    update: RadiiUpdate
+    found_m: np.ndarray
+    u_found_m: np.ndarray
+    u_before_m: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -50,7 +121,7 @@ class Found:
     noise_m2: np.ndarray
 
 
-def update_by_survey(job, surveyed):
+def update_by_survey(job, surveyed, progress):
     """`RadiiWall` of a job that has former radii and a survey of some courses.
 
     Parameters
@@ -59,6 +130,8 @@ def update_by_survey(job, surveyed):
         Job with radii and change.
     surveyed : Wall or StrappedWall
         Wall of the new survey.
+    progress : callable
+        Called with a line of text as the step begins.
 
     Returns
     -------
@@ -70,8 +143,9 @@ def update_by_survey(job, surveyed):
         If the former radii do not explain the new radii, or if the declared shared uncertainty
         exceeds the uncertainty common to the new radii.
     """
-    measured = measured_courses(job, surveyed)
-    measured_radii, radii, change = _radii_by_survey(job, surveyed, measured), job.radii, job.change
+    progress(message("updating_radii", "bringing the former radii up to date"))
+    measured, radii, change = measured_courses(job, surveyed), job.radii, job.radii.change
+    measured_radii = _radii_by_survey(job, surveyed, measured)
     former = np.where(radii.is_known, radii.radius_m, job.tank.nominal_diameter_m / 2)
     former_causes = _former_causes(radii, change)
     prior = sum(cause.columns @ cause.columns.T for cause in former_causes)
@@ -94,6 +168,44 @@ def update_by_survey(job, surveyed):
     return replace(wall, updated=updated)
 
 
+def update_radii(prior_m2, measured, misclosure_m, noise_m2, shared_m=0.0):
+    """`RadiiUpdate` of former radii.
+
+    Parameters
+    ----------
+    prior_m2 : ndarray, shape (courses, courses)
+        Covariance P of the former radii, including their possible change, m2.
+    measured : ndarray of int, shape (k,)
+        Indices of the courses measured again.
+    misclosure_m : ndarray, shape (k,)
+        New minus former radii, m.
+    noise_m2 : ndarray, shape (k, k)
+        Covariance R of the new radii, m2.
+    shared_m : float
+        Standard uncertainty common to all former and new radii, m: C = shared^2 1 1'.
+
+    Returns
+    -------
+    RadiiUpdate
+
+    Examples
+    --------
+    Six courses with uncertainties of 0.7 mm (common) and 0.3 mm (each), changes of 0.8 mm (common)
+    and 0.3 mm (each), and one course measured again with 0.5 mm:
+
+    >>> prior = 1.13 * np.ones((6, 6)) + 0.18 * np.eye(6)
+    >>> found = update_radii(prior, np.array([0]), np.array([1.2]), np.array([[0.25]]))
+    >>> [round(float(one), 2) for one in (found.w[0], *found.change_m[:2])]
+    [0.96, 1.01, 0.87]
+    """
+    measured = np.asarray(measured, dtype=int)
+    common = shared_m**2
+    spread = prior_m2[np.ix_(measured, measured)] + noise_m2 - 2 * common
+    # The transposed system: S is symmetric, and P H' - C = (H P - C')'.
+    gain = np.linalg.solve(spread, prior_m2[measured] - common).T
+    return RadiiUpdate(measured, misclosure_m, np.sqrt(np.diag(spread)), gain)
+
+
 def measured_courses(job, surveyed):
     """Indices (k,) of the courses that the survey determines, from the bottom up."""
     courses_of_points = set()
@@ -107,8 +219,6 @@ def _radii_by_survey(job, surveyed, measured):
     # No bottom, deadwood, roof or liquid: the radii then describe the empty shell alone.
     job_of_survey = replace(
         job,
-        radii=None,
-        change=None,
         bottom=Bottom(),
         deadwood=(),
         roof=None,

@@ -1,7 +1,8 @@
-"""The part of the record on former radii, and on their update by a new survey."""
+"""Saved part of former radii, and of their update by a new survey."""
 
 import numpy as np
 
+from tankcal.record.choices import bottom_choice, roof_choice, top_choice
 from tankcal.record.schema import Saved, key
 
 
@@ -40,15 +41,13 @@ class RadiiRecord(Saved):
     courses: list[CourseByRadius] = key("from the bottom up")
 
 
-def radii_of(result):
-    """Return the `RadiiRecord` of a result; None if its wall has no declared radii."""
+def save_radii(result):
+    """`RadiiRecord` of a result."""
     wall, radii, change = result.radii, result.job.radii, None
-    if wall is None:
-        return None
     if wall.updated is not None:
-        from tankcal.pipeline.radii_update import LARGEST_W
+        from tankcal.methods.radii.update import LARGEST_W
 
-        declared = result.job.change
+        declared = radii.change
         change = ChangeOfRadii(declared.common_m, declared.own_m, declared.shared_m, LARGEST_W)
     return RadiiRecord(
         radii.source, radii.note, radii.temperature_c, radii.u_common_m, change, _courses(result)
@@ -86,3 +85,23 @@ def _survey_values(updated, course, is_known):
             values["misclosure_m"] = updated.update.misclosure_m[k]
             values["w"] = updated.update.w[k]
     return values
+
+
+def choices_of(result):
+    """Choices on former radii of the courses, and on their origin: {code: value}."""
+    job = result.job
+    temperature = "radii_applied" if job.switches.temperature else "off"
+    if job.radii.temperature_c == job.table.reference_temperature_c:
+        temperature = "radii_as_they_are"
+    return {
+        "bottom": bottom_choice(job),
+        **top_choice(job),
+        "radii": job.radii.source,
+        "radii_beside": "none" if result.radii.updated is None else "survey",
+        "between_sections": "radii",
+        "tilt": "not_known",
+        "course_heights": "along_axis",
+        "roof": roof_choice(job),
+        "thickness": "radii",
+        "temperature": temperature,
+    }

@@ -1,49 +1,30 @@
 """Upright tank defined by the radii of its courses.
 
 The radii come from a former table or record, or are declared. They are used alone, or updated by a
-survey of some courses (`partial_survey`).
+survey of some courses (`update`).
 
 Each radius is that of the circle of the mean area of a course, inside, shell empty, at its own
 reference temperature. The volume up to a joint therefore depends on the radii alone. Between joints
 the uncertainty includes the possible form of a course (`geometry.field.mean_field`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tankcal.geometry.field.mean_field import MeanField
 from tankcal.messages import message
-from tankcal.pipeline.radii_update import RadiiUpdate
 from tankcal.pipeline.strapped_wall import UprightAxis
 from tankcal.pipeline.tanks import shell_zero
 from tankcal.pipeline.wall import joints_of
 from tankcal.tank.factors import Factor
 from tankcal.uncertainty import factor_of
 
+if TYPE_CHECKING:
+    from tankcal.methods.radii.update import Updated
+
 OWN, COMMON = "course_radii", "course_radii_common"  # names of the causes in a budget
-
-
-@dataclass(frozen=True)
-class Updated:
-    """Survey that updated former radii.
-
-    Attributes
-    ----------
-    surveyed : Wall or StrappedWall
-        Wall from the survey of some courses.
-    update : RadiiUpdate
-    found_m, u_found_m : ndarray, shape (k,)
-        Radii of the measured courses by the survey alone, and their standard uncertainties, m.
-    u_before_m : ndarray, shape (courses,)
-        Standard uncertainties of the former radii, with the declared change, m.
-    """
-
-    surveyed: object
-    update: RadiiUpdate
-    found_m: np.ndarray
-    u_found_m: np.ndarray
-    u_before_m: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -71,10 +52,11 @@ class RadiiWall:
     radius_m: np.ndarray
     causes: tuple[Factor, ...]
     by_inputs: dict
-    updated: Updated | None = None
+    updated: "Updated | None" = None
     surveyed_as = "radii"
     shell = UprightAxis()
     without_inputs = ("offset", "scale", "tilt")  # of surveyed lengths
+    has_applied_inputs = True
     straps = None
 
     @property
@@ -137,3 +119,18 @@ def causes_of(radii):
         Factor(COMMON, common, u=1000 * radii.u_common_m, unit="mm", type="B"),
         Factor(OWN, factor_of(radii.covariance_m2), type="B"),
     )
+
+
+def job_as_declared(job):
+    """Job whose survey has the conditions of its radii: inside, empty, at their temperature."""
+    temperature = job.radii.temperature_c
+    if temperature == job.table.reference_temperature_c:
+        temperature = None
+    survey = replace(
+        job.survey,
+        side="inside",
+        shell_temperature_c=temperature,
+        liquid_level_m=None,
+        liquid_density_kg_m3=None,
+    )
+    return replace(job, survey=survey)

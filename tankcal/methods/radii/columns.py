@@ -25,6 +25,10 @@ RADII = (
     ),
 )
 COLUMNS = {"radii": RADII}
+EXAMPLES = (
+    {"course": "1", "radius_m": 6.5012, "u_mm": 0.3},
+    {"course": "2", "radius_m": 6.5004, "u_mm": 0.3},
+)
 
 
 def _mm(name, note):

@@ -1,18 +1,23 @@
 """Checks of declared radii as a whole: courses, dimensions, requirements of a new survey."""
 
-from tankcal.job.checking import is_not_given, missing_beside, refuse_repeated, tell
-from tankcal.job.checks.extent import has_radii, is_metered, is_surveyed
+from tankcal.job.checking import has_rows, is_not_given, missing_beside, refuse_repeated, tell
+from tankcal.job.checks.bearing import of_temperature
+from tankcal.job.checks.extent import is_metered, is_surveyed
 from tankcal.job.checks.strapping import refuse_others
-from tankcal.job.contract.radii import KEYS, NEEDED, NEEDED_OF_CHANGE
+from tankcal.job.covariance import Archive, read_covariance
 from tankcal.job.plausibility import DIAMETER_MISS, DIAMETER_MISS_M, IMPOSSIBLE_MISS
 from tankcal.messages import message
+from tankcal.methods.radii.columns import KEYS, NEEDED, NEEDED_OF_CHANGE
+
+COVARIANCE = Archive("radii_cov.npz", "courses", "radii.csv", 1)
 
 DIAMETER = (1.8, 2.2)  # ratio to the nominal radius that indicates a diameter
 
 
 def check_radii(values, tables, raw, log):
-    """Check courses, radii and required settings; parameters as for `check_all`."""
-    if not has_radii(tables):
+    """Check courses, radii, their covariance, and required settings; as for `Method.check`."""
+    read_radii_covariance(tables, raw, log)
+    if not has_rows(tables["radii"]):
         _tell_without_rows(raw, log)
         return
     table, courses = tables["radii"], tables["courses"]
@@ -144,3 +149,45 @@ def _check_settings(values, tables, raw, log):
             common=common,
         )
         refuse("change", "shared_mm", expected)
+
+
+def read_radii_covariance(tables, raw, log):
+    """Covariance matrix of the radii, in the order of radii.csv, m2; None if not given or invalid.
+
+    Parameters
+    ----------
+    tables, raw, log
+        As for `Method.check`.
+    """
+    radii, data = tables["radii"], raw.archives.get(COVARIANCE.file)
+    if data is None:
+        return None
+    if radii is None:
+        if "radii" not in raw.tables or raw.tables["radii"] is not None:  # else reported already
+            expected = message(
+                "covariance_without_radii",
+                "given without its radii; expected radii.csv beside it",
+            )
+            log.problem(COVARIANCE.file, expected)
+        return None
+    if radii.columns["u_mm"] is not None:
+        expected = message(
+            "covariance_beside_u",
+            "given together with u_mm of the radii; expected only one of them",
+        )
+        log.problem(COVARIANCE.file, expected)
+    return read_covariance(data, radii.of("course"), log, COVARIANCE)
+
+
+def useless_inputs(values, tables):
+    """Reasons for inputs without effect on radii alone; {} beside a survey."""
+    if is_surveyed(tables):
+        return {}
+    why = message(
+        "radii_are_inside",
+        "expected only with a survey: the radii are those of the empty shell, inside, with their"
+        " own uncertainty",
+    )
+    inputs = ("scale", "offset", "tilt", "paint", "shell_temperature", "survey_level")
+    reasons = of_temperature(values, values["radii"]["reference_temperature_c"])
+    return reasons | dict.fromkeys((*inputs, "survey_density"), why)

@@ -1,0 +1,121 @@
+"""Radii of the courses by a former table, a record or a declaration, alone or with a survey."""
+
+from tankcal.methods.base import Method
+
+
+class RadiiMethod(Method):
+    """Former radii of the courses; a survey of some courses updates them."""
+
+    name = "radii"
+    attribute = "radii"
+    kinds = ("vertical",)
+    tables = ("radii",)
+    archives = ("radii_cov.npz",)
+    starter = "radii"
+    starter_registers = ()
+    starter_has_network = False
+    starts = (("survey.side", "inside"), ("datum.bottom_z_m", "0.0"))
+    replaces_points = True
+    completes_survey = True
+    is_inside = True
+    saved_note = "radii of a former table; left out if there are none"
+
+    # ---- job
+
+    def columns(self):
+        from tankcal.methods.radii.columns import COLUMNS
+
+        return COLUMNS
+
+    def settings(self):
+        from tankcal.methods.radii.columns import KEYS
+
+        return KEYS
+
+    def table_notes(self):
+        note = "one row for each course, with its radius as a former table or a record has it"
+        return {"radii": note}
+
+    def examples(self):
+        from tankcal.methods.radii.columns import EXAMPLES
+
+        return {"radii": list(EXAMPLES)}
+
+    def no_rows(self):
+        from tankcal.messages import message
+
+        return message("no_rows_of_radii", "no rows; expected the radius of each course")
+
+    def check(self, values, tables, registers, raw, log):
+        from tankcal.methods.radii.checks import check_radii
+
+        check_radii(values, tables, raw, log)
+
+    def useless_inputs(self, values, tables):
+        from tankcal.methods.radii.checks import useless_inputs
+
+        return useless_inputs(values, tables)
+
+    def read(self, values, tables, registers, raw):
+        from tankcal.methods.radii.readings import make_radii
+
+        return make_radii(values, tables, raw)
+
+    # ---- pipeline
+
+    def finds(self, job):
+        return job.points is None and job.strapping is None
+
+    def find(self, job, progress, network):
+        from tankcal.methods.radii.wall import find_radii_wall
+        from tankcal.pipeline.surveying import Surveyed
+
+        return Surveyed(job, find_radii_wall(job, progress))
+
+    def complete(self, job, survey, progress):
+        from tankcal.methods.radii.update import update_by_survey
+
+        return update_by_survey(job, survey, progress)
+
+    def former_radii_m(self, job):
+        import numpy as np
+
+        nominal_m = job.tank.nominal_diameter_m / 2
+        return np.where(job.radii.is_known, job.radii.radius_m, nominal_m)
+
+    def job_as_surveyed(self, job):
+        from tankcal.methods.radii.wall import job_as_declared
+
+        return job_as_declared(job)
+
+    def inside_radii(self, job, survey):
+        from tankcal.pipeline.nominal_size import radii_of_courses
+
+        return radii_of_courses(job, survey.radius_m)
+
+    # ---- record
+
+    def saved_type(self):
+        from tankcal.methods.radii.saved import RadiiRecord
+
+        return RadiiRecord
+
+    def save(self, result):
+        from tankcal.methods.radii.saved import save_radii
+
+        return save_radii(result)
+
+    def choices(self, result):
+        from tankcal.methods.radii.saved import choices_of
+
+        return choices_of(result)
+
+    # ---- report
+
+    def report_tables(self):
+        from tankcal.methods.radii import tables
+
+        return tables
+
+    def sheets(self, record):
+        return [("radii", "radii_subtitle", [("radii", self.report_tables().RADII)])]
