@@ -158,7 +158,7 @@ def check_table(job, survey, computed, sighting=None):
     tuple of Problem
     """
     of_size = check_size(job, survey)
-    survey = getattr(survey, "surveyed", None) or survey  # warnings about what was measured
+    survey = getattr(survey, "surveyed", None) or survey  # warnings are about the measurements
     return (
         *of_size,
         *_check_survey(job, survey, computed.top_m),
