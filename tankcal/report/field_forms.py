@@ -1,15 +1,19 @@
 """Field sheets of a starter job: empty tables of readings to fill in by hand on site."""
 
 from tankcal.job.contract import columns_of, tables_of_survey
-from tankcal.job.starter.form import DECLARED, METERED, OF_SHELLS
+from tankcal.job.starter.form import METERED, STRAPPED
 from tankcal.job.starter.texts import split_unit, texts_in
-from tankcal.methods.base import methods
+from tankcal.methods.base import methods, methods_for
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
 
 FILE = "field-sheets.pdf"
 # Surveys recorded by hand.
-BY_PEN = (*(survey for survey in OF_SHELLS if survey != DECLARED), METERED)
+BY_PEN = (
+    *STRAPPED,
+    *(method.starter for method in methods_for("vertical") if method.field_forms),
+    METERED,
+)
 FORMS = (  # input tables of each form, read together, and the number of rows on a sheet
     (("lines",), 12),
     (("offsets",), 30),
