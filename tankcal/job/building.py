@@ -10,7 +10,6 @@ from tankcal.job.checks.extent import (
     has_clouds,
     has_shape,
     has_survey,
-    is_metered,
     is_sighted,
     is_strapped,
 )
@@ -25,7 +24,6 @@ from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
     CLOUD_TABLES,
     COVARIANCE_FILE,
-    LIQUID_TABLES,
     REGISTERS,
     STRAPPING_TABLES,
     SURVEY_TABLES,
@@ -102,10 +100,6 @@ def _make_surveys(raw, values, tables, registers):
         from tankcal.job.clouds import make_clouds
 
         surveys["clouds"] = make_clouds(values, tables, registers, raw)
-    if is_metered(tables):
-        from tankcal.job.liquid import make_metering
-
-        surveys["liquid"] = make_metering(values, tables, registers, raw)
     return surveys
 
 
@@ -117,7 +111,7 @@ def _read_tables(raw, registers, is_whole, log):
     for each file.
     """
     kind = kind_of(raw)
-    allowed = None if kind is None else TABLES_OF_KIND[kind] + LIQUID_TABLES
+    allowed = None if kind is None else TABLES_OF_KIND[kind]
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
     if kind == "vertical":
@@ -223,10 +217,6 @@ def _tell_clouds_missing(raw, tables, log):
 
 _IN_PLACE_OF_POINTS = {
     **{method.tables[0]: method.no_rows() for method in methods() if method.no_rows()},
-    "liquid": message(
-        "no_rows_of_liquid",
-        "no rows; expected the start of each run, and a row for each batch and the dip after it",
-    ),
     "circumferences": message(
         "no_circumferences", "no rows; expected a reading of the tape on each course at least"
     ),

@@ -6,11 +6,12 @@
 import datetime
 
 from tankcal.job.contract import COLUMNS, KEYS
-from tankcal.job.contract.keys import STARTS_OF_LIQUID, STARTS_OF_STRAPPING
+from tankcal.job.contract.keys import STARTS_OF_STRAPPING
 from tankcal.job.folder import read_folder
 from tankcal.job.sheets import read_workbook
 from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE, Log
 from tankcal.messages import message
+from tankcal.methods.base import methods
 from tankcal.text.form_words import NO, YES, meant
 from tankcal.text.numerals import NUMBER
 
@@ -106,7 +107,9 @@ def _starts(section, field):
     if (section, field.name) in OF_EVERY_FORM:
         return (*map(str, field.choices), "")
     name = f"{section}.{field.name}"
-    given = [start.get(name, "") for start in (STARTS_OF_STRAPPING, STARTS_OF_LIQUID)]
+    of_methods = (method.starter_settings(kind) for method in methods() for kind in method.kinds)
+    starts = (STARTS_OF_STRAPPING, *of_methods)
+    given = [start.get(name, "") for start in starts]
     return [_plain(start, field) for start in ("", field.start, *given)]
 
 

@@ -30,13 +30,12 @@ STRAPPING_TABLES = (
     *("lines", "offsets"),
 )
 CLOUD_TABLES = ("scan_targets",)
-LIQUID_TABLES = ("liquid",)
 OVERRULING_TABLES = ("overrulings",)
 # The input files of a record are in this order: first the methods for upright tanks.
 _UPRIGHT = tuple(table for method in methods_for("vertical") for table in method.tables)
 _OTHERS = tuple(table for method in methods() for table in method.tables if table not in _UPRIGHT)
 TABLES = TANK_TABLES + STRAPPING_TABLES + CLOUD_TABLES + _UPRIGHT
-TABLES += LIQUID_TABLES + _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
+TABLES += _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
 REGISTERS = {  # name of an entry in each list
     "cameras": "camera",
     "instruments": "instrument",

@@ -17,6 +17,7 @@ GROUP = "tankcal.methods"  # entry points of methods in other distributions
 _BUILT_IN = (
     "tankcal.methods.hits:HitsMethod",
     "tankcal.methods.tangents:TangentsMethod",
+    "tankcal.methods.liquid:LiquidMethod",
     "tankcal.methods.radii:RadiiMethod",
     "tankcal.methods.rings:RingsMethod",
     "tankcal.methods.great_circles:GreatCirclesMethod",
@@ -46,8 +47,6 @@ class Method:
         Files of arrays that belong to these tables; `RawJob.archives` has their content.
     starter : str or None
         Value of `tankcal new --survey` that starts a job with these tables.
-    starts : tuple of (str, str)
-        Initial values of settings in such a job: ("survey.side", "outside").
     starter_registers : tuple of str
         Lists in such a job.
     starter_has_network : bool
@@ -65,6 +64,9 @@ class Method:
         Whether the readings supply the courses that a survey of the wall does not measure.
     is_inside : bool
         Whether the readings, without a survey, are sizes of the inside.
+    is_supplement : bool
+        Whether the readings supplement a survey by other methods, or the drawing; `supplement`
+        combines them with it.
     is_smooth : bool
         Whether the readings show the wall smoother than it is.
     has_own_offset : bool
@@ -78,8 +80,12 @@ class Method:
         Whether `warnings` compares the size of the whole tank with the drawing.
     field_forms : tuple of (tuple of str, int)
         Forms of the field sheets: the tables filled in together, and the rows on a sheet.
+    field_facts : tuple of str
+        Facts at the head of the field sheets; (): the facts of a survey of the wall.
     csv_files : tuple of str
         Output files of `csv_tables`.
+    hidden_sheets : tuple of str
+        Sheets of the workbook for other programs, which are hidden.
     saved_note : str
         Description of the saved part in the JSON schema of the record.
     """
@@ -91,7 +97,6 @@ class Method:
     shared_tables = ()
     archives = ()
     starter = None
-    starts = ()
     starter_registers = ("instruments",)
     starter_has_network = True
     needs_station_heights = False
@@ -100,13 +105,16 @@ class Method:
     replaces_points = False
     completes_survey = False
     is_inside = False
+    is_supplement = False
     is_smooth = False
     has_own_offset = False
     names_levels = False
     has_named_points = False
     compares_size = False
     field_forms = ()
+    field_facts = ()
     csv_files = ()
+    hidden_sheets = ()
     saved_note = ""
 
     # ---- job
@@ -127,12 +135,24 @@ class Method:
         """Tables of a starter job, in their order."""
         return (*self.tables, *self.shared_tables)
 
+    def starter_settings(self, kind):
+        """Initial values of settings in a starter job for a kind of tank: {"survey.side": text}."""
+        return {}
+
+    def section_notes(self):
+        """English notes above the sections of job.toml in a starter: {section: note}."""
+        return {}
+
     def table_notes(self):
         """English notes above the tables in a starter: {table: note}."""
         return {}
 
     def examples(self):
         """Example rows for the notes of a starter: {table: list of {column: value}}."""
+        return {}
+
+    def setting_examples(self):
+        """Example values for a starter workbook: {"section.key" or "list.key": value}."""
         return {}
 
     def is_given(self, tables):
@@ -282,6 +302,27 @@ class Method:
         """
         raise NotImplementedError
 
+    def supplement(self, job, survey, progress):
+        """Combine the readings with a survey; for a method that is a supplement.
+
+        Parameters
+        ----------
+        job : Job
+        survey : object
+            Survey of the job.
+        progress : callable
+            Called with a message as a step begins.
+
+        Returns
+        -------
+        object
+            `body`: `Body` of the table. `body_for(density)`: the body for another density of the
+            liquid. `result(levels_m)`: results at the rows of the table, with the name of the
+            method as `surveyed_as`. `correction(corrections, gross_m3, top_m3)`: `Correction` of
+            the volume at the top row, or None.
+        """
+        raise NotImplementedError
+
     def warnings(self, job, survey, sights=None):
         """`Problem`s of a survey: undetermined quantities, outliers, disagreement.
 
@@ -289,7 +330,8 @@ class Method:
         ----------
         job : Job
         survey : object
-            Survey that `find` returned; of a method with sights, the wall fitted to their points.
+            Survey that `find` returned; of a method with sights, the wall fitted to their points;
+            of a supplement, its result.
         sights : object, optional
             Sights that `find` returned.
 
@@ -325,6 +367,29 @@ class Method:
         The cells of the report's notebook import it as `from tankcal.report.tables import NAME`.
         """
         raise AttributeError(f"the method {self.name} has no tables of the report")
+
+    def report_figures(self):
+        """Module with facts, sentences and figures of the reports.
+
+        The cells of the report's notebook import it as `from tankcal.report import NAME`.
+        """
+        raise AttributeError(f"the method {self.name} has no figures of the report")
+
+    def facts(self):
+        """`Column`s of facts of the survey, for certificate and workbook."""
+        return ()
+
+    def unchecked(self, paper):
+        """Sentences of the certificate on errors that the survey would not show."""
+        return []
+
+    def field_blocks(self, paper, texts):
+        """Blocks of the field sheets before the forms of its tables."""
+        return []
+
+    def field_columns(self, paper, columns):
+        """Columns (heading, unit, relative width) of the form of its first table."""
+        return columns
 
     def csv_tables(self):
         """Tables that are also written as CSV files: {name of the file without .csv: Table}."""
@@ -371,6 +436,11 @@ def method_of(survey):
 def given_methods(job):
     """Methods whose readings a `Job` contains."""
     return tuple(method for method in methods() if method.readings_of(job) is not None)
+
+
+def supplement_of(job):
+    """Given method that supplements the survey of a `Job`; None without one."""
+    return next((method for method in given_methods(job) if method.is_supplement), None)
 
 
 def is_sighted(job):

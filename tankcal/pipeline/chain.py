@@ -10,8 +10,8 @@ import numpy as np
 from tankcal.errors import InputError, Problem
 from tankcal.job import Job
 from tankcal.messages import message
-from tankcal.pipeline.corrections import correction_by_liquid, corrections_of, gross_at_top
-from tankcal.pipeline.liquid_geometry import filled_with
+from tankcal.methods.base import supplement_of
+from tankcal.pipeline.corrections import corrections_of, gross_at_top
 from tankcal.pipeline.overruling import effect_of, warn_of_overrulings
 from tankcal.pipeline.result import Result
 from tankcal.pipeline.simulation import gum_intervals, simulate_table
@@ -20,7 +20,7 @@ from tankcal.pipeline.statements import pairs_to_simulate, statements, verdict_o
 from tankcal.pipeline.survey_warnings import incomplete_certificate, open_questions
 from tankcal.pipeline.surveying import adjust_decided, find_survey, placed
 from tankcal.pipeline.table import check_table, compute_table
-from tankcal.pipeline.tanks import body_of
+from tankcal.pipeline.tanks import body_of, filled_with
 from tankcal.tank.dips import proportional_parts
 from tankcal.tank.falling_capacity import refuse_falling
 
@@ -96,14 +96,11 @@ def _run(job, progress, part_progress, simulated, cluster):
     original_job = job
     survey_result = find_survey(job, progress, cluster=cluster, part_progress=part_progress)
     job, survey, adjustment = survey_result.job, survey_result.survey, survey_result.adjustment
-    # The table may be that of liquid: the metered runs are adjusted first.
-    measured_liquid = None
-    if job.liquid is not None:
-        from tankcal.pipeline.liquid import measure_by_liquid
-
-        progress(message("adjusting_liquid", "adjusting the runs by liquid with the geometry"))
-        measured_liquid = measure_by_liquid(job, survey)
-    tabulation = compute_table(job, survey, progress, measured_liquid and measured_liquid.body)
+    # The table may be that of a supplement, such as metered liquid, which is adjusted first.
+    method, supplement = supplement_of(job), None
+    if method is not None:
+        supplement = method.supplement(job, survey, progress)
+    tabulation = compute_table(job, survey, progress, supplement and supplement.body)
     body, zero, table = tabulation.body, tabulation.zero_m, tabulation.table
     # Effect of overruled readings on the volume and the level of the top row.
     top = float(table.volume_m3[-1]), float(tabulation.levels_m[-1])
@@ -119,7 +116,7 @@ def _run(job, progress, part_progress, simulated, cluster):
         pairs = pairs_to_simulate(stated, job, body, table)
         simulation = simulate_table(job, survey, body, zero, table, pairs, progress=part_progress)
         intervals = simulation.intervals(table)
-    liquid = measured_liquid and measured_liquid.result(tabulation.levels_m)
+    supplemented = supplement and supplement.result(tabulation.levels_m)
     ship = None
     if job.ship is not None:
         from tankcal.pipeline.ship import ship_tables
@@ -127,14 +124,14 @@ def _run(job, progress, part_progress, simulated, cluster):
         ship = ship_tables(job, survey, body, table, progress=part_progress)
     return Result(
         job=job,
-        surveys=_surveys_by_kind(survey),
+        surveys=_surveys_by_kind(survey, supplemented),
         body=body,
         zero_m=zero,
         table=table,
         straightness=tabulation.straightness,
         proportional_parts=_proportional_parts(job, tabulation, intervals.U_m3),
-        corrections=_list_corrections(job, survey, tabulation, liquid),
-        by_density=_volumes_by_density(job, survey, tabulation.levels_m, zero, measured_liquid),
+        corrections=_list_corrections(job, survey, tabulation, supplement),
+        by_density=_volumes_by_density(job, survey, tabulation.levels_m, zero, supplement),
         stated=stated,
         simulation=simulation,
         intervals=intervals,
@@ -145,39 +142,36 @@ def _run(job, progress, part_progress, simulated, cluster):
             survey_result.sighting,
             survey,
             tabulation,
-            liquid,
+            supplemented,
             overruled,
         ),
         adjustment=adjustment,
         sights=survey_result.sights,
-        liquid=liquid,
         ship=ship,
         overrulings=overruled,
     )
 
 
-def _surveys_by_kind(survey):
-    """Surveys by `surveyed_as`: the survey, and the survey of some courses that it completes."""
-    surveys = (survey, getattr(survey, "surveyed", None))
+def _surveys_by_kind(survey, supplemented):
+    """Surveys by `surveyed_as`, with a survey of some courses that it completes."""
+    surveys = (survey, getattr(survey, "surveyed", None), supplemented)
     return {found.surveyed_as: found for found in surveys if found is not None}
 
 
-def _collect_warnings(job, adjustment, sighting, survey, tabulation, liquid, overruled):
+def _collect_warnings(job, adjustment, sighting, survey, tabulation, supplemented, overruled):
     """All warnings of a job, each with its place in the input."""
-    adjustment_warnings, liquid_warnings = (), ()
+    adjustment_warnings = of_supplement = ()
     if adjustment is not None:
         questions = open_questions(job, adjustment.datum, adjustment.causes)
         adjustment_warnings = (*adjustment.warnings, *questions, *_base_warnings(job, adjustment))
-    if liquid is not None:
-        from tankcal.pipeline.liquid_checks import check_liquid_result
-
-        liquid_warnings = check_liquid_result(job, liquid)
+    if supplemented is not None:
+        of_supplement = supplement_of(job).warnings(job, supplemented)
     warnings = (
         *job.warnings,
         *adjustment_warnings,
         *warn_of_overrulings(job, overruled),
         *check_table(job, survey, tabulation, sighting),
-        *liquid_warnings,
+        *of_supplement,
         *incomplete_certificate(job),
     )
     return placed(job, warnings)
@@ -272,19 +266,18 @@ def _proportional_parts(job, tabulation, U_m3):
     return proportional_parts(tabulation.volume_m3, edges, spec.step_m, PARTS, bound_m3)
 
 
-def _list_corrections(job, survey, tabulation, liquid):
-    """Corrections of the table; with a table by liquid, the effect of the liquid is the last."""
+def _list_corrections(job, survey, tabulation, supplement):
+    """Corrections of the table; the effect of a supplement is the last."""
     corrections = corrections_of(job, survey, tabulation.over_m)
-    if liquid is None or liquid.certified == "geometry":
+    if supplement is None:
         return corrections
     gross = gross_at_top(job, survey, tabulation.over_m)
-    return (
-        *corrections,
-        correction_by_liquid(corrections, gross, float(tabulation.table.volume_m3[-1])),
-    )
+    top = float(tabulation.table.volume_m3[-1])
+    by_supplement = supplement.correction(corrections, gross, top)
+    return corrections if by_supplement is None else (*corrections, by_supplement)
 
 
-def _volumes_by_density(job, survey, levels, zero_m, measured_liquid):
+def _volumes_by_density(job, survey, levels, zero_m, supplement):
     """Volumes at the rows of the table for each further density of the liquid.
 
     Density changes the liquid head and the draught of a floating roof.
@@ -292,10 +285,10 @@ def _volumes_by_density(job, survey, levels, zero_m, measured_liquid):
     volumes = {}
     for density in job.table.other_densities_kg_m3:
         filled = filled_with(job, density)
-        if measured_liquid is None:
+        if supplement is None:
             body = body_of(filled, survey, uncertain=False)
         else:
-            body = measured_liquid.body_for(density)
+            body = supplement.body_for(density)
         volumes[density] = body.volume_m3(levels)
         refuse_falling(filled, body, zero_m, levels - zero_m, volumes[density])
     return volumes

@@ -11,7 +11,6 @@ from tankcal.units import STANDARD_GRAVITY
 
 # Cited by title and edition only: the texts of paid standards were not read, so no clause is cited.
 ISO_7507 = "ISO 7507-1:2003"
-ISO_4269 = "ISO 4269:2001"
 TIMOSHENKO = "Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells"
 INSIDE_PLATE = message("inside_plate", "r_inside = r − t")
 INSIDE_PAINT = message("inside_paint", "r_inside = r − t − paint")
@@ -82,29 +81,6 @@ def corrections_of(job, survey, over_m=0.0):
             Correction(code, is_applied, size, 100 * size / reference, formula, source)
         )
     return tuple(corrections)
-
-
-def correction_by_liquid(corrections, gross_m3, top_m3):
-    """Return the `Correction` by metered runs at the top row: the rest after all other corrections.
-
-    Parameters
-    ----------
-    corrections : tuple of Correction
-    gross_m3, top_m3 : float
-        Volume at the top row without any correction, and according to the table.
-
-    Returns
-    -------
-    Correction
-    """
-    sum_m3 = sum(
-        correction.size_m3
-        for correction in corrections
-        if correction.applied and correction.code != "tilt"
-    )
-    size = top_m3 - gross_m3 - sum_m3
-    formula = message("by_liquid", "adjusted together with the metered volumes")
-    return Correction("liquid", True, size, 100 * size / gross_m3, formula, ISO_4269)
 
 
 def gross_at_top(job, survey, over_m=0.0):

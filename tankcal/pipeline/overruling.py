@@ -12,6 +12,7 @@ from tankcal.errors import HeightError, InputError, Problem, SolutionError
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.job.model.overrulings import Overruling
 from tankcal.messages import message
+from tankcal.methods.base import supplement_of
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.tanks import body_of
 
@@ -130,12 +131,11 @@ class _Attempt:
         """Solve a job with the given decisions only."""
         try:
             surveyed = find_survey(replace(job, overrulings=decisions), lambda text: None)
-            if job.liquid is None:
+            method = supplement_of(surveyed.job)
+            if method is None:
                 body = body_of(surveyed.job, surveyed.survey, uncertain=False)
             else:
-                from tankcal.pipeline.liquid import measure_by_liquid
-
-                body = measure_by_liquid(surveyed.job, surveyed.survey).body
+                body = method.supplement(surveyed.job, surveyed.survey, lambda text: None).body
             return cls(surveyed, float(body.volume_m3(np.array([level_m]))[0]))
         except (InputError, SolutionError, HeightError):
             return cls(None, np.nan)

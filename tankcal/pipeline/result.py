@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
     from tankcal.methods.radii.wall import RadiiWall
     from tankcal.pipeline.cloud_wall import Clouded
-    from tankcal.pipeline.liquid_result import LiquidResult
-    from tankcal.pipeline.nominal_wall import NominalWall
+    from tankcal.pipeline.liquid.nominal_wall import NominalWall
+    from tankcal.pipeline.liquid.result import LiquidResult
     from tankcal.pipeline.read_wall import ReadWall
     from tankcal.pipeline.scan import Scan
     from tankcal.pipeline.ship import ShipTables
@@ -55,14 +55,13 @@ class Result:
         The job as computed, with its points if these came from an adjustment.
     surveys : dict
         {`surveyed_as` of a survey: the survey}: the wall or solid that the measurements determine,
-        and with declared radii also the survey that checks them. The properties `wall`, `scan`,
-        `strapped`, `nominal`, `radii` and `rings` are entries of it. The survey of a method of
-        `tankcal.methods` has the name of the method, such as "great_circles".
+        with declared radii also the survey that checks them, and the results of a method that
+        supplements it. The properties `wall`, `scan`, `strapped`, `nominal`, `radii`, `rings` and
+        `liquid` are entries of it. The survey of a method of `tankcal.methods` has the name of the
+        method, such as "great_circles".
     sights : dict
         {method: its sights as points of the wall}; the properties `sighting`, `touching` and
         `clouded` are entries of it.
-    liquid : liquid.LiquidResult or None
-        Calibration by metered liquid, in addition to the geometry.
     ship : ship.ShipTables or None
         Corrections of soundings for trim and list of a ship's tank.
     body : body.Body
@@ -118,7 +117,6 @@ class Result:
     warnings: tuple[Problem, ...]
     adjustment: "Adjustment | None" = None
     sights: dict[str, object] = field(default_factory=dict)
-    liquid: "LiquidResult | None" = None
     ship: "ShipTables | None" = None
     overrulings: Overrulings | None = None
 
@@ -151,6 +149,11 @@ class Result:
     def rings(self):
         """Rings of a horizontal cylinder measured by strapping."""
         return self.surveys.get("rings")
+
+    @property
+    def liquid(self) -> "LiquidResult | None":
+        """Calibration by metered liquid, in addition to the geometry."""
+        return self.surveys.get("liquid")
 
     @property
     def sighting(self) -> "Sighting | None":

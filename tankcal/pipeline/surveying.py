@@ -193,10 +193,6 @@ def _survey(job, progress, network):
         from tankcal.pipeline.strapped_wall import find_strapped_wall
 
         return find_strapped_wall(job, progress, network.amplitudes)
-    if job.tank.kind == "vertical" and job.points is None and job.liquid is not None:
-        from tankcal.pipeline.nominal_wall import find_nominal_wall
-
-        return find_nominal_wall(job, progress)
     if job.tank.kind == "vertical":
         return find_wall(job, progress, network.dof, network.amplitudes)
     if job.mesh is not None:

@@ -3,9 +3,8 @@
 import numpy as np
 
 from tankcal.adjust import CRITICAL
-from tankcal.methods.base import given_methods
+from tankcal.methods.base import given_methods, supplement_of
 from tankcal.pipeline.tanks import as_surveyed
-from tankcal.record.liquid import geometry_beside
 from tankcal.record.schema import Saved, key
 from tankcal.record.table import zero_of
 
@@ -26,14 +25,14 @@ class Choice(Saved):
 def choices_of(result):
     """Return the `Choice`s of a result: all its assumptions."""
     job, survey = result.job, next(iter(result.surveys.values()), None)
-    of_methods = _choices_of_methods(result, ("vertical", "horizontal"))
+    of_methods = _choices_of_supplements(result)
+    of_methods |= _choices_of_methods(result, ("vertical", "horizontal"))
     # A record states these choices after those on the wall.
     later = {code: of_methods.pop(code) for code in _OF_EVERY_TANK if code in of_methods}
     values = {
         "zero": zero_of(result),
         **(_shell_choices(job, result) if result.wall is not None else {}),
         **(_strap_choices(job) if result.strapped is not None else {}),
-        **_liquid_choices(result),
         **of_methods,
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job, result),
@@ -149,8 +148,14 @@ def _choices_of_methods(result, kinds):
     """
     choices = {}
     for method in given_methods(result.job) if result.job.tank.kind in kinds else ():
-        choices |= method.choices(result)
+        choices |= {} if method.is_supplement else method.choices(result)
     return choices
+
+
+def _choices_of_supplements(result):
+    """Assumptions of a method that supplements the survey of any tank."""
+    method = supplement_of(result.job)
+    return {} if method is None else method.choices(result)
 
 
 def _sphere_choices(job):
@@ -158,23 +163,6 @@ def _sphere_choices(job):
     if job.sphere is not None and job.switches.head and job.table.pressure_pa:
         return {"pressure": job.table.pressure_pa / 1e5}
     return {}
-
-
-def _liquid_choices(result):
-    """Return the choices on metered liquid: the printed table, and the geometry used with it."""
-    if result.liquid is None:
-        return {}
-    job, geometry = result.job, geometry_beside(result)
-    choices = {"liquid": result.liquid.certified, "liquid_beside": geometry}
-    if geometry == "drawing":
-        choices |= {
-            "bottom": bottom_choice(job),
-            **top_choice(job),
-            "tilt": "not_measured",
-            "course_heights": "along_axis",
-            "roof": roof_choice(job),
-        }
-    return choices
 
 
 # ---- single choices
@@ -232,8 +220,6 @@ def _covariance_choice(job):
 
 
 def _thickness_choice(job, result):
-    if result.liquid is not None and geometry_beside(result) == "drawing":
-        return "drawing"
     if job.survey.side == "inside":
         return "inside"
     solid = job.horizontal or job.sphere

@@ -23,7 +23,6 @@ from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.choices import Choice, adjustment_choices, choices_of
 from tankcal.record.clouds import CloudsRecord, clouds_of
 from tankcal.record.lines import LinesRecord, lines_of
-from tankcal.record.liquid import LiquidRecord, liquid_of
 from tankcal.record.long_tables import LongTables
 from tankcal.record.schema import Saved, fill_from, key, to_plain
 from tankcal.record.ship import ShipRecord, ship_of
@@ -103,9 +102,6 @@ class Record(Saved, kw_only=True):
     surveys: dict = key(
         "saved part of each method", default_factory=dict, parts=saved_parts_of_methods
     )
-    liquid: LiquidRecord | None = key(
-        "metered runs; left out if there are none", default=None, optional=True
-    )
     ship: ShipRecord | None = key(
         "corrections for trim and list; left out if there are none", default=None, optional=True
     )
@@ -170,7 +166,6 @@ def record_of(result):
             strapping=strapping_of(result),
             lines=lines_of(result),
             clouds=clouds_of(result),
-            liquid=liquid_of(result),
             ship=ship_of(result),
             surveys=surveys_of(result),
             courses=survey.courses_of(result),

@@ -7,7 +7,6 @@ listed as missing.
 from tankcal.job.plausibility_table import CODES
 from tankcal.methods.base import methods
 from tankcal.report import blocks
-from tankcal.report.metered_liquid import hidden_errors
 from tankcal.report.tables.facts import (
     CERTIFICATE,
     REFERENCES,
@@ -59,7 +58,8 @@ def doubtful_input(paper):
 
     Such input can change the volume by far more than U. The blocks therefore follow the result.
     """
-    lines, hidden, notices = doubts_of(paper.record["warnings"]), hidden_errors(paper), []
+    hidden = [sentence for method in methods() for sentence in method.unchecked(paper)]
+    lines, notices = doubts_of(paper.record["warnings"]), []
     if lines:
         notices += [
             blocks.notice(paper.word("certificate.doubtful")),
@@ -122,8 +122,6 @@ def instruments_of(record):
             used |= method.certificates(record[method.name])
     for entry in (record.get("clouds") or {}).get("scanners", ()):
         used[entry["scanner"]] = entry["certificate"]
-    for entry in (record.get("liquid") or {}).get("meters", ()):
-        used[entry["meter"]] = entry["certificate"]
     if strapping:
         used |= certificates_of_tapes(strapping["tapes"])
     return used

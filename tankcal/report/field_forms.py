@@ -1,9 +1,9 @@
 """Field sheets of a starter job: empty tables of readings to fill in by hand on site."""
 
 from tankcal.job.contract import columns_of, tables_of_survey
-from tankcal.job.starter.form import METERED, STRAPPED
+from tankcal.job.starter.form import STRAPPED
 from tankcal.job.starter.texts import split_unit, texts_in
-from tankcal.methods.base import methods, methods_for
+from tankcal.methods.base import Method, methods, methods_for
 from tankcal.report import blocks
 from tankcal.report.plain import PlainPaper
 
@@ -12,7 +12,6 @@ FILE = "field-sheets.pdf"
 BY_PEN = (
     *STRAPPED,
     *(method.starter for method in methods_for("vertical") if method.field_forms),
-    METERED,
 )
 FORMS = (  # input tables of each form, read together, and the number of rows on a sheet
     (("lines",), 12),
@@ -25,7 +24,6 @@ FORMS = (  # input tables of each form, read together, and the number of rows on
     (("obstructions",), 9),
     (("thickness",), 8),
     (("tape_checks",), 4),
-    (("liquid",), 26),
 )
 ROWS_BESIDE = {("tangents", "directions"): 20}  # rows if another form is on the same page
 # Surveys with heights of the stations above the bottom.
@@ -41,8 +39,6 @@ ANGLES = ("direction", "zenith", "angle")
 OTHER_UNITS = ("_gon", "_dms")
 WIDE = {"name": 1.5, "text": 2.0}  # widths of columns relative to a column of numbers
 FACTS = ("tank", "date", "crew", "weather", "shell_temperature", "instruments", "masters")
-FACTS_OF_LIQUID = ("tank", "date", "crew", "weather", "calibrating_liquid", "dipped_by")
-ROWS_OF_METERS, ROWS_OF_VALVES = 5, 8  # rows of the forms for meters and for the tightness test
 
 
 def is_filled_by_pen(survey):
@@ -85,6 +81,8 @@ def sheets(survey, language, kind="vertical"):
     texts = texts_in(language)
     paper = PlainPaper(texts.words)
     title = paper.word("forms.title")
+    method = next((method for method in methods_for(kind) if method.starter == survey), Method())
+    facts = method.field_facts or FACTS
     shown = [
         blocks.document(
             title=title,
@@ -93,12 +91,10 @@ def sheets(survey, language, kind="vertical"):
             footer=texts.words["page"]["footer"],
         ),
         blocks.masthead(title, paper.word(f"forms.{_code(survey)}")),
-        blocks.key_values([(paper.word(f"forms.{fact}"), " ") for fact in _facts(survey)]),
+        blocks.key_values([(paper.word(f"forms.{fact}"), " ") for fact in facts]),
         blocks.paragraph(paper.word("forms.how")),
     ]
-    if survey == METERED:
-        shown.append(blocks.paragraph(paper.word("forms.batches")))
-        shown += [*_meters(paper, texts), *_valves(paper)]
+    shown += method.field_blocks(paper, texts)
     tables = tables_of_survey(kind, survey)
     forms = [(names, rows) for names, rows in FORMS if set(names) <= set(tables)]
     if any(_is_angle(field) for names, _ in forms for field in _columns(names, kind)):
@@ -107,50 +103,12 @@ def sheets(survey, language, kind="vertical"):
         titles = [texts.words["input"]["titles"][name] for name in names]
         columns = [_column(texts, field) for field in _columns(names, kind)]
         shown.append(blocks.heading("; ".join(titles)))
-        if names == ("liquid",):  # meters show totals; the office takes the differences
-            columns = [(heading, unit, 1.0) for heading, unit, _ in columns]
-            columns.insert(2, (paper.word("forms.meter_shows"), "", WIDE["name"]))
+        if names == method.tables[:1]:
+            columns = method.field_columns(paper, columns)
         shown.append(blocks.form(columns, ROWS_BESIDE.get((survey, names[0]), rows)))
         if names == ("setups",) and survey in HEIGHTS_OF:
             shown += _heights(paper, texts)
     return [*shown, blocks.signature([paper.word("forms.signed")])]
-
-
-def _facts(survey):
-    return FACTS_OF_LIQUID if survey == METERED else FACTS
-
-
-def _meters(paper, texts):
-    """Form of the meters, for the file meters.toml."""
-    labels = texts.words["input"]["labels"]
-    columns = [
-        (labels["meter"], "", WIDE["name"]),
-        (paper.word("forms.serial_number"), "", WIDE["name"]),
-        (paper.word("forms.prover"), "", WIDE["name"]),
-        (paper.word("forms.factor_before"), "", 1.0),
-        (paper.word("forms.factor_after"), "", 1.0),
-        (paper.word("forms.flows"), "m³/h", WIDE["name"]),
-    ]
-    return [
-        blocks.heading(texts.words["input"]["titles"]["meters"]),
-        blocks.form(columns, ROWS_OF_METERS),
-    ]
-
-
-def _valves(paper):
-    """Form for the level with all valves shut, before and after the filling."""
-    columns = [
-        (paper.word("forms.time"), "", 1.0),
-        (paper.word("forms.dip"), "m", 1.0),
-        (paper.word("forms.later"), "", 1.0),
-        (paper.word("forms.dip"), "m", 1.0),
-        (paper.word("forms.valves_shut"), "", WIDE["text"]),
-    ]
-    return [
-        blocks.heading(paper.word("forms.tight")),
-        blocks.paragraph(paper.word("forms.tight_how")),
-        blocks.form(columns, ROWS_OF_VALVES),
-    ]
 
 
 def _heights(paper, texts):

@@ -17,7 +17,6 @@ _NOT_IN_ALL = (  # keys that some kinds of record, or records of earlier version
     "strapping",
     "lines",
     "clouds",
-    "liquid",
     "radii",
     "ship",
     "overrulings",

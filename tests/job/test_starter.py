@@ -26,7 +26,7 @@ from tankcal.job.contract import (
 from tankcal.job.fields import Field
 from tankcal.job.rule_files import LIMITS, RULE, parse_rule, shipped_names
 from tankcal.job.starter import write_input_workbook, write_starter
-from tankcal.job.starter.form import METERED, OF_GREAT_CIRCLES, STRAPPED
+from tankcal.job.starter.form import OF_GREAT_CIRCLES, STRAPPED
 from tankcal.job.starter.page import filled_page
 from tankcal.job.tables import Log
 from tankcal.tank.rules import TANKS
@@ -109,7 +109,7 @@ def test_a_starter_for_a_survey(tmp_path, survey):
     elif survey == "radii":
         assert "adjustment" not in settings
         assert list(settings["radii"]) == [field.name for field in KEYS["radii"]]
-    elif survey == METERED:
+    elif survey == "liquid":
         assert "adjustment" not in settings
         assert list(settings["liquid"]) == [field.name for field in KEYS["liquid"]]
     else:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from metered_runs import fill, metered_job
 
-from tankcal.pipeline.liquid_adjustment import adjust_liquid
-from tankcal.pipeline.liquid_alone import geometry_alone
-from tankcal.pipeline.liquid_body import join_body
-from tankcal.pipeline.nominal_wall import find_nominal_wall
+from tankcal.pipeline.liquid.adjustment import adjust_liquid
+from tankcal.pipeline.liquid.alone import geometry_alone
+from tankcal.pipeline.liquid.body import join_body
+from tankcal.pipeline.liquid.nominal_wall import find_nominal_wall
 from tankcal.tank.solids import LyingTank, Sphere
 from tankcal.uncertainty import combine
 

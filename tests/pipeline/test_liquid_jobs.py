@@ -18,12 +18,12 @@ from numpy.testing import assert_allclose
 
 import tankcal
 from tankcal.job.model import DeclaredInput
-from tankcal.pipeline.liquid import measure_by_liquid
-from tankcal.pipeline.liquid_adjustment import adjust_liquid
-from tankcal.pipeline.liquid_alone import geometry_alone, geometry_beside
-from tankcal.pipeline.liquid_body import join_body
-from tankcal.pipeline.liquid_checks import check_liquid_result
-from tankcal.pipeline.liquid_naming import is_steady_leak
+from tankcal.methods.liquid.warnings import check_liquid
+from tankcal.pipeline.liquid.adjustment import adjust_liquid
+from tankcal.pipeline.liquid.alone import geometry_alone, geometry_beside
+from tankcal.pipeline.liquid.body import join_body
+from tankcal.pipeline.liquid.measuring import measure_by_liquid
+from tankcal.pipeline.liquid.naming import is_steady_leak
 from tankcal.pipeline.surveying import find_survey
 from tankcal.record import record_of
 from tankcal.report import certificate
@@ -93,7 +93,7 @@ def test_a_drift_with_time_has_a_test_of_its_own(upright, w, named, told):
     """The limit is 3.29, of one test in a thousand; a named cause is told in another warning."""
     found = run(upright).liquid
     leak = replace(next(filter(is_steady_leak, found.causes)), w=w, size=0.05, is_named=named)
-    problems = check_liquid_result(upright, replace(found, causes=(leak,)))
+    problems = check_liquid(upright, replace(found, causes=(leak,)))
     assert ("liquid_drifts" in [one.expected.code for one in problems]) is told
 
 

@@ -11,11 +11,11 @@ import pytest
 from metered_runs import Fault, fill, metered_job
 
 from tankcal.job.model import DeclaredInput
-from tankcal.pipeline.liquid_adjustment import adjust_liquid
-from tankcal.pipeline.liquid_alone import geometry_alone
-from tankcal.pipeline.liquid_geometry import Geometry
-from tankcal.pipeline.liquid_naming import alternatives_of, is_steady_leak
-from tankcal.pipeline.nominal_wall import find_nominal_wall
+from tankcal.pipeline.liquid.adjustment import adjust_liquid
+from tankcal.pipeline.liquid.alone import geometry_alone
+from tankcal.pipeline.liquid.geometry import Geometry
+from tankcal.pipeline.liquid.naming import alternatives_of, is_steady_leak
+from tankcal.pipeline.liquid.nominal_wall import find_nominal_wall
 from tankcal.tank.liquid import name_causes
 from tankcal.tank.solids import LyingTank
 

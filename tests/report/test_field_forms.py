@@ -7,7 +7,6 @@ import pytest
 
 from tankcal.cli import main
 from tankcal.job.contract import SURVEYS_OF_KIND, tables_of_survey
-from tankcal.job.starter.form import METERED
 from tankcal.job.starter.texts import texts_in
 from tankcal.report.field_forms import (
     BY_PEN,
@@ -29,8 +28,8 @@ HIGH_MM, ROW_MM = 245, 7  # of what is written on a page, and of a row
 @pytest.mark.parametrize(
     ("kind", "survey"),
     [
-        *(("vertical", one) for one in BY_PEN if one != METERED),
-        *((kind, one) for kind, own in SURVEYS_OF_KIND.items() for one in own),
+        *(("vertical", one) for one in BY_PEN if one != "liquid"),
+        *((kind, one) for kind, own in SURVEYS_OF_KIND.items() for one in own if one != "liquid"),
     ],
 )
 def test_every_table_of_readings_has_a_sheet(kind, survey, language):
@@ -100,7 +99,7 @@ def pages_of(path):
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_crew_that_fills_a_tank_writes_meters_valves_and_batches(language):
     """What the meter shows beside the batch: the office takes the difference."""
-    found = [block.data for block in sheets(METERED, language)]
+    found = [block.data for block in sheets("liquid", language)]
     words = texts_in(language).words
     titles = [one["text"] for one in found if one["kind"] == "heading"]
     of_tables = words["input"]["titles"]

@@ -13,13 +13,12 @@ from tankcal.job.checks.extent import (
     extent_of,
     has_shape,
     has_wall_points,
-    is_metered,
+    is_supplemented,
     wall_of,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
 from tankcal.job.checks.lines import check_lines
-from tankcal.job.checks.liquid import check_liquid
-from tankcal.job.checks.plausible import check_metering, check_plausible
+from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps
 from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
@@ -70,9 +69,6 @@ def check_all(values, tables, registers, raw, is_whole, log):
             method.check(values, tables, registers, raw, log)
         check_tiny_sds(tables, registers, raw, log)
         check_clouds(values, tables, registers, raw, log)
-        check_liquid(values, tables, registers, raw, log)
-        if values is not None:
-            check_metering(values, tables, registers, raw, log)
     check_survey(values, tables, registers, raw, is_whole, log)
     if tables["overrulings"] is not None:
         check_overrulings(tables["overrulings"], tables, is_whole, log)
@@ -117,7 +113,7 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
         if points is not None:
             check_cylinder(points, tables, values, raw, log)
         check_bottom(values, tables["bottom"], points, extent, raw, log)
-        check_top(values, is_metered(tables), raw, log)
+        check_top(values, is_supplemented(tables), raw, log)
         check_roof(values["roof"], extent, raw, log)
     elif has_rows(points):
         check_scan(points, values, kind, raw, log)
@@ -143,4 +139,5 @@ def _is_measured(kind, tables, raw):
     return any(
         method.is_given(tables) or raw.tables.get(method.tables[0], ()) is None
         for method in methods_for(kind)
+        if not method.is_supplement
     )

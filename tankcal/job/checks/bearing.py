@@ -5,8 +5,8 @@ from tankcal.job.checks.extent import (
     has_clouds,
     has_inside_sizes,
     has_wall_points,
-    is_metered_alone,
     is_strapped,
+    is_unsurveyed,
     may_be_seen_from_both_sides,
     wall_of,
 )
@@ -135,7 +135,7 @@ def _has_own_offset(tables):
         any(method.has_own_offset and method.is_given(tables) for method in methods())
         or has_clouds(tables)
         or (is_strapped(tables) and not has_wall_points(tables))
-        or is_metered_alone(tables)
+        or is_unsurveyed(tables)
     )
 
 

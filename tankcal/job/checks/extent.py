@@ -31,9 +31,9 @@ def has_clouds(tables):
     return has_rows(tables.get("clouds"))
 
 
-def is_metered(tables):
-    """Return True if metered liquid was filled or drawn off between dips."""
-    return has_rows(tables.get("liquid"))
+def is_supplemented(tables):
+    """Return True if readings supplement a survey or the drawing, such as metered liquid."""
+    return any(method.is_supplement and method.is_given(tables) for method in methods())
 
 
 def is_surveyed(tables):
@@ -44,11 +44,7 @@ def is_surveyed(tables):
 def has_shape(tables):
     """Return True if measurements other than points.csv determine the wall of a vertical tank."""
     has_readings = has_survey(tables) or is_strapped(tables) or is_sighted(tables)
-    return (
-        has_readings
-        or is_metered(tables)
-        or any(method.replaces_points for method in _given(tables))
-    )
+    return has_readings or any(method.replaces_points for method in _given(tables))
 
 
 def is_completed(tables):
@@ -66,9 +62,9 @@ def _given(tables):
     return [method for method in methods_for("vertical") if method.is_given(tables)]
 
 
-def is_metered_alone(tables):
-    """Return True if only metered liquid and nominal dimensions determine the tank."""
-    return is_metered(tables) and not is_surveyed(tables)
+def is_unsurveyed(tables):
+    """Return True if only such readings and nominal dimensions determine the tank."""
+    return is_supplemented(tables) and not is_surveyed(tables)
 
 
 def is_sighted(tables):
@@ -97,7 +93,8 @@ def wall_of(tables):
     """Origin of the wall of a lying tank: "points", "straps", or None for its dimensions."""
     if has_wall_points(tables):
         return "points"
-    is_measured = any(method.is_given(tables) for method in methods_for("horizontal"))
+    of_wall = (method for method in methods_for("horizontal") if not method.is_supplement)
+    is_measured = any(method.is_given(tables) for method in of_wall)
     return "straps" if is_strapped(tables) or is_measured else None
 
 

@@ -11,7 +11,6 @@ from tankcal.job.contract import (
     courses,
     deadwood,
     lines,
-    liquid,
     overrulings,
     points,
     roof,
@@ -48,9 +47,8 @@ COLUMNS |= strapping.COLUMNS | lines.COLUMNS | stadia.COLUMNS
 for _method in methods():
     COLUMNS |= _method.columns()
     REGISTER_KEYS |= _method.register_fields()
-COLUMNS |= clouds.COLUMNS | liquid.COLUMNS
-COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
-_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS | liquid.KEYS
+COLUMNS |= clouds.COLUMNS | SURVEY_COLUMNS | overrulings.COLUMNS
+_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 for _method in methods():
     _KEYS |= _method.settings()
@@ -63,7 +61,7 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
     "tangents": (),
     "cloud": (*clouds.COLUMNS, *clouds.BESIDE),
-    "liquid": tuple(liquid.COLUMNS),
+    "liquid": (),
     "radii": (),
 }
 

@@ -331,4 +331,3 @@ KEYS = {
 
 # Values that starter forms of these surveys contain, in place of `start`.
 STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
-STARTS_OF_LIQUID = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # vertical tanks only

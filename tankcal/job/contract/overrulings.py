@@ -25,7 +25,6 @@ READINGS = tuple(name for name in OF_SURVEYS if name not in (*_WITHOUT_READINGS,
 _WALL_WITHOUT_NAMES = (
     "circumferences",
     "offsets",
-    "liquid",
     "scan_targets",
 )
 MOST = 200  # largest number of decisions; more would replace the outlier test

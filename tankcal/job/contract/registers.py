@@ -4,7 +4,6 @@ from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
 from tankcal.job.contract.clouds import CLOUD
 from tankcal.job.contract.lines import PLUMMET
-from tankcal.job.contract.liquid import METER
 from tankcal.job.contract.ranging import RANGING
 from tankcal.job.contract.shorthand import FREE
 from tankcal.job.contract.stadia import BAR
@@ -268,7 +267,6 @@ REGISTER_KEYS = {
     "cameras": CAMERA,
     "instruments": (*INSTRUMENT, *TAPE, *PLUMMET, *RANGING, *BAR),
     "clouds": CLOUD,
-    "meters": METER,
 }
 REGISTERS_OF_SURVEY = {
     "photos": ("cameras", "instruments"),
@@ -277,7 +275,6 @@ REGISTERS_OF_SURVEY = {
     "reference-line": ("instruments",),
     "triangulation": ("instruments",),
     "cloud": ("clouds", "instruments"),
-    "liquid": ("meters",),
 }
 # Keys of [adjustment] that require photographs.
 OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field", "image_weights")

@@ -39,7 +39,7 @@ def depth_of_top(values):
     return None if diameter is None else depth_of_head(given, given["depth_m"], diameter)
 
 
-def check_top(values, is_metered, raw, log):
+def check_top(values, is_supplemented, raw, log):
     """Check that a head has a form and sizes, and sizes that fit the diameter."""
     given, form, depth = values["top"], values["top"]["form"], values["top"]["depth_m"]
     diameter = values["tank"]["nominal_diameter_m"]
@@ -51,7 +51,7 @@ def check_top(values, is_metered, raw, log):
         return
     if form is None:
         return
-    if is_metered:
+    if is_supplemented:
         expected = message(
             "top_beside_liquid",
             "given together with liquid.csv; expected a blank: metered runs calibrate only the"

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from tankcal.job.model.liquid import Meter, Metering
 from tankcal.job.model.overrulings import Overruling
 from tankcal.job.model.parts import (
     Bottom,
@@ -34,6 +33,7 @@ from tankcal.tank.rules.model import Rule
 
 if TYPE_CHECKING:
     from tankcal.job.model.clouds import Clouds
+    from tankcal.methods.liquid.readings import Metering
     from tankcal.methods.radii.readings import Radii
     from tankcal.survey.measurements import Measurements
     from tankcal.survey.reference_line import ReferenceLines
@@ -54,8 +54,6 @@ __all__ = [
     "Job",
     "Material",
     "Mesh",
-    "Meter",
-    "Metering",
     "Overruling",
     "Points",
     "Ring",
@@ -186,7 +184,7 @@ class Job:
     hits: "WallHits | None" = None
     tangents: "Tangents | None" = None
     clouds: "Clouds | None" = None
-    liquid: Metering | None = None
+    liquid: "Metering | None" = None
     radii: "Radii | None" = None
     rings: tuple[Ring, ...] = ()
     surveys: dict = field(default_factory=dict)

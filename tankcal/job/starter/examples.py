@@ -48,13 +48,6 @@ EXAMPLES_OF_KEYS = {
     "bottom.centre_z_m": -0.15,
     "shell.shape_sd_mm": 5.0,
     "strapping.wave_mm": 20.0,
-    "liquid.density_kg_m3": 998.2,
-    "liquid.density_temperature_c": 20.0,
-    "liquid.expansion_per_k": 2.1e-4,
-    "liquid.u_density_kg_m3": 0.2,
-    "liquid.s_dip_mm": 0.5,
-    "liquid.u_dip_zero_mm": 0.5,
-    "liquid.run_ppm": 100.0,
     "radii.source": "table",
     "radii.u_common_mm": 0.7,
     "radii.reference_temperature_c": 15.0,
@@ -91,12 +84,6 @@ EXAMPLES_OF_KEYS = {
     "clouds.u_scale_ppm": 10.0,
     "clouds.s_translation_mm": 0.0,
     "clouds.s_rotation_arcsec": 8.0,
-    "meters.factor": 1.00052,
-    "meters.u_factor_ppm": 400.0,
-    "meters.k": 2.0,
-    "meters.repeatability_ppm": 100.0,
-    "meters.fixed_l": 2.0,
-    "meters.certificate": "V 31/2026",
 }
 EXAMPLES_OF_TABLES = {
     "points": [
@@ -220,20 +207,6 @@ EXAMPLES_OF_TABLES = {
         {"scan": "A", "target": "T1", "x_m": 4.2153, "y_m": -1.0482, "z_m": 0.3127, "s_mm": 1.0},
         {"scan": "A", "target": "T2", "x_m": -3.3318, "y_m": 2.7604, "z_m": 2.1145, "s_mm": 1.0},
     ],
-    "liquid": [
-        {"run": "1", "meter": "M-3", "volume_m3": 0.0, "time": "2026-05-04T08:00"},
-        {
-            "run": "1",
-            "meter": "M-3",
-            "volume_m3": 20.034,
-            "dip_m": 0.3012,
-            "meter_temperature_c": 18.4,
-            "tank_temperature_c": 18.1,
-            "shell_temperature_c": 19.0,
-            "flow_m3_h": 60.0,
-            "time": "2026-05-04T08:35",
-        },
-    ],
     "check": [{"point": "C1", "x_m": 6.5, "y_m": 0.02, "z_m": 2.85}],
     "setups": [{"setup": "S1-1", "station": "S1", "instrument": "TS", "instrument_height_m": 1.55}],
     "distances": [
@@ -272,4 +245,5 @@ EXAMPLES_OF_TABLES = {
     ],
 }
 for _method in methods():
+    EXAMPLES_OF_KEYS |= _method.setting_examples()
     EXAMPLES_OF_TABLES |= _method.examples()

@@ -13,14 +13,13 @@ from tankcal.job.contract import (
     TABLES_OF_KIND,
     tables_of_survey,
 )
-from tankcal.job.contract.keys import STARTS_OF_LIQUID, STARTS_OF_STRAPPING
+from tankcal.job.contract.keys import STARTS_OF_STRAPPING
 from tankcal.job.contract.uncertainty import UNITS
 from tankcal.job.fields import Field
 from tankcal.methods.base import methods, methods_for
 from tankcal.text.languages import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys without an adjustment of points
-METERED = "liquid"  # survey for every kind of tank
 # Surveys for vertical tanks; for other kinds see SURVEYS_OF_KIND.
 OF_SHELLS = (
     *STRAPPED, *(method.starter for method in methods_for("vertical")),
@@ -59,10 +58,9 @@ class Form:
         _refuse_others(self.language, LANGUAGES)
         if self.survey is not None:
             _refuse_others(self.survey, SURVEYS)
-            has_none = "points" not in TABLES_OF_KIND[self.kind] and self.survey != METERED
-            of_other = self.survey in OF_SHELLS and self.kind != "vertical"
-            of_other &= self.survey not in SURVEYS_OF_KIND.get(self.kind, {})
-            if has_none or of_other:
+            has_points = "points" in TABLES_OF_KIND[self.kind] and self.survey not in OF_SHELLS
+            is_own = self.survey in SURVEYS_OF_KIND.get(self.kind, {})
+            if not (has_points or is_own or self.kind == "vertical"):
                 raise ValueError(f"a tank of kind {self.kind} has no survey; expected another kind")
 
     @property
@@ -106,11 +104,9 @@ class Form:
         if section == "csv" and self.language != DEFAULT:
             return DECIMAL_COMMAS[field.name]
         for method in methods_for(self.kind):
-            starts = dict(method.starts) if method.starter == self.survey else {}
+            starts = method.starter_settings(self.kind) if method.starter == self.survey else {}
             if f"{section}.{field.name}" in starts:
                 return starts[f"{section}.{field.name}"]
-        if self.survey == METERED and self.kind == "vertical":
-            return STARTS_OF_LIQUID.get(f"{section}.{field.name}", field.start)
         if self.survey in STRAPPED and self.kind == "sphere":
             return field.start if (section, field.name) != ("survey", "side") else "outside"
         if self.survey in STRAPPED:
@@ -151,9 +147,7 @@ class Form:
             return False
         if (section, field.name) in OF_GREAT_CIRCLES and self.survey not in STRAPPED:
             return False
-        if section.startswith("adjustment") and self.survey in (*STRAPPED, METERED):
-            return False
-        if section == METERED and self.survey != METERED:
+        if section.startswith("adjustment") and self.survey in STRAPPED:
             return False
         if any(section in method.settings() and self.survey != method.starter
                for method in methods()):  # fmt: skip

@@ -41,7 +41,6 @@ SECTION_NOTES = {
     "material": "the shell's steel",
     "shell": "how far the wall is from a circle",
     "strapping": "how the tape lay",
-    "liquid": "the liquid that was metered into the tank, and how well its dips were read",
     "radii": "the radii of radii.csv: where they come from, and how well they are known",
     "change": "only beside a new survey of some courses: how far the radii may have changed since",
     "checks": "only compared, to tell a slip of the hand: nothing here changes a number",
@@ -90,9 +89,9 @@ TABLE_NOTES = {
     "offsets": "one row for each reading of the wall's offset; repeated readings are repeated rows",
     "stadia": "one row for each reading of a stadia bar from a set-up; may stay empty",
     "scan_targets": "one row for each target in each scan; may stay empty",
-    "liquid": "one row for the start of each run, and one for each batch with the dip after it",
 }
 for _method in methods():
+    SECTION_NOTES |= _method.section_notes()
     TABLE_NOTES |= _method.table_notes()
 REGISTER_NOTES = {
     "cameras": "one section for each camera; put its name, as in photos.csv, in place of NAME",

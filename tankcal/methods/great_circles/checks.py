@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from tankcal.job.checking import tell
-from tankcal.job.checks.extent import has_wall_points, is_metered
+from tankcal.job.checks.extent import has_wall_points, is_supplemented
 from tankcal.job.checks.strapping import (
     MOST_STRAPS,
     check_girths,
@@ -44,7 +44,7 @@ def check_great_circles(values, tables, registers, raw, log, *, is_given):
             " comes from either",
         )
         log.problem(table.file, expected)
-    if is_metered(tables):
+    if is_supplemented(tables):
         expected = message(
             "liquid_beside_circles", "given together with great_circles.csv; expected only one"
         )

@@ -17,7 +17,6 @@ class InsideHitsMethod(Method):
         *("setups", "control", "directions", "zenith_angles", "slope_distances"),
     )
     starter = "wall-hits"
-    starts = (("survey.side", "inside"),)
     needs_station_heights = True
     is_sighted = True
     has_own_offset = True
@@ -32,6 +31,9 @@ class InsideHitsMethod(Method):
         from tankcal.methods.hits.columns import COLUMNS
 
         return COLUMNS
+
+    def starter_settings(self, kind):
+        return {"survey.side": "inside"}
 
     def check(self, values, tables, registers, raw, log):
         from tankcal.methods.inside_hits.checks import check_inside_hits

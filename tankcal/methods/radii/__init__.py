@@ -14,7 +14,6 @@ class RadiiMethod(Method):
     starter = "radii"
     starter_registers = ()
     starter_has_network = False
-    starts = (("survey.side", "inside"), ("datum.bottom_z_m", "0.0"))
     replaces_points = True
     completes_survey = True
     is_inside = True
@@ -31,6 +30,9 @@ class RadiiMethod(Method):
         from tankcal.methods.radii.columns import KEYS
 
         return KEYS
+
+    def starter_settings(self, kind):
+        return {"survey.side": "inside", "datum.bottom_z_m": "0.0"}
 
     def table_notes(self):
         note = "one row for each course, with its radius as a former table or a record has it"

@@ -2,7 +2,7 @@
 
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, refuse_repeated, tell
 from tankcal.job.checks.bearing import of_temperature
-from tankcal.job.checks.extent import is_metered, is_surveyed
+from tankcal.job.checks.extent import is_supplemented, is_surveyed
 from tankcal.job.checks.strapping import refuse_others
 from tankcal.job.covariance import Archive, read_covariance
 from tankcal.job.plausibility import DIAMETER_MISS, DIAMETER_MISS_M, IMPOSSIBLE_MISS
@@ -26,7 +26,7 @@ def check_radii(values, tables, raw, log):
     refuse_others(table, "course", known, log)
     if not is_surveyed(tables) and not _has_unreadable_survey(raw):
         _refuse_gaps(table, courses, log)
-    if is_metered(tables):
+    if is_supplemented(tables):
         expected = message(
             "radii_beside_liquid",
             "given beside {file}; expected only one of them",

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from tankcal.job.checking import has_rows, refuse_repeated
-from tankcal.job.checks.extent import has_wall_points, is_metered, is_strapped
+from tankcal.job.checks.extent import has_wall_points, is_strapped, is_supplemented
 from tankcal.job.checks.strapping import (
     END_M,
     MOST_STRAPS,
@@ -74,7 +74,7 @@ def _are_both_there(tables, raw, log):
 def _refuse_beside(tables, log):
     for is_there, what in (
         (has_wall_points(tables), message("points_beside_rings", "points of the wall")),
-        (is_metered(tables), message("metered_runs", "runs of metered liquid")),
+        (is_supplemented(tables), message("metered_runs", "runs of metered liquid")),
     ):
         if is_there:
             expected = message(

@@ -15,7 +15,6 @@ class TangentsMethod(Method):
         *("stadia", "circumferences", "obstructions"),
     )
     starter = "tangents"
-    starts = (("survey.side", "outside"),)
     needs_station_heights = True
     tables_with_sds = ("tangents",)
     is_sighted = True
@@ -32,6 +31,9 @@ class TangentsMethod(Method):
         from tankcal.methods.tangents.columns import TANGENTS
 
         return {"tangents": TANGENTS}
+
+    def starter_settings(self, kind):
+        return {"survey.side": "outside"}
 
     def table_notes(self):
         return {"tangents": "one row for each sight to a limb of the tank, from outside"}

@@ -1,6 +1,6 @@
 """From a checked job to the body of its tank: all parts, with the enabled corrections."""
 
-from tankcal.pipeline.tanks.common import as_surveyed, thermal_scale
+from tankcal.pipeline.tanks.common import as_surveyed, filled_with, thermal_scale
 from tankcal.pipeline.tanks.vertical import (
     critical_zone,
     insets_of,
@@ -13,6 +13,7 @@ __all__ = [
     "as_surveyed",
     "body_of",
     "critical_zone",
+    "filled_with",
     "heeled_body",
     "insets_of",
     "shell_volume",

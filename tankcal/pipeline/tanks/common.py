@@ -1,5 +1,7 @@
 """Parts common to all kinds of tank: unseen form, input values, deadwood and temperature."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from tankcal.methods.base import method_of
@@ -150,6 +152,15 @@ def as_surveyed(job, survey):
     """Job in the state of its surveyed wall (`Method.job_as_surveyed`)."""
     method = method_of(survey)
     return job if method is None else method.job_as_surveyed(job)
+
+
+def filled_with(job, density_kg_m3):
+    """Return the job with another liquid, which also supports the floating roof."""
+    if density_kg_m3 is None:
+        return job
+    density = float(density_kg_m3)
+    roof = job.roof and replace(job.roof, reference_density_kg_m3=density)
+    return replace(job, table=replace(job.table, liquid_density_kg_m3=density), roof=roof)
 
 
 def thermal_scale(job, switches):

@@ -5,12 +5,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from tankcal.job.checks.liquid import MOST_ROWS
 from tankcal.planning.wall.checks import least_ring_m
 from tankcal.planning.wall.filling import LEAST_STEP_M, SAME_M
 from tankcal.planning.wall.model import USUAL_AT, PlannedStrap, even_radius_m
 from tankcal.planning.wall.reading import change_plan, lengths_of_bars
 from tankcal.survey.tangents import FEWEST_SETUPS
+from tankcal.tank.liquid.reduction import MOST_ROWS
 
 OF_FILLING = ("step", "top_of_run", "half_steps", "empty_start", "run")
 SEARCHED = (

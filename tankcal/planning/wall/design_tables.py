@@ -9,7 +9,6 @@ from itertools import islice
 import numpy as np
 
 from tankcal.job.checks.lines import MOST_OFFSETS
-from tankcal.job.checks.liquid import MOST_ROWS
 from tankcal.job.checks.strapping import MOST_STRAPS
 from tankcal.job.tables import Table
 from tankcal.planning.obstacles import find_hidden
@@ -17,6 +16,7 @@ from tankcal.planning.wall.filling import rows_of_runs
 from tankcal.survey.stadia import angle_of_distance_rad
 from tankcal.survey.tangents import MOST_TANGENTS
 from tankcal.survey.wall_hits import MOST_HITS
+from tankcal.tank.liquid.reduction import MOST_ROWS
 
 OFF_WALL_M = 0.2  # distance of a reference line from the wall
 USUAL_BAR_M = 2.0  # length of an undescribed stadia; the job reports the missing description

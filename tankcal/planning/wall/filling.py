@@ -6,10 +6,10 @@ meter would show.
 
 import numpy as np
 
-from tankcal.job.checks.liquid import MOST_ROWS
 from tankcal.messages import message
 from tankcal.planning.entries import PLAN_FILE, too_many_sections
 from tankcal.planning.wall.model import PlannedRun
+from tankcal.tank.liquid.reduction import MOST_ROWS
 
 LEAST_STEP_M = 0.001  # smallest step between two dips
 LEAST_BATCH_M3 = 1e-3  # replaces a batch volume that is zero or unknown

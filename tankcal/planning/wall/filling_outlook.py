@@ -8,8 +8,8 @@ import numpy as np
 from tankcal.adjust import noncentrality
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.pipeline.liquid_alone import filled_range_m
-from tankcal.pipeline.liquid_body import join_body
+from tankcal.pipeline.liquid.alone import filled_range_m
+from tankcal.pipeline.liquid.body import join_body
 from tankcal.planning.entries import PLAN_FILE
 from tankcal.planning.wall.filling import SAME_M
 from tankcal.uncertainty import combine

@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.geometry.field.information import expect_amplitudes
-from tankcal.pipeline.liquid_adjustment import adjust_liquid
-from tankcal.pipeline.liquid_alone import geometry_beside
-from tankcal.pipeline.liquid_geometry import load_geometry
+from tankcal.pipeline.liquid.adjustment import adjust_liquid
+from tankcal.pipeline.liquid.alone import geometry_beside
+from tankcal.pipeline.liquid.geometry import load_geometry
 from tankcal.pipeline.surveying import find_survey
 from tankcal.planning.wall.design_tables import OFF_WALL_M
 from tankcal.planning.wall.reading_errors import EXACT

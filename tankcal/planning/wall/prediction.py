@@ -11,10 +11,11 @@ from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.field.estimate import LEVELS
 from tankcal.geometry.field.information import expect_amplitudes
 from tankcal.job.model import Job
+from tankcal.methods.base import supplement_of
 from tankcal.pipeline.cause_correlations import noise_of_wall
-from tankcal.pipeline.liquid import LiquidResult, Measured, measure_by_liquid
-from tankcal.pipeline.liquid_checks import check_liquid_result
-from tankcal.pipeline.nominal_wall import NominalWall
+from tankcal.pipeline.liquid.measuring import Measured
+from tankcal.pipeline.liquid.nominal_wall import NominalWall
+from tankcal.pipeline.liquid.result import LiquidResult
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.section_homogeneity import OF_SCATTER
 from tankcal.pipeline.statements import statements
@@ -156,10 +157,10 @@ class WallPrediction(TableResults):
     def warnings(self):
         """Warnings of the planned survey, a tuple of Problem."""
         result = self.result
-        of_run = (
-            *check_table(result.job, result.wall, result.computed_table, result.sighting),
-            *check_liquid_result(result.job, result.liquid),
-        )
+        of_run = check_table(result.job, result.wall, result.computed_table, result.sighting)
+        method = supplement_of(result.job)
+        if method is not None:
+            of_run = (*of_run, *method.warnings(result.job, result.liquid))
         problems = (
             *self.plan.warnings,
             *self.plan.job.warnings,
@@ -215,7 +216,9 @@ def predict_wall_table(job, amplitudes):
 
 def _wall_table(surveyed, wall):
     """Return the `WallTable` of a `Surveyed` with a wall of the predicted precision."""
-    metering = measure_by_liquid(surveyed.job, wall)
+    method, metering = supplement_of(surveyed.job), None
+    if method is not None:
+        metering = method.supplement(surveyed.job, wall, lambda text: None)
     table = compute_table(surveyed.job, wall, body=metering and metering.body)
     return WallTable(surveyed.job, wall, table, surveyed.sighting, metering)
 

@@ -9,7 +9,6 @@ from tankcal.report.outputs.csv_files import write_table
 from tankcal.report.tables import (
     capacity,
     lines,
-    liquid,
     readings,
     ship,
     strapping,
@@ -26,7 +25,6 @@ FILES = (
     "strapping.csv",
     *(file for method in methods() for file in method.csv_files),
     "offsets.csv",
-    "liquid_steps.csv",
     "capacity.csv",
     "ship_corrections.csv",
     "photos.csv",
@@ -49,8 +47,6 @@ def write_tables(record, directory):
             tables |= {name: (table, None) for name, table in method.csv_tables().items()}
     if record.get("lines"):
         tables["offsets"] = lines.OFFSETS, None
-    if record.get("liquid"):
-        tables["liquid_steps"] = liquid.STEPS, None
     if record["capacity"]:
         tables["capacity"] = capacity.capacity_table(record), _capacity(record)
     if record.get("ship"):

@@ -5,8 +5,8 @@ Each set of facts is a `Table` with a single row. `Column.key` is the label of t
 the facts.
 """
 
+from tankcal.methods.base import methods
 from tankcal.report.dip_point import dip_point_text
-from tankcal.report.metered_liquid import metered_liquid_text
 from tankcal.report.tables.table import Column, Table
 from tankcal.text.words import method_line
 
@@ -37,40 +37,6 @@ def _scanned(paper, row):
         read=sum(scan["delivered"] for scan in scans),
         means=sum(scan["readings"] for scan in scans),
     )
-
-
-def _metered(paper, row):
-    """Return a sentence on runs, steps and range of dips of a calibration by liquid, or None."""
-    liquid = paper.record.get("liquid")
-    if not liquid:
-        return None
-    low, high = (paper.height(liquid[f"{end}_dip_m"]) for end in ("lowest", "highest"))
-    counts = {"runs": len(liquid["runs"]), "steps": len(liquid["steps"])}
-    return paper.word("texts.liquid_metered", **counts, low=low, high=high)
-
-
-def _metered_liquid(paper, row):
-    liquid = paper.record.get("liquid")
-    return liquid and metered_liquid_text(paper, liquid)
-
-
-def _metered_with(paper, row):
-    """Return the meters with their factors and provers in words, or None."""
-    liquid = paper.record.get("liquid")
-    return liquid and "; ".join(_meter(paper, meter) for meter in liquid["meters"])
-
-
-def _meter(paper, meter):
-    factor, u = (paper.number(meter[key], u=meter["u_factor"]) for key in ("factor", "u_factor"))
-    text = paper.word("texts.liquid_meter", name=meter["meter"], factor=factor, u=u)
-    if not meter["prover"]:
-        return text
-    return paper.word("texts.liquid_prover", meter=text, prover=meter["prover"])
-
-
-def _metered_table(paper, row):
-    liquid = paper.record.get("liquid")
-    return liquid and paper.word(f"liquid_tables.{liquid['certified']}")
 
 
 def _volume(paper, row):
@@ -176,10 +142,7 @@ SURVEY = Table(
         Column("survey_method", text=_method, sheet=True),
         Column("radii_source", text=radii_source_text, sheet=True),
         Column("scanned", text=_scanned, sheet=True),
-        Column("metered", text=_metered, sheet=True),
-        Column("metered_liquid", text=_metered_liquid, sheet=True),
-        Column("metered_with", text=_metered_with, sheet=True),
-        Column("metered_table", text=_metered_table, sheet=True),
+        *(column for method in methods() for column in method.facts()),
         Column("survey_side", words="sides", sheet=True),
         Column("shell_temperature", "degC", digits=3, sheet=True,
                in_sheet={"digits": None, "decimals": 1}),

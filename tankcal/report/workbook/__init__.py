@@ -4,6 +4,7 @@ The package computes no results. The cells contain values of the record, possibl
 (mm for m, litres per centimetre for m2). The stored results of formulas are values of the record.
 """
 
+from tankcal.methods.base import methods
 from tankcal.report.workbook.book import Book
 from tankcal.report.workbook.calculator import calculator_sheets, factor_sheet
 from tankcal.report.workbook.capacity import (
@@ -38,7 +39,8 @@ from tankcal.text.words import language_of, load_words, translate_record
 # Sheets for other programs, which would print on hundreds of pages: hidden.
 _HIDDEN = (
     *("capacity_mm", "workings", "covariance_factor", "monte_carlo", "points", "adjusted_points"),
-    *("observations", "deviations", "liquid_steps"),
+    *("observations", "deviations"),
+    *(sheet for method in methods() for sheet in method.hidden_sheets),
 )
 
 

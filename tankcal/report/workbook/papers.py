@@ -9,7 +9,6 @@ from tankcal.report.paper import DECIMALS_OF_PARTS
 from tankcal.report.tables import (
     clouds,
     lines,
-    liquid,
     ship,
     strapping,
     tank,
@@ -68,14 +67,6 @@ TABLES_SHEETS = {
     "strapping": TablesSheet("strapping", _strapping_tables),
     "lines": TablesSheet("lines", (lines.LEVELS, lines.PLUMMETS, lines.LINES, lines.OFFSETS)),
     "clouds": TablesSheet("clouds", clouds.TABLES, omits_empty=True),
-    "liquid": TablesSheet(
-        "liquid", (liquid.METERS, liquid.RUNS, liquid.SIZES, liquid.CAUSES), omits_empty=True
-    ),
-    "liquid_steps": TablesSheet(
-        "liquid",
-        lambda record: (liquid.STEPS, liquid.DIPS, liquid.volumes_table(record)),
-        omits_empty=True,
-    ),
 }
 
 

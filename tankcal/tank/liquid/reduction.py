@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+MOST_ROWS = 3000  # largest number of rows of liquid.csv; the adjustment uses dense matrices
 EMPTY = -1  # start of a step in the empty, dry tank, in place of the index of a dip
 
 
@@ -69,9 +70,9 @@ def fill_of(metering):
     Parameters
     ----------
     metering : object
-        Object with run, meter, dip_m, used, as in `job.model.liquid.Metering`. The rows of a run
-        are consecutive and the first row is its start; a blank dip there denotes the empty tank.
-        The dip of an unused row is ignored, but its volume entered the tank.
+        Object with run, meter, dip_m, used, as in `methods.liquid.readings.Metering`. The rows of a
+        run are consecutive and the first row is its start; a blank dip there denotes the empty
+        tank. The dip of an unused row is ignored, but its volume entered the tank.
 
     Returns
     -------

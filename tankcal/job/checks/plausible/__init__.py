@@ -1,13 +1,12 @@
 """Plausibility of single numbers: ranges and cross-checks of `tankcal.job.plausibility`."""
 
 from tankcal.job.checks.plausible.levels import check_dates, check_levels
-from tankcal.job.checks.plausible.liquid import check_metering
 from tankcal.job.checks.plausible.material import check_material
 from tankcal.job.checks.plausible.plates import check_plates
 from tankcal.job.checks.plausible.sizes import check_rings, check_sizes
 from tankcal.job.checks.plausible.targets import check_targets
 
-__all__ = ["check_metering", "check_plausible"]
+__all__ = ["check_plausible"]
 
 
 def check_plausible(values, tables, extent, kind, raw, log):

@@ -3,10 +3,6 @@
 import numpy as np
 
 from tankcal.job.checking import tell
-from tankcal.job.checks.extent import is_metered
-from tankcal.job.checks.liquid import meters_read
-from tankcal.job.checks.runs import place_runs, steps_of
-from tankcal.job.contract.liquid import TEMPERATURES
 from tankcal.job.plausibility import (
     AMBIENT,
     BATCH_SD,
@@ -19,6 +15,9 @@ from tankcal.job.plausibility import (
     TANK_C_STEP_K,
 )
 from tankcal.messages import message
+from tankcal.methods.liquid.checks import meters_read
+from tankcal.methods.liquid.columns import TEMPERATURES
+from tankcal.methods.liquid.runs import place_runs, steps_of
 
 FAHRENHEIT_ZERO, FAHRENHEIT_STEP = 32.0, 5 / 9
 L_MIN_PER_M3_H = 1000 / 60
@@ -26,7 +25,7 @@ L_MIN_PER_M3_H = 1000 / 60
 
 def check_metering(values, tables, registers, raw, log):
     """Warn about implausible readings; parameters as for `checks.check_all`."""
-    if not is_metered(tables) or not tables["liquid"].rows:
+    if not tables["liquid"].rows:
         return
     table, meters = tables["liquid"], registers["meters"]
     _check_expansion(values, raw, log)

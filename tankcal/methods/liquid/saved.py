@@ -3,6 +3,7 @@
 import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
+from tankcal.record.choices import bottom_choice, roof_choice, top_choice
 from tankcal.record.schema import Finite, Saved, fill_from, key
 
 
@@ -169,11 +170,9 @@ class LiquidRecord(Saved):
 RATIOS = {"tilt": "m/m", "scale": "1"}  # units of sizes that are no lengths
 
 
-def liquid_of(result):
-    """Return the `LiquidRecord` of a result; None without metered liquid."""
+def save_liquid(result):
+    """Return the `LiquidRecord` of a result."""
     liquid, metering = result.liquid, result.job.liquid
-    if liquid is None:
-        return None
     low_m, high_m = liquid.filled_m
     flex, below = liquid.bottom_flex, liquid.bottom_m3
     return fill_from(
@@ -214,6 +213,22 @@ def liquid_of(result):
         joint=fill_from(VolumesBeside, liquid.tables["joint"]),
         controls=_controls(liquid),
     )
+
+
+def choices_of(result):
+    """Choices on the printed table, and on the geometry used with the liquid: {code: value}."""
+    job, geometry = result.job, geometry_beside(result)
+    choices = {"liquid": result.liquid.certified, "liquid_beside": geometry}
+    if geometry == "drawing":
+        choices |= {
+            "bottom": bottom_choice(job),
+            **top_choice(job),
+            "tilt": "not_measured",
+            "course_heights": "along_axis",
+            "roof": roof_choice(job),
+            "thickness": "drawing",
+        }
+    return choices
 
 
 def geometry_beside(result):
@@ -284,7 +299,7 @@ def _steps(liquid, probability):
 
 def _controlled_w(readings):
     """Return the test quantities; nan for readings whose redundancy is a rounding error."""
-    from tankcal.pipeline.liquid_checks import CONTROLLED
+    from tankcal.methods.liquid.warnings import CONTROLLED
 
     return np.where(readings.redundancy > CONTROLLED, readings.w, np.nan)
 
@@ -326,7 +341,7 @@ def _causes(liquid):
 
 def _controls(liquid):
     """Return `LiquidControl` of each meter and of a steady leak; None if the table ignores them."""
-    from tankcal.pipeline.liquid_naming import is_steady_leak
+    from tankcal.pipeline.liquid.naming import is_steady_leak
 
     rows = [
         LiquidControl(

@@ -11,7 +11,7 @@ import numpy as np
 
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.simulation.curvature import vary_input
-from tankcal.pipeline.tanks import body_of, zero_height
+from tankcal.pipeline.tanks import body_of, filled_with, zero_height
 from tankcal.tank.service import shell_factor, solid_factor
 from tankcal.uncertainty import triangular
 
@@ -91,15 +91,6 @@ class Geometry:
         Its other methods raise SolutionError if no tank has the moved sizes.
         """
         return replace(self, moves=moves)
-
-
-def filled_with(job, density_kg_m3):
-    """Return the job with another liquid, which also supports the floating roof."""
-    if density_kg_m3 is None:
-        return job
-    density = float(density_kg_m3)
-    roof = job.roof and replace(job.roof, reference_density_kg_m3=density)
-    return replace(job, table=replace(job.table, liquid_density_kg_m3=density), roof=roof)
 
 
 @dataclass(frozen=True)

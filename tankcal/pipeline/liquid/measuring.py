@@ -1,6 +1,6 @@
 """Calibration by liquid in a job: its steps, its results, and the body of the printed table.
 
-measured = measure_by_liquid(job, survey)     None: the job has no metered runs
+measured = measure_by_liquid(job, survey)
 measured.body                                  body of the table
 result = measured.result(levels_m)             `LiquidResult` at the rows of the table
 """
@@ -12,9 +12,10 @@ import numpy as np
 from scipy.special import gammaincc
 
 from tankcal.adjust import noncentrality
-from tankcal.errors import SolutionError
+from tankcal.errors import InputError, SolutionError
 from tankcal.messages import message
-from tankcal.pipeline.liquid_adjustment import (
+from tankcal.pipeline.corrections import Correction
+from tankcal.pipeline.liquid.adjustment import (
     BOTTOM,
     FLEX,
     RUNS,
@@ -22,22 +23,22 @@ from tankcal.pipeline.liquid_adjustment import (
     adjust_liquid,
     adjusted_at,
 )
-from tankcal.pipeline.liquid_alone import filled_range_m, geometry_alone, geometry_beside
-from tankcal.pipeline.liquid_body import join_body
-from tankcal.pipeline.liquid_geometry import filled_with
-from tankcal.pipeline.liquid_naming import alternatives_of, causes_in_words
-from tankcal.pipeline.liquid_result import (
+from tankcal.pipeline.liquid.alone import filled_range_m, geometry_alone, geometry_beside
+from tankcal.pipeline.liquid.body import join_body
+from tankcal.pipeline.liquid.naming import alternatives_of, causes_in_words
+from tankcal.pipeline.liquid.result import (
     Estimate,
     LiquidChecks,
     LiquidDips,
     LiquidResult,
     LiquidSteps,
+    beside_table,
 )
-from tankcal.pipeline.liquid_tables import beside_table, or_none
-from tankcal.pipeline.tanks import body_of, zero_height
+from tankcal.pipeline.tanks import body_of, filled_with, zero_height
 from tankcal.tank.liquid import fill_of, name_causes
 from tankcal.tank.liquid.readings import batch_sd_m3
 
+ISO_4269 = "ISO 4269:2001"
 OF_NO_WEIGHT_M = 1.0  # standard deviation of a dip without weight, m
 # Causes that change all volumes: the effect of an undetectable size of them is reported.
 CONTROLLED = ("meter", "leak")
@@ -88,27 +89,51 @@ class Measured:
         printed = self.alone if basis == "liquid" else self.joint
         return join_body(printed.known, density_kg_m3)
 
+    def correction(self, corrections, gross_m3, top_m3):
+        """Return the `Correction` at the top row: the rest after all other corrections.
+
+        Parameters
+        ----------
+        corrections : tuple of Correction
+        gross_m3, top_m3 : float
+            Volume at the top row without any correction, and according to the table.
+
+        Returns
+        -------
+        Correction or None
+            None if the table is that of the geometry.
+        """
+        if self.job.liquid.certified == "geometry":
+            return None
+        sum_m3 = sum(
+            correction.size_m3
+            for correction in corrections
+            if correction.applied and correction.code != "tilt"
+        )
+        size = top_m3 - gross_m3 - sum_m3
+        formula = message("by_liquid", "adjusted together with the metered volumes")
+        return Correction("liquid", True, size, 100 * size / gross_m3, formula, ISO_4269)
+
     def result(self, levels_m):
         """Return the `LiquidResult` at the rows of a table."""
         return _compute_result(self, np.asarray(levels_m, dtype=float))
 
 
 def measure_by_liquid(job, survey):
-    """Return the `Measured` tank of a job, or None without metered runs.
+    """Return the `Measured` tank of a job with metered runs.
 
     Raises
     ------
     InputError, SolutionError
-        As `liquid_adjustment.adjust_liquid`.
+        As `liquid.adjustment.adjust_liquid`.
     """
-    if job.liquid is None:
-        return None
     joint = _require_convergence(adjust_liquid(geometry_beside(job, survey)))
-
-    def adjust_alone():
-        return _require_convergence(adjust_liquid(geometry_alone(job, survey)))
-
-    alone = adjust_alone() if job.liquid.certified == "liquid" else or_none(adjust_alone)
+    try:
+        alone = _require_convergence(adjust_liquid(geometry_alone(job, survey)))
+    except (SolutionError, InputError):
+        if job.liquid.certified == "liquid":
+            raise
+        alone = None
     return Measured(job, survey, joint, alone)
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.pipeline.liquid_geometry import column_of, sources_at, stacked, volumes_at
+from tankcal.pipeline.liquid.geometry import column_of, sources_at, stacked, volumes_at
 from tankcal.tank.body import Body, Factor, ShellPart, SolidPart
 from tankcal.tank.parts import Part
 from tankcal.uncertainty import Source

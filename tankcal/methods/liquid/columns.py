@@ -192,3 +192,36 @@ NEEDED = (  # keys of [liquid] required with liquid.csv
     *("density_kg_m3", "density_temperature_c", "expansion_per_k", "u_density_kg_m3"),
     "u_dip_zero_mm",
 )
+
+STARTS = {"survey.side": "inside", "datum.bottom_z_m": "0.0"}  # of upright tanks only
+SETTING_EXAMPLES = {
+    "liquid.density_kg_m3": 998.2,
+    "liquid.density_temperature_c": 20.0,
+    "liquid.expansion_per_k": 2.1e-4,
+    "liquid.u_density_kg_m3": 0.2,
+    "liquid.s_dip_mm": 0.5,
+    "liquid.u_dip_zero_mm": 0.5,
+    "liquid.run_ppm": 100.0,
+    "meters.factor": 1.00052,
+    "meters.u_factor_ppm": 400.0,
+    "meters.k": 2.0,
+    "meters.repeatability_ppm": 100.0,
+    "meters.fixed_l": 2.0,
+    "meters.certificate": "V 31/2026",
+}
+EXAMPLES = {
+    "liquid": [
+        {"run": "1", "meter": "M-3", "volume_m3": 0.0, "time": "2026-05-04T08:00"},
+        {
+            "run": "1",
+            "meter": "M-3",
+            "volume_m3": 20.034,
+            "dip_m": 0.3012,
+            "meter_temperature_c": 18.4,
+            "tank_temperature_c": 18.1,
+            "shell_temperature_c": 19.0,
+            "flow_m3_h": 60.0,
+            "time": "2026-05-04T08:35",
+        },
+    ],
+}

@@ -8,8 +8,8 @@ import numpy as np
 from tankcal.job.checking import UNIT_FACTOR
 from tankcal.job.checks.sized_volumes import volume_by_sizes
 from tankcal.job.checks.survey.files import tell_rows
-from tankcal.job.contract.liquid import TEMPERATURES
 from tankcal.messages import message
+from tankcal.methods.liquid.columns import TEMPERATURES
 
 ABOVE_TOP_M, ABOVE_TOP = 0.05, 0.03  # a dip above the nominal top: length, share of the height
 BELOW_BOTTOM_M = 0.3  # a dip below the nominal bottom

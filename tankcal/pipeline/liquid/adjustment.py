@@ -19,8 +19,8 @@ import numpy as np
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
-from tankcal.pipeline.liquid_body import Known
-from tankcal.pipeline.liquid_geometry import (
+from tankcal.pipeline.liquid.body import Known
+from tankcal.pipeline.liquid.geometry import (
     Loaded,
     column_of,
     load_geometry,

@@ -6,8 +6,8 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.job.tables import SETTINGS_FILE
 from tankcal.messages import message
-from tankcal.pipeline.liquid_naming import causes_in_words, is_steady_leak, leak_unit
-from tankcal.pipeline.survey_limits import limits_of
+from tankcal.pipeline.liquid.naming import causes_in_words, is_steady_leak, leak_unit
+from tankcal.pipeline.survey_limits import limits_of_method
 
 TOLD = 3  # largest number of steps reported individually
 FAR = 2 * CRITICAL  # test quantity from which a cause changes the table by more than U
@@ -15,20 +15,8 @@ CONTROLLED = 1e-6  # smallest redundancy of a reading that can be tested
 HIDDEN_U = 2.0  # largest change of a volume by an undetectable error without warning, in U
 
 
-def check_liquid_result(job, result):
-    """Return the warnings of a `LiquidResult`; () for None.
-
-    Parameters
-    ----------
-    job : Job
-    result : LiquidResult or None
-
-    Returns
-    -------
-    tuple of Problem
-    """
-    if result is None:
-        return ()
+def check_liquid(job, result):
+    """Return the warnings of a `LiquidResult`, a tuple of Problem."""
     return (
         *_check_agreement(job.liquid, result),
         *_check_readings(job.liquid, result),
@@ -43,7 +31,10 @@ def check_liquid_result(job, result):
 def _check_agreement(metering, result):
     """Warn if liquid and geometry disagree, by the test of all steps or by a named cause."""
     named = [verdict for verdict in result.causes if verdict.is_named]
-    if result.probability >= limits_of("liquid")["global_probability"] and not named:
+    if (
+        result.probability >= limits_of_method("tankcal.pipeline.liquid")["global_probability"]
+        and not named
+    ):
         return
     if named:
         template = (

@@ -4,8 +4,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.pipeline.liquid_tables import BesideTable
 from tankcal.tank.liquid import Verdict
+from tankcal.uncertainty import combine
+
+
+@dataclass(frozen=True)
+class BesideTable:
+    """Volumes at the rows of the printed table, according to one kind of information.
+
+    Attributes
+    ----------
+    kind : {"geometry", "liquid", "joint"}
+    volume_m3, u_m3, U_m3 : ndarray, shape (rows,)
+        Volume, its standard and expanded uncertainty; nan where liquid alone has no dips.
+    """
+
+    kind: str
+    volume_m3: np.ndarray
+    u_m3: np.ndarray
+    U_m3: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -130,7 +147,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class LiquidResult:
-    """Results of metered runs and geometry of a tank.
+    """Results of metered runs and geometry of a tank, as an entry of `Result.surveys`.
 
     Attributes
     ----------
@@ -184,3 +201,36 @@ class LiquidResult:
     causes: tuple[Verdict, ...]
     filled_m: tuple[float, float]
     tables: dict[str, BesideTable]
+
+    surveyed_as = "liquid"
+
+
+def beside_table(kind, body, levels_m, probability, known=None):
+    """Compute the `BesideTable` of a body.
+
+    Parameters
+    ----------
+    kind : str
+        "geometry", "liquid" or "joint".
+    body : Body
+    levels_m : array_like, shape (rows,)
+        Levels of the rows.
+    probability : float
+        Coverage probability of U.
+    known : ndarray of bool, shape (rows,), optional
+        Rows with information; None: all rows.
+
+    Returns
+    -------
+    BesideTable
+    """
+    levels = np.asarray(levels_m, dtype=float)
+    known = np.full(len(levels), True) if known is None else known
+    columns = {name: np.full(len(levels), np.nan) for name in ("volume_m3", "u_m3", "U_m3")}
+    inside = np.clip(levels[known], body.lowest_m, body.highest_m)
+    if len(inside):
+        combined = combine(body.sources(inside), len(inside))
+        columns["volume_m3"][known] = body.volume_m3(inside)
+        columns["u_m3"][known] = combined.u
+        columns["U_m3"][known] = combined.expanded(probability)
+    return BesideTable(kind, **columns)

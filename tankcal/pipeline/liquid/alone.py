@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.pipeline.liquid_geometry import Geometry, wide_input
-from tankcal.pipeline.nominal_wall import NominalWall, find_nominal_wall
+from tankcal.pipeline.liquid.geometry import Geometry, wide_input
+from tankcal.pipeline.liquid.nominal_wall import NominalWall, find_nominal_wall
 from tankcal.pipeline.scan import Scan
-from tankcal.pipeline.survey_limits import limits_of
+from tankcal.pipeline.survey_limits import limits_of_method
 from tankcal.pipeline.tanks.solid import sized_job
 
 KEPT = (  # inputs that describe the liquid, the parts and the elasticity, not the shape of the wall
@@ -58,7 +58,7 @@ def geometry_alone(job, survey):
 
 def _wide_inputs(job):
     """Inputs of sizes with almost no information."""
-    wide = limits_of("liquid")["wide"]
+    wide = limits_of_method("tankcal.pipeline.liquid")["wide"]
     zero = wide_input("datum", wide["zero_mm"] / 1000, "mm", wide["zero_mm"])
     if job.horizontal is not None:
         lying = job.horizontal

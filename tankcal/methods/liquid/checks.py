@@ -4,25 +4,20 @@ from tankcal.job.checking import has_rows, is_not_given, missing_beside, setting
 from tankcal.job.checks.extent import (
     extent_of,
     has_wall_points,
-    is_metered,
-    is_metered_alone,
     is_strapped,
+    is_unsurveyed,
 )
-from tankcal.job.checks.runs import check_runs, place_runs
 from tankcal.job.contract.bottom import bottom_form
-from tankcal.job.contract.liquid import GEOMETRY, NEEDED
 from tankcal.job.entries import kind_of
 from tankcal.job.tables import nearest
 from tankcal.messages import message
-
-MOST_ROWS = 3000  # largest number of rows of liquid.csv
+from tankcal.methods.liquid.columns import GEOMETRY, NEEDED
+from tankcal.methods.liquid.runs import check_runs, place_runs
+from tankcal.tank.liquid.reduction import MOST_ROWS
 
 
 def check_liquid(values, tables, registers, raw, log):
     """Check meters, settings and the order of rows; parameters as for `check_all`."""
-    if not is_metered(tables):
-        _tell_without_rows(tables, registers, raw, log)
-        return
     table = tables["liquid"]
     if len(table.rows) > MOST_ROWS:
         expected = message(
@@ -57,7 +52,7 @@ def meters_read(table, meters):
     return names
 
 
-def _tell_without_rows(tables, registers, raw, log):
+def tell_without_rows(tables, registers, raw, log):
     """Report meters, settings or an empty table without any readings."""
     if "liquid" in raw.tables:
         table = raw.tables["liquid"]
@@ -161,7 +156,7 @@ def _check_settings(values, tables, raw, log):
             run=next(iter(runs)),
         )
         tell(log.problem, raw, "liquid", "run_ppm", expected)
-    alone = is_metered_alone(tables) and not _has_unreadable_survey(raw)
+    alone = is_unsurveyed(tables) and not _has_unreadable_survey(raw)
     if alone and given["table"] == GEOMETRY:
         expected = message(
             "no_geometry_beside_liquid",
@@ -169,7 +164,7 @@ def _check_settings(values, tables, raw, log):
             table=GEOMETRY,
         )
         tell(log.problem, raw, "liquid", "table", expected)
-    if given["u_radius_mm"] is not None and not is_metered_alone(tables):
+    if given["u_radius_mm"] is not None and not is_unsurveyed(tables):
         expected = message(
             "radius_beside_survey",
             "given beside a survey of the wall; expected only where liquid alone tells the tank",

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from tankcal.methods.liquid import tables
+from tankcal.methods.liquid.facts import control_text, density_text, with_u
 from tankcal.pipeline.plot_style import FAINT, GREY, INK, RED, WIDTH, Drawing, set_margins, styled
 from tankcal.report import numbers
-from tankcal.report.metered_liquid import control_text, density_text, with_u
-from tankcal.report.tables import liquid as tables
 
 MOST_ROWS = 16  # rows of the table of volumes in the papers; the workbook has all rows
 MARKERS = "osD^vP*X"  # marker of each run, as matplotlib names it

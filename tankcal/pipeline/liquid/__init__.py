@@ -1,0 +1,1 @@
+"""Calibration by metered liquid: its adjustment with the geometry of the tank."""
