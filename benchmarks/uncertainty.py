@@ -32,10 +32,9 @@ from tankcal.geometry.field.estimate import LEVELS
 from tankcal.job import DeclaredInput
 from tankcal.tank.body import Body, ShellPart
 from tankcal.tank.capacity import Capacity
-from tankcal.tank.courses import CourseShape, gauss_levels
 from tankcal.tank.factors import survey_factors
 from tankcal.tank.fittings import deadwood
-from tankcal.tank.volumes import ShellVolume
+from tankcal.tank.volumes import CourseShape, ShellVolume, gauss_levels
 from tankcal.uncertainty import combine, group_correlated
 
 PEER_S, TABLES = 4.0, 20  # seconds of a peer, tables of ours, in a round

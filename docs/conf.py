@@ -39,15 +39,17 @@ SECTION = re.compile(r"^\s*-{3,}\s*$")
 
 
 def set_plain_docstrings(app, what, name, obj, options, lines):
-    """A docstring without numpydoc sections keeps its columns: the text after its first paragraph
-    is set as it was typed."""
+    """Keep the columns of a docstring without numpydoc sections, and of every module: the text
+    after its first paragraph is set as typed."""
     if what in ("property", "attribute"):  # else a colon would be read as a type
         lines[0] = lines[0].replace(": ", "; ", 1)
-    if any(SECTION.match(line) for line in lines) or "" not in lines:
+    has_headings = any(SECTION.match(line) for line in lines)
+    if (has_headings and what != "module") or "" not in lines:
         return
     first = lines.index("")
     rest = lines[first + 1 :]
-    if any(line.startswith(" ") for line in rest) or any("  " in line.strip() for line in rest):
+    has_columns = any(line.startswith(" ") or "  " in line.strip() for line in rest)
+    if has_headings or has_columns:
         lines[first:] = ["", "::", "", *("   " + line for line in rest), ""]
 
 

@@ -56,7 +56,6 @@ REFERENCE = {  # {title: modules of a page of the reference}, in the order of th
         for name in (
             "body",
             "capacity",
-            "courses",
             "volumes",
             "solids",
             "heads",

@@ -1,6 +1,6 @@
 // The uncertainty of the volume between two dips, from the covariance factor of the table.
 
-/** A function (low, high) of two reads of the table to {u, k}; see tankcal/tank/deliveries/pairs.py. */
+/** A function (low, high) of two reads of the table to {u, k}; see tankcal/tank/deliveries.py. */
 function deliveryUncertainty(data, heights) {
   const kept = unpacked(data.rows, Uint32Array);
   const factor = unpacked(data.factor, Float32Array);

@@ -130,7 +130,7 @@ def _files_of_workbook(path):
 
 def _files_of_former(path):
     """Return the table named in a former.toml, if it is beside this file."""
-    from tankcal.recalibration.inputs import rows_file
+    from tankcal.recalibration.comparison import rows_file
 
     try:
         table = rows_file(path)

@@ -214,7 +214,7 @@ def _report(task, clock):
 
 
 def _compare(task, clock):
-    from tankcal.recalibration.inputs import Asked, compare_files
+    from tankcal.recalibration.comparison import Asked, compare_files
     from tankcal.record.schema import to_plain
     from tankcal.report.comparison import write_comparison
 

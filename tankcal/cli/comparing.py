@@ -64,7 +64,7 @@ def add(commands):
 def _compare(options):
     prepare_for_small_work()
     speak_of_record(options.language, options.new, options.old)
-    from tankcal.recalibration.inputs import Asked, compare_files
+    from tankcal.recalibration.comparison import Asked, compare_files
     from tankcal.record.schema import to_plain
 
     if options.out is not None:

@@ -70,7 +70,7 @@ def _write_notebook(options, out):
     """Return the path of the notebook of a job, after writing it or keeping manual changes."""
     from tankcal.terminal.input_language import read_job_language
     from tankcal.workbench.draft import Draft, source_of
-    from tankcal.workbench.notebook_file import notebook_path, write_notebook
+    from tankcal.workbench.serving import notebook_path, write_notebook
 
     language = options.language or read_job_language(options.job)
     if language is not None:

@@ -1,12 +1,10 @@
 """Exports of a table to gauging and inventory systems.
 
 profiles      description of a file for a system (TOML), and the shipped profiles with their texts
-marks         rows as whole numbers of last digits, each rounded once
-chords, breakpoints, splines   rows selected for a polyline or a spline of few points
+chords, breakpoints   rows selected for a polyline or a spline of few points
 choosing      rows of a record for a profile, or the reasons why the profile does not fit
 writing       the text, and the text read back by the linter
-shell_movement   HyTD of a gauge supported by the shell
-exporting     from a record to the file, with provenance and report
+exporting     from a record to the file, with HyTD of the gauge, provenance and report
 """
 
 from tankcal.exports.exporting import Export, export_record, write_export

@@ -5,7 +5,7 @@ import unicodedata
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem
-from tankcal.exports.marks import count_increments, to_quanta
+from tankcal.exports.choosing import count_increments, to_quanta
 from tankcal.exports.profiles import LEVEL_UNITS_M, LINE_ENDS, MARKED
 from tankcal.job.tables import Log
 from tankcal.linter import lint

@@ -20,9 +20,8 @@ from tankcal.geometry.clutter import (
     find_rings,
     shell_problem,
 )
-from tankcal.geometry.field.blunders import find_blunders
+from tankcal.geometry.field.blunders import find_blunders, find_uprights
 from tankcal.geometry.field.sites import Sites, spans_of
-from tankcal.geometry.field.uprights import find_uprights
 from tankcal.geometry.patches import NO_COLUMN, find_buckles, find_columns, find_seams
 from tankcal.messages import message
 

@@ -4,7 +4,7 @@ The limit of S grows with the square of the spacing of the points. Three figures
 the out-of-plane settlement: S of all points, S of a subset with the spacing that the rule requires,
 and the curvature, which is independent of the spacing. Each figure estimates the true value. The
 bias of the largest reading and of R2 is removed by extrapolation to errors of 0
-(`tankcal.inspection.extrapolation`).
+(`tankcal.inspection.out_of_plane`).
 """
 
 from dataclasses import dataclass
@@ -12,23 +12,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.gum.coverage import coverage_factor
-from tankcal.inspection.epochs import Epoch, find_differences, is_within_noise, warn_about_points
-from tankcal.inspection.extrapolation import (
-    Estimate,
-    Statistic,
-    estimate_statistic,
-    simulate_errors,
-)
+from tankcal.inspection.levelling import Epoch, find_differences, is_within_noise, warn_about_points
 from tankcal.inspection.out_of_plane import (
     Curvature,
+    Estimate,
     Neighbours,
     Plane,
+    Statistic,
     curvature_rows,
+    estimate_statistic,
     find_largest_curvature,
     find_neighbours,
     fit_plane,
     r_squared,
     select_subset,
+    simulate_errors,
 )
 from tankcal.inspection.rules import compute_curvature_limit
 from tankcal.inspection.verdict import PROBABILITY, Figure

@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tankcal.intercomparison.drawing import FAMILIES, draw_tank
 from tankcal.intercomparison.observers import METHODS
 from tankcal.intercomparison.observers.cloud import LAS_STEP_M
 from tankcal.intercomparison.site import Chance, request_table
+from tankcal.intercomparison.tank import FAMILIES, draw_tank
 from tankcal.job.contract import COLUMNS, KEYS, REGISTER_KEYS
 from tankcal.messages import message
 from tankcal.record.intercomparison import (

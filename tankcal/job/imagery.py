@@ -9,8 +9,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tankcal.camera.comparator import fit_transformation, group_readings
-from tankcal.camera.film import Surface, flatten_film, heights_at
+from tankcal.camera.comparator import (
+    Surface,
+    fit_transformation,
+    flatten_film,
+    group_readings,
+    heights_at,
+)
 from tankcal.errors import SolutionError
 from tankcal.job.cameras import image_coordinates, image_frames
 from tankcal.job.contract.registers import MARKS

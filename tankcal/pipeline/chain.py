@@ -21,8 +21,8 @@ from tankcal.pipeline.survey_warnings import incomplete_certificate, open_questi
 from tankcal.pipeline.surveying import adjust_decided, find_survey, placed
 from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of, filled_with
+from tankcal.tank.capacity import refuse_falling
 from tankcal.tank.dips import proportional_parts
-from tankcal.tank.falling_capacity import refuse_falling
 
 if TYPE_CHECKING:
     from tankcal.survey import Adjustment

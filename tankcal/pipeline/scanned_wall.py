@@ -1,6 +1,6 @@
 """Wall about a scanned horizontal cylinder or sphere: sizes, volumes and their uncertainty.
 
-The deviation f from the fitted shape is one random field (`geometry.field.solids`). Its functionals
+The deviation f from the fitted shape is one random field (`geometry.field.places`). Its functionals
 are the volumes below levels from empty to full. Dips count from the wall itself below the dip
 point. With w the wet part of the wall and A the area of the free surface,
 
@@ -22,13 +22,14 @@ from tankcal.geometry.field.places import (
     CylinderFunctionals,
     OnCylinder,
     OnSphere,
+    SolidField,
     cap_volumes,
     cells_along,
     cells_around,
+    estimate_sizes,
     means_of_neighbours,
     wet_cells,
 )
-from tankcal.geometry.field.solids import SolidField, estimate_sizes
 from tankcal.geometry.primitives import sphere_distances, unit_vectors
 from tankcal.pipeline.survey_warnings import noise_is_estimated
 from tankcal.pipeline.tanks.common import factor_of_unseen

@@ -10,8 +10,7 @@ from tankcal.messages import message
 from tankcal.pipeline.tanks import heeled_body
 from tankcal.pipeline.tanks.solid import ship_pipe
 from tankcal.tank.meshes import holds
-from tankcal.tank.ships import corrections_of, in_ship_frame
-from tankcal.tank.ships.corrections import FULL
+from tankcal.tank.ships import FULL, corrections_of, in_ship_frame
 from tankcal.uncertainty import combine
 
 STEPS_M = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)

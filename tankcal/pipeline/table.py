@@ -16,7 +16,7 @@ from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.solver.threads import threads_for
 from tankcal.tank.body import Body
-from tankcal.tank.capacity import Capacity
+from tankcal.tank.capacity import Capacity, refuse_falling
 from tankcal.tank.dips import (
     HEIGHT_STEPS_M,
     LADDERS_M,
@@ -26,7 +26,6 @@ from tankcal.tank.dips import (
     table_heights,
     top_mark,
 )
-from tankcal.tank.falling_capacity import refuse_falling
 from tankcal.uncertainty import ROUNDING, combine
 
 CLOSED = 1e-3  # area at the top, relative to the largest area, below which a tank is closed

@@ -22,8 +22,8 @@ from tankcal.planning.model import (
     Targets,
     Tie,
 )
-from tankcal.planning.obstacles import obstacles_of
 from tankcal.planning.places import full_turn, joints_of, places_around, plate_m, row_heights_m
+from tankcal.planning.visibility import obstacles_of
 
 # Defaults of [limits]: largest angle of incidence, degrees, and fewest rays per point.
 INCIDENCE_DEG, RAYS = 70.0, 3

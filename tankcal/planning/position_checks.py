@@ -10,14 +10,15 @@ from tankcal.messages import join_with_and, list_some, message
 from tankcal.planning.bases import STADIA_FILE, base_m
 from tankcal.planning.entries import PLAN_FILE
 from tankcal.planning.model import Box, Pillar
-from tankcal.planning.obstacles import (
+from tankcal.planning.places import TOUCH_M, joints_m, plate_m
+from tankcal.planning.visibility import (
+    GRAZE_M,
     find_hidden,
+    find_in_sight,
     message_of_cut_line,
     message_of_misplaced_station,
     message_of_obstacle_at,
 )
-from tankcal.planning.places import TOUCH_M, joints_m, plate_m
-from tankcal.planning.visibility import GRAZE_M, find_in_sight
 from tankcal.survey.stadia import distance_of_angle_m
 
 NEAR_M = 0.05  # smallest distance of a station from the wall

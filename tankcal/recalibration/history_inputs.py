@@ -12,8 +12,8 @@ from tankcal import record as records
 from tankcal.errors import InputError, Problem, reason_of
 from tankcal.job.tables import Log
 from tankcal.messages import list_some, message
+from tankcal.recalibration.comparison import read_course_sizes, rows_file
 from tankcal.recalibration.history import DatedTable, history_of
-from tankcal.recalibration.inputs import read_course_sizes, rows_file
 from tankcal.recalibration.reading import read_former
 from tankcal.record.history import CheckInHistory, InspectionInHistory
 from tankcal.record.inspection import INSPECTION, VERDICTS

@@ -9,8 +9,7 @@ from tankcal.errors import InputError
 from tankcal.job.tables import Log
 from tankcal.linter.rows import read_rows
 from tankcal.messages import message
-from tankcal.recalibration.declared import FormerFacts, read_former_facts
-from tankcal.recalibration.former import FormerRoof, FormerTable
+from tankcal.recalibration.former import FormerFacts, FormerRoof, FormerTable, read_former_facts
 from tankcal.record import load
 from tankcal.record.covariance_factor import factor_of
 

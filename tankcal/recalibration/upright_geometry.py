@@ -14,8 +14,15 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.recalibration.rounding import roughness, row_sds, u_factors
-from tankcal.recalibration.table_fit import Rows, State, are_kinks_fixed, try_fit
+from tankcal.recalibration.table_fit import (
+    Rows,
+    State,
+    are_kinks_fixed,
+    roughness,
+    row_sds,
+    try_fit,
+    u_factors,
+)
 from tankcal.recalibration.upright_search import (
     LEAST_GAIN,
     SAME_ZERO,

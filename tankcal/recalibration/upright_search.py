@@ -14,10 +14,21 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import SolutionError
 from tankcal.messages import message
-from tankcal.recalibration.fittings import find_fittings, pair_kinks_again
-from tankcal.recalibration.rounding import ROUGH, roughness, simulate_rounding, u_factors
-from tankcal.recalibration.seams import FARTHEST_M, find_zeros, move_seams
-from tankcal.recalibration.table_fit import DENSITY_SD_KG_M3, try_fit
+from tankcal.recalibration.seams import (
+    FARTHEST_M,
+    find_fittings,
+    find_zeros,
+    move_seams,
+    pair_kinks_again,
+)
+from tankcal.recalibration.table_fit import (
+    DENSITY_SD_KG_M3,
+    ROUGH,
+    roughness,
+    simulate_rounding,
+    try_fit,
+    u_factors,
+)
 from tankcal.recalibration.upright_shell import no_bulges, show_bulges
 
 SEAMS_FREE = "base", "density", "seams"

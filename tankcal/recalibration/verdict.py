@@ -14,7 +14,7 @@ import numpy as np
 
 from tankcal.record.comparison import LegalNumber, Reason, TableAge
 from tankcal.tank.capacity import Quantity
-from tankcal.tank.rules.deviation import StatedVolume, judge_volume
+from tankcal.tank.rules.verdict import StatedVolume, judge_volume
 
 DAYS_OF_YEAR = 365.25
 USUAL_LIMIT_M = 5e-3  # limit of an undeclared zero for rules without a limit

@@ -8,7 +8,7 @@ from tankcal.planning.bases import group_by_ends
 from tankcal.planning.prediction import PointOutlook, SectionOutlook
 from tankcal.planning.reliability import GroupReliability
 from tankcal.planning.wall.changes import wall_count
-from tankcal.planning.wall.filling_outlook import FillingOutlook
+from tankcal.planning.wall.filling import FillingOutlook
 from tankcal.planning.wall.prediction import CourseOutlook, ReadingsOutlook
 from tankcal.record.saved_formats import SavedFormat
 from tankcal.record.schema import Saved, fill_from, key, to_plain

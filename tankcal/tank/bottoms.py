@@ -8,23 +8,298 @@ counts above that plane (level 0),
 so it is positive below the plane, and negative where the bottom is above the plane. A level L = z
 counts as wet. Between the plane and the edge of the bottom, the wall may differ from the outline of
 the plan. This difference is neglected, as the product of two small heights.
+
+Surveyed bottom
+---------------
+
+Heights are a trend 1, x, y, rho, rho^2 (a leaning plate, a cone, a dish), plus a form whose
+covariance decreases linearly with the distance, - b |p - q|, plus waves finer than the points. b
+and the waves are estimated by restricted maximum likelihood. The alternative, triangles between the
+points, cuts off a part of a cone (compared in tests/tank/test_soundings.py). Sources: Matheron 1973
+(intrinsic random functions); Cressie 1993, Statistics for Spatial Data, 3.4; Patterson & Thompson
+1971.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
+from scipy.special import ndtr
 
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 from tankcal.tank.parts import Part, as_levels
-from tankcal.tank.soundings import SurveyedSurface, surveyed_surface
 from tankcal.tank.terrain import Surface, surface
 from tankcal.tank.tips import FORMS as TIPS
 from tankcal.tank.tips import Tip, tip_of
-from tankcal.uncertainty import Source
+from tankcal.uncertainty import Source, factor_of
 
+MESH, COVARIANCE_MESH = (48, 144), (16, 48)  # rings and azimuths of the meshes
+FEWEST_POINTS, MOST_POINTS = 12, 500  # least and largest number of surveyed points
+BEYOND_WALL = 0.01  # points beyond the wall by more than 1 % of the radius are refused
+BANDS = 24  # bands of wet area, at whose limits the covariance is computed
+TREND = 5  # number of functions of the trend
+WORST_CONDITION = 1e3  # largest condition number of the trend, in units of the mean radius
+LEAST_WAVES_M2 = 1e-8  # lower bound of the variance of waves: a tenth of a millimetre
 FORMS = ("flat", *TIPS)
 LEAN_AZIMUTHS = 720  # number of triangles of a leaning plate
+
+
+@dataclass(frozen=True)
+class SurveyedSurface:
+    """Bottom predicted from surveyed points.
+
+    surface          surface over a polar mesh
+    edges_m          (e,) ascending levels, the last above the whole surface
+    noise_m3         (e, c) factor of the covariance of the volumes below the edges due to the noise
+    form_m3          factor due to the form between the points, and to the volume it hides
+    noise_dof, form_dof  degrees of freedom of the noise and of the form
+    form_m2_per_m    b: variance of a height difference is 2 b distance
+    waves_sd_m       standard deviation of waves finer than the points; including the noise if no
+                     standard deviation is given
+    w                (n,) difference of each point from the prediction by all others, over its sd
+    by_points_m2     (e, n) derivative of the volumes below the edges by the heights of the points
+    """
+
+    surface: Surface
+    edges_m: np.ndarray
+    noise_m3: np.ndarray
+    form_m3: np.ndarray
+    noise_dof: float
+    form_dof: float
+    form_m2_per_m: float
+    waves_sd_m: float
+    w: np.ndarray
+    by_points_m2: np.ndarray
+
+
+def surveyed_surface(footprint, xyz_m, sd_m=None, slope=(0.0, 0.0)):
+    """Return the bottom through surveyed points, smoothed according to their noise.
+
+    Parameters
+    ----------
+    footprint : Footprint
+        Outline of the first course at its bottom.
+    xyz_m : ndarray, shape (n, 3)
+        x, y in the frame of the survey, z above the bottom of the first course.
+    sd_m : ndarray, shape (n,), or float, optional
+        Standard deviations of z; None: noise and waves are estimated jointly.
+    slope : array_like, shape (2,), optional
+        (dx/dz, dy/dz) of the axis of the shell.
+
+    Returns
+    -------
+    SurveyedSurface
+
+    Raises
+    ------
+    SolutionError
+        For fewer than 12 or more than 500 points, a point outside the wall, and points that are not
+        spread over the plan.
+    """
+    xyz = np.asarray(xyz_m, dtype=float)
+    n = len(xyz)
+    if not FEWEST_POINTS <= n <= MOST_POINTS:
+        raise SolutionError(
+            message(
+                "bottom_points_count",
+                "{count} surveyed points of the bottom; expected {fewest} to {most}",
+                count=n,
+                fewest=FEWEST_POINTS,
+                most=MOST_POINTS,
+            )
+        )
+    if not np.all(np.isfinite(xyz)):
+        raise SolutionError(
+            message("bottom_point_not_finite", "a surveyed point of the bottom is not finite")
+        )
+    size = np.sqrt(footprint.area_m2 / np.pi)
+    # Shift the points along the axis to the plane of the plan.
+    plan = xyz[:, :2] - (footprint.x_m, footprint.y_m) - np.outer(xyz[:, 2], slope)
+    _refuse_outside(footprint, plan)
+    noise = np.zeros(n) if sd_m is None else np.broadcast_to(np.square(sd_m), (n,))
+    kriging = _fit_kriging(plan / size, xyz[:, 2], noise)
+    predicted, predictor = _predict_surface(footprint, MESH, kriging, size, xyz[:, 2])
+    edges = _edges(predicted)
+    # The volumes are linear in the heights of the mesh, which are linear in the points.
+    by_points = predicted.wet_weights(edges) @ predictor
+    waves = kriging.waves_m2 * by_points @ by_points.T
+    form, hidden = _form(footprint, kriging, size, xyz[:, 2], edges)
+    has_sd = sd_m is not None
+    return SurveyedSurface(
+        surface=predicted,
+        edges_m=edges,
+        noise_m3=factor_of((by_points * noise) @ by_points.T if has_sd else waves),
+        form_m3=np.column_stack([factor_of(form + waves if has_sd else form), hidden]),
+        noise_dof=np.inf if has_sd else float(n - TREND),
+        form_dof=float(n - TREND),
+        form_m2_per_m=float(kriging.form_m2 / size),
+        waves_sd_m=float(np.sqrt(kriging.waves_m2)),
+        w=kriging.left_out(xyz[:, 2]),
+        by_points_m2=-by_points,
+    )
+
+
+def _predict_surface(footprint, mesh, kriging, size, heights):
+    """Return the surface over a mesh, and the weights (v, n) of the heights of the points."""
+    plan, faces = footprint.mesh(*mesh)
+    predictor = kriging.predictor(plan / size)
+    return surface(plan, faces, predictor @ heights), predictor
+
+
+def _form(footprint, kriging, size, heights, edges):
+    """Return the covariance (e, e) of the volumes below edges due to the form, and its bias (e,).
+
+    The covariance is that of wet @ (predicted - true). Both surfaces reproduce a constant, so the
+    generalised covariance - distance may replace a covariance. Below a level, a rough surface
+    leaves more room than a smooth surface: E(L - z)+ > (L - E z)+. Above the whole surface, the
+    difference is zero.
+    """
+    predicted, predictor = _predict_surface(footprint, COVARIANCE_MESH, kriging, size, heights)
+    grid, points = footprint.mesh(*COVARIANCE_MESH)[0] / size, kriging.points
+    wet, to_points, among_points = (
+        predicted.wet_weights(edges),
+        _distances(grid, points),
+        _distances(points, points),
+    )
+    by_points = wet @ predictor
+    cross_covariance = wet @ to_points @ by_points.T
+    true_covariance = wet @ _distances(grid, grid) @ wet.T
+    combined = (
+        cross_covariance
+        + cross_covariance.T
+        - true_covariance
+        - by_points @ among_points @ by_points.T
+    )
+    variance = 2 * np.sum(predictor * to_points, axis=1)
+    variance -= np.sum(predictor @ among_points * predictor, axis=1)
+    # Prediction error of the height at each vertex.
+    sd = np.sqrt(np.maximum(kriging.form_m2 * variance, 0) + kriging.waves_m2)
+    difference = np.abs(edges[:, None] - predicted.heights_m) / sd
+    # E(L - z)+ - (L - E z)+ for a normal z: sd (phi(d) - d Phi(-d)).
+    excess = sd * (
+        np.exp(-(difference**2) / 2) / np.sqrt(2 * np.pi) - difference * ndtr(-difference)
+    )
+    hidden = excess @ predicted.wet_weights(predicted.highest_m)[0]
+    hidden[-1] = 0.0
+    return kriging.form_m2 * (combined + combined.T) / 2, hidden
+
+
+def _refuse_outside(footprint, plan):
+    """Raise SolutionError for a point outside the wall."""
+    azimuth, distance = np.arctan2(*plan.T), np.hypot(*plan.T)
+    excess = distance / footprint.radius_at(azimuth) - 1
+    worst = int(np.argmax(excess))
+    if not excess[worst] <= BEYOND_WALL:
+        raise SolutionError(
+            message(
+                "bottom_point_off_wall",
+                "point {point} of the bottom is {distance_m:.3f} m from the axis, "
+                "outside the wall ({wall_m:.3f} m)",
+                point=worst + 1,
+                distance_m=distance[worst],
+                wall_m=footprint.radius_at(azimuth[worst]),
+            )
+        )
+
+
+def _edges(surface_of_points):
+    """Return levels with (k / BANDS)^2 of the plan below them, closer near the bottom."""
+    order = np.argsort(surface_of_points.heights_m[surface_of_points.faces].mean(axis=1))
+    filled = np.cumsum(surface_of_points.areas_m2[order])
+    target_areas = filled[-1] * (np.arange(1, BANDS) / BANDS) ** 2
+    middle = surface_of_points.heights_m[surface_of_points.faces].mean(axis=1)[order]
+    return np.unique(
+        np.append(np.interp(target_areas, filled, middle), surface_of_points.highest_m)
+    )
+
+
+@dataclass(frozen=True)
+class _Kriging:
+    """Heights at points (n, 2) with variances of form and waves, in units of the mean radius.
+
+    covariance  (n, n) of the heights, without the trend
+    contrasts   (n, n - TREND) combinations of heights independent of the trend
+    """
+
+    points: np.ndarray
+    form_m2: float
+    waves_m2: float
+    covariance: np.ndarray
+    contrasts: np.ndarray
+
+    def predictor(self, grid):
+        """Return weights (v, n) of the heights of the points in the height at each vertex."""
+        trend = _trend(self.points)
+        # Universal kriging: Lagrange multipliers enforce unbiasedness for the trend.
+        system = np.block([[self.covariance, trend], [trend.T, np.zeros((TREND, TREND))]])
+        right_side = np.hstack([-self.form_m2 * _distances(grid, self.points), _trend(grid)])
+        return np.linalg.solve(system, right_side.T)[: len(trend)].T
+
+    def left_out(self, heights):
+        """Return differences (n,) of heights from predictions by all others, over their sds."""
+        inner = self.contrasts.T @ self.covariance @ self.contrasts
+        weights = self.contrasts @ np.linalg.solve(inner, self.contrasts.T)
+        return weights @ heights / np.sqrt(np.diag(weights))
+
+
+def _fit_kriging(points, heights, noise):
+    """Fit form and waves by REML; raise SolutionError for a poor spread of the points."""
+    trend = _trend(points)
+    if np.linalg.cond(trend) > WORST_CONDITION:
+        raise SolutionError(
+            message(
+                "bottom_points_unspread",
+                "the points of the bottom do not spread over its plan: expected some in "
+                "the middle, some at the wall, some between, all around",
+            )
+        )
+    contrasts = np.linalg.qr(trend, mode="complete")[0][:, TREND:]
+    # Contrasts eliminate the trend: the generalised covariance becomes positive definite.
+    form = -contrasts.T @ _distances(points, points) @ contrasts
+    measured = contrasts.T @ (noise[:, None] * contrasts)
+    observed = contrasts.T @ heights
+
+    def misfit(logs):
+        """Return minus twice the log-likelihood, up to a constant, and its gradient."""
+        amplitude, waves = np.exp(logs)
+        inner = amplitude * form + measured + (LEAST_WAVES_M2 + waves) * np.eye(len(observed))
+        inverse = np.linalg.inv(inner)
+        solved = inverse @ observed
+        by_amplitude = np.sum(inverse * form) - solved @ form @ solved
+        by_waves = np.trace(inverse) - solved @ solved
+        value = np.linalg.slogdet(inner)[1] + observed @ solved
+        return value, np.array([amplitude * by_amplitude, waves * by_waves])
+
+    size = np.log(np.mean(observed**2) + LEAST_WAVES_M2)
+    bounds = [(size - 20, size + 10), (np.log(LEAST_WAVES_M2) - 5, size + 5)]
+    # Two starts guard against a local maximum.
+    results = [
+        scipy.optimize.minimize(
+            misfit,
+            [size, size + log_ratio],
+            jac=True,
+            method="L-BFGS-B",
+            bounds=bounds,
+            options={"ftol": 1e-14, "gtol": 1e-8},
+        )
+        for log_ratio in (-5, -1)
+    ]
+    amplitude, waves = np.exp(min(results, key=lambda result: result.fun).x)
+    waves += LEAST_WAVES_M2
+    covariance = np.diag(noise + waves) - amplitude * _distances(points, points)
+    return _Kriging(points, float(amplitude), float(waves), covariance, contrasts)
+
+
+def _distances(points, other_points):
+    """Return the distances between points (rows) and other points (columns)."""
+    return scipy.spatial.distance.cdist(points, other_points)
+
+
+def _trend(points):
+    """Return the functions (n, TREND) of the trend at points."""
+    rho = np.hypot(*points.T)
+    return np.column_stack([np.ones(len(points)), points, rho, rho**2])
 
 
 @dataclass(frozen=True)

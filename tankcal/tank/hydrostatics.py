@@ -28,9 +28,8 @@ from tankcal.errors import HeightError, SolutionError
 from tankcal.geometry.field.estimate import LEVELS
 from tankcal.messages import message
 from tankcal.quadrature import height_polynomials
-from tankcal.tank.courses import CourseShape, gauss_levels
 from tankcal.tank.parts import Part, as_levels
-from tankcal.tank.volumes import ShellVolume
+from tankcal.tank.volumes import CourseShape, ShellVolume, gauss_levels
 from tankcal.units import STANDARD_GRAVITY
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact to degree seven

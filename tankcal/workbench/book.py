@@ -13,9 +13,8 @@ from tankcal.job.contract import columns_of
 from tankcal.job.sheets import KEY, SECTION, VALUE, is_read
 from tankcal.job.tables import REGISTERS, SETTINGS_SHEET, TABLES
 from tankcal.text.numerals import NUMBER
-from tankcal.workbench.decimals import AmbiguousNumber
 from tankcal.workbench.keys import Entry, field_of
-from tankcal.workbench.tables import EditedTable, Row
+from tankcal.workbench.tables import AmbiguousNumber, EditedTable, Row
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,12 @@ from tankcal.job.tables import REGISTERS, TABLES
 from tankcal.report.folders import default_folder
 from tankcal.text.languages import DEFAULT, nearest_language
 from tankcal.workbench.computing import Refusal, Run
-from tankcal.workbench.decimals import text_for_file
 from tankcal.workbench.display import Reader
 from tankcal.workbench.draft import Draft
 from tankcal.workbench.findings import BAD, DOUBTFUL
 from tankcal.workbench.keys import SETTINGS, field_of
 from tankcal.workbench.plain import list_page, table_page, text_page
+from tankcal.workbench.tables import text_for_file
 
 # Environment variables of interactive sessions.
 SESSION_VARIABLES = ("JPY_SESSION_NAME", "VOILA_REQUEST_URL", "VSCODE_PID")

@@ -6,9 +6,9 @@ from tankcal.errors import SHEET
 from tankcal.job.contract import KEYS, REGISTER_KEYS, SECTIONS
 from tankcal.job.starter.texts import Texts, split_unit, texts_in
 from tankcal.text.words import marks_of, say
-from tankcal.workbench.decimals import text_for_display, text_for_file
 from tankcal.workbench.findings import BAD
 from tankcal.workbench.keys import READ_ONLY_SECTIONS, SETTINGS, field_of
+from tankcal.workbench.tables import text_for_display, text_for_file
 
 # Names of the columns in which keys are shown.
 OWNER, KEY, VALUE, UNIT, EXPECTED = "owner", "key", "value", "unit", "expected"

@@ -12,7 +12,7 @@ from tankcal.job.contract import KEYS, REGISTER_KEYS
 from tankcal.job.contract.registers import FAMILIES, SHORT_KEYS
 from tankcal.job.fields import Field
 from tankcal.text.numerals import NUMBER
-from tankcal.workbench.decimals import AmbiguousNumber
+from tankcal.workbench.tables import AmbiguousNumber
 
 SETTINGS = "job"  # name of the settings
 READ_ONLY_SECTIONS = ("csv",)  # define the format of files

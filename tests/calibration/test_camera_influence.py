@@ -14,13 +14,13 @@ from photographed_jobs import by_tape, control_of, measurements, tank_job
 
 import tankcal
 from tankcal.calibration.influence.blocks import compare_blocks, make_block
-from tankcal.calibration.influence.exchange import (
+from tankcal.calibration.influence.runs import (
     add_pixel_size,
     exchange_calibration,
+    influence,
     leave_out_readings,
     select_free_parameters,
 )
-from tankcal.calibration.influence.runs import influence
 from tankcal.calibration.product.differences import collect_differences
 from tankcal.camera.model import PARAMETERS, Form, distort_image_points
 from tankcal.errors import InputError

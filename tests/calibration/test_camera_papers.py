@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from camera_sets import HOSTILE, SMALL, Q, sets
 
-from tankcal.calibration.curves import decentring_profile, radial_curve
+from tankcal.calibration.edges import decentring_profile, radial_curve
 from tankcal.calibration.product.check import check_product
 from tankcal.calibration.product.limits import shipped_limits
 from tankcal.calibration.stability.comparison import compare

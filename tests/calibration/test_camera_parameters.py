@@ -14,15 +14,20 @@ from surveyed import by_photographs
 import tankcal
 from tankcal.calibration.edges import Frame, left_shifts, own_shift
 from tankcal.calibration.interiors import collect_interiors
-from tankcal.calibration.parameters.analysis import analyse_job, analyse_record
-from tankcal.calibration.parameters.conditioning import drop_parameters
-from tankcal.calibration.parameters.dropping import Dropping, compare_points, read_interior_after
+from tankcal.calibration.parameters.analysis import (
+    Dropping,
+    analyse_job,
+    analyse_record,
+    compare_points,
+    read_interior_after,
+)
 from tankcal.calibration.parameters.judgement import Choices
 from tankcal.calibration.parameters.recommendation import Evidence, Limit, pessoa_rule, recommend
 from tankcal.calibration.parameters.significance import (
     ZeroTest,
     compute_f,
     critical_f,
+    drop_parameters,
     group_tests,
     single_tests,
 )

@@ -20,8 +20,15 @@ from tankcal.calibration.stability.fits import (
     make_orientation_model,
     rays,
 )
-from tankcal.calibration.stability.grids import Grid, default_grid, parse_grid
-from tankcal.calibration.stability.terrains import DRAWN, TERRAINS, Terrain, parse_terrain
+from tankcal.calibration.stability.grids import (
+    DRAWN,
+    TERRAINS,
+    Grid,
+    Terrain,
+    default_grid,
+    parse_grid,
+    parse_terrain,
+)
 from tankcal.camera.model import (
     AFFINITIES,
     CONVENTIONS,

@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from draws import draws
 
-from tankcal.camera.comparator import KINDS, find_mark_error, fit_transformation, group_readings
-from tankcal.camera.film import Surface, flatten_film, heights_at
+from tankcal.camera.comparator import (
+    KINDS,
+    Surface,
+    find_mark_error,
+    fit_transformation,
+    flatten_film,
+    group_readings,
+    heights_at,
+)
 from tankcal.errors import SolutionError
 
 CORNERS = np.array([[-83.0, -58.0], [83.1, -58.2], [82.9, 58.1], [-83.2, 58.0]])

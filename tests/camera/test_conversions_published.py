@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from jacobians import assert_derivative
 
-from tankcal.camera.formats.fitting import linearise_fit
 from tankcal.camera.formats.frame import (
     frame_points,
+    linearise_fit,
     make_framed_camera,
     pixels_to_mm,
     project_rays,

@@ -5,7 +5,7 @@ from fractions import Fraction
 import pytest
 
 from tankcal.errors import InputError
-from tankcal.exports.marks import count_increments, to_quanta
+from tankcal.exports.choosing import count_increments, to_quanta
 from tankcal.exports.profiles import find_profile, parse_profile, shipped_profiles
 from tankcal.job.tables import Log
 from tankcal.tank.dips import parse_dip

@@ -13,7 +13,7 @@ from generated_seams import SHAPES, Ladder, Pipe, Seam, put_before, scan_of, wal
 from generated_walls import job_of, survey
 
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
-from tankcal.geometry.field.hidden_seams import hidden_seams_m
+from tankcal.geometry.field.estimate import hidden_seams_m
 from tankcal.geometry.patches import find_columns
 from tankcal.geometry.shell import UNDECIDED
 from tankcal.pipeline.tanks import body_of

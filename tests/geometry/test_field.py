@@ -24,8 +24,13 @@ from tankcal.geometry.field.components import (
     plate_profiles,
     seam_correlation,
 )
-from tankcal.geometry.field.estimate import LEVELS, WallField, gauss_heights
-from tankcal.geometry.field.hidden_seams import hidden_covariance_m2, hidden_seams_m
+from tankcal.geometry.field.estimate import (
+    LEVELS,
+    WallField,
+    gauss_heights,
+    hidden_covariance_m2,
+    hidden_seams_m,
+)
 from tankcal.geometry.field.likelihood import Misfit
 from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.tanks import body_of

@@ -13,14 +13,15 @@ from tankcal.geometry.field.places import (
     OnCylinder,
     OnGreatCircles,
     OnSphere,
+    SolidField,
     cap_integrals,
     cells_along,
     cells_around,
     degree_shares,
+    estimate_sizes,
     means_of_neighbours,
     wet_cells,
 )
-from tankcal.geometry.field.solids import SolidField, estimate_sizes
 
 RADIUS, LENGTH = 1.3, 6.0
 

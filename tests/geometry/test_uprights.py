@@ -12,10 +12,15 @@ from test_columns import judged
 from test_field import RADIUS_M, sites_of
 
 from tankcal.geometry.field.amplitudes import assumed_amplitudes
-from tankcal.geometry.field.blunders import find_blunders, restricted_precision
+from tankcal.geometry.field.blunders import (
+    _eliminate,
+    _jump,
+    find_blunders,
+    find_uprights,
+    restricted_precision,
+)
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.sites import free_design
-from tankcal.geometry.field.uprights import _eliminate, _jump, find_uprights
 from tankcal.geometry.shell import UNDECIDED
 
 POINTS, NOISE_M = 24, 1e-3

@@ -21,13 +21,15 @@ from tankcal.gum.monte_carlo.inputs import inputs_of
 from tankcal.gum.monte_carlo.linear import LEAST, LONG, SHORT, SPACING, Shape, linear_law, shapes_of
 from tankcal.gum.monte_carlo.quadratic import (
     NEAR,
+    POINTS,
+    SETS,
     SHORT_STEP,
     _normal_between,
     _Roots,
+    _scores_near,
     _smooth_between,
 )
-from tankcal.gum.monte_carlo.quadratic_rows import NEAR as NEAR_LEVEL
-from tankcal.gum.monte_carlo.quadratic_rows import POINTS, SETS, _scores_near
+from tankcal.gum.monte_carlo.quadratic import NEAR as NEAR_LEVEL
 from tankcal.uncertainty import coverage_factor
 
 EXACT_RECTANGULAR = 2 * np.sqrt(3) * (2 - (3 / 5) ** 0.25)

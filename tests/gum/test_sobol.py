@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from tankcal.gum.monte_carlo.sobol import COORDINATES, sobol_points
+from tankcal.gum.monte_carlo.inputs import COORDINATES, sobol_points
 
 
 @pytest.mark.parametrize("inputs", [0, 1, 2, 15, COORDINATES, COORDINATES + 1])

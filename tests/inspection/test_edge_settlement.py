@@ -5,8 +5,7 @@ import pytest
 from jacobians import assert_derivative
 from numpy.testing import assert_allclose
 
-from tankcal.inspection.bulges import find_bulge
-from tankcal.inspection.edges import assess_edges, bent_line, find_break
+from tankcal.inspection.edges import assess_edges, bent_line, find_break, find_bulge
 from tankcal.inspection.levelling import RadialLine
 from tankcal.inspection.rules import BulgeLimits, EdgeLimits, largest_drop_mm
 from tankcal.job.tables import Log

@@ -6,7 +6,7 @@ from jacobians import assert_derivative
 from levelled_tanks import A_MM, LIMITS, TANK_A, epoch_of, even_azimuths, waves
 from numpy.testing import assert_allclose
 
-from tankcal.inspection.epochs import Levelling, is_within_noise
+from tankcal.inspection.levelling import Levelling, is_within_noise
 from tankcal.inspection.out_of_plane import (
     find_largest_curvature,
     find_neighbours,

@@ -8,11 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tankcal.camera.model import PARAMETERS, Form, distort_image_points
-from tankcal.intercomparison.drawing import draw_tank
 from tankcal.intercomparison.observers import METHODS, tape
 from tankcal.intercomparison.observers.cloud import observe_cloud
 from tankcal.intercomparison.observers.photographs import camera_rotation, photograph
 from tankcal.intercomparison.site import Chance, observe_site, request_table
+from tankcal.intercomparison.tank import draw_tank
 
 U_READ_M = 2e-5  # files have hundredths of a millimetre
 

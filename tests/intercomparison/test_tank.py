@@ -8,9 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tankcal.intercomparison.defects import Band, Buckle, Course, Dent, Flat, Oval, Seam
-from tankcal.intercomparison.drawing import FAMILIES, draw_tank
 from tankcal.intercomparison.site import request_table
-from tankcal.intercomparison.tank import Fitting, Floor, Tank, Wave, tank_of
+from tankcal.intercomparison.tank import FAMILIES, Fitting, Floor, Tank, Wave, draw_tank, tank_of
 from tankcal.units import STANDARD_GRAVITY
 
 LEVEL = Floor()

@@ -11,7 +11,7 @@ from spoilt import FORMS, places, problems_of, settings_place, table_file, write
 
 from tankcal.job import load
 from tankcal.job.contract import bottom
-from tankcal.tank.soundings import FEWEST_POINTS, MOST_POINTS
+from tankcal.tank.bottoms import FEWEST_POINTS, MOST_POINTS
 
 RINGS = [(0.0, 0.0, -0.1)] + [
     (r * np.sin(a), r * np.cos(a), -0.1 + r / 65)

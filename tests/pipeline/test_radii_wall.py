@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from radii_jobs import HEIGHTS_M, RADII_M, closed_volume_m3, radii_parts
 
 import tankcal
-from tankcal.geometry.field.mean_field import MeanField
+from tankcal.geometry.field.estimate import MeanField
 
 JOINTS_M = np.cumsum(HEIGHTS_M)
 

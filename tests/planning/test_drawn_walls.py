@@ -10,8 +10,13 @@ from scipy.spatial import ConvexHull
 from wall_plan_folders import HITS, LINES, TANGENTS
 
 from tankcal.planning import load_plan
-from tankcal.planning.wall.nominal_readings import levels_of_readings, set_readings
-from tankcal.planning.wall.reading_errors import EXACT, Errors, add_network_errors
+from tankcal.planning.wall.nominal_readings import (
+    EXACT,
+    Errors,
+    add_network_errors,
+    levels_of_readings,
+    set_readings,
+)
 from tankcal.planning.wall.tank_walls import DrawnWall, RoundWall, plates_of
 from tankcal.survey.sighting import rays
 from tankcal.survey.strapping import reduce_straps

@@ -26,7 +26,7 @@ from tankcal.planning.wall.prediction import predict_wall_table
 from tankcal.record.plan import WALL_PLAN
 from tankcal.report.planning import empty_job
 from tankcal.report.planning.wall_rows import rows_of_runs
-from tankcal.tank.liquid.run_effect import averaged
+from tankcal.tank.liquid.adjustment import averaged
 from tankcal.uncertainty import combine
 
 FILLING = EXAMPLE.parent / "plan-liquid"

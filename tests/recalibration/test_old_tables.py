@@ -13,8 +13,8 @@ from jacobians import assert_derivative
 import tankcal
 from tankcal.errors import InputError, SolutionError
 from tankcal.recalibration.computed_rows import find_computed_rows
-from tankcal.recalibration.fittings import Fitting
 from tankcal.recalibration.read_table import read_table
+from tankcal.recalibration.seams import Fitting
 from tankcal.recalibration.solid_geometry import fit_lying
 from tankcal.recalibration.table_fit import State
 from tankcal.report.table_job import write_job

@@ -12,11 +12,15 @@ from former_tables import SimulatedTank, draw_tank, table_of
 from jacobians import assert_derivative
 from numpy.testing import assert_allclose
 
-from tankcal.recalibration.fittings import Fitting, find_fittings, pair_kinks_again
 from tankcal.recalibration.former import FormerRoof, FormerTable
-from tankcal.recalibration.rounding import row_sds
-from tankcal.recalibration.seams import find_seams, find_zeros
-from tankcal.recalibration.table_fit import Rows, State
+from tankcal.recalibration.seams import (
+    Fitting,
+    find_fittings,
+    find_seams,
+    find_zeros,
+    pair_kinks_again,
+)
+from tankcal.recalibration.table_fit import Rows, State, row_sds
 from tankcal.recalibration.upright_geometry import read_upright
 from tankcal.recalibration.upright_search import drop_phantom_fittings
 from tankcal.recalibration.upright_shell import Rings

@@ -30,10 +30,8 @@ from tankcal.report.pdf import pdf
 from tankcal.report.uncertainty import budget, method, monte_carlo, rule
 from tankcal.report.uncertainty import figures as drawn
 from tankcal.report.uncertainty.stated import stated_rows, uneven_rows
-from tankcal.tank.rules.deviation import DeviationVerdict
-from tankcal.tank.rules.expanded import UncertaintyVerdict
 from tankcal.tank.rules.model import DEVIATION_OF, GUARDS, RELATIVE_TO, SIDES, TANKS, UNCERTAINTY_OF
-from tankcal.tank.rules.verdict import RuleVerdict
+from tankcal.tank.rules.verdict import DeviationVerdict, RuleVerdict, UncertaintyVerdict
 from tankcal.text.digits import decimals_of, decimals_of_rows, fixed
 from tankcal.text.words import input_name, load_words
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.inspection.epochs import Epoch
+from tankcal.inspection.levelling import Epoch
 from tankcal.inspection.rules import SettlementLimits, Strength
 
 A_MM = (

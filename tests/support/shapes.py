@@ -3,7 +3,7 @@
 import numpy as np
 
 import tankcal.sections as sections
-from tankcal.tank.courses import CourseShape, gauss_levels
+from tankcal.tank.volumes import CourseShape, gauss_levels
 
 
 def ring(radius, azimuth, centre=(0.0, 0.0), z=0.0):

@@ -7,9 +7,8 @@ import pytest
 from jacobians import assert_derivative
 
 from tankcal.errors import HeightError, SolutionError
-from tankcal.tank.gauge_tubes import GaugeTube
 from tankcal.tank.heads import End
-from tankcal.tank.solids import LyingTank
+from tankcal.tank.solids import GaugeTube, LyingTank
 
 PLACES = [(0.2, 0.0), (-0.2, 0.0), (0.0, 0.4), (0.15, 0.4), (0.15, -0.4), (-0.6, 0.4)]
 DIPS = np.array([0.0, 0.2, 0.7, 1.1, 1.6])

@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tankcal.tank.liquid import Effect, adjust_steps, fill_of, reading_effects, reduce_steps
-from tankcal.tank.liquid.run_effect import averaged
+from tankcal.tank.liquid.adjustment import averaged
 
 RADIUS_M, COURSES, HEIGHT_M = 6.5, 6, 1.6
 AREA_M2 = np.pi * RADIUS_M**2

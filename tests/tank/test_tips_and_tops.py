@@ -15,8 +15,7 @@ from tankcal.tank.factors import Factor
 from tankcal.tank.heads import End, standard_end
 from tankcal.tank.hydrostatics import liquid_head
 from tankcal.tank.meshes.part import Mesh, mesh_part
-from tankcal.tank.tips import FORMS, tip_of
-from tankcal.tank.tops import HeadedShell
+from tankcal.tank.tips import FORMS, HeadedShell, tip_of
 from tankcal.tank.volumes import ShellVolume
 
 R, D = 1.5, 3.0

@@ -10,8 +10,7 @@ from shapes import course_of, modes, ring
 
 from tankcal.errors import HeightError
 from tankcal.geometry.field.estimate import LEVELS
-from tankcal.tank.courses import gauss_levels
-from tankcal.tank.volumes import ShellVolume
+from tankcal.tank.volumes import ShellVolume, gauss_levels
 from tankcal.uncertainty import factor_of
 
 HEIGHTS = np.concatenate([[0.001, 0.002, 0.01], np.linspace(0.05, 9.5, 190)])

@@ -13,9 +13,9 @@ from tankcal.job.tables import REGISTERS, TABLES
 from tankcal.text.languages import LANGUAGES
 from tankcal.workbench import Refusal, desk, open_job
 from tankcal.workbench.computing import Run, Stopped
-from tankcal.workbench.decimals import AmbiguousNumber, text_for_display, text_for_file
 from tankcal.workbench.desk import Desk
 from tankcal.workbench.plain import warnings_page
+from tankcal.workbench.tables import AmbiguousNumber, text_for_display, text_for_file
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NUMBER = Field("x_m", "number", "")

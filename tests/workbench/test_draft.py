@@ -12,9 +12,9 @@ from openpyxl import load_workbook
 import tankcal
 from tankcal.errors import InputError
 from tankcal.workbench import draft as drafts
-from tankcal.workbench.decimals import AmbiguousNumber
 from tankcal.workbench.draft import Draft
 from tankcal.workbench.findings import BAD, DOUBTFUL
+from tankcal.workbench.tables import AmbiguousNumber
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FOLDERS = sorted(path.parent.name for path in EXAMPLES.glob("*/job.toml"))

@@ -15,7 +15,7 @@ from nbclient.exceptions import CellExecutionError
 import tankcal
 from tankcal.cli import main
 from tankcal.text.languages import LANGUAGES
-from tankcal.workbench.notebook_file import make_notebook
+from tankcal.workbench.serving import make_notebook
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

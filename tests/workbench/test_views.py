@@ -318,7 +318,7 @@ def test_picture_and_list_look_at_the_same_point(widgets, result, english):
 
 
 def test_sliders_of_the_budget(widgets, result, paper):
-    from tankcal.workbench.views.budget_panel import BudgetPanel
+    from tankcal.workbench.views.what_if import BudgetPanel
 
     panel = BudgetPanel(result, paper)
     before = panel.totals.value

@@ -22,25 +22,304 @@ from tankcal.calibration.influence.blocks import (
     compare_blocks,
     make_block,
 )
-from tankcal.calibration.influence.exchange import (
-    FILE,
-    STATES,
-    add_pixel_size,
-    can_be_weighted,
-    exchange_calibration,
-    leave_out_readings,
-    refuse_unsuitable,
-    select_camera,
-    select_free_parameters,
-)
 from tankcal.calibration.product.check import ALPHA
-from tankcal.errors import TankcalError
+from tankcal.camera.model import PARAMETERS
+from tankcal.errors import InputError, Problem, TankcalError
 from tankcal.messages import message
 from tankcal.pipeline.chain import adjust_job
+from tankcal.survey.photographs import ELEMENTS, TURNS
 
+STATES = ("fixed", "weighted", "free")
+SAME = 1e-5  # largest relative rounding difference of formats or pixels: 0.05 px of 4608
+FILE = "cameras.toml"
 REFERENCE = "reference"
 REASON_LINES = 3  # number of lines kept of the reason why there is no volume
 EXPECTED_ERRORS = (TankcalError, np.linalg.LinAlgError)
+
+
+def select_camera(job, camera=None):
+    """Return the job.CameraSetup to replace: the only camera, or the named camera.
+
+    Raises InputError if the job has no photographs or no such camera, or if several cameras have
+    photos and no name is given.
+    """
+    measurements = job.measurements
+    setups = () if measurements is None else measurements.cameras
+    photographed = set() if measurements is None else {item.camera for item in measurements.photos}
+    known = {item.camera.name: item for item in setups if item.camera.name in photographed}
+    if measurements is None or measurements.image_points is None or not known:
+        raise InputError(
+            Problem(
+                "job.toml",
+                message("camera_no_photographs", "no photographs: no camera can be replaced"),
+            )
+        )
+    if camera is None and len(known) == 1:
+        return next(iter(known.values()))
+    if camera in known:
+        return known[camera]
+    if camera is None:
+        expected = message(
+            "camera_several",
+            "several cameras; expected the name of one of them: {names}",
+            names=[*known],
+        )
+    else:
+        expected = message(
+            "camera_without_photos",
+            "no photos of a camera {camera}; expected the name of one of them: {names}",
+            camera=camera,
+            names=[*known],
+        )
+    raise InputError(Problem(FILE, expected))
+
+
+def refuse_unsuitable(setup, calibrations, file=FILE):
+    """Raise InputError, with all problems, for calibrations that cannot replace a camera.
+
+    Parameters
+    ----------
+    setup : job.CameraSetup
+        Camera of the job.
+    calibrations : sequence of job.CameraSetup
+        Calibrations to check.
+    file : str, optional
+        Name of the file of the calibrations in messages.
+    """
+    problems, seen = [], set()
+    if not calibrations:
+        problems.append(
+            Problem(
+                file, message("camera_no_calibrations", "no calibrations; expected one or more")
+            )
+        )
+    for calibration in calibrations:
+        name = calibration.camera.name
+        if name in seen:
+            text = message("camera_name_twice", "this name is given twice; expected once")
+            problems.append(Problem(file, text, None, name))
+        seen.add(name)
+        for quantity, unit, theirs, ours in (
+            (
+                message("camera_the_format", "the format"),
+                "mm",
+                calibration.format_mm,
+                setup.format_mm,
+            ),
+            (message("camera_the_pixel", "the pixel"), "mm", calibration.pixel_mm, setup.pixel_mm),
+        ):
+            if _is_different(theirs, ours):
+                text = message(
+                    "camera_differs",
+                    "{what} is {theirs} {unit}; expected that of the job's camera "
+                    "{name}, {ours} {unit}",
+                    what=quantity,
+                    theirs=_format_pair(theirs),
+                    unit=unit,
+                    name=setup.camera.name,
+                    ours=_format_pair(ours),
+                )
+                problems.append(Problem(file, text, None, name))
+        if not (np.isfinite(calibration.camera.values).all() and calibration.camera.values[0] > 0):
+            text = message(
+                "camera_not_finite", "expected finite parameters and a principal distance above 0"
+            )
+            problems.append(Problem(file, text, None, name))
+    if problems:
+        raise InputError(problems)
+
+
+def add_pixel_size(setup, calibrations):
+    """Return the setup with a pixel size for the residuals.
+
+    A setup without a pixel size takes the common pixel size of the calibrations, if there is one.
+    """
+    known = [item.pixel_mm for item in calibrations if item.pixel_mm is not None]
+    if (
+        setup.pixel_mm is not None
+        or not known
+        or any(_is_different(item, known[0]) for item in known)
+    ):
+        return setup
+    return replace(setup, pixel_mm=known[0])
+
+
+def _is_different(theirs, ours):
+    if theirs is None or ours is None:
+        return False
+    return not np.allclose(theirs, ours, rtol=SAME, atol=0.0)
+
+
+def _format_pair(values):
+    return " x ".join(f"{value:.6g}" for value in values)
+
+
+def select_free_parameters(setup, calibrations):
+    """Names of the parameters adjusted in all runs "free".
+
+    These are the parameters in the model of the job and those with a value in a calibration.
+    """
+    is_given = np.array([calibration.camera.values != 0 for calibration in calibrations]).any(
+        axis=0
+    )
+    return tuple(
+        name
+        for name, scope, has_value in zip(PARAMETERS, setup.camera.scope, is_given, strict=True)
+        if name == "c" or scope != "off" or has_value
+    )
+
+
+def exchange_calibration(measurements, setup, calibration, state, free):
+    """Replace the calibration of a camera.
+
+    Parameters
+    ----------
+    measurements : job.Measurements
+        Measurements of the job.
+    setup : job.CameraSetup
+        Camera to replace.
+    calibration : job.CameraSetup
+        Calibration with the new values, form and standard deviations.
+    state : str
+        "fixed", "weighted" or "free".
+    free : sequence of str
+        Names of the parameters adjusted in runs "free".
+
+    Returns
+    -------
+    measurements : job.Measurements
+        Measurements with the new calibration.
+    setup : job.CameraSetup
+        New camera.
+    held : tuple of str
+        Parameters that are fixed because they have no standard deviation.
+    """
+    camera, roles, held = calibration.camera, [], []
+    for name, value, sd, scope in zip(
+        PARAMETERS, camera.values, camera.sd, setup.camera.scope, strict=True
+    ):
+        role = _state_of_parameter(name, value, sd, state, free)
+        roles.append(("camera" if scope == "off" else scope, role) if role else ("off", "fixed"))
+        if state == "weighted" and role == "fixed" and sd != 0:
+            held.append(name)
+    changed = replace(
+        setup.camera,
+        values=np.array(camera.values, dtype=float),
+        form=camera.form,
+        sd=np.array(camera.sd, dtype=float),
+        scope=tuple(scope for scope, _ in roles),
+        state=tuple(role for _, role in roles),
+    )
+    pixel = calibration.pixel_mm if setup.pixel_mm is None else setup.pixel_mm
+    new_setup = replace(setup, camera=changed, pixel_mm=pixel)
+    cameras = tuple(new_setup if item is setup else item for item in measurements.cameras)
+    return replace(measurements, cameras=cameras), new_setup, tuple(held)
+
+
+def _state_of_parameter(name, value, sd, state, free):
+    """State of a parameter in a run; "" if the parameter is not in the model."""
+    if state == "free":
+        return "free" if name in free else ""
+    if state == "weighted" and sd > 0:
+        return "weighted"
+    return "fixed" if name == "c" or value != 0 else ""
+
+
+def can_be_weighted(calibration):
+    """Whether a calibration has a standard deviation above 0 of any parameter."""
+    return bool((np.nan_to_num(calibration.camera.sd) > 0).any())
+
+
+def leave_out_readings(measurements, removed):
+    """Exclude rejected readings from job.Measurements, and switch off the search for outliers.
+
+    Image points and readings between points become check readings. Known coordinates and
+    orientations become approximate values. All readings of a rejected mean are excluded.
+    """
+    settings = replace(measurements.settings, snooping=False, explain=False)
+    remaining = replace(measurements, settings=settings)
+    images = measurements.image_points
+    for reading in removed:
+        if images is not None and reading.file == images.file:
+            remaining = _exclude_image(remaining, reading)
+        elif measurements.control is not None and reading.file == measurements.control.file:
+            remaining = replace(remaining, control=_release_coordinate(remaining.control, reading))
+        elif reading.file == "photos.csv":
+            remaining = replace(
+                remaining, photos=tuple(_release_element(p, reading) for p in remaining.photos)
+            )
+        else:
+            remaining = replace(
+                remaining,
+                readings=tuple(
+                    _exclude_reading(table, reading) if table.file == reading.file else table
+                    for table in remaining.readings
+                ),
+            )
+    return remaining
+
+
+def _exclude_image(measurements, reading):
+    images = measurements.image_points
+    pairs = zip(images.photo, images.point, strict=True)
+    is_rejected = np.array([pair == tuple(reading.ids) for pair in pairs])
+    images = replace(images, check=np.asarray(images.check, dtype=bool) | is_rejected)
+    return replace(measurements, image_points=images)
+
+
+def _release_coordinate(control, reading):
+    """Make one coordinate of a control point, in its system, an approximate value."""
+    systems = control.system or (None,) * len(control.point)
+    rows = [i for i, name in enumerate(control.point) if name == reading.ids[0]]
+    if reading.row is not None:
+        system = systems[control.rows.index(reading.row)]
+        rows = [i for i in rows if systems[i] == system]
+    sd = np.array(control.sd_m, dtype=float)
+    sd[rows, "xyz".index(reading.element)] = np.nan
+    return replace(control, sd_m=sd)
+
+
+def _release_element(photo, reading):
+    if photo.name != reading.ids[0]:
+        return photo
+    sd = np.array(photo.sd, dtype=float)
+    if reading.element in TURNS:
+        sd[3:] = np.nan
+    else:
+        sd[ELEMENTS.index(reading.element)] = np.nan
+    return replace(photo, sd=sd)
+
+
+def _exclude_reading(table, reading):
+    """Make a rejected reading, and all readings averaged in it, check readings."""
+    keys = _reading_keys(table)
+    rows = [i for i, key in enumerate(keys) if key[0] == tuple(reading.ids)]
+    if reading.row is not None:
+        rows = [table.rows.index(reading.row)]
+    if reading.repeats > 1:  # several readings of the same value
+        same_keys = {_key_without_order(table, keys[i]) for i in rows}
+        rows = [i for i, key in enumerate(keys) if _key_without_order(table, key) in same_keys]
+    check = np.array(table.check, dtype=bool)
+    check[rows] = True
+    return replace(table, check=check)
+
+
+def _reading_keys(table):
+    """Keys that identify the readings of a table: names, set-up, set, instrument and kind."""
+    n = len(table.value)
+    blank = (None,) * n
+    names = zip(table.setup or table.start, table.end, strict=True)
+    if table.origin:
+        names = zip(table.setup or table.start, table.origin, table.end, strict=True)
+    kind = blank if table.horizontal is None else np.asarray(table.horizontal).tolist()
+    return list(
+        zip(names, table.setup or blank, table.set or blank, table.instrument or blank, kind,
+            strict=True)
+    )  # fmt: skip
+
+
+def _key_without_order(table, key):
+    return (frozenset(key[0]), *key[1:]) if table.table == "distances" else key
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,6 @@ import numpy as np
 
 from tankcal.calibration.edges import Shift, left_shifts, own_shift
 from tankcal.calibration.interiors import Interior
-from tankcal.calibration.parameters.components import Components, components
-from tankcal.calibration.parameters.conditioning import Prediction, drop_parameters
 from tankcal.calibration.parameters.recommendation import (
     CORRELATED,
     LIMIT_PX,
@@ -28,7 +26,11 @@ from tankcal.calibration.parameters.recommendation import (
 )
 from tankcal.calibration.parameters.significance import (
     ALPHA,
+    Components,
+    Prediction,
     ZeroTest,
+    components,
+    drop_parameters,
     group_tests,
     select_groups,
     single_tests,

@@ -34,8 +34,7 @@ from tankcal.calibration.stability.fits import (
     fit_rotation,
     ideal_derivatives,
 )
-from tankcal.calibration.stability.grids import Grid, default_grid
-from tankcal.calibration.stability.terrains import SEED, TERRAINS, Terrain
+from tankcal.calibration.stability.grids import SEED, TERRAINS, Grid, Terrain, default_grid
 from tankcal.camera.model import correct_image_points, distort_image_points
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.rotations import angles_of

@@ -2,7 +2,7 @@
 
 from tankcal.calibration.targets.circles import eccentricity_px, read_circles
 from tankcal.calibration.targets.coded import read_coded
-from tankcal.calibration.targets.opencv import target_image
+from tankcal.calibration.targets.pictures import target_image
 from tankcal.calibration.targets.reading import (
     ImagePoint,
     PhotoReading,

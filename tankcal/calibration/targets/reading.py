@@ -13,16 +13,22 @@ import numpy as np
 
 from tankcal.calibration.targets.circles import read_circles
 from tankcal.calibration.targets.coded import read_coded
-from tankcal.calibration.targets.naming import (
+from tankcal.calibration.targets.pictures import (
+    ENCODINGS,
+    load_dictionary,
+    opencv,
+    photo_name,
+    read_picture,
+)
+from tankcal.calibration.targets.results import (
     CORNERS,
+    REASONS,
+    RefusedTarget,
     match_circles_to_places,
     read_names,
     read_places,
     warn_of_unused,
 )
-from tankcal.calibration.targets.opencv import load_dictionary, opencv
-from tankcal.calibration.targets.pictures import ENCODINGS, photo_name, read_picture
-from tankcal.calibration.targets.results import REASONS, RefusedTarget
 from tankcal.errors import InputError, Problem, reason_of
 from tankcal.job.fields import Refused as InvalidName
 from tankcal.job.tables import Log, shown

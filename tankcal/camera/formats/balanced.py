@@ -17,8 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.formats.fitting import USUAL
-from tankcal.camera.formats.frame import make_film_camera, make_framed_camera
+from tankcal.camera.formats.frame import USUAL, make_film_camera, make_framed_camera
 from tankcal.camera.formats.published import convert_camera
 from tankcal.camera.formats.texts import duplicate_message, exact_text, short_text
 from tankcal.camera.model import Form

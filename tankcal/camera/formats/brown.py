@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.camera.formats.fitting import fit
 from tankcal.camera.formats.frame import (
     differences_px,
+    fit,
     frame_points,
     make_framed_camera,
     pixels_to_mm,

@@ -27,9 +27,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.camera.formats.brown import Brown, Terms, convert_from_brown, convert_to_brown
-from tankcal.camera.formats.fitting import fit
 from tankcal.camera.formats.frame import (
     differences_px,
+    fit,
     frame_points,
     make_framed_camera,
     pixels_to_mm,

@@ -18,10 +18,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tankcal.camera.formats.fitting import USUAL, fit
 from tankcal.camera.formats.frame import (
     SAME_POINT_PX,
+    USUAL,
     differences_px,
+    fit,
     frame_points,
     make_framed_camera,
     pixels_to_mm,

@@ -13,15 +13,40 @@ of the part that the survey does not determine,
     variance * (K_gg - A K_g' - K_g A' + A K A').
 
 Source: Robinson 1991 (best linear unbiased prediction).
+
+Seams between the columns of points
+-----------------------------------
+
+The model contains two narrow seams along the whole shell, of depth d, width w and profile cos^2, at
+random azimuths. Columns of points at the spacing s measure each seam with the area A = d w / 2
+times 1 + q cos phi,
+
+    q = 2 sinc(w / s) / (1 - (w / s)^2),
+
+with phi the position between the columns, so two seams cause an error of standard deviation q A.
+For s > w, a seam may be missed completely: q = 1. The readings determine seams that points do meet.
+
+The columns of a course measure that course only. Errors of two courses are equal where their
+columns are aligned; otherwise their correlation is that of the responses of both sets of columns to
+a seam at a random azimuth.
+
+Wall of known mean radii
+------------------------
+
+All other departures of a course (bulge, taper) have the mean 0 over its height, since the measured
+radius includes their mean: f - M f, with M the mean over the course. They do not change the volume
+at a joint. Between joints they contribute to the uncertainty, with the prior amplitudes of walls
+(`components`).
 """
 
 from dataclasses import dataclass
 from functools import cache, cached_property
+from math import factorial
 
 import numpy as np
 import scipy.linalg
 
-from tankcal.geometry.field.amplitudes import Amplitudes
+from tankcal.geometry.field.amplitudes import Amplitudes, assumed_amplitudes
 from tankcal.geometry.field.components import (
     COMPONENTS,
     ROUND_SHAPES,
@@ -29,7 +54,6 @@ from tankcal.geometry.field.components import (
     weld_columns,
 )
 from tankcal.geometry.field.covariances import Covariances, clip_to_semidefinite
-from tankcal.geometry.field.hidden_seams import hidden_covariance_m2
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
 from tankcal.geometry.field.sites import Sites, free_design
 from tankcal.quadrature import panels
@@ -39,6 +63,11 @@ LEVELS = 7  # number of Gauss levels of a course, at which its outlines are esti
 SHAPES = ("mean", *ROUND_SHAPES, "weld")
 # Grid of the integrals along outlines: largest step along the arc, and least number of azimuths.
 GRID_M, FEWEST_OF_GRID = 0.1, 720
+DEPTH_M, PART, WIDTH_M = 0.035, 0.0046, 0.8  # seam: depth, at most PART of the radius; width
+SAME_RAD = 1e-9  # azimuths with a smaller difference are equal up to rounding
+SHORTEST = 12.0  # waves shorter than WIDTH_M / 12 have a response to cos^2 below 1e-7
+PER_WAVE = 4  # least number of grid places for each shortest wave: k d <= pi / 4
+TERMS = 14  # terms of the series of exp(-i k d): truncation error below 1e-12
 
 
 @cache
@@ -391,3 +420,194 @@ class Functionals:
             spectrum = np.fft.rfft(kernel).real
             covariances[shape] = np.fft.irfft(waves * spectrum, gradients.shape[1]) @ gradients.T
         return covariances
+
+
+def hidden_covariance_m2(course, azimuth_rad, radius_m):
+    """Return the covariance of mean radii of courses due to seams between their points.
+
+    Parameters
+    ----------
+    course : ndarray of int, shape (n,)
+        Course of each point: 0, 1, ...
+    azimuth_rad : ndarray, shape (n,)
+        Azimuths; nan for the mean of a full turn, which misses no seam.
+    radius_m : float
+        Radius of the tank, m.
+
+    Returns
+    -------
+    ndarray, shape (courses, courses)
+        m2.
+
+    Examples
+    --------
+    >>> around = np.arange(24) * FULL_TURN / 24
+    >>> course = np.repeat([0, 1, 2], 24)
+    >>> turned = np.concatenate([around, around, around + FULL_TURN / 48])
+    >>> covariance = hidden_covariance_m2(course, turned, 7.5)
+    >>> np.round(covariance / covariance[0, 0], 3)
+    array([[ 1.   ,  1.   , -0.373],
+           [ 1.   ,  1.   , -0.373],
+           [-0.373, -0.373,  1.   ]])
+    """
+    courses = range(int(course.max(initial=-1)) + 1)
+    columns = [_find_columns(azimuth_rad[course == item]) for item in courses]
+    size = np.array([_error_sd_m(gaps, radius_m) for _, gaps in columns])
+    wave = np.arange(1, int(SHORTEST * FULL_TURN * radius_m / WIDTH_M) + 2)
+    ratio = wave * WIDTH_M / (FULL_TURN * radius_m)
+    responses = np.array([_spectrum(*item, wave) for item in columns]) * _seam_response(ratio)
+    # Unit vectors of responses: their scalar products are the correlations of the errors.
+    responses /= np.maximum(np.linalg.norm(responses, axis=1, keepdims=True), 1e-30)
+    return np.outer(size, size) * (responses @ responses.conj().T).real
+
+
+def hidden_seams_m(azimuth_rad, radius_m):
+    """Return the standard uncertainty of a mean radius due to seams between the points, m.
+
+    Each gap between columns has a weight equal to its share of the turn.
+
+    Parameters
+    ----------
+    azimuth_rad : ndarray, shape (n,)
+        Azimuths of the points of a course.
+    radius_m : float
+        Radius of the tank, m.
+
+    Examples
+    --------
+    >>> round(1e3 * hidden_seams_m(np.arange(72) * FULL_TURN / 72, 7.5), 2)
+    0.2
+    """
+    return _error_sd_m(_find_columns(azimuth_rad)[1], radius_m)
+
+
+def _find_columns(azimuth_rad):
+    """Return ascending azimuths of columns, and the gap after each column, rad."""
+    turns = np.unique(azimuth_rad[np.isfinite(azimuth_rad)] % FULL_TURN)
+    gaps = np.diff(turns, append=turns[:1] + FULL_TURN)
+    distinct = gaps > SAME_RAD  # equal up to rounding, also across the end of the turn
+    return turns[distinct], gaps[distinct]
+
+
+def _error_sd_m(gaps, radius_m):
+    """Return the standard deviation of the mean radius due to seams, m."""
+    if not len(gaps):
+        return 0.0
+    parts = 2 * _seam_response(np.maximum(WIDTH_M / (radius_m * gaps), 1.0))
+    # A seam of area A changes the mean radius by A / (2 pi R).
+    area = min(DEPTH_M, PART * radius_m) * WIDTH_M / 2
+    return area / (FULL_TURN * radius_m) * float(np.sqrt(parts**2 @ gaps / FULL_TURN))
+
+
+def _seam_response(ratio):
+    """Return the response of the profile cos^2 of width w to a wave of length w / ratio."""
+    # The limit at ratio = 1 is finite, but numerator and denominator vanish.
+    ratio = np.where(np.abs(ratio - 1) < 1e-9, 1 + 1e-9, ratio)
+    return np.sinc(ratio) / (1 - ratio**2)
+
+
+def _spectrum(turns, gaps, wave):
+    """Return the sum (k,) of share exp(-i wave azimuth) over columns, for waves 1, 2, ... (k,).
+
+    The share of a column is the part of the turn for which it is the nearest column. Its azimuth is
+    a grid place plus a remainder d, which enters as the series of exp(-i k d). Without the
+    remainder, the correlation of two courses would depend on a rotation of the whole survey.
+    """
+    count = 1 << int(np.ceil(np.log2(PER_WAVE * len(wave))))
+    share = (gaps + np.roll(gaps, 1)) / (2 * FULL_TURN)
+    place = np.rint(turns / FULL_TURN * count).astype(int)
+    remainder = turns - place * FULL_TURN / count
+    spectrum = np.zeros(len(wave), dtype=complex)
+    for order in reversed(range(TERMS)):  # Horner: sum of (-i k)^m / m! times the m-th moments
+        moments = np.bincount(place % count, share * remainder**order / factorial(order), count)
+        spectrum = spectrum * (-1j * wave) + np.fft.rfft(moments)[1 : len(wave) + 1]
+    return spectrum
+
+
+@dataclass(frozen=True)
+class MeanField:
+    """Wall of courses with known mean radii, with the interface of `WallField`.
+
+    Attributes
+    ----------
+    mean_radius_m : ndarray, shape (courses,)
+        m.
+    """
+
+    mean_radius_m: np.ndarray
+    stated = ()
+
+    @cached_property
+    def amplitudes(self):
+        """Assumed `Amplitudes` of the wall between the joints."""
+        return assumed_amplitudes()
+
+    @cached_property
+    def sites(self):
+        """`Sites` of full turns at the Gauss levels of each course."""
+        courses = len(self.mean_radius_m)
+        n = courses * LEVELS
+        return Sites(
+            course=np.repeat(np.arange(courses), LEVELS),
+            ring=np.full(n, -1),
+            zeta=np.tile(gauss_heights(), courses),
+            azimuth_rad=np.full(n, np.nan),
+            leans=np.zeros(n, dtype=bool),
+        )
+
+    @cached_property
+    def outlines_m(self):
+        """Radius (courses, LEVELS, g) at each Gauss level of each course, m."""
+        return self.outlines_at(gauss_heights())
+
+    def outlines_at(self, zeta):
+        """Return the radius (courses, k, g) at heights (k,) of each course, m."""
+        shape = (len(self.mean_radius_m), len(np.atleast_1d(zeta)), FEWEST_OF_GRID)
+        return np.broadcast_to(self.mean_radius_m[:, None, None], shape)
+
+    def functionals(self, gradients_m):
+        """Return `MeanFunctionals` of the wall: integrals of gradients times the radius.
+
+        gradients_m  (courses, LEVELS, g), as for `WallField.functionals`
+        """
+        return MeanFunctionals(self, 2 * np.pi * np.mean(gradients_m, axis=2))
+
+    def seen(self, departures_m):
+        """Return the mean (courses, LEVELS) of departures (n,) at the sites over each course."""
+        means = departures_m.reshape(-1, LEVELS) @ _level_weights()
+        return np.repeat(means[:, None], LEVELS, axis=1)
+
+
+class MeanFunctionals:
+    """Linear functionals of a `MeanField`, one for each course and Gauss level.
+
+    Attributes
+    ----------
+    weights : ndarray, shape (f, courses)
+        Derivative by the mean radii.
+    """
+
+    def __init__(self, field, totals):
+        self._field, self._totals = field, totals
+        # A functional depends on the mean radius of its own course only.
+        by_course = np.eye(len(totals))[:, None] * totals[:, :, None]
+        self.weights = by_course.reshape(-1, len(totals))
+
+    def unseen(self, index):
+        """Return the covariance (f, f) due to the part of a component outside the mean."""
+        component, size = COMPONENTS[index], self._field.amplitudes.variances_m2[index]
+        if component.shape != "mean":  # waves along the perimeter do not change areas
+            return np.zeros((self._totals.size, self._totals.size))
+        # h of f - M f: (I - M) h (I - M)'.
+        about_mean = np.eye(LEVELS) - _level_weights()
+        levels = self._field.sites.heights_at(0, gauss_heights())
+        height = about_mean @ component.height_covariance(levels, levels) @ about_mean.T
+        count, flat = len(self._totals), self._totals.ravel()
+        course_correlation = np.ones((count, count)) if component.common else np.eye(count)
+        of_heights = np.kron(course_correlation, height)
+        return clip_to_semidefinite(size * np.outer(flat, flat) * of_heights)
+
+
+def _level_weights():
+    """Return the Gauss weights (LEVELS,), fractions of the height of a course."""
+    return panels([0.0, 1.0], LEVELS)[1]

@@ -17,11 +17,9 @@ import scipy
 from scipy.special import ndtr, ndtri
 
 from tankcal.gum.monte_carlo.goal import Goal, may_stop, simulation
-from tankcal.gum.monte_carlo.inputs import inputs_of
+from tankcal.gum.monte_carlo.inputs import inputs_of, sobol_points
 from tankcal.gum.monte_carlo.linear import linear_law, shapes_of
-from tankcal.gum.monte_carlo.quadratic import QuadraticRows
-from tankcal.gum.monte_carlo.quadratic_rows import table_estimates
-from tankcal.gum.monte_carlo.sobol import sobol_points
+from tankcal.gum.monte_carlo.quadratic import QuadraticRows, table_estimates
 
 DIFFERENCE = 1e-3  # step of the numerical derivatives, in scales of the input
 LEVELS = 501  # lower ends tried for the shortest interval

@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 
-from tankcal.intercomparison.observers.sighting import Tool, incidence, rays_of, read_targets
+from tankcal.intercomparison.observers.total_station import Tool, incidence, rays_of, read_targets
 from tankcal.intercomparison.site import finish, observe_site
 from tankcal.units import FULL_TURN
 

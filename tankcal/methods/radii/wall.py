@@ -5,7 +5,7 @@ survey of some courses (`update`).
 
 Each radius is that of the circle of the mean area of a course, inside, shell empty, at its own
 reference temperature. The volume up to a joint therefore depends on the radii alone. Between joints
-the uncertainty includes the possible form of a course (`geometry.field.mean_field`).
+the uncertainty includes the possible form of a course (`geometry.field.estimate`).
 """
 
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tankcal.geometry.field.mean_field import MeanField
+from tankcal.geometry.field.estimate import MeanField
 from tankcal.messages import message
 from tankcal.pipeline.strapped_wall import UprightAxis
 from tankcal.pipeline.tanks import shell_zero

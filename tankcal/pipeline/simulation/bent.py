@@ -15,8 +15,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from tankcal.gum.monte_carlo import ESTIMATES, Simulation, numerical_tolerance
-from tankcal.gum.monte_carlo.inputs import inputs_of
-from tankcal.gum.monte_carlo.sobol import sobol_points
+from tankcal.gum.monte_carlo.inputs import inputs_of, sobol_points
 
 PROBES = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])  # tested errors of the datum, in u
 TOLERATED = 0.005  # largest error of the parabola, relative to u of the volume

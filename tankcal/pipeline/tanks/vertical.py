@@ -17,7 +17,6 @@ from tankcal.pipeline.tanks.common import (
     thermal_scale,
 )
 from tankcal.tank.body import Body, ShellPart
-from tankcal.tank.courses import DEPARTURES, CourseShape
 from tankcal.tank.factors import cause_factors
 from tankcal.tank.fittings import floating_roof
 from tankcal.tank.heads import End, standard_end
@@ -25,9 +24,8 @@ from tankcal.tank.hydrostatics import liquid_head
 from tankcal.tank.parts import Part
 from tankcal.tank.terrain import Footprint
 from tankcal.tank.tips import FORMS as TIPS
-from tankcal.tank.tips import tip_of
-from tankcal.tank.tops import HeadedShell
-from tankcal.tank.volumes import ShellVolume
+from tankcal.tank.tips import HeadedShell, tip_of
+from tankcal.tank.volumes import DEPARTURES, CourseShape, ShellVolume
 from tankcal.units import FULL_TURN
 
 # The plan of a bottom is that of the shell, so it widens with the shell.

@@ -11,7 +11,7 @@ from tankcal.job.checks.strapping import MOST_STRAPS, too_many_straps
 from tankcal.job.tables import Log
 from tankcal.messages import list_some, message
 from tankcal.planning.entries import PLAN_FILE, check_form, no_such_name, too_many_sections
-from tankcal.planning.obstacles import (
+from tankcal.planning.visibility import (
     check_obstacles,
     message_of_cut_line,
     message_of_misplaced_station,

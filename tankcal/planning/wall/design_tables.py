@@ -11,7 +11,7 @@ import numpy as np
 from tankcal.job.checks.lines import MOST_OFFSETS
 from tankcal.job.checks.strapping import MOST_STRAPS
 from tankcal.job.tables import Table
-from tankcal.planning.obstacles import find_hidden
+from tankcal.planning.visibility import find_hidden
 from tankcal.planning.wall.filling import rows_of_runs
 from tankcal.survey.stadia import angle_of_distance_rad
 from tankcal.survey.tangents import MOST_TANGENTS

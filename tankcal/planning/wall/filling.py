@@ -1,20 +1,33 @@
-"""Planned runs of metered liquid: checks, and their rows of liquid.csv.
+"""Planned runs of metered liquid: checks, their rows of liquid.csv, and their predicted effect.
 
 The volumes in these rows are approximate; `nominal_filling` replaces them by the volumes that a
 meter would show.
+
+The predicted effect comprises U of rows and differences, detectable causes, and reliability.
 """
+
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
+from tankcal.adjust import noncentrality
+from tankcal.errors import InputError, Problem
 from tankcal.messages import message
+from tankcal.pipeline.liquid.alone import filled_range_m
+from tankcal.pipeline.liquid.body import join_body
 from tankcal.planning.entries import PLAN_FILE, too_many_sections
 from tankcal.planning.wall.model import PlannedRun
 from tankcal.tank.liquid.reduction import MOST_ROWS
+from tankcal.uncertainty import combine
 
 LEAST_STEP_M = 0.001  # smallest step between two dips
 LEAST_BATCH_M3 = 1e-3  # replaces a batch volume that is zero or unknown
 MOST_RUNS = 50
 SAME_M = 1e-6  # largest difference of equal dips
+LEAST_SHARE = 0.01  # smallest relative reduction of the u of a cause that is listed
+UNCONTROLLED = 1e-4  # redundancy
+OF_INSTRUMENTS = "instrument"  # part of the kinds of causes whose note names the instrument
 
 
 def check_runs(plan_input, is_run_declared, log):
@@ -160,3 +173,296 @@ def rows_of_runs(runs, volume_at):
                 way = np.copysign(max(abs(way), LEAST_BATCH_M3), run.dips_m[-1] - run.dips_m[0])
                 yield common | sd | at_meter | {"volume_m3": float(way), "dip_m": dip}
             before = below
+
+
+@dataclass(frozen=True)
+class DipOutlook:
+    """Predicted volume below a dip.
+
+    Attributes
+    ----------
+    dip_m : float
+        From the table's zero, m.
+    volume_m3 : float
+        Volume below the dip, m3.
+    U_geometry_m3 : float
+        Expanded uncertainty by geometry only, surveyed or declared, m3.
+    U_liquid_m3 : float or None
+        Expanded uncertainty by liquid only, m3. None outside its dips, or if liquid only does not
+        determine the tank.
+    U_m3 : float
+        Expanded uncertainty by both, m3.
+    """
+
+    dip_m: float
+    volume_m3: float
+    U_geometry_m3: float
+    U_liquid_m3: float | None
+    U_m3: float
+
+
+@dataclass(frozen=True)
+class DifferenceOutlook:
+    """Predicted volume between two dips (a delivery).
+
+    Attributes
+    ----------
+    low_m, high_m : float
+        Dips, m.
+    volume_m3 : float
+        Volume between the dips, m3.
+    U_geometry_m3 : float
+        As in `DipOutlook`.
+    U_m3 : float
+        Expanded uncertainty by geometry and liquid, m3.
+    """
+
+    low_m: float
+    high_m: float
+    volume_m3: float
+    U_geometry_m3: float
+    U_m3: float
+
+
+@dataclass(frozen=True)
+class CauseOutlook:
+    """A meter, or a cause whose uncertainty liquid reduces.
+
+    Attributes
+    ----------
+    kind : str
+        As in the budget of a table.
+    name : str
+        Name of the meter or instrument; "" if the cause is common to all.
+    unit : str
+        Unit of both uncertainties.
+    u_before : float
+        Standard uncertainty without liquid.
+    u_after : float
+        Standard uncertainty with liquid.
+    """
+
+    kind: str
+    name: str
+    unit: str
+    u_before: float
+    u_after: float
+
+
+@dataclass(frozen=True)
+class LiquidReadings:
+    """Reliability of batches or dips.
+
+    Attributes
+    ----------
+    kind : str
+        "batches" or "dips".
+    count : int
+        Number of readings.
+    uncontrolled : int
+        Number of readings that no other reading controls.
+    redundancy : float
+        Mean redundancy number.
+    detectable : float or None
+        Largest minimal detectable error, m3 for batches, m for dips; None if all are uncontrolled.
+    """
+
+    kind: str
+    count: int
+    uncontrolled: int
+    redundancy: float
+    detectable: float | None
+
+
+@dataclass(frozen=True)
+class FillingOutlook:
+    """Predicted results of runs of liquid.
+
+    Attributes
+    ----------
+    runs, batches : int
+        Numbers of runs and batches.
+    dips : tuple of DipOutlook
+    differences : tuple of DifferenceOutlook
+        Between neighbouring dips of `dips`.
+    causes : tuple of CauseOutlook
+    readings : tuple of LiquidReadings
+    redundancy : int
+        Degrees of freedom of the overall test: steps minus unknowns that only the steps determine.
+    detectable_radius_m : float or None
+        Smallest detectable common offset of all radii of the geometry, m.
+    run_sd : float
+        Relative standard deviation of the run effect.
+    run_dof : float or None
+        Its degrees of freedom; None if it is declared.
+    """
+
+    runs: int
+    batches: int
+    dips: tuple[DipOutlook, ...]
+    differences: tuple[DifferenceOutlook, ...]
+    causes: tuple[CauseOutlook, ...]
+    readings: tuple[LiquidReadings, ...]
+    redundancy: int
+    detectable_radius_m: float | None
+    run_sd: float
+    run_dof: float | None
+
+
+def outlook_of_filling(plan, metering, result, table):
+    """Return the `FillingOutlook` of a WallPlan.
+
+    Parameters
+    ----------
+    plan : WallPlan
+    metering : Measured
+    result : LiquidResult
+    table : ComputedTable
+    """
+    dips = _dips_of(plan, table)
+    bodies = _bodies(metering)
+    rows = _rows(plan, bodies, dips, table)
+    dof = result.run_dof
+    return FillingOutlook(
+        runs=len(plan.design.runs),
+        batches=len(result.steps.row),
+        dips=rows,
+        differences=_differences(bodies, dips, table),
+        causes=_causes(metering.joint),
+        readings=_readings(result),
+        redundancy=result.dof,
+        detectable_radius_m=None if plan.design.is_metered_alone else result.detectable_radius_m,
+        run_sd=result.run_sd,
+        run_dof=float(dof) if np.isfinite(dof) else None,
+    )
+
+
+def _dips_of(plan, table):
+    """Return the listed dips: those of the plan, or else those of the runs and the full tank."""
+    if plan.dips_m:
+        return np.array(plan.dips_m)
+    filled = np.clip(filled_range_m(plan.job.liquid), table.table.height_m[0], table.top_m)
+    return np.unique(np.round([*filled, table.top_m], 4))
+
+
+def refuse_other_dips(dips_m, table):
+    """Raise InputError for dips outside a `ComputedTable`."""
+    low, top = float(table.table.height_m[0]), table.top_m
+    beyond = [dip for dip in dips_m if not low - SAME_M <= dip <= top + SAME_M]
+    if beyond:
+        expected = message(
+            "plan_dips_beyond",
+            "found {dip:g}; expected {low:.4g} to {high:.4g} m, the dips of the table",
+            dip=beyond[0],
+            low=low,
+            high=top,
+        )
+        raise InputError(Problem(PLAN_FILE, expected, None, "filling.dips_m"))
+
+
+def _bodies(metering):
+    """Return {"geometry", "liquid", "joint": Body}.
+
+    None if liquid only does not determine the tank.
+    """
+    joint = metering.joint.known
+    return {
+        "geometry": joint.geometry.moved_to({}).body(),
+        "liquid": None if metering.alone is None else join_body(metering.alone.known),
+        "joint": join_body(joint),
+    }
+
+
+def _expanded(body, levels, table, weights=None):
+    """U (n,) of volumes at levels, or of their weighted sums."""
+    levels = np.clip(levels, body.lowest_m, body.highest_m)
+    sources = body.sources(levels)
+    if weights is not None:
+        sources = [source.weighted(weights) for source in sources]
+    return combine(sources, len(levels if weights is None else weights)).expanded(
+        table.table.probability
+    )
+
+
+def _rows(plan, bodies, dips, table):
+    levels = dips + table.zero_m
+    low, high = filled_range_m(plan.job.liquid)
+    inside = (dips >= low - SAME_M) & (dips <= high + SAME_M)
+    U_of = {
+        name: np.full(len(dips), np.nan) if body is None else _expanded(body, levels, table)
+        for name, body in bodies.items()
+    }
+    liquid = np.where(inside, U_of["liquid"], np.nan)
+    volumes = bodies["joint"].volume_m3(np.clip(levels, None, bodies["joint"].highest_m))
+    columns = (dips, volumes, U_of["geometry"], liquid, U_of["joint"])
+    return tuple(
+        DipOutlook(
+            float(dip),
+            float(volume),
+            float(by_geometry),
+            float(by_liquid) if np.isfinite(by_liquid) else None,
+            float(U),
+        )
+        for dip, volume, by_geometry, by_liquid, U in zip(*columns, strict=True)
+    )
+
+
+def _differences(bodies, dips, table):
+    if len(dips) < 2:
+        return ()
+    levels, over = dips + table.zero_m, np.diff(np.eye(len(dips)), axis=0)
+    joint, geometry = bodies["joint"], bodies["geometry"]
+    volumes = over @ joint.volume_m3(np.clip(levels, None, joint.highest_m))
+    before, expanded = (_expanded(body, levels, table, over) for body in (geometry, joint))
+    columns = (pairwise(dips), volumes, before, expanded)
+    return tuple(
+        DifferenceOutlook(float(low), float(high), float(volume), float(by_geometry), float(U))
+        for (low, high), volume, by_geometry, U in zip(*columns, strict=True)
+    )
+
+
+def _causes(result):
+    """Return the meters, and other scalar causes whose uncertainty liquid reduces."""
+    adjusted, fill = result.adjusted, result.fill
+    metering = result.known.geometry.job.liquid
+    outlooks = []
+    effects = (effect for effect in adjusted.effects if effect.kind == "meter_factor")
+    columns = next((effect.columns.T for effect in effects), None)
+    for number, name in enumerate(fill.meters):
+        u = 1e6 * metering.meters[name].u_factor
+        left = 1.0 if columns is None else _left(adjusted, columns[number])
+        outlooks.append(CauseOutlook("meter_factor", name, "ppm", u, u * left))
+    of_geometry = [source for source in result.known.sources if not source.parts]
+    of_liquid = [cause for cause in result.known.liquid if cause.kind != "meter_factor"]
+    for cause in (*of_geometry, *of_liquid):
+        if cause.u and cause.unit and cause.columns_m3.shape[1] == 1:
+            left = _left(adjusted, cause.columns_m3[:, 0])
+            if left < 1 - LEAST_SHARE:
+                name = cause.note if cause.kind.startswith(OF_INSTRUMENTS) else ""
+                u = float(cause.u)
+                outlooks.append(CauseOutlook(cause.kind, name, cause.unit, u, u * left))
+    return tuple(outlooks)
+
+
+def _left(adjusted, column):
+    """Ratio of the u of a cause after to before.
+
+    Column (n,): effect of one u on the misclosures.
+    """
+    # A cause with prior variance 1 has the posterior variance 1 - c' M c, with the weights M of
+    # all tests (`tank.liquid.adjustment`).
+    return float(np.sqrt(max(1.0 - column @ adjusted.weight @ column, 0.0)))
+
+
+def _readings(result):
+    delta, outlooks = noncentrality(), []
+    for kind, readings in (("batches", result.steps), ("dips", result.dips)):
+        shows = readings.redundancy > UNCONTROLLED
+        detectable = None
+        if shows.any():
+            detectable = float(
+                np.max(delta * readings.sd[shows] / np.sqrt(readings.redundancy[shows]))
+            )
+        mean = float(np.mean(readings.redundancy)) if len(shows) else 0.0
+        outlooks.append(LiquidReadings(kind, len(shows), int(np.sum(~shows)), mean, detectable))
+    return tuple(outlooks)

@@ -24,7 +24,7 @@ from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
 from tankcal.pipeline.tangent_checks import judge_tangents
 from tankcal.planning.table import TableResults, refuse_without_delivery
-from tankcal.planning.wall.filling_outlook import (
+from tankcal.planning.wall.filling import (
     FillingOutlook,
     outlook_of_filling,
     refuse_other_dips,

@@ -17,9 +17,13 @@ from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import compute_table
 from tankcal.planning.simulations import SIMULATING, refuse_failed
-from tankcal.planning.wall.nominal_readings import levels_of_readings, set_readings
+from tankcal.planning.wall.nominal_readings import (
+    Errors,
+    add_network_errors,
+    levels_of_readings,
+    set_readings,
+)
 from tankcal.planning.wall.prediction import WallPrediction
-from tankcal.planning.wall.reading_errors import Errors, add_network_errors
 from tankcal.planning.wall.tank_walls import DrawnWall
 from tankcal.uncertainty import combine
 

@@ -10,7 +10,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from tankcal.calibration.curves import decentring_profile, radial_curve
+from tankcal.calibration.edges import decentring_profile, radial_curve
 from tankcal.camera.model import KEYS, PARAMETERS, Form
 from tankcal.pipeline.plot_style import FAINT, GREY, INK, RED, WIDTH, even_groups, set_margins
 from tankcal.report import numbers

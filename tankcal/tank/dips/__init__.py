@@ -7,15 +7,23 @@ straightness  error of straight lines between rows, and the step that meets a bo
 reading       ullage, and the dip of a volume
 """
 
-from tankcal.tank.dips.parts import ProportionalParts, proportional_parts
-from tankcal.tank.dips.reading import Dips, dips_of, ullage_m
-from tankcal.tank.dips.rows import MOST_ROWS, round_each, table_heights, top_mark
+from tankcal.tank.dips.rows import (
+    MOST_ROWS,
+    Dips,
+    dips_of,
+    round_each,
+    table_heights,
+    top_mark,
+    ullage_m,
+)
 from tankcal.tank.dips.straightness import (
     LADDERS_M,
+    ProportionalParts,
     Rows,
     Straightness,
     choose_rows,
     interpolation_errors,
+    proportional_parts,
 )
 from tankcal.tank.dips.units import (
     HEIGHT_STEPS_M,

@@ -9,11 +9,18 @@ The functions use plain arrays and are independent of a job. Source: ISO 4269:20
 (methods, by their catalogue pages); the mathematics is in docs/liquid.md.
 """
 
-from tankcal.tank.liquid.adjustment import Effect, LiquidAdjustment, adjust_steps
-from tankcal.tank.liquid.naming import Alternative, Verdict, name_causes
+from tankcal.tank.liquid.adjustment import (
+    Alternative,
+    Effect,
+    LiquidAdjustment,
+    RunEffect,
+    Verdict,
+    adjust_steps,
+    estimate_run_effect,
+    name_causes,
+)
 from tankcal.tank.liquid.readings import ReadingEffects, reading_effects
 from tankcal.tank.liquid.reduction import Fill, ReducedSteps, fill_of, reduce_steps
-from tankcal.tank.liquid.run_effect import RunEffect, estimate_run_effect
 
 __all__ = [
     "Alternative",

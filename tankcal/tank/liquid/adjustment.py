@@ -20,6 +20,28 @@ the column c (m3 per unit of the cause)
 This is the best linear prediction: G y = A' S^-1 y with S = A A' + R, without inversion of S, so
 that a prior may be arbitrarily wide. Source: Koch 1999, Parameter estimation and hypothesis
 testing, 3.5; Baarda 1968.
+
+Cause of misclosures
+--------------------
+
+The statistic of an alternative of free size is w of its column. For an alternative of known size
+(temperatures in Fahrenheit), it is the square root of the reduction of chi-square. Alternatives
+whose chi-square is not significantly larger than that of the most likely alternative are named with
+it. Of a kind with many members (a dip, a batch), one member is more often large by chance. All
+kinds have equal prior probability, shared among their members, which subtracts 2 ln(members) from
+w^2.
+
+Run effect
+----------
+
+With M the weights of all known effects without the run effect, and Z the misclosures for a run
+effect of one,
+
+    Z' M Z = Q diag(l) Q',   d = Q' Z' M y / l  ~  N(0, diag(theta + 1/l)),
+
+independent of one another. The restricted likelihood of theta, the variance of the run effect, is
+thus that of these few normal variables. Source: Patterson & Thompson 1971 (REML); Searle, Casella &
+McCulloch 1992, 6.6.
 """
 
 from dataclasses import dataclass
@@ -28,11 +50,16 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
+from tankcal.adjust import noncentrality
 from tankcal.errors import SolutionError
 from tankcal.messages import message
 
 UNTOLD = 1e-10  # relative to the largest pivot: a free cause with a smaller pivot is unobserved
 UNSEEN = 1e-12  # relative to c' R^-1 c: a cause with a smaller c' M c cannot be tested
+ALIKE = 3.84  # chi-square at 5 %: a smaller difference between two causes is not significant
+LEAST = 4.0  # least |w| of a named cause
+TOLD = 1e-9  # relative to the largest l: directions with a smaller l are not determined
+GRID = 400  # log-spaced variances, from 1e-3 of the mean noise variance to 1e4 of the largest
 
 
 @dataclass(frozen=True)
@@ -235,3 +262,201 @@ def _refuse_unobserved(upper, free):
                 "begins in the empty tank, or dips that differ",
             )
         )
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Possible cause of misclosures.
+
+    Attributes
+    ----------
+    kind : str
+        "meter", "radii", "dip", "dip_zero", "batch", "leak", "bottom", "fahrenheit", "swapped".
+    column : ndarray, shape (n,)
+        Change of the misclosures for one unit of the cause, m3.
+    of : str or int or None
+        Member of the kind: a meter, a row.
+    unit : str
+        Unit of the size: "1", "m", "m3"; "" for a cause that either applies or not.
+    is_whole : bool
+        True: the size is either one or zero.
+    most : float
+        Largest possible size; a cause with a larger estimate is not named.
+    """
+
+    kind: str
+    column: np.ndarray
+    of: object = None
+    unit: str = "1"
+    is_whole: bool = False
+    most: float = np.inf
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Result of the test of an alternative.
+
+    Attributes
+    ----------
+    cause : Alternative
+    size, sd, w : float
+        Estimate, in its unit; its standard deviation (inf: the steps cannot determine it); signed
+        w.
+    detectable : float
+        Smallest size detected with a power of 0.8 at 0.1 %.
+    is_named : bool
+        Whether the cause is the most likely, with a sufficiently large |w|, or is not significantly
+        less likely.
+    undetected_U : float or None
+        External reliability: largest change of a volume of the table by an error of the size
+        `detectable`, over the U of that volume; None: not computed for causes of this kind.
+    """
+
+    cause: Alternative
+    size: float
+    sd: float
+    w: float
+    detectable: float
+    is_named: bool = False
+    undetected_U: float | None = None
+
+
+def name_causes(adjusted, alternatives):
+    """Return the `Verdict`s of all alternatives, the most likely first.
+
+    Parameters
+    ----------
+    adjusted : LiquidAdjustment
+    alternatives : sequence of Alternative
+
+    Returns
+    -------
+    tuple of Verdict
+    """
+    if not alternatives:
+        return ()
+    columns = np.stack([alternative.column for alternative in alternatives], axis=1)
+    size, sd, w = adjusted.test(columns)
+    for place, alternative in enumerate(alternatives):
+        if alternative.is_whole and np.isfinite(sd[place]):
+            # Reduction of chi-square for the fixed size one: (size^2 - (size - 1)^2) / sd^2.
+            reduction = (2 * size[place] - 1) / sd[place] ** 2
+            w[place] = np.sqrt(max(reduction, 0.0))
+    kinds = [alternative.kind for alternative in alternatives]
+    score = w**2 - 2 * np.log([kinds.count(kind) for kind in kinds])
+    order = np.argsort(-score, kind="stable")
+    large = (np.abs(w) > LEAST) & (
+        np.abs(size) <= [alternative.most for alternative in alternatives]
+    )
+    best = np.max(score[large], initial=-np.inf)
+    # Score: w^2 less the penalty for the number of members of the kind.
+    named = large & (best - score < ALIKE)
+    delta = noncentrality()
+    return tuple(
+        Verdict(
+            alternatives[i],
+            float(size[i]),
+            float(sd[i]),
+            float(w[i]),
+            float(delta * sd[i]),
+            bool(named[i]),
+        )
+        for i in order
+    )
+
+
+@dataclass(frozen=True)
+class RunEffect:
+    """Standard deviation of the run effect, relative, with its degrees of freedom.
+
+    Attributes
+    ----------
+    sd : float
+    dof : float
+        inf for a declared run effect.
+    restricted_sd : float
+        Maximum of the restricted likelihood; 0 if the readings explain all differences of runs.
+    """
+
+    sd: float
+    dof: float
+    restricted_sd: float
+
+
+def estimate_run_effect(weight, misclosure_m3, run_m3):
+    """Return the `RunEffect` of two or more runs; None if they do not determine it.
+
+    The likelihood of few runs is flat, and its maximum is often 0, which is no proof that runs do
+    not differ. sd and dof are therefore those of the variance averaged over the restricted
+    likelihood. With tau = theta + s, s the (harmonic) mean noise of a run, they follow from the
+    mean and the variance of 1/tau, for 1/tau distributed as chi-square over its dof:
+
+        1/tau = E[1/tau],   dof = 2 E[1/tau]^2 / Var[1/tau],   sd^2 = tau - s,
+
+    under the scale prior 1/tau; the dof of theta alone is multiplied by ((tau - s) / tau)^2. For
+    runs that differ much more than their noise, the result is the usual mean square with its dof.
+
+    Parameters
+    ----------
+    weight : ndarray, shape (n, n)
+        M without a run effect.
+    misclosure_m3 : ndarray, shape (n,)
+    run_m3 : ndarray, shape (n, runs)
+        Misclosures for a run effect of one in each run.
+
+    Returns
+    -------
+    RunEffect or None
+    """
+    differences, noise = run_differences(weight, misclosure_m3, run_m3)
+    if run_m3.shape[1] < 2 or len(noise) < 2:
+        return None
+    return averaged(differences, noise)
+
+
+def run_differences(weight, misclosure_m3, run_m3):
+    """Return independent variables of mean 0 and variances theta + s, and s.
+
+    A common change of all runs acts like the factor of the meter. This direction has a large s, due
+    to the uncertainty of the meter certificate and of the geometry, and hence little weight.
+
+    Parameters
+    ----------
+    weight, misclosure_m3, run_m3
+        As for `estimate_run_effect`.
+
+    Returns
+    -------
+    d, s : ndarray
+    """
+    information = run_m3.T @ weight @ run_m3
+    size, turn = np.linalg.eigh(information)
+    determined = size > TOLD * size[-1]
+    d = turn.T @ (run_m3.T @ (weight @ misclosure_m3))
+    return d[determined] / size[determined], 1 / size[determined]
+
+
+def averaged(d, s):
+    """Return the `RunEffect` of independent variables d of variances theta + s."""
+    mean_noise, largest = 1 / np.mean(1 / s), max(np.max(d**2), np.max(s))
+    theta = np.concatenate([[0.0], np.geomspace(1e-3 * mean_noise, 1e4 * largest, GRID)])
+    variance = theta[:, None] + s
+    restricted = -0.5 * np.sum(np.log(variance) + d**2 / variance, axis=1)
+    tau = theta + mean_noise
+    # Subtract the maximum before the exponential, which would underflow otherwise.
+    density = np.exp(restricted - restricted.max()) / tau
+    mass = np.sum(np.diff(theta) * (density[1:] + density[:-1]) / 2)
+
+    def mean(values):
+        integrand = density * values
+        return np.sum(np.diff(theta) * (integrand[1:] + integrand[:-1]) / 2) / mass
+
+    precision = mean(1 / tau)
+    # A lower bound of the variance limits the dof to a finite number.
+    spread = max(mean(1 / tau**2) - precision**2, 1e-12 * precision**2)
+    mean_tau = 1 / precision
+    theta_mean = max(mean_tau - mean_noise, 0.0)
+    dof = 2 * precision**2 / spread * (theta_mean / mean_tau) ** 2
+    return RunEffect(
+        float(np.sqrt(theta_mean)), float(dof), float(np.sqrt(theta[restricted.argmax()]))
+    )

@@ -1,12 +1,444 @@
-"""All limits of a rule for a table: a verdict for each limit, and a verdict for the rule."""
+"""Verdicts of a rule on a table: for expanded uncertainty, for deviation, and for the whole rule.
 
-from dataclasses import dataclass
+Limits of the expanded uncertainty
+----------------------------------
+
+U(h) <= limit V(h), or limit V(top). With a constant k, U is convex between rows and the limit is
+linear, so a limit met at two neighbouring rows is met between them. No quantity is divided, so the
+empty tank (V = 0) meets a limit only if U = 0 as well. Deliveries are judged over all dips by the
+law of propagation, and simulated deliveries by their printed U. The simulated deliveries are the
+worst one, and some to the lowest dip (`deliveries_to_judge`). There the volume cannot be negative,
+and the errors of the two dips do not cancel according to the law of propagation.
+
+Agreement with a stated volume
+------------------------------
+
+The tolerance interval about the stated volume is [T_L, T_U]. The acceptance interval is [T_L + w,
+T_U - w] with w = U, or w = 0 (simple acceptance). With F the standard normal distribution, or
+Student's t for finite degrees of freedom,
+p_c = F((T_U - y)/u) - F((T_L - y)/u); a missing limit is at infinity. Source: JCGM 106:2012 7.3,
+7.4 (probability), 8.2 (simple acceptance), 8.3.2 (guarded acceptance); t for few degrees of
+freedom: JCGM 101:2008 6.4.9.
+"""
+
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr, stdtr
 
-from tankcal.tank.rules.deviation import DeviationVerdict, judge_deviation
-from tankcal.tank.rules.expanded import UncertaintyVerdict, deliveries_to_judge, judge_uncertainty
-from tankcal.tank.rules.model import TANKS, Rule, printed_of_table
+from tankcal.errors import HeightError
+from tankcal.messages import message
+from tankcal.tank.deliveries import (
+    Delivery,
+    deliveries,
+    least_delivery_m,
+    ratio_of,
+    worst_deliveries,
+)
+from tankcal.tank.rules.model import TANKS, DeviationLimit, Rule, UncertaintyLimit, printed_of_table
+
+AT_TOP_M = 1e-3  # a dip within a millimetre of the last row counts as the top
+_ROUNDING = 1e-12  # relative tolerance: U equal to the limit meets it
+_SAME_M = 1e-6  # heights of deliveries with a smaller difference are equal
+TO_LOWEST = 12  # number of simulated deliveries to the lowest dip for a limit
+
+
+@dataclass(frozen=True)
+class StatedVolume:
+    """Stated volume for comparison with the table.
+
+    Attributes
+    ----------
+    volume_m3 : float
+    high_m : float
+        Dip of the volume, or higher dip of a delivery.
+    low_m : float or None
+        Lower dip of a delivery; None: the volume below `high_m`.
+    """
+
+    volume_m3: float
+    high_m: float
+    low_m: float | None = None
+
+
+@dataclass(frozen=True)
+class DeviationVerdict:
+    """Result of a DeviationLimit for a stated volume.
+
+    Attributes
+    ----------
+    limit : DeviationLimit
+    stated : StatedVolume
+    code : str
+        "conforms": in the acceptance interval; "guard_band": in the tolerance but not accepted;
+        "fails": outside the tolerance; "not_for_use": the dip is in the critical zone of a roof.
+    passed : bool or None
+        True for "conforms", None for "not_for_use", else False.
+    volume_m3, k, dof : float
+        Volume of the table, coverage factor and degrees of freedom.
+    U_m3, u_m3 : float
+        As printed; if the printed U exceeds that of the table, u is increased in proportion.
+    deviation_m3 : float
+        Table less stated volume.
+    tolerance_m3 : tuple[float, float]
+        (T_L, T_U) of the volume; infinite on a side without limit.
+    accepted_m3 : tuple[float, float]
+        (A_L, A_U); A_L > A_U if the guard bands leave no acceptance interval.
+    guard_m3 : float
+        w.
+    probability : float
+        Probability of conformity, 0 to 1.
+    """
+
+    limit: DeviationLimit
+    stated: StatedVolume
+    code: str
+    passed: bool | None
+    volume_m3: float
+    u_m3: float
+    U_m3: float
+    k: float
+    dof: float
+    deviation_m3: float
+    tolerance_m3: tuple[float, float]
+    accepted_m3: tuple[float, float]
+    guard_m3: float
+    probability: float
+
+
+def conformity_probability(value, u, lower, upper, dof=np.inf):
+    """Return p_c = F((upper - value)/u) - F((lower - value)/u), vectorised.
+
+    Parameters
+    ----------
+    value, u : array_like
+        Estimate and standard uncertainty; u = 0: 1 inside the limits, else 0.
+    lower, upper : array_like
+        Limits; -inf or inf for a missing limit.
+    dof : array_like, optional
+        Degrees of freedom of u: Student's t; inf: normal.
+
+    Returns
+    -------
+    ndarray
+    """
+    value, u, lower, upper, dof = np.broadcast_arrays(value, u, lower, upper, dof)
+    exact = u == 0
+    scale = np.where(exact, 1.0, u)
+    # Use the smaller tail, so that small probabilities have full relative accuracy.
+    above, below = (upper - value) / scale, (lower - value) / scale
+    flip = above + below > 0
+    above, below = np.where(flip, -below, above), np.where(flip, -above, below)
+    inside = (value >= lower) & (value <= upper)
+    return np.where(exact, inside.astype(float), _cdf(above, dof) - _cdf(below, dof))
+
+
+def _cdf(z, dof):
+    """Return the distribution function of Student's t; for dof = inf, of the normal."""
+    finite = np.where(np.isfinite(dof), dof, 1.0)
+    bounded = np.clip(z, -1e300, 1e300)
+    return np.where(np.isfinite(dof), stdtr(finite, bounded), ndtr(z))
+
+
+def judge_deviation(limit, table, stated, printed=None):
+    """Return the DeviationVerdict of a limit, a Capacity and a StatedVolume, or None.
+
+    None: the limit does not apply. A limit of deliveries applies to stated volumes with low_m,
+    other limits to volumes without low_m. A limit of the capacity applies only within a millimetre
+    of the last row of the table. Raises HeightError for a dip outside the table.
+
+    Parameters
+    ----------
+    limit : DeviationLimit
+    table : Capacity
+    stated : StatedVolume
+    printed : PrintedU, optional
+        Printed uncertainties; None: those of the table.
+
+    Returns
+    -------
+    DeviationVerdict or None
+    """
+    if (limit.of == "deliveries") != (stated.low_m is not None):
+        return None
+    if limit.of == "capacity" and stated.high_m < table.height_m[-1] - AT_TOP_M:
+        return None
+    if stated.low_m is None:
+        quantity = table.at(stated.high_m)
+    else:
+        quantity = table.delivery(stated.low_m, stated.high_m)
+    U = (printed or printed_of_table(table)).of(table, stated.low_m, stated.high_m, quantity.U_m3)
+    return judge_volume(limit, stated, quantity, U)
+
+
+def judge_volume(limit, stated, quantity, U):
+    """Return the DeviationVerdict of a limit and a StatedVolume for a volume.
+
+    Parameters
+    ----------
+    limit : DeviationLimit
+    stated : StatedVolume
+    quantity : Quantity
+        Volume for comparison, see `tankcal.tank.capacity`.
+    U : float
+        Printed expanded uncertainty, m3.
+
+    Returns
+    -------
+    DeviationVerdict
+    """
+    # The printed U may be that of Monte Carlo: u grows in proportion.
+    u = quantity.u_m3 * U / quantity.U_m3 if quantity.U_m3 else 0.0
+    tolerance = limit.limit * abs(stated.volume_m3) if limit.limit_m3 is None else limit.limit_m3
+    # A one-sided limit has an infinite tolerance on the other side.
+    lower = -math.inf if limit.side == "upper" else stated.volume_m3 - tolerance
+    upper = math.inf if limit.side == "lower" else stated.volume_m3 + tolerance
+    guard = U if limit.guard == "U" else 0.0
+    code = _deviation_code(quantity, lower, upper, guard)
+    return DeviationVerdict(
+        limit=limit,
+        stated=stated,
+        code=code,
+        passed=None if code == "not_for_use" else code == "conforms",
+        volume_m3=quantity.value_m3,
+        u_m3=u,
+        U_m3=U,
+        k=quantity.k,
+        dof=quantity.dof,
+        deviation_m3=quantity.value_m3 - stated.volume_m3,
+        tolerance_m3=(lower, upper),
+        accepted_m3=(lower + guard, upper - guard),
+        guard_m3=guard,
+        probability=float(conformity_probability(quantity.value_m3, u, lower, upper, quantity.dof)),
+    )
+
+
+def _deviation_code(quantity, lower, upper, guard):
+    """Return the code of a verdict."""
+    if not quantity.for_use:
+        return "not_for_use"
+    if lower + guard <= quantity.value_m3 <= upper - guard:
+        return "conforms"
+    return "guard_band" if lower <= quantity.value_m3 <= upper else "fails"
+
+
+@dataclass(frozen=True)
+class UncertaintyVerdict:
+    """Result of an UncertaintyLimit.
+
+    Attributes
+    ----------
+    limit : UncertaintyLimit
+    code : str
+        "holds": everywhere; "holds_from": only from `from_m` on; "fails": nowhere; "stated": no
+        limit is given; "nothing_to_judge": no row or delivery is for use.
+    passed : bool or None
+        True for "holds", False for "holds_from" and "fails", else None.
+    from_m : float or None
+        Least dip from which on all rows meet the limit, or least height of such deliveries; None:
+        none, or no limit is given.
+    from_m3 : float or None
+        Volume at that dip; None for deliveries.
+    worst_low_m, worst_m : float or None
+        Dips of the row or delivery closest to the limit or farthest beyond it; worst_low_m is None
+        except for deliveries; both are None if no row or delivery is judged.
+    worst_m3, worst_U_m3 : float or None
+        Volume and U of that row or delivery.
+    worst_ratio : float or None
+        U over the quantity in relative_to (equal to the limit if it is just met); inf for an empty
+        tank.
+    """
+
+    limit: UncertaintyLimit
+    code: str
+    passed: bool | None
+    from_m: float | None = None
+    from_m3: float | None = None
+    worst_low_m: float | None = None
+    worst_m: float | None = None
+    worst_m3: float | None = None
+    worst_U_m3: float | None = None
+    worst_ratio: float | None = None
+
+
+def judge_uncertainty(limit, table, lowest_m=None, printed=None):
+    """Return the UncertaintyVerdict of an UncertaintyLimit for a Capacity.
+
+    Parameters
+    ----------
+    limit : UncertaintyLimit
+    table : Capacity
+    lowest_m : float, optional
+        Dip at the start of the calibrated zone; only rows from there on, and deliveries between
+        them, are judged. None: all.
+    printed : PrintedU, optional
+        Printed uncertainties; None: those of the table. The search for deliveries uses the U of the
+        table; the worst delivery and all simulated deliveries have their printed U.
+
+    Returns
+    -------
+    UncertaintyVerdict
+
+    Raises
+    ------
+    HeightError
+        For a lowest_m above the last row of the table.
+    """
+    if lowest_m is not None and lowest_m > table.height_m[-1]:
+        raise HeightError(
+            message(
+                "lowest_above_table",
+                "lowest level {lowest_m:g} m: the table ends at {end_m:g}",
+                lowest_m=lowest_m,
+                end_m=table.height_m[-1],
+            )
+        )
+    judged_rows = table.for_use(table.height_m)
+    if not np.any(judged_rows):
+        return UncertaintyVerdict(limit, "nothing_to_judge", None)
+    printed = printed or printed_of_table(table)
+    capacity = float(table.volume_m3[judged_rows][-1])
+    if lowest_m is not None:
+        judged_rows &= table.height_m >= lowest_m
+    if limit.of == "deliveries":
+        return _judge_deliveries(limit, _restrict_table(table, lowest_m), capacity, printed)
+    if limit.of == "capacity":
+        judged_rows &= np.arange(len(judged_rows)) == np.flatnonzero(judged_rows).max(initial=-1)
+    if not np.any(judged_rows):
+        return UncertaintyVerdict(limit, "nothing_to_judge", None)
+    return _judge_rows(limit, table, printed.rows_m3, np.flatnonzero(judged_rows), capacity)
+
+
+def _restrict_table(table, lowest_m):
+    """Return the table from a dip on."""
+    if lowest_m is None:
+        return table
+    selected = table.height_m >= lowest_m
+    sources = tuple(
+        replace(source, columns_m3=source.columns_m3[selected]) for source in table.sources
+    )
+    rows = {name: getattr(table, name)[selected] for name in ("height_m", "volume_m3", "area_m2")}
+    return replace(table, sources=sources, **rows)
+
+
+def _judge_rows(limit, table, printed, rows, capacity):
+    """Return the verdict of the rows of a table."""
+    volume, U = table.volume_m3[rows], printed[rows]
+    base = volume if limit.relative_to == "itself" else np.full(len(rows), capacity)
+    ratio = ratio_of(U, base)
+    # A product instead of a quotient: an empty tank has no ratio.
+    is_met = limit.limit * base * (1 + _ROUNDING) >= U
+    exceeded = np.flatnonzero(~is_met)
+    # The limit is met from the row after the last row that exceeds it.
+    first = exceeded[-1] + 1 if len(exceeded) else 0
+    code = "holds" if not len(exceeded) else "holds_from" if first < len(rows) else "fails"
+    worst = int(np.argmax(ratio))
+    return UncertaintyVerdict(
+        limit,
+        code,
+        code == "holds",
+        from_m=None if code == "fails" else float(table.height_m[rows[first]]),
+        from_m3=None if code == "fails" else float(volume[first]),
+        worst_m=float(table.height_m[rows[worst]]),
+        worst_m3=float(volume[worst]),
+        worst_U_m3=float(U[worst]),
+        worst_ratio=float(ratio[worst]),
+    )
+
+
+def deliveries_to_judge(limit, table):
+    """Return ((low_m, high_m), ...) of the deliveries that decide a limit of deliveries.
+
+    They are the deliveries with the largest U and the largest U over volume, and some to the lowest
+    dip, from the least height to the whole table; only dips for use.
+    """
+    worst = worst_deliveries(table, limit.minimum_height_m)
+    if worst is None:
+        return ()
+    lowest, top = table.height_m[0], table.height_m[-1]
+    heights = np.linspace(limit.minimum_height_m, top - lowest, TO_LOWEST)
+    highs = np.minimum(lowest + heights, top)
+    usable = table.for_use(highs) & table.for_use(lowest)
+    pairs = [(delivery.low_m, delivery.high_m) for delivery in (worst.absolute, worst.relative)]
+    return (*pairs, *((float(lowest), float(high)) for high in highs[usable]))
+
+
+def _judge_deliveries(limit, table, capacity, printed):
+    """Return the verdict of the deliveries of a table."""
+    worst_of_table = worst_deliveries(table, limit.minimum_height_m)
+    if worst_of_table is None:
+        return UncertaintyVerdict(limit, "nothing_to_judge", None)
+    is_relative = limit.relative_to == "itself" or limit.limit is None
+    judged = _printed_deliveries(
+        worst_of_table.relative if is_relative else worst_of_table.absolute, limit, table, printed
+    )
+
+    def size(delivery):
+        return delivery.relative if is_relative else delivery.U_m3
+
+    worst = max(judged, key=size)
+    ratio = worst.relative if is_relative else float(ratio_of(worst.U_m3, capacity))
+    if limit.limit is None:
+        return _delivery_verdict(limit, "stated", worst, ratio)
+    bound = (limit.limit if is_relative else limit.limit * capacity) * (1 + _ROUNDING)
+    exceeded_heights = [_height(delivery) for delivery in judged if size(delivery) > bound]
+    if not exceeded_heights:
+        return _delivery_verdict(limit, "holds", worst, ratio, limit.minimum_height_m)
+    # The factor of printed over propagated U reduces the limit for deliveries without simulation.
+    from_m = least_delivery_m(table, bound / printed.factor, is_relative)
+    met_heights = [
+        _height(delivery)
+        for delivery in judged
+        if _height(delivery) > max(exceeded_heights) + _SAME_M
+    ]
+    # A simulated delivery exceeds the limit above that height: use simulated heights only.
+    if from_m is not None and max(exceeded_heights) > from_m - _SAME_M:
+        from_m = float(np.ceil(1000 * min(met_heights) - 1e-6) / 1000) if met_heights else None
+    code = "fails" if from_m is None else "holds_from"
+    return _delivery_verdict(limit, code, worst, ratio, from_m)
+
+
+def _printed_deliveries(worst, limit, table, printed):
+    """Return the worst Delivery of the table and all simulated deliveries, with their printed U."""
+    first, last = table.height_m[[0, -1]]
+    least = limit.minimum_height_m - _SAME_M
+    pairs = {(worst.low_m, worst.high_m): printed.of(table, worst.low_m, worst.high_m, worst.U_m3)}
+    pairs |= {
+        (low, high): U
+        for (low, high), U in printed.pairs_m3.items()
+        if low >= first and high <= last and high - low >= least
+    }
+    low, high = np.array(list(pairs)).T
+    computed, U = deliveries(table, low, high), np.array(list(pairs.values()))
+    k = ratio_of(U, computed.u_m3)
+    fields = (low, high, computed.volume_m3, computed.u_m3, computed.dof, k, U)
+    rows = zip(*fields, ratio_of(U, computed.volume_m3), strict=True)
+    return [
+        Delivery(*map(float, row))
+        for row, for_use in zip(rows, computed.for_use, strict=True)
+        if for_use
+    ]
+
+
+def _height(delivery):
+    """Return the height of a delivery."""
+    return delivery.high_m - delivery.low_m
+
+
+def _delivery_verdict(limit, code, worst: Delivery, ratio, from_m=None):
+    """Return the verdict for the worst delivery."""
+    return UncertaintyVerdict(
+        limit,
+        code,
+        {"holds": True, "stated": None}.get(code, False),
+        from_m=from_m,
+        worst_low_m=worst.low_m,
+        worst_m=worst.high_m,
+        worst_m3=worst.volume_m3,
+        worst_U_m3=worst.U_m3,
+        worst_ratio=ratio,
+    )
 
 
 @dataclass(frozen=True)
@@ -91,7 +523,7 @@ def judge(rule, table, tank, lowest_m=None, stated=(), printed=None):
     return RuleVerdict(
         rule=rule,
         tank=tank,
-        code=_code(verdicts, unjudged) if limits or others else "not_for_this_tank",
+        code=_rule_code(verdicts, unjudged) if limits or others else "not_for_this_tank",
         verified=all(limit.verified for limit in applied) if applied else rule.verified,
         capacity_m3=capacity,
         uncertainty=uncertainty,
@@ -129,7 +561,7 @@ def _applies_to(limit, tank):
     return not limit.tanks or tank in limit.tanks
 
 
-def _code(verdicts, unjudged):
+def _rule_code(verdicts, unjudged):
     """Return the code of the rule from the codes of its limits, the most severe first."""
     codes = {verdict.code for verdict in verdicts}
     if "fails" in codes:

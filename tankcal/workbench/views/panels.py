@@ -5,10 +5,10 @@ from importlib.util import find_spec
 
 import ipywidgets as widgets
 
-from tankcal.workbench.views.budget_panel import BudgetPanel
 from tankcal.workbench.views.calculator import Calculator
 from tankcal.workbench.views.page import frame_html, table_page, wall_page
 from tankcal.workbench.views.points import PointsPanel
+from tankcal.workbench.views.what_if import BudgetPanel
 
 WIDE = {"width": "100%"}  # layout
 # Style that prevents truncated titles of tabs.
