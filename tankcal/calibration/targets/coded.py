@@ -1,7 +1,7 @@
 """Coded targets (ArUco, AprilTag) in a photograph: detection by OpenCV, measurement of the edges.
 
-OpenCV proposes squares and their codes. The fit of their edges determines the corners, and
-the code is read again, cell by cell, from these corners. Doubtful targets are refused with a reason. The
+OpenCV proposes squares and their codes. The fit of their edges determines the corners, and the code
+is read again, cell by cell, from these corners. Doubtful targets are refused with a reason. The
 corners of OpenCV have errors of 0.2 to 1 px, because blur rounds a corner inwards.
 
 Edges and corners of a square

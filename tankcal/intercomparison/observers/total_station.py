@@ -1,5 +1,4 @@
-"""Simulated survey by reflectorless points from a total station in the tank, off its middle.
-"""
+"""Simulated survey by reflectorless points from a total station in the tank, off its middle."""
 
 from dataclasses import dataclass
 
