@@ -15,8 +15,8 @@ from independent_shells import settle
 from joined_jobs import outside_job
 
 import tankcal
-from tankcal.errors import InputError
-from tankcal.methods.hits.wall import sight_wall
+from tankcal.errors import InputError, SolutionError
+from tankcal.methods.hits.wall import find_hit_wall, sight_wall
 from tankcal.methods.tangents.wall import touch_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.capacity import Capacity
@@ -83,3 +83,26 @@ def test_mirrored_stations_round_a_settled_shell_are_refused(tmp_path):
     mirrored = {name: place * [-1, 1, 1] for name, place in job.hits.stations.items()}
     with pytest.raises(InputError, match="other way round"):
         sight_wall(replace(job, hits=replace(job.hits, stations=mirrored)), None, print)
+
+
+@pytest.mark.slow
+def test_blank_stations_that_do_not_settle_are_refused(shared, tmp_path):
+    """Planted: stations deleted. The table was 4.6 % too large, 2 U, before."""
+    name = "untied-stations-called-mirrored"
+    folder = shutil.copytree(shared / "cases" / name, tmp_path / "job")
+    control = folder / "control.csv"
+    heading, *rows = (row.split(",") for row in control.read_text().splitlines())
+    blank = [heading, *([point, "", "", z] for point, _, _, z in rows)]
+    control.write_text("\n".join(",".join(row) for row in blank) + "\n")
+    with pytest.raises(SolutionError, match="places of the set-ups do not settle"):
+        tankcal.run(tankcal.load(folder))
+
+
+def test_places_that_do_not_settle_are_refused(tmp_path, monkeypatch):
+    """Without passes, places known to 0.1 m are off by more than the limit."""
+    monkeypatch.setattr("tankcal.methods.hits.wall.ROUNDS", 0)
+    rng = np.random.default_rng(0)
+    shell = settled_shell(rng, radius_m=3.8, courses=4, top_m=0.03)
+    job = outside_job(rng, shell, folder=tmp_path / "job", hits=8, setups=4)
+    with pytest.raises(SolutionError, match="places of the set-ups do not settle"):
+        find_hit_wall(job, None, lambda text: None)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tankcal.errors import InputError, Problem
+from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.messages import message
 from tankcal.methods.hits.checks import offset_unknown
 from tankcal.methods.hits.misread import refuse_other_units
@@ -21,6 +21,9 @@ from tankcal.survey.sighting import Beside, sight
 FEWEST_AROUND = 3  # smallest number of stations that show their side of the wall
 ROUNDS = 4  # largest number of iterations for offsets and places of set-ups
 SETTLED_M = 1e-5  # largest movement of a hit in the last iteration
+# Movement of a hit after the last iteration that refuses the table. Stations known to 0.1 m leave
+# less than 0.1 mm, wrong ones 30 to 130 mm.
+UNSETTLED_M = 0.01
 
 
 def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
@@ -44,6 +47,11 @@ def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
         The job with its hits as points.
     sighting : Sighting
     wall : Wall
+
+    Raises
+    ------
+    SolutionError
+        If the places of set-ups do not settle.
     """
     job, sighting = sight_wall(job, adjustment, progress)
     wall, sizes = find_wall(job, progress, dof, amplitudes), None
@@ -60,7 +68,21 @@ def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
                    for name, correction in estimates.offsets_m.items()}  # fmt: skip
         job, sighting = _as_points(job, replace(sighted, beside=sighting.beside, told_m=offsets))
         wall = find_wall(job, progress, dof, amplitudes, sizes=sizes)
+    if wall.told is not None and wall.told.largest_m > UNSETTLED_M:
+        raise SolutionError(_not_settled(wall.told.largest_m))
     return job, replace(sighting, told=told_causes(job, wall)), wall
+
+
+def _not_settled(moved_m):
+    """Message that the places of set-ups do not settle."""
+    return message(
+        "setups_not_settled",
+        "no capacity: the places of the set-ups do not settle, the last pass still moved hits by"
+        " {moved_mm:.0f} mm, so the hits do not determine where the set-ups stood; give x_m and"
+        " y_m of their stations to 0.3 m in control.csv, tie the set-ups by common targets, or"
+        " strap a course (circumferences.csv)",
+        moved_mm=1000 * moved_m,
+    )
 
 
 def sight_wall(job, adjustment, progress):
