@@ -55,10 +55,13 @@ def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
     """
     job, sighting = sight_wall(job, adjustment, progress)
     wall, sizes = find_wall(job, progress, dof, amplitudes), None
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS + 1):
         estimates = wall.told
-        if estimates is None or estimates.largest_m < SETTLED_M:
+        is_last = number == ROUNDS
+        if estimates is None or estimates.largest_m < (UNSETTLED_M if is_last else SETTLED_M):
             break
+        if is_last:
+            raise SolutionError(_not_settled(estimates.largest_m))
         if len(estimates.poses):
             # Poses absorb a part of the form, which later rounds no longer see: keep its size.
             sizes = wall.field.amplitudes
@@ -68,8 +71,6 @@ def find_hit_wall(job, adjustment, progress, dof=np.inf, *, amplitudes=None):
                    for name, correction in estimates.offsets_m.items()}  # fmt: skip
         job, sighting = _as_points(job, replace(sighted, beside=sighting.beside, told_m=offsets))
         wall = find_wall(job, progress, dof, amplitudes, sizes=sizes)
-    if wall.told is not None and wall.told.largest_m > UNSETTLED_M:
-        raise SolutionError(_not_settled(wall.told.largest_m))
     return job, replace(sighting, told=told_causes(job, wall)), wall
 
 
