@@ -58,6 +58,7 @@ def document(**properties):
         letterhead : dict of a letterhead.Letterhead, or None.
         record_sha256 : hexadecimal digits for the keywords of the PDF, or "".
         attachments : embedded files (attachments.Attachment.data).
+        dense : whether the PDF has small letters and margins, for a form on a single page.
 
     Returns
     -------
@@ -80,6 +81,7 @@ def document(**properties):
         "letterhead": None,
         "attachments": [],
         "record_sha256": "",
+        "dense": False,
     }
     unknown = sorted(set(properties) - set(known))
     if unknown:
@@ -135,6 +137,11 @@ def with_next(block):
 def whole(block):
     """Return the table, to be kept on one page; it must not be longer than a page."""
     return Block({**block.data, "whole": True})
+
+
+def side_by_side(block):
+    """Return the names and values, with their second half beside the first half in the PDF."""
+    return Block({**block.data, "side-by-side": True})
 
 
 def listing(items):

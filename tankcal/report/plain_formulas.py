@@ -30,6 +30,42 @@ _SET_AS = (  # pattern of the plain text and LaTeX; a longer pattern precedes it
         r"-m \, (1 - %s / 8000) / (\rho_\text{ref} - %s)",
     ),
     (r"-m/rho_ref", r"-m / \rho_\text{ref}"),
+    # Steps of tickets.
+    (r"TOV = V\(h\)", r"\text{TOV} = V(h)"),
+    (r"FW = V\(h_w\)", r"\text{FW} = V(h_\text{w})"),
+    (r"t_S = \(7 t_L \+ t_A\)/8", r"t_\text{S} = (7 \, t_\text{L} + t_\text{A}) / 8"),
+    (r"t_S = t_L", r"t_\text{S} = t_\text{L}"),
+    (
+        r"CTSh = 1 \+ 2 α ΔT \+ \(α ΔT\)²",
+        r"\text{CTSh} = 1 + 2 \, \alpha \, \Delta T + (\alpha \, \Delta T)^2",
+    ),
+    (r"CTSh = s³ V\(h/s\)/V\(h\)", r"\text{CTSh} = s^3 \, V(h/s) / V(h)"),
+    (
+        r"ρ_b = ρ_s/VCF\(ρ_b, t_s\)",
+        r"\rho_\text{b} = \rho_\text{s} / \text{VCF}(\rho_\text{b}, t_\text{s})",
+    ),
+    (r"VCF\(ρ_b, t_L\)", r"\text{VCF}(\rho_\text{b}, t_\text{L})"),
+    (r"ρ_L = ρ_b VCF", r"\rho_\text{L} = \rho_\text{b} \, \text{VCF}"),
+    (
+        r"FRA = −m_r \(1/ρ_L − 1/ρ_ref\)",
+        r"\text{FRA} = -m_\text{r} \, (1/\rho_\text{L} - 1/\rho_\text{ref})",
+    ),
+    (r"FRA = −m_r/ρ_L", r"\text{FRA} = -m_\text{r} / \rho_\text{L}"),
+    (r"FRA = 0", r"\text{FRA} = 0"),
+    (
+        r"GOV = \(TOV − FW\) CTSh \+ FRA",
+        r"\text{GOV} = (\text{TOV} - \text{FW}) \, \text{CTSh} + \text{FRA}",
+    ),
+    (r"GSV = GOV VCF", r"\text{GSV} = \text{GOV} \, \text{VCF}"),
+    (r"CSW = 1 − S&W", r"\text{CSW} = 1 - \text{SW}"),
+    (r"NSV = GSV CSW", r"\text{NSV} = \text{GSV} \, \text{CSW}"),
+    (r"m = NSV ρ_b", r"m = \text{NSV} \, \rho_\text{b}"),
+    (
+        r"f = \(1 − ρ_a/ρ_b\)/\(1 − ρ_a/ρ_w\)",
+        r"f = (1 - \rho_\text{a}/\rho_\text{b}) / (1 - \rho_\text{a}/\rho_\text{w})",
+    ),
+    (r"W = m f", r"W = m \, f"),
+    (r"ρ_([Labsw])\b", r"\rho_\text{%s}"),
 )
 
 

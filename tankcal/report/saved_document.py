@@ -7,6 +7,7 @@ report` can write them again (docs/house.md, "How a document is declared").
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 
 from tankcal.errors import InputError, Problem, TankcalError, VocabularyError, reason_of
@@ -42,6 +43,11 @@ class SavedDocument:
         {name of the CSV file: its table}. A table without rows has no file.
     has_page : bool
         Whether the document has a web page.
+    others : Mapping of str to callable
+        {name of a further file: function that writes it}, as `write_workbook`, before the PDF.
+    recomputed_by : str
+        "module:function" that computes the content again, as (content, folder of the inputs) to
+        (number of compared values or None, list of Problem); "": not possible.
     """
 
     saved_format: SavedFormat
@@ -52,13 +58,23 @@ class SavedDocument:
     without_content: Callable[[str], Message]
     tables: Mapping = field(default_factory=dict)
     has_page: bool = True
+    others: Mapping = field(default_factory=dict)
+    recomputed_by: str = ""
 
     @property
     def files(self):
         """Names of all possible files, the saved file first (tuple of str)."""
         page = (self._file(".html"),) if self.has_page else ()
         workbook, pdf = self._file(".xlsx"), self._file(".pdf")
-        return (self.saved_format.file, *self.tables, workbook, pdf, *page, manifest.FILE)
+        return (
+            self.saved_format.file,
+            *self.tables,
+            workbook,
+            *self.others,
+            pdf,
+            *page,
+            manifest.FILE,
+        )
 
     def _file(self, suffix):
         return Path(self.saved_format.file).with_suffix(suffix).name
@@ -130,6 +146,8 @@ class SavedDocument:
             if rows := table.rows(paper.record):
                 write_table(table, folder / name, rows)
         write_workbook(paper, folder / self._file(".xlsx"))
+        for name, write_file in self.others.items():
+            write_file(paper, folder / name)
         progress(setting_papers)
         # The PDF embeds the files that were written before it.
         blocks = [block.data for block in pages(paper, folder)]
@@ -137,6 +155,14 @@ class SavedDocument:
         if self.has_page:
             blocks = [block.data for block in pages(paper, whole=True)]
             (folder / self._file(".html")).write_text(page(blocks), encoding="utf-8")
+
+    def compute_again(self, content, folder):
+        """Compute the content again, as `recomputed_by` does.
+
+        The function is in a package above `report`, so it is named by a text.
+        """
+        module, _, name = self.recomputed_by.partition(":")
+        return getattr(import_module(module), name)(content, folder)
 
     def rebuild(self, source, folder, language=None, progress=None, letterhead=None):
         """Write all files from a saved file; other arguments and errors as in `write`."""

@@ -24,6 +24,8 @@ class SavedPaper(PlainPaper):
         Name of the saved file.
     attached : dict
         {name of an embedded file: key of its description}.
+    is_dense : bool
+        Whether the PDF has small letters and margins, for a form on a single page.
     record : dict
         Content of the saved file, from which declared tables take their rows.
     letterhead : dict or None
@@ -31,6 +33,7 @@ class SavedPaper(PlainPaper):
     """
 
     kind = file = ""
+    is_dense = False
     attached: ClassVar[dict] = {}
     record: dict
     letterhead: dict | None
@@ -52,6 +55,7 @@ class SavedPaper(PlainPaper):
                 footer=self._footer(folder),
                 letterhead=self.letterhead,
                 attachments=self._attachments(folder),
+                **({"dense": True} if self.is_dense else {}),
             ),
             blocks.masthead(title, self.subject()),
         ]

@@ -153,7 +153,7 @@ def _folder(verification, folder, job, callbacks):
     verification.manifest_sha256 = manifest and manifest.sha256
     if (folder / RECORD).is_file():
         _results(verification, folder, job, callbacks, manifest)
-    elif not verify_saved_folder(verification, folder, callbacks, manifest):
+    elif not verify_saved_folder(verification, folder, callbacks, manifest, job):
         text = message("verify_no_record", "is missing; expected the record of the results")
         raise InputError(Problem(RECORD, text))
     _listed(verification, folder, manifest)

@@ -1,4 +1,4 @@
-"""Reproduction of papers and numbers by `tankcal verify`."""
+"""Reproduction of documents and numbers by `tankcal verify`."""
 
 import re
 import tempfile
@@ -11,6 +11,7 @@ from tankcal.record import long_tables
 from tankcal.record import manifest as manifests
 from tankcal.report.letterhead import LETTERHEAD_FILE, PLACE, Letterhead, Logo, read_saved
 from tankcal.report.paper_content import content_of_paper
+from tankcal.report.verified_files import compare_inputs
 from tankcal.text.languages import LANGUAGES
 
 MOST_TOLD = 10  # largest number of reported numbers, and of texts, that differ
@@ -312,11 +313,12 @@ def _compare_covariance(verification, path, adjustment):
         )
 
 
-def verify_saved_folder(verification, folder, callbacks, manifest):
+def verify_saved_folder(verification, folder, callbacks, manifest, inputs):
     """Verify a folder with a saved file other than a record; return whether it is such a folder.
 
-    The papers of comparisons, inspections and histories are written again from their file. For
-    plans, camera results and any other folder with SHA256SUMS, only the hashes are compared.
+    Comparisons, inspections, histories and tickets are written again from their saved file. A
+    ticket is also computed again from its record. For plans, camera results and any other folder
+    with SHA256SUMS, only the hashes are compared.
 
     Parameters
     ----------
@@ -328,6 +330,8 @@ def verify_saved_folder(verification, folder, callbacks, manifest):
         Progress (step, part); None: compare hashes only.
     manifest : Manifest or None
         Content of SHA256SUMS.
+    inputs : path
+        Folder of the input files, with the record of a ticket.
 
     Returns
     -------
@@ -339,13 +343,16 @@ def verify_saved_folder(verification, folder, callbacks, manifest):
 
     document, path = find_document(folder)
     if document is not None:
-        document.load(path)
+        content = document.load(path)
         _take(verification, path)
         if callbacks is not None:
             make_papers_again(
                 verification, folder, manifest, _rebuild_of(document, path, callbacks[0])
             )
-        verification.note(_not_computed(path.name))
+        if not document.recomputed_by:
+            verification.note(_not_computed(path.name))
+        elif callbacks is not None:
+            _compute_document_again(verification, document, content, inputs)
         return True
     for name in (CAMERA.file, PLAN.file):
         path = Path(folder) / name
@@ -359,6 +366,32 @@ def verify_saved_folder(verification, folder, callbacks, manifest):
             message("verify_no_saved_file", "nothing here but hashes: no file says what is inside")
         )
     return manifest is not None
+
+
+def _compute_document_again(verification, document, content, inputs):
+    """Compute a saved file again from its record; report differences and changed input files."""
+    compare_inputs(verification, content, inputs)
+    try:
+        count, problems = document.compute_again(content, inputs)
+    except InputError as error:
+        verification.problems += error.problems
+        return
+    verification.problems += problems
+    if count is None:
+        verification.note(
+            message(
+                "verify_record_not_found",
+                "the record of {file} is not in the folder of the inputs ({folder}): its "
+                "numbers were not computed again",
+                file=verification.saved_file,
+                folder=str(inputs),
+            )
+        )
+    elif not problems:
+        verification.made_again.add(verification.saved_file)
+        verification.note(
+            message("verify_values_again", "computed again: {count} values, all equal", count=count)
+        )
 
 
 def _rebuild_of(document, path, step):

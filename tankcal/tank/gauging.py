@@ -2,21 +2,34 @@
 
 import numpy as np
 
-# {name: standard uncertainty if the ticket does not declare it}; None: by the rule below. Values
-# with "memory" are from memory: practice of manual gauging, class II tapes, ISO 4268 thermometers,
-# reproducibility of hydrometers and of the centrifuge. None of these texts was read. "assumed": our
+# {name: (standard uncertainty if the ticket does not declare it, origin)}; None: by the rule below.
+# "memory": from memory of practice of manual gauging, class II tapes, ISO 4268 thermometers,
+# reproducibility of hydrometers and of the centrifuge; none of these texts was read. "assumed": our
 # own choice.
-UNCERTAINTIES = {
-    "u_dip_mm": 1.0,  # memory
-    "u_tape_ppm": 115.0,  # memory
-    "u_water_dip_mm": 1.5,  # assumed
-    "u_temperature_k": 0.25,  # assumed
-    "u_thermometer_k": 0.15,  # memory
-    "u_ambient_k": 3.0,  # assumed
-    "u_density_kg_m3": 0.5,  # memory
-    "u_sw_percent": 0.1,  # memory
-    "u_vcf_percent": None,  # memory
-    "u_expansion_per_k": 1e-6,  # assumed
+ASSUMPTIONS = {
+    "u_dip_mm": (1.0, "memory"),
+    "u_tape_ppm": (115.0, "memory"),
+    "u_water_dip_mm": (1.5, "assumed"),
+    "u_temperature_k": (0.25, "assumed"),
+    "u_thermometer_k": (0.15, "memory"),
+    "u_ambient_k": (3.0, "assumed"),
+    "u_density_kg_m3": (0.5, "memory"),
+    "u_sw_percent": (0.1, "memory"),
+    "u_vcf_percent": (None, "memory"),
+    "u_expansion_per_k": (1e-6, "assumed"),
+}
+UNCERTAINTIES = {name: value for name, (value, _) in ASSUMPTIONS.items()}
+KEY_OF_INPUT = {  # input of the budget without its state: key of its standard uncertainty
+    "dip": "u_dip_mm",
+    "water dip": "u_water_dip_mm",
+    "temperature": "u_temperature_k",
+    "tape": "u_tape_ppm",
+    "thermometer": "u_thermometer_k",
+    "ambient": "u_ambient_k",
+    "density": "u_density_kg_m3",
+    "sw": "u_sw_percent",
+    "expansion": "u_expansion_per_k",
+    "vcf": "u_vcf_percent",
 }
 # Expanded uncertainty (95 %) of the volume correction at temperatures, percent of the volume; from
 # memory of the 1980 edition, for 60 degF. Below the first point it grows in proportion to the

@@ -449,7 +449,7 @@ def test_command_prints_the_quantities(settings, example_record, tmp_path, capsy
     assert main(["ticket", str(example_record), str(path), "--out", str(out)]) == 0
     text = capsys.readouterr().out
     assert "net standard volume" in text
-    assert "E_n" in text
+    assert "Eₙ" in text
     with out.open(encoding="utf-8") as stream:
         (row,) = csv.DictReader(stream)
     assert main(["ticket", str(example_record), str(path), "--json"]) == 0

@@ -8,3 +8,13 @@ class Quantity(Product):
 
     name = "quantity"
     commands = (("ticket", "tankcal.products.quantity.command"),)
+
+    def documents(self):
+        from tankcal.report import ticket
+
+        return (ticket.DOCUMENT,)
+
+    def saved_types(self):
+        from tankcal.record import ticket
+
+        return ((ticket.TICKET, None, ticket.TicketFile),)

@@ -1,6 +1,8 @@
 """Reading of tickets: ticket.toml for one ticket, a CSV file beside it for many."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +16,13 @@ from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import message
 from tankcal.products.quantity.chain import Gauging, Product
+from tankcal.products.quantity.factor_table import read_factor_table
 from tankcal.products.quantity.transfer import STATES, Transfer
 from tankcal.products.settings import read_sections
+from tankcal.record.manifest import digest_of
 from tankcal.tank.gauging import UNCERTAINTIES
 from tankcal.tank.volume_correction.alcohol import Ethanol
-from tankcal.tank.volume_correction.corrections import CORRECTIONS
+from tankcal.tank.volume_correction.corrections import CORRECTIONS, TABLE
 from tankcal.tank.volume_correction.petroleum import BASES_C, GROUPS, glass_correction
 from tankcal.tank.volume_correction.ranges import DEGREES, OutsideRangeError
 
@@ -31,6 +35,7 @@ TICKET = (
     Field("number", "text", "number of the ticket"),
     Field("date", "date", "day of the transfer, year-month-day"),
     Field("by", "text", "person who gauged the tank"),
+    Field("customer", "text", "customer, or the other party"),
     Field("note", "text", "remark"),
     number("coverage_probability", "coverage probability; blank: 0.95", 0.5, 0.9999),
 )
@@ -43,6 +48,7 @@ PRODUCT = (
     choice("group", "group of the product in D1250", (*GROUPS, COEFFICIENT)),
     choice("base", "base temperature", (*BASES_C,)),
     positive("alpha_per_k", "coefficient of cubic expansion of the liquid, 1/K", 0.01),
+    Field("factor_table", "text", "CSV file of factors, for correction = table"),
     positive("density_kg_m3", "density, kg/m3", 2000),
     choice(
         "density_is",
@@ -69,6 +75,7 @@ GAUGING = (
     number("temperature_c", "mean temperature of the liquid, degrees Celsius", -60, 200),
     number("ambient_c", "temperature of the air, degrees Celsius", -60, 70),
     number("pressure_kpa", "gauge pressure above the liquid, kPa; blank: 0", 0, 20_000),
+    number("reference_height_m", "reference height read at the gauging, metres", 0, 200),
 )
 COMPARISON = (
     choice("quantity", "quantity of the other party", COMPARED),
@@ -104,10 +111,14 @@ ROWS = (
     positive("compared_value", "quantity of the other party, m3 or kg", 1e9),
 )
 
+SETTINGS_NAME = message("ticket_settings", "settings of the ticket")  # in place of a file
+
 # Slips of the hand: limits of a plausible input.
 HOTTEST_C = 60.0  # a hotter light product is probably in degrees Fahrenheit
 COLDEST_HEAVY = 900.0  # kg/m3; heavier products are heated
 LEAST_SW_PERCENT = 0.005  # a smaller value is probably a fraction
+HOTTEST_AIR_C = 50.0  # a hotter air is probably in degrees Fahrenheit
+MOST_REFERENCE_SHIFT_M = 0.003  # repeatability of manual gauging, from memory
 LEAST_DENSITY = 300.0  # kg/m3; a smaller value is a relative density, or in g/cm3
 
 
@@ -125,6 +136,8 @@ class Tickets:
     compared : tuple or None
         (quantity, values (n,), U or None, source) of the other party.
     warnings : tuple of Problem
+    files : dict
+        {name of an input file: its SHA-256}.
     """
 
     names: tuple[str, ...]
@@ -132,18 +145,26 @@ class Tickets:
     transfer: Transfer
     compared: tuple | None
     warnings: tuple = ()
+    files: Mapping = field(default_factory=dict)
+
+    @cached_property
+    def quantities(self):
+        """{state: `Quantities`}, with "moved" for closing less opening."""
+        return self.transfer.quantities()
 
 
-def read_tickets(table, settings, rows=None):
+def read_tickets(table, settings, rows=None, factors=None):
     """Read and check tickets of a tank.
 
     Parameters
     ----------
     table : TankTable
-    settings : Path
-        ticket.toml.
-    rows : Path, optional
+    settings : path or dict
+        ticket.toml, or its content as {section: {key: value}}.
+    rows : path, optional
         CSV file with one ticket in each row; its columns replace keys of `settings`.
+    factors : FactorTable, optional
+        Table of volume correction factors in place of the file `factor_table`.
 
     Returns
     -------
@@ -154,15 +175,27 @@ def read_tickets(table, settings, rows=None):
     InputError
         With every problem of the files.
     """
-    log = Log()
-    settings = Path(settings).absolute()  # "." has a name for messages
-    sections, places, marks = read_sections(settings, SECTIONS, log)
+    log, paths = Log(), []
+    if isinstance(settings, Mapping):
+        folder, name = Path.cwd(), SETTINGS_NAME
+    else:
+        settings = Path(settings).absolute()  # "." has a name for messages
+        paths.append(settings)
+        folder, name = settings.parent, settings.name
+    sections, places, marks = read_sections(settings, SECTIONS, log, name)
     if rows is not None:
         rows = Path(rows).absolute()
-    columns = None if rows is None else _read_rows(rows, marks, settings.name, log)
+        paths.append(rows)
+    columns = None if rows is None else _read_rows(rows, marks, name, log)
     log.stop_if_problems()
-    source = _Source(settings.name, sections, places, columns, log)
-    correction = _correction(source)
+    source = _Source(name, sections, places, columns, log)
+    product = sections["product"]
+    if factors is None and product["correction"] == TABLE and product["factor_table"]:
+        path = folder / product["factor_table"]
+        paths.append(path)
+        factors = read_factor_table(path, product["base"] or "20C", marks, log, name)
+        log.stop_if_problems()
+    correction = _correction(source, factors)
     names = ("1",) if columns is None else tuple(columns.of("ticket"))
     if columns is None:
         names = (sections["ticket"]["number"] or "1",)
@@ -193,7 +226,8 @@ def read_tickets(table, settings, rows=None):
     transfer = Transfer(table, gaugings, taped, product, u, probability)
     _refuse_negative(source, transfer)
     log.stop_if_problems()
-    return Tickets(names, sections, transfer, compared, tuple(log.warnings))
+    files = {path.name: digest_of(path) for path in paths}
+    return Tickets(names, sections, transfer, compared, tuple(log.warnings), files)
 
 
 def _read_rows(path, marks, settings_file, log):
@@ -235,8 +269,8 @@ class _Source:
         return self.column(key) is not None or self.sections[section][name] is not None
 
     def has_any(self, state):
-        """Whether the TOML file has a section of the state, or a column of it has a value."""
-        return state in self.places or any(
+        """Whether a key of the state has a value, in the TOML file or in a column."""
+        return any(value is not None for value in self.sections[state].values()) or any(
             self.column(key) is not None and np.isfinite(self.numbers(key)).any()
             for key in (f"{state}.{field.name}" for field in GAUGING)
         )
@@ -248,8 +282,8 @@ class _Source:
         values = np.full(self.count, default if fixed is None else fixed, dtype=float)
         column = self.column(key)
         if column is not None:
-            given = self.columns.numbers(column)
-            values = np.where(np.isnan(given), values, given)
+            cells = self.columns.numbers(column)
+            values = np.where(np.isnan(cells), values, cells)
         return values
 
     def tell(self, key, expected, ticket=0, *, is_warning=False):
@@ -270,25 +304,32 @@ class _Source:
                 return
 
 
-def _correction(source):
+def _correction(source, factors):
     """Volume correction of the section [product]; None after a problem."""
     product = source.sections["product"]
     if product["correction"] is None:
         return None
     make, needed = CORRECTIONS[product["correction"]]
-    given = {key: product[key] for key in needed}
+    keys = {key: product[key] for key in needed}
     if "group" in needed and product["group"] == COEFFICIENT:
-        given |= {"group": None, "alpha_per_k": product["alpha_per_k"]}
+        keys |= {"group": None, "alpha_per_k": product["alpha_per_k"]}
         needed = (*needed, "alpha_per_k")
     is_complete = True
-    for key in ("group", "base", "alpha_per_k"):
+    if product["correction"] == TABLE:
+        keys["factor_table"] = factors
+        if source.sections["uncertainty"]["u_vcf_percent"] is None:
+            text = message("ticket_table_u", "missing; expected the standard uncertainty of the "
+                           "factors of your table, in percent")  # fmt: skip
+            source.tell("uncertainty.u_vcf_percent", text)
+            is_complete = False
+    for key in ("group", "base", "alpha_per_k", "factor_table"):
         if product[key] is not None and key not in needed:
             _refuse_without_use(source, key, product, make)
     for key in needed:
         if product[key] is None:
             source.tell(f"product.{key}", missing_beside(f"correction = {product['correction']}"))
             is_complete = False
-    return make(**given) if is_complete else None
+    return make(**keys) if is_complete else None
 
 
 def _refuse_without_use(source, key, product, make):
@@ -329,6 +370,7 @@ def _gauging(source, state, table):
         source.tell_each(f"{state}.ullage_m", by_ullage, lambda _: text)
         by_ullage[:] = False
     level = np.where(by_ullage, (table.reference_height_m or 0.0) - ullage, dip)
+    _warn_of_reference(source, state, table)
     _refuse_levels(source, state, table, level, by_ullage)
     temperature = source.numbers(f"{state}.temperature_c")
     text = message("ticket_no_temperature", "missing; expected the temperature of the liquid")
@@ -352,6 +394,29 @@ def _gauging(source, state, table):
         level, water, temperature, ambient, source.numbers(f"{state}.pressure_kpa", 0)
     )
     return gauging, np.where(by_ullage, -ullage, level)
+
+
+def _warn_of_reference(source, state, table):
+    """Warn if the reference height read at the gauging is not that of the table."""
+    key = f"{state}.reference_height_m"
+    read = source.numbers(key)
+    if table.reference_height_m is None:
+        text = message("ticket_no_reference_in_table", "not compared: the record has no reference "
+                       "height")  # fmt: skip
+        source.tell_each(key, np.isfinite(read), lambda _: text, is_warning=True)
+        return
+
+    def moved(ticket):
+        return message(
+            "ticket_reference_moved",
+            "{read:.4f} m, and {table:.4f} m in the table: the zero of the tape, the dip plate or "
+            "the reference point differs from that of the table by {shift:+.1f} mm",
+            read=read[ticket], table=table.reference_height_m,
+            shift=1000 * (read[ticket] - table.reference_height_m),
+        )  # fmt: skip
+
+    is_moved = np.abs(read - table.reference_height_m) > MOST_REFERENCE_SHIFT_M + 1e-9
+    source.tell_each(key, is_moved, moved, is_warning=True)
 
 
 def _refuse_levels(source, state, table, level, by_ullage):
@@ -445,6 +510,11 @@ def _warn_of_slips(source, gaugings, product):
     for key, celsius in measured.items():
         is_hot = (celsius > HOTTEST_C) & (product.density < COLDEST_HEAVY)
         source.tell_each(key, is_hot, lambda _: text, is_warning=True)
+    air = message("ticket_hot_air", "more than {limit:g} degC in the air: is it in degrees "
+                  "Fahrenheit?", limit=HOTTEST_AIR_C)  # fmt: skip
+    for state, gauging in gaugings.items():
+        is_hot = gauging.ambient_c > HOTTEST_AIR_C
+        source.tell_each(f"{state}.ambient_c", is_hot, lambda _: air, is_warning=True)
     share = 100 * product.water_share
     fraction = message("ticket_sw_fraction", "less than {limit:g} %: is it a fraction?",
                        limit=LEAST_SW_PERCENT)  # fmt: skip

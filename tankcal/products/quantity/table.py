@@ -1,6 +1,10 @@
 """Capacity table of a record: volumes at any dip, and their covariance."""
 
-from dataclasses import dataclass
+import hashlib
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +17,7 @@ from tankcal.tank.fittings import FloatingRoof, floating_roof
 
 @dataclass(frozen=True)
 class TankTable:
-    """Capacity table of one tank.
+    """Capacity table of a tank.
 
     Attributes
     ----------
@@ -43,6 +47,10 @@ class TankTable:
         Height of the reference point above the zero of the dips, for ullages.
     digest : str
         SHA-256 of the record.
+    certificate : dict
+        Section [certificate] of the job.
+    date : str
+        Date of the calibration, ISO.
     """
 
     tank: str
@@ -59,6 +67,8 @@ class TankTable:
     reference_height_m: float | None = None
     digest: str = ""
     is_roof_in_table: bool = True
+    certificate: Mapping = field(default_factory=dict)
+    date: str = ""
 
     def volume(self, level_m):
         """Volume at each dip, m3, linear between two rows; (n,) real or complex dips."""
@@ -106,6 +116,33 @@ class TankTable:
         return row, (level_m - low) / (high - low)
 
 
+def table_of(source):
+    """Return the table of a result or record.
+
+    Parameters
+    ----------
+    source : Result, dict or path
+        Result of `tankcal.run`, record of `tankcal.record.load`, or a record.json or its folder.
+
+    Returns
+    -------
+    TankTable
+
+    Raises
+    ------
+    InputError
+        As `read_table`.
+    """
+    if isinstance(source, str | Path):
+        path = Path(source)
+        return read_table(path / "record.json" if path.is_dir() else path)
+    record = source if isinstance(source, Mapping) else records.record_of(source)
+    with tempfile.TemporaryDirectory(prefix="tankcal-") as folder:
+        path = Path(folder) / "record.json"
+        records.save(record, path)  # the SHA-256 is that of the file
+        return read_table(path)
+
+
 def read_table(path):
     """Read the table of a record.
 
@@ -123,8 +160,6 @@ def read_table(path):
     InputError
         If the file is no record, or contains no capacity table.
     """
-    import hashlib
-
     record = records.load(path)
     capacity, job = record["capacity"], record["job"]
     if not capacity:
@@ -150,11 +185,13 @@ def read_table(path):
         ),
         reference_height_m=job["datum"]["reference_height_m"],
         digest=hashlib.sha256(path.read_bytes()).hexdigest(),
+        certificate=job["certificate"],
+        date=job["survey"]["date"],
     )
 
 
 def _read_roof(record):
-    """`FloatingRoof` of a record; None without one."""
+    """`FloatingRoof` of a record, or None."""
     details = {detail["code"]: detail["value"] for detail in record["roof"] or ()}
     if not details:
         return None

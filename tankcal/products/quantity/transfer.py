@@ -21,7 +21,7 @@ STATES = ("opening", "closing")
 
 @dataclass(frozen=True)
 class Transfer:
-    """Quantities of n tickets of one tank.
+    """Quantities of n tickets of a tank.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class Transfer:
 
 @dataclass(frozen=True)
 class Quantities:
-    """Quantities of n tickets in one state, in the order of QUANTITIES.
+    """Quantities of n tickets in a state, in the order of QUANTITIES.
 
     Attributes
     ----------

@@ -18,15 +18,11 @@ DEGREE, KILOGRAM, ONE = r"\degree", r"\kilogram", r"\one"
 LEAST_K = 1.0  # smallest coverage factor of D-SI
 
 
-class Translations:
-    """Words and sentences on a record in each language; the first language is authoritative."""
+class Languages:
+    """Words and sentences in each language; the first language is authoritative."""
 
-    def __init__(self, record, words):
-        self.papers = {
-            group["language"]["code"].split("-")[0]: Paper(record, words=group) for group in words
-        }
-        self.record = record
-        self.job = record["job"]
+    def __init__(self, papers):
+        self.papers = {paper.words["language"]["code"].split("-")[0]: paper for paper in papers}
 
     def word(self, name, /, **values):
         """Return the word or sentence "group.key", {language: text}."""
@@ -43,6 +39,15 @@ class Translations:
     def or_not_stated(self, text):
         """Return a text of the job, or "not stated" in each language."""
         return clean(text) or self.word("dcc.not_stated")
+
+
+class Translations(Languages):
+    """Words and sentences on a record in each language."""
+
+    def __init__(self, record, words):
+        super().__init__(Paper(record, words=group) for group in words)
+        self.record = record
+        self.job = record["job"]
 
 
 def clean(text):
@@ -92,8 +97,13 @@ def add_contact(parent, name, contact_name, address):
 # ---- quantities
 
 
-def add_real(parent, name, value, unit, names, standard=None, of="quantity", kind=None):
-    """Add a number with unit and standard uncertainty, unless the value is None or not finite."""
+def add_real(
+    parent, name, value, unit, names, standard=None, of="quantity", kind=None, expanded=None
+):
+    """Add a number with unit and uncertainty, unless the value is None or not finite.
+
+    `standard` is a standard uncertainty, `expanded` is (U, k, probability).
+    """
     if value is None or not math.isfinite(value):
         return
     element = _add_named(parent, of, names, kind or f"tankcal_{name}")
@@ -104,6 +114,12 @@ def add_real(parent, name, value, unit, names, standard=None, of="quantity", kin
         uncertainty = add_child(number, "measurementUncertaintyUnivariate", space=SI)
         stated = add_child(uncertainty, "standardMU", space=SI)
         add_child(stated, "valueStandardMU", repr(float(standard)), space=SI)
+    if expanded is not None:
+        uncertainty = add_child(number, "measurementUncertaintyUnivariate", space=SI)
+        stated = add_child(uncertainty, "expandedMU", space=SI)
+        names_of = ("valueExpandedMU", "coverageFactor", "coverageProbability")
+        for name_of, figure in zip(names_of, expanded, strict=True):
+            add_child(stated, name_of, repr(float(figure)), space=SI)
 
 
 def add_real_list(parent, name, values, unit, names, kind=None):

@@ -48,6 +48,7 @@ class Constant:
         return density / self.factor(density, temperature_c, pressure_kpa)
 
 
+TABLE = "table"  # a supplied table of factors, read by the reader of tickets
 CORRECTIONS = {  # name of the key `correction`: class, and the keys that it needs
     "D1250-80": (lambda **keys: Petroleum(1980, **keys), ("group", "base")),
     "D1250-04": (lambda **keys: Petroleum(2004, **keys), ("group", "base")),
@@ -56,4 +57,5 @@ CORRECTIONS = {  # name of the key `correction`: class, and the keys that it nee
     "OIML-R22": (Ethanol, ()),
     "GPA-TP27": (LiquefiedGas, ()),
     "coefficient": (Constant, ("alpha_per_k", "base")),
+    TABLE: (lambda factor_table, base: factor_table, ("factor_table", "base")),
 }

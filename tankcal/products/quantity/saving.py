@@ -1,0 +1,346 @@
+"""The saved form of a ticket, and its computation from the saved form."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+from tankcal.products.quantity.chain import QUANTITIES
+from tankcal.products.quantity.reading import SETTINGS_NAME, read_tickets
+from tankcal.products.quantity.results import compare
+from tankcal.products.quantity.table import read_table
+from tankcal.products.quantity.transfer import STATES
+from tankcal.record.manifest import digest_of
+from tankcal.record.schema import to_plain
+from tankcal.record.texts import warnings_of
+from tankcal.record.ticket import (
+    ComparisonOfTicket,
+    ContributionToTicket,
+    FactorsOfTicket,
+    GaugingOfTicket,
+    QuantityOfTicket,
+    StepOfTicket,
+    TableOfTicket,
+    TicketFile,
+    TicketFileEntry,
+    UncertaintyOfTicket,
+)
+from tankcal.tank.gauging import ASSUMPTIONS, KEY_OF_INPUT
+from tankcal.tank.volume_correction.factors import FactorTable
+
+UNITS = {  # of the steps; others have no unit
+    **dict.fromkeys(("tov_m3", "fw_m3", "fra_m3", "gov_m3", "gsv_m3", "nsv_m3"), "m3"),
+    **dict.fromkeys(("base_density", "observed_density"), "kg/m3"),
+    **dict.fromkeys(("mass_kg", "weight_kg"), "kg"),
+    "shell_c": "degC",
+}
+RECORD = "record.json"
+MOST_FOLDERS = 200  # of the folder of the inputs that are searched for the record
+TOLERANCE = 1e-9  # largest relative difference between two computations
+
+
+def ticket_file(tickets):
+    """Return the saved form of a single ticket.
+
+    Parameters
+    ----------
+    tickets : Tickets
+        A single ticket of `read_tickets`.
+
+    Returns
+    -------
+    TicketFile
+    """
+    sections, transfer = tickets.sections, tickets.transfer
+    head, product = sections["ticket"], sections["product"]
+    table, correction = transfer.table, transfer.product.correction
+    quantities = tickets.quantities
+    return TicketFile(
+        notice=table.certificate.get("notice") or "",
+        tank=table.tank,
+        number=tickets.names[0],
+        date=_text(head["date"]),
+        by=head["by"],
+        customer=head["customer"],
+        product=product["name"],
+        note=head["note"],
+        probability=transfer.probability,
+        table=_table(table, transfer.product),
+        correction=correction.name,
+        base_c=float(correction.base_c),
+        density_kg_m3=product["density_kg_m3"],
+        density_is=product["density_is"],
+        density_temperature_c=product["density_temperature_c"],
+        sw_percent=product["sw_percent"],
+        air_kg_m3=transfer.product.air_kg_m3,
+        weights_kg_m3=transfer.product.weights_kg_m3,
+        insulated=transfer.product.is_insulated,
+        gaugings=[_gauging(sections, transfer, state) for state in transfer.gaugings],
+        steps=_steps(transfer.steps),
+        quantities=_quantities(quantities),
+        budget=_budget(quantities),
+        uncertainties=_uncertainties(sections["uncertainty"], quantities),
+        comparison=_comparison(tickets, quantities),
+        not_in_u=_not_in_u(sections, table),
+        factors=_factors(correction),
+        inputs={
+            section: {key: _text(value) for key, value in values.items() if value is not None}
+            for section, values in sections.items()
+            if any(value is not None for value in values.values())
+        },
+        files=[TicketFileEntry(name, digest) for name, digest in tickets.files.items()],
+        warnings=warnings_of(tickets.warnings),
+    )
+
+
+def document_file(tickets):
+    """Return the saved form of a ticket that is to be signed, with its number and date.
+
+    Raises
+    ------
+    InputError
+        If `number` or `date` is missing.
+    """
+    head = tickets.sections["ticket"]
+    expected = message("ticket_for_document", "missing; expected for the document of a ticket")
+    settings = next(iter(tickets.files), SETTINGS_NAME)
+    problems = [
+        Problem(settings, expected, column=f"ticket.{key}")
+        for key in ("number", "date")
+        if head[key] is None
+    ]
+    if problems:
+        raise InputError(problems)
+    return ticket_file(tickets)
+
+
+def _text(value):
+    """A date as an ISO text; other values unchanged."""
+    return value.isoformat() if hasattr(value, "isoformat") else value
+
+
+def _number(value):
+    return float(value) if np.isfinite(value) else None
+
+
+def _table(table, product):
+    roof = "in_table" if table.is_roof_in_table else "not_in_table"
+    return TableOfTicket(
+        table.digest,
+        table.kind,
+        table.certificate.get("number") or None,
+        table.certificate.get("laboratory") or None,
+        _text(table.date),
+        table.temperature_c,
+        float(product.expansion_per_k[0]),
+        table.reference_height_m,
+        None if table.roof is None else roof,
+    )
+
+
+def _gauging(sections, transfer, state):
+    gauging = transfer.gaugings[state]
+    return GaugingOfTicket(
+        state,
+        float(gauging.level_m[0]),
+        sections[state]["ullage_m"],
+        _number(gauging.water_m[0]),
+        float(gauging.temperature_c[0]),
+        None if transfer.product.is_insulated else _number(gauging.ambient_c[0]),
+        float(gauging.pressure_kpa[0]),
+    )
+
+
+def _steps(steps):
+    closing, opening = steps["closing"], steps.get("opening")
+    return [
+        StepOfTicket(
+            step.name,
+            UNITS.get(step.name, ""),
+            None if opening is None else float(getattr(opening, step.name)[0]),
+            float(getattr(closing, step.name)[0]),
+        )
+        for step in fields(closing)
+    ]
+
+
+def _quantities(quantities):
+    return [
+        QuantityOfTicket(
+            state, name, *map(float, (result.value[0, at], result.u[0, at])),
+            _number(result.dof[0, at]), *map(float, (result.k[0, at], result.U[0, at])),
+        )
+        for state, result in quantities.items()
+        for at, name in enumerate(QUANTITIES)
+    ]  # fmt: skip
+
+
+def _budget(quantities):
+    rows = []
+    for state, result in quantities.items():
+        for at, quantity in enumerate(QUANTITIES):
+            variance = result.u[0, at] ** 2
+            parts = [(float(part[0, at]), name) for name, part in result.contributions.items()]
+            for part, name in sorted(parts, key=lambda part: -abs(part[0])):
+                share = part**2 / variance if variance > 0 else 0.0
+                rows.append(
+                    ContributionToTicket(state, quantity, *_split(name), part, float(share))
+                )
+    return rows
+
+
+def _split(name):
+    """(input, gauging or None) of the name of an input."""
+    first, _, last = name.rpartition(" ")
+    return (first, last) if last in STATES else (name, None)
+
+
+def _uncertainties(declared, quantities):
+    """Uncertainties of the inputs that contribute to a quantity."""
+    used = {
+        KEY_OF_INPUT.get(_split(name)[0])
+        for result in quantities.values()
+        for name, part in result.contributions.items()
+        if np.any(part != 0)
+    }
+    rows = []
+    for name, (assumed, origin) in ASSUMPTIONS.items():
+        if name in used:
+            is_declared = declared[name] is not None
+            value = declared[name] if is_declared else assumed
+            rows.append(UncertaintyOfTicket(name, value, "declared" if is_declared else origin))
+    return rows
+
+
+def _comparison(tickets, quantities):
+    comparison = compare(tickets, quantities)
+    if comparison is None:
+        return None
+    _, values, other_u, source = tickets.compared
+    e_n = None if comparison.e_n is None else _number(comparison.e_n[0])
+    return ComparisonOfTicket(
+        comparison.quantity, source, float(values[0]), other_u,
+        float(comparison.difference[0]), e_n, None if e_n is None else abs(e_n) <= 1,
+    )  # fmt: skip
+
+
+def _not_in_u(sections, table):
+    """Codes of effects that U does not contain."""
+    codes = ["layers", "slips", "conformity"]
+    if sections["product"]["density_is"] == "observed":
+        codes.append("sample_temperature")
+    if sections["product"]["alpha_per_k"] is not None:
+        codes.append("alpha")
+    if any(sections[state]["ullage_m"] is not None for state in STATES):
+        codes.append("reference_height")
+    if table.roof is not None:
+        codes.append("roof_mass")
+    if any(sections[state]["pressure_kpa"] for state in STATES):
+        codes.append("vapour")
+    return codes
+
+
+def _factors(correction):
+    if not isinstance(correction, FactorTable):
+        return None
+    columns = correction.density_kg_m3, correction.temperature_c, correction.factors
+    return FactorsOfTicket(correction.file, *(column.tolist() for column in columns))
+
+
+# ---- computing again
+
+
+def compute_again(saved, folder):
+    """Compute a saved ticket again from its inputs and its record.
+
+    Parameters
+    ----------
+    saved : dict
+        Content of ticket.json.
+    folder : Path
+        Folder to be searched for the record: a record.json in it or in its subfolders.
+
+    Returns
+    -------
+    numbers : int or None
+        Number of the compared values; None: the record was not found.
+    problems : list of Problem
+        Differences.
+
+    Raises
+    ------
+    InputError
+        If the inputs are not those of a ticket.
+    """
+    problems = []
+    path = _find_record(folder, saved["table"]["sha256"])
+    if path is None:
+        return None, problems
+    factors = saved["factors"]
+    if factors is not None:
+        grid = (np.array(factors[key]) for key in ("density_kg_m3", "temperature_c", "factor"))
+        factors = FactorTable(factors["file"], *grid, saved["inputs"]["product"].get("base"))
+    tickets = read_tickets(read_table(path), saved["inputs"], factors=factors)
+    again = to_plain(ticket_file(tickets))
+    ignored = {"format", "tankcal", "files", "warnings", "inputs"}
+    pairs = [
+        pair
+        for name in again
+        if name not in ignored
+        for pair in _leaves(name, saved.get(name), again[name])
+    ]
+    for place, recorded, computed in pairs:
+        if not _agree(recorded, computed):
+            expected = message(
+                "verify_ticket_apart",
+                "{place} is {recorded}, computed again {computed}; expected equal values",
+                place=place, recorded=_value_text(recorded), computed=_value_text(computed),
+            )  # fmt: skip
+            problems.append(Problem("ticket.json", expected))
+    return len(pairs), problems
+
+
+def _value_text(value):
+    return f"{value:.10g}" if isinstance(value, float) else repr(value)[:80]
+
+
+def _find_record(folder, digest):
+    """The record.json with a SHA-256 in a folder or its subfolders; None if there is none."""
+    folder = Path(folder)
+    if folder.is_file():
+        folder = folder.parent
+    try:
+        subfolders = sorted(path for path in folder.iterdir() if path.is_dir())[:MOST_FOLDERS]
+    except OSError as error:
+        raise InputError(Problem(str(folder), str(error))) from error
+    for place in (folder, *subfolders, *(path / "results" for path in subfolders)):
+        path = place / RECORD
+        if path.is_file() and digest_of(path) == digest:
+            return path
+    return None
+
+
+def _leaves(place, recorded, computed):
+    """Yield (place, recorded, computed) of all values of two nested data."""
+    if isinstance(computed, dict) and isinstance(recorded, dict):
+        for name in {**recorded, **computed}:
+            yield from _leaves(f"{place}.{name}", recorded.get(name), computed.get(name))
+    elif isinstance(computed, list) and isinstance(recorded, list):
+        if len(computed) != len(recorded):
+            yield f"{place}[]", len(recorded), len(computed)
+        for row, pair in enumerate(zip(recorded, computed, strict=False)):
+            yield from _leaves(f"{place}[{row}]", *pair)
+    else:
+        yield place, recorded, computed
+
+
+def _agree(recorded, computed):
+    numbers = (int, float)
+    if isinstance(recorded, bool) or isinstance(computed, bool):
+        return recorded is computed
+    if isinstance(recorded, numbers) and isinstance(computed, numbers):
+        # Small contributions are differences of large numbers, so 1e-9 alone is too strict.
+        return abs(recorded - computed) <= TOLERANCE * max(abs(computed), 1e-3)
+    return recorded == computed

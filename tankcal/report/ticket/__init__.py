@@ -1,0 +1,160 @@
+"""Files of `tankcal ticket`: JSON, CSV, workbook, XML, PDF of a single page, and web page.
+
+All values come from ticket.json; no number is computed here.
+"""
+
+from typing import ClassVar
+
+from tankcal.messages import message
+from tankcal.record.ticket import TICKET
+from tankcal.report import blocks
+from tankcal.report.plain import words_with_part
+from tankcal.report.saved_document import SavedDocument
+from tankcal.report.saved_paper import SavedPaper, bearable
+from tankcal.report.ticket.tables import BUDGET, QUANTITIES, STEPS, UNCERTAINTIES
+from tankcal.text.languages import DEFAULT
+from tankcal.text.words import load_words, message_sentence
+
+__all__ = ["DOCUMENT", "FILES", "TicketPaper", "rebuild", "refuse_foreign", "write_ticket"]
+
+FILE, WORKBOOK, XML = "ticket.json", "ticket.xlsx", "ticket.xml"
+TABLES = {
+    "steps.csv": STEPS,
+    "quantities.csv": QUANTITIES,
+    "budget.csv": BUDGET,
+    "uncertainties.csv": UNCERTAINTIES,
+}
+
+
+class TicketPaper(SavedPaper):
+    """Formatter of a `record.ticket.TicketFile` in a language.
+
+    Words are looked up in the part of a group under `ticket` first, then in the group.
+
+    Parameters
+    ----------
+    ticket : dict
+        The ticket as plain data; it is checked by its schema.
+    language : str, optional
+        As in languages.LANGUAGES; None: English.
+    letterhead : letterhead.Letterhead, optional
+    """
+
+    kind, file = "ticket", FILE
+    attached: ClassVar[dict] = {FILE: "ticket", WORKBOOK: "ticket_workbook", XML: "ticket_xml"}
+    is_dense = True
+
+    def __init__(self, ticket, language=None, letterhead=None):
+        super().__init__(words_with_part(load_words(language or DEFAULT), "ticket"))
+        self.saved = self.record = TICKET.migrated(ticket, TICKET.file)
+        self.letterhead = letterhead.data() if letterhead else None
+
+    def head(self, folder=None):
+        """Document block and title; the facts below name number, tank and product."""
+        document, _ = super().head(folder)
+        return [document, blocks.masthead(self.word(f"titles.{self.kind}"))]
+
+    def subject(self):
+        """Return the number of the ticket, the tank and the product."""
+        saved = self.record
+        tank = f"{self.word('page.tank')} {saved['tank']}"
+        return bearable(" · ".join(filter(None, (saved["number"], tank, saved["product"]))))
+
+    def date(self):
+        """Return the ISO date of the transfer, or "" if it is not known."""
+        return self.record["date"] or ""
+
+    def warning(self, entry):
+        """Return a warning with its key, such as closing.dip_m."""
+        sentence = message_sentence(self.words, entry["text"], entry["code"], entry["values"])
+        place = f"{entry['column']}: " if entry["column"] else ""
+        return bearable(f"{place}{sentence}")
+
+    def correction(self):
+        """Return the volume correction with edition, group and base."""
+        saved = self.record
+        return message_sentence(
+            self.words, saved["correction"], saved["correction_code"], saved["correction_values"]
+        )
+
+    @property
+    def state(self):
+        """State of the main result: "moved", or "closing" for a stock."""
+        return "moved" if len(self.record["gaugings"]) > 1 else "closing"
+
+    def quantity(self, state, name):
+        """Return the saved quantity of a state."""
+        return next(
+            row
+            for row in self.record["quantities"]
+            if (row["state"], row["quantity"]) == (state, name)
+        )
+
+    def input_name(self, row):
+        """Return the name of an input of the budget, with its gauging."""
+        name = self.words["inputs"][row["input"]]
+        if row["gauging"] is None:
+            return name
+        return f"{name}, {self.words['states'][row['gauging']]}"
+
+
+def _load_renderers():
+    from tankcal.report.ticket.pages import pages
+    from tankcal.report.ticket.workbook import write
+
+    return pages, write
+
+
+def _write_xml(paper, path):
+    from tankcal.report.ticket.xml import ticket_xml
+
+    path.write_bytes(ticket_xml(paper))
+
+
+DOCUMENT = SavedDocument(
+    TICKET,
+    TicketPaper,
+    _load_renderers,
+    steps=(
+        message("ticket_tables", "writing the tables of the ticket"),
+        message("ticket_pages", "setting the pages of the ticket"),
+    ),
+    unreadable=lambda error: message(
+        "ticket_unreadable", "cannot be read as a ticket: {error}", error=error
+    ),
+    without_content=lambda what: message(
+        "no_ticket", "does not have the content of a ticket ({what})", what=what
+    ),
+    tables=TABLES,
+    others={XML: _write_xml},
+    recomputed_by="tankcal.products.quantity.saving:compute_again",
+)
+FILES, refuse_foreign, rebuild = DOCUMENT.files, DOCUMENT.refuse_foreign, DOCUMENT.rebuild
+
+
+def write_ticket(ticket, folder, language=None, progress=None, letterhead=None):
+    """Write ticket.json, CSV files, workbook, XML, PDF and web page: all files or none.
+
+    Parameters
+    ----------
+    ticket : TicketFile or dict
+        Result of `products.quantity.saving.ticket_file`, or its plain data.
+    folder : path
+        Created if missing. An earlier ticket in the folder is replaced.
+    language : str, optional
+        Language of PDF, page and workbook (languages.LANGUAGES); None: English.
+    progress : callable, optional
+        progress(text), called at the beginning of each step.
+    letterhead : report.letterhead.Letterhead, optional
+        Letterhead of the author.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        For a folder with other files, or for data that are not a ticket.
+    """
+    return DOCUMENT.write(ticket, folder, language, progress, letterhead)
