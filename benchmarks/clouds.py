@@ -24,9 +24,9 @@ from measured import Row, tell
 
 from tankcal.clouds import describe_cloud
 from tankcal.clouds.wall import find_cloud_wall
-from tankcal.job.model.clouds import CloudFile
-from tankcal.pipeline.cloud_cluster import open_passes
-from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
+from tankcal.methods.clouds.readings import CloudFile
+from tankcal.pipeline.clouds.cluster import open_passes
+from tankcal.pipeline.clouds.passes import Placing, Reading, Telling
 from tankcal.survey.scans import ScanSetup
 from tankcal.survey.wall_hits import RangingInstrument
 

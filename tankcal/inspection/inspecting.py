@@ -25,7 +25,7 @@ from tankcal.inspection.welds import list_welds
 from tankcal.job.folder import OF_INSPECTIONS
 from tankcal.job.tables import Log
 from tankcal.messages import message
-from tankcal.pipeline.cloud_passes import Reading
+from tankcal.pipeline.clouds.passes import Reading
 from tankcal.record import content_error
 from tankcal.record.inspection import InspectedTank, InspectionFile, InspectionRule
 from tankcal.record.texts import WarningRecord, warnings_of

@@ -29,8 +29,8 @@ from tankcal.inspection.welds import (
     locate_wall,
 )
 from tankcal.messages import message
-from tankcal.pipeline.cloud_cluster import open_passes
-from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
+from tankcal.pipeline.clouds.cluster import open_passes
+from tankcal.pipeline.clouds.passes import Placing, Reading, Telling
 from tankcal.record.inspection import WeldGap
 from tankcal.uncertainty import coverage_factor
 from tankcal.units import FULL_TURN, MM_PER_M
@@ -49,7 +49,7 @@ def find_gaps(result, limits_mm, reading=None, progress=None):
         Result for an upright tank. The files of its clouds are read again.
     limits_mm : dict
         Limits of the rule, {"peaking": mm, "banding": mm}. A missing key is an unknown limit.
-    reading : tankcal.pipeline.cloud_passes.Reading, optional
+    reading : tankcal.pipeline.clouds.passes.Reading, optional
         Number of workers; by default the files are read in this process.
     progress : callable, optional
         Function that receives a message for each step.

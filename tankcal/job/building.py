@@ -7,7 +7,6 @@ from tankcal.job.assembly import Attached, make_frame, make_job, read_mesh_file
 from tankcal.job.checking import has_rows
 from tankcal.job.checks import check_all
 from tankcal.job.checks.extent import (
-    has_clouds,
     has_shape,
     has_survey,
     is_sighted,
@@ -15,14 +14,12 @@ from tankcal.job.checks.extent import (
 )
 from tankcal.job.checks.lines import has_lines
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
-from tankcal.job.contract.clouds import KINDS as OF_CLOUDS
 from tankcal.job.contract.strapping import IN_PLACE
 from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.overrulings import make_overrulings
 from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
-    CLOUD_TABLES,
     COVARIANCE_FILE,
     REGISTERS,
     STRAPPING_TABLES,
@@ -96,10 +93,6 @@ def _make_surveys(raw, values, tables, registers):
         from tankcal.job.lines import make_lines
 
         surveys["lines"] = make_lines(tables, registers)
-    if has_clouds(tables):
-        from tankcal.job.clouds import make_clouds
-
-        surveys["clouds"] = make_clouds(values, tables, registers, raw)
     return surveys
 
 
@@ -107,8 +100,8 @@ def _read_tables(raw, registers, is_whole, log):
     """Read and check all tables.
 
     Returns {name: ColumnValues}, with None for a table that is missing, unreadable or not allowed
-    for the kind of tank, and for an empty table of a survey. The clouds form a table with one row
-    for each file.
+    for the kind of tank, and for an empty table of a survey. A list of readings, such as clouds,
+    forms a table with a row for each entry.
     """
     kind = kind_of(raw)
     allowed = None if kind is None else TABLES_OF_KIND[kind]
@@ -118,9 +111,10 @@ def _read_tables(raw, registers, is_whole, log):
         allowed += STRAPPING_TABLES
     for method in methods_for(kind):
         allowed += method.tables + method.shared_tables
-    if kind in OF_CLOUDS:
-        allowed += CLOUD_TABLES
-    tables = {"clouds": _cloud_table(raw, registers, kind, log)}
+    listed = [method for method in methods() if method.register]
+    tables = {
+        method.register: _table_of_list(method, raw, registers, kind, log) for method in listed
+    }
     # Without a valid kind, the table of rings indicates a lying cylinder.
     assumed_kind = kind or ("horizontal" if raw.tables.get("rings") is not None else None)
     for name in TABLES:
@@ -147,17 +141,16 @@ def _as_upright(table):
     return replace(table, columns=table.columns | equivalents) if equivalents else table
 
 
-def _cloud_table(raw, registers, kind, log):
-    """ColumnValues of the clouds, one row each; None if absent or not allowed for the kind."""
-    given, register = registers["clouds"], raw.registers.get("clouds")
-    if register is None or not given:
+def _table_of_list(method, raw, registers, kind, log):
+    """ColumnValues of a list of readings; None if absent or not allowed for the kind."""
+    entries, register = registers[method.register], raw.registers.get(method.register)
+    if register is None or not entries:
         return None
-    if kind is not None and kind not in OF_CLOUDS:
+    if kind is not None and kind not in method.kinds:
         log.problem(register.file, not_for_this_kind(kind))
         return None
-    rows = tuple(register.rows[name] for name in given)
-    columns = {"cloud": [*given], "file": [keys["file"] for keys in given.values()]}
-    return ColumnValues(register.file, rows, 0, columns)
+    rows = tuple(register.rows[name] for name in entries)
+    return ColumnValues(register.file, rows, 0, {REGISTERS[method.register]: [*entries]})
 
 
 def not_for_this_kind(kind):
@@ -170,15 +163,16 @@ def not_for_this_kind(kind):
 def _tell_missing_tables(raw, tables, kind, log):
     if kind == "vertical":
         _tell_sights_missing(raw, tables, log)
-        _tell_clouds_missing(raw, tables, log)
+        _tell_empty_lists(raw, tables, log)
     # Any measurement of the shape of the wall replaces the points.
     for name in REQUIRED_TABLES.get(kind, ()):
         is_replaced = name == "points" and (has_shape(tables) or has_lines(tables))
         if name in raw.tables or is_replaced:
             continue
-        if name == "points" and "clouds" in raw.registers:
-            if raw.registers["clouds"] is not None:  # else reported already
-                log.problem(raw.registers["clouds"].file, _NO_CLOUD)
+        lists = [table for table in _IN_PLACE_OF_POINTS if table in raw.registers]
+        if name == "points" and lists:
+            if raw.registers[lists[0]] is not None:  # else reported already
+                log.problem(raw.registers[lists[0]].file, _IN_PLACE_OF_POINTS[lists[0]])
             continue
         replacements = [table for table in _IN_PLACE_OF_POINTS if table in raw.tables]
         if name != "points" or not replacements:
@@ -193,7 +187,7 @@ def _tell_sights_missing(raw, tables, log):
     has_readings = has_survey(tables) or is_strapped(tables)  # otherwise reported as missing points
     if has_targets or not has_readings or not has_rows(tables["setups"]):
         return
-    of_methods = (method.tables[0] for method in methods() if method.is_sighted)
+    of_methods = (method.readings_table for method in methods() if method.is_sighted)
     sights = [name for name in of_methods if name in raw.tables]
     for name in sights:
         if raw.tables[name] is not None:
@@ -207,25 +201,21 @@ def _tell_sights_missing(raw, tables, log):
         log.problem(tables["setups"].file, expected)
 
 
-def _tell_clouds_missing(raw, tables, log):
-    """Report an empty clouds.toml beside a survey without targets or other sights to the wall."""
+def _tell_empty_lists(raw, tables, log):
+    """Report an empty list of readings beside a survey without targets or sights to the wall."""
     has_targets = has_rows(tables["points"]) or has_rows(tables["targets"]) or is_sighted(tables)
-    register = raw.registers.get("clouds")
-    if register is not None and has_survey(tables) and not register.entries and not has_targets:
-        log.problem(register.file, _NO_CLOUD)
+    for name, register in raw.registers.items():
+        is_empty = name in _IN_PLACE_OF_POINTS and register is not None and not register.entries
+        if is_empty and has_survey(tables) and not has_targets:
+            log.problem(register.file, _IN_PLACE_OF_POINTS[name])
 
 
 _IN_PLACE_OF_POINTS = {
-    **{method.tables[0]: method.no_rows() for method in methods() if method.no_rows()},
+    **{method.readings_table: method.no_rows() for method in methods() if method.no_rows()},
     "circumferences": message(
         "no_circumferences", "no rows; expected a reading of the tape on each course at least"
     ),
 }
-
-
-_NO_CLOUD = message(
-    "no_cloud_at_all", "nothing filled in; expected a section for each file of a scanner"
-)
 
 
 def _missing(raw, name):

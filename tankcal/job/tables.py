@@ -29,12 +29,11 @@ STRAPPING_TABLES = (
     *("circumferences", "obstructions", "thickness", "tape_checks"),
     *("lines", "offsets"),
 )
-CLOUD_TABLES = ("scan_targets",)
 OVERRULING_TABLES = ("overrulings",)
 # The input files of a record are in this order: first the methods for upright tanks.
 _UPRIGHT = tuple(table for method in methods_for("vertical") for table in method.tables)
 _OTHERS = tuple(table for method in methods() for table in method.tables if table not in _UPRIGHT)
-TABLES = TANK_TABLES + STRAPPING_TABLES + CLOUD_TABLES + _UPRIGHT
+TABLES = TANK_TABLES + STRAPPING_TABLES + _UPRIGHT
 TABLES += _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
 REGISTERS = {  # name of an entry in each list
     "cameras": "camera",

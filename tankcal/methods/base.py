@@ -17,6 +17,7 @@ GROUP = "tankcal.methods"  # entry points of methods in other distributions
 _BUILT_IN = (
     "tankcal.methods.hits:HitsMethod",
     "tankcal.methods.tangents:TangentsMethod",
+    "tankcal.methods.clouds:CloudsMethod",
     "tankcal.methods.liquid:LiquidMethod",
     "tankcal.methods.radii:RadiiMethod",
     "tankcal.methods.rings:RingsMethod",
@@ -41,6 +42,9 @@ class Method:
         Kinds of tank that the method can measure: "vertical", "horizontal", "sphere", "mesh".
     tables : tuple of str
         Tables of a job that belong to the method; the first table contains its readings.
+    register : str or None
+        List whose entries are the readings, such as "clouds"; they form a table of this name, with
+        a row for each entry. None: the readings are in the first table.
     shared_tables : tuple of str
         Tables of other methods that the method also reads.
     archives : tuple of str
@@ -67,6 +71,8 @@ class Method:
     is_supplement : bool
         Whether the readings supplement a survey by other methods, or the drawing; `supplement`
         combines them with it.
+    has_means : bool
+        Whether the points of the wall are means of many readings, not single sights.
     is_smooth : bool
         Whether the readings show the wall smoother than it is.
     has_own_offset : bool
@@ -94,6 +100,7 @@ class Method:
     attribute = None
     kinds = ()
     tables = ()
+    register = None
     shared_tables = ()
     archives = ()
     starter = None
@@ -106,6 +113,7 @@ class Method:
     completes_survey = False
     is_inside = False
     is_supplement = False
+    has_means = False
     is_smooth = False
     has_own_offset = False
     names_levels = False
@@ -118,6 +126,11 @@ class Method:
     saved_note = ""
 
     # ---- job
+
+    @property
+    def readings_table(self):
+        """Name of the table with the readings."""
+        return self.register or self.tables[0]
 
     def columns(self):
         """Columns of the tables: {table: tuple of `job.fields.Field`}."""
@@ -163,7 +176,7 @@ class Method:
         tables : dict
             {table: ColumnValues; None: missing}.
         """
-        table = tables.get(self.tables[0])
+        table = tables.get(self.readings_table)
         return table is not None and bool(table.rows or table.skipped)
 
     def no_rows(self):
@@ -444,8 +457,8 @@ def supplement_of(job):
 
 
 def is_sighted(job):
-    """Whether the points of the wall of a `Job` are sights of a method."""
-    return any(method.is_sighted for method in given_methods(job))
+    """Whether the points of the wall of a `Job` are single sights of a method."""
+    return any(method.is_sighted and not method.has_means for method in given_methods(job))
 
 
 def completing_method(job):

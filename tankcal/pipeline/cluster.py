@@ -1,6 +1,6 @@
 """Dask workers on this machine or of a scheduler at an address, and their errors.
 
-`cloud_cluster` reads clouds by workers, and `tankcal.batch` computes jobs. Errors of dask, of the
+`clouds.cluster` reads clouds by workers, and `tankcal.batch` computes jobs. Errors of dask, of the
 network or of another machine are reported in one line.
 """
 

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+    from tankcal.methods.clouds.wall import Clouded
     from tankcal.methods.radii.wall import RadiiWall
-    from tankcal.pipeline.cloud_wall import Clouded
     from tankcal.pipeline.liquid.nominal_wall import NominalWall
     from tankcal.pipeline.liquid.result import LiquidResult
     from tankcal.pipeline.read_wall import ReadWall

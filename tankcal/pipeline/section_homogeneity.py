@@ -19,7 +19,7 @@ from scipy.special import chdtr
 
 from tankcal.geometry.field.section_noise import bartlett
 from tankcal.messages import list_some, message
-from tankcal.methods.base import is_sighted
+from tankcal.methods.base import given_methods
 from tankcal.pipeline.survey_warnings import SHOWN, noise_is_estimated, of_points
 
 # Keys of the warnings that only measured points, not planned points, can cause.
@@ -100,7 +100,8 @@ def homogeneity_of(job, wall):
         None if points share unknowns of instruments (hits, clouds, tangents) or were averaged in
         cells, because sections then have no separate noise.
     """
-    shares_unknowns = job.clouds or is_sighted(job) or job.points.unbound
+    is_sighted = any(method.is_sighted for method in given_methods(job))
+    shares_unknowns = is_sighted or job.points.unbound
     if shares_unknowns or wall.points_read != len(wall.accepted):
         return None
     noise = wall.section_noise

@@ -3,6 +3,7 @@
 The readings may be those of a survey or the predicted readings of a plan.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -42,7 +43,7 @@ class Surveyed:
     adjustment : Adjustment or None
     sights : dict
         {method: its sights as points of the wall}: "hits" (`survey.sighting.Sighting`), "tangents"
-        (`survey.tangents.Touching`) or "clouds" (`cloud_wall.Clouded`).
+        (`survey.tangents.Touching`) or "clouds" (`methods.clouds.wall.Clouded`).
     """
 
     job: Job
@@ -66,10 +67,14 @@ class Network:
         None if the job has no measurements to be adjusted.
     amplitudes : Amplitudes or None
         Known amplitudes of the components of an upright wall; None: estimated from the readings.
+    cluster, part_progress : optional
+        Workers that read large files, and callback for their progress; as in `chain.run`.
     """
 
     adjustment: "Adjustment | None"
     amplitudes: object
+    cluster: int | str | None = None
+    part_progress: Callable | None = None
 
     @property
     def dof(self):
@@ -93,7 +98,7 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     amplitudes : Amplitudes, optional
         Known amplitudes of the components of an upright wall; None: estimated from the readings.
     cluster, part_progress : optional
-        Workers that read cloud files, and callback for their progress; see `cloud_passes.Reading`.
+        Workers that read large files, and callback for their progress; as in `chain.run`.
 
     Returns
     -------
@@ -106,27 +111,18 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
     """
     adjustment, sights = None, {}
     sighted = [method for method in given_methods(job) if method.is_sighted]
-    is_sighted = bool(sighted) or job.clouds is not None
     if job.measurements is not None:
         adjustment = _adjusted(job, progress)
-    if not is_sighted and adjustment is not None:
+    if not sighted and adjustment is not None:
         from tankcal.survey import wall_points
 
         points = wall_points(adjustment, job.measurements, job.survey.side)
         job = replace(job, points=s_transform(points))
-    network = Network(adjustment, amplitudes)
+    network = Network(adjustment, amplitudes, cluster, part_progress)
     try:
         if sighted:
             found = sighted[0].find(job, progress, network)
             job, survey, sights = found.job, found.survey, found.sights
-        elif job.clouds is not None:
-            from tankcal.pipeline.cloud_passes import Reading
-            from tankcal.pipeline.cloud_wall import find_wall_in_clouds
-
-            reading = Reading(cluster, part_progress)
-            job, sights["clouds"], survey = find_wall_in_clouds(
-                job, adjustment, progress, network.dof, amplitudes=amplitudes, reading=reading
-            )
         else:
             survey = _survey(job, progress, network)
     except SolutionError as error:
@@ -134,9 +130,9 @@ def find_survey(job, progress, amplitudes=None, *, cluster=None, part_progress=N
             raise
         texts = (warning.text for warning in placed(job, adjustment.warnings[:TOLD]))
         raise SolutionError(*error.args, *texts) from error
-    if adjustment is not None and not is_sighted and is_surveyed_as(survey, "wall"):
+    if adjustment is not None and not sighted and is_surveyed_as(survey, "wall"):
         refuse_other_side(job, partial(is_within_wall, survey), adjustment)
-    elif adjustment is not None and not is_sighted and is_surveyed_as(survey, "scan"):
+    elif adjustment is not None and not sighted and is_surveyed_as(survey, "scan"):
         refuse_other_side(job, survey.is_within, adjustment)
     refuse_other_size(job, survey)
     completing = completing_method(job)

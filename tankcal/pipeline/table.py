@@ -184,9 +184,7 @@ def _check_sights(job, survey, sighting):
     for method in given_methods(job):
         if method.is_sighted:
             return method.warnings(job, survey, sighting)
-    from tankcal.pipeline.cloud_checks import check_clouds
-
-    return check_clouds(job, survey, sighting)
+    return ()
 
 
 def _check_survey(job, survey, top_m):

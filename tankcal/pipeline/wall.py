@@ -219,7 +219,7 @@ def is_smoothed(job):
 
 def _has_own_offsets(job):
     """Whether the instruments of the wall have offsets of their own, as of hits and clouds."""
-    return bool(job.clouds) or any(method.has_own_offset for method in given_methods(job))
+    return any(method.has_own_offset for method in given_methods(job))
 
 
 def _is_smooth(job):

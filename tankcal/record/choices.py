@@ -109,8 +109,6 @@ def _shell_choices(job, result):
 def _survey_choices(job, result):
     """Return the choices on the origin of the points and of their covariance."""
     choices = {"covariance": _covariance_choice(job) if result.adjustment is None else "adjusted"}
-    if job.clouds is not None:
-        choices = {"survey": "clouds", "covariance": "clouds"}
     for method in given_methods(job):
         choices = method.choices(result) if method.is_sighted else choices
     if result.straps is not None:

@@ -21,7 +21,6 @@ from tankcal.pipeline.corrections import Correction
 from tankcal.record import survey, table, tank_parts, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.choices import Choice, adjustment_choices, choices_of
-from tankcal.record.clouds import CloudsRecord, clouds_of
 from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.long_tables import LongTables
 from tankcal.record.schema import Saved, fill_from, key, to_plain
@@ -96,9 +95,6 @@ class Record(Saved, kw_only=True):
     lines: LinesRecord | None = key(
         "reference lines; left out if there are none", default=None, optional=True
     )
-    clouds: CloudsRecord | None = key(
-        "clouds of the wall; left out if there are none", default=None, optional=True
-    )
     surveys: dict = key(
         "saved part of each method", default_factory=dict, parts=saved_parts_of_methods
     )
@@ -165,7 +161,6 @@ def record_of(result):
             homogeneity=survey.homogeneity_record(job, result.wall),
             strapping=strapping_of(result),
             lines=lines_of(result),
-            clouds=clouds_of(result),
             ship=ship_of(result),
             surveys=surveys_of(result),
             courses=survey.courses_of(result),

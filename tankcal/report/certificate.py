@@ -120,8 +120,6 @@ def instruments_of(record):
     for method in methods():
         if record.get(method.name):
             used |= method.certificates(record[method.name])
-    for entry in (record.get("clouds") or {}).get("scanners", ()):
-        used[entry["scanner"]] = entry["certificate"]
     if strapping:
         used |= certificates_of_tapes(strapping["tapes"])
     return used

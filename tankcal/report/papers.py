@@ -16,7 +16,6 @@ _NOT_IN_ALL = (  # keys that some kinds of record, or records of earlier version
     "homogeneity",
     "strapping",
     "lines",
-    "clouds",
     "radii",
     "ship",
     "overrulings",

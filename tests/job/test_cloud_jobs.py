@@ -14,8 +14,8 @@ from written_clouds import some_wall, write_e57
 
 import tankcal
 from tankcal.errors import InputError
-from tankcal.job.contract.clouds import ASSUMED
 from tankcal.job.starter import write_input_workbook, write_starter
+from tankcal.methods.clouds.columns import ASSUMED
 
 
 def small(**given):

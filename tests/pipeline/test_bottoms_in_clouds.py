@@ -21,7 +21,7 @@ from tankcal.clouds.inside.bottom import find_bottom_in_cells
 from tankcal.clouds.inside.floor_cells import FloorCells, floor_grid
 from tankcal.clouds.wall.surfaces import CylinderSurface
 from tankcal.job.model.parts import Bottom
-from tankcal.pipeline.cloud_bottom import CloudInside, with_bottom
+from tankcal.methods.clouds.bottom import CloudInside, with_bottom
 from tankcal.record import record_of
 from tankcal.record.schema import check_data
 from tankcal.record.versions import RECORD

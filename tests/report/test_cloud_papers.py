@@ -10,8 +10,8 @@ from browser import Browser
 from paper_cells import paper_blocks
 
 import tankcal
+from tankcal.methods.clouds.saved import shared_part_of
 from tankcal.record import record_of
-from tankcal.record.clouds import shared_part_of
 from tankcal.report import clouds as drawn
 from tankcal.report import workbook
 from tankcal.report.paper import Paper

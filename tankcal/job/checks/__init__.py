@@ -6,7 +6,6 @@ values are missing or invalid, because these faults have already been reported.
 
 from tankcal.job.checking import has_rows, loads_sphere
 from tankcal.job.checks.bearing import useless_inputs
-from tankcal.job.checks.clouds import check_clouds
 from tankcal.job.checks.extent import (
     Extent,
     estimate_diameter_m,
@@ -68,7 +67,6 @@ def check_all(values, tables, registers, raw, is_whole, log):
         for method in methods_for(kind_of(raw)):
             method.check(values, tables, registers, raw, log)
         check_tiny_sds(tables, registers, raw, log)
-        check_clouds(values, tables, registers, raw, log)
     check_survey(values, tables, registers, raw, is_whole, log)
     if tables["overrulings"] is not None:
         check_overrulings(tables["overrulings"], tables, is_whole, log)
@@ -137,7 +135,7 @@ def _check_of_kind(values, tables, extent, kind, raw, log):
 def _is_measured(kind, tables, raw):
     """Whether a method for this kind has readings, or a table of readings that is unreadable."""
     return any(
-        method.is_given(tables) or raw.tables.get(method.tables[0], ()) is None
+        method.is_given(tables) or raw.tables.get(method.readings_table, ()) is None
         for method in methods_for(kind)
         if not method.is_supplement
     )

@@ -2,7 +2,6 @@
 
 from tankcal.job.checking import has_rows, loads_sphere
 from tankcal.job.checks.extent import (
-    has_clouds,
     has_inside_sizes,
     has_wall_points,
     is_strapped,
@@ -133,7 +132,6 @@ def _has_own_offset(tables):
     """Return True if no offset common to all radii affects the measurements of the wall."""
     return (
         any(method.has_own_offset and method.is_given(tables) for method in methods())
-        or has_clouds(tables)
         or (is_strapped(tables) and not has_wall_points(tables))
         or is_unsurveyed(tables)
     )

@@ -26,11 +26,6 @@ def tells_by_tape(tables):
     return is_strapped(tables) and any(use != "check" for use in tables["circumferences"].of("use"))
 
 
-def has_clouds(tables):
-    """Return True if the wall was scanned."""
-    return has_rows(tables.get("clouds"))
-
-
 def is_supplemented(tables):
     """Return True if readings supplement a survey or the drawing, such as metered liquid."""
     return any(method.is_supplement and method.is_given(tables) for method in methods())
@@ -69,13 +64,13 @@ def is_unsurveyed(tables):
 
 def is_sighted(tables):
     """Return True if sights without targets, or scans, determine the wall."""
-    return has_clouds(tables) or any(sights_given(tables))
+    return any(sights_given(tables))
 
 
 def sights_given(tables):
     """Return the names of the tables of sighting methods that have rows."""
     sighted = [method for method in methods() if method.is_sighted]
-    return [method.tables[0] for method in sighted if method.is_given(tables)]
+    return [method.readings_table for method in sighted if method.is_given(tables)]
 
 
 def may_be_seen_from_both_sides(tables):

@@ -6,7 +6,6 @@ of `docs/job-format.md` (`make job-format`) are generated from these lists.
 
 from tankcal.job.contract import (
     bottom,
-    clouds,
     correlations,
     courses,
     deadwood,
@@ -47,7 +46,7 @@ COLUMNS |= strapping.COLUMNS | lines.COLUMNS | stadia.COLUMNS
 for _method in methods():
     COLUMNS |= _method.columns()
     REGISTER_KEYS |= _method.register_fields()
-COLUMNS |= clouds.COLUMNS | SURVEY_COLUMNS | overrulings.COLUMNS
+COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
 _KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 for _method in methods():
@@ -60,7 +59,7 @@ SURVEYS = ADJUSTED_SURVEYS | {
     "wall-hits": (),  # filled in below, as for each survey of a method
     "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
     "tangents": (),
-    "cloud": (*clouds.COLUMNS, *clouds.BESIDE),
+    "cloud": (),
     "liquid": (),
     "radii": (),
 }

@@ -25,7 +25,6 @@ READINGS = tuple(name for name in OF_SURVEYS if name not in (*_WITHOUT_READINGS,
 _WALL_WITHOUT_NAMES = (
     "circumferences",
     "offsets",
-    "scan_targets",
 )
 MOST = 200  # largest number of decisions; more would replace the outlier test
 
@@ -158,7 +157,7 @@ def names_of_points(tables):
         is unreadable or the points result from an adjustment.
     """
     names = []
-    if has_rows(tables["clouds"]):
+    if any(method.has_means and method.is_given(tables) for method in methods()):
         return {}
     for name in ("points", "targets"):
         if has_rows(tables[name]):

@@ -2,7 +2,6 @@
 
 from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
-from tankcal.job.contract.clouds import CLOUD
 from tankcal.job.contract.lines import PLUMMET
 from tankcal.job.contract.ranging import RANGING
 from tankcal.job.contract.shorthand import FREE
@@ -266,7 +265,6 @@ SHORT_KEYS = {
 REGISTER_KEYS = {
     "cameras": CAMERA,
     "instruments": (*INSTRUMENT, *TAPE, *PLUMMET, *RANGING, *BAR),
-    "clouds": CLOUD,
 }
 REGISTERS_OF_SURVEY = {
     "photos": ("cameras", "instruments"),
@@ -274,7 +272,6 @@ REGISTERS_OF_SURVEY = {
     "strapping": ("instruments",),
     "reference-line": ("instruments",),
     "triangulation": ("instruments",),
-    "cloud": ("clouds", "instruments"),
 }
 # Keys of [adjustment] that require photographs.
 OF_PHOTOS = ("fixed_photo", "image_sd_um", "reading_limit_um", "depth_of_field", "image_weights")

@@ -32,7 +32,7 @@ from tankcal.survey.points import Points
 from tankcal.tank.rules.model import Rule
 
 if TYPE_CHECKING:
-    from tankcal.job.model.clouds import Clouds
+    from tankcal.methods.clouds.readings import Clouds
     from tankcal.methods.liquid.readings import Metering
     from tankcal.methods.radii.readings import Radii
     from tankcal.survey.measurements import Measurements

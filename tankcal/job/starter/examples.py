@@ -77,13 +77,6 @@ EXAMPLES_OF_KEYS = {
     "instruments.kind": "tape",
     "instruments.certified_temperature_c": 20.0,
     "instruments.u_scale_ppm": 15.0,
-    "clouds.file": "scans/inside.e57",
-    "clouds.unit": "m",
-    "clouds.pose": "file",
-    "clouds.u_offset_mm": 1.0,
-    "clouds.u_scale_ppm": 10.0,
-    "clouds.s_translation_mm": 0.0,
-    "clouds.s_rotation_arcsec": 8.0,
 }
 EXAMPLES_OF_TABLES = {
     "points": [
@@ -202,10 +195,6 @@ EXAMPLES_OF_TABLES = {
             "sy_mm": 2.0,
             "sz_mm": 1.0,
         }
-    ],
-    "scan_targets": [
-        {"scan": "A", "target": "T1", "x_m": 4.2153, "y_m": -1.0482, "z_m": 0.3127, "s_mm": 1.0},
-        {"scan": "A", "target": "T2", "x_m": -3.3318, "y_m": 2.7604, "z_m": 2.1145, "s_mm": 1.0},
     ],
     "check": [{"point": "C1", "x_m": 6.5, "y_m": 0.02, "z_m": 2.85}],
     "setups": [{"setup": "S1-1", "station": "S1", "instrument": "TS", "instrument_height_m": 1.55}],

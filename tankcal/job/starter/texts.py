@@ -88,7 +88,6 @@ TABLE_NOTES = {
     "lines": "one row for each vertical line of sight round the tank",
     "offsets": "one row for each reading of the wall's offset; repeated readings are repeated rows",
     "stadia": "one row for each reading of a stadia bar from a set-up; may stay empty",
-    "scan_targets": "one row for each target in each scan; may stay empty",
 }
 for _method in methods():
     SECTION_NOTES |= _method.section_notes()

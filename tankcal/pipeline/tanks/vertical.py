@@ -8,6 +8,7 @@ from tankcal.geometry.field.components import COMPONENTS, KINDS
 from tankcal.geometry.field.estimate import gauss_heights
 from tankcal.job.contract.bottom import OF_CLOUD
 from tankcal.job.plausibility import INSIDE, PLATES_TO_INSIDE
+from tankcal.methods.base import given_methods
 from tankcal.pipeline.tanks.common import (
     as_surveyed,
     deadwood_part,
@@ -362,9 +363,10 @@ def _declared(job):
 
 def _factors(job, wall, volume, features):
     """`Factor`s of the features of the shell: from readings, and from unseen form by kind."""
+    has_means = any(method.has_means for method in given_methods(job))
     return (
         *wall.factors(job, features.weights),
-        *_factors_of_unseen(wall, volume, features, _declared(job), scanned=bool(job.clouds)),
+        *_factors_of_unseen(wall, volume, features, _declared(job), scanned=has_means),
     )
 
 

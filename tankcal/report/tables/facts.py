@@ -23,22 +23,6 @@ def _method(paper, row):
     return method_line(paper.words, adjustment) if adjustment else None
 
 
-def _scanned(paper, row):
-    """Return a sentence on the point clouds with their numbers of points, or None."""
-    clouds = paper.record.get("clouds")
-    if not clouds:
-        return None
-    scans = clouds["scans"]
-    return paper.word(
-        "texts.cloud_method",
-        scans=len(scans),
-        files=len(clouds["files"]),
-        wall=sum(scan["of_wall"] for scan in scans),
-        read=sum(scan["delivered"] for scan in scans),
-        means=sum(scan["readings"] for scan in scans),
-    )
-
-
 def _volume(paper, row):
     return paper.plain(row["nominal_volume"], "m³")
 
@@ -141,7 +125,6 @@ SURVEY = Table(
     (
         Column("survey_method", text=_method, sheet=True),
         Column("radii_source", text=radii_source_text, sheet=True),
-        Column("scanned", text=_scanned, sheet=True),
         *(column for method in methods() for column in method.facts()),
         Column("survey_side", words="sides", sheet=True),
         Column("shell_temperature", "degC", digits=3, sheet=True,

@@ -150,11 +150,11 @@ _LARGEST = 32767  # largest deviation, in tenths of a millimetre
 
 def cloud_map_view(paper):
     """Block of the map, which only the web page shows."""
-    from tankcal.report.clouds import departures_mm, joints_m, limit_mm, of_turn  # matplotlib
+    from tankcal.report import clouds  # of the method; imports matplotlib
 
     record = paper.record
     wall_map = record["clouds"]["map"]
-    tenths = np.nan_to_num(10 * departures_mm(record), nan=HIDDEN).round()
+    tenths = np.nan_to_num(10 * clouds.departures_mm(record), nan=HIDDEN).round()
     return Block(
         {
             "kind": "cloud_map",
@@ -163,8 +163,8 @@ def cloud_map_view(paper):
             "tenths": pack_numbers(np.clip(tenths, HIDDEN, _LARGEST), "<i2"),
             "azimuth_deg": pack_numbers(wall_map["azimuth_edges_deg"], "<f4"),
             "height_m": pack_numbers(wall_map["height_edges_m"], "<f4"),
-            "joints_m": joints_m(record),
-            "limit_mm": limit_mm(record),
+            "joints_m": clouds.joints_m(record),
+            "limit_mm": clouds.limit_mm(record),
             "hidden": [
                 [
                     *interval,
@@ -173,7 +173,7 @@ def cloud_map_view(paper):
                     paper.word(f"obstructions.{obstruction['guess']}"),
                 ]
                 for obstruction in record["clouds"]["obstructions"]
-                for interval in of_turn(obstruction)
+                for interval in clouds.of_turn(obstruction)
             ],
         }
     )

@@ -7,7 +7,6 @@ from tankcal.methods.base import methods
 from tankcal.report.numbers import unit
 from tankcal.report.paper import DECIMALS_OF_PARTS
 from tankcal.report.tables import (
-    clouds,
     lines,
     ship,
     strapping,
@@ -37,13 +36,10 @@ class TablesSheet:
         Key of the record whose content the sheet requires.
     tables : tuple of Table, or callable
         Tables in order, or tables(record) that returns them.
-    omits_empty : bool
-        True: tables without rows are omitted; False: a text takes their place.
     """
 
     key: str
     tables: tuple | Callable
-    omits_empty: bool = False
 
 
 def _course_tables(record):
@@ -66,11 +62,10 @@ TABLES_SHEETS = {
     "courses": TablesSheet("courses", _course_tables),
     "strapping": TablesSheet("strapping", _strapping_tables),
     "lines": TablesSheet("lines", (lines.LEVELS, lines.PLUMMETS, lines.LINES, lines.OFFSETS)),
-    "clouds": TablesSheet("clouds", clouds.TABLES, omits_empty=True),
 }
 
 
-_BEFORE_METHODS = "clouds"  # the sheets of the methods follow this sheet
+_BEFORE_METHODS = "lines"  # the sheets of the methods follow this sheet
 
 
 def tables_sheets(book, record):
@@ -97,9 +92,7 @@ def _method_sheets(book, record, method):
 def _tables_sheet(book, record, code, declared):
     tables = declared.tables(record) if callable(declared.tables) else declared.tables
     sections = [
-        cell_table(book, table, title=book.word(f"headings.{table.name}"))
-        for table in tables
-        if not declared.omits_empty or table.rows(record)
+        cell_table(book, table, title=book.word(f"headings.{table.name}")) for table in tables
     ]
     write_sheet(book, SheetContent(code, sections, book.word(f"texts.{code}_subtitle")))
 

@@ -4,9 +4,9 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.pipeline.cloud_bottom import check_inside
-from tankcal.pipeline.cloud_overlaps import overlap_test, overlaps_of, scans_apart
-from tankcal.pipeline.cloud_wall import FILE, TARGETS
+from tankcal.methods.clouds.bottom import check_inside
+from tankcal.methods.clouds.overlaps import overlap_test, overlaps_of, scans_apart
+from tankcal.methods.clouds.wall import FILE, TARGETS
 from tankcal.pipeline.ranging_checks import causes_unlike_certificates
 
 HIDDEN = 0.25  # largest share of hidden cells of a course: their form is only interpolated

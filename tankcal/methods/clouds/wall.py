@@ -8,16 +8,16 @@ import numpy as np
 from tankcal.clouds import wall as cells_of_clouds
 from tankcal.clouds.wall.growing import EMPTY, FEW, FEWEST
 from tankcal.errors import InputError, Problem, SolutionError
-from tankcal.job.checks.clouds import offset_untold
 from tankcal.job.model import InputFile
 from tankcal.job.tables import unreadable_file
 from tankcal.messages import message
+from tankcal.methods.clouds.bottom import CloudInside, find_inside, with_bottom
+from tankcal.methods.clouds.checks import offset_untold
+from tankcal.methods.clouds.overlaps import normals_of, overlaps_of, scans_apart
+from tankcal.methods.clouds.units import is_unit_defined, refusal_of_units
 from tankcal.pipeline.cause_correlations import told_causes
-from tankcal.pipeline.cloud_bottom import CloudInside, find_inside, with_bottom
-from tankcal.pipeline.cloud_cluster import open_passes
-from tankcal.pipeline.cloud_overlaps import normals_of, overlaps_of, scans_apart
-from tankcal.pipeline.cloud_passes import Placing, Reading, Telling
-from tankcal.pipeline.cloud_units import is_unit_defined, refusal_of_units
+from tankcal.pipeline.clouds.cluster import open_passes
+from tankcal.pipeline.clouds.passes import Placing, Reading, Telling
 from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.scan import fit_scan
 from tankcal.pipeline.sighted_points import through_wall

@@ -147,3 +147,18 @@ BESIDE = (  # tables that connect scans or determine an offset
     *("setups", "control", "directions", "zenith_angles", "slope_distances"),
     "circumferences",
 )
+SETTING_EXAMPLES = {
+    "clouds.file": "scans/inside.e57",
+    "clouds.unit": "m",
+    "clouds.pose": "file",
+    "clouds.u_offset_mm": 1.0,
+    "clouds.u_scale_ppm": 10.0,
+    "clouds.s_translation_mm": 0.0,
+    "clouds.s_rotation_arcsec": 8.0,
+}
+EXAMPLES = {
+    "scan_targets": [
+        {"scan": "A", "target": "T1", "x_m": 4.2153, "y_m": -1.0482, "z_m": 0.3127, "s_mm": 1.0},
+        {"scan": "A", "target": "T2", "x_m": -3.3318, "y_m": 2.7604, "z_m": 2.1145, "s_mm": 1.0},
+    ],
+}

@@ -1,7 +1,7 @@
 """Passes over the files of the clouds of a job: points in the frame of the tank, and their counts.
 
 A `Share` is the part of a file that is read in one go. This module reads all shares one after the
-other; `cloud_cluster` reads them by workers. The sums agree to the last bit.
+other; `clouds.cluster` reads them by workers. The sums agree to the last bit.
 """
 
 import time
@@ -52,7 +52,7 @@ class Placing:
 
     Attributes
     ----------
-    files : tuple of job.model.clouds.CloudFile
+    files : tuple of methods.clouds.readings.CloudFile
     scans : tuple of ScanSetup
     ranging : dict of str to RangingInstrument
         Instruments by name.

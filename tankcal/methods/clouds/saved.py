@@ -204,13 +204,11 @@ class CloudsRecord(Saved):
     )
 
 
-def clouds_of(result):
-    """`CloudsRecord` of a result; None if the wall was not scanned."""
-    clouded, clouds = result.clouded, result.job.clouds
-    if clouded is None:
-        return None
-    from tankcal.pipeline.cloud_overlaps import overlaps_of
+def save_clouds(result):
+    """`CloudsRecord` of a result."""
+    from tankcal.methods.clouds.overlaps import overlaps_of
 
+    clouded, clouds = result.clouded, result.job.clouds
     cells, registration = clouded.cells, clouded.registration
     zero_m = _zero_m(result)
     certificates = {name: tool.certificate for name, tool in clouds.ranging.items()}
@@ -433,7 +431,7 @@ def _inside(result, zero_m):
 
 def _things(inside, declared_names, zero_m):
     """`ThingSeen` of each proposed row of deadwood.csv."""
-    from tankcal.pipeline.cloud_bottom import deadwood_rows
+    from tankcal.methods.clouds.bottom import deadwood_rows
 
     return [
         ThingSeen(

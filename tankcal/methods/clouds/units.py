@@ -7,8 +7,8 @@ import numpy as np
 from tankcal.clouds.wall.passes import PointSample
 from tankcal.clouds.wall.start import has_wall
 from tankcal.errors import InputError, Problem
-from tankcal.job.contract.clouds import UNITS_M
 from tankcal.messages import message
+from tankcal.methods.clouds.columns import UNITS_M
 
 FILE = "clouds.toml"
 SAMPLE, MOST_CHUNKS = 60_000, 8  # largest numbers of points and of chunks examined per file

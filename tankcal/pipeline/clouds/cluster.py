@@ -17,7 +17,7 @@ from tankcal.clouds.wall.cells import WallCells
 from tankcal.clouds.wall.passes import sample_points, sum_cells
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
-from tankcal.pipeline.cloud_passes import JobPasses, Tally
+from tankcal.pipeline.clouds.passes import JobPasses, Tally
 from tankcal.pipeline.cluster import Watch, count_cores, failures_told, is_installed, open_client
 
 # Fewest points and cores for which local workers are faster: docs/clouds.md.

@@ -6,8 +6,8 @@ import matplotlib
 import numpy as np
 from matplotlib.patches import Rectangle
 
+from tankcal.methods.clouds import tables
 from tankcal.pipeline.plot_style import GREY, WIDTH, Drawing, styled
-from tankcal.report.tables import clouds as tables
 
 FULL_COLOUR = 98  # percentile of absolute deviations that has the last colour
 LEAST_LIMIT_MM = 0.5  # smallest deviation of the last colour

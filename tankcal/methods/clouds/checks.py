@@ -4,9 +4,13 @@ import numpy as np
 
 from tankcal.errors import InputError
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, name_twice, tell
-from tankcal.job.checks.extent import has_clouds, has_survey, sights_given, tells_by_tape
+from tankcal.job.checks.extent import has_survey, sights_given, tells_by_tape
 from tankcal.job.contract.bottom import OF_CLOUD
-from tankcal.job.contract.clouds import (
+from tankcal.job.contract.shorthand import FREE
+from tankcal.job.entries import kind_of
+from tankcal.job.tables import unreadable_file
+from tankcal.messages import message
+from tankcal.methods.clouds.columns import (
     DOCUMENTED,
     OF_FILE,
     OF_SCANNER,
@@ -14,10 +18,6 @@ from tankcal.job.contract.clouds import (
     REGISTRATION,
     UNITS_M,
 )
-from tankcal.job.contract.shorthand import FREE
-from tankcal.job.entries import kind_of
-from tankcal.job.tables import unreadable_file
-from tankcal.messages import message
 
 FEWEST_TARGETS = 3  # smallest number of targets that determine the pose of a scan
 RIGID = 1e-4  # largest deviation of a pose from a rotation, due to rounding
@@ -29,7 +29,7 @@ def check_clouds(values, tables, registers, raw, log):
     given, targets = registers.get("clouds", {}), tables["scan_targets"]
     if values is not None and kind_of(raw) == "vertical":
         _check_bottom(values, given, tables, raw, log)
-    if not has_clouds(tables):
+    if not has_rows(tables["clouds"]):
         if has_rows(targets):
             log.warning(targets.file, message("no_clouds", "without effect: the job has no cloud"))
         return
@@ -60,7 +60,7 @@ def _check_bottom(values, given, tables, raw, log):
     if values["bottom"]["form"] != OF_CLOUD:
         return
     sides = {keys["side"] or values["survey"]["side"] or "inside" for keys in given.values()}
-    if not has_clouds(tables) or "inside" not in sides:
+    if not has_rows(tables["clouds"]) or "inside" not in sides:
         text = message(
             "bottom_without_cloud",
             "found cloud; expected a scan from inside in clouds.toml, or another form: scans from"
@@ -89,7 +89,7 @@ def _teller(raw, file, name, log):
 
 def _refuse_beside(tables, log):
     beside = {"points": has_rows(tables["points"]), "targets": has_rows(tables["targets"])}
-    beside |= dict.fromkeys(sights_given(tables), True)
+    beside |= {name: name != "clouds" for name in sights_given(tables)}
     for name, is_there in beside.items():
         if is_there:
             expected = message(
