@@ -56,6 +56,7 @@ _US = re.compile("us|american|americanos?|americanas?|estadounidenses?")
 _IMPERIAL = re.compile("uk|imp|imperial|imperiais|imperiales|british|britanicos?|ingles|ingleses|"
                        "english|canadian|canadenses?|canadienses?")  # fmt: skip
 _DRY = re.compile("dry|secos?")
+_OF_DRINKS = re.compile("beer|ale|wine|spirits?|whisk[e]?y|cerveja|cerveza|vinho|vino")
 _FOREIGN = (
     (
         re.compile(
@@ -119,6 +120,9 @@ _SUBSTITUTIONS = tuple(
     (re.compile(pattern, re.ASCII), into)
     for pattern, into in (
         (r"_", " , "),
+        (r"\b([hkdcm])\. ?([mlg])\b(?!\.?[a-z])", r"\1\2"),  # c.m.
+        (r"(?<![\d.,])(?<!\d )['’]?000(?:['’]?s)?(?![\d.,])", " 1000 "),  # '000 L, 000's L
+        (r"(?<=\d)['’]s\b", " "),  # 100's L
         (r"\busa?\b|\bu\.s\.?(?:a\.?)?|\beua\b|\be\.u\.a\.?|\bee\.? ?uu\.?", " us "),
         (r"\bu\.k\.?", " uk "),
         (r"″|”|\"|''|′′|’’", " in "),
@@ -151,14 +155,15 @@ _SUBSTITUTIONS = tuple(
         (r"\b(?:1/)?(8|16|32|64)[ -]?(?:ths?|nds?|avos?)\b", r" 1/\1 "),
         (r"\b(?:eighths?|oitavos?|octavos?)\b", " 1/8 "),
         (r"\b(?:sixteenths?|dezesseis ?avos?|dieciseis ?avos?)\b", " 1/16 "),
-        (r"\b(?:quarters?)\b", " 1/4 "),
+        (r"\b(?:quarters?)\b|\b[cq]uartos? de (?=pol|pulg|plg)", " 1/4 "),
+        (r"\b(?:half|halves)\b|\b(?:meia|media) (?=pol|pulg|plg)", " 1/2 "),
         (r"\b(?:tenths?|decimos?|decimas?)\b", " 1/10 "),
         (r"\b(?:hundredths?|centesimos?|centesimas?)\b", " 1/100 "),
         (r"\b(?:thousandths?|milesimos?|milesimas?)\b", " 1/1000 "),
     )
 )  # fmt: skip
 _TOKEN = re.compile(
-    r"\d+/\d+|\d+(?:[.,]\d+)*(?:\^\d+)?|°?[a-z]+[23]?|[%‰°]|[()\[\]{},;:/×*·=-]", re.ASCII
+    r"[0-9]+/[0-9]+|[0-9]+(?:[.,][0-9]+)*(?:\^[0-9]+)?|°?[^\W\d_]+[23]?|[%‰°]|[()\[\]{},;:/×*·=-]"
 )
 _POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")
 
@@ -331,7 +336,8 @@ def _unit_without_size(tokens, dimension, text):
         before, after = _neighbours(tokens, k)
         is_bare = before in _OPENS and after in _CLOSES and value and value >= _LEAST_BARE_FACTOR
         is_power = is_bare and float(log10(value)).is_integer()
-        if value and (before in _TIMES or is_power):
+        is_part = "/" in token and before in _OPENS and after in _CLOSES  # (16ths)
+        if value and (before in _TIMES or is_power or is_part):
             return Unit(complaint=_unclear_factor(token))
     return NO_UNIT
 
@@ -393,9 +399,13 @@ def _factor(tokens, places):
             continue
         before, after = _neighbours(tokens, k)
         ahead = k + 1
-        while ahead < len(tokens) and (
-            tokens[ahead] in _TIMES | _BETWEEN
-            or any(pattern.fullmatch(tokens[ahead]) for pattern in (_US, _IMPERIAL))
+        while (
+            ahead < len(tokens)
+            and ahead not in places
+            and (
+                tokens[ahead] in _TIMES | _BETWEEN
+                or any(pattern.fullmatch(tokens[ahead]) for pattern in (_US, _IMPERIAL))
+            )
         ):
             ahead += 1
         signs = {before, *tokens[k + 1 : ahead]} & _TIMES
@@ -441,7 +451,8 @@ def _countries(tokens, names):
         any(pattern.fullmatch(token) for token in tokens) for pattern in (_US, _IMPERIAL, _DRY)
     )
     gallons = [name for name in names if _GALLON.fullmatch(name)]
-    is_odd = is_imperial and any(_BARREL.fullmatch(name) for name in names)
+    is_of_drinks = any(_OF_DRINKS.fullmatch(token) for token in tokens)
+    is_odd = (is_imperial or is_of_drinks) and any(_BARREL.fullmatch(name) for name in names)
     if is_odd or (gallons and (is_dry or (is_us and is_imperial))):
         return (), _unusable(" ".join(names), _UNCLEAR, VOLUME)
     if not gallons:

@@ -84,6 +84,9 @@ def assert_refused(folder, text, *words):
         ("miles de litros", 1),
         ("Thousands of US gallons", 1000 * US_GALLON),
         ("Volume (x 0.1 m3)", 100 * LITRE),
+        ("Volume (100's L)", 100 * LITRE),
+        ("Volume ('000 L)", 1),
+        ("Volume, 000’s L", 1),
         ("V/L", LITRE),
         ("GOV at 15 °C (L)", LITRE),
         ("Volume (net), bbl at 60F", BARREL),
@@ -126,6 +129,12 @@ def test_volumes_of_every_unit_are_exact(heading, size, tmp_path):
         ("dieciseisavos de pulgada", INCH_M / 16),
         ("Height (10 cm)", 0.1),
         ("Height (x 5 mm)", 0.005),
+        ("Dip (x 0.1 in)", INCH_M / 10),
+        ("Dip (half inch)", INCH_M / 2),
+        ("Nível (meia polegada)", INCH_M / 2),
+        ("Sonda (cuartos de pulgada)", INCH_M / 4),
+        ("Dip (c.m.)", 0.01),
+        ("Dip M.M.", 0.001),
     ],
 )
 def test_heights_of_every_unit_are_exact(heading, size, tmp_path):
@@ -161,6 +170,8 @@ def test_heights_of_every_unit_are_exact(heading, size, tmp_path):
         ("Volume (Mbbl)", "Mbbl", "several meanings"),
         ("Volume (MCF)", "MCF", "several meanings"),
         ("Imperial barrels", "barrels", "several meanings"),
+        ("Volume (beer barrels)", "barrels", "several meanings"),
+        ("Volume (μL)", "μL", "not a unit that is read"),
         ("Volume (kg/L)", "kg/l", "not a unit that is read"),
         ("Volume (L) or gal", "l gal", "two units"),
         ("Volume (cm)", "cm", "a length"),
@@ -173,7 +184,9 @@ def test_units_of_no_volume_are_refused_by_name(heading, unit, kind, tmp_path):
     assert_refused(tmp_path, text, "table.csv, row 1", f"the unit {unit}, ", kind, "m3, L, hL")
 
 
-@pytest.mark.parametrize("heading", ["Level (mV)", "Level (%)", "Nível, kPa", "Level (V)"])
+@pytest.mark.parametrize(
+    "heading", ["Level (mV)", "Level (%)", "Nível, kPa", "Level (V)", "Dip (µm)"]
+)
 def test_units_of_no_height_are_refused_by_name(heading, tmp_path):
     text = columns(f"{heading};Volume (L)", range(101), volumes(CM, decimals=2), separator=";")
     assert_refused(tmp_path, text, "row 1", "found the unit", "m, dm, cm, mm, in, ft")
@@ -196,6 +209,27 @@ def test_a_factor_that_may_be_the_rounding_is_refused(heading, decimals, digits,
     assert_refused(tmp_path, columns(heading, labels, cells), "factor", found, "rounding")
     explicit = heading.replace("(10 L)", "(x 10 L)").replace("(1/4 in)", "(in)")
     assert lint(write(tmp_path, columns(explicit, labels, cells))).errors == 0
+
+
+@pytest.mark.parametrize(
+    ("heading", "size"),
+    [
+        ("Dip (0.1 in)", INCH_M / 10),
+        ("Dip (0.01 in)", INCH_M / 100),
+        ("Volume (100's L)", 100 * LITRE),
+        ("Volume ('000 L)", 1),
+        ("Dip (half inch)", INCH_M / 2),
+        ("Dip (c.m.)", 0.01),
+    ],
+)
+def test_factors_of_headings(heading, size):
+    """The factor before "in" is not dropped, as it was with "in" taken for a preposition."""
+    assert heading_of(heading).unit == pytest.approx(size, rel=1e-12)
+
+
+@pytest.mark.parametrize("heading", ["Dip (16ths)", "Dip (0.3 in)", "Dip (15 in)"])
+def test_factors_of_headings_that_are_refused(heading):
+    assert "perhaps a factor" in str(heading_of(heading).named.complaint)
 
 
 def test_units_in_a_row_of_their_own(tmp_path):
