@@ -77,6 +77,8 @@ def reason_of(error):
         return message("not_utf8", "not UTF-8 text: byte {at}", at=error.start + 1)
     if isinstance(error, RecursionError):
         return message("nested_too_deeply", "nested too deeply")
+    if isinstance(error, ValueError) and "int_max_str_digits" in str(error):
+        return message("number_too_long", "a number with too many digits")
     if isinstance(error, OSError):
         return (
             _SYSTEM_MESSAGES.get(error.errno)

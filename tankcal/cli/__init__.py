@@ -234,6 +234,8 @@ def translate_parser(parser, known):
     for action in parser._actions:
         if isinstance(action.metavar, str):
             action.metavar = known["metavars"].get(action.metavar, action.metavar)
+        elif isinstance(action.metavar, tuple):
+            action.metavar = tuple(known["metavars"].get(name, name) for name in action.metavar)
         if isinstance(action, argparse._SubParsersAction):
             _put_in_list(action, known)
             for command_parser in action.choices.values():

@@ -91,10 +91,13 @@ def _compare(kinds):
         "--terrain", metavar="I|II|LOW,RANGE", help="for spr: heights in m (default: I)"
     )
     parser.add_argument(
-        "--pixel-um", type=parse_positive, help="for film: pixel size for differences in pixels"
+        "--pixel-um",
+        metavar="UM",
+        type=parse_positive,
+        help="for film: pixel size for differences in pixels",
     )
     parser.add_argument(
-        "--seed", type=parse_count, default=1, help="seed of the terrain (default 1)"
+        "--seed", metavar="N", type=parse_count, default=1, help="seed of the terrain (default 1)"
     )
     parser.add_argument(
         "--threshold",
@@ -126,6 +129,7 @@ def _influence(kinds):
     )
     parser.add_argument(
         "--states",
+        metavar="STATES",
         type=_states,
         default=("fixed", "weighted", "free"),
         help="one or more of fixed,weighted,free (default: all)",
@@ -192,6 +196,7 @@ def _convert(kinds):
     )
     parser.add_argument(
         "--pixel-um",
+        metavar="UM",
         type=parse_positive,
         help="height of a pixel, if the file does not contain it and a form in pixels is read or "
         "written",
@@ -205,11 +210,12 @@ def _convert(kinds):
     )
     parser.add_argument(
         "--radius-mm",
+        metavar="MM",
         type=parse_positive,
         default=0.0,
         help="R0 of the balanced form aicon (default 0)",
     )
-    parser.add_argument("--name", help="this camera of the file only")
+    parser.add_argument("--name", metavar="NAME", help="this camera of the file only")
     parser.add_argument(
         "--as",
         dest="form",
@@ -241,6 +247,7 @@ def _read(kinds):
     )
     parser.add_argument(
         "--dictionary",
+        metavar="DICTIONARY",
         default="DICT_5X5_100",
         help="dictionary of the codes (default: DICT_5X5_100)",
     )
@@ -260,6 +267,7 @@ def _read(kinds):
         )
     parser.add_argument(
         "--bit-errors",
+        metavar="N",
         type=parse_count,
         default=0,
         help="largest number of wrong cells in a code (default 0)",

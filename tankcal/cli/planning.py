@@ -70,7 +70,11 @@ def add(commands):
         "0.01 (default: none)",
     )
     plan.add_argument(
-        "--seed", type=parse_count, default=1, help="seed of the simulation (default 1)"
+        "--seed",
+        metavar="N",
+        type=parse_count,
+        default=1,
+        help="seed of the simulation (default 1)",
     )
     add_language(plan)
     plan.add_argument("--quiet", action="store_true", help="no progress, only problems")

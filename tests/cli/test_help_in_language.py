@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from tankcal.cli import _parser, main, translate_parser
@@ -72,6 +73,37 @@ def test_no_english_is_left_in_any_help(language):
     ]
     assert len(texts) > 80
     assert [text for text in texts if ENGLISH.search(text)] == []
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_names_of_values_are_translated(language):
+    """Symbols of units and counts are the same in all languages; words are not."""
+    speak("en")
+    parser = _parser()
+    translate_parser(parser, load_words(language))
+    symbols = {
+        "N",
+        "S",
+        "K",
+        "M",
+        "M3",
+        "MM",
+        "UM",
+        "PX",
+        "GB",
+        "GPA",
+        "MPA",
+        "ARCSEC",
+        "HEX",
+        "ID",
+    }
+    symbols |= {"ALPHA", "I|II|LOW,RANGE", "COLUMNSxROWS,START,START,STEP"}
+    names = set()
+    for one in parsers_of(parser):
+        for action in one._actions:
+            if action.nargs != 0 and action.choices is None:
+                names |= set(np.atleast_1d(action.metavar or action.dest.upper()))
+    assert names - symbols <= set(load_words(language)["help"]["metavars"].values())
 
 
 @pytest.mark.slow(after=1)

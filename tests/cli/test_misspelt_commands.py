@@ -1,6 +1,7 @@
 """Slips on the command line: misspelt commands, results in place of a job, missing files."""
 
 import errno
+import json
 import os
 
 import pytest
@@ -52,6 +53,16 @@ def test_errors_of_the_system_are_told_in_the_language(number, language):
     assert str(reason) == os.strerror(number)
     speak(language)
     assert say_in_language(reason) not in ("", os.strerror(number))
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_a_number_of_too_many_digits_is_told_in_the_language(language):
+    with pytest.raises(ValueError, match="digits") as error:
+        json.loads("9" * 5000)
+    reason = reason_of(error.value)
+    assert str(reason) == "a number with too many digits"
+    speak(language)
+    assert "digits" not in say_in_language(reason)
 
 
 @pytest.mark.parametrize("language", OTHERS)
