@@ -5,7 +5,6 @@ Truth: the same points in a file without the particularity.
 
 import io
 import struct
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from written_clouds import some_wall, write_e57, write_las
 from tankcal.clouds import describe_cloud, pieces_of, read_cloud
 from tankcal.errors import InputError
 
-CASES = Path("/work/shared/cases")
 TITLES = "//X{0}Y{0}Z{0}Rf{0}Intensity"
 
 

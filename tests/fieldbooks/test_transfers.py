@@ -4,7 +4,6 @@ Truth: the same survey written without the additions gives the same tables, to t
 """
 
 import re
-from pathlib import Path
 
 import pytest
 from simulated_fieldbooks import one_stand
@@ -13,7 +12,6 @@ from written_fieldbooks import PROFILE, WRITERS
 from tankcal.errors import InputError
 from tankcal.fieldbooks import Choices, import_fieldbooks
 
-CASES = Path("/work/shared/cases")
 TRANSFERS = {
     "STX in the first line": lambda data: b"\x02\r\n" + data,
     "STX and ETX around the file": lambda data: b"\x02" + data + b"\x03",
@@ -145,10 +143,11 @@ def test_a_format_that_is_not_read_is_named(tmp_path, name):
 @pytest.mark.parametrize("case", ["gsi-stx-etx/book.gsi", "sdr-stx-first-line/book.sdr",
                                   "gsi-dashes-for-no-height/book.gsi",
                                   "gsi-dashes-station-height/book.gsi"])  # fmt: skip
-def test_cases_from_outside(tmp_path, case):
-    if not (CASES / case).exists():
+def test_cases_from_outside(tmp_path, case, shared):
+    path = shared / "cases" / case
+    if not path.exists():
         pytest.skip("the cases from outside are not here")
-    tables, _ = read(tmp_path / "case", (CASES / case).read_bytes(), case[-3:], hits=("W*",))
+    tables, _ = read(tmp_path / "case", path.read_bytes(), case[-3:], hits=("W*",))
     assert tables["wall_hits.csv"].count(b"\n") == 7
     control = tables["control.csv"].decode().split()
     xy = "200.000,100.000" if "sdr" in case else "100.000,200.000"
