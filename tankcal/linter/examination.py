@@ -127,13 +127,21 @@ def most_suspicious(rows):
         return None
     size = np.abs(difference[screened])
     candidates = np.flatnonzero((size > allowed[screened]) & ~rows.is_settled[screened])
-    around = [size[max(k - ROUGHNESS_ROWS, 0) : k + ROUGHNESS_ROWS + 1] for k in candidates]
-    roughness = np.array([ROUGHNESS_FACTOR * np.median(sizes) for sizes in around])
-    candidates = candidates[size[candidates] > roughness] if len(candidates) else candidates
+    # Among rows of exact heights, a row of rounded height has a small weight. Its weighted
+    # difference is below the roughness of the others, so that in quanta is compared as well.
+    is_rough = [_is_rough(size, k) and _is_rough(size / rows.weight[screened], k)
+                for k in candidates]  # fmt: skip
+    candidates = candidates[~np.array(is_rough, dtype=bool)]
     if len(candidates) == 0:
         return None
     excess = size[candidates] / allowed[screened][candidates]
     return int(screened[candidates[np.argmax(excess)]])
+
+
+def _is_rough(size, k):
+    """Whether the difference of row k is usual among the rows around it."""
+    around = size[max(k - ROUGHNESS_ROWS, 0) : k + ROUGHNESS_ROWS + 1]
+    return size[k] <= ROUGHNESS_FACTOR * np.median(around)
 
 
 MOST_ROUNDS = 150

@@ -47,7 +47,7 @@ _FEW_SPLIT_ROWS = 5
 _FEWEST_MULTIPLES = 3  # fewest volumes that show whether a factor is the rounding
 _WHOLE = 1e-9
 _TOTAL = re.compile("(?:(?:grand|sub)[ -]?)?tota(?:ls?|is|les)|sum(?:a|as|me)?|soma|average|mean|"
-                    "media|promedio|maximum|maximo|end|fim|fin")  # fmt: skip
+                    "media|promedio|max|maximum|maxim[oa]|nominal|end|fim|fin")  # fmt: skip
 _LINES_OF_HEADING = 3  # largest number of heading lines above the steps of a wide table
 _LONGEST_UNIT = 24  # largest number of letters of a cell in a row of units
 
@@ -279,7 +279,7 @@ def _is_total(cells, pair):
     if pair.height < len(cells) and has_digit(cells[pair.height]):
         return False
     words = (re.findall("[a-z-]+", plain_text(cell)) for cell in cells if isinstance(cell, str))
-    return any(bool(word) and _TOTAL.fullmatch(word[0]) is not None for word in words)
+    return any(_TOTAL.fullmatch(word) for label in words for word in label)
 
 
 def _refuse_split_rows(grid, block):

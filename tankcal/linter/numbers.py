@@ -312,7 +312,7 @@ def _spell_fractions(text):
     def figures(match):
         return f"{match[1]} " * bool(match[1]) + normalize("NFKD", match[2]).replace("\u2044", "/")
 
-    return _VULGAR.sub(figures, text.strip())
+    return _VULGAR.sub(figures, text.strip()).replace("\u2044", "/")
 
 
 def _guess_unit_of_parts(name, in_parts, rows, log):

@@ -302,11 +302,15 @@ def find_unnamed_columns(name, block_rows, pairs, heading_row, heading_cells):
 
 
 def title_unit(above):
-    """Return the `Unit` of volumes in a title above the heading ("volumes in litres")."""
+    """Return the `Unit` of volumes in a title above the heading ("volumes in litres", "US gal")."""
     for line in above[::-1]:
         for cell in line:
             if not isinstance(cell, str):
                 continue
+            title = heading_of(cell)
+            is_alone = sum(bool(other) for other in line) == 1
+            if is_alone and title.role == "volume" and title.named.is_named:
+                return title.named
             tokens = tokens_of(cell)
             for k, token in enumerate(tokens[:-1]):
                 if token in ("in", "em", "en") and heading_of(cell).role == "volume":

@@ -41,9 +41,9 @@ def assert_quarters(folder, heading, labels, separator=","):
 
 
 @pytest.mark.slow(after=1)
-@pytest.mark.parametrize("form", ["{} {}/4", "{}-{}/4", "{}{}", "{} {}"])
+@pytest.mark.parametrize("form", ["{} {}/4", "{} {}\u20444", "{}-{}/4", "{}{}", "{} {}"])
 def test_inches_with_fractions(form, tmp_path):
-    part = (lambda n: n) if "/" in form else VULGAR.get
+    part = (lambda n: n) if "4" in form else VULGAR.get
     labels = [form.format(k // 4, part(k % 4)) if k % 4 else str(k // 4) for k in range(161)]
     assert_quarters(tmp_path, "Dip (in),US gallons", labels)
     assert_quarters(tmp_path, "Medição (1/4 pol),galões (EUA)", labels)
@@ -247,8 +247,10 @@ def test_columns_of_parts_are_named_and_left_out(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "footer", ["Total,12566.37", "TOTAL GERAL,12566.37", "Sum:,633345", "Suma,633345", "Soma,9"]
-)
+    "footer",
+    ["Total,12566.37", "TOTAL GERAL,12566.37", "Sum:,633345", "Suma,633345", "Soma,9",
+     "Capacidade total,12566.37", "Capacidad máxima,12566", "Max.,12566.37", "Nominal,12500"],
+)  # fmt: skip
 def test_a_total_row_is_no_row_of_the_table(footer, tmp_path):
     heights = [k / 100 for k in range(101)]
     text = columns("Height (cm),Volume (L)", range(101), volumes(heights, 0.001, 2))
@@ -268,7 +270,32 @@ def test_summaries_of_several_columns_of_volumes_name_them(tmp_path):
     assert net.startswith("table.csv, Net volume (L): 101 rows")
 
 
+@pytest.mark.parametrize(
+    ("title", "unit"), [("Barrels", BARREL), ("US gallons", US_GALLON), ("Litros", 0.001)]
+)
+def test_a_title_that_is_a_unit_holds_for_a_wide_table(title, unit, tmp_path):
+    """Barrels in the title were taken as cubic metres."""
+    cells = [[f"{2 * r + k / 6:.3f}" for r in range(7)] for k in range(12)]
+    text = columns("Feet," + ",".join(map(str, range(12))), range(7), *cells)
+    report = lint(write(tmp_path, f"{title}\n{text}"))
+    assert "no unit" not in str(report.findings)
+    total = float(report.summaries[0].split("total ")[1].split()[0])
+    assert total == pytest.approx((12 + 11 / 6) * float(unit), rel=1e-4)
+
+
 # the last row
+
+
+@pytest.mark.parametrize("share", [0.5, 1.2, 1.5])
+def test_a_share_too_much_in_a_last_row_at_a_part_of_a_step(share, tmp_path):
+    """3 cm after steps of 10 cm: 0.5 cm of rounding is 17 % of the last interval, not 20 %."""
+    labels = [*range(0, 101, 10), 103]
+    cells = volumes([k / 100 for k in labels], 0.001, 2)
+    true = columns("Height (cm),Volume (L)", labels, cells)
+    assert lint(write(tmp_path, true)).findings == ()
+    cells[-1] = f"{1000 * AREA_M2 * (1 + 0.03 * share):.2f}"
+    (finding,) = lint(write(tmp_path, columns("Height (cm),Volume (L)", labels, cells))).findings
+    assert f"row 13, Volume (L): error: found {cells[-1]}; expected about 12943.36" in str(finding)
 
 
 @pytest.mark.slow(after=4)
