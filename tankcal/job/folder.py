@@ -76,6 +76,8 @@ _TOML_REASONS = {  # {beginning of a message of tomllib: reason for the user}
 _DECIMAL_COMMA = re.compile(
     r"(\s*[\w.\"'-]+\s*=\s*[+-]?\d+),(\d+(?:[eE][+-]?\d+)?)\s*(?:#.*)?", re.DOTALL
 )
+_BARE_TEXT = re.compile(r"(\s*[\w.\"'-]+\s*=\s*)([^\s\"'\[\]{}#\\][^\"'\[\]{}#\\]*?)\s*(?:#.*)?")
+_DATE_OF_DAYS = re.compile(r"(\d{1,2})[/.-](\d{1,2})[/.-](\d{4})")
 
 
 def read_folder(folder, log, edited=None):
@@ -348,8 +350,8 @@ def parsed_toml(file, data, log):
 def _content(file, text, log):
     """Parse a TOML text; None if unreadable.
 
-    A decimal comma is reported and read as a point, so that the remaining text is checked in the
-    same run.
+    A decimal comma is reported and read as a point, and a text without quotation marks as a text.
+    The remaining text is so checked in the same run.
     """
     lines = split_lines(text)  # tomllib does not accept a lone carriage return as line end
     for _ in range(MAX_PROBLEMS_PER_FILE):
@@ -358,6 +360,15 @@ def _content(file, text, log):
         except (ValueError, RecursionError) as error:
             row = _row_of(error)
             number = _DECIMAL_COMMA.fullmatch(lines[row - 1]) if row else None
+            is_bare = number is None and str(error).startswith(
+                ("Invalid value", "Expected newline")
+            )
+            bare = _BARE_TEXT.fullmatch(lines[row - 1]) if row and is_bare else None
+            if bare is not None and number is None:
+                log.problem(file, _bare_value(bare[2]), row)
+                date = _DATE_OF_DAYS.fullmatch(bare[2])
+                lines[row - 1] = bare[1] + ("2000-01-01" if date else f'"{bare[2]}"')
+                continue
             if number is None:
                 reason = _reason(error)
                 expected = message(
@@ -376,6 +387,19 @@ def _content(file, text, log):
             log.problem(file, expected, row)
             lines[row - 1] = f"{number[1]}.{number[2]}"
     return None
+
+
+def _bare_value(text):
+    """Message about a value that is neither number nor date and has no quotation marks."""
+    if _DATE_OF_DAYS.fullmatch(text):
+        return message("date_in_toml", "found {found}; expected a date as year-month-day, such as "
+                       "2024-05-31", found=text)  # fmt: skip
+    if text[0].isdigit():
+        return message("number_in_toml", "found {found}; expected a number alone, without unit, or "
+                       "a text in quotation marks", found=text)  # fmt: skip
+    return message(
+        "bare_text_in_toml", 'found {found}; expected "{found}", with quotation marks', found=text
+    )
 
 
 def _row_of(error):

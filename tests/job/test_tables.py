@@ -92,8 +92,8 @@ def test_settings_know_their_rows():
 
 
 BROKEN_TOML = (
-    "id = T-1", 'id = "T', "id = 'T", "id 1", "= 1", "[tank\nid = 1", "[[tank]\n", "id = [1, 2",
-    "id = {a = 1", "id = 1 2", 'id = "C:\\dir"', 'id = "\\uZZZZ"', 'id = "\\ud800"',
+    "id = [T-1]", 'id = "T', "id = 'T", "id 1", "= 1", "[tank\nid = 1", "[[tank]\n", "id = [1, 2",
+    "id = {a = 1", 'id = "1" 2', 'id = "C:\\dir"', 'id = "\\uZZZZ"', 'id = "\\ud800"',
     "id = 2026-02-30",
     "id = 1\nid = 2", "a = {b = 1}\na.c = 2", "a = {b = 1, b = 2}", "id = \"a\x01b\"", "id", "id =",
     "[]", "[a.]", "[a]\n[a]\n", "a = 1\n[a]\n", 'id = """a', "x = [[" + "[" * 3000, "\x01",
@@ -115,7 +115,7 @@ def test_every_error_of_toml_is_told_in_the_language(text, language):
 @pytest.mark.parametrize(
     ("text", "row", "words"),
     [
-        ("[tank]\nid = T-1\n", 2, "a text needs quotation marks"),
+        ("[tank]\nid = [T-1]\n", 2, "a text needs quotation marks"),
         ("[tank]\nid = 1\nid = 2\n", 3, "given twice"),
         ("id = 1\n", 1, "is in no [section]"),
         ("x = " + "[" * 3000, None, "too deeply nested"),
@@ -145,6 +145,20 @@ def test_decimal_commas_in_settings_are_reported_one_by_one():
     assert "is in no [section]" in log.problems[2].expected  # x: what else is wrong is told
     found = {key: (value.raw, value.row) for key, value in settings["table"].items()}
     assert found == {"step_m": (0.01, 5), "low_m": (-0.15, 6), "list": ([1, 5], 7)}
+
+
+def test_texts_without_quotation_marks_are_reported_one_by_one():
+    """The first of them hid all the others, and did not name itself."""
+    log = Log()
+    text = "[tank]\nid = TQ-101 # tag\nside = inside\ndate = 31/05/2024\nz = 10 m\nyear = 1987\n"
+    settings, _ = read_toml("job.toml", text.encode(), log)
+    assert [(problem.row, problem.expected) for problem in log.problems] == [
+        (2, 'found TQ-101; expected "TQ-101", with quotation marks'),
+        (3, 'found inside; expected "inside", with quotation marks'),
+        (4, "found 31/05/2024; expected a date as year-month-day, such as 2024-05-31"),
+        (5, "found 10 m; expected a number alone, without unit, or a text in quotation marks"),
+    ]
+    assert settings["tank"]["year"].raw == 1987
 
 
 def test_a_file_of_nothing_but_decimal_commas_ends():
