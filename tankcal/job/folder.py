@@ -392,13 +392,13 @@ def _content(file, text, log):
 def _bare_value(text):
     """Message about a value that is neither number nor date and has no quotation marks."""
     if _DATE_OF_DAYS.fullmatch(text):
-        return message("date_in_toml", "found {found}; expected a date as year-month-day, such as "
-                       "2024-05-31", found=text)  # fmt: skip
+        return message("date_in_toml", "found {text}; expected a date as year-month-day, such as "
+                       "2024-05-31", text=text)  # fmt: skip
     if text[0].isdigit():
-        return message("number_in_toml", "found {found}; expected a number alone, without unit, or "
-                       "a text in quotation marks", found=text)  # fmt: skip
+        return message("number_in_toml", "found {text}; expected a number alone, without unit, or "
+                       "a text in quotation marks", text=text)  # fmt: skip
     return message(
-        "bare_text_in_toml", 'found {found}; expected "{found}", with quotation marks', found=text
+        "bare_text_in_toml", 'found {text}; expected "{text}", with quotation marks', text=text
     )
 
 
