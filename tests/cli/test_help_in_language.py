@@ -80,7 +80,7 @@ def test_names_of_values_are_translated(language):
     """Symbols of units and counts are the same in all languages; words are not."""
     speak("en")
     parser = _parser()
-    translate_parser(parser, load_words(language))
+    translate_parser(parser, load_words(language)["help"])
     symbols = {
         "N",
         "S",
