@@ -135,7 +135,7 @@ def computed(folder, size):
     """Job, wall, body and levels of a table of so many rows, from 300 points."""
     import tankcal
     from tankcal.pipeline.tanks import body_of
-    from tankcal.pipeline.wall import find_wall
+    from tankcal.pipeline.wall.finding import find_wall
 
     write_points(folder, 300)
     job = tankcal.load(folder)
@@ -163,7 +163,7 @@ def wall_of_points(folder, size):
     """From points to the wall and the volumes."""
     import tankcal
     from tankcal.pipeline.tanks import body_of
-    from tankcal.pipeline.wall import find_wall
+    from tankcal.pipeline.wall.finding import find_wall
 
     write_points(folder, size)
     job = tankcal.load(folder)

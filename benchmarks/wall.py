@@ -65,7 +65,7 @@ def once(size):
     import tankcal
     from tankcal.geometry.shell import find_shell
     from tankcal.pipeline.tanks import body_of
-    from tankcal.pipeline.wall import fit_wall
+    from tankcal.pipeline.wall.finding import fit_wall
 
     rng = np.random.default_rng(1)
     azimuth, z = rng.uniform(0, 2 * np.pi, size), rng.uniform(0.01, 19.99, size)

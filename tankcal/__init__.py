@@ -24,8 +24,8 @@ if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
     from tankcal.job import Job, load
     from tankcal.linter import lint
     from tankcal.pipeline.chain import adjust_job, run
+    from tankcal.pipeline.plots.views import plot
     from tankcal.pipeline.result import Result
-    from tankcal.pipeline.views import plot
     from tankcal.report.outputs import write
     from tankcal.survey import Adjustment
 
@@ -38,7 +38,7 @@ _ROOM_OF = {
     "adjust_job": "pipeline.chain",
     "Result": "pipeline.result",
     "Adjustment": "survey",
-    "plot": "pipeline.views",
+    "plot": "pipeline.plots.views",
     "write": "report.outputs",
     "lint": "linter",
     "TankcalError": "errors",

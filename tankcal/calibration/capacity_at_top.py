@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tankcal.pipeline.chain import run
-from tankcal.pipeline.point_covariance import s_transform
-from tankcal.pipeline.survey_warnings import refuse_undetermined
+from tankcal.pipeline.checks.survey import refuse_undetermined
+from tankcal.pipeline.wall.point_covariance import s_transform
 from tankcal.survey import wall_points
 
 STEP_M = 0.1  # step of the table, m; only its top row is used

@@ -10,9 +10,9 @@ from tankcal.inspection.rules import Strength
 from tankcal.inspection.shape import Sizes
 from tankcal.job import load
 from tankcal.messages import message
-from tankcal.pipeline.surveyed_wall import Wall
 from tankcal.pipeline.surveying import find_survey, placed
-from tankcal.pipeline.wall import warnings_of
+from tankcal.pipeline.wall.finding import warnings_of
+from tankcal.pipeline.wall.surveyed import Wall
 from tankcal.record.making import JobAsRead
 from tankcal.record.schema import fill_from, to_plain
 from tankcal.record.texts import warnings_of as records_of

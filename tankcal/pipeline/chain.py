@@ -11,16 +11,16 @@ from tankcal.errors import InputError, Problem
 from tankcal.job import Job
 from tankcal.messages import message
 from tankcal.methods.base import supplement_of
-from tankcal.pipeline.corrections import corrections_of, gross_at_top
-from tankcal.pipeline.overruling import effect_of, warn_of_overrulings
+from tankcal.pipeline.checks.survey import incomplete_certificate, open_questions
+from tankcal.pipeline.overruling.effects import effect_of, warn_of_overrulings
 from tankcal.pipeline.result import Result
 from tankcal.pipeline.simulation import gum_intervals, simulate_table
 from tankcal.pipeline.simulation.table import SIMULATING
 from tankcal.pipeline.statements import pairs_to_simulate, statements, verdict_of
-from tankcal.pipeline.survey_warnings import incomplete_certificate, open_questions
 from tankcal.pipeline.surveying import adjust_decided, find_survey, placed
 from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of, filled_with
+from tankcal.pipeline.tanks.corrections import corrections_of, gross_at_top
 from tankcal.tank.capacity import refuse_falling
 from tankcal.tank.dips import proportional_parts
 
@@ -119,7 +119,7 @@ def _run(job, progress, part_progress, simulated, cluster):
     supplemented = supplement and supplement.result(tabulation.levels_m)
     ship = None
     if job.ship is not None:
-        from tankcal.pipeline.ship import ship_tables
+        from tankcal.pipeline.tanks.ship import ship_tables
 
         ship = ship_tables(job, survey, body, table, progress=part_progress)
     return Result(
@@ -179,7 +179,7 @@ def _collect_warnings(job, adjustment, sighting, survey, tabulation, supplemente
 
 def _base_warnings(job, adjustment):
     """Warnings of the bases measured by stadia."""
-    from tankcal.pipeline.stadia_checks import check_bases, check_rejected_bases
+    from tankcal.pipeline.checks.stadia import check_bases, check_rejected_bases
 
     rejected = check_rejected_bases(job.measurements, adjustment.readings)
     return (*check_bases(job.measurements), *rejected)

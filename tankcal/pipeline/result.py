@@ -10,11 +10,11 @@ import numpy as np
 from tankcal.errors import HeightError, Problem
 from tankcal.job import Job
 from tankcal.messages import message
-from tankcal.pipeline.corrections import Correction
-from tankcal.pipeline.overruling import Overrulings
+from tankcal.pipeline.overruling.effects import Overrulings
 from tankcal.pipeline.simulation import Intervals, TableSimulation
 from tankcal.pipeline.statements import Statements, stated_delivery, stated_volume
 from tankcal.pipeline.tanks import shell_volume
+from tankcal.pipeline.tanks.corrections import Correction
 from tankcal.tank import dips
 from tankcal.tank.body import Body
 from tankcal.tank.budgets import Budget, budget, reading_sources
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
     from tankcal.pipeline.liquid.nominal_wall import NominalWall
     from tankcal.pipeline.liquid.result import LiquidResult
     from tankcal.pipeline.read_wall import ReadWall
-    from tankcal.pipeline.scan import Scan
-    from tankcal.pipeline.ship import ShipTables
+    from tankcal.pipeline.solids.scan import Scan
     from tankcal.pipeline.strapped_wall import StrappedWall
-    from tankcal.pipeline.surveyed_wall import Wall
+    from tankcal.pipeline.tanks.ship import ShipTables
+    from tankcal.pipeline.wall.surveyed import Wall
     from tankcal.pipeline.wall_straps import Straps
     from tankcal.survey import Adjustment
     from tankcal.survey.sighting import Sighting
@@ -201,7 +201,7 @@ class Result:
 
     def plot(self, what: str | None = None) -> "Figure":
         """Draw a figure of the result, chosen by the names that `tankcal.plot` accepts."""
-        from tankcal.pipeline.views import plot
+        from tankcal.pipeline.plots.views import plot
 
         return plot(self, what)
 

@@ -20,7 +20,7 @@ from tankcal.geometry.girth import perimeter_excess
 from tankcal.messages import message
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.tanks import insets_of, shell_zero
-from tankcal.pipeline.wall import joints_of
+from tankcal.pipeline.wall.finding import joints_of
 from tankcal.pipeline.wall_readings import (
     factors_of_plates,
     factors_of_readings,

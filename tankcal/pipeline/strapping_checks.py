@@ -10,11 +10,15 @@ from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.methods.base import completing_method
+from tankcal.pipeline.checks.cross_checks import check_side, is_size_declared
+from tankcal.pipeline.checks.moved_setups import tested
+from tankcal.pipeline.checks.nominal_size import (
+    allowed_departure_m,
+    departure_of_size,
+    nominal_radius_m,
+)
+from tankcal.pipeline.checks.survey_limits import limit_at, limits_of
 from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
-from tankcal.pipeline.cross_checks import check_side, is_size_declared
-from tankcal.pipeline.moved_setups import tested
-from tankcal.pipeline.nominal_size import allowed_departure_m, departure_of_size, nominal_radius_m
-from tankcal.pipeline.survey_limits import limit_at, limits_of
 from tankcal.pipeline.tape_checks import check_tapes
 from tankcal.pipeline.wall_readings import FORMER
 

@@ -15,12 +15,12 @@ from tankcal.job.model import Job
 from tankcal.job.tables import in_book
 from tankcal.messages import message
 from tankcal.methods.base import completing_method, given_methods
-from tankcal.pipeline.cross_checks import is_within_wall, refuse_other_side
-from tankcal.pipeline.nominal_size import refuse_other_size
-from tankcal.pipeline.overruled_points import refuse_kept_readings, with_decided_readings
-from tankcal.pipeline.point_covariance import s_transform
-from tankcal.pipeline.survey_warnings import refuse_undetermined
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.checks.cross_checks import is_within_wall, refuse_other_side
+from tankcal.pipeline.checks.nominal_size import refuse_other_size
+from tankcal.pipeline.checks.survey import refuse_undetermined
+from tankcal.pipeline.overruling.points import refuse_kept_readings, with_decided_readings
+from tankcal.pipeline.wall.finding import find_wall
+from tankcal.pipeline.wall.point_covariance import s_transform
 
 if TYPE_CHECKING:
     from tankcal.survey import Adjustment
@@ -192,7 +192,7 @@ def _survey(job, progress, network):
     if job.tank.kind == "vertical":
         return find_wall(job, progress, network.dof, network.amplitudes)
     if job.mesh is not None:
-        from tankcal.pipeline.ship import check_pipe
+        from tankcal.pipeline.tanks.ship import check_pipe
         from tankcal.tank.meshes import parse_mesh
 
         progress(message("checking_mesh", "checking the mesh {file}", file=job.mesh.file))
@@ -200,7 +200,7 @@ def _survey(job, progress, network):
         check_pipe(job, mesh)
         return mesh
     if job.points is not None:
-        from tankcal.pipeline.scan import fit_scan
+        from tankcal.pipeline.solids.scan import fit_scan
 
         progress(
             message(

@@ -10,9 +10,9 @@ import numpy as np
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.messages import message
 from tankcal.methods.base import given_methods, method_of
-from tankcal.pipeline.cross_checks import check_mesh, check_scan, check_wall
-from tankcal.pipeline.nominal_size import check_size
-from tankcal.pipeline.survey_warnings import against_nominal, warn_of_undeclared
+from tankcal.pipeline.checks.cross_checks import check_mesh, check_scan, check_wall
+from tankcal.pipeline.checks.nominal_size import check_size
+from tankcal.pipeline.checks.survey import against_nominal, warn_of_undeclared
 from tankcal.pipeline.tanks import body_of, critical_zone, zero_height
 from tankcal.solver.threads import threads_for
 from tankcal.tank.body import Body
@@ -171,7 +171,7 @@ def _undeclared(job, survey, body):
     """Inputs without u: those of the table, then those that affect only corrections of a ship."""
     of_ship = ()
     if job.ship is not None:
-        from tankcal.pipeline.ship import undeclared_of_ship
+        from tankcal.pipeline.tanks.ship import undeclared_of_ship
 
         of_ship = undeclared_of_ship(job, survey)
     return tuple(dict.fromkeys((*body.undeclared(), *of_ship)))
@@ -205,7 +205,7 @@ def _check_survey(job, survey, top_m):
 
 def _check_wall_of_points(job, wall):
     """Warnings about a wall surveyed by points, with its straps and reference lines."""
-    from tankcal.pipeline.wall import warnings_of
+    from tankcal.pipeline.wall.finding import warnings_of
 
     straps_problems = lean_problems = ()
     if wall.straps is not None:

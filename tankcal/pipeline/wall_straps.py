@@ -19,7 +19,7 @@ from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.girth import Ring, perimeter_excess, seen_excess
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.tanks import insets_of
-from tankcal.pipeline.untied_setups import Unbound
+from tankcal.pipeline.wall.untied_setups import Unbound
 from tankcal.pipeline.wall_readings import (
     FORMER,
     columns_of,

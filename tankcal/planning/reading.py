@@ -52,7 +52,7 @@ from tankcal.job.tables import (
 )
 from tankcal.job.tables import TABLES as JOB_FILES
 from tankcal.messages import message
-from tankcal.pipeline.wall_warnings import ADVISED_POINTS, FEWEST_POINTS
+from tankcal.pipeline.checks.wall import ADVISED_POINTS, FEWEST_POINTS
 from tankcal.planning.assembly import assemble_plan, limits_of
 from tankcal.planning.contract import (
     JOB_TABLES,

@@ -11,9 +11,9 @@ import numpy as np
 
 from tankcal.errors import SolutionError, TankcalError
 from tankcal.messages import message
-from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.table import compute_table
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
+from tankcal.pipeline.wall.point_covariance import s_transform
 from tankcal.planning.measurements import draw_blunders, draw_measurements
 from tankcal.planning.prediction import Prediction
 from tankcal.survey import adjust_survey, wall_points

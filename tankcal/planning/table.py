@@ -17,13 +17,13 @@ import scipy.sparse
 from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.job.model import Job
 from tankcal.messages import message
-from tankcal.pipeline.point_covariance import common_motions, s_transform_factors
+from tankcal.pipeline.checks.survey import refuse_undetermined
 from tankcal.pipeline.statements import MINIMA_M, statements
-from tankcal.pipeline.survey_warnings import refuse_undetermined
-from tankcal.pipeline.surveyed_wall import Wall
 from tankcal.pipeline.table import ComputedTable, compute_table
 from tankcal.pipeline.tanks.vertical import volume_by_points
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
+from tankcal.pipeline.wall.point_covariance import common_motions, s_transform_factors
+from tankcal.pipeline.wall.surveyed import Wall
 from tankcal.solver.effects import covariances
 from tankcal.survey.points import Points
 from tankcal.survey.results import causes_of

@@ -17,7 +17,7 @@ from tankcal.job.model.settings import (
     Tank,
 )
 from tankcal.methods.base import find_method, methods
-from tankcal.pipeline.corrections import Correction
+from tankcal.pipeline.tanks.corrections import Correction
 from tankcal.record import survey, table, tank_parts, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.choices import Choice, adjustment_choices, choices_of

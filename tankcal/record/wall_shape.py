@@ -7,7 +7,7 @@ that any rule can be applied later. u includes the common errors of the values.
 import numpy as np
 
 from tankcal.pipeline.tanks.vertical import nominal_inside_m
-from tankcal.pipeline.wall_shape import wall_shape_of
+from tankcal.pipeline.wall.shape import wall_shape_of
 from tankcal.record.schema import Finite, Saved, key
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Rectangle
 
-from tankcal.pipeline.plot_style import GREY, INK, PALE, RED, WIDTH, styled
+from tankcal.pipeline.plots.style import GREY, INK, PALE, RED, WIDTH, styled
 from tankcal.report.dip_point import dip_point
 
 _LEFT, _RIGHT = 2.0, 4.0  # sides of the tank on the page

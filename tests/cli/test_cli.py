@@ -51,7 +51,11 @@ HEAVY = {  # what a run without papers has no need of, and waits for when it is 
 }
 SURVEYS = {  # of kinds that only some jobs have
     *("tankcal.survey.adjustment", "tankcal.survey.network.results", "tankcal.survey.observations"),
-    *("tankcal.pipeline.strapped_wall", "tankcal.methods.hits.wall", "tankcal.pipeline.scan"),
+    *(
+        "tankcal.pipeline.strapped_wall",
+        "tankcal.methods.hits.wall",
+        "tankcal.pipeline.solids.scan",
+    ),
     *("tankcal.pipeline.liquid", "tankcal.methods.radii.wall", "tankcal.clouds.wall"),
     *("tankcal.tank.meshes", "tankcal.tank.ships", "tankcal.job.excel", "tankcal.job.measuring"),
 }

@@ -8,7 +8,7 @@ from generated_walls import FULL_TURN, GeneratedWall, Survey, _cap, job_of, surv
 
 from tankcal.geometry.patches import find_buckles
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
 
 
 def grid(spacing=0.6, reach=4.0):

@@ -17,8 +17,8 @@ from tankcal.geometry.field.estimate import hidden_seams_m
 from tankcal.geometry.patches import find_columns
 from tankcal.geometry.shell import UNDECIDED
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.undecided_columns import factors_of_undecided
-from tankcal.pipeline.wall import find_wall, fit_wall
+from tankcal.pipeline.wall.finding import find_wall, fit_wall
+from tankcal.pipeline.wall.undecided_columns import factors_of_undecided
 from tankcal.tank.capacity import Capacity
 
 TURN_M, NOISE_M = 36.0, 0.001

@@ -7,7 +7,7 @@ import pytest
 from generated_walls import job_of, make_wall, survey
 from jacobians import assert_derivative
 
-import tankcal.pipeline.wall as pipeline_wall
+import tankcal.pipeline.wall.finding as pipeline_wall
 from tankcal.geometry.field.amplitudes import (
     Amplitudes,
     assumed_amplitudes,
@@ -34,7 +34,7 @@ from tankcal.geometry.field.estimate import (
 from tankcal.geometry.field.likelihood import Misfit
 from tankcal.geometry.field.sites import Sites
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
 from tankcal.pipeline.wall_straps import _joined
 
 FULL_TURN, RADIUS_M = 2 * np.pi, 6.5

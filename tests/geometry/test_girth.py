@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from tankcal.geometry.field.amplitudes import Amplitudes
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.geometry.girth import Ring, _excess_of, hull_perimeter, perimeter_excess, seen_excess
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
 from tankcal.pipeline.wall_straps import area_term
 
 TURN = 2 * np.pi * np.arange(20_000) / 20_000

@@ -23,7 +23,7 @@ from generated_walls import job_of
 from tankcal.geometry.patches import find_seams
 from tankcal.geometry.shell import find_shell
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
 from tankcal.tank.capacity import Capacity
 
 BELIEVED_M = 0.013

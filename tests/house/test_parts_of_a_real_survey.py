@@ -14,7 +14,7 @@ from real_tank import write_real_job
 
 import tankcal
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall, joints_of
+from tankcal.pipeline.wall.finding import find_wall, joints_of
 from tankcal.tank.capacity import Capacity
 
 ROWS, DELIVERIES, DELIVERED_M = 10, 5, 2.0

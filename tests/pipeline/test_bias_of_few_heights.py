@@ -15,7 +15,7 @@ from test_coverage_of_walls import ROWS, judged
 
 from tankcal.geometry.field.components import COMPONENTS, Heights
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
 
 HEIGHTS = {"middle": (0.5,), "quarters": (0.25, 0.75), "fifths": (0.2, 0.8), "joints": (0.05, 0.95)}
 INDEPENDENT = ("settled", "flat-plates", "filled")

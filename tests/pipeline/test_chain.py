@@ -10,7 +10,7 @@ import tankcal
 from tankcal.errors import InputError
 from tankcal.pipeline.chain import run
 from tankcal.pipeline.tanks import insets_of, shell_volume, thermal_scale
-from tankcal.pipeline.wall import fit_wall
+from tankcal.pipeline.wall.finding import fit_wall
 
 
 def result_of(tmp_path, **changes):

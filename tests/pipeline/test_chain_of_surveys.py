@@ -11,10 +11,10 @@ from photographed_jobs import between, by_tape, control_of, measurements, tank_j
 from tankcal.errors import InputError, SolutionError
 from tankcal.job.model import DeclaredInput, Sphere
 from tankcal.pipeline.chain import adjust_job, run
-from tankcal.pipeline.point_covariance import s_transform
-from tankcal.pipeline.survey_warnings import refuse_undetermined
+from tankcal.pipeline.checks.survey import refuse_undetermined
 from tankcal.pipeline.tanks import body_of, insets_of, shell_volume
-from tankcal.pipeline.wall import find_wall, fit_wall
+from tankcal.pipeline.wall.finding import find_wall, fit_wall
+from tankcal.pipeline.wall.point_covariance import s_transform
 from tankcal.sections import coordinates_of
 from tankcal.survey import Cause, wall_points
 from tankcal.survey.measurements import AdjustmentSettings, Instrument, Measurements

@@ -16,7 +16,7 @@ from test_coverage_of_walls import judged, least_in_class, study
 
 from tankcal.methods.hits.wall import sight_wall
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall, is_smoothed
+from tankcal.pipeline.wall.finding import find_wall, is_smoothed
 
 HITS = {1: 12, 2: 16, 3: 24}
 

@@ -26,7 +26,7 @@ from tankcal.methods.tangents.wall import touch_wall
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
 
 TOTAL = ROWS - 1
 FAR = 2.0  # errors beyond so many U must not pass without a mark

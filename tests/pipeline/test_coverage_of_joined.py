@@ -14,7 +14,7 @@ from joined_jobs import ring_job, sighted, untied_job, whole_job
 from test_coverage_of_walls import judged, least_in_class, study
 
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
 
 COUNTS = {1: 8, 2: 12, 3: 16}
 

@@ -18,7 +18,7 @@ from generated_solids import (
     survey_lying,
 )
 
-from tankcal.pipeline.scan import fit_scan
+from tankcal.pipeline.solids.scan import fit_scan
 from tankcal.pipeline.tanks import body_of
 from tankcal.tank.capacity import Capacity
 

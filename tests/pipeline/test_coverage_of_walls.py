@@ -15,7 +15,7 @@ from generated_walls import FAMILIES, job_of, make_wall, survey
 from scipy.stats import binom
 
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
 from tankcal.tank.capacity import Capacity
 
 LEAST_HELD, LEAST_IN_CLASS = 0.94, 0.92

@@ -5,8 +5,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plot_style import STYLE
-from tankcal.pipeline.plots import bottom_rows, capacity_curves
+from tankcal.pipeline.plots.figures import bottom_rows, capacity_curves
+from tankcal.pipeline.plots.style import STYLE
 from tankcal.text.labels import Label, write_labels
 
 

@@ -23,7 +23,7 @@ from tankcal.methods.hits.wall import sight_wall
 from tankcal.methods.tangents.wall import touch_wall
 from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
 
 TOP = 9  # of the rows that `judged` states: the full tank
 

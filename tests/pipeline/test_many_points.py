@@ -5,7 +5,7 @@ import pytest
 from generated_walls import FULL_TURN, GeneratedWall, Survey, job_of, make_wall
 
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
 from tankcal.tank.capacity import Capacity
 
 POINTS, COURSES = 4000, 6

@@ -15,8 +15,8 @@ from scipy.stats import chi2
 import tankcal
 from tankcal.geometry.field.section_noise import bartlett
 from tankcal.geometry.outlines import polar
-from tankcal.pipeline.section_homogeneity import homogeneity_of, warn_of_sections
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.checks.homogeneity import homogeneity_of, warn_of_sections
+from tankcal.pipeline.wall.finding import find_wall
 from tankcal.record import record_of
 
 SHARE_ACCUSED = 0.02  # of valid surveys, at most: two tests, each at 1 %

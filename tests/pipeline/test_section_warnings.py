@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from generated_walls import GeneratedWall, job_of, survey
 
-from tankcal.pipeline.wall import find_wall, warnings_of
+from tankcal.pipeline.wall.finding import find_wall, warnings_of
 
 COURSES = 6
 

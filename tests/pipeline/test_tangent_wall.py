@@ -23,9 +23,9 @@ from job_builder import tangent_parts, write_book, write_folder
 import tankcal
 from tankcal.errors import InputError, SolutionError
 from tankcal.geometry.field.sites import free_design
-from tankcal.pipeline.cause_correlations import noise_of_wall
-from tankcal.pipeline.moved_setups import critical_of_setup
-from tankcal.pipeline.tangent_checks import judge_tangents
+from tankcal.pipeline.checks.moved_setups import critical_of_setup
+from tankcal.pipeline.checks.tangents import judge_tangents
+from tankcal.pipeline.wall.cause_correlations import noise_of_wall
 from tankcal.survey.poses import poses_in_network
 
 FOOT, SLOPE, HEIGHT, PLATE = (0.3, -0.2), (0.002, -0.001), 8.0, 0.008

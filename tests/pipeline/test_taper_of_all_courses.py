@@ -9,7 +9,7 @@ from generated_walls import GeneratedWall, job_of, survey
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.tanks import body_of
-from tankcal.pipeline.wall import find_wall, warnings_of
+from tankcal.pipeline.wall.finding import find_wall, warnings_of
 from tankcal.tank.capacity import Capacity
 
 TAPER_M = 3e-3  # how much wider the top of each course is than its middle

@@ -10,7 +10,7 @@ from jacobians import assert_derivative
 from test_hit_wall import HEIGHT, LEVELS, PLATE, SLOPE, arc_parts, line_parts, run, strapped
 
 from tankcal.geometry.circles import circle_by_points, fit_circle
-from tankcal.pipeline.wall_shape import wall_shape_of
+from tankcal.pipeline.wall.shape import wall_shape_of
 from tankcal.record.survey import sections_of
 
 SETUPS, SEED = 6, 4

@@ -8,9 +8,9 @@ from plan_folders import changed_plan, fill_folder, with_setups
 
 import tankcal.survey.readings
 from tankcal.job import load
-from tankcal.pipeline.point_covariance import s_transform
 from tankcal.pipeline.table import compute_table
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.finding import find_wall
+from tankcal.pipeline.wall.point_covariance import s_transform
 from tankcal.planning import load_plan, predict
 from tankcal.planning.measurements import draw_measurements
 from tankcal.report.planning import empty_job

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.colors import to_hex
 from plan_folders import PLAN, changed_plan, with_setups
 
-from tankcal.pipeline.plot_style import INK, RED
+from tankcal.pipeline.plots.style import INK, RED
 from tankcal.planning import load_plan, predict
 from tankcal.planning.improvements import what_helps
 from tankcal.planning.model import Pillar, Tie

@@ -9,7 +9,7 @@ import pytest
 from paper_pages import pages_of
 
 from tankcal.messages import fill_template
-from tankcal.pipeline import corrections
+from tankcal.pipeline.tanks import corrections
 from tankcal.report import blocks
 from tankcal.report.pdf import pdf
 from tankcal.report.plain import Column, PlainPaper

@@ -19,7 +19,7 @@ from uncertain_job import HOSTILE, as_before, write_uncertain_job
 import tankcal
 from tankcal.gum.distributions import NAMES
 from tankcal.job.contract.uncertainty import INPUTS
-from tankcal.pipeline import plot_style
+from tankcal.pipeline.plots import style as plot_style
 from tankcal.record import record_of, save
 from tankcal.record.covariance_factor import blocks_of
 from tankcal.record.schema import to_plain

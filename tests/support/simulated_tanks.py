@@ -18,7 +18,7 @@ import tankcal
 from tankcal.geometry.form import harmonics
 from tankcal.job.model import DeclaredInput
 from tankcal.pipeline.tanks import body_of, zero_height
-from tankcal.pipeline.wall import find_wall, fit_wall
+from tankcal.pipeline.wall.finding import find_wall, fit_wall
 from tankcal.tank.capacity import Capacity
 from tankcal.uncertainty import Source
 

@@ -20,7 +20,7 @@ from tankcal.geometry.great_ellipses import (
 )
 from tankcal.messages import message
 from tankcal.methods.great_circles.columns import KINDS
-from tankcal.pipeline.nominal_size import single_radius
+from tankcal.pipeline.checks.nominal_size import single_radius
 from tankcal.pipeline.wall_readings import (
     WallReading,
     factors_of_readings,

@@ -8,9 +8,9 @@ from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.pipeline import tape_checks
-from tankcal.pipeline.nominal_size import allowed_departure_m
+from tankcal.pipeline.checks.nominal_size import allowed_departure_m
+from tankcal.pipeline.checks.survey_limits import limits_of_method
 from tankcal.pipeline.strapping_checks import FAR_LIMITS, check_repeats, limit_of_repeats
-from tankcal.pipeline.survey_limits import limits_of_method
 
 FILE = "great_circles.csv"
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tankcal.errors import InputError, Problem
 from tankcal.messages import list_some, message
-from tankcal.pipeline.wall import joints_of
+from tankcal.pipeline.wall.finding import joints_of
 from tankcal.survey.diagnosis.misread_files import OTHER_UNITS
 from tankcal.units import DEG_IN_GON, FULL_TURN, GON_IN_DEG
 

@@ -9,10 +9,10 @@ from tankcal.messages import message
 from tankcal.methods.hits.checks import offset_unknown
 from tankcal.methods.hits.misread import refuse_other_units
 from tankcal.methods.hits.misread_lines import refuse_misread_heights, refuse_misread_lines
-from tankcal.pipeline.cause_correlations import told_causes
-from tankcal.pipeline.point_covariance import s_transform
-from tankcal.pipeline.sighted_points import take_points, through_wall
-from tankcal.pipeline.wall import find_wall
+from tankcal.pipeline.wall.cause_correlations import told_causes
+from tankcal.pipeline.wall.finding import find_wall
+from tankcal.pipeline.wall.point_covariance import s_transform
+from tankcal.pipeline.wall.sighted_points import take_points, through_wall
 from tankcal.sections import coordinates_of
 from tankcal.survey import wall_points
 from tankcal.survey.poses import covariance_with_points, poses_of, settle_poses

@@ -22,11 +22,11 @@ from tankcal.errors import InputError, Problem
 from tankcal.geometry.cylinders import FittedCylinder
 from tankcal.messages import message
 from tankcal.methods.inside_hits.checks import offset_undeclared, untied_setup
-from tankcal.pipeline.overruled_points import decisions_of
-from tankcal.pipeline.point_covariance import s_transform
-from tankcal.pipeline.scan import NEVER_M, NEVER_PART, fit_scan
-from tankcal.pipeline.scanned_wall import offsets
-from tankcal.pipeline.sighted_points import take_points
+from tankcal.pipeline.overruling.points import decisions_of
+from tankcal.pipeline.solids.scan import NEVER_M, NEVER_PART, fit_scan
+from tankcal.pipeline.solids.scanned_wall import offsets
+from tankcal.pipeline.wall.point_covariance import s_transform
+from tankcal.pipeline.wall.sighted_points import take_points
 from tankcal.survey.poses import poses_in_network, poses_of
 from tankcal.survey.sighting import WALL, sight
 

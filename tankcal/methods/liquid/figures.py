@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.methods.liquid import tables
 from tankcal.methods.liquid.facts import control_text, density_text, with_u
-from tankcal.pipeline.plot_style import FAINT, GREY, INK, RED, WIDTH, Drawing, set_margins, styled
+from tankcal.pipeline.plots.style import FAINT, GREY, INK, RED, WIDTH, Drawing, set_margins, styled
 from tankcal.report import numbers
 
 MOST_ROWS = 16  # rows of the table of volumes in the papers; the workbook has all rows

@@ -17,7 +17,7 @@ from tankcal.geometry.field.estimate import MeanField
 from tankcal.messages import message
 from tankcal.pipeline.strapped_wall import UprightAxis
 from tankcal.pipeline.tanks import shell_zero
-from tankcal.pipeline.wall import joints_of
+from tankcal.pipeline.wall.finding import joints_of
 from tankcal.tank.factors import Factor
 from tankcal.uncertainty import factor_of
 

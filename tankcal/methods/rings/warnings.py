@@ -8,9 +8,10 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.pipeline.checks.cross_checks import check_side
+from tankcal.pipeline.checks.nominal_size import allowed_departure_m, departure_of_size
+from tankcal.pipeline.checks.survey_limits import limits_of
 from tankcal.pipeline.compared_courses import exchanged_courses
-from tankcal.pipeline.cross_checks import check_side
-from tankcal.pipeline.nominal_size import allowed_departure_m, departure_of_size
 from tankcal.pipeline.strapping_checks import (
     FAR_LIMITS,
     FILE,
@@ -19,7 +20,6 @@ from tankcal.pipeline.strapping_checks import (
     read_once,
     straps_apart,
 )
-from tankcal.pipeline.survey_limits import limits_of
 from tankcal.pipeline.tape_checks import check_tapes
 from tankcal.pipeline.wall_readings import names_of
 

@@ -5,17 +5,17 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.geometry.shell import course_of
 from tankcal.messages import message
-from tankcal.pipeline.level_checks import (
+from tankcal.pipeline.checks.levels import (
     check_nominal,
     check_size_told,
     courses_with_few,
     girth_m,
     levels_with_few,
 )
-from tankcal.pipeline.moved_setups import worst_setup
-from tankcal.pipeline.survey_limits import limits_of
-from tankcal.pipeline.tangent_checks import RULES, judge_tangents, least_tangents
-from tankcal.pipeline.wall import joints_of
+from tankcal.pipeline.checks.moved_setups import worst_setup
+from tankcal.pipeline.checks.survey_limits import limits_of
+from tankcal.pipeline.checks.tangents import RULES, judge_tangents, least_tangents
+from tankcal.pipeline.wall.finding import joints_of
 
 MANY_LEVELS = 0.5  # share of wrong levels above which the heights as a whole are wrong
 TOGETHER = 0.5  # limit of a whole set-up, relative to the limit of a single sight

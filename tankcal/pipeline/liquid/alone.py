@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from tankcal.pipeline.checks.survey_limits import limits_of_method
 from tankcal.pipeline.liquid.geometry import Geometry, wide_input
 from tankcal.pipeline.liquid.nominal_wall import NominalWall, find_nominal_wall
-from tankcal.pipeline.scan import Scan
-from tankcal.pipeline.survey_limits import limits_of_method
+from tankcal.pipeline.solids.scan import Scan
 from tankcal.pipeline.tanks.solid import sized_job
 
 KEPT = (  # inputs that describe the liquid, the parts and the elasticity, not the shape of the wall

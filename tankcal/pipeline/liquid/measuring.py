@@ -14,7 +14,6 @@ from scipy.special import gammaincc
 from tankcal.adjust import noncentrality
 from tankcal.errors import InputError, SolutionError
 from tankcal.messages import message
-from tankcal.pipeline.corrections import Correction
 from tankcal.pipeline.liquid.adjustment import (
     BOTTOM,
     FLEX,
@@ -35,6 +34,7 @@ from tankcal.pipeline.liquid.result import (
     beside_table,
 )
 from tankcal.pipeline.tanks import body_of, filled_with, zero_height
+from tankcal.pipeline.tanks.corrections import Correction
 from tankcal.tank.liquid import fill_of, name_causes
 from tankcal.tank.liquid.readings import batch_sd_m3
 

@@ -15,7 +15,7 @@ from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.strapped_wall import UprightAxis, field_of_readings
 from tankcal.pipeline.tanks import insets_of, shell_zero
 from tankcal.pipeline.tanks.vertical import nominal_inside_m
-from tankcal.pipeline.wall import joints_of
+from tankcal.pipeline.wall.finding import joints_of
 from tankcal.pipeline.wall_readings import (
     WallReading,
     factors_of_readings,

@@ -12,17 +12,17 @@ from tankcal.geometry.field.estimate import LEVELS
 from tankcal.geometry.field.information import expect_amplitudes
 from tankcal.job.model import Job
 from tankcal.methods.base import supplement_of
-from tankcal.pipeline.cause_correlations import noise_of_wall
+from tankcal.pipeline.checks.homogeneity import OF_SCATTER
+from tankcal.pipeline.checks.tangents import judge_tangents
 from tankcal.pipeline.liquid.measuring import Measured
 from tankcal.pipeline.liquid.nominal_wall import NominalWall
 from tankcal.pipeline.liquid.result import LiquidResult
 from tankcal.pipeline.read_wall import ReadWall
-from tankcal.pipeline.section_homogeneity import OF_SCATTER
 from tankcal.pipeline.statements import statements
 from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
-from tankcal.pipeline.tangent_checks import judge_tangents
+from tankcal.pipeline.wall.cause_correlations import noise_of_wall
 from tankcal.planning.table import TableResults, refuse_without_delivery
 from tankcal.planning.wall.filling import (
     FillingOutlook,

@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 
 from tankcal.calibration.edges import decentring_profile, radial_curve
 from tankcal.camera.model import KEYS, PARAMETERS, Form
-from tankcal.pipeline.plot_style import FAINT, GREY, INK, RED, WIDTH, even_groups, set_margins
+from tankcal.pipeline.plots.style import FAINT, GREY, INK, RED, WIDTH, even_groups, set_margins
 from tankcal.report import numbers
 from tankcal.report.camera.drawings import (
     draw_matrix,

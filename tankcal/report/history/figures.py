@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plot_style import FAINT, INK, RED, WIDTH, set_margins
+from tankcal.pipeline.plots.style import FAINT, INK, RED, WIDTH, set_margins
 from tankcal.report.camera.drawings import COLOURS, line_style, styled
 from tankcal.report.comparison.figures import draw_E_n_limits, typeset_E_n
 

@@ -5,7 +5,7 @@ from math import ceil
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plot_style import FAINT, GREY, INK, RED, WIDTH, set_margins
+from tankcal.pipeline.plots.style import FAINT, GREY, INK, RED, WIDTH, set_margins
 from tankcal.report import blocks
 from tankcal.report.camera.drawings import line_style, styled
 from tankcal.report.inspection.paper import epoch_name

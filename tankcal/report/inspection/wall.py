@@ -5,8 +5,8 @@ from math import ceil
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline import plots
-from tankcal.pipeline.plot_style import (
+from tankcal.pipeline.plots import figures as plots
+from tankcal.pipeline.plots.style import (
     FAINT,
     GREY,
     INK,

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plot_style import (
+from tankcal.pipeline.plots.style import (
     GREY,
     INK,
     PALE,

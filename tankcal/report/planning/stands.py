@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
-from tankcal.pipeline.plot_style import GREY, INK, PALE, WIDTH, round_factor, styled
+from tankcal.pipeline.plots.style import GREY, INK, PALE, WIDTH, round_factor, styled
 from tankcal.planning.bases import group_by_ends
 from tankcal.planning.model import TAPED, Box
 from tankcal.planning.places import reference_rad

@@ -5,7 +5,7 @@ from math import ceil
 import numpy as np
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plot_style import FAINT, GREY, WIDTH, set_margins
+from tankcal.pipeline.plots.style import FAINT, GREY, WIDTH, set_margins
 from tankcal.report import blocks
 from tankcal.report.camera.drawings import COLOURS, line_style, styled
 from tankcal.report.scores.paper import EVERY

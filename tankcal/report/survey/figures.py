@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
-from tankcal.pipeline.plot_style import (
+from tankcal.pipeline.plots.style import (
     FAINT,
     GREY,
     INK,

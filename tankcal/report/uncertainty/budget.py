@@ -1,6 +1,6 @@
 """Budgets: complete for the top row and one delivery, contributions for all others."""
 
-from tankcal.pipeline.plot_style import even_groups
+from tankcal.pipeline.plots.style import even_groups
 from tankcal.report import blocks
 from tankcal.report.numbers import degrees_of_freedom, like_its_sd, symbol
 from tankcal.report.tables import Column, Table

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 
-from tankcal.pipeline.plot_style import FAINT, INK, RED, WIDTH, set_margins, styled
+from tankcal.pipeline.plots.style import FAINT, INK, RED, WIDTH, set_margins, styled
 from tankcal.record.covariance_factor import factor_of
 
 _SHORT_AXIS = 20  # ratio of the ends of an axis up to which minor ticks have numbers

@@ -9,7 +9,7 @@ from math import sqrt
 
 import numpy as np
 
-from tankcal.pipeline.plot_style import round_factor
+from tankcal.pipeline.plots.style import round_factor
 from tankcal.report.blocks import Block
 from tankcal.report.web.packing import pack_numbers
 from tankcal.report.web.wall_map import limit_rejected

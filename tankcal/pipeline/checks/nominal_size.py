@@ -11,7 +11,7 @@ from tankcal.errors import InputError, Problem
 from tankcal.job.plausibility import IMPOSSIBLE_MISS, INSIDE, PLATES_TO_INSIDE, unit_guess
 from tankcal.messages import list_some, message
 from tankcal.methods.base import given_methods, method_of
-from tankcal.pipeline.survey_limits import limits_of
+from tankcal.pipeline.checks.survey_limits import limits_of
 from tankcal.pipeline.wall_straps import mean_radii
 
 SHOWN = 5  # courses named in a message

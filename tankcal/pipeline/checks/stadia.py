@@ -7,7 +7,7 @@ import numpy as np
 from tankcal.errors import Problem
 from tankcal.job.contract.stadia import KIND
 from tankcal.messages import message
-from tankcal.pipeline.survey_limits import limits_of
+from tankcal.pipeline.checks.survey_limits import limits_of
 
 UNLIKE_SDS = 3.0  # largest difference of two readings of a base, in standard deviations
 

@@ -7,8 +7,8 @@ import numpy as np
 from tankcal.geometry.field.components import COMPONENTS
 from tankcal.messages import list_some, message
 from tankcal.methods.base import given_methods
-from tankcal.pipeline.survey_warnings import LARGE_NOISE_M, SHOWN, of_points
-from tankcal.pipeline.undecided_columns import tell_undecided
+from tankcal.pipeline.checks.survey import LARGE_NOISE_M, SHOWN, of_points
+from tankcal.pipeline.wall.undecided_columns import tell_undecided
 
 FEWEST_POINTS, ADVISED_POINTS = 5, 10  # least and recommended number of points of a section
 WIDE_GAP_DEG = 45

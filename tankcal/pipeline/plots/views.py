@@ -54,7 +54,9 @@ def plot(result, what: str | None = None) -> "Figure":
 
 
 def _drawn(draw, result):
-    from tankcal.pipeline import plots  # matplotlib is loaded when something is drawn
+    from tankcal.pipeline.plots import (
+        figures as plots,  # matplotlib is loaded when something is drawn
+    )
 
     return draw(plots, result)
 

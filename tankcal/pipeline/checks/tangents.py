@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tankcal.adjust import noncentrality
-from tankcal.pipeline.cause_correlations import noise_of_wall
-from tankcal.pipeline.level_checks import girth_m
-from tankcal.pipeline.moved_setups import moved_setups, tested
-from tankcal.pipeline.survey_limits import limit_at
+from tankcal.pipeline.checks.levels import girth_m
+from tankcal.pipeline.checks.moved_setups import moved_setups, tested
+from tankcal.pipeline.checks.survey_limits import limit_at
+from tankcal.pipeline.wall.cause_correlations import noise_of_wall
 
 RULES = "tangents"
 SUSPECT = 2.0  # w of the worst set-up above which it is tested by the other set-ups

@@ -31,7 +31,7 @@ from tankcal.geometry.field.places import (
     wet_cells,
 )
 from tankcal.geometry.primitives import sphere_distances, unit_vectors
-from tankcal.pipeline.survey_warnings import noise_is_estimated
+from tankcal.pipeline.checks.survey import noise_is_estimated
 from tankcal.pipeline.tanks.common import factor_of_unseen
 from tankcal.pipeline.tanks.solid import solid_as_surveyed
 from tankcal.sections import coordinates_of

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from tankcal.geometry.shell import course_of
-from tankcal.pipeline.wall import joints_of
+from tankcal.pipeline.wall.finding import joints_of
 from tankcal.sections import coordinates_of
 
 

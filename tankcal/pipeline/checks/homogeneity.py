@@ -20,7 +20,7 @@ from scipy.special import chdtr
 from tankcal.geometry.field.section_noise import bartlett
 from tankcal.messages import list_some, message
 from tankcal.methods.base import given_methods
-from tankcal.pipeline.survey_warnings import SHOWN, noise_is_estimated, of_points
+from tankcal.pipeline.checks.survey import SHOWN, noise_is_estimated, of_points
 
 # Keys of the warnings that only measured points, not planned points, can cause.
 OF_SCATTER = ("sections_inhomogeneous", "sections_off_stated")

@@ -20,7 +20,7 @@ from tankcal.job.plausibility import (
     side_doubt,
 )
 from tankcal.messages import message
-from tankcal.pipeline.survey_warnings import origin_of
+from tankcal.pipeline.checks.survey import origin_of
 
 NEAR_FOOT_M = 0.3  # largest distance of a point that represents the wall at the foot of the dip
 

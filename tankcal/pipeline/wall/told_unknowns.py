@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from tankcal.pipeline.untied_setups import offsets_then_poses, size_of
+from tankcal.pipeline.wall.untied_setups import offsets_then_poses, size_of
 from tankcal.sections import circle_by_coordinates, coordinates_of
 
 SURE = 0.1  # largest standard deviation of a determined combination, in its prior range

@@ -10,8 +10,8 @@ from tankcal.geometry.field.estimate import WallField
 from tankcal.geometry.field.section_noise import noise_of_sections
 from tankcal.geometry.shell import Shell
 from tankcal.pipeline.read_wall import ReadWall
-from tankcal.pipeline.told_unknowns import ToldUnknowns
-from tankcal.pipeline.undecided_columns import factors_of_undecided
+from tankcal.pipeline.wall.told_unknowns import ToldUnknowns
+from tankcal.pipeline.wall.undecided_columns import factors_of_undecided
 from tankcal.pipeline.wall_readings import (
     factors_of_plates,
     factors_of_readings,

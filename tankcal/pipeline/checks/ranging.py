@@ -4,7 +4,7 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.pipeline.survey_limits import limits_of
+from tankcal.pipeline.checks.survey_limits import limits_of
 
 RULES = "wall_hits"
 UNLIKE_SDS = 3.0  # largest deviation of an offset or scale from its certificate, in sds

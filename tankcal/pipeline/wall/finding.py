@@ -16,29 +16,29 @@ from tankcal.geometry.outlines import polar
 from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
 from tankcal.messages import Message, message
 from tankcal.methods.base import completing_method, given_methods, is_sighted
-from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
-from tankcal.pipeline.point_covariance import given_covariance, median_sd, radial_sds
-from tankcal.pipeline.section_homogeneity import warn_of_sections
-from tankcal.pipeline.survey_limits import limits_of
-from tankcal.pipeline.survey_warnings import (
+from tankcal.pipeline.checks.homogeneity import warn_of_sections
+from tankcal.pipeline.checks.survey import (
     noise_is_estimated,
     origin_of,
     warn_of_vague_points,
     warn_of_vague_vertical,
 )
-from tankcal.pipeline.surveyed_wall import Wall
-from tankcal.pipeline.told_unknowns import told_unknowns, with_spread
-from tankcal.pipeline.undecided_columns import undecided_halves
-from tankcal.pipeline.untied_setups import unbound_of
-from tankcal.pipeline.wall_readings import noise_by_inputs
-from tankcal.pipeline.wall_straps import PointsOfWall, join_readings, told_courses
-from tankcal.pipeline.wall_warnings import (
+from tankcal.pipeline.checks.survey_limits import limits_of
+from tankcal.pipeline.checks.wall import (
     ADVISED_POINTS,
     FEWEST_POINTS,
     check_shell,
     warn_of_taper,
     weak_sections,
 )
+from tankcal.pipeline.overruling.points import decisions_of, refuse_kept
+from tankcal.pipeline.wall.point_covariance import given_covariance, median_sd, radial_sds
+from tankcal.pipeline.wall.surveyed import Wall
+from tankcal.pipeline.wall.told_unknowns import told_unknowns, with_spread
+from tankcal.pipeline.wall.undecided_columns import undecided_halves
+from tankcal.pipeline.wall.untied_setups import unbound_of
+from tankcal.pipeline.wall_readings import noise_by_inputs
+from tankcal.pipeline.wall_straps import PointsOfWall, join_readings, told_courses
 from tankcal.sections import (
     coordinates_of,
     covariance_of,

@@ -4,8 +4,8 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import list_some, message
-from tankcal.pipeline.cross_checks import is_size_declared
-from tankcal.pipeline.nominal_size import allowed_departure_m, inside_radii, nominal_radius_m
+from tankcal.pipeline.checks.cross_checks import is_size_declared
+from tankcal.pipeline.checks.nominal_size import allowed_departure_m, inside_radii, nominal_radius_m
 
 SHOWN = 5  # largest number of names in a message
 

@@ -10,10 +10,10 @@ from tankcal.errors import InputError, Problem, SolutionError
 from tankcal.geometry.cylinders import FittedCylinder, lying_cylinder
 from tankcal.geometry.primitives import fit_sphere
 from tankcal.messages import message
-from tankcal.pipeline.cross_checks import refuse_misfit
-from tankcal.pipeline.overruled_points import decisions_of, refuse_kept
-from tankcal.pipeline.scanned_wall import Fitted, agreeing, offsets, scanned_wall
-from tankcal.pipeline.survey_warnings import origin_of
+from tankcal.pipeline.checks.cross_checks import refuse_misfit
+from tankcal.pipeline.checks.survey import origin_of
+from tankcal.pipeline.overruling.points import decisions_of, refuse_kept
+from tankcal.pipeline.solids.scanned_wall import Fitted, agreeing, offsets, scanned_wall
 from tankcal.sections import covariance_of
 from tankcal.tank.factors import Factor
 from tankcal.tank.surveyed_form import SurveyedForm

@@ -1,0 +1,1 @@
+"""Warnings about a survey: agreement of readings, sizes, set-ups, the wall and its noise."""

@@ -1,0 +1,1 @@
+"""Manual decisions against the outlier search: their effect on points and on the result."""

@@ -1,0 +1,1 @@
+"""Horizontal cylinders and spheres fitted to points."""

@@ -1,0 +1,1 @@
+"""Upright wall from points: separation from clutter, field, sections, shape."""
