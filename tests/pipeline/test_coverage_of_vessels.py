@@ -21,7 +21,7 @@ from tankcal.pipeline.tanks import body_of
 from tankcal.tank.capacity import Capacity
 
 LEAST_HELD, DELIVERED = 0.94, 0.3  # of the highest dip
-MOST_WIDE_OF_RINGS = 3.0  # mean U over 1.96 rms errors of the full tank; 3.9 before R counted
+MOST_WIDE_OF_RINGS = 2.0  # mean U over 1.96 rms errors of the full tank
 
 
 def ellipse_below(a, b, height):

@@ -34,7 +34,7 @@ SMALLEST = 1e-8  # keeps the remainder of a covariance without its modelled part
 NEAR_M = 0.02  # azimuths within this distance along the arc count as equal for the common form
 WIDE_M = 1.0  # prior sd of a shared unknown about its first estimate (practically free)
 MOST_FOLLOWED = 80  # largest number of values of the common form over all courses
-BULGES = np.array([one.shape == "mean" and one.orders != "joints" for one in COMPONENTS])
+BULGES = np.array([one.shape == "mean" for one in COMPONENTS])
 MOST_ASKED = 200  # readings used of a course: each step of a search inverts their covariance
 
 
@@ -68,7 +68,7 @@ class Amplitudes:
         return 2 / self.noise_log_sd**2 if self.noise_log_sd else np.inf
 
     def scale_bulges(self, scale):
-        """Return amplitudes with those of bulges and tapers multiplied by a scale."""
+        """Return amplitudes with those of bulges, joints and tapers multiplied by a scale."""
         return replace(self, likely_m2=np.where(BULGES, scale**2, 1.0) * self.likely_m2)
 
     def assumed_share(self):

@@ -39,8 +39,8 @@ class Sites:
     smoothed : bool
         Whether the readings show the wall smoother than it is; see `components.log_covariance`.
     bulge_scale : float
-        Prior amplitudes of bulges and tapers of this wall, relative to `components.COMPONENTS`.
-        Joints are not scaled: the shrinkage of a weld depends on the plate, not on R.
+        Prior amplitudes of bulges, drawn-in joints and tapers of this wall, relative to
+        `components.COMPONENTS`.
     """
 
     course: np.ndarray

@@ -27,7 +27,11 @@ from tankcal.survey.strapping import reduce_straps, tapes_used
 from tankcal.tank.factors import Factor
 from tankcal.tank.rings import WAVES
 
-UPRIGHT_M = 7.5  # radius of the measured shell; bulges scale with the square root of the radius
+# Radius of the measured shell, m. Bulges and drawn-in joints of rings scale with the square root of
+# the radius R. A girth weld that shrinks with the force F draws a plate of thickness t in by
+# F beta R / (2 E t) with beta = (3 (1 - nu^2))^(1/4) / sqrt(R t), the ring load of a long cylinder;
+# a residual strain moves the plate in proportion to R, and filling in proportion to R^2.
+UPRIGHT_M = 7.5
 FLATTENED = 0.5  # share of the variance round a ring due to its weight on saddles
 KIND_OF_WAVES = {"oval": "ovality", "seam": "seams"}
 
