@@ -3,7 +3,7 @@
 from collections import Counter
 
 from tankcal.report import blocks
-from tankcal.report.batch import STATUSES
+from tankcal.report.batch.paper import STATUSES
 from tankcal.report.saved_paper import bearable
 from tankcal.report.tables import Column, Table
 from tankcal.report.workbook.book import workbook_head
