@@ -55,6 +55,7 @@ def test_input_cells_have_names_and_prompts(record, language, tmp_path):
     open_cells = [
         (sheet.title, cell.coordinate)
         for sheet in book
+        if sheet.title != load_words(language)["workbook"]["sheets"]["quantity"]
         for row in sheet
         for cell in row
         if not cell.protection.locked
@@ -81,7 +82,8 @@ def test_input_cells_have_names_and_prompts(record, language, tmp_path):
 
 
 OLD = {"IF", "AND", "OR", "NOT", "ISBLANK", "ISNUMBER", "ISLOGICAL", "INDEX", "MATCH", "MIN", "MAX",
-       "ROWS", "ROUND", "CHOOSE", "SUMSQ", "SQRT", "EXP", "NORMSINV", "BETAINV"}  # fmt: skip
+       "ROWS", "ROUND", "CHOOSE", "SUMSQ", "SQRT", "EXP", "NORMSINV", "BETAINV", "LN", "ABS",
+       "SIGN", "INT", "MOD", "COUNT", "SUMPRODUCT", "ISERROR"}  # fmt: skip
 
 
 WITHOUT_READING = {

@@ -19,7 +19,7 @@ SHIPPED = sorted(
     path.stem for path in (shipped_folder("report_templates") / "words").glob("*.toml")
 )
 WORD = re.compile(r"[^\W\d_]{4,}")  # letters: more than a unit or a symbol has
-UNITS = {"ppm", "arcsec"}
+UNITS = {"ppm", "arcsec", "CTSh"}
 
 
 @pytest.fixture(scope="module")

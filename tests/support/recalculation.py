@@ -16,7 +16,10 @@ from tankcal.text.words import translate_record
 FIRST_COLUMN = 6  # of the copies of the calculator: F and on, its own is B
 _CELL = re.compile(r"\bB(\d+)\b")
 _WITH_FORMULAS = ("dip_calculator", "workings")
-_READ = ("capacity", "other_densities", "covariance_factor", *_WITH_FORMULAS)
+_READ = (
+    *("capacity", "other_densities", "covariance_factor", "quantity", "quantity_workings"),
+    *_WITH_FORMULAS,
+)
 
 
 def recalculated(sources, folder):

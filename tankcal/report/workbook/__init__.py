@@ -22,6 +22,7 @@ from tankcal.report.workbook.papers import (
     ship_sheet,
     tables_sheets,
 )
+from tankcal.report.workbook.quantity import quantity_sheets
 from tankcal.report.workbook.survey import (
     adjustment_sheet,
     cameras_sheet,
@@ -38,8 +39,8 @@ from tankcal.text.words import language_of, load_words, translate_record
 
 # Sheets for other programs, which would print on hundreds of pages: hidden.
 _HIDDEN = (
-    *("capacity_mm", "workings", "covariance_factor", "monte_carlo", "points", "adjusted_points"),
-    *("observations", "deviations"),
+    *("capacity_mm", "workings", "quantity_workings", "covariance_factor", "monte_carlo"),
+    *("points", "adjusted_points", "observations", "deviations"),
     *(sheet for method in methods() for sheet in method.hidden_sheets),
 )
 
@@ -86,6 +87,7 @@ def _sheets_of_tank(book, record):
     densities_sheet(book, record)
     millimetres_sheet(book, record)
     calculator_sheets(book, record)
+    quantity_sheets(book, record)
     factor_sheet(book, record)
     tables_sheets(book, record)
     if record.get("ship"):

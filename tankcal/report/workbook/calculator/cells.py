@@ -1,13 +1,14 @@
 """Lines of the two sheets of the calculator, and the addresses in their formulas.
 
-All formulas are in column B and refer to column B, named ranges and constants. In the texts of
-formulas, `[dip]` denotes the cell of the line "dip", and `#within` the number of this sentence.
+All formulas of the calculator are in column B and refer to column B, named ranges and constants. In
+the texts of formulas, `[dip]` denotes the cell of the line "dip", and `#within` the number of this
+sentence.
 """
 
 import re
 from dataclasses import dataclass
 
-from xlsxwriter.utility import quote_sheetname
+from xlsxwriter.utility import quote_sheetname, xl_rowcol_to_cell
 
 from tankcal.text.digits import NOTHING
 
@@ -76,19 +77,25 @@ class Places:
     book : Book
         Workbook.
     rows : dict
-        {key: (code of the sheet, row from 0)}.
+        {key: (code of the sheet, row from 0)}, or with the column as third value.
     sentences : sequence of str
         Keys of the sentences; the first sentence has the number 1.
     """
 
     def __init__(self, book, rows, sentences):
-        self._names = {code: book.sheet_name(code) for code in {code for code, _ in rows.values()}}
+        self._names = {
+            code: book.sheet_name(code) for code in {place[0] for place in rows.values()}
+        }
         self._rows = rows
         self._numbers = {key: number for number, key in enumerate(sentences, start=1)}
 
     def number(self, sentence):
         """Return the number of a sentence."""
         return self._numbers[sentence]
+
+    def place(self, key):
+        """Return sheet, row and, unless it is column B, the column of a cell, from 0."""
+        return self._rows[key]
 
     def row(self, key):
         """Return the row of a line, from 0."""
@@ -98,9 +105,9 @@ class Places:
         """Return a formula with addresses for the sheet with a code."""
 
         def cell(match):
-            code, row = self._rows[match[1]]
+            code, row, *column = self._rows[match[1]]
             place = "" if code == sheet else quote_sheetname(self._names[code]) + "!"
-            return f"{place}B{row + 1}"
+            return place + xl_rowcol_to_cell(row, *(column or (VALUES,)))
 
         numbered = _NUMBER.sub(lambda match: str(self._numbers[match[1]]), text)
         return "=" + _CELL.sub(cell, numbered)

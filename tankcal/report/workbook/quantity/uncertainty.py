@@ -1,0 +1,191 @@
+"""Formulas of U: derivatives of the quantities by each input, and their combination.
+
+Own inputs of a gauging are independent; shared inputs act on the difference closing - opening with
+the difference of both derivatives, and so do the columns of the covariance factor of the table.
+"""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+from tankcal.report.workbook.calculator.coverage import normal, student
+from tankcal.report.workbook.quantity.correction import TYPED
+from tankcal.report.workbook.quantity.rows import NONE, STATES, Cell, Row, state_row
+from tankcal.tank.fittings import AIR_KG_M3, WEIGHTS_KG_M3
+from tankcal.tank.gauging import VCF_AT_K, VCF_PERCENT
+from tankcal.uncertainty import least_of
+
+QUANTITIES = ("tov", "gov", "gsv", "nsv", "mass", "weight")
+OWN = ("dip", "water", "temperature", "interpolation")
+SHARED = ("thermometer", "tape", "ambient", "density", "sw", "expansion", "vcf")
+_INFINITE = "1E+99"  # replaces infinite degrees of freedom
+
+
+def rows(table):
+    """Rows of the derivatives of both gaugings, and of u, k and U of the difference."""
+    interpolation = table.record.get("interpolation")
+    largest_m3 = interpolation["largest_m3"] if interpolation else 0.0
+    block = []
+    for state in STATES:
+        block += _derivatives(state, largest_m3)
+    return [*_scale(), *block, *_table_rows(table), *_combination(table)]
+
+
+def _scale():
+    """Row of the relative standard uncertainty of VCF, as `Transfer._vcf_scale`."""
+    distance, formula = "ABS([liquid@]-[t_b])", ""
+    points = list(zip(VCF_AT_K.tolist(), VCF_PERCENT.tolist(), strict=True))
+    for (low, low_u), (high, high_u) in reversed(list(pairwise(points))):
+        line = f"{low_u!r}+({distance}-{low!r})*{high_u - low_u!r}/{high - low!r}"
+        # The last slope goes on beyond the last point.
+        formula = f"IF({distance}<{high!r},{line},{formula})" if formula else line
+    rule = f"SIGN([liquid@]-[t_b])*({formula})/100/1.96"
+    scale = f"IF(ISBLANK([u_vcf]),{rule},[u_vcf]/100)"
+    return [state_row("scale", "u(VCF)/VCF", f"IF([state@]=#fine,{scale},0)", 0)]
+
+
+def _derivatives(state, interpolation_m3):
+    """Rows of the derivatives of a gauging: an input each, with u in the last column."""
+    by_level = "[tov_slope@]*[ctsh@]+[net@]*[ctsh_h@]"
+    by_shell = "[net@]*[ctsh_t@]"
+    liquid_share = "IF([insulated_code]=1,1,7/8)"
+    by_temperature = f"{by_shell}*{liquid_share}+[fra_rho@]*[rho_b]*[vcf_t@]"
+    rho_slope, vcf_slope = "[rho_ratio]*[rho_b]/[density]", "[vcf_r@]/[density]"
+    by_density = f"[fra_rho@]*({rho_slope}*[vcf@]+[rho_b]*{vcf_slope})"
+    taped = "IF(ISBLANK([ullage@]),[level@],-[ullage@])"
+    by_vcf = "[vcf@]*[scale@]"
+    # {input: (dTOV, dGOV, dVCF, drho_base, dCSW, standard uncertainty)}
+    parts = {
+        "dip": ("[tov_slope@]", by_level, "0", "0", "0", "[u_dip]/1000"),
+        "water": ("0", "-[has_water@]*[water_slope@]*[ctsh@]", "0", "0", "0", "[u_water]/1000"),
+        "temperature": ("0", by_temperature, "[vcf_t@]", "0", "0", "[u_temperature]"),
+        "interpolation": ("1", "[ctsh@]", "0", "0", "0", repr(interpolation_m3 / math.sqrt(3))),
+        "thermometer": ("0", by_temperature, "[vcf_t@]", "0", "0", "[u_thermometer]"),
+        "tape": (f"[tov_slope@]*{taped}", f"({by_level})*{taped}", "0", "0", "0", "[u_tape]/1E6"),
+        "ambient": ("0", f"IF([insulated_code]=1,0,{by_shell}/8)", "0", "0", "0", "[u_ambient]"),
+        "density": ("0", by_density, vcf_slope, rho_slope, "0", "[u_density]"),
+        "sw": ("0", "0", "0", "0", "-1", "IF(ISBLANK([sw]),0,[u_sw]/100)"),
+        "expansion": ("0", "[net@]*[ctsh_a@]", "0", "0", "0", "[u_expansion]"),
+        "vcf": ("0", f"[fra_rho@]*[rho_b]*{by_vcf}", by_vcf, "0", "0", "1"),
+    }  # fmt: skip
+    per_density = f"(1-{AIR_KG_M3!r}/{WEIGHTS_KG_M3!r})"
+    rows = []
+    for name in (*OWN, *SHARED):
+        key = f"{name}_{{}}@"
+        gov, vcf, rho, csw, gsv, nsv = (
+            f"[{key.format(part)}]" for part in ("gov", "v", "rho", "csw", "gsv", "nsv")
+        )
+        by_tov, by_gov, by_v, by_rho, by_csw, u = parts[name]
+        cells = {
+            "tov": by_tov,
+            "gov": by_gov,
+            "gsv": f"[vcf@]*{gov}+[gov@]*{vcf}",
+            "nsv": f"[csw@]*{gsv}+[gsv@]*{csw}",
+            "mass": f"[rho_b]*{nsv}+[nsv@]*{rho}",
+            "weight": f"([rho_b]-{AIR_KG_M3!r})/{per_density}*{nsv}+[nsv@]*{rho}/{per_density}",
+            "v": by_v,
+            "rho": by_rho,
+            "csw": by_csw,
+            "u": u,
+        }
+        rows.append(Row("∂", tuple(
+            Cell(f"{name}_{part}@", f"IF([state@]=#fine,{formula},0)", 0)
+            for part, formula in cells.items()
+        ), "interpolation" if name == "interpolation" else f"u_{name}"))  # fmt: skip
+    return [_fill_state(row, state) for row in rows]
+
+
+def _fill_state(row, state):
+    """Row with the cells of a state in place of "@"."""
+    cells = (
+        Cell(cell.key.replace("@", f"_{state}"), cell.formula.replace("@", f"_{state}"),
+             cell.result)
+        for cell in row.cells
+    )  # fmt: skip
+    return replace(row, cells=tuple(cells))
+
+
+def _table_rows(table):
+    """Rows of degrees of freedom of the table at each dip, and the places in its factor."""
+    groups = [group for group in table.groups() if math.isfinite(group.dof)]
+    least = least_of([group.dof for group in groups])
+
+    def dof(row):
+        if not groups:
+            return _INFINITE
+        every = f"SUMSQ(INDEX(covariance_factor,{row},0))"
+        fourth = "+".join(
+            f"SUMSQ(INDEX(covariance_factor,{row},{group.first + 1}):"
+            f"INDEX(covariance_factor,{row},{group.last + 1}))^2/{group.dof!r}"
+            for group in groups
+        )
+        return f"IF({fourth}>0,MAX({every}^2/({fourth}),{least!r}),{_INFINITE})"
+
+    formula = f"MIN({dof('[tov_row@]')},{dof('[tov_row@]+1')})" if groups else _INFINITE
+    places = [
+        state_row(f"use_{key}", "", f"IF([state@]=#fine,[{key}@],{blank})", blank)
+        for key, blank in (
+            ("tov_row", 1), ("tov_part", 0), ("water_row", 1), ("water_part", 0), ("has_water", 0),
+        )
+    ]  # fmt: skip
+    return [*places, state_row("table_dof", "ν", f"IF([state@]=#fine,{formula},{_INFINITE})",
+                               float(_INFINITE))]  # fmt: skip
+
+
+def _factor(state):
+    """Formula of the row of the covariance factor of TOV - FW of a gauging."""
+
+    def at(key):
+        low, high = (f"INDEX(covariance_factor,[use_{key}_row_{state}]{end},0)"
+                     for end in ("", "+1"))  # fmt: skip
+        return f"({low}*(1-[use_{key}_part_{state}])+{high}*[use_{key}_part_{state}])"
+
+    return f"({at('tov')}-[use_has_water_{state}]*{at('water')})"
+
+
+def _combination(table):
+    """Rows of variance by the table, u, degrees of freedom, k and U, a column per quantity."""
+    is_stock, good = "[level_state_o]=#opening_blank", "[state_c]=#fine"
+    complete = f"AND({good},OR({is_stock},[state_o]=#fine))"
+    probability = table.job["table"]["coverage_probability"]
+    symbols = {"table": "u²(TOV - FW)", "u": "u", "dof": "ν", "k": "k", "U": "U"}
+    parts = {key: [] for key in symbols}
+    has_roof = bool(table.record["roof"])
+    for name in QUANTITIES:
+        by_table = "0"
+        if table.capacity["inputs"]:
+            slopes = [f"[interpolation_{name}_{state}]" for state in STATES]
+            factors = [_factor(state) for state in STATES]
+            by_table = f"SUMPRODUCT(({slopes[1]}*{factors[1]}-{slopes[0]}*{factors[0]})^2)"
+        independent = "+".join(
+            f"SUMPRODUCT((([{OWN[0]}_{name}_{s}]:[{OWN[-1]}_{name}_{s}])"
+            f"*([{OWN[0]}_u_{s}]:[{OWN[-1]}_u_{s}]))^2)"
+            for s in STATES
+        )
+        shared = (
+            f"SUMPRODUCT(((([{SHARED[0]}_{name}_c]:[{SHARED[-1]}_{name}_c])"
+            f"-([{SHARED[0]}_{name}_o]:[{SHARED[-1]}_{name}_o]))"
+            f"*([{SHARED[0]}_u_c]:[{SHARED[-1]}_u_c]))^2)"
+        )
+        variance, dof = f"[table_{name}]", f"[dof_{name}]"
+        effective = f"IF({variance}>0,[u_{name}]^4/({variance}^2/MIN([table_dof_o],[table_dof_c]))"
+        # The uncertainty of a typed factor is not known, so U ends with the observed volume.
+        is_open = name == "tov" or (name == "gov" and not has_roof)
+        known = complete if is_open else f"AND({complete},[correction_code]<>{TYPED})"
+        z = normal(probability)
+        cells = {
+            "table": f"IF({known},{by_table},{NONE})",
+            "u": f"IF({known},SQRT({variance}+{independent}+{shared}),{NONE})",
+            "dof": f"IF({known},{effective},{_INFINITE}),{NONE})",
+            "k": f"IF({known},IF({dof}>1E+15,{z},{student(probability, dof, z)}),{NONE})",
+            "U": f"IF({known},[k_{name}]*[u_{name}],{NONE})",
+        }
+        for key, formula in cells.items():
+            parts[key].append(Cell(f"{key}_{name}", formula))
+    differences = Row("Δ", tuple(
+        Cell(f"moved_{name}",
+             f"IF({complete},[{source}_c]-IF({is_stock},0,[{source}_o]),{NONE})")
+        for name in QUANTITIES
+        for source in ["tov_volume" if name == "tov" else name]
+    ))  # fmt: skip
+    return [differences, *(Row(symbols[key], tuple(cells)) for key, cells in parts.items())]
