@@ -1,6 +1,6 @@
 """Formulas of the volume corrections: checks of the product, density at the base, VCF.
 
-D1250 of 1980 and 2004 have the same form, with d = 0 in 1980:
+D1250 of 1980 and 2004 share their equations, with d = 0 in 1980:
 
     a(r) = K0 / r^2 + K1 / r + K2,   A = d a(r) / 2,   B = -(da/dln r) / a
     r* = r (1 + (exp(A (1 + 0.8 A)) - 1) / (1 + A (1 + 1.6 A) B)),   a* = a(r*)
