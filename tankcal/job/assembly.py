@@ -36,9 +36,9 @@ from tankcal.job.model import (
     Tank,
     Top,
 )
-from tankcal.job.strapping import gauged
 from tankcal.job.structure import structure, to_si
 from tankcal.job.tables import fingerprint, read_beside
+from tankcal.job.tapes import gauged
 from tankcal.messages import message
 from tankcal.tank.rules.model import Rule
 

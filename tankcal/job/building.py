@@ -12,9 +12,7 @@ from tankcal.job.checks.extent import (
     is_sighted,
     is_strapped,
 )
-from tankcal.job.checks.lines import has_lines
 from tankcal.job.contract import COLUMNS, REQUIRED_TABLES, TABLES_OF_KIND
-from tankcal.job.contract.strapping import IN_PLACE
 from tankcal.job.covariance import read_covariance
 from tankcal.job.entries import ColumnValues, kind_of, read_columns, read_register, read_settings
 from tankcal.job.overrulings import make_overrulings
@@ -22,7 +20,6 @@ from tankcal.job.rule_files import find_rule
 from tankcal.job.tables import (
     COVARIANCE_FILE,
     REGISTERS,
-    STRAPPING_TABLES,
     SURVEY_TABLES,
     TABLES,
     TANK_TABLES,
@@ -30,6 +27,9 @@ from tankcal.job.tables import (
 )
 from tankcal.messages import message
 from tankcal.methods.base import methods, methods_for
+
+# Columns of upright tanks, with the columns that lying tanks have in their place.
+IN_PLACE = {"course": "ring", "level_m": "from_a_m"}
 
 
 def job_of(raw, log, is_whole=True):
@@ -69,31 +69,13 @@ def job_of(raw, log, is_whole=True):
         frame = make_frame(raw, values, tables, measurements, tuple(log.warnings))
         return replace(frame, overrulings=overrulings)
     job = make_job(raw, values, tables, attached, measurements, tuple(log.warnings))
-    surveys = _make_surveys(raw, values, tables, registers)
-    by_method = {}
+    by_attribute, by_method = {}, {}
     for method in methods_for(kind_of(raw)):  # two methods may share a table
         if method.is_given(tables):
             readings = method.read(values, tables, registers, raw)
-            attributes = by_method if method.attribute is None else surveys
+            attributes = by_method if method.attribute is None else by_attribute
             attributes[method.attribute or method.name] = readings
-    return replace(job, overrulings=overrulings, surveys=by_method, **surveys)
-
-
-def _make_surveys(raw, values, tables, registers):
-    """Measurements other than points, by the attributes of `Job`.
-
-    The modules are imported only if the job has the tables, because they load slowly.
-    """
-    surveys = {}
-    if is_strapped(tables):
-        from tankcal.job.strapping import make_strapping
-
-        surveys["strapping"] = make_strapping(values, tables, registers)
-    if has_lines(tables):
-        from tankcal.job.lines import make_lines
-
-        surveys["lines"] = make_lines(tables, registers)
-    return surveys
+    return replace(job, overrulings=overrulings, surveys=by_method, **by_attribute)
 
 
 def _read_tables(raw, registers, is_whole, log):
@@ -107,8 +89,6 @@ def _read_tables(raw, registers, is_whole, log):
     allowed = None if kind is None else TABLES_OF_KIND[kind]
     if kind is not None and "points" in allowed:
         allowed += SURVEY_TABLES
-    if kind == "vertical":
-        allowed += STRAPPING_TABLES
     for method in methods_for(kind):
         allowed += method.tables + method.shared_tables
     listed = [method for method in methods() if method.register]
@@ -166,7 +146,9 @@ def _tell_missing_tables(raw, tables, kind, log):
         _tell_empty_lists(raw, tables, log)
     # Any measurement of the shape of the wall replaces the points.
     for name in REQUIRED_TABLES.get(kind, ()):
-        is_replaced = name == "points" and (has_shape(tables) or has_lines(tables))
+        is_replaced = name == "points" and (
+            has_shape(tables) or any(method.is_given(tables) for method in methods_for(kind))
+        )
         if name in raw.tables or is_replaced:
             continue
         lists = [table for table in _IN_PLACE_OF_POINTS if table in raw.registers]
@@ -212,9 +194,6 @@ def _tell_empty_lists(raw, tables, log):
 
 _IN_PLACE_OF_POINTS = {
     **{method.readings_table: method.no_rows() for method in methods() if method.no_rows()},
-    "circumferences": message(
-        "no_circumferences", "no rows; expected a reading of the tape on each course at least"
-    ),
 }
 
 

@@ -6,7 +6,6 @@
 import datetime
 
 from tankcal.job.contract import COLUMNS, KEYS
-from tankcal.job.contract.keys import STARTS_OF_STRAPPING
 from tankcal.job.folder import read_folder
 from tankcal.job.sheets import read_workbook
 from tankcal.job.tables import SETTINGS_FILE, WORKBOOK_FILE, Log
@@ -108,8 +107,7 @@ def _starts(section, field):
         return (*map(str, field.choices), "")
     name = f"{section}.{field.name}"
     of_methods = (method.starter_settings(kind) for method in methods() for kind in method.kinds)
-    starts = (STARTS_OF_STRAPPING, *of_methods)
-    given = [start.get(name, "") for start in starts]
+    given = [start.get(name, "") for start in of_methods]
     return [_plain(start, field) for start in ("", field.start, *given)]
 
 

@@ -25,15 +25,11 @@ SURVEY_TABLES = (
     *("horizontal_angles", "vertical_angles", "height_differences", "plumb_lines"),
     *("vectors", "stadia", "correlated_readings"),
 )
-STRAPPING_TABLES = (
-    *("circumferences", "obstructions", "thickness", "tape_checks"),
-    *("lines", "offsets"),
-)
 OVERRULING_TABLES = ("overrulings",)
 # The input files of a record are in this order: first the methods for upright tanks.
 _UPRIGHT = tuple(table for method in methods_for("vertical") for table in method.tables)
 _OTHERS = tuple(table for method in methods() for table in method.tables if table not in _UPRIGHT)
-TABLES = TANK_TABLES + STRAPPING_TABLES + _UPRIGHT
+TABLES = TANK_TABLES + _UPRIGHT
 TABLES += _OTHERS + SURVEY_TABLES + OVERRULING_TABLES
 REGISTERS = {  # name of an entry in each list
     "cameras": "camera",

@@ -15,6 +15,8 @@ from tankcal.entry_points import find_entry_points
 
 GROUP = "tankcal.methods"  # entry points of methods in other distributions
 _BUILT_IN = (
+    "tankcal.methods.strapping:StrappingMethod",
+    "tankcal.methods.lines:LinesMethod",
     "tankcal.methods.hits:HitsMethod",
     "tankcal.methods.tangents:TangentsMethod",
     "tankcal.methods.clouds:CloudsMethod",
@@ -66,6 +68,9 @@ class Method:
         Whether a job with these readings needs no points of the wall.
     completes_survey : bool
         Whether the readings supply the courses that a survey of the wall does not measure.
+    accompanies_points : bool
+        Whether the readings may be joined with points of a wall. `warnings` and `choices` then also
+        deal with the wall of these points.
     is_inside : bool
         Whether the readings, without a survey, are sizes of the inside.
     is_supplement : bool
@@ -84,6 +89,8 @@ class Method:
         Whether overrulings.csv can name a sight by its set-up and row, as a point of the wall.
     compares_size : bool
         Whether `warnings` compares the size of the whole tank with the drawing.
+    comes_last : bool
+        Whether its forms and its instruments follow those of the other methods.
     field_forms : tuple of (tuple of str, int)
         Forms of the field sheets: the tables filled in together, and the rows on a sheet.
     field_facts : tuple of str
@@ -111,6 +118,7 @@ class Method:
     is_sighted = False
     replaces_points = False
     completes_survey = False
+    accompanies_points = False
     is_inside = False
     is_supplement = False
     has_means = False
@@ -119,6 +127,7 @@ class Method:
     names_levels = False
     has_named_points = False
     compares_size = False
+    comes_last = False
     field_forms = ()
     field_facts = ()
     csv_files = ()
@@ -258,6 +267,10 @@ class Method:
         """
         raise NotImplementedError
 
+    def courses_read(self, job):
+        """Names of the courses that these readings determine beside points of other courses."""
+        return set()
+
     def complete(self, job, survey, progress):
         """Survey of a tank from the survey of another method, completed by these readings.
 
@@ -360,6 +373,10 @@ class Method:
         """Dataclass (a `record.schema.Saved`) of the saved part; None: nothing is saved."""
         return
 
+    def is_saved(self, result):
+        """Whether the record of a `Result` has a saved part of this method."""
+        return self.name in result.surveys or self.name in result.sights
+
     def save(self, result):
         """Saved part of a `Result` whose surveys or sights contain this method."""
         raise NotImplementedError
@@ -404,7 +421,7 @@ class Method:
         """Columns (heading, unit, relative width) of the form of its first table."""
         return columns
 
-    def csv_tables(self):
+    def csv_tables(self, record):
         """Tables that are also written as CSV files: {name of the file without .csv: Table}."""
         return {}
 
@@ -454,6 +471,11 @@ def given_methods(job):
 def supplement_of(job):
     """Given method that supplements the survey of a `Job`; None without one."""
     return next((method for method in given_methods(job) if method.is_supplement), None)
+
+
+def accompanying_methods(job):
+    """Methods of a `Job` whose readings may be joined with points of its wall."""
+    return tuple(method for method in given_methods(job) if method.accompanies_points)
 
 
 def is_sighted(job):

@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
     from tankcal.methods.clouds.wall import Clouded
     from tankcal.methods.radii.wall import RadiiWall
+    from tankcal.methods.strapping.wall import StrappedWall
     from tankcal.pipeline.liquid.nominal_wall import NominalWall
     from tankcal.pipeline.liquid.result import LiquidResult
     from tankcal.pipeline.read_wall import ReadWall
     from tankcal.pipeline.solids.scan import Scan
-    from tankcal.pipeline.strapped_wall import StrappedWall
     from tankcal.pipeline.tanks.ship import ShipTables
     from tankcal.pipeline.wall.surveyed import Wall
     from tankcal.pipeline.wall_straps import Straps
@@ -133,7 +133,7 @@ class Result:
     @property
     def strapped(self) -> "StrappedWall | None":
         """Wall of a vertical tank measured by strapping."""
-        return self.surveys.get("strapped")
+        return self.surveys.get("strapping")
 
     @property
     def nominal(self) -> "NominalWall | None":

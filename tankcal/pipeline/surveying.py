@@ -185,10 +185,6 @@ def _survey(job, progress, network):
     for method in given_methods(job):
         if method.finds(job):
             return method.find(job, progress, network).survey
-    if job.strapping is not None and job.points is None:
-        from tankcal.pipeline.strapped_wall import find_strapped_wall
-
-        return find_strapped_wall(job, progress, network.amplitudes)
     if job.tank.kind == "vertical":
         return find_wall(job, progress, network.dof, network.amplitudes)
     if job.mesh is not None:

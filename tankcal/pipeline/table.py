@@ -9,7 +9,7 @@ import numpy as np
 
 from tankcal.geometry.field.cells import MOST_SITES
 from tankcal.messages import message
-from tankcal.methods.base import given_methods, method_of
+from tankcal.methods.base import accompanying_methods, given_methods, method_of
 from tankcal.pipeline.checks.cross_checks import check_mesh, check_scan, check_wall
 from tankcal.pipeline.checks.nominal_size import check_size
 from tankcal.pipeline.checks.survey import against_nominal, warn_of_undeclared
@@ -188,50 +188,24 @@ def _check_sights(job, survey, sighting):
 
 
 def _check_survey(job, survey, top_m):
-    """Warnings about a survey, by its kind."""
-    method, kind = method_of(survey), None if survey is None else survey.surveyed_as
-    if method is not None:
-        return method.warnings(job, survey)
-    if kind == "wall":
-        return _check_wall_of_points(job, survey)
-    if kind == "strapped":
-        from tankcal.pipeline.strapping_checks import check_strapped
-
-        return (*check_strapped(job, survey), *_check_reference_lines(job, survey))
-    if kind == "scan":
-        return check_scan(job, survey, top_m)
-    return () if survey is None else check_mesh(job, top_m)
-
-
-def _check_wall_of_points(job, wall):
-    """Warnings about a wall surveyed by points, with its straps and reference lines."""
-    from tankcal.pipeline.wall.finding import warnings_of
-
-    straps_problems = lean_problems = ()
-    if wall.straps is not None:
-        from tankcal.pipeline.strapping_checks import check_straps_beside_points
-
-        straps_problems = check_straps_beside_points(job, wall)
-    if job.lines is not None:
-        from tankcal.pipeline.line_checks import check_leans
-
-        lean_problems = check_leans(job, wall)
-    return (
-        *warnings_of(job, wall),
-        *check_wall(job, wall),
-        *straps_problems,
-        *_check_reference_lines(job, wall.read),
-        *lean_problems,
-    )
-
-
-def _check_reference_lines(job, wall):
-    """Warnings about reference lines."""
-    if job.lines is None:
+    """Warnings about a survey, and about the readings that accompany it."""
+    if survey is None:
         return ()
-    from tankcal.pipeline.line_checks import check_lines
+    method = method_of(survey)
+    if method is not None:
+        problems = method.warnings(job, survey)
+    elif survey.surveyed_as == "wall":
+        from tankcal.pipeline.wall.finding import warnings_of
 
-    return check_lines(job, wall)
+        problems = (*warnings_of(job, survey), *check_wall(job, survey))
+    elif survey.surveyed_as == "scan":
+        return check_scan(job, survey, top_m)
+    else:
+        return check_mesh(job, top_m)
+    for other in accompanying_methods(job):
+        if other is not method:
+            problems = (*problems, *other.warnings(job, survey))
+    return problems
 
 
 def _remove_rounding(volumes, areas, sources):

@@ -17,6 +17,7 @@ from tankcal.geometry.field.components import COMPONENTS, ROUND_SHAPES
 from tankcal.geometry.field.estimate import LEVELS, WallField
 from tankcal.geometry.field.sites import Sites
 from tankcal.geometry.girth import Ring, perimeter_excess, seen_excess
+from tankcal.methods.base import accompanying_methods
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.tanks import insets_of
 from tankcal.pipeline.wall.untied_setups import Unbound
@@ -202,14 +203,12 @@ class PointsOfWall:
 
 def told_courses(job, seen):
     """Indices of the courses measured by points (the set `seen`), straps or reference lines."""
-    place, strapped, of_lines = {course.name: i for i, course in enumerate(job.courses)}, (), ()
-    if job.strapping is not None:
-        strapped = (strap.course for strap in job.strapping.straps if not strap.check)
-    if job.lines is not None:
-        of_lines = (offset.course for offset in job.lines.offsets if not offset.check)
-    return courses_with_radius(
-        seen, {place[strap] for strap in strapped}, {place[offset] for offset in of_lines}
-    )
+    place = {course.name: i for i, course in enumerate(job.courses)}
+    strapped, of_lines = set(), set()
+    for method in accompanying_methods(job):
+        courses = strapped if method.replaces_points else of_lines
+        courses.update(place[name] for name in method.courses_read(job))
+    return courses_with_radius(seen, strapped, of_lines)
 
 
 def join_readings(job, points, amplitudes, joints_m, *, is_known):

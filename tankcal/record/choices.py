@@ -3,7 +3,7 @@
 import numpy as np
 
 from tankcal.adjust import CRITICAL
-from tankcal.methods.base import given_methods, supplement_of
+from tankcal.methods.base import accompanying_methods, given_methods
 from tankcal.pipeline.tanks import as_surveyed
 from tankcal.record.schema import Saved, key
 from tankcal.record.table import zero_of
@@ -25,19 +25,22 @@ class Choice(Saved):
 def choices_of(result):
     """Return the `Choice`s of a result: all its assumptions."""
     job, survey = result.job, next(iter(result.surveys.values()), None)
-    of_methods = _choices_of_supplements(result)
-    of_methods |= _choices_of_methods(result, ("vertical", "horizontal"))
+    of_methods, of_solids = {}, {}
+    is_early = job.tank.kind in ("vertical", "horizontal")
+    for method in given_methods(job):
+        # A record of a sphere has the choices on its survey after those on its temperature.
+        choices = of_methods if is_early or method.is_supplement else of_solids
+        choices |= method.choices(result)
     # A record states these choices after those on the wall.
     later = {code: of_methods.pop(code) for code in _OF_EVERY_TANK if code in of_methods}
     values = {
         "zero": zero_of(result),
         **(_shell_choices(job, result) if result.wall is not None else {}),
-        **(_strap_choices(job) if result.strapped is not None else {}),
         **of_methods,
         **({"form": "learned"} if result.scan is not None and job.horizontal is not None else {}),
         "thickness": _thickness_choice(job, result),
         "temperature": _temperature_choice(job),
-        **_choices_of_methods(result, ("sphere",)),
+        **of_solids,
         **_sphere_choices(job),
         "height_expansion": "yes" if job.table.height_expansion else "no",
         "head": _head_choice(as_surveyed(job, survey)),
@@ -111,49 +114,9 @@ def _survey_choices(job, result):
     choices = {"covariance": _covariance_choice(job) if result.adjustment is None else "adjusted"}
     for method in given_methods(job):
         choices = method.choices(result) if method.is_sighted else choices
-    if result.straps is not None:
-        choices["straps"] = "beside_points"
-    if job.lines is not None:
-        choices["lines"] = "beside_points"
+    for method in accompanying_methods(job):
+        choices |= method.choices(result)
     return choices
-
-
-def _strap_choices(job):
-    """Return the choices on a strapped shell, also with offsets from reference lines."""
-    return {
-        "bottom": bottom_choice(job),
-        "survey": "strapping" if job.lines is None else "reference_line",
-        "area_term": _area_term_choice(job.strapping.shape_sd_m),
-        **top_choice(job),
-        "between_sections": "cylinders" if job.lines is None else "revolution",
-        "tilt": "not_measured" if job.lines is None else "not_applied",
-        "course_heights": "along_axis",
-        "roof": roof_choice(job),
-        "form": "learned",
-    }
-
-
-def _area_term_choice(shape_sd_m):
-    if shape_sd_m is None:
-        return "assumed"
-    return "none" if shape_sd_m == 0 else 1000 * shape_sd_m
-
-
-def _choices_of_methods(result, kinds):
-    """Assumptions of the methods of a job, if its tank is of these kinds.
-
-    A record of a sphere has them at another place than the records of other tanks.
-    """
-    choices = {}
-    for method in given_methods(result.job) if result.job.tank.kind in kinds else ():
-        choices |= {} if method.is_supplement else method.choices(result)
-    return choices
-
-
-def _choices_of_supplements(result):
-    """Assumptions of a method that supplements the survey of any tank."""
-    method = supplement_of(result.job)
-    return {} if method is None else method.choices(result)
 
 
 def _sphere_choices(job):

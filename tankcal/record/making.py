@@ -21,11 +21,9 @@ from tankcal.pipeline.tanks.corrections import Correction
 from tankcal.record import survey, table, tank_parts, texts
 from tankcal.record.adjustment import AdjustmentRecord, adjustment_of
 from tankcal.record.choices import Choice, adjustment_choices, choices_of
-from tankcal.record.lines import LinesRecord, lines_of
 from tankcal.record.long_tables import LongTables
 from tankcal.record.schema import Saved, fill_from, key, to_plain
 from tankcal.record.ship import ShipRecord, ship_of
-from tankcal.record.strapping import StrappingRecord, strapping_of
 from tankcal.record.versions import FORMAT
 from tankcal.record.wall_shape import WallShapeRecord, shape_record
 from tankcal.tank.deliveries import WorstDeliveries
@@ -88,12 +86,6 @@ class Record(Saved, kw_only=True):
         "of the noise of the sections; left out if no section has independent noise",
         default=None,
         optional=True,
-    )
-    strapping: StrappingRecord | None = key(
-        "circumferences by tape; left out if there are none", default=None, optional=True
-    )
-    lines: LinesRecord | None = key(
-        "reference lines; left out if there are none", default=None, optional=True
     )
     surveys: dict = key(
         "saved part of each method", default_factory=dict, parts=saved_parts_of_methods
@@ -159,8 +151,6 @@ def record_of(result):
             overrulings=survey.overrulings_of(result),
             sections=survey.sections_of(result),
             homogeneity=survey.homogeneity_record(job, result.wall),
-            strapping=strapping_of(result),
-            lines=lines_of(result),
             ship=ship_of(result),
             surveys=surveys_of(result),
             courses=survey.courses_of(result),
@@ -189,10 +179,9 @@ def record_of(result):
 
 
 def surveys_of(result):
-    """Saved part of each method whose survey or sights a result contains, by its name."""
-    found = {**result.surveys, **result.sights}
-    saved = [name for name in saved_parts_of_methods() if name in found]
-    return {name: find_method(name).save(result) for name in saved}
+    """Saved part of each method, by its name."""
+    named = ((name, find_method(name)) for name in saved_parts_of_methods())
+    return {name: method.save(result) for name, method in named if method.is_saved(result)}
 
 
 def record_of_adjustment(job, adjustment):

@@ -14,7 +14,6 @@ from tankcal.report.tables.facts import (
     SURVEY_DATE,
     tank_facts,
 )
-from tankcal.report.tables.strapping import certificates_of_tapes
 
 TO_WRITE_ON = ""  # value that the page style prints as a blank line
 # Entries of [certificate] that other parts of the paper print.
@@ -110,18 +109,12 @@ def _instruments(paper):
 def instruments_of(record):
     """Return {instrument: certificate or None} of all instruments of a record."""
     adjustment = record["adjustment"]
-    strapping, lines = (record.get(key) for key in ("strapping", "lines"))
     used = {}
     for entry in adjustment["instruments"] if adjustment else ():
         used[entry["instrument"]] = entry["details"].get("certificate")
-    for entry in lines["plummets"] if lines else ():
-        if entry["plummet"]:  # None: the job does not describe the plummet
-            used[entry["plummet"]] = entry["certificate"]
-    for method in methods():
+    for method in sorted(methods(), key=lambda method: method.comes_last):
         if record.get(method.name):
             used |= method.certificates(record[method.name])
-    if strapping:
-        used |= certificates_of_tapes(strapping["tapes"])
     return used
 
 

@@ -1,7 +1,6 @@
 """Field sheets of a starter job: empty tables of readings to fill in by hand on site."""
 
 from tankcal.job.contract import columns_of, tables_of_survey
-from tankcal.job.starter.form import STRAPPED
 from tankcal.job.starter.texts import split_unit, texts_in
 from tankcal.methods.base import Method, methods, methods_for
 from tankcal.report import blocks
@@ -9,21 +8,16 @@ from tankcal.report.plain import PlainPaper
 
 FILE = "field-sheets.pdf"
 # Surveys recorded by hand.
-BY_PEN = (
-    *STRAPPED,
-    *(method.starter for method in methods_for("vertical") if method.field_forms),
-)
+BY_PEN = (*(method.starter for method in methods_for("vertical") if method.field_forms),)
 FORMS = (  # input tables of each form, read together, and the number of rows on a sheet
-    (("lines",), 12),
-    (("offsets",), 30),
     (("setups",), 9),
     (("stadia",), 6),
     (("directions", "zenith_angles", "slope_distances"), 30),
-    *(form for method in methods() for form in method.field_forms),
-    (("circumferences",), 15),
-    (("obstructions",), 9),
-    (("thickness",), 8),
-    (("tape_checks",), 4),
+    *(
+        form
+        for method in sorted(methods(), key=lambda method: method.comes_last)
+        for form in method.field_forms
+    ),
 )
 ROWS_BESIDE = {("tangents", "directions"): 20}  # rows if another form is on the same page
 # Surveys with heights of the stations above the bottom.

@@ -20,10 +20,22 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tankcal.geometry.form import harmonics
+from tankcal.messages import message
 from tankcal.units import ARCSEC as ARCSEC  # for callers, who state angles in arc seconds
 
 SAME_LEVEL_M = 0.02  # largest difference of heights regarded as one level
 FEWEST_LINES = 4  # lines per level: three for radius and centre, and one redundant
+MOST_OFFSETS = 2000  # largest number of readings of one tank
+
+
+def too_many_offsets(count):
+    """Message about more offsets than can be used."""
+    return message(
+        "too_many_offsets",
+        "{count} offsets; expected at most {most}",
+        count=count,
+        most=MOST_OFFSETS,
+    )
 
 
 @dataclass(frozen=True)

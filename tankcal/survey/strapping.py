@@ -23,6 +23,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tankcal.messages import message
+
 KINDS = ("butt_strap", "weld", "step", "lap", "step_over", "measured", "sag")
 # Values assumed where a job declares none: half-widths of rectangular distributions.
 TAPE_TEMPERATURE_K = 2.0  # of a measured tape temperature
@@ -30,6 +32,17 @@ TENSION_SHARE = 0.1  # of the pull, relative
 FRICTION_SHARE = 0.5  # of the coefficient of friction, relative
 WEIGHT_SHARE = 0.05  # of the weight per metre, relative
 RECTANGULAR = np.sqrt(3.0)
+MOST_STRAPS = 1000  # largest number of readings of one tank
+
+
+def too_many_straps(count):
+    """Message about more circumferences than can be used."""
+    return message(
+        "too_many_straps",
+        "{count} readings; expected at most {most}",
+        count=count,
+        most=MOST_STRAPS,
+    )
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ HEAVY = {  # what a run without papers has no need of, and waits for when it is 
 SURVEYS = {  # of kinds that only some jobs have
     *("tankcal.survey.adjustment", "tankcal.survey.network.results", "tankcal.survey.observations"),
     *(
-        "tankcal.pipeline.strapped_wall",
+        "tankcal.methods.strapping.wall",
         "tankcal.methods.hits.wall",
         "tankcal.pipeline.solids.scan",
     ),
@@ -66,8 +66,8 @@ SURVEYS = {  # of kinds that only some jobs have
     ("example", "needed"),
     [
         ("silva-1995", set()),
-        ("strapping", {"tankcal.pipeline.strapped_wall"}),
-        ("reference-line", {"tankcal.pipeline.strapped_wall"}),
+        ("strapping", {"tankcal.methods.strapping.wall"}),
+        ("reference-line", {"tankcal.methods.strapping.wall"}),
     ],
 )
 def test_a_run_without_papers_loads_only_what_its_job_needs(example, needed, tmp_path):

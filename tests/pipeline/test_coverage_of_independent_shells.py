@@ -24,8 +24,8 @@ from test_coverage_of_walls import ROWS, Found, judged
 from tankcal.errors import TankcalError
 from tankcal.job.plausibility_table import CODES
 from tankcal.methods.hits.wall import find_hit_wall
+from tankcal.methods.strapping.wall import find_strapped_wall
 from tankcal.methods.tangents.wall import touch_wall
-from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.table import check_table, compute_table
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall.finding import find_wall

@@ -15,7 +15,7 @@ from generated_strapping import shape_of
 from generated_walls import make_wall
 from test_coverage_of_walls import judged, least_in_class, study
 
-from tankcal.pipeline.strapped_wall import find_strapped_wall
+from tankcal.methods.strapping.wall import find_strapped_wall
 from tankcal.pipeline.tanks import body_of
 
 LINES = {1: 8, 2: 12, 3: 24}

@@ -16,7 +16,7 @@ from test_coverage_of_walls import ROWS, judged, least_in_class, study
 
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.job.model import DeclaredInput
-from tankcal.pipeline.strapped_wall import find_strapped_wall
+from tankcal.methods.strapping.wall import find_strapped_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import typical_shape_m
 from tankcal.units import FULL_TURN

@@ -20,8 +20,8 @@ from joined_jobs import lines_of, ring_job, sighted, untied_job, whole_job
 from test_coverage_of_walls import judged
 
 from tankcal.methods.hits.wall import sight_wall
+from tankcal.methods.strapping.wall import find_strapped_wall
 from tankcal.methods.tangents.wall import touch_wall
-from tankcal.pipeline.strapped_wall import find_strapped_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall.finding import find_wall
 

@@ -30,7 +30,7 @@ from test_hit_wall import (
 import tankcal
 from tankcal.geometry.field.covariances import Covariances
 from tankcal.geometry.field.likelihood import LEAST_NOISE_M
-from tankcal.pipeline.line_checks import check_leans, compare_leans, levels_and_lean
+from tankcal.methods.lines.warnings import check_leans, compare_leans, levels_and_lean
 from tankcal.units import ARCSEC
 
 KAPPA, COUNT = 15 * ARCSEC, 12

@@ -17,7 +17,7 @@ from radii_jobs import HEIGHTS_M, RADII_M, closed_volume_m3, partial_parts, radi
 import tankcal
 from tankcal.errors import SolutionError
 from tankcal.methods.radii.update import update_radii
-from tankcal.record.strapping import strapping_of
+from tankcal.methods.strapping.saved import save_strapping
 
 EXAMPLES_AT = Path(__file__).resolve().parents[2] / "examples"
 # The page prints +0.028 % for the first: 0.02746 % rounded twice.
@@ -95,7 +95,7 @@ def test_a_job_with_one_course_strapped_again(tmp_path):
 
 def test_the_straps_tell_nothing_of_courses_that_kept_their_former_radius(tmp_path):
     """Former radii are inside; a table of straps took them for outside ones, less plate again."""
-    told = strapping_of(computed(tmp_path, partial_parts(("1", "3")))).courses
+    told = save_strapping(computed(tmp_path, partial_parts(("1", "3")))).courses
     assert [one.course for one in told] == ["1", "3"]
     inside = [one.inside_radius_m for one in told]  # at the survey: by the steel and 11 K more
     assert_allclose(inside, [RADII_M[0], RADII_M[2]], atol=1.5e-3)

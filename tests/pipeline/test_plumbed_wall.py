@@ -9,8 +9,8 @@ from job_builder import plumbed_parts, write_book, write_folder
 import tankcal
 from tankcal.errors import InputError
 from tankcal.geometry.field.sites import free_design
-from tankcal.pipeline.line_checks import least_lines
-from tankcal.pipeline.strapped_wall import find_strapped_wall
+from tankcal.methods.lines.warnings import least_lines
+from tankcal.methods.strapping.wall import find_strapped_wall
 from tankcal.pipeline.tanks import body_of
 from tankcal.units import ARCSEC
 

@@ -10,9 +10,10 @@ from job_builder import S_1, strapped_parts, write_book, write_folder, write_str
 
 import tankcal
 from tankcal.errors import InputError, SolutionError
+from tankcal.methods.strapping.wall import find_strapped_wall
+from tankcal.methods.strapping.warnings import limit_of_repeats
 from tankcal.pipeline.compared_courses import exchanged_courses
-from tankcal.pipeline.strapped_wall import field_of_readings, find_strapped_wall
-from tankcal.pipeline.strapping_checks import limit_of_repeats
+from tankcal.pipeline.taped_wall import field_of_readings
 from tankcal.record import record_of
 from tankcal.survey.strapping import Obstruction
 

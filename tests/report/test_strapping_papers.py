@@ -7,11 +7,11 @@ import pytest
 from job_builder import strapped_parts, write_folder
 
 import tankcal
+from tankcal.methods.strapping.tables import STRAPS, strapped_courses_of, straps_of
 from tankcal.record import load as load_record
 from tankcal.record import read
 from tankcal.report.outputs import write
 from tankcal.report.paper import Paper
-from tankcal.report.tables.strapping import STRAPS, strapped_courses_of, straps_of
 from tankcal.text.words import load_words
 
 

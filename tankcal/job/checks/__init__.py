@@ -16,10 +16,8 @@ from tankcal.job.checks.extent import (
     wall_of,
 )
 from tankcal.job.checks.geometry import check_cylinder, check_scan
-from tankcal.job.checks.lines import check_lines
 from tankcal.job.checks.plausible import check_plausible
 from tankcal.job.checks.settings import check_settings, check_steps
-from tankcal.job.checks.strapping import check_strapping
 from tankcal.job.checks.survey import check_survey
 from tankcal.job.checks.tiny_sds import check_tiny_sds
 from tankcal.job.contract.bottom import check_bottom
@@ -61,9 +59,6 @@ def check_all(values, tables, registers, raw, is_whole, log):
     """
     if is_whole:
         check_tank(values, tables, raw, log)
-        if kind_of(raw) == "vertical":
-            check_strapping(values, tables, registers, raw, log)
-            check_lines(values, tables, registers, raw, log)
         for method in methods_for(kind_of(raw)):
             method.check(values, tables, registers, raw, log)
         check_tiny_sds(tables, registers, raw, log)

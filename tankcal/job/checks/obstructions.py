@@ -1,8 +1,16 @@
 """Checks of the obstructions of a tape: required lengths, plausible dimensions."""
 
-from tankcal.job.contract.strapping import NEEDED
 from tankcal.messages import message
 
+NEEDED = {  # columns required for each kind of obstruction
+    "butt_strap": ("thickness_mm", "width_mm"),
+    "weld": ("thickness_mm", "width_mm"),
+    "step": ("thickness_mm",),
+    "lap": ("thickness_mm",),
+    "step_over": ("over_mm", "arc_mm"),
+    "measured": ("excess_mm",),
+    "sag": ("span_m",),
+}
 THICK_WELD_MM = 5.0  # highest weld reinforcement
 # Obstructions at the vertical seams of plates, and the shortest plate.
 ONE_A_PLATE, LEAST_PLATE_M = ("butt_strap", "weld", "lap"), 1.2

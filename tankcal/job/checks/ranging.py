@@ -1,6 +1,6 @@
 """Instruments of a job that measure distances, and the set-ups that use them."""
 
-from tankcal.job.checks.strapping import tapes_of
+from tankcal.job.checks.tapes import tapes_of
 
 RANGE_NOTHING = ("plummet", "stadia", "level")  # kinds of instruments without a distance
 

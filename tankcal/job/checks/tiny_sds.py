@@ -12,7 +12,6 @@ from tankcal.methods.base import methods
 
 LEAST = {"s_mm": 0.02, "s_arcsec": 0.02}  # smallest sd of a scale or circle
 SURE = {"s_mm": 0.002, "s_arcsec": 0.002}  # smaller values are in metres or degrees
-READ = ("circumferences", "offsets")
 
 
 def check_tiny_sds(tables, registers, raw, log):
@@ -25,7 +24,7 @@ def check_tiny_sds(tables, registers, raw, log):
         (log.problem if smallest < SURE[column] else log.warning)(*details)
 
     of_methods = (name for method in methods() for name in method.tables_with_sds)
-    for name in (*READ, *of_methods, "tape_checks"):
+    for name in (*of_methods, "tape_checks"):
         table = tables.get(name)
         if not has_rows(table):
             continue

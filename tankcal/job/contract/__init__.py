@@ -9,14 +9,12 @@ from tankcal.job.contract import (
     correlations,
     courses,
     deadwood,
-    lines,
     overrulings,
     points,
     roof,
     ship,
     stadia,
     stated,
-    strapping,
     top,
     uncertainty,
     welds,
@@ -42,20 +40,20 @@ SECTIONS = (
 )
 _TABLES = (points, courses, welds, bottom, deadwood, uncertainty, correlations, stated)
 COLUMNS = {table.__name__.rpartition(".")[2]: table.COLUMNS for table in _TABLES}
-COLUMNS |= strapping.COLUMNS | lines.COLUMNS | stadia.COLUMNS
+COLUMNS |= stadia.COLUMNS
 for _method in methods():
     COLUMNS |= _method.columns()
     REGISTER_KEYS |= _method.register_fields()
 COLUMNS |= SURVEY_COLUMNS | overrulings.COLUMNS
-_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS | strapping.KEYS
+_KEYS = COMMON_KEYS | PART_KEYS | LYING_KEYS
 _KEYS |= {"bottom": bottom.KEYS, "top": top.KEYS, "roof": roof.KEYS, "ship": ship.KEYS}
 for _method in methods():
     _KEYS |= _method.settings()
 KEYS = {section: _KEYS[section] for section in SECTIONS}
 
 SURVEYS = ADJUSTED_SURVEYS | {
-    "strapping": tuple(strapping.COLUMNS),
-    "reference-line": (*lines.COLUMNS, *strapping.COLUMNS),
+    "strapping": (),
+    "reference-line": (),
     "wall-hits": (),  # filled in below, as for each survey of a method
     "triangulation": (*stadia.COLUMNS, *stadia.BESIDE),
     "tangents": (),

@@ -328,6 +328,3 @@ KEYS = {
     "certificate": CERTIFICATE,
     "csv": CSV,
 }
-
-# Values that starter forms of these surveys contain, in place of `start`.
-STARTS_OF_STRAPPING = {"survey.side": "outside", "datum.bottom_z_m": "0.0"}

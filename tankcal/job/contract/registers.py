@@ -2,14 +2,53 @@
 
 from tankcal.camera.comparator import KINDS as TRANSFORMATIONS
 from tankcal.camera.model import AFFINITIES, CONVENTIONS
-from tankcal.job.contract.lines import PLUMMET
 from tankcal.job.contract.ranging import RANGING
-from tankcal.job.contract.shorthand import FREE
+from tankcal.job.contract.shorthand import FREE, number
 from tankcal.job.contract.stadia import BAR
-from tankcal.job.contract.strapping import TAPE
 from tankcal.job.fields import Field
 from tankcal.survey.network.survey import STATES
 
+TAPE = (  # keys of instruments.toml for tapes
+    number("thickness_mm", "thickness of a tape for strapping, millimetres", 0, 5),
+    number(
+        "section_mm2",
+        "cross-section of a tape, mm²; with e_gpa it determines the stretch",
+        0.1,
+        100,
+    ),
+    number("e_gpa", "Young's modulus of a tape, GPa", 1, 500),
+    number(
+        "friction",
+        "coefficient of friction between tape and shell; blank: a tension is the mean round the"
+        " tank",
+        0,
+        1,
+    ),
+    number(
+        "laying_mm",
+        "standard deviation of the reading from the lay of the tape in each pull, millimetres",
+        0,
+        50,
+    ),
+    number(
+        "weight_n_per_m",
+        "weight of a metre of a tape, newtons; needed if the tape hangs free (sag in"
+        " obstructions.csv)",
+        0.01,
+        5,
+    ),
+    Field("master", "name", "master tape compared with this tape in tape_checks.csv"),
+)
+PLUMMET = (  # keys of instruments.toml for plummets
+    Field(
+        "u_collimation_arcsec",
+        "number",
+        "standard uncertainty of the verticality of a plummet's line, seconds of arc; blank:"
+        " estimated from its two faces",
+        low=0,
+        high=3600,
+    ),
+)
 INSTRUMENT_KINDS = ("tape", "edm", "total_station", "theodolite", "level", "plummet", "stadia")
 # Key in cameras.toml and largest magnitude of each parameter of tankcal.camera.model.
 PARAMETER_KEYS = {
@@ -269,8 +308,6 @@ REGISTER_KEYS = {
 REGISTERS_OF_SURVEY = {
     "photos": ("cameras", "instruments"),
     "total-station": ("instruments",),
-    "strapping": ("instruments",),
-    "reference-line": ("instruments",),
     "triangulation": ("instruments",),
 }
 # Keys of [adjustment] that require photographs.

@@ -13,7 +13,6 @@ from tankcal.job.contract import (
     TABLES_OF_KIND,
     tables_of_survey,
 )
-from tankcal.job.contract.keys import STARTS_OF_STRAPPING
 from tankcal.job.contract.uncertainty import UNITS
 from tankcal.job.fields import Field
 from tankcal.methods.base import methods, methods_for
@@ -21,9 +20,7 @@ from tankcal.text.languages import DEFAULT, LANGUAGES
 
 STRAPPED = ("strapping", "reference-line")  # surveys without an adjustment of points
 # Surveys for vertical tanks; for other kinds see SURVEYS_OF_KIND.
-OF_SHELLS = (
-    *STRAPPED, *(method.starter for method in methods_for("vertical")),
-)  # fmt: skip
+OF_SHELLS = tuple(method.starter for method in methods_for("vertical"))
 OF_GREAT_CIRCLES = (("sphere", "ovality_mm"), ("sphere", "form_mm"))
 # Marks of CSV files from spreadsheets in these languages.
 DECIMAL_COMMAS = {"separator": ";", "decimal": ","}
@@ -107,10 +104,6 @@ class Form:
             starts = method.starter_settings(self.kind) if method.starter == self.survey else {}
             if f"{section}.{field.name}" in starts:
                 return starts[f"{section}.{field.name}"]
-        if self.survey in STRAPPED and self.kind == "sphere":
-            return field.start if (section, field.name) != ("survey", "side") else "outside"
-        if self.survey in STRAPPED:
-            return STARTS_OF_STRAPPING.get(f"{section}.{field.name}", field.start)
         return field.start
 
     def is_to_fill_in(self, section, field):
@@ -143,19 +136,15 @@ class Form:
     def _has(self, section, field):
         if field.of_survey and self.survey is None:
             return False
-        if section in ("shell", "strapping") and self.survey not in STRAPPED:
-            return False
         if (section, field.name) in OF_GREAT_CIRCLES and self.survey not in STRAPPED:
             return False
-        if section.startswith("adjustment") and self.survey in STRAPPED:
-            return False
-        if any(section in method.settings() and self.survey != method.starter
-               for method in methods()):  # fmt: skip
-            return False
-        starting = (method for method in methods() if method.starter == self.survey)
+        starting = [method for method in methods() if method.starter == self.survey]
         if section.startswith("adjustment") and not all(
             method.starter_has_network for method in starting
         ):
+            return False
+        owners = [method for method in methods() if section in method.settings()]
+        if owners and not set(owners) & set(starting):
             return False
         of_photos = section == "adjustment.camera" or field.name in OF_PHOTOS
         return field.suits(self.kind) and (self.survey == "photos" or not of_photos)

@@ -39,10 +39,6 @@ SECTION_NOTES = {
     "roof": "the floating roof: all of it, or nothing when there is none",
     "corrections": "false switches a correction off, and the report says so",
     "material": "the shell's steel",
-    "shell": "how far the wall is from a circle",
-    "strapping": "how the tape lay",
-    "radii": "the radii of radii.csv: where they come from, and how well they are known",
-    "change": "only beside a new survey of some courses: how far the radii may have changed since",
     "checks": "only compared, to tell a slip of the hand: nothing here changes a number",
     "inspection": "only for tankcal inspect: no capacity depends on it",
     "adjustment": "how bad points are treated, and what holds the frame of a survey",
@@ -65,12 +61,6 @@ TABLE_NOTES = {
     " budget; may stay empty",
     "overrulings": "one row for each point or reading that was decided by hand against the search"
     " for blunders; may stay empty",
-    "circumferences": "one row for each reading of the tape round the tank",
-    "obstructions": "one row for each kind of obstacle on the way of a circumference; may stay"
-    " empty",
-    "thickness": "one row for each reading of a gauge of plates; may stay empty",
-    "tape_checks": "one row for each comparison of the working tape with its master; may stay"
-    " empty",
     "targets": "one row for each target of the wall; may stay empty: the wall is then searched",
     "photos": "one row for each photo; orientations may stay blank, they are found",
     "image_points": "one row for each image of a point; a repeated row is a repeated reading",
@@ -85,8 +75,6 @@ TABLE_NOTES = {
     "plumb_lines": "one row for each pair of points on one vertical line; may stay empty",
     "vectors": "one row for each vector between two points (GNSS); may stay empty",
     "correlated_readings": "one row for each pair of values that are correlated; may stay empty",
-    "lines": "one row for each vertical line of sight round the tank",
-    "offsets": "one row for each reading of the wall's offset; repeated readings are repeated rows",
     "stadia": "one row for each reading of a stadia bar from a set-up; may stay empty",
 }
 for _method in methods():

@@ -24,6 +24,9 @@ class GreatCirclesMethod(Method):
 
         return {"great_circles": GREAT_CIRCLES}
 
+    def starter_settings(self, kind):
+        return {"survey.side": "outside"}
+
     def table_notes(self):
         note = "one row for each reading of the tape round the sphere: equator and meridians"
         return {"great_circles": note}
@@ -102,7 +105,7 @@ class GreatCirclesMethod(Method):
 
         return tables
 
-    def csv_tables(self):
+    def csv_tables(self, record):
         return {"great_circles": self.report_tables().CIRCLES}
 
     def sheets(self, record):
@@ -111,6 +114,6 @@ class GreatCirclesMethod(Method):
         return [("great_circles", "great_circles_subtitle", tables)]
 
     def certificates(self, saved):
-        from tankcal.report.tables.strapping import certificates_of_tapes
+        from tankcal.methods.strapping.tables import certificates_of_tapes
 
         return certificates_of_tapes(saved["tapes"])

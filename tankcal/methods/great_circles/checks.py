@@ -4,17 +4,16 @@ from dataclasses import replace
 
 from tankcal.job.checking import tell
 from tankcal.job.checks.extent import has_wall_points, is_supplemented
-from tankcal.job.checks.strapping import (
-    MOST_STRAPS,
+from tankcal.job.checks.tapes import (
     check_girths,
     check_readings,
     check_tape_temperature,
     refuse_inside,
     tapes_of,
     tell_without_effect,
-    too_many_straps,
 )
 from tankcal.messages import message
+from tankcal.survey.strapping import MOST_STRAPS, too_many_straps
 
 MOST_APART = 0.05  # largest relative difference of great circles of one sphere
 

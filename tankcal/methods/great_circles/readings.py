@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tankcal.job.checks.strapping import tapes_of, tapes_read
-from tankcal.job.strapping import tools_of
+from tankcal.job.checks.tapes import tapes_of, tapes_read
+from tankcal.job.tapes import tools_of
 from tankcal.survey.strapping import Strap, Strapping
 
 

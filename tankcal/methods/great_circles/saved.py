@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from tankcal.methods.strapping.saved import TapeUsed, tapes_of
 from tankcal.record.schema import Saved, key
-from tankcal.record.strapping import TapeUsed, tapes_of
 
 _STEPS = ("certificate", "temperature", "tension", "tape_thickness", "rise", "sag")
 

@@ -1,6 +1,6 @@
 """Tables of a strapped sphere: readings with corrections, and tapes."""
 
-from tankcal.report.tables.strapping import TAPES, convert_to_ppm
+from tankcal.methods.strapping.tables import TAPES, convert_to_ppm
 from tankcal.report.tables.table import Column, Table
 
 _STEPS = ("certificate", "temperature", "tension", "tape_thickness", "rise", "sag")

@@ -7,10 +7,10 @@ import numpy as np
 from tankcal.adjust import CRITICAL
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.pipeline import tape_checks
+from tankcal.methods.strapping import tape_warnings
+from tankcal.methods.strapping.warnings import FAR_LIMITS, check_repeats, limit_of_repeats
 from tankcal.pipeline.checks.nominal_size import allowed_departure_m
 from tankcal.pipeline.checks.survey_limits import limits_of_method
-from tankcal.pipeline.strapping_checks import FAR_LIMITS, check_repeats, limit_of_repeats
 
 FILE = "great_circles.csv"
 
@@ -18,7 +18,7 @@ FILE = "great_circles.csv"
 def check_circles(job, sphere):
     """Return the warnings of a `StrappedSphere`."""
     strapping = job.surveys["great_circles"].strapping
-    of_straps = (*tape_checks.check_tapes(job, sphere, strapping), *check_repeats(sphere))
+    of_straps = (*tape_warnings.check_tapes(job, sphere, strapping), *check_repeats(sphere))
     return (
         *(_assign_to_circles(problem) for problem in of_straps),
         *_check_equator(sphere),
@@ -30,7 +30,7 @@ def check_circles(job, sphere):
 
 def _assign_to_circles(problem):
     """Assign a problem of tape readings to the file of great circles."""
-    return replace(problem, file=FILE) if problem.file == tape_checks.FILE else problem
+    return replace(problem, file=FILE) if problem.file == tape_warnings.FILE else problem
 
 
 def _check_equator(sphere):

@@ -5,10 +5,10 @@ import numpy as np
 from tankcal.job.checking import has_rows, refuse_repeated, tell_missing
 from tankcal.job.checks.extent import has_survey, tells_by_tape
 from tankcal.job.checks.ranging import instruments_used, ranging_of
-from tankcal.job.checks.strapping import refuse_others
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
 from tankcal.job.checks.survey.instruments import check_correction
 from tankcal.job.checks.survey.readings import check_angle, warn_copies
+from tankcal.job.checks.tapes import refuse_others
 from tankcal.job.contract.registers import FREE
 from tankcal.messages import message
 from tankcal.survey.wall_hits import FEWEST_HITS, MOST_HITS, too_many_hits

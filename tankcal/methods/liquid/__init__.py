@@ -93,7 +93,7 @@ class LiquidMethod(Method):
     # ---- pipeline
 
     def finds(self, job):
-        return job.tank.kind == "vertical" and job.points is None and job.strapping is None
+        return job.tank.kind == "vertical" and job.points is None
 
     def find(self, job, progress, network):
         from tankcal.pipeline.liquid.nominal_wall import find_nominal_wall
@@ -162,7 +162,7 @@ class LiquidMethod(Method):
 
         return columns_of_batches(paper, columns)
 
-    def csv_tables(self):
+    def csv_tables(self, record):
         return {"liquid_steps": self.report_tables().STEPS}
 
     def sheets(self, record):

@@ -34,9 +34,21 @@ class RadiiMethod(Method):
     def starter_settings(self, kind):
         return {"survey.side": "inside", "datum.bottom_z_m": "0.0"}
 
+    def section_notes(self):
+        return {
+            "radii": "the radii of radii.csv: where they come from, and how well they are known",
+            "change": "only beside a new survey of some courses: how far the radii may have"
+            " changed since",
+        }
+
     def table_notes(self):
         note = "one row for each course, with its radius as a former table or a record has it"
         return {"radii": note}
+
+    def setting_examples(self):
+        from tankcal.methods.radii.columns import SETTING_EXAMPLES
+
+        return SETTING_EXAMPLES
 
     def examples(self):
         from tankcal.methods.radii.columns import EXAMPLES
@@ -66,7 +78,7 @@ class RadiiMethod(Method):
     # ---- pipeline
 
     def finds(self, job):
-        return job.points is None and job.strapping is None
+        return job.points is None
 
     def find(self, job, progress, network):
         from tankcal.methods.radii.wall import find_radii_wall
@@ -118,6 +130,11 @@ class RadiiMethod(Method):
         from tankcal.methods.radii import tables
 
         return tables
+
+    def report_figures(self):
+        from tankcal.methods.radii import figures
+
+        return figures
 
     def sheets(self, record):
         return [("radii", "radii_subtitle", [("radii", self.report_tables().RADII)])]

@@ -3,7 +3,7 @@
 from tankcal.job.checking import has_rows, is_not_given, missing_beside, refuse_repeated, tell
 from tankcal.job.checks.bearing import of_temperature
 from tankcal.job.checks.extent import is_supplemented, is_surveyed
-from tankcal.job.checks.strapping import refuse_others
+from tankcal.job.checks.tapes import refuse_others
 from tankcal.job.covariance import Archive, read_covariance
 from tankcal.job.plausibility import DIAMETER_MISS, DIAMETER_MISS_M, IMPOSSIBLE_MISS
 from tankcal.messages import message

@@ -80,3 +80,11 @@ CHANGE = (
 KEYS = {"radii": SETTINGS, "change": CHANGE}
 NEEDED = ("source", "u_common_mm")  # keys of [radii] required with radii.csv
 NEEDED_OF_CHANGE = ("common_mm", "own_mm")  # keys of [change] required with a survey
+SETTING_EXAMPLES = {
+    "radii.source": "table",
+    "radii.u_common_mm": 0.7,
+    "radii.reference_temperature_c": 15.0,
+    "radii.note": "certificate 1234/2009",
+    "change.common_mm": 0.8,
+    "change.own_mm": 0.3,
+}

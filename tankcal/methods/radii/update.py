@@ -26,7 +26,7 @@ from tankcal.geometry.field.components import KINDS
 from tankcal.job.model import Bottom
 from tankcal.messages import message
 from tankcal.methods.radii.wall import COMMON, causes_of, wall_of_radii
-from tankcal.pipeline.strapped_wall import StrappedWall
+from tankcal.methods.strapping.wall import StrappedWall
 from tankcal.pipeline.tanks import body_of
 from tankcal.pipeline.wall_straps import told_courses
 from tankcal.tank.factors import Factor

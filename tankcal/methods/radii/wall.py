@@ -15,8 +15,8 @@ import numpy as np
 
 from tankcal.geometry.field.estimate import MeanField
 from tankcal.messages import message
-from tankcal.pipeline.strapped_wall import UprightAxis
 from tankcal.pipeline.tanks import shell_zero
+from tankcal.pipeline.taped_wall import UprightAxis
 from tankcal.pipeline.wall.finding import joints_of
 from tankcal.tank.factors import Factor
 from tankcal.uncertainty import factor_of

@@ -6,20 +6,19 @@ import numpy as np
 
 from tankcal.job.checking import has_rows, refuse_repeated
 from tankcal.job.checks.extent import has_wall_points, is_strapped, is_supplemented
-from tankcal.job.checks.strapping import (
+from tankcal.job.checks.tapes import (
     END_M,
-    MOST_STRAPS,
     check_girths,
     check_readings,
     check_strapping_settings,
     refuse_others,
     refuse_repeats_elsewhere,
     tell_without_effect,
-    too_many_straps,
 )
 from tankcal.job.contract.courses import SMALLEST_THICKNESS_MM, thin_plate
 from tankcal.job.plausibility import IMPOSSIBLE_MISS
 from tankcal.messages import message
+from tankcal.survey.strapping import MOST_STRAPS, too_many_straps
 
 MOST_RINGS = 100
 # Largest difference of the sum of the rings from the length of the cylinder: metres, or relative.

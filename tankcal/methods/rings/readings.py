@@ -4,8 +4,8 @@ import numpy as np
 
 from tankcal.job.assembly import gauged_plate
 from tankcal.job.model.parts import Ring
-from tankcal.job.strapping import gauged
 from tankcal.job.structure import structure
+from tankcal.job.tapes import gauged
 
 
 def make_rings(tables):

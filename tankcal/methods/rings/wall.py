@@ -18,8 +18,8 @@ from tankcal.geometry.field.estimate import LEVELS, gauss_heights
 from tankcal.geometry.girth import perimeter_excess
 from tankcal.messages import message
 from tankcal.pipeline.checks.nominal_size import InsideRadii
-from tankcal.pipeline.strapped_wall import TapedWall, adjust_readings
 from tankcal.pipeline.tanks.common import factor_of_unseen
+from tankcal.pipeline.taped_wall import TapedWall, adjust_readings
 from tankcal.pipeline.wall_readings import names_of, readings_of_straps
 from tankcal.pipeline.wall_straps import AreaTerm, gauged_plates
 from tankcal.quadrature import panels

@@ -8,11 +8,8 @@ import numpy as np
 
 from tankcal.errors import Problem
 from tankcal.messages import message
-from tankcal.pipeline.checks.cross_checks import check_side
-from tankcal.pipeline.checks.nominal_size import allowed_departure_m, departure_of_size
-from tankcal.pipeline.checks.survey_limits import limits_of
-from tankcal.pipeline.compared_courses import exchanged_courses
-from tankcal.pipeline.strapping_checks import (
+from tankcal.methods.strapping.tape_warnings import check_tapes
+from tankcal.methods.strapping.warnings import (
     FAR_LIMITS,
     FILE,
     check_repeats,
@@ -20,7 +17,10 @@ from tankcal.pipeline.strapping_checks import (
     read_once,
     straps_apart,
 )
-from tankcal.pipeline.tape_checks import check_tapes
+from tankcal.pipeline.checks.cross_checks import check_side
+from tankcal.pipeline.checks.nominal_size import allowed_departure_m, departure_of_size
+from tankcal.pipeline.checks.survey_limits import limits_of
+from tankcal.pipeline.compared_courses import exchanged_courses
 from tankcal.pipeline.wall_readings import names_of
 
 LIMITS = "repeats_lying"  # table of the rule file

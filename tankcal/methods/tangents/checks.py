@@ -4,9 +4,9 @@ import numpy as np
 
 from tankcal.job.checking import has_rows, tell
 from tankcal.job.checks.extent import has_survey
-from tankcal.job.checks.strapping import check_levels, refuse_others
 from tankcal.job.checks.survey.files import SurveyFiles, refuse_undefined
 from tankcal.job.checks.survey.readings import check_angle, warn_copies
+from tankcal.job.checks.tapes import check_levels, refuse_others
 from tankcal.messages import message
 from tankcal.survey.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
 

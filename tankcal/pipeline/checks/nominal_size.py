@@ -3,7 +3,7 @@
 An offset, a scale or a unit that is wrong in all readings of a survey affects only the size.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -104,12 +104,10 @@ def inside_radii(job, survey):
     InsideRadii or None
     """
     kind = None if survey is None else survey.surveyed_as
-    if kind in ("wall", "strapped"):
+    if kind == "wall":
         plates = np.array([course.thickness_m + course.paint_m for course in job.courses])
         radius = mean_radii(survey.field) - plates * (job.survey.side == "outside")
-        if kind == "wall":
-            return radii_of_courses(job, radius, _sds_of_courses(survey, len(radius)))
-        return replace(radii_of_courses(job, radius), has_single_checks=False)
+        return radii_of_courses(job, radius, _sds_of_courses(survey, len(radius)))
     if kind == "scan":
         plate = (job.horizontal or job.sphere).thickness_m
         diameter = dict(zip(survey.names, survey.values, strict=True))["diameter"]
@@ -202,8 +200,9 @@ def check_size(job, survey):
 
 def _has_own_line(job, survey):
     """Whether another check compares the whole tank of this survey with the drawing."""
-    by_method = any(method.compares_size for method in given_methods(job))
-    return by_method or survey.surveyed_as == "strapped"
+    found_by = method_of(survey)
+    compared = [method for method in given_methods(job) if method.compares_size]
+    return any(method.is_sighted or method is found_by for method in compared)
 
 
 def _unlike_drawing(job, radius_m, miss_m):

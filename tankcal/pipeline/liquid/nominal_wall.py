@@ -12,9 +12,9 @@ import numpy as np
 
 from tankcal.messages import message
 from tankcal.pipeline.read_wall import ReadWall
-from tankcal.pipeline.strapped_wall import UprightAxis, field_of_readings
 from tankcal.pipeline.tanks import insets_of, shell_zero
 from tankcal.pipeline.tanks.vertical import nominal_inside_m
+from tankcal.pipeline.taped_wall import UprightAxis, field_of_readings
 from tankcal.pipeline.wall.finding import joints_of
 from tankcal.pipeline.wall_readings import (
     WallReading,

@@ -15,7 +15,12 @@ from tankcal.geometry.field.sites import Sites, spans_of
 from tankcal.geometry.outlines import polar
 from tankcal.geometry.shell import WIDE_BAND, course_of, find_shell
 from tankcal.messages import Message, message
-from tankcal.methods.base import completing_method, given_methods, is_sighted
+from tankcal.methods.base import (
+    accompanying_methods,
+    completing_method,
+    given_methods,
+    is_sighted,
+)
 from tankcal.pipeline.checks.homogeneity import warn_of_sections
 from tankcal.pipeline.checks.survey import (
     noise_is_estimated,
@@ -165,8 +170,9 @@ def fit_wall(job, shell, dof=np.inf, *, amplitudes=None, sizes=None):
     sections = tuple(fit_section(*section, form_m2) for section in to_fit)
     by_points = means @ _radii_by_points(sections, len(accepted))
     by_inputs = _derivatives_by_inputs(job.points, by_points, accepted)
-    is_read = job.strapping is not None or job.lines is not None
-    is_read = is_read or len({group.course for group in groups}) < len(job.courses)
+    is_read = bool(accompanying_methods(job)) or len({group.course for group in groups}) < len(
+        job.courses
+    )
     if is_read or job.points.unbound or by_inputs or _is_smooth(job):
         unbound = unbound_of(job.points, by_points, accepted)
         noise = by_points @ (covariance @ by_points.T)  # includes covariances between sections

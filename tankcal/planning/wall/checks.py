@@ -6,8 +6,6 @@ from copy import copy
 import numpy as np
 
 from tankcal.errors import Problem
-from tankcal.job.checks.lines import MOST_OFFSETS, too_many_offsets
-from tankcal.job.checks.strapping import MOST_STRAPS, too_many_straps
 from tankcal.job.tables import Log
 from tankcal.messages import list_some, message
 from tankcal.planning.entries import PLAN_FILE, check_form, no_such_name, too_many_sections
@@ -19,6 +17,8 @@ from tankcal.planning.visibility import (
 )
 from tankcal.planning.wall.filling import check_runs
 from tankcal.planning.wall.model import USUAL_AT, even_radius_m, evenness_of_limbs
+from tankcal.survey.reference_line import MOST_OFFSETS, too_many_offsets
+from tankcal.survey.strapping import MOST_STRAPS, too_many_straps
 from tankcal.survey.tangents import FEWEST_SETUPS, MOST_TANGENTS, too_many_tangents
 from tankcal.survey.wall_hits import FEWEST_HITS, MOST_HITS, too_many_hits
 

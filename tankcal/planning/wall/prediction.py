@@ -19,9 +19,9 @@ from tankcal.pipeline.liquid.nominal_wall import NominalWall
 from tankcal.pipeline.liquid.result import LiquidResult
 from tankcal.pipeline.read_wall import ReadWall
 from tankcal.pipeline.statements import statements
-from tankcal.pipeline.strapped_wall import StrappedWall
 from tankcal.pipeline.surveying import find_survey
 from tankcal.pipeline.table import ComputedTable, check_table, compute_table
+from tankcal.pipeline.taped_wall import TapedWall
 from tankcal.pipeline.wall.cause_correlations import noise_of_wall
 from tankcal.planning.table import TableResults, refuse_without_delivery
 from tankcal.planning.wall.filling import (
@@ -235,7 +235,7 @@ def courses_of(result):
     weights = mean @ field.means.weights
     covariance = sum(mean @ field.means.unseen(i) @ mean.T for i in range(len(COMPONENTS)))
     wall = result.wall
-    noise = field.noise_m2 if isinstance(wall, StrappedWall) else noise_of_wall(wall)
+    noise = field.noise_m2 if isinstance(wall, TapedWall) else noise_of_wall(wall)
     sds = np.sqrt(np.diag(covariance) + np.einsum("ij,jk,ik->i", weights, noise, weights))
     names = [course.name for course in job.courses]
     straps = Counter(

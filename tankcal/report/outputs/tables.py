@@ -8,10 +8,8 @@ from tankcal.record.columns import count_rows
 from tankcal.report.outputs.csv_files import write_table
 from tankcal.report.tables import (
     capacity,
-    lines,
     readings,
     ship,
-    strapping,
     survey,
     tank,
 )
@@ -22,9 +20,7 @@ FILES = (
     "points.csv",
     "points_cov.npz",
     "sections.csv",
-    "strapping.csv",
     *(file for method in methods() for file in method.csv_files),
-    "offsets.csv",
     "capacity.csv",
     "ship_corrections.csv",
     "photos.csv",
@@ -40,13 +36,9 @@ def write_tables(record, directory):
         "points": (survey.POINTS, survey.point_columns(record)),
         "sections": (tank.SECTIONS, None),
     }
-    if record.get("strapping"):
-        tables["strapping"] = strapping.straps_of(record), None
     for method in methods():
         if record.get(method.name):
-            tables |= {name: (table, None) for name, table in method.csv_tables().items()}
-    if record.get("lines"):
-        tables["offsets"] = lines.OFFSETS, None
+            tables |= {name: (table, None) for name, table in method.csv_tables(record).items()}
     if record["capacity"]:
         tables["capacity"] = capacity.capacity_table(record), _capacity(record)
     if record.get("ship"):

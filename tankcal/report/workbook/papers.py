@@ -1,15 +1,10 @@
 """Sheets of the working papers: courses, surveys, ship, corrections, tank, and provenance."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 from tankcal.methods.base import methods
 from tankcal.report.numbers import unit
 from tankcal.report.paper import DECIMALS_OF_PARTS
 from tankcal.report.tables import (
-    lines,
     ship,
-    strapping,
     tank,
 )
 from tankcal.report.workbook.look import Column, number_format
@@ -26,22 +21,6 @@ from tankcal.text.digits import decimals_of
 _INSIDE_WIDTHS = (50, 16, 16, 16, 16)  # widths of the columns of the sheet inside, letters
 
 
-@dataclass(frozen=True)
-class TablesSheet:
-    """Sheet of tables of the record, each under its heading [workbook.headings].<name>.
-
-    Attributes
-    ----------
-    key : str
-        Key of the record whose content the sheet requires.
-    tables : tuple of Table, or callable
-        Tables in order, or tables(record) that returns them.
-    """
-
-    key: str
-    tables: tuple | Callable
-
-
 def _course_tables(record):
     if not record["sections"]:
         return (tank.COURSES,)
@@ -49,52 +28,26 @@ def _course_tables(record):
     return (tank.COURSES, tank.SECTIONS, *noise, tank.modes_table(record), tank.SHELL)
 
 
-def _strapping_tables(record):
-    return (
-        strapping.straps_of(record),
-        strapping.strapped_courses_of(record),
-        strapping.TAPES,
-    )
-
-
-# Sheets by code. The subtitle is the word [workbook.texts].<code>_subtitle.
-TABLES_SHEETS = {
-    "courses": TablesSheet("courses", _course_tables),
-    "strapping": TablesSheet("strapping", _strapping_tables),
-    "lines": TablesSheet("lines", (lines.LEVELS, lines.PLUMMETS, lines.LINES, lines.OFFSETS)),
-}
-
-
-_BEFORE_METHODS = "lines"  # the sheets of the methods follow this sheet
-
-
 def tables_sheets(book, record):
-    """Write the sheets of TABLES_SHEETS and of the methods whose content the record has."""
-    for code, declared in TABLES_SHEETS.items():
-        if record.get(declared.key):
-            _tables_sheet(book, record, code, declared)
-        if code == _BEFORE_METHODS:
-            for method in methods():
-                if record.get(method.name):
-                    _method_sheets(book, record, method)
+    """Write the sheet of courses, and the sheets of the methods whose content the record has."""
+    if record.get("courses"):
+        tables = _course_tables(record)
+        _tables_sheet(
+            book, "courses", "courses_subtitle", [(table.name, table) for table in tables]
+        )
+    for method in methods():
+        if record.get(method.name):
+            for code, subtitle, tables in method.sheets(record):
+                _tables_sheet(book, code, subtitle, tables)
 
 
-def _method_sheets(book, record, method):
-    """Write the sheets of a method of `tankcal.methods`."""
-    for code, subtitle, tables in method.sheets(record):
-        sections = [
-            cell_table(book, table, name=name, title=book.word(f"headings.{name}"))
-            for name, table in tables
-        ]
-        write_sheet(book, SheetContent(code, sections, book.word(f"texts.{subtitle}")))
-
-
-def _tables_sheet(book, record, code, declared):
-    tables = declared.tables(record) if callable(declared.tables) else declared.tables
+def _tables_sheet(book, code, subtitle, tables):
+    """Write a sheet of tables, each under its heading [workbook.headings].<name>."""
     sections = [
-        cell_table(book, table, title=book.word(f"headings.{table.name}")) for table in tables
+        cell_table(book, table, name=name, title=book.word(f"headings.{name}"))
+        for name, table in tables
     ]
-    write_sheet(book, SheetContent(code, sections, book.word(f"texts.{code}_subtitle")))
+    write_sheet(book, SheetContent(code, sections, book.word(f"texts.{subtitle}")))
 
 
 def ship_sheet(book, record):

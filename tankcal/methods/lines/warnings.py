@@ -8,8 +8,8 @@ import numpy as np
 from tankcal.adjust import SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.messages import message
+from tankcal.methods.lines.departures import check_lines_apart, check_scale, check_sign
 from tankcal.pipeline.checks.survey_limits import limit_at, limits_of, repeat_factor
-from tankcal.pipeline.line_departures import check_lines_apart, check_scale, check_sign
 from tankcal.survey.reference_line import (
     collimation_by_faces,
     lean_of,
@@ -52,20 +52,20 @@ def levels_and_lean(job, wall):
     return levels, lean_of(job.lines, levels)
 
 
-def check_lines(job, wall):
-    """Return the warnings of the reference lines of a wall; () without lines.
+def check_lines(job, survey):
+    """Return the warnings of the reference lines beside straps, or beside the points of a `Wall`.
 
     Parameters
     ----------
     job : Job
-    wall : StrappedWall or Wall
+    survey : StrappedWall or Wall
 
     Returns
     -------
     tuple of Problem
     """
-    if job.lines is None:
-        return ()
+    is_of_points = survey.surveyed_as == "wall"
+    wall = survey.read if is_of_points else survey
     levels, lean = levels_and_lean(job, wall)
     return (
         *_check_rejected(job, wall),
@@ -77,7 +77,7 @@ def check_lines(job, wall):
         *_check_axis(job, levels, lean),
         *_check_scope(job, lean),
         *_check_plummets(job),
-        *(_check_straps(job, wall, levels) if wall.surveyed_as == "strapped" else ()),
+        *(check_leans(job, survey) if is_of_points else _check_straps(job, wall, levels)),
     )
 
 
@@ -139,8 +139,6 @@ def compare_leans(lean, shell):
 
 def check_leans(job, wall):
     """Yield a warning of a `Wall` whose lines show another lean than its points."""
-    if job.lines is None:
-        return
     test = compare_leans(levels_and_lean(job, wall.read)[1], wall.shell)
     if test is None or test.w <= CRITICAL_LEAN:
         return

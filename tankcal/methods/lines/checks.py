@@ -4,43 +4,25 @@ import numpy as np
 
 from tankcal.job.checking import has_rows, refuse_repeated, tell_missing
 from tankcal.job.checks.extent import has_wall_points, is_strapped
-from tankcal.job.checks.strapping import (
+from tankcal.job.checks.survey.stadia import is_bar
+from tankcal.job.checks.tapes import (
     check_levels,
     names_of,
     refuse_free_scale,
     refuse_others,
     tapes_of,
 )
-from tankcal.job.checks.survey.stadia import is_bar
 from tankcal.job.contract.registers import REGISTER_KEYS
 from tankcal.job.tables import nearest
 from tankcal.messages import message
-from tankcal.survey.reference_line import FEWEST_LINES, SAME_LEVEL_M
+from tankcal.survey.reference_line import FEWEST_LINES, MOST_OFFSETS, SAME_LEVEL_M, too_many_offsets
 
 NAMELESS = ""  # name of a plummet that is not described
-MOST_OFFSETS = 2000  # largest number of readings of one tank
 CLOSE_DEG = 0.01  # smallest difference of azimuth of two lines
 
 
-def has_lines(tables):
-    """Return True if offsets from reference lines were read."""
-    return has_rows(tables["lines"]) or has_rows(tables["offsets"])
-
-
-def too_many_offsets(count):
-    """Message about more offsets than can be used."""
-    return message(
-        "too_many_offsets",
-        "{count} offsets; expected at most {most}",
-        count=count,
-        most=MOST_OFFSETS,
-    )
-
-
 def check_lines(values, tables, registers, raw, log):
-    """Check lines, offsets, plummets and circumferences; parameters as for `check_all`."""
-    if not has_lines(tables):
-        return
+    """Check lines, offsets, plummets and circumferences; parameters as for `Method.check`."""
     lines, offsets, straps = (tables[name] for name in ("lines", "offsets", "circumferences"))
     if not has_rows(lines) or not has_rows(offsets):
         missing = "offsets" if has_rows(lines) else "lines"

@@ -68,13 +68,25 @@ OFFSETS = (
     USE,
 )
 COLUMNS = {"lines": LINES, "offsets": OFFSETS}
-PLUMMET = (  # keys of instruments.toml for plummets
-    Field(
-        "u_collimation_arcsec",
-        "number",
-        "standard uncertainty of the verticality of a plummet's line, seconds of arc; blank:"
-        " estimated from its two faces",
-        low=0,
-        high=3600,
-    ),
-)
+EXAMPLES = {
+    "lines": [{"line": "A", "azimuth_deg": 0}, {"line": "B", "azimuth_deg": 30}],
+    "offsets": [
+        {
+            "line": "A",
+            "course": "1",
+            "level_m": 0.45,
+            "offset_mm": 201.0,
+            "s_mm": 0.5,
+            "face": 1,
+            "reference": True,
+        },
+        {
+            "line": "A",
+            "course": "1",
+            "level_m": 1.35,
+            "offset_mm": 198.5,
+            "s_mm": 0.5,
+            "face": 1,
+        },
+    ],
+}

@@ -1,4 +1,4 @@
-"""Checks of a strapping as a whole: its tables against each other and against the shell."""
+"""Checks of tapes and of readings by tape, of all methods that use them."""
 
 import numpy as np
 
@@ -10,50 +10,14 @@ from tankcal.job.checking import (
     tell_missing,
     temperature_missing,
 )
-from tankcal.job.checks.extent import has_wall_points, is_completed, is_strapped
 from tankcal.job.checks.obstructions import check_obstructions
 from tankcal.job.checks.spans import check_spans
-from tankcal.job.contract.observations import READINGS
 from tankcal.job.contract.registers import FREE
 from tankcal.job.plausibility import IMPOSSIBLE_MISS, unit_guess
 from tankcal.job.tables import nearest
 from tankcal.messages import message
 
-MOST_STRAPS = 1000  # largest number of readings of one tank
 END_M = 0.02  # largest distance of a level beyond the end of its course
-
-
-def too_many_straps(count):
-    """Message about more circumferences than can be used."""
-    return message(
-        "too_many_straps",
-        "{count} readings; expected at most {most}",
-        count=count,
-        most=MOST_STRAPS,
-    )
-
-
-def check_strapping(values, tables, registers, raw, log):
-    """Check circumferences, courses, obstructions and comparisons; as for `check_all`."""
-    straps = tables["circumferences"]
-    if not is_strapped(tables):
-        tell_without_effect(tables, log)
-        return
-    if len(straps.rows) > MOST_STRAPS:
-        log.problem(straps.file, too_many_straps(len(straps.rows)))
-        return
-    courses = tables["courses"]
-    known = () if courses is None else tuple(courses.of("course"))
-    is_alone = _stands_alone(tables, raw)
-    needs_each_course = is_alone and _tell_each_course(tables, raw)
-    _check_courses(straps, tables, courses, known, needs_each_course, log)
-    check_readings(straps, tables, registers, raw, log)
-    if has_rows(tables["thickness"]):
-        refuse_others(tables["thickness"], "course", known, log)
-    if values is not None:
-        check_girths(straps, values["tank"]["nominal_diameter_m"], IMPOSSIBLE_MISS, log)
-        check_strapping_settings(values, tables, registers, is_alone, raw, log)
-        check_levels(straps, courses, values, log)
 
 
 def check_readings(straps, tables, registers, raw, log):
@@ -83,32 +47,6 @@ def check_readings(straps, tables, registers, raw, log):
     _check_comparisons(tables["tape_checks"], tapes, raw, log)
 
 
-def _stands_alone(tables, raw):
-    """Return True if circumferences are the only measurements of the wall.
-
-    An unreadable table of points counts as a measurement. Set-ups without sights are reported
-    separately.
-    """
-    unreadable = (raw.tables.get(name, ()) is None for name in ("points", "wall_hits", *READINGS))
-    return not (has_wall_points(tables) or has_rows(tables["setups"]) or any(unreadable))
-
-
-def _tell_each_course(tables, raw):
-    """Return True if each course needs a circumference.
-
-    Otherwise lines or radii may determine it; if they are incomplete or unreadable, this is
-    reported separately.
-    """
-    others = ("radii", "lines", "offsets")
-    is_unreadable = any(raw.tables.get(name, ()) is None for name in others)
-    has_others = any(has_rows(tables.get(name)) for name in others)
-    has_complete_lines = has_rows(tables["lines"]) and has_rows(tables["offsets"])
-    has_declared_radii = not is_not_given(raw, "radii", "source")
-    return not (is_unreadable or has_declared_radii or is_completed(tables)) and (
-        has_complete_lines or not has_others
-    )
-
-
 def tapes_of(registers):
     """{name: {key: value}} of the instruments that are tapes."""
     return {
@@ -134,31 +72,6 @@ def tell_without_effect(tables, log):
                 "not_strapped", "without effect: the job has no circumferences by tape"
             )
             log.warning(tables[name].file, expected)
-
-
-def _check_courses(straps, tables, courses, known, every, log):
-    """Check the courses of circumferences; every: True if each course needs one."""
-    refuse_others(straps, "course", known, log)
-    reached = {
-        course
-        for table in (straps, tables["offsets"])
-        if has_rows(table)
-        for course, use in zip(table.of("course"), table.of("use"), strict=True)
-        if use != "check"
-    }
-    if straps.skipped or courses is None or courses.skipped or None in reached:
-        return
-    for row, name in zip(courses.rows, known, strict=True):
-        if name is not None and name not in reached and every:
-            expected = message(
-                "course_not_strapped",
-                "no circumference was measured on course {course!r}; expected one at least in"
-                " {file}",
-                course=name,
-                file=straps.file,
-            )
-            log.problem(courses.file, expected, row, "course")
-    refuse_repeats_elsewhere(straps, "level_m", log)
 
 
 def refuse_repeats_elsewhere(straps, column, log):

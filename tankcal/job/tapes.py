@@ -1,25 +1,10 @@
-"""From the checked tables of a strapping to `Strapping`: SI units, one object for each reading."""
+"""Tapes, obstructions, comparisons and gauge readings of a job, in SI."""
 
 import numpy as np
 
-from tankcal.job.checks.strapping import tapes_of, tapes_read
-from tankcal.survey.strapping import Comparison, Obstruction, Strap, Strapping, Tape
+from tankcal.survey.strapping import Comparison, Obstruction, Tape
 
 LEAST_GAUGE_SD_M = 5e-5  # smallest standard deviation of the mean of gauge readings
-
-
-def make_strapping(values, tables, registers):
-    """Build `Strapping` from settings, tables and registers without problems."""
-    table = tables["circumferences"]
-    tapes, keys = tapes_of(registers), values["strapping"]
-    return Strapping(
-        straps=_straps(table, tapes),
-        **tools_of(tables, tapes),
-        shape_sd_m=_metres(values["shell"]["shape_sd_mm"]),
-        wave_m=_metres(keys["wave_mm"]),
-        helix_m=_metres(keys["helix_mm"]),
-        plate_sd_m={name: means[1] for name, means in gauged(tables["thickness"]).items()},
-    )
 
 
 def tools_of(tables, tapes):
@@ -53,28 +38,9 @@ def gauged(table):
     return means
 
 
-def _metres(millimetres):
+def metres(millimetres):
     """Length in m from mm; None if not given."""
     return None if millimetres is None else millimetres / 1000
-
-
-def _straps(table, tapes):
-    columns = (
-        *map(table.of, ("circumference", "course", "level_m", "reading_m", "s_mm")),
-        tapes_read(table, tapes),
-        *map(table.of, ("temperature_c", "tension_n", "pulls", "use")),
-    )
-    return tuple(
-        Strap(
-            *(name, course, level, reading, s_mm / 1000, tape, temperature, tension),
-            pulls=int(pulls or 1),
-            check=use == "check",
-            row=row,
-        )
-        for row, name, course, level, reading, s_mm, tape, temperature, tension, pulls, use in zip(
-            table.rows, *columns, strict=True
-        )
-    )
 
 
 def _tape(name, given):
@@ -110,7 +76,7 @@ def _obstructions(table):
     lengths = [f"{name}_mm" for name in ("thickness", "width", "over", "arc", "excess")]
     columns = map(table.of, ("circumference", "kind", "count", *lengths, "span_m", "s_mm"))
     for name, kind, count, *sizes, span, s_mm in zip(*columns, strict=True):
-        sizes = map(_metres, sizes)
+        sizes = map(metres, sizes)
         item = Obstruction(kind, count or 1.0, *sizes, span_m=span, sd_m=(s_mm or 0.0) / 1000)
         obstructions.setdefault(name, []).append(item)
     return {name: tuple(items) for name, items in obstructions.items()}

@@ -1,19 +1,9 @@
-"""Tables and keys of strapping: circumferences, obstructions, plate thicknesses and tapes."""
+"""Tables and keys of strapping: circumferences, obstructions, plate thicknesses."""
 
 from tankcal.job.contract.kinds import LYING, STRAPPED, VERTICAL
 from tankcal.job.fields import Field
 from tankcal.job.shared_columns import NOTE, USE, readings_by_tape
 from tankcal.survey.strapping import KINDS
-
-NEEDED = {  # columns required for each kind of obstruction
-    "butt_strap": ("thickness_mm", "width_mm"),
-    "weld": ("thickness_mm", "width_mm"),
-    "step": ("thickness_mm",),
-    "lap": ("thickness_mm",),
-    "step_over": ("over_mm", "arc_mm"),
-    "measured": ("excess_mm",),
-    "sag": ("span_m",),
-}
 
 
 def _name(name, note, required=False, kinds=()):
@@ -107,7 +97,6 @@ TAPE_CHECKS = (
             0, 100),
     Field("when", "choice", "comparison before or after the work", choices=("before", "after")),
 )  # fmt: skip
-IN_PLACE = {"course": "ring", "level_m": "from_a_m"}  # columns of horizontal tanks
 COLUMNS = {
     "circumferences": CIRCUMFERENCES,
     "obstructions": OBSTRUCTIONS,
@@ -146,34 +135,51 @@ KEYS = {
         ),
     ),
 }
-TAPE = (  # keys of instruments.toml for tapes
-    _number("thickness_mm", "thickness of a tape for strapping, millimetres", 0, 5),
-    _number(
-        "section_mm2",
-        "cross-section of a tape, mm²; with e_gpa it determines the stretch",
-        0.1,
-        100,
-    ),
-    _number("e_gpa", "Young's modulus of a tape, GPa", 1, 500),
-    _number(
-        "friction",
-        "coefficient of friction between tape and shell; blank: a tension is the mean round the"
-        " tank",
-        0,
-        1,
-    ),
-    _number(
-        "laying_mm",
-        "standard deviation of the reading from the lay of the tape in each pull, millimetres",
-        0,
-        50,
-    ),
-    _number(
-        "weight_n_per_m",
-        "weight of a metre of a tape, newtons; needed if the tape hangs free (sag in"
-        " obstructions.csv)",
-        0.01,
-        5,
-    ),
-    _name("master", "master tape compared with this tape in tape_checks.csv"),
-)
+EXAMPLES = {
+    "circumferences": [
+        {
+            "circumference": "1-20",
+            "course": "1",
+            "ring": "1",
+            "level_m": 0.38,
+            "from_a_m": 0.38,
+            "reading_m": 40.8925,
+            "s_mm": 0.5,
+        },
+        {
+            "circumference": "1-80",
+            "course": "1",
+            "ring": "1",
+            "level_m": 1.52,
+            "from_a_m": 1.52,
+            "reading_m": 40.8931,
+            "s_mm": 0.5,
+        },
+    ],
+    "obstructions": [
+        {
+            "circumference": "1-20",
+            "kind": "butt_strap",
+            "count": 6,
+            "thickness_mm": 8,
+            "width_mm": 100,
+        },
+        {
+            "circumference": "1-80",
+            "kind": "step_over",
+            "over_mm": 1022.0,
+            "arc_mm": 1000.0,
+            "s_mm": 0.5,
+        },
+    ],
+    "thickness": [
+        {"course": "1", "ring": "1", "thickness_mm": 7.92, "azimuth_deg": 90, "paint_mm": 0.3}
+    ],
+    "tape_checks": [
+        {"level": "1", "master_m": 40.8930, "working_m": 40.8921, "s_mm": 0.3, "when": "before"}
+    ],
+}
+SETTING_EXAMPLES = {
+    "shell.shape_sd_mm": 5.0,
+    "strapping.wave_mm": 20.0,
+}

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tankcal.pipeline.line_checks import compare_leans, levels_and_lean
 from tankcal.record.schema import Saved, key
 from tankcal.survey.reference_line import collimation_by_faces
 from tankcal.units import FULL_TURN
@@ -85,11 +84,11 @@ class LinesRecord(Saved):
     )
 
 
-def lines_of(result):
-    """Return the `LinesRecord` of a result; None without lines."""
+def save_lines(result):
+    """`LinesRecord` of a result."""
+    from tankcal.methods.lines.warnings import compare_leans, levels_and_lean
+
     lines = result.job.lines
-    if lines is None:
-        return None
     offsets = _offsets(result)
     levels, lean = levels_and_lean(result.job, result.read)
     names = [course.name for course in result.job.courses]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tankcal.job.checks.lines import at_reference, plummets_of, plummets_used
+from tankcal.methods.lines.checks import at_reference, plummets_of, plummets_used
 from tankcal.survey.reference_line import Line, Offset, Plummet, ReferenceLines
 from tankcal.units import ARCSEC
 

@@ -1,7 +1,7 @@
 """Warnings about a strapping that are unlikely for a valid survey of a tank without defects.
 
 The checks name a probable cause: exchanged courses, an inside circumference, or a single wrong
-strap. Checks of the tapes and of their readings are in `tape_checks`.
+strap. Checks of the tapes and of their readings are in `tape_warnings`.
 """
 
 import numpy as np
@@ -10,6 +10,7 @@ from tankcal.adjust import CRITICAL, SD_OVER_MEDIAN
 from tankcal.errors import Problem
 from tankcal.messages import message
 from tankcal.methods.base import completing_method
+from tankcal.methods.strapping.tape_warnings import check_tapes
 from tankcal.pipeline.checks.cross_checks import check_side, is_size_declared
 from tankcal.pipeline.checks.moved_setups import tested
 from tankcal.pipeline.checks.nominal_size import (
@@ -19,7 +20,6 @@ from tankcal.pipeline.checks.nominal_size import (
 )
 from tankcal.pipeline.checks.survey_limits import limit_at, limits_of
 from tankcal.pipeline.compared_courses import course_apart, exchanged_courses
-from tankcal.pipeline.tape_checks import check_tapes
 from tankcal.pipeline.wall_readings import FORMER
 
 FILE = "circumferences.csv"
@@ -46,27 +46,21 @@ def limit_of_repeats(circumference_m, table="repeats"):
     return limit_at("strapping", table, "limit_mm", circumference_m) / 1000
 
 
-def check_strapped(job, wall):
-    """`Problem`s of a wall determined by straps, with or without reference lines."""
-    straps = wall.straps
+def check_strapping(job, wall):
+    """`Problem`s of straps: of the wall that they determine, or beside the points of a `Wall`."""
+    straps = getattr(wall, "straps", None)
+    if straps is None or job.tank.kind != "vertical":
+        return ()
+    of_tapes = (*check_tapes(job, straps, job.strapping), *check_repeats(straps))
+    if wall.surveyed_as == "wall":
+        return (*of_tapes, *_check_contradictions(straps, strapped_together(wall)))
     return (
-        *check_tapes(job, straps, job.strapping),
-        *check_repeats(straps),
+        *of_tapes,
         *_check_pairs(job, straps),
         *(_check_courses(job, straps) if completing_method(job) is None else ()),
         *_check_first_course(job, straps),
         *_check_single_course(job, straps),
         *_check_uncontrolled(job, wall),
-    )
-
-
-def check_straps_beside_points(job, wall):
-    """`Problem`s of straps round a `Wall` surveyed by points."""
-    straps = wall.straps
-    return (
-        *check_tapes(job, straps, job.strapping),
-        *check_repeats(straps),
-        *_check_contradictions(straps, strapped_together(wall)),
     )
 
 

@@ -1,7 +1,8 @@
-"""The part of the record on strapping: readings, their corrections, tapes, courses."""
+"""Saved part of strapping: readings, their corrections, tapes, courses."""
 
 import numpy as np
 
+from tankcal.record.choices import bottom_choice, roof_choice, top_choice
 from tankcal.record.schema import Finite, Saved, key
 from tankcal.record.survey import radius_sd, shell_by_survey
 from tankcal.units import FULL_TURN
@@ -77,11 +78,9 @@ class StrappingRecord(Saved):
     helix_m: float | None = key("largest difference in height of its ends; null: not given")
 
 
-def strapping_of(result):
-    """Return the `StrappingRecord` of a result; None without straps."""
+def save_strapping(result):
+    """`StrappingRecord` of a result."""
     straps, strapping = result.straps, result.job.strapping
-    if straps is None:
-        return None
     return StrappingRecord(
         readings=_readings(result),
         tapes=tapes_of(straps.tapes, strapping),
@@ -172,3 +171,29 @@ def _courses(result):
             )
         )
     return rows
+
+
+def choices_of(result):
+    """Choices on straps, alone or beside points: {code: value}; {} for rings."""
+    job = result.job
+    if result.wall is not None:
+        return {"straps": "beside_points"}
+    if result.strapped is None:
+        return {}
+    return {
+        "bottom": bottom_choice(job),
+        "survey": "strapping",
+        "area_term": _area_term_choice(job.strapping.shape_sd_m),
+        **top_choice(job),
+        "between_sections": "cylinders",
+        "tilt": "not_measured",
+        "course_heights": "along_axis",
+        "roof": roof_choice(job),
+        "form": "learned",
+    }
+
+
+def _area_term_choice(shape_sd_m):
+    if shape_sd_m is None:
+        return "assumed"
+    return "none" if shape_sd_m == 0 else 1000 * shape_sd_m

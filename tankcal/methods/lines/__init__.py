@@ -1,0 +1,122 @@
+"""Reference lines: offsets of the wall from vertical lines of sight, beside straps or points."""
+
+from tankcal.methods.base import Method
+
+
+class LinesMethod(Method):
+    """Offsets from reference lines, which transfer a strapped or surveyed radius to other courses.
+
+    The wall is that of the straps or points beside the lines.
+    """
+
+    name = "lines"
+    attribute = "lines"
+    kinds = ("vertical",)
+    tables = ("lines", "offsets")
+    shared_tables = ("circumferences", "obstructions", "thickness", "tape_checks")
+    starter = "reference-line"
+    starter_has_network = False
+    tables_with_sds = ("offsets",)
+    accompanies_points = True
+    field_forms = ((("lines",), 12), (("offsets",), 30))
+    csv_files = ("offsets.csv",)
+    saved_note = "reference lines; left out if there are none"
+
+    # ---- job
+
+    def columns(self):
+        from tankcal.methods.lines.columns import COLUMNS
+
+        return COLUMNS
+
+    def settings(self):
+        from tankcal.methods.strapping.columns import KEYS
+
+        return KEYS
+
+    def starter_settings(self, kind):
+        return {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
+
+    def table_notes(self):
+        return {
+            "lines": "one row for each vertical line of sight round the tank",
+            "offsets": "one row for each reading of the wall's offset; repeated readings are"
+            " repeated rows",
+        }
+
+    def examples(self):
+        from tankcal.methods.lines.columns import EXAMPLES
+
+        return EXAMPLES
+
+    def is_given(self, tables):
+        from tankcal.job.checking import has_rows
+
+        return any(has_rows(tables[name]) for name in self.tables)
+
+    def check(self, values, tables, registers, raw, log):
+        from tankcal.methods.lines.checks import check_lines
+
+        if self.is_given(tables):
+            check_lines(values, tables, registers, raw, log)
+
+    def read(self, values, tables, registers, raw):
+        from tankcal.methods.lines.readings import make_lines
+
+        return make_lines(tables, registers)
+
+    # ---- pipeline
+
+    def finds(self, job):
+        return False
+
+    def courses_read(self, job):
+        return {offset.course for offset in job.lines.offsets if not offset.check}
+
+    def warnings(self, job, survey, sights=None):
+        from tankcal.methods.lines.warnings import check_lines
+
+        return check_lines(job, survey)
+
+    # ---- record
+
+    def saved_type(self):
+        from tankcal.methods.lines.saved import LinesRecord
+
+        return LinesRecord
+
+    def is_saved(self, result):
+        return result.job.lines is not None
+
+    def save(self, result):
+        from tankcal.methods.lines.saved import save_lines
+
+        return save_lines(result)
+
+    def choices(self, result):
+        if result.strapped is None:
+            return {"lines": "beside_points"}
+        wall = {"between_sections": "revolution", "tilt": "not_applied"}
+        return {"survey": "reference_line", **wall}
+
+    # ---- report
+
+    def report_tables(self):
+        from tankcal.methods.lines import tables
+
+        return tables
+
+    def csv_tables(self, record):
+        return {"offsets": self.report_tables().OFFSETS}
+
+    def sheets(self, record):
+        declared = self.report_tables()
+        tables = (declared.LEVELS, declared.PLUMMETS, declared.LINES, declared.OFFSETS)
+        return [("lines", "lines_subtitle", [(table.name, table) for table in tables])]
+
+    def certificates(self, saved):
+        return {
+            entry["plummet"]: entry["certificate"]
+            for entry in saved["plummets"]
+            if entry["plummet"]  # None: the job does not describe the plummet
+        }

@@ -1,0 +1,155 @@
+"""Strapping: circumferences by tape of an upright tank, alone or beside points of its wall."""
+
+from tankcal.methods.base import Method
+
+
+class StrappingMethod(Method):
+    """Circumferences of the courses of an upright tank, or of the rings of a horizontal tank.
+
+    The wall of a horizontal tank is that of the method "rings", from the same readings.
+    """
+
+    name = "strapping"
+    attribute = "strapping"
+    kinds = ("vertical", "horizontal")
+    tables = ("circumferences", "obstructions", "thickness", "tape_checks")
+    starter = "strapping"
+    starter_has_network = False
+    tables_with_sds = ("circumferences",)
+    replaces_points = True
+    accompanies_points = True
+    compares_size = True
+    comes_last = True
+    field_forms = (
+        (("circumferences",), 15),
+        (("obstructions",), 9),
+        (("thickness",), 8),
+        (("tape_checks",), 4),
+    )
+    csv_files = ("strapping.csv",)
+    saved_note = "circumferences by tape; left out if there are none"
+
+    # ---- job
+
+    def columns(self):
+        from tankcal.methods.strapping.columns import COLUMNS
+
+        return COLUMNS
+
+    def settings(self):
+        from tankcal.methods.strapping.columns import KEYS
+
+        return KEYS
+
+    def starter_settings(self, kind):
+        return {"survey.side": "outside", "datum.bottom_z_m": "0.0"}
+
+    def section_notes(self):
+        return {
+            "shell": "how far the wall is from a circle",
+            "strapping": "how the tape lay",
+        }
+
+    def table_notes(self):
+        return {
+            "circumferences": "one row for each reading of the tape round the tank",
+            "obstructions": "one row for each kind of obstacle on the way of a circumference; may"
+            " stay empty",
+            "thickness": "one row for each reading of a gauge of plates; may stay empty",
+            "tape_checks": "one row for each comparison of the working tape with its master; may"
+            " stay empty",
+        }
+
+    def setting_examples(self):
+        from tankcal.methods.strapping.columns import SETTING_EXAMPLES
+
+        return SETTING_EXAMPLES
+
+    def examples(self):
+        from tankcal.methods.strapping.columns import EXAMPLES
+
+        return EXAMPLES
+
+    def no_rows(self):
+        from tankcal.messages import message
+
+        text = "no rows; expected a reading of the tape on each course at least"
+        return message("no_circumferences", text)
+
+    def check(self, values, tables, registers, raw, log):
+        from tankcal.job.entries import kind_of
+        from tankcal.methods.strapping.checks import check_strapping
+
+        if kind_of(raw) == "vertical":
+            check_strapping(values, tables, registers, raw, log)
+
+    def read(self, values, tables, registers, raw):
+        from tankcal.methods.strapping.readings import make_strapping
+
+        return make_strapping(values, tables, registers)
+
+    # ---- pipeline
+
+    def finds(self, job):
+        return job.tank.kind == "vertical" and job.points is None
+
+    def find(self, job, progress, network):
+        from tankcal.methods.strapping.wall import find_strapped_wall
+        from tankcal.pipeline.surveying import Surveyed
+
+        return Surveyed(job, find_strapped_wall(job, progress, network.amplitudes))
+
+    def courses_read(self, job):
+        return {strap.course for strap in job.strapping.straps if not strap.check}
+
+    def inside_radii(self, job, survey):
+        from tankcal.methods.strapping.wall import inside_radii
+
+        return inside_radii(job, survey)
+
+    def warnings(self, job, survey, sights=None):
+        from tankcal.methods.strapping.warnings import check_strapping
+
+        return check_strapping(job, survey)
+
+    # ---- record
+
+    def saved_type(self):
+        from tankcal.methods.strapping.saved import StrappingRecord
+
+        return StrappingRecord
+
+    def is_saved(self, result):
+        return result.straps is not None
+
+    def save(self, result):
+        from tankcal.methods.strapping.saved import save_strapping
+
+        return save_strapping(result)
+
+    def choices(self, result):
+        from tankcal.methods.strapping.saved import choices_of
+
+        return choices_of(result)
+
+    # ---- report
+
+    def report_tables(self):
+        from tankcal.methods.strapping import tables
+
+        return tables
+
+    def csv_tables(self, record):
+        return {"strapping": self.report_tables().straps_of(record)}
+
+    def sheets(self, record):
+        declared = self.report_tables()
+        tables = (
+            declared.straps_of(record),
+            declared.strapped_courses_of(record),
+            declared.TAPES,
+        )
+        return [("strapping", "strapping_subtitle", [(table.name, table) for table in tables])]
+
+    def certificates(self, saved):
+        return self.report_tables().certificates_of_tapes(saved["tapes"])
