@@ -6,7 +6,7 @@ from tankcal.methods.base import Method
 class StrappingMethod(Method):
     """Circumferences of the courses of an upright tank, or of the rings of a horizontal tank.
 
-    The wall of a horizontal tank is that of the method "rings", from the same readings.
+    The method "rings" finds the wall of a horizontal tank from these readings.
     """
 
     name = "strapping"
