@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # what a type checker reads; nothing of it runs
     from tankcal.pipeline.chain import adjust_job, run
     from tankcal.pipeline.plots.views import plot
     from tankcal.pipeline.result import Result
+    from tankcal.products.quantity.ticketing import ticket
     from tankcal.report.outputs import write
     from tankcal.survey import Adjustment
 
@@ -41,6 +42,7 @@ _ROOM_OF = {
     "plot": "pipeline.plots.views",
     "write": "report.outputs",
     "lint": "linter",
+    "ticket": "products.quantity.ticketing",
     "TankcalError": "errors",
     "InputError": "errors",
     "SolutionError": "errors",
@@ -61,6 +63,7 @@ __all__ = [
     "load",
     "plot",
     "run",
+    "ticket",
     "write",
 ]
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -351,6 +352,23 @@ class Result:
                 message("no_ullage", "no ullage; expected datum.reference_height_m in the job")
             )
         return self.at(float(dips.ullage_m(reference, ullage_m)))
+
+    def ticket(self, settings, rows=None):
+        """Quantity of a transfer or of a stock with its U, as `tankcal.ticket`.
+
+        Parameters
+        ----------
+        settings : path or dict
+            ticket.toml, or its content.
+        rows : path, optional
+            CSV file with a ticket in each row.
+
+        Returns
+        -------
+        tankcal.products.quantity.reading.Tickets
+        """
+        # Products are above the results, so the function is named by a text.
+        return import_module("tankcal.products.quantity.ticketing").ticket(self, settings, rows)
 
     def delivery(self, low_m: float, high_m: float) -> Quantity:
         """Volume between two dips with its own uncertainty; HeightError outside the table."""

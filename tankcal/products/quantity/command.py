@@ -63,6 +63,7 @@ def _ticket(options):
     speak_of_record(options.language, options.record)
     from tankcal.products.quantity.reading import read_tickets
     from tankcal.products.quantity.results import rows_of, write_rows
+    from tankcal.products.quantity.slips import find_slips
     from tankcal.products.quantity.table import read_table
     from tankcal.report.outputs import record_file
 
@@ -76,15 +77,16 @@ def _ticket(options):
     show, written = Progress(options.quiet or options.machine), ()
     if is_folder:
         written = _write_document(tickets, options.out, show)
+    warnings = [*tickets.warnings, *find_slips(tickets)]
     rows = rows_of(tickets, tickets.quantities, tickets.transfer.steps)
     if options.out is not None and not is_folder:
         write_rows(Path(options.out), rows)
     if options.machine:
         print_json(exit_status=0, tank=table.tank, record=table.digest,
                    correction=tickets.transfer.product.correction.name, tickets=rows,
-                   warnings=[problem_of(warning) for warning in tickets.warnings])  # fmt: skip
+                   warnings=[problem_of(warning) for warning in warnings])  # fmt: skip
         return 0
-    warn(tickets.warnings)
+    warn(warnings)
     if options.tickets is None:
         _tell(tickets)
     else:

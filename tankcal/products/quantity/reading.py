@@ -15,7 +15,7 @@ from tankcal.job.fields import Field
 from tankcal.job.folder import read_csv
 from tankcal.job.tables import Log, read_bytes
 from tankcal.messages import message
-from tankcal.products.quantity.chain import Gauging, Product
+from tankcal.products.quantity.chain import QUANTITIES, Gauging, Product
 from tankcal.products.quantity.factor_table import read_factor_table
 from tankcal.products.quantity.transfer import STATES, Transfer
 from tankcal.products.settings import read_sections
@@ -25,8 +25,10 @@ from tankcal.tank.volume_correction.alcohol import Ethanol
 from tankcal.tank.volume_correction.corrections import CORRECTIONS, TABLE
 from tankcal.tank.volume_correction.petroleum import BASES_C, GROUPS, glass_correction
 from tankcal.tank.volume_correction.ranges import DEGREES, OutsideRangeError
+from tankcal.text.display import volume_text
 
 MOST_TICKETS = 100_000
+COLUMNS = ("value", "u", "dof", "k", "U")  # of `Tickets.frame`
 GLASS = {"glass 15C": "15C", "glass 20C": "20C", "glass 60F": "60F"}
 COMPARED = ("gov_m3", "gsv_m3", "nsv_m3", "mass_kg", "weight_kg")
 COEFFICIENT = "coefficient"
@@ -124,7 +126,9 @@ LEAST_DENSITY = 300.0  # kg/m3; a smaller value is a relative density, or in g/c
 
 @dataclass(frozen=True)
 class Tickets:
-    """Checked tickets of one tank.
+    """Checked tickets of a tank, and their quantities.
+
+    `print` shows the net standard volume of each ticket.
 
     Attributes
     ----------
@@ -151,6 +155,66 @@ class Tickets:
     def quantities(self):
         """{state: `Quantities`}, with "moved" for closing less opening."""
         return self.transfer.quantities()
+
+    @property
+    def result_state(self):
+        """State of the main result: "moved", or "closing" for a stock."""
+        return "moved" if "moved" in self.quantities else "closing"
+
+    def __str__(self):
+        result, place = self.quantities[self.result_state], QUANTITIES.index("nsv_m3")
+        rows = zip(*(part[:, place] for part in (result.value, result.U, result.k)), strict=True)
+        moved = ", closing less opening," if self.result_state == "moved" else ""
+        return "\n".join(
+            f"{name}: NSV{moved} {volume_text(*row)}"
+            for name, row in zip(self.names, rows, strict=True)
+        )
+
+    def frame(self):
+        """Quantities as a DataFrame: value, u, dof, k, U by ticket, state and quantity."""
+        import pandas
+
+        rows = [
+            (name, state, quantity, *(getattr(result, key)[row, place] for key in COLUMNS))
+            for row, name in enumerate(self.names)
+            for state, result in self.quantities.items()
+            for place, quantity in enumerate(QUANTITIES)
+        ]
+        index = ["ticket", "state", "quantity"]
+        return pandas.DataFrame(rows, columns=[*index, *COLUMNS]).set_index(index)
+
+    def budget(self, quantity="nsv_m3", state=None, ticket=0):
+        """Budget of a quantity as a DataFrame; the squares of `contribution` add up to u squared.
+
+        Parameters
+        ----------
+        quantity : str, optional
+            One of QUANTITIES.
+        state : {"opening", "closing", "moved"}, optional
+            None: "moved", or "closing" for a stock.
+        ticket : int, optional
+            Index of the ticket.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns contribution (m3 or kg) and share (of the variance), the largest first.
+        """
+        import pandas
+
+        result = self.quantities[state or self.result_state]
+        place = QUANTITIES.index(quantity)
+        parts = {name: part[ticket, place] for name, part in result.contributions.items()}
+        frame = pandas.DataFrame({"contribution": parts})
+        frame["share"] = frame.contribution**2 / result.u[ticket, place] ** 2
+        return frame.sort_values("share", ascending=False, kind="stable")
+
+    def write(self, folder, language=None):
+        """Write the document of a single ticket; see `report.ticket.write_ticket`."""
+        from tankcal.products.quantity.saving import document_file
+        from tankcal.report.ticket import write_ticket
+
+        return write_ticket(document_file(self), folder, language)
 
 
 def read_tickets(table, settings, rows=None, factors=None):

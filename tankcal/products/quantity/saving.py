@@ -10,6 +10,7 @@ from tankcal.messages import message
 from tankcal.products.quantity.chain import QUANTITIES
 from tankcal.products.quantity.reading import SETTINGS_NAME, read_tickets
 from tankcal.products.quantity.results import compare
+from tankcal.products.quantity.slips import find_slips
 from tankcal.products.quantity.table import read_table
 from tankcal.products.quantity.transfer import STATES
 from tankcal.record.manifest import digest_of
@@ -91,7 +92,7 @@ def ticket_file(tickets):
             if any(value is not None for value in values.values())
         },
         files=[TicketFileEntry(name, digest) for name, digest in tickets.files.items()],
-        warnings=warnings_of(tickets.warnings),
+        warnings=warnings_of([*tickets.warnings, *find_slips(tickets)]),
     )
 
 

@@ -12,6 +12,7 @@ from tankcal import record as records
 from tankcal.errors import InputError, Problem
 from tankcal.messages import message
 from tankcal.record.covariance_factor import factor_of
+from tankcal.record.schema import Saved, to_plain
 from tankcal.tank.fittings import FloatingRoof, floating_roof
 
 
@@ -121,8 +122,9 @@ def table_of(source):
 
     Parameters
     ----------
-    source : Result, dict or path
-        Result of `tankcal.run`, record of `tankcal.record.load`, or a record.json or its folder.
+    source : Result, dict, Record or path
+        Result of `tankcal.run`, record of `tankcal.record.load` or `read`, or a record.json or its
+        folder.
 
     Returns
     -------
@@ -136,6 +138,8 @@ def table_of(source):
     if isinstance(source, str | Path):
         path = Path(source)
         return read_table(path / "record.json" if path.is_dir() else path)
+    if isinstance(source, Saved):
+        source = to_plain(source)
     record = source if isinstance(source, Mapping) else records.record_of(source)
     with tempfile.TemporaryDirectory(prefix="tankcal-") as folder:
         path = Path(folder) / "record.json"

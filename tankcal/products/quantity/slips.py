@@ -1,0 +1,120 @@
+"""Search for a slip that explains a contradiction between a ticket and the other party.
+
+Some slips leave plausible inputs, such as an ullage written as a dip. If the comparison fails, each
+slip is tried: its correction is reported if the comparison would then agree. This is a hint for the
+person who signs, never a correction of the ticket.
+"""
+
+import numpy as np
+
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+from tankcal.products.quantity.reading import SETTINGS_NAME, read_tickets
+from tankcal.products.quantity.results import compare
+from tankcal.tank.volume_correction.factors import FactorTable
+from tankcal.tank.volume_correction.ranges import DEGREES
+
+OTHER_BASES_C = {"15C": 20.0, "20C": 15.0, "60F": 20.0}  # another customary base
+STATES = ("opening", "closing")
+
+
+def find_slips(tickets):
+    """Slips that would explain why a single ticket contradicts the other party.
+
+    Parameters
+    ----------
+    tickets : Tickets
+        A single ticket.
+
+    Returns
+    -------
+    tuple of Problem
+        Warnings; empty if there is no comparison, or if it agrees.
+    """
+    e_n = _e_n(tickets)
+    if len(tickets.names) != 1 or e_n is None or abs(e_n) <= 1:
+        return ()
+    file = next(iter(tickets.files), SETTINGS_NAME)
+    correction = tickets.transfer.product.correction
+    factors = correction if isinstance(correction, FactorTable) else None
+    table = tickets.transfer.table
+    slips = []
+    for key, text, changed in _candidates(tickets.sections, table):
+        try:
+            other = _e_n(read_tickets(table, _drop_blanks(changed), factors=factors))
+        except InputError:  # the changed ticket is impossible
+            continue
+        if abs(other) <= 1:
+            expected = message(
+                "ticket_slip", "would explain the difference (E_n {e_n:.2f}): {slip}?", e_n=other,
+                slip=text,
+            )  # fmt: skip
+            slips.append(Problem(file, expected, column=key))
+    return tuple(slips)
+
+
+def _e_n(tickets):
+    """E_n of the comparison of a single ticket; None if it is not known."""
+    comparison = compare(tickets, tickets.quantities)
+    if comparison is None or comparison.e_n is None or not np.isfinite(comparison.e_n[0]):
+        return None
+    return float(comparison.e_n[0])
+
+
+def _drop_blanks(sections):
+    return {
+        section: {key: value for key, value in values.items() if value is not None}
+        for section, values in sections.items()
+    }
+
+
+def _candidates(sections, table):
+    """Yield (key, slip in words, sections without the slip)."""
+    product, base = sections["product"], sections["product"]["base"]
+    if table.reference_height_m is not None:
+        for states in (STATES, *((state,) for state in STATES)):
+            changed = _exchange_dips(sections, states)
+            if changed is not None:
+                text = message("ticket_slip_ullage", "is the dip an ullage, or the ullage a dip")
+                yield f"{states[-1]}.dip_m", text, changed
+    celsius = dict(sections)
+    for state in STATES:
+        celsius[state] = _map(sections[state], ("temperature_c", "ambient_c"), _convert_fahrenheit)
+    celsius["product"] = _map(product, ("density_temperature_c",), _convert_fahrenheit)
+    fahrenheit = message("ticket_slip_fahrenheit", "are the temperatures in degrees Fahrenheit")
+    yield "closing.temperature_c", fahrenheit, celsius
+    if product["density_is"] == "base":
+        observed = {"density_is": "observed"}
+        if base is not None:
+            changed = observed | {"density_temperature_c": OTHER_BASES_C[base]}
+            text = message(
+                "ticket_slip_base", "is the density that at {other:g} {unit}",
+                other=OTHER_BASES_C[base], unit=DEGREES,
+            )  # fmt: skip
+            yield "product.density_kg_m3", text, sections | {"product": product | changed}
+        changed = observed | {"density_temperature_c": sections["closing"]["temperature_c"]}
+        text = message("ticket_slip_observed", "was the density observed in the tank")
+        yield "product.density_is", text, sections | {"product": product | changed}
+    if product["sw_percent"]:
+        changed = product | {"sw_percent": 100 * product["sw_percent"]}
+        text = message("ticket_slip_sw", "is S&W a fraction")
+        yield "product.sw_percent", text, sections | {"product": changed}
+
+
+def _exchange_dips(sections, states):
+    """Sections with dips as ullages and ullages as dips in some states; None without them."""
+    changed = dict(sections)
+    for state in states:
+        dip, ullage = sections[state]["dip_m"], sections[state]["ullage_m"]
+        if dip is None and ullage is None:
+            return None
+        changed[state] = sections[state] | {"dip_m": ullage, "ullage_m": dip}
+    return changed
+
+
+def _map(values, keys, function):
+    return values | {key: function(values[key]) for key in keys if values[key] is not None}
+
+
+def _convert_fahrenheit(value):
+    return (value - 32) / 1.8
