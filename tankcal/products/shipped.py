@@ -110,7 +110,7 @@ class Exports(Product):
     """Capacity tables for gauging systems."""
 
     name = "exports"
-    commands = (("export", "tankcal.cli.exporting"),)
+    commands = (("export", "tankcal.cli.exporting"), ("chart", "tankcal.cli.charting"))
 
     def completions(self):
         from tankcal.exports.profiles import shipped_profiles

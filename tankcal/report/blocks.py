@@ -290,6 +290,38 @@ def form(columns, rows):
     return Block({"kind": "form", "columns": heads, "rows": int(rows)})
 
 
+def chart(title, facts, heads, rows, *, across, size_pt, note=""):
+    """Chart for the wall: a title and facts in large letters, and pairs side by side.
+
+    Parameters
+    ----------
+    title : str
+        Title in large letters.
+    facts : list of (str, str)
+        Labels and values.
+    heads : list of (str, str)
+        Headings of the two columns of a pair.
+    rows : list of [str, str]
+        Pairs, down each column.
+    across : int
+        Number of columns of pairs.
+    size_pt : float
+        Type size of the pairs, points.
+    note : str, optional
+        Text below the pairs.
+
+    Returns
+    -------
+    Block
+    """
+    facts = [[_text(name), _text(value)] for name, value in facts]
+    return Block({
+        "kind": "chart", "title": _text(title), "facts": facts, "heads": list(heads[0]),
+        "rows": [list(row) for row in rows], "across": across, "size_pt": size_pt,
+        "note": _text(note),
+    })  # fmt: skip
+
+
 def columns_table(columns, rows=None, caption="", align=None, across=4, decimal_mark="."):
     """Long narrow table, with several parts side by side on each page.
 

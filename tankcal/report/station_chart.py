@@ -1,0 +1,198 @@
+"""Field chart of a small tank: litres at each centimetre on a page, in large type.
+
+The chart is for the wall of a fuel station, where a dip stick is read in whole centimetres. Volumes
+between two rows of the table are interpolated linearly and rounded to litres once.
+"""
+
+import hashlib
+import math
+from pathlib import Path
+
+import numpy as np
+
+from tankcal import record as records
+from tankcal.errors import InputError, Problem
+from tankcal.messages import message
+from tankcal.report import blocks
+from tankcal.report.plain import PlainPaper
+from tankcal.report.uncertainty.sources import critical_zone
+from tankcal.report.uncertainty.stated import k_of_rows, stated_U_m3
+from tankcal.text.digits import NOTHING, fixed, format_significant, shortest
+from tankcal.text.words import language_of, load_words
+
+MOST_ROWS = 400  # rows of a page in type that can be read from arm's length
+_TABLE_PT = 630.0, 500.0  # height and width of the rows on the page, points
+_ROW = 1.3  # height of a row in units of the type size
+_LETTER, _BESIDE = 0.56, 1.9  # width of a digit, and of margins of a column, in the type size
+_ACROSS = range(1, 10)  # numbers of columns side by side
+_MOST_PT = 20.0  # largest type
+
+
+def write_chart(source, out, language=None, product=None, step_cm=1):
+    """Write the field chart of a record as a PDF.
+
+    Parameters
+    ----------
+    source : Path
+        A record.json.
+    out : Path
+        Path of the PDF; an existing file is replaced.
+    language : str, optional
+        One of `languages.LANGUAGES`; None: the language of the job.
+    product : str, optional
+        Name of the product; None: that of the job.
+    step_cm : int, optional
+        Centimetres between two rows.
+
+    Returns
+    -------
+    int
+        Number of rows.
+
+    Raises
+    ------
+    InputError
+        For a record without a table, and for a table with too many rows for a page.
+    """
+    from tankcal.report.pdf import pdf
+
+    record = records.load(source)
+    if not record["capacity"]:
+        text = message("chart_no_table", "the record of a survey without a tank; expected a table")
+        raise InputError(Problem(source.name, text))
+    rows = chart_rows(record, step_cm)
+    if len(rows) > MOST_ROWS:
+        text = message(
+            "chart_many_rows",
+            "the chart would have {count} rows; a page has at most {most}: expected a larger step",
+            count=len(rows), most=MOST_ROWS,
+        )  # fmt: skip
+        raise InputError(Problem("--step-cm", text))
+    digest = hashlib.sha256(source.read_bytes()).hexdigest()
+    language = language or language_of(record)
+    shown = pages(record, rows, language, product, digest)
+    content = pdf([block.data for block in shown], source.parent)
+    temporary = Path(out).with_name(f".{Path(out).name}.tmp")
+    try:
+        temporary.write_bytes(content)
+        temporary.replace(out)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return len(rows)
+
+
+def chart_rows(record, step_cm=1):
+    """Rows (cm, litres or None) of each step within the table; None in a critical zone."""
+    capacity, critical = record["capacity"], critical_zone(record)
+    heights, volumes = capacity["height_m"], capacity["volume_m3"]
+    # The tolerance keeps the errors of binary fractions from losing a row at a whole centimetre.
+    first, last = math.ceil(100 * heights[0] - 1e-7), math.floor(100 * heights[-1] + 1e-7)
+    dips = [cm for cm in range(first, last + 1) if cm % step_cm == 0]
+    litres = 1000 * np.interp(np.array(dips) / 100, heights, volumes)
+    return [
+        (cm, None if critical and critical[0] < cm / 100 < critical[1] else volume)
+        for cm, volume in zip(dips, litres.tolist(), strict=True)
+    ]
+
+
+def pages(record, rows, language, product=None, digest=""):
+    """Return the blocks of the page.
+
+    Parameters
+    ----------
+    record : dict
+        Loaded record.json.
+    rows : list of (int, float or None)
+        Result of `chart_rows`.
+    language : str
+        One of `languages.LANGUAGES`.
+    product : str, optional
+        Name of the product; None: that of the job.
+    digest : str, optional
+        SHA-256 of the record.
+
+    Returns
+    -------
+    list of Block
+    """
+    words = load_words(language)
+    paper, job = PlainPaper(words), record["job"]
+    marks, certificate = paper.marks, job["certificate"]
+    tank, title = job["tank"], paper.word("chart.title")
+    product = product or tank["details"].get("product") or ""
+    survey = (job["survey"] or {}).get("date")
+    day = certificate.get("date_of_issue") or survey
+    facts = [
+        (paper.word("chart.product"), product),
+        (paper.word("chart.number"), certificate.get("number") or NOTHING),
+        (paper.word("chart.date"), NOTHING if day is None else str(day)[:10]),
+        (paper.word("chart.uncertainty"), _uncertainty(paper, record)),
+    ]
+    temperature = shortest(job["table"]["reference_temperature_c"], marks)
+    texts = [paper.word("chart.use", temperature=temperature)]
+    if any(litres is None for _, litres in rows):
+        texts.append(paper.word("chart.critical", sign=NOTHING))
+    cells = [
+        [str(cm), NOTHING if litres is None else fixed(litres, 0, marks)] for cm, litres in rows
+    ]
+    across, size_pt = layout(len(cells), max(len(text) for row in cells for text in row))
+    return [
+        blocks.document(
+            title=f"{title} {tank['id']}",
+            language=language,
+            date=str(day)[:10] if day else "",
+            notice=str(certificate.get("notice") or ""),
+            running=[title, certificate.get("laboratory") or ""],
+            footer=f"tankcal {record['tankcal']} · record.json SHA-256 {digest[:16]}",
+            record_sha256=digest,
+            dense=True,
+        ),
+        blocks.chart(
+            f"{paper.word('page.tank')} {tank['id']}",
+            facts,
+            [("cm", "L")],
+            cells,
+            across=across,
+            size_pt=size_pt,
+            note=" ".join(texts),
+        ),
+    ]
+
+
+def _uncertainty(paper, record):
+    """Text of the largest U of the rows, in litres, with k and the coverage probability."""
+    capacity = record["capacity"]
+    U = stated_U_m3(capacity)
+    row = max(range(len(U)), key=U.__getitem__)
+    largest = format_significant(1000 * U[row], 2, paper.marks)
+    k = k_of_rows(capacity)[row]
+    values = {"U": largest, "coverage": paper.word("chart.probability", percent=shortest(
+        100 * record["job"]["table"]["coverage_probability"], paper.marks))}  # fmt: skip
+    if k is None:
+        return paper.word("chart.largest_U", **values)
+    return paper.word("chart.largest_U_k", k=fixed(k, 2, paper.marks), **values)
+
+
+def layout(count, letters):
+    """Number of columns side by side, and the type size in points, for the largest type.
+
+    Parameters
+    ----------
+    count : int
+        Number of rows.
+    letters : int
+        Letters of the longest volume.
+
+    Returns
+    -------
+    int, float
+    """
+    height, width = _TABLE_PT
+
+    def size(across):
+        by_height = height / (math.ceil(count / across) + 1) / _ROW
+        by_width = width / across / (_LETTER * (letters + 4) + _BESIDE)
+        return min(by_height, by_width, _MOST_PT)
+
+    across = max(_ACROSS, key=size)
+    return across, round(size(across), 2)

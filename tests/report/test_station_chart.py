@@ -1,0 +1,85 @@
+"""The field chart of `tankcal chart`: its numbers, and a single page of readable type."""
+
+import io
+import re
+
+import numpy as np
+import pypdf
+import pytest
+from calculated_tanks import afloat, example_with_rows
+
+from tankcal.cli import main
+from tankcal.report.pdf import pdf
+from tankcal.report.station_chart import MOST_ROWS, chart_rows, layout, pages
+from tankcal.text.languages import LANGUAGES
+
+READABLE_PT = 7.0  # smallest type of a chart with the most rows
+
+
+@pytest.fixture(scope="module")
+def tank(tmp_path_factory):
+    """(record, path of record.json)."""
+    folder = tmp_path_factory.mktemp("tank")
+    return example_with_rows(0.2, folder)[1], folder / "record.json"
+
+
+def test_volumes_are_those_of_the_table_between_its_rows(tank):
+    record, _ = tank
+    capacity = record["capacity"]
+    rows = chart_rows(record)
+    assert [cm for cm, _ in rows] == list(range(951))
+    assert dict(rows)[20] == pytest.approx(1000 * capacity["volume_m3"][1], rel=1e-12)
+    low, high = 1000 * capacity["volume_m3"][1], 1000 * capacity["volume_m3"][2]
+    assert dict(rows)[25] == pytest.approx(low + 0.25 * (high - low), rel=1e-12)
+
+
+def test_a_critical_zone_has_no_volumes(tmp_path):
+    record = afloat(tmp_path)[1]
+    rows = dict(chart_rows(record))
+    roof = {line["code"]: line["value"] for line in record["roof"]}
+    low, high = roof["roof_critical_bottom"], roof["roof_critical_top"]
+    blank = [cm for cm, litres in rows.items() if litres is None]
+    assert blank == [cm for cm in rows if low < cm / 100 < high]
+    assert blank
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_most_rows_are_readable_on_a_page(tank, language):
+    record, _ = tank
+    rows = [(cm, 123456.0) for cm in range(MOST_ROWS)]
+    shown = pages(record, rows, language, product="Diesel B S10 com um nome bastante comprido")
+    content = pdf([block.data for block in shown])
+    assert len(pypdf.PdfReader(io.BytesIO(content)).pages) == 1
+    assert layout(MOST_ROWS, 6)[1] >= READABLE_PT
+    assert layout(250, 6)[1] >= 10.0  # a tank of 2.5 m diameter
+
+
+@pytest.mark.parametrize("count", [1, 7, 60, 150, 250, 333])
+def test_every_number_of_rows_is_a_page(tank, count):
+    rows = [(cm, 12345.0) for cm in range(count)]
+    content = pdf([block.data for block in pages(tank[0], rows, "en")])
+    assert len(pypdf.PdfReader(io.BytesIO(content)).pages) == 1
+
+
+def test_the_command_writes_each_row_and_the_facts(tank, tmp_path, capsys):
+    record, source = tank
+    out = tmp_path / "chart.pdf"
+    assert main(["chart", str(source), "--step-cm", "5", "--product", "Diesel", "--out", str(out),
+                 "--language", "en"]) == 0  # fmt: skip
+    (page,) = pypdf.PdfReader(out).pages
+    text = page.extract_text()
+    printed = set(re.findall(r"\d+", text))
+    litres = np.array([value for _, value in chart_rows(record, 5)])
+    assert {f"{value:.0f}" for value in litres} <= printed
+    for fact in ("Diesel", record["job"]["tank"]["id"], record["job"]["certificate"]["number"]):
+        assert fact in text
+    assert "191 rows" in capsys.readouterr().out
+
+
+def test_too_many_rows_and_a_wrong_ending_are_refused(tank, tmp_path, capsys):
+    chart = ["chart", str(tank[1]), "--language", "en", "--out"]
+    assert main([*chart, str(tmp_path / "chart.pdf")]) == 2
+    assert "951 rows" in capsys.readouterr().err
+    assert main([*chart, str(tmp_path / "chart.csv")]) == 2
+    assert ".pdf" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
