@@ -308,7 +308,12 @@ def check_rows(tables, log):
                 text = row.cells.get(field.name, "")
                 if not text:
                     if field.required:
-                        _refuse(log, row, table, field)
+                        expected = message(
+                            "imported_blank",
+                            "not in the file; expected {wanted}",
+                            wanted=field.expectation(),
+                        )
+                        log.problem(row.file, expected, row.row, f"{table}.{field.name}")
                     continue
                 try:
                     read_value(field, text, ".")
@@ -316,13 +321,6 @@ def check_rows(tables, log):
                     if (field.name, text) not in reported:
                         log.problem(row.file, error.text, row.row, f"{table}.{field.name}")
                     reported.add((field.name, text))
-
-
-def _refuse(log, row, table, field):
-    expected = message(
-        "imported_blank", "not in the file; expected {wanted}", wanted=field.expectation()
-    )
-    log.problem(row.file, expected, row.row, f"{table}.{field.name}")
 
 
 def needed_columns(table, rows):

@@ -346,7 +346,11 @@ def _relative_heights(z_m, course, joints_m):
 def _rejection_reasons(xyz_m, joints_m):
     """Return reasons (n,) why a point cannot belong to the wall by its position alone; else ""."""
     reason = np.full(len(xyz_m), "", dtype=object)
-    reason[_mark_duplicates(xyz_m)] = "same_place"
+    # Mark points with exactly the coordinates of an earlier point.
+    first = np.unique(xyz_m, axis=0, return_index=True)[1]
+    repeated = np.ones(len(xyz_m), dtype=bool)
+    repeated[first] = False
+    reason[repeated] = "same_place"
     reason[xyz_m[:, 2] > joints_m[-1] + END_TOLERANCE_M] = "above_shell"
     reason[xyz_m[:, 2] < joints_m[0] - END_TOLERANCE_M] = "below_shell"
     return reason
@@ -357,14 +361,6 @@ def _mean_radii(distance, course, courses, otherwise):
     return np.array(
         [distance[course == c].mean() if np.any(course == c) else otherwise for c in range(courses)]
     )
-
-
-def _mark_duplicates(xyz_m):
-    """Mark points with exactly the coordinates of an earlier point."""
-    first = np.unique(xyz_m, axis=0, return_index=True)[1]
-    repeated = np.ones(len(xyz_m), dtype=bool)
-    repeated[first] = False
-    return repeated
 
 
 def consensus_circle(xy, nominal_radius):

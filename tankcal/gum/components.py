@@ -261,20 +261,16 @@ def group_correlated(sources, correlations):
     for name, source in sources.items():
         if name in grouped:
             continue
-        names = _find_correlated(name, pairs, sources)
+        # Names of the inputs correlated with an input, directly or through other inputs.
+        reached, added = set(), {name}
+        # Breadth-first search; the result has the order of the sources.
+        while added:
+            reached |= added
+            added = {partner for pair in pairs if pair & reached for partner in pair} - reached
+        names = [partner for partner in sources if partner in reached]
         grouped |= set(names)
         results.append(source if len(names) == 1 else _join_sources(names, sources, pairs))
     return tuple(results)
-
-
-def _find_correlated(name, pairs, order):
-    """Names of the inputs correlated with an input, directly or through other inputs."""
-    reached, added = set(), {name}
-    # Breadth-first search; the result has the order of the sources.
-    while added:
-        reached |= added
-        added = {partner for pair in pairs if pair & reached for partner in pair} - reached
-    return [partner for partner in order if partner in reached]
 
 
 def _join_sources(names, sources, pairs):

@@ -96,7 +96,10 @@ def read_settlement(path, log):
         return None
     azimuth, radius_m = circle_azimuths
     places = _places(values, azimuth, log)
-    groups = _repeats(values, epochs)
+    # Rows of each point in each epoch, {(epoch, point): rows}.
+    groups = {}
+    for i, pair in enumerate(zip(epochs, values.of("point"), strict=True)):
+        groups.setdefault(pair, []).append(i)
     given = values.of("s_mm")[0] is not None
     pooled, dof = _pool_sd(values, groups)
     if given:
@@ -284,14 +287,6 @@ def _places(values, azimuth, log):
                 log.problem(values.file, text, values.rows[i], "point")
         places[point] = float(first + np.mean(differences)) % 360
     return places
-
-
-def _repeats(values, epochs):
-    """Rows of each point in each epoch, {(epoch, point): rows}."""
-    groups = {}
-    for i, pair in enumerate(zip(epochs, values.of("point"), strict=True)):
-        groups.setdefault(pair, []).append(i)
-    return groups
 
 
 def _pool_sd(values, groups):

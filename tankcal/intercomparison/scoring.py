@@ -82,7 +82,7 @@ def score_folders(folders, truth, package=None):
         answers = read_answers(folder, requested, folder_log)
         if answers is not None and answers.saved.participant.package != truth_sha256:
             folder_log.problem(
-                _identifying_file(folder),
+                ANSWERS.file if (Path(folder) / ANSWERS.file).is_file() else PARTICIPANT,
                 _other_package(answers.saved.participant.package, truth_sha256),
             )
         problems += [_add_folder(folder, item, folders) for item in folder_log.problems]
@@ -103,11 +103,6 @@ def _other_package(promised, own):
         promised=promised,
         own=own,
     )
-
-
-def _identifying_file(folder):
-    """Name of the file of a folder that identifies the participant."""
-    return ANSWERS.file if (Path(folder) / ANSWERS.file).is_file() else PARTICIPANT
 
 
 def _add_folder(folder, problem, folders):

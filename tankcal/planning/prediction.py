@@ -292,7 +292,14 @@ def sections_of(result):
 def list_warnings(prediction):
     """Return a tuple of Problem for the plan, its network, the wall and the table."""
     result = prediction.result
-    of_table = check_table(_with_full_covariance(result), result.wall, result.computed_table)
+    points, adjusted = result.job.points, result.covariance.adjusted
+    number = {name: i for i, name in enumerate(adjusted.survey.points)}
+    covariance = PredictedCovariance(adjusted, np.array([number[name] for name in points.names]))
+    of_table = check_table(
+        replace(result.job, points=replace(points, covariance_m2=covariance)),
+        result.wall,
+        result.computed_table,
+    )
     of_run = (
         *prediction.network.frame.warnings,
         *open_questions(result.job, prediction.datum, result.job.points.causes),
@@ -313,14 +320,6 @@ def list_warnings(prediction):
             for problem in of_run
         ),
     )
-
-
-def _with_full_covariance(result):
-    """Return the job of a PredictedTable with the full covariance of its points."""
-    points, adjusted = result.job.points, result.covariance.adjusted
-    number = {name: i for i, name in enumerate(adjusted.survey.points)}
-    covariance = PredictedCovariance(adjusted, np.array([number[name] for name in points.names]))
-    return replace(result.job, points=replace(points, covariance_m2=covariance))
 
 
 def _undetermined_targets(prediction):

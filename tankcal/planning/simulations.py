@@ -117,6 +117,9 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
     names = tuple(name for name in adjusted[0] if all(name in result for result in adjusted))
     xyz = np.array([[result[name] for name in names] for result in adjusted])
     sds = {point.name: point.sd_m for point in prediction.points}
+    parts = [
+        source.columns_m3[-1] for source in prediction.table.sources if source.kind in OF_SURVEY
+    ]
     return SimulatedSurveys(
         seed=seed,
         blunders=blunders,
@@ -126,7 +129,7 @@ def simulate(prediction: Prediction, runs=500, seed=1, blunders=0.0, progress=No
         scatter_m=xyz.std(axis=0, ddof=1),
         predicted_m=np.array([sds[name] for name in names]),
         volumes_m3=np.array(volumes),
-        predicted_volume_m3=_u_by_survey(prediction.table),
+        predicted_volume_m3=float(np.linalg.norm(np.concatenate(parts))),
         set_aside=np.array(aside),
     )
 
@@ -177,9 +180,3 @@ def _add_blunders(measurements, share, rng):
         for reading in measurements.readings
     )
     return replace(measurements, image_points=images, readings=readings)
-
-
-def _u_by_survey(table):
-    """Standard uncertainty of the top row from the survey only."""
-    parts = [source.columns_m3[-1] for source in table.sources if source.kind in OF_SURVEY]
-    return float(np.linalg.norm(np.concatenate(parts)))

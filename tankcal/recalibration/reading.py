@@ -70,7 +70,9 @@ def read_former(path, former_toml=None) -> FormerTable:
     if rows is None:
         log.stop_if_problems()
         raise AssertionError("no rows and no problem")
-    record = _load_record(path)
+    with path.open("rb") as file:
+        start = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")
+    record = load(path) if path.suffix.lower() == ".json" or start[:1] == b"{" else None
     if record is None:
         former = _table_from_rows(rows, declared, log)
     else:
@@ -130,13 +132,6 @@ def _read_rows(path, declared, log):
         log.problems += errors[:MOST_FINDINGS]
         return None, ()
     return rows, tuple(finding.problem for finding in report.findings)
-
-
-def _load_record(path):
-    """Return the record in a file, migrated to the latest version; None for any other file."""
-    with path.open("rb") as file:
-        start = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")
-    return load(path) if path.suffix.lower() == ".json" or start[:1] == b"{" else None
 
 
 def _table_from_rows(rows, declared, log):

@@ -240,19 +240,15 @@ def _lowest_row(rows, state, degree=2):
     tries = np.flatnonzero(ring.dip_m <= ring.dip_m[-1] - length) if len(ring.dip_m) else ()
     if len(tries) == 0:
         return float(rows.dip_m[0])
-    for place in [int(tries[0]), *_select_tries(tries)]:
+    # At most BOTTOM_TRIES of the rows, rising, closer together near the bottom.
+    last = len(tries) - 1
+    places = np.round(last * np.linspace(0, 1, BOTTOM_TRIES) ** 1.5).astype(int)
+    for place in [int(tries[0]), *tries[np.unique(places)]]:
         dip = ring.dip_m[place]
         window = ring.select((ring.dip_m >= dip) & (ring.dip_m <= dip + length + 1e-9))
         if _is_one_cut(window, degree):
             return float(dip)
     return float(rows.dip_m[0])
-
-
-def _select_tries(tries):
-    """At most BOTTOM_TRIES of the rows, rising, closer together near the bottom."""
-    last = len(tries) - 1
-    places = np.round(last * np.linspace(0, 1, BOTTOM_TRIES) ** 1.5).astype(int)
-    return tries[np.unique(places)]
 
 
 def _is_one_cut(ring, degree):

@@ -97,18 +97,13 @@ class SurveyedForm:
 
     def at(self, level_share):
         """Return the weights (rows, NODES) of values at the nodes for values at levels."""
-        return _through_nodes()(_turn(level_share))
+        return scipy.interpolate.CubicSpline(node_turns(), np.eye(NODES))(_turn(level_share))
 
     @cached_property
     def _bend(self):
         return scipy.interpolate.CubicSpline(
             node_turns(), self.bend, bc_type=((1, 0.0), "not-a-knot")
         )
-
-
-def _through_nodes():
-    """Return the spline with unit values at each node."""
-    return scipy.interpolate.CubicSpline(node_turns(), np.eye(NODES))
 
 
 def _turn(level_share):

@@ -266,7 +266,10 @@ def components(names, covariance, values=None, *, of="correlation", unscaled=Fal
     # Loadings c_ij sqrt(lambda_j) / sd(x_i)
     root = np.sqrt(np.where(eigenvalues > 0, eigenvalues, np.nan))
     loadings = vectors * root / weight[:, None]
-    vectors, loadings = _orient(vectors, loadings, weight)
+    # The signs of vectors and loadings are chosen so that the largest loading is positive.
+    largest = np.argmax(np.abs(vectors) / weight[:, None], axis=0)
+    sign = np.where(vectors[largest, np.arange(len(weight))] < 0, -1.0, 1.0)
+    vectors, loadings = vectors * sign, loadings * sign
     share = 100 * eigenvalues / eigenvalues.sum()
     x = np.full(len(sd), np.nan) if values is None else np.asarray(values, dtype=float)
     if of == "correlation" and not unscaled:
@@ -309,13 +312,6 @@ def _check_matrix(names, covariance):
     if (np.abs(matrix - matrix.T) > 1e-9 * size).any():
         raise ValueError("a matrix that is not symmetric")
     return matrix
-
-
-def _orient(vectors, loadings, sd):
-    """Change signs of vectors and loadings so that the largest loading is positive."""
-    largest = np.argmax(np.abs(vectors) / sd[:, None], axis=0)
-    sign = np.where(vectors[largest, np.arange(len(sd))] < 0, -1.0, 1.0)
-    return vectors * sign, loadings * sign
 
 
 @dataclass(frozen=True)

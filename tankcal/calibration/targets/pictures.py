@@ -58,7 +58,10 @@ def read_header(data):
         if data[:2] == b"\xff\xd8":
             return _read_jpeg_header(data)
         if data[:4] in (b"II*\0", b"MM\0*"):
-            return _read_tiff_header(data)
+            tags = _read_tags(data)
+            if TIFF_WIDTH not in tags or TIFF_HEIGHT not in tags:
+                return None
+            return Header((tags[TIFF_WIDTH], tags[TIFF_HEIGHT]), tags.get(TIFF_TURN, 1))
         if data[:2] == b"BM":
             columns, lines = struct.unpack("<ii", data[18:26])
             return Header((abs(columns), abs(lines)))
@@ -83,13 +86,6 @@ def _read_jpeg_header(data):
             turn = _read_tags(data[place + 10 : place + 2 + length]).get(TIFF_TURN, 1)
         place += 2 + length
     return None
-
-
-def _read_tiff_header(data):
-    tags = _read_tags(data)
-    if TIFF_WIDTH not in tags or TIFF_HEIGHT not in tags:
-        return None
-    return Header((tags[TIFF_WIDTH], tags[TIFF_HEIGHT]), tags.get(TIFF_TURN, 1))
 
 
 def _read_tags(data):

@@ -275,7 +275,11 @@ def _convert_values(values, camera, to_form, used, may_turn):
     image_mm = pixels_to_mm(points, camera.pixel_mm, camera.size_px)
     if used is None:
         used = (*USUAL, *(name for name, value in zip(PARAMETERS, values, strict=True) if value))
-    start = _first_values(values, camera.form, to_form)
+    # Start values (13,) of the form without a balance: first-order, without A and B.
+    start = balance_about(values, camera.form, 0.0)[0]
+    if (CONVENTIONS[camera.form.convention] > 0) != (CONVENTIONS[to_form.convention] > 0):
+        start[list(TURNS_ROUND)] *= -1
+    start[[11, 12]] = 0.0
     start[excluded] = 0.0
     # The fit uses the form without a balance; balancing afterwards is exact.
     plain = Form(to_form.convention, to_form.affinity)
@@ -286,15 +290,6 @@ def _convert_values(values, camera, to_form, used, may_turn):
         result.turn_rad,
         False,
     )
-
-
-def _first_values(values, form, to_form):
-    """Start values (13,) of the form without a balance: first-order, without A and B."""
-    plain = balance_about(values, form, 0.0)[0]
-    if (CONVENTIONS[form.convention] > 0) != (CONVENTIONS[to_form.convention] > 0):
-        plain[list(TURNS_ROUND)] *= -1
-    plain[[11, 12]] = 0.0
-    return plain
 
 
 def _convert_exactly(values, form, to_form):

@@ -223,7 +223,8 @@ def likelihood_of(sites, radius_m, noise_m2, nominal_m, estimate_noise):
         sites, radius_m, noise_m2 = sites.take(sample), radius_m[sample], noise_m2[selection]
     common = _common_values(sites, nominal_m)
     if sites.shared is not None:
-        radius_m = radius_m - _fit_free(sites, radius_m)
+        design = free_design(sites)[0]
+        radius_m = radius_m - (design @ np.linalg.lstsq(design, radius_m, rcond=None)[0])
     parts = tuple(
         _build_part(sites, radius_m, noise_m2, nominal_m, members, common, estimate_noise)
         for members in sites.members
@@ -255,12 +256,6 @@ def _sample_readings(sites):
         keys = sites.zeta[members], sites.azimuth_rad[members], sites.ring[members]
         samples.append(members[np.lexsort(keys)][np.arange(len(members)) // 2 % step == 0])
     return np.sort(np.concatenate(samples))
-
-
-def _fit_free(sites, radius_m):
-    """Return the part (n,) of the radii explained by the parameters without prior."""
-    design = free_design(sites)[0]
-    return design @ np.linalg.lstsq(design, radius_m, rcond=None)[0]
 
 
 def _component_indices(sites):

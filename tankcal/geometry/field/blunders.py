@@ -159,16 +159,14 @@ def _split_readings(sites):
     count = 1 if len(sites) <= MOST_SITES else len(sites) / PIECE
     by_course = np.argsort(sites.course, kind="stable")
     pieces = []
-    for belt in np.array_split(np.arange(sites.course.max() + 1), _count_belts(count, sites)):
+    for belt in np.array_split(
+        np.arange(sites.course.max() + 1),
+        int(np.clip(round(np.sqrt(count)), 1, sites.course.max() + 1)),
+    ):
         members = by_course[np.isin(sites.course[by_course], belt)]
         order = members[np.argsort(sites.azimuth_rad[members] % FULL_TURN, kind="stable")]
         pieces += np.array_split(order, max(round(count * len(order) / len(sites)), 1))
     return pieces
-
-
-def _count_belts(count, sites):
-    """Return the number of belts of courses for a number of pieces."""
-    return int(np.clip(round(np.sqrt(count)), 1, sites.course.max() + 1))
 
 
 class Piece:

@@ -54,7 +54,10 @@ def observe_tape(tank, chance, asked):
     """
     site = observe_site(tank, chance, asked, outside=True)
     strap(site, range(len(tank.courses_m)))
-    form = _shape_sd_m(tank)
+    # Standard deviation of the radius round the wall, root mean square over the courses, m.
+    azimuth = FULL_TURN * np.arange(2048) / 2048
+    middles = (tank.joints_m[:-1] + tank.joints_m[1:]) / 2
+    form = float(np.sqrt(np.mean([np.var(tank.radii_m(azimuth, z)) for z in middles])))
     site.parts.settings["shell.shape_sd_mm"] = chance.declared(1000 * form, 1)
     return finish(site)
 
@@ -102,13 +105,6 @@ def strap(site, courses, repeats=REPEATS):
         "u_scale_ppm": 1e6 * U_SCALE,
         "laying_mm": 1000 * LAYING_M,
     }
-
-
-def _shape_sd_m(tank):
-    """Standard deviation of the radius round the wall, root mean square over the courses, m."""
-    azimuth = FULL_TURN * np.arange(2048) / 2048
-    middles = (tank.joints_m[:-1] + tank.joints_m[1:]) / 2
-    return float(np.sqrt(np.mean([np.var(tank.radii_m(azimuth, z)) for z in middles])))
 
 
 def observe_lines(tank, chance, asked):

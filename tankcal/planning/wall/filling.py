@@ -320,7 +320,12 @@ def outlook_of_filling(plan, metering, result, table):
     table : ComputedTable
     """
     dips = _dips_of(plan, table)
-    bodies = _bodies(metering)
+    joint = metering.joint.known
+    bodies = {
+        "geometry": joint.geometry.moved_to({}).body(),
+        "liquid": None if metering.alone is None else join_body(metering.alone.known),
+        "joint": join_body(joint),
+    }
     rows = _rows(plan, bodies, dips, table)
     dof = result.run_dof
     return FillingOutlook(
@@ -358,19 +363,6 @@ def refuse_other_dips(dips_m, table):
             high=top,
         )
         raise InputError(Problem(PLAN_FILE, expected, None, "filling.dips_m"))
-
-
-def _bodies(metering):
-    """Return {"geometry", "liquid", "joint": Body}.
-
-    None if liquid only does not determine the tank.
-    """
-    joint = metering.joint.known
-    return {
-        "geometry": joint.geometry.moved_to({}).body(),
-        "liquid": None if metering.alone is None else join_body(metering.alone.known),
-        "joint": join_body(joint),
-    }
 
 
 def _expanded(body, levels, table, weights=None):

@@ -62,8 +62,13 @@ def reading_effects(metering, fill, reduced, volume_m3, area_m2, growth=None):
             metering.u_temperature_c * _temperature_columns(metering, fill, reduced, volume_m3),
         ),
     ]
+    meter_names = np.array(metering.meter)
+    columns = [
+        reduced.by_row_m3[:, meter_names == name].sum(axis=1) * metering.meters[name].u_factor
+        for name in fill.meters
+    ]
     common = [
-        Effect("meter_factor", -_factor_columns(metering, fill, reduced)),
+        Effect("meter_factor", -np.stack(columns, axis=1)),
         Effect("dip_zero", metering.u_dip_zero_m * dips.sum(axis=1, keepdims=True)),
         Effect("liquid_expansion", _expansion_columns(metering, fill, volume_m3, growth)),
     ]
@@ -84,16 +89,6 @@ def batch_sd_m3(metering, fill):
     row_sd = np.where(np.isfinite(metering.s_volume_m3), metering.s_volume_m3, by_meter)
     counted = fill.batches & (metering.volume_m3 != 0)
     return np.sqrt(np.sum(np.where(counted, row_sd, 0.0) ** 2, axis=1))
-
-
-def _factor_columns(metering, fill, reduced):
-    """Return the metered volume (n, meters) of each meter times the relative u of its factor."""
-    meter_names = np.array(metering.meter)
-    columns = [
-        reduced.by_row_m3[:, meter_names == name].sum(axis=1) * metering.meters[name].u_factor
-        for name in fill.meters
-    ]
-    return np.stack(columns, axis=1)
 
 
 def _temperature_columns(metering, fill, reduced, volume_m3):

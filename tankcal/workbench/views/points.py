@@ -28,7 +28,11 @@ class PointsPanel(traitlets.HasTraits):
         super().__init__()
         self.paper, self.on_overrule = paper, on_overrule
         self.points = {item.name: item for item in list_inspected(paper.record)}
-        self.used = _read_deviations(paper.record)
+        self.used = {
+            point["point"]: point["residual_m"]
+            for point in paper.record["points"]
+            if point["used"] and point["residual_m"] is not None
+        }
         word = paper.word
         self.list = widgets.Select(
             options=[(self._line(item), item.name) for item in self.points.values()],
@@ -145,15 +149,6 @@ class PointsPanel(traitlets.HasTraits):
         """Show a message below the buttons."""
         lines = "<br>".join(map(escape, text.splitlines()))
         self.state.value = f'<div role="status" style="color:{colour}">{lines}</div>'
-
-
-def _read_deviations(record):
-    """Deviations of the used points from the circles of their sections, {name: m}."""
-    return {
-        point["point"]: point["residual_m"]
-        for point in record["points"]
-        if point["used"] and point["residual_m"] is not None
-    }
 
 
 def _button(text, act):
